@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cmath>
+
+#include <glm/ext/quaternion_float.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+namespace catgs {
+
+/// Camera-to-world rigid transform. Camera axes: x right, y down, z forward. World units are the
+/// scene's. `orientation` is a unit quaternion that rotates camera axes into the world.
+struct Pose {
+  glm::vec3 position{0.0f};
+  glm::quat orientation{1.0f, 0.0f, 0.0f, 0.0f};  // glm's constructor order: w, x, y, z
+};
+
+/// A pinhole camera at a pose. Pixel centres lie at integer + 0.5.
+struct Camera {
+  Pose world_from_camera;
+  glm::ivec2 size_px{0};
+  glm::vec2 focal_px{0.0f};
+  glm::vec2 principal_point_px{0.0f};
+  float near_z = 0.2f;  // world units along the view axis; Gaussians nearer than this are dropped
+};
+
+/// Camera with square pixels and the principal point in the middle of the image.
+inline Camera make_camera(const Pose& world_from_camera, glm::ivec2 size_px, float focal_px,
+                          float near_z = 0.2f) {
+  return {world_from_camera, size_px, glm::vec2(focal_px), glm::vec2(size_px) * 0.5f, near_z};
+}
+
+/// Focal length in pixels of an image `height_px` high that spans `fov_y_rad` vertically.
+inline float focal_from_fov_y(float fov_y_rad, int height_px) {
+  return 0.5f * static_cast<float>(height_px) / std::tan(0.5f * fov_y_rad);
+}
+
+/// Rotation part of the world-to-camera transform; p_camera = R (p_world - position).
+inline glm::mat3 camera_from_world_rotation(const Pose& world_from_camera) {
+  return glm::mat3_cast(glm::conjugate(world_from_camera.orientation));
+}
+
+}  // namespace catgs

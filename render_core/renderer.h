@@ -1,0 +1,130 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "render_core/camera.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs {
+
+class ThreadPool;
+
+// One interface for every core. A Renderer owns one scene on one device; a View is one client's
+// share of it (its caches and its output image). Views of a Renderer may render at the same time
+// from different threads; one View renders one frame at a time.
+
+enum class Pipeline {
+  vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
+  exact,    // exact ellipse/tile culling; the same image as the reference
+};
+
+enum class PixelFormat {
+  rgb_f32,  // one plane, 3 floats a pixel, display-referred, clamped to [0, 1]
+  i420,     // three planes, 8 bit, BT.709 limited range, 4:2:0 (the encoder's food)
+};
+
+enum class MemorySpace { host, device };
+
+/// Stages of a frame, in data-flow order. A core that fuses stages reports 0 for the absorbed one.
+enum class Stage { project, bin, sort, blend, convert };
+inline constexpr std::size_t stage_count = 5;
+inline constexpr std::array<std::string_view, stage_count> stage_names = {"project", "bin", "sort",
+                                                                          "blend", "convert"};
+
+enum class FrameKind { key, sub };
+
+struct FrameStats {
+  FrameKind kind = FrameKind::key;
+  std::uint32_t visible = 0;             // Gaussians that passed culling
+  std::uint64_t list_entries = 0;        // sum of all tile lists
+  std::uint32_t list_max = 0;            // longest tile list
+  std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
+  std::array<float, stage_count> stage_ms{};
+};
+
+struct FrameRequest {
+  Camera camera;
+  glm::vec3 background{0.0f};
+};
+
+struct Plane {
+  std::byte* data = nullptr;
+  std::size_t stride_bytes = 0;
+};
+
+/// A finished frame, borrowed from its View: valid until the View's next render() or its end.
+struct FrameView {
+  PixelFormat format = PixelFormat::rgb_f32;
+  MemorySpace space = MemorySpace::host;
+  glm::ivec2 size_px{0};
+  std::array<Plane, 3> planes{};
+  FrameStats stats;
+};
+
+/// Outcome of the frame path, which never throws.
+struct RenderStatus {
+  enum class Code { ok, invalid_request, out_of_memory, device_failed };
+  Code code = Code::ok;
+  std::string message;  // names stage and cause; empty when ok
+  [[nodiscard]] bool ok() const { return code == Code::ok; }
+};
+
+struct ViewSettings {
+  Pipeline pipeline = Pipeline::exact;
+  PixelFormat format = PixelFormat::rgb_f32;
+};
+
+class View {
+ public:
+  virtual ~View() = default;
+  View() = default;
+  View(const View&) = delete;
+  View& operator=(const View&) = delete;
+
+  /// Renders one frame and waits for it. Any image size from 1x1 to max_image_side is accepted and
+  /// may change from frame to frame (i420 needs even sides). On failure `frame` is untouched.
+  virtual RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept = 0;
+};
+
+inline constexpr int max_image_side_px = 8192;
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  Renderer() = default;
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  /// For people: "CPU, AVX3_DL, 2 threads".
+  [[nodiscard]] virtual std::string description() const = 0;
+  /// Scene bytes resident on the device.
+  [[nodiscard]] virtual std::size_t scene_bytes() const = 0;
+  [[nodiscard]] virtual std::unique_ptr<View> make_view(const ViewSettings& settings) = 0;
+};
+
+enum class RendererKind { automatic, cpu, cuda, reference };
+
+struct RendererOptions {
+  RendererKind kind = RendererKind::automatic;
+  std::shared_ptr<ThreadPool> pool;  // CPU core; null: the Renderer makes its own
+  std::string simd = "auto";         // CPU core: auto or a name of simd_targets()
+};
+
+struct MadeRenderer {
+  std::unique_ptr<Renderer> renderer;
+  std::string reason;  // why this core was chosen, for people
+};
+
+/// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run.
+MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
+                           const RendererOptions& options = {});
+
+}  // namespace catgs

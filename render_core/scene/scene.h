@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "render_core/camera.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs {
+
+/// What was wrong with the Gaussians of a file and what was done about it.
+struct SanitizeReport {
+  std::size_t read = 0;      // Gaussians in the file
+  std::size_t dropped = 0;   // removed: not finite, invisible or absurd
+  std::size_t repaired = 0;  // kept with a value clamped or a quaternion normalised
+};
+
+struct Bounds {
+  glm::vec3 min{0.0f};
+  glm::vec3 max{0.0f};
+};
+
+/// How to look at a scene the first time (DESIGN §6): from a sidecar, from the training's
+/// cameras.json, or estimated from the Gaussians.
+struct SceneHints {
+  glm::vec3 up{0.0f, -1.0f, 0.0f};  // unit, world axes; y points down in 3DGS captures
+  Pose start_pose;                  // world_from_camera
+  float near_z = 0.2f;              // world units
+  Bounds limits;                    // where the camera may go, world axes
+  glm::vec3 focus{0.0f};            // what orbiting turns around
+  std::string source;               // "sidecar scene.json", "cameras.json", "estimated"
+};
+
+/// A scene ready to be rendered.
+struct Scene {
+  std::string name;    // file or folder name without extension
+  std::string format;  // "3DGS ply", "sog v2 (zip)", …
+  GaussianCloud cloud;
+  SceneHints hints;
+  SanitizeReport report;
+};
+
+struct LoadOptions {
+  std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
+  std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
+  std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
+  int threads = 0;                                // 0: one per core
+};
+
+/// Reads any supported scene: .ply (original and compressed), .splat, .spz, .sog, a streamed or
+/// unpacked SOG folder, a training output folder. Throws InputError.
+Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
+
+}  // namespace catgs

@@ -1,0 +1,94 @@
+#include "render_core/thread_pool.h"
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+namespace catgs {
+
+struct ThreadPool::Loop {
+  Loop(std::size_t n, const std::function<void(std::size_t)>& f) : count(n), body(f) {}
+
+  const std::size_t count;
+  const std::function<void(std::size_t)>& body;
+  std::atomic<std::size_t> next{0};
+  int helpers = 0;  // workers inside run(); guarded by the pool's mutex
+  std::condition_variable_any left;
+
+  void run() {
+    for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i);
+  }
+};
+
+ThreadPool::ThreadPool(int threads)
+    : threads_(threads > 0 ? threads
+                           : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
+  workers_.reserve(static_cast<std::size_t>(threads_));
+  for (int i = 0; i < threads_; ++i)
+    workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+}
+
+ThreadPool::~ThreadPool() {
+  for (auto& worker : workers_) worker.request_stop();
+  wake_.notify_all();
+  workers_.clear();
+}
+
+void ThreadPool::submit(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back(std::move(task));
+  }
+  wake_.notify_one();
+}
+
+void ThreadPool::parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+  if (threads_ == 1 || count <= 1) {
+    for (std::size_t i = 0; i < count; ++i) body(i);
+    return;
+  }
+  Loop loop(count, body);
+  {
+    const std::lock_guard lock(mutex_);
+    loops_.push_back(&loop);
+  }
+  wake_.notify_all();
+  loop.run();
+  std::unique_lock lock(mutex_);
+  std::erase(loops_, &loop);
+  loop.left.wait(lock, [&] { return loop.helpers == 0; });
+}
+
+ThreadPool::Loop* ThreadPool::loop_to_help() const {
+  // The caller of a loop works on it too, hence one helper fewer than threads.
+  const auto loop = std::find_if(loops_.begin(), loops_.end(),
+                                 [this](const Loop* l) { return l->helpers < threads_ - 1; });
+  return loop == loops_.end() ? nullptr : *loop;
+}
+
+void ThreadPool::work(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, stop, [this] { return !tasks_.empty() || loop_to_help() != nullptr; });
+    if (!tasks_.empty()) {
+      auto task = std::move(tasks_.front());
+      tasks_.pop_front();
+      lock.unlock();
+      task();
+      task = nullptr;
+      lock.lock();
+    } else if (Loop* loop = loop_to_help()) {
+      ++loop->helpers;
+      lock.unlock();
+      loop->run();
+      lock.lock();
+      // Its indices are handed out: nobody else needs to look at it.
+      std::erase(loops_, loop);
+      if (--loop->helpers == 0) loop->left.notify_all();
+    } else if (stop.stop_requested()) {
+      return;
+    }
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "render_core/renderer.h"
+
+namespace catgs {
+
+enum class Codec { h264, mjpeg };
+
+enum class EncoderKind { automatic, nvenc, x264, jpeg };
+
+struct EncoderSettings {
+  glm::ivec2 size_px{0};    // even sides, 16…8192
+  int fps = 60;             // nominal rate: sizes the one-frame VBV, says the level
+  int bitrate_kbps = 8000;  // h264: cap; mjpeg picks its quality to stay near it
+  int threads = 1;          // encoder-internal
+};
+
+/// One encoded frame. H.264: an Annex B access unit, SPS and PPS in front of every IDR.
+/// MJPEG: one JPEG file.
+struct EncodedFrame {
+  std::vector<std::byte> bytes;
+  bool idr = false;
+};
+
+struct EncodeStatus {
+  bool ok = true;
+  std::string message;  // names encoder and cause; empty when ok
+};
+
+/// A live encoder: one frame in, one frame out, no delay, no B-frames. Not thread-safe; one per
+/// session.
+class Encoder {
+ public:
+  virtual ~Encoder() = default;
+  Encoder() = default;
+  Encoder(const Encoder&) = delete;
+  Encoder& operator=(const Encoder&) = delete;
+
+  /// `frame` is i420 of the settings' size in host memory. The first frame is an IDR in any case.
+  /// `out.bytes` is reused: its capacity survives from call to call.
+  virtual EncodeStatus encode(const FrameView& frame, bool force_idr,
+                              EncodedFrame& out) noexcept = 0;
+
+  /// Takes effect with the next frame, without an IDR.
+  virtual void set_bitrate(int bitrate_kbps) noexcept = 0;
+
+  [[nodiscard]] virtual Codec codec() const = 0;
+  [[nodiscard]] virtual std::string_view name() const = 0;  // "libx264", "mjpeg", "h264_nvenc"
+  /// For WebCodecs: "avc1.PPCCLL" of the bitstream really produced; empty for MJPEG.
+  [[nodiscard]] virtual std::string codec_string() const = 0;
+};
+
+/// What a start-up probe found out by really encoding a few frames.
+struct EncoderProbe {
+  EncoderKind kind = EncoderKind::x264;
+  std::string name;
+  bool usable = false;
+  std::string reason;  // why it is usable or not, for people: "no NVIDIA driver (libcuda.so.1)"
+};
+
+/// Tries every encoder, best first. Takes tens of milliseconds; call it once.
+std::vector<EncoderProbe> probe_encoders();
+
+/// Throws InputError when the encoder cannot be opened with these settings. `kind` is concrete.
+std::unique_ptr<Encoder> make_encoder(EncoderKind kind, const EncoderSettings& settings);
+
+}  // namespace catgs

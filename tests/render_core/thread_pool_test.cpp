@@ -1,0 +1,46 @@
+#include "render_core/thread_pool.h"
+
+#include <atomic>
+#include <latch>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+TEST(ThreadPool, LoopCallsEveryIndexOnce) {
+  ThreadPool pool(3);
+  for (const std::size_t count : {0u, 1u, 2u, 1000u}) {
+    std::vector<std::atomic<int>> calls(count);
+    pool.parallel_for(count, [&](std::size_t i) { calls[i].fetch_add(1); });
+    for (const auto& c : calls) EXPECT_EQ(c.load(), 1);
+  }
+}
+
+TEST(ThreadPool, LoopsRunInsideTasks) {
+  ThreadPool pool(2);
+  std::atomic<std::size_t> sum{0};
+  std::latch done(8);
+  for (int task = 0; task < 8; ++task) {
+    pool.submit([&] {
+      pool.parallel_for(100, [&](std::size_t i) { sum += i; });
+      done.count_down();
+    });
+  }
+  done.wait();
+  EXPECT_EQ(sum.load(), 8u * 4950u);
+}
+
+TEST(ThreadPool, DestructorFinishesSubmittedTasks) {
+  std::atomic<int> ran{0};
+  {
+    ThreadPool pool(2);
+    for (int i = 0; i < 50; ++i) pool.submit([&] { ++ran; });
+  }
+  EXPECT_EQ(ran.load(), 50);
+}
+
+}  // namespace
+}  // namespace catgs
