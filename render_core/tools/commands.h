@@ -1,0 +1,33 @@
+#pragma once
+
+#include <stdexcept>
+
+#include <CLI/CLI.hpp>
+
+namespace catgs {
+
+// Subcommands of catgs-render. Each lives in its own file, adds itself to the program and runs from
+// its CLI11 callback; main.cpp turns what it throws into a message and an exit code:
+//
+//   0  done
+//   1  a check that was asked for failed     CheckFailed
+//   2  bad usage or bad input                CLI::ParseError, InputError
+//   3  anything else, a bug or a full disk   any other exception
+
+/// A check that the user asked for did not hold. The message says which, with both values.
+struct CheckFailed : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+inline constexpr int exit_check_failed = 1;
+inline constexpr int exit_bad_input = 2;
+inline constexpr int exit_internal = 3;
+
+/// The program's --quiet, which every subcommand obeys.
+inline bool is_quiet(const CLI::App& command) {
+  const CLI::App* app = &command;
+  while (app->get_parent() != nullptr) app = app->get_parent();
+  return app->get_option("--quiet")->count() > 0;
+}
+
+}  // namespace catgs

@@ -1,0 +1,43 @@
+// catgs-render: the renderer without a server. Exit codes are documented in commands.h.
+#include <cstdio>
+#include <exception>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+#include "render_core/tools/commands.h"
+
+namespace catgs {
+namespace {
+
+int run(int argc, char** argv) {
+  CLI::App app("Inspects, renders and measures 3D Gaussian Splatting scenes.", "catgs-render");
+  app.set_version_flag("--version", CATGS_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough();
+  bool quiet = false;  // read back by is_quiet()
+  app.add_flag("-q,--quiet", quiet, "No progress on the terminal");
+  app.footer("Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal.");
+
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : exit_bad_input;
+  } catch (const CheckFailed& error) {
+    fmt::print(stderr, "catgs-render: {}\n", error.what());
+    return exit_check_failed;
+  } catch (const InputError& error) {
+    fmt::print(stderr, "catgs-render: {}\n", error.what());
+    return exit_bad_input;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "catgs-render: internal error: {}\n", error.what());
+    return exit_internal;
+  }
+}
+
+}  // namespace
+}  // namespace catgs
+
+int main(int argc, char** argv) { return catgs::run(argc, argv); }
