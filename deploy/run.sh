@@ -1,0 +1,225 @@
+#!/usr/bin/env bash
+# Builds the server and serves scenes to a browser: see usage below.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() {
+  cat <<'USAGE'
+usage: deploy/run.sh [SCENE...] [options] [catgs-server options]
+
+Installs what the build needs, builds the server and the browser client, and serves the scenes.
+Without a SCENE it makes a procedural city of 300,000 Gaussians and serves that.
+SCENE is a .ply, .splat, .spz or .sog file, a streamed SOG folder or a training output folder.
+
+  --port N     listen on port N (default 8080)
+  --lan        also serve other devices in this network: all interfaces, a token, TLS with a
+               self-signed certificate, and a QR code of the link for your phone
+  --no-cuda    build for the CPU even where a GPU and nvcc are found
+  --log FILE   the build's full log (default build/run/run.log)
+  -h, --help   this text
+
+Everything from the first other option on goes to catgs-server as it is, for example
+  deploy/run.sh garden.ply --port 9000 --encoder jpeg
+
+Exit status: 0 stopped with Ctrl-C, 1 a step failed, 2 wrong usage, 3 packages are missing and
+installing them needs root, 4 not Debian 12 or Ubuntu 24.04, 5 the port is in use.
+USAGE
+}
+
+readonly build_dir=$SOURCE_DIR/build/run
+readonly bin_dir=$build_dir/bin
+scenes=()
+server_options=()
+port=8080
+lan=0
+allow_cuda=1
+log=$build_dir/run.log
+demo_scene=$build_dir/scenes/city.ply
+
+parse_arguments() {
+  while (($# > 0)); do
+    case $1 in
+      --port | --log)
+        (($# > 1)) || fail "$EXIT_USAGE" "$1 needs a value. See --help."
+        if [[ $1 == --port ]]; then port=$2; else log=$2; fi
+        shift
+        ;;
+      --port=*) port=${1#*=} ;;
+      --log=*) log=${1#*=} ;;
+      --lan) lan=1 ;;
+      --no-cuda) allow_cuda=0 ;;
+      -h | --help)
+        usage
+        exit 0
+        ;;
+      -*)
+        server_options=("$@")
+        break
+        ;;
+      *)
+        [[ -e $1 ]] || fail "$EXIT_USAGE" "No such scene: $1"
+        scenes+=("$(realpath -- "$1")")
+        ;;
+    esac
+    shift
+  done
+  if [[ ! $port =~ ^[1-9][0-9]{0,4}$ ]] || ((port > 65535)); then
+    fail "$EXIT_USAGE" "--port $port: a port is a number from 1 to 65535."
+  fi
+}
+
+# Prints the inode of the socket that listens on the port, whatever its address; nothing if free.
+listening_inode() {
+  local hex
+  hex=$(printf ':%04X' "$1")
+  # State 0A is LISTEN; field 2 is address:port, field 10 the inode.
+  awk -v port="$hex" '$4 == "0A" && substr($2, length($2) - 4) == port { print $10; exit }' \
+    /proc/net/tcp /proc/net/tcp6 2>/dev/null
+}
+
+check_port() {
+  local inode owner="another user's program (run as root to see which)" fd pid
+  inode=$(listening_inode "$port")
+  [[ -n $inode ]] || return 0
+  fd=$(find /proc/[0-9]*/fd -maxdepth 1 -lname "socket:\[$inode\]" -print -quit 2>/dev/null || true)
+  if [[ -n $fd ]]; then
+    pid=${fd#/proc/}
+    pid=${pid%%/*}
+    owner="$(tr '\0' ' ' <"/proc/$pid/cmdline" | cut -c1-80) (process $pid)"
+  fi
+  fail "$EXIT_PORT_BUSY" "Port $port is in use by: $owner" \
+    "Stop that program, or choose another port: ./deploy/run.sh --port $((port % 65535 + 1))"
+}
+
+check_system() {
+  printf 'distribution: %s\ncores: %s\nCUDA: %s (%s)\n' "$distribution" "$(nproc)" \
+    "$cuda_choice" "$cuda_note"
+  df -h "$SOURCE_DIR"
+  free -h
+}
+
+make_demo_scene() {
+  mkdir -p "$(dirname "$demo_scene")"
+  # A name of its own until it is whole: an interrupted run leaves no half scene behind.
+  local partial=${demo_scene%.ply}.partial.ply
+  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$partial"
+  mv "$partial" "$demo_scene"
+}
+
+ensure_scene() {
+  if ((${#scenes[@]} > 0)); then
+    step_done "Scene: ${scenes[*]##*/}"
+    return
+  fi
+  scenes=("$demo_scene")
+  # Like make: a newer generator may draw another city.
+  if [[ $demo_scene -nt $bin_dir/catgs-render ]]; then
+    step_done "Demo scene: city, 300,000 Gaussians, already made"
+  else
+    step "Make the demo scene: city, 300,000 Gaussians" make_demo_scene
+  fi
+}
+
+# ---- --lan: a certificate for this machine's addresses, a token, and the link as a QR code ------
+
+readonly lan_dir=$build_dir/lan
+lan_address=""
+
+choose_lan_address() {
+  # The source address of the default route is the one that phones in the same network see.
+  lan_address=$(ip -4 route get 192.0.2.1 2>/dev/null | sed -n 's/.* src \([0-9.]*\).*/\1/p')
+  [[ -n $lan_address ]] || lan_address=$(hostname -I | awk '{ print $1 }')
+  [[ -n $lan_address ]] ||
+    fail "$EXIT_FAILED" "--lan: this machine has no network address. Connect it, or leave --lan out."
+}
+
+# Kept while the addresses stay: the browser's exception and the phone's link survive a restart.
+make_lan_credentials() {
+  local names address
+  names="DNS:$(hostname),DNS:localhost,IP:127.0.0.1"
+  for address in $(hostname -I); do
+    names+=",IP:$address"
+  done
+  umask 077
+  mkdir -p "$lan_dir"
+  [[ -s $lan_dir/token ]] || openssl rand -hex 16 >"$lan_dir/token"
+  if [[ -f $lan_dir/names && $(<"$lan_dir/names") == "$names" ]] &&
+    openssl x509 -in "$lan_dir/cert.pem" -noout -checkend 86400; then
+    return
+  fi
+  # 397 days: the longest life that phones accept of a server certificate.
+  openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 397 \
+    -keyout "$lan_dir/key.pem" -out "$lan_dir/cert.pem" -subj "/CN=CaT-GS on $(hostname)" \
+    -addext "subjectAltName=$names" -addext extendedKeyUsage=serverAuth
+  printf '%s' "$names" >"$lan_dir/names"
+}
+
+# ---- serving ----------------------------------------------------------------------------------
+
+readonly server_log=$build_dir/server.log
+
+start_server() {
+  local -a options=(--scene "${scenes[@]}" --port "$port")
+  if ((lan)); then
+    options+=(--bind 0.0.0.0 --token-file "$lan_dir/token"
+      --tls-cert "$lan_dir/cert.pem" --tls-key "$lan_dir/key.pem")
+  fi
+  : >"$server_log"
+  start_group "$server_log" "$bin_dir/catgs-server" "${options[@]}" "${server_options[@]}"
+}
+
+# The step that waits for it: fails when the server ends before it listens.
+wait_until_serving() {
+  local server=$1
+  until [[ -n $(listening_inode "$port") ]]; do
+    if ! kill -0 "$server" 2>/dev/null; then
+      cat "$server_log"
+      return 1
+    fi
+    sleep 0.1
+  done
+}
+
+print_welcome() {
+  local url="http://127.0.0.1:$port/"
+  echo
+  echo "CaT-GS serves ${scenes[*]##*/}"
+  if ((lan)); then
+    url="https://$lan_address:$port/#token=$(<"$lan_dir/token")"
+    qrencode -t ANSIUTF8 "$url"
+    echo "  The certificate is this machine's own: accept the browser's warning once."
+  fi
+  echo "  open      $url"
+  echo "  stop      Ctrl-C"
+  echo "  server's log: $server_log"
+}
+
+main() {
+  parse_arguments "$@"
+  detect_distribution
+  check_port
+  if ((allow_cuda)); then
+    choose_cuda
+  else
+    cuda_note="--no-cuda was given"
+  fi
+  if ((lan)); then
+    build_packages+=("${lan_packages[@]}")
+  fi
+  steps_begin $((6 + lan)) "$log"
+  step "System: $distribution, $(nproc) cores, $cuda_note" check_system
+  ensure_packages "${build_packages[@]}"
+  configure_build run "-DCATGS_CUDA=$cuda_choice"
+  build_all run "Build server, tools and client"
+  ensure_scene
+  if ((lan)); then
+    choose_lan_address
+    step "Certificate and token for $lan_address" make_lan_credentials
+  fi
+  start_server
+  print_welcome
+  wait "$group"
+}
+
+main "$@"

@@ -1,0 +1,69 @@
+#!/usr/bin/env bash
+# Builds everything with its tests and runs them under one CTest summary: see usage below.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR
+source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() {
+  cat <<'USAGE'
+usage: deploy/test.sh [--quick | --full] [--log FILE]
+
+Installs what build and tests need, builds, and runs the tests.
+
+  --quick      unit, integration and lint tests only (minutes, once built)
+  (default)    and the load and browser tests
+  --full       and the sanitizer builds, clang-tidy, and a start from nothing in a fresh Debian
+  --log FILE   the full log (default build/release/test.log)
+  -h, --help   this text
+
+Exit status: 0 all tests passed, 1 a step or a test failed, 2 wrong usage, 3 packages are missing
+and installing them needs root, 4 not Debian 12 or Ubuntu 24.04.
+USAGE
+}
+
+readonly build_dir=$SOURCE_DIR/build/release
+log=$build_dir/test.log
+selection=(--label-exclude '^$')
+
+parse_arguments() {
+  while (($# > 0)); do
+    case $1 in
+      --quick) selection=(--label-regex '^(unit|integration|lint)$') ;;
+      --full)
+        selection=(--build-config Full)
+        test_packages+=(clang-tidy-14 debootstrap)
+        ;;
+      --log)
+        (($# > 1)) || fail "$EXIT_USAGE" "--log needs a value. See --help."
+        log=$2
+        shift
+        ;;
+      -h | --help)
+        usage
+        exit 0
+        ;;
+      *) fail "$EXIT_USAGE" "Unknown argument: $1. See --help." ;;
+    esac
+    shift
+  done
+}
+
+# The step itself always succeeds: the report below says what failed, and sets the exit status.
+run_tests() {
+  ctest --test-dir "$build_dir" --parallel "$(nproc)" --output-on-failure --no-tests=error \
+    --output-junit "$build_dir/tests.xml" "${selection[@]}" || true
+}
+
+main() {
+  parse_arguments "$@"
+  detect_distribution
+  steps_begin 4 "$log"
+  ensure_packages "${build_packages[@]}" "${test_packages[@]}"
+  configure_build release
+  build_all release "Build with tests"
+  rm -f "$build_dir/tests.xml"
+  step "Test" run_tests
+  python3 -B "$SOURCE_DIR/tests/report.py" "$build_dir/tests.xml" "$log"
+}
+
+main "$@"

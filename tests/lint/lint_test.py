@@ -1,0 +1,63 @@
+#!/usr/bin/env python3
+"""Plants one fault of each kind and requires that `lint.py rules` reports it, and nothing else."""
+
+import subprocess
+import sys
+import unittest
+
+import lint
+
+CLEAN = ["#pragma once", "#include <vector>", '#include "render_core/camera.h"']
+
+
+class RuleFindings(unittest.TestCase):
+    def findings(self, path, *lines):
+        return list(lint.rule_findings(path, list(lines)))
+
+    def expect_one(self, text, path, *lines):
+        findings = self.findings(path, *lines)
+        self.assertEqual(len(findings), 1, findings)
+        self.assertIn(text, findings[0])
+
+    def test_clean_files_have_no_findings(self):
+        self.assertEqual(self.findings("render_core/scene/a.h", *CLEAN), [])
+        self.assertEqual(self.findings("server/net/wire.cpp", '#include "catgs.pb.h"'), [])
+        self.assertEqual(self.findings("server/net/socket.cpp", "#include <libwebsockets.h>"), [])
+        self.assertEqual(self.findings("render_core/make_renderer.cpp",
+                                       '#include "render_core/cpu/cpu_renderer.h"'), [])
+        self.assertEqual(self.findings("web_client/src/wire/codec.ts",
+                                       'import { create } from "@bufbuild/protobuf";'), [])
+
+    def test_layering(self):
+        self.expect_one("neither server nor wire", "render_core/cpu/a.cpp",
+                        '#include "server/session/session.h"')
+        self.expect_one("no network", "render_core/scene/a.cpp", "#include <libavcodec/avcodec.h>")
+        self.expect_one("under the renderers", "render_core/scene/a.cpp",
+                        '#include "render_core/renderer.h"')
+        self.expect_one("chooses a core", "server/main.cpp",
+                        '#include "render_core/cpu/cpu_renderer.h"')
+        self.expect_one("speaks to the socket", "server/session/a.cpp",
+                        "#include <libwebsockets.h>")
+        self.expect_one("speaks protobuf", "server/session/a.cpp", '#include "catgs.pb.h"')
+        self.expect_one("speaks to the codecs", "server/pipeline/a.cpp",
+                        "#include <libavutil/frame.h>")
+        self.expect_one("its tests", "server/main.cpp", '#include "tests/support/video.h"')
+        self.expect_one("nobody's library", "server/main.cpp",
+                        '#include "render_core/tools/commands.h"')
+        self.expect_one("speaks protobuf", "web_client/src/ui/panel.ts",
+                        'import { Pose } from "../wire/generated/catgs_pb";')
+
+    def test_length_marker_words_and_guards(self):
+        self.expect_one("lines, the limit", "server/a.cpp", *["int x;"] * (lint.MAX_LINES + 1))
+        self.expect_one("marker word", "server/a.cpp", "// TO" "DO: later")
+        self.expect_one("#pragma once", "server/a.h", "int x;")
+
+    def test_missing_tool_is_a_skip(self):
+        result = subprocess.run([sys.executable, lint.__file__, "shell"], env={"PATH": "/nonexistent"},
+                                capture_output=True, text=True, check=False)
+        self.assertEqual(result.returncode, lint.EXIT_SKIPPED)
+        self.assertIn("shellcheck", result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

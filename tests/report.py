@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""usage: report.py JUNIT_XML LOG
+
+Prints what a CTest run left to know: the failed tests with the end of their output, the skipped
+ones with their reason, the summary line. Exit status 1 when a test failed or no run was recorded.
+"""
+
+import pathlib
+import re
+import sys
+import xml.etree.ElementTree as ElementTree
+
+OUTPUT_LINES = 15
+# GoogleTest prints "file:line: Skipped" and the reason below it; scripts print "SKIPPED: reason".
+SKIP_REASON = re.compile(r"(?:: Skipped\n|SKIPPED: )(.+)")
+
+
+def skip_reason(output: str) -> str:
+    match = SKIP_REASON.search(output)
+    return match.group(1).strip() if match else "no reason given"
+
+
+def main() -> int:
+    results, log = pathlib.Path(sys.argv[1]), sys.argv[2]
+    if not results.is_file():
+        print(f"CTest recorded no result. The whole log: {log}", file=sys.stderr)
+        return 1
+    suite = ElementTree.parse(results).getroot()
+    failed, skipped = [], []
+    for case in suite.iter("testcase"):
+        output = case.findtext("system-out") or ""
+        # A test whose program is missing is "notrun" as well; only a declared skip is no failure.
+        message = case.find("skipped").get("message") if case.find("skipped") is not None else ""
+        if message.startswith("SKIP_") or case.get("status") == "disabled":
+            skipped.append((case.get("name"), skip_reason(output)))
+        elif case.get("status") != "run":
+            failed.append((case.get("name"), [message, *output.splitlines()[-OUTPUT_LINES:]]))
+    for name, lines in failed:
+        print(f"\nFAILED {name}")
+        print("\n".join(f"    {line}" for line in lines))
+    if skipped:
+        print(f"\nSkipped, {len(skipped)}:")
+        print("\n".join(f"    {name}: {reason}" for name, reason in skipped))
+    total = int(suite.get("tests"))
+    print(f"\n{total - len(failed) - len(skipped)} tests passed, {len(failed)} failed, "
+          f"{len(skipped)} skipped of {total} in {float(suite.get('time')):.0f} s. Log: {log}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
