@@ -16,11 +16,22 @@ enum class Codec { h264, mjpeg };
 
 enum class EncoderKind { automatic, nvenc, x264, jpeg };
 
+/// libavcodec's name of an encoder: "h264_nvenc", "libx264", "mjpeg"; "automatic".
+std::string_view encoder_name(EncoderKind kind);
+
+inline constexpr int min_encoded_side_px = 16;
+inline constexpr int max_encoded_side_px = 8192;
+inline constexpr int max_encoded_fps = 240;
+inline constexpr int max_encoder_threads = 64;
+inline constexpr int min_bitrate_kbps = 100;
+inline constexpr int max_bitrate_kbps = 200000;
+
 struct EncoderSettings {
-  glm::ivec2 size_px{0};    // even sides, 16…8192
-  int fps = 60;             // nominal rate: sizes the one-frame VBV, says the level
-  int bitrate_kbps = 8000;  // h264: cap; mjpeg picks its quality to stay near it
-  int threads = 1;          // encoder-internal
+  glm::ivec2 size_px{0};  // even sides, 16…8192; h264: within a level (8192x4320, not 8192x8192)
+  int fps = 60;           // 1…240, nominal: sizes the one-frame VBV, says the level
+  int bitrate_kbps = 8000;  // 100…200000; h264: cap; mjpeg picks its quality to stay near it
+  int threads = 1;          // 1…64, encoder-internal; h264: as many slices
+  std::string x264_preset = "ultrafast";  // "superfast", "veryfast", …: smaller, slower
 };
 
 /// One encoded frame. H.264: an Annex B access unit, SPS and PPS in front of every IDR.
@@ -49,12 +60,14 @@ class Encoder {
   virtual EncodeStatus encode(const FrameView& frame, bool force_idr,
                               EncodedFrame& out) noexcept = 0;
 
-  /// Takes effect with the next frame, without an IDR.
+  /// Takes effect with the next frame, without an IDR. Clamped to 100 kbit/s and to what the level
+  /// of the running stream allows (h264: at least the bitrate it was opened with).
   virtual void set_bitrate(int bitrate_kbps) noexcept = 0;
 
   [[nodiscard]] virtual Codec codec() const = 0;
   [[nodiscard]] virtual std::string_view name() const = 0;  // "libx264", "mjpeg", "h264_nvenc"
-  /// For WebCodecs: "avc1.PPCCLL" of the bitstream really produced; empty for MJPEG.
+  /// For WebCodecs: "avc1.PPCCLL" of the bitstream really produced, known from the start; empty for
+  /// MJPEG.
   [[nodiscard]] virtual std::string codec_string() const = 0;
 };
 

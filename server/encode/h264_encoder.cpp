@@ -1,0 +1,208 @@
+#include "server/encode/h264_encoder.h"
+
+#include <algorithm>
+#include <exception>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "render_core/error.h"
+#include "server/encode/encoder_input.h"
+#include "server/encode/h264_bitstream.h"
+#include "server/encode/h264_level.h"
+#include "server/encode/libav.h"
+
+namespace catgs {
+
+namespace {
+
+/// One frame interval of the bitrate: no frame may take longer on a link of that rate. Rounded up
+/// to whole kbit, the unit in which libavcodec hands it to x264.
+int one_frame_vbv_bits(int bitrate_kbps, int fps) { return (bitrate_kbps + fps - 1) / fps * 1000; }
+
+void apply_bitrate(AVCodecContext& context, int bitrate_kbps, int fps) {
+  context.bit_rate = std::int64_t{bitrate_kbps} * 1000;
+  context.rc_max_rate = context.bit_rate;
+  context.rc_buffer_size = one_frame_vbv_bits(bitrate_kbps, fps);
+}
+
+/// What every H.264 encoder is told, whoever makes it.
+void apply_common(AVCodecContext& context, const EncoderSettings& settings, int level_idc) {
+  context.width = settings.size_px.x;
+  context.height = settings.size_px.y;
+  context.pix_fmt = AV_PIX_FMT_YUV420P;
+  context.time_base = {1, settings.fps};
+  context.framerate = {settings.fps, 1};
+  context.color_primaries = AVCOL_PRI_BT709;
+  context.color_trc = AVCOL_TRC_BT709;
+  context.colorspace = AVCOL_SPC_BT709;
+  context.color_range = AVCOL_RANGE_MPEG;
+  context.chroma_sample_location = AVCHROMA_LOC_LEFT;
+  context.level = level_idc;
+  context.max_b_frames = 0;
+  context.gop_size = std::numeric_limits<int>::max();  // an IDR only when asked for
+  context.thread_count = settings.threads;
+  // Parameter sets come with the open encoder instead of inside its packets: they are then known,
+  // and corrected, before the first frame.
+  context.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  apply_bitrate(context, settings.bitrate_kbps, settings.fps);
+}
+
+void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) {
+  to.insert(to.end(), bytes.begin(), bytes.end());
+}
+
+/// SPS and PPS of an open encoder as an Annex B stream, each SPS saying that frames come in order.
+/// `codec_string` is that of the SPS.
+std::vector<std::byte> read_parameter_sets(const AVCodecContext& context, const char* name,
+                                           std::string& codec_string) {
+  constexpr std::byte start_code[] = {std::byte{0}, std::byte{0}, std::byte{0}, std::byte{1}};
+  const std::span header(reinterpret_cast<const std::byte*>(context.extradata),
+                         static_cast<std::size_t>(std::max(context.extradata_size, 0)));
+  std::vector<std::byte> sets;
+  for (const h264::NalUnit& unit : h264::split_annex_b(header)) {
+    if (unit.type() == h264::NalType::sps) {
+      const auto sps = h264::parse_sps(unit);
+      const auto rewritten = h264::with_zero_reorder_frames(unit);
+      if (!sps || !rewritten) break;
+      codec_string = h264::codec_string(*sps);
+      append(sets, start_code);
+      append(sets, *rewritten);
+    } else if (unit.type() == h264::NalType::pps) {
+      append(sets, start_code);
+      append(sets, unit.bytes);
+    }
+  }
+  if (codec_string.empty()) throw InputError(name, "SPS", "the encoder gave none that can be read");
+  return sets;
+}
+
+class LibavH264Encoder final : public Encoder {
+ public:
+  LibavH264Encoder(libav::CodecContext context, const EncoderSettings& settings, int level_idc)
+      : context_(std::move(context)),
+        input_(libav::make_frame()),
+        packet_(libav::make_packet()),
+        size_px_(settings.size_px),
+        fps_(settings.fps),
+        max_bitrate_kbps_(h264::level_max_bitrate_kbps(level_idc).value()) {
+    parameter_sets_ = read_parameter_sets(*context_, context_->codec->name, codec_string_);
+  }
+
+  EncodeStatus encode(const FrameView& frame, bool force_idr, EncodedFrame& out) noexcept override {
+    try {
+      if (const std::string fault = input_fault(frame, size_px_); !fault.empty()) {
+        return {false, std::string(name()) + ": " + fault};
+      }
+      borrow(frame);
+      input_->pts = next_pts_++;
+      input_->pict_type = force_idr || input_->pts == 0 ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
+      return submit(out);
+    } catch (const std::exception& error) {
+      return {false, std::string(name()) + ": " + error.what()};
+    }
+  }
+
+  void set_bitrate(int bitrate_kbps) noexcept override {
+    apply_bitrate(*context_, std::clamp(bitrate_kbps, min_bitrate_kbps, max_bitrate_kbps_), fps_);
+  }
+
+  [[nodiscard]] Codec codec() const override { return Codec::h264; }
+  [[nodiscard]] std::string_view name() const override { return context_->codec->name; }
+  [[nodiscard]] std::string codec_string() const override { return codec_string_; }
+
+ private:
+  /// Lends the frame's planes to libav without a copy. Encoders without delay are done with them
+  /// when encode() returns.
+  void borrow(const FrameView& frame) {
+    av_frame_unref(input_.get());
+    input_->format = context_->pix_fmt;
+    input_->width = size_px_.x;
+    input_->height = size_px_.y;
+    for (std::size_t i = 0; i < frame.planes.size(); ++i) {
+      const Plane& plane = frame.planes[i];
+      const auto height = static_cast<std::size_t>(i == 0 ? size_px_.y : size_px_.y / 2);
+      auto* data = reinterpret_cast<std::uint8_t*>(plane.data);
+      input_->data[i] = data;
+      input_->linesize[i] = static_cast<int>(plane.stride_bytes);
+      input_->buf[i] = av_buffer_create(
+          data, plane.stride_bytes * height, [](void*, std::uint8_t*) {}, nullptr,
+          AV_BUFFER_FLAG_READONLY);
+      if (input_->buf[i] == nullptr) throw std::bad_alloc();
+    }
+  }
+
+  EncodeStatus submit(EncodedFrame& out) {
+    const libav::LogCapture log;
+    int result = avcodec_send_frame(context_.get(), input_.get());
+    if (result >= 0) result = avcodec_receive_packet(context_.get(), packet_.get());
+    av_frame_unref(input_.get());
+    if (result < 0) return {false, std::string(name()) + ": " + log.explain(result)};
+    out.idr = (packet_->flags & AV_PKT_FLAG_KEY) != 0;
+    out.bytes.clear();
+    if (out.idr) append(out.bytes, parameter_sets_);
+    append(out.bytes,
+           std::as_bytes(std::span(packet_->data, static_cast<std::size_t>(packet_->size))));
+    av_packet_unref(packet_.get());
+    return {};
+  }
+
+  libav::CodecContext context_;
+  libav::Frame input_;
+  libav::Packet packet_;
+  glm::ivec2 size_px_;
+  int fps_;
+  int max_bitrate_kbps_;  // of the level that the SPS names
+  std::int64_t next_pts_ = 0;
+  std::string codec_string_;
+  std::vector<std::byte> parameter_sets_;
+};
+
+int level_or_throw(const char* name, const EncoderSettings& settings) {
+  const auto level = h264::level(settings.size_px, settings.fps, settings.bitrate_kbps);
+  if (!level) {
+    throw InputError(name,
+                     "size " + std::to_string(settings.size_px.x) + "x" +
+                         std::to_string(settings.size_px.y) + " at " +
+                         std::to_string(settings.fps) + " fps",
+                     "more than any H.264 level admits", "lower the size or the frame rate");
+  }
+  return *level;
+}
+
+}  // namespace
+
+std::unique_ptr<Encoder> make_x264_encoder(const EncoderSettings& settings) {
+  const AVCodec& codec = libav::find_encoder("libx264");
+  const int level_idc = level_or_throw(codec.name, settings);
+  libav::CodecContext context = libav::make_context(codec);
+  apply_common(*context, settings, level_idc);
+  context->thread_type = FF_THREAD_SLICE;  // frame threads would each hold back a frame
+  libav::Options options;
+  options.set("preset", settings.x264_preset.c_str());
+  options.set("tune", "zerolatency");  // no look-ahead, no B-frames, constant frame rate
+  options.set("forced-idr", "1");      // a requested key frame is an IDR
+  options.set("sc_threshold", "0");    // no I-frames at scene cuts: a teleport is coded as P
+  libav::open(*context, codec, options);
+  return std::make_unique<LibavH264Encoder>(std::move(context), settings, level_idc);
+}
+
+std::unique_ptr<Encoder> make_nvenc_encoder(const EncoderSettings& settings) {
+  const AVCodec& codec = libav::find_encoder("h264_nvenc");
+  const int level_idc = level_or_throw(codec.name, settings);
+  libav::CodecContext context = libav::make_context(codec);
+  apply_common(*context, settings, level_idc);
+  libav::Options options;
+  options.set("preset", "p3");
+  options.set("tune", "ull");  // ultra low latency
+  options.set("rc", "cbr");
+  options.set("delay", "0");  // a frame in, its packet out
+  options.set("zerolatency", "1");
+  options.set("forced-idr", "1");
+  options.set("no-scenecut", "1");
+  libav::open(*context, codec, options);
+  return std::make_unique<LibavH264Encoder>(std::move(context), settings, level_idc);
+}
+
+}  // namespace catgs

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <glm/vec2.hpp>
+
+namespace catgs {
+
+/// Three 8-bit planes of a 4:2:0 picture; chroma planes have half its sides.
+struct Yuv420Planes {
+  std::uint8_t* data[3] = {};
+  std::ptrdiff_t stride_bytes[3] = {};
+};
+
+/// Video samples (BT.709, limited range) to what JFIF prescribes (BT.601, full range). Even sides.
+/// The planes must not overlap. JFIF centres chroma between luma columns where the video's sits on
+/// the left one: that quarter of a chroma sample is not resampled.
+void video_to_jfif(const Yuv420Planes& video, const Yuv420Planes& jfif, glm::ivec2 size_px);
+
+}  // namespace catgs

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+
+namespace catgs {
+
+/// Chooses the quantiser of each JPEG so that frames stay near bitrate / fps. Every JPEG stands
+/// alone, so the last one is the best forecast of the next: its bytes times qscale^0.7 hardly move
+/// between neighbouring frames (the exponent was fitted on rendered scenes).
+class JpegRateControl {
+ public:
+  static constexpr double finest_qscale = 2;
+  static constexpr double coarsest_qscale = 31;
+
+  JpegRateControl(int bitrate_kbps, int fps, std::size_t pixels);
+
+  void set_bitrate(int bitrate_kbps);
+  /// Told after every frame: how large it became with this qscale().
+  void update(int qscale, std::size_t bytes);
+  /// libavcodec's quantiser scale for the next frame.
+  [[nodiscard]] int qscale() const;
+
+ private:
+  int fps_;
+  double budget_bytes_ = 0;
+  double complexity_;  // forecast of bytes x qscale^0.7
+};
+
+}  // namespace catgs

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavutil/dict.h>
+#include <libavutil/frame.h>
+}
+
+namespace catgs::libav {
+
+// Owners of libav's objects, and its words: what it logs and what its error codes mean.
+
+struct Deleter {
+  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+};
+using CodecContext = std::unique_ptr<AVCodecContext, Deleter>;
+using Frame = std::unique_ptr<AVFrame, Deleter>;
+using Packet = std::unique_ptr<AVPacket, Deleter>;
+
+/// Empty objects; they throw std::bad_alloc where libav returns null.
+CodecContext make_context(const AVCodec& codec);
+Frame make_frame();
+Packet make_packet();
+
+/// Options for avcodec_open2.
+class Options {
+ public:
+  Options() = default;
+  ~Options() { av_dict_free(&dictionary_); }
+  Options(const Options&) = delete;
+  Options& operator=(const Options&) = delete;
+
+  void set(const char* key, const char* value);
+  [[nodiscard]] AVDictionary** raw() { return &dictionary_; }
+  /// First option that nobody took: after avcodec_open2, one that the codec does not know.
+  [[nodiscard]] std::string first_unused() const;
+
+ private:
+  AVDictionary* dictionary_ = nullptr;
+};
+
+/// Throws InputError where this libavcodec lacks the encoder.
+const AVCodec& find_encoder(const char* name);
+
+/// avcodec_open2 that throws InputError with libav's reason, also for an option nobody knows.
+void open(AVCodecContext& context, const AVCodec& codec, Options& options);
+
+/// Collects the errors that libav logs on this thread while it lives, so that they reach our
+/// message instead of stderr. The first one silences libav's own printing for the whole process.
+class LogCapture {
+ public:
+  LogCapture();
+  ~LogCapture();
+  LogCapture(const LogCapture&) = delete;
+  LogCapture& operator=(const LogCapture&) = delete;
+
+  /// What went wrong: the logged errors, else the meaning of `error_code`.
+  [[nodiscard]] std::string explain(int error_code) const;
+
+ private:
+  static void on_message(void* object, int level, const char* format, va_list arguments);
+
+  static thread_local LogCapture* active_;
+  LogCapture* outer_;
+  std::string text_;
+};
+
+}  // namespace catgs::libav
