@@ -14,11 +14,19 @@
 
 namespace catgs {
 
-/// What was wrong with the Gaussians of a file and what was done about it.
+/// What was wrong with the Gaussians of a file and what was done about it (see sanitize.h).
 struct SanitizeReport {
   std::size_t read = 0;      // Gaussians in the file
-  std::size_t dropped = 0;   // removed: not finite, invisible or absurd
-  std::size_t repaired = 0;  // kept with a value clamped or a quaternion normalised
+  std::size_t dropped = 0;   // removed; the sum of the next three
+  std::size_t repaired = 0;  // kept with changed values; one Gaussian may count in several below
+
+  std::size_t not_finite = 0;  // dropped: NaN or infinite mean, scale, rotation or opacity
+  std::size_t invisible = 0;   // dropped: peak alpha under 1/255, which no pipeline draws
+  std::size_t absurd = 0;      // dropped: beyond any reasonable distance or size
+
+  std::size_t zero_rotations = 0;  // repaired: quaternion 0 became the identity
+  std::size_t clamped = 0;         // repaired: scale or opacity moved into the valid range
+  std::size_t zeroed_sh = 0;       // repaired: NaN or infinite SH coefficients became 0
 };
 
 struct Bounds {

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
+
+namespace catgs {
+
+// Scene files store what training optimises: logits, logarithms, colours as the coefficient of the
+// constant basis function. These are the maps between that and GaussianCloud's plain values.
+
+/// Value of the constant spherical-harmonics basis function, 1 / (2 sqrt(pi)).
+inline constexpr float sh_c0 = 0.28209479177387814f;
+
+inline float sigmoid(float logit) { return 1.0f / (1.0f + std::exp(-logit)); }
+
+/// Inverse of sigmoid; `value` in [0, 1] is kept off the ends so that the result is finite.
+inline float logit(float value) {
+  const double v = std::clamp(static_cast<double>(value), 1e-9, 1.0 - 1e-9);
+  return static_cast<float>(std::log(v / (1.0 - v)));
+}
+
+inline glm::vec3 exp(const glm::vec3& v) { return {std::exp(v.x), std::exp(v.y), std::exp(v.z)}; }
+inline glm::vec3 log(const glm::vec3& v) { return {std::log(v.x), std::log(v.y), std::log(v.z)}; }
+
+/// SH coefficient of a colour component in [0, 1], as far as the constant term goes.
+inline float sh_from_colour(float colour) { return (colour - 0.5f) / sh_c0; }
+inline float colour_from_sh(float sh) { return 0.5f + sh_c0 * sh; }
+
+/// Unit quaternion. Zero and non-finite ones are returned as they are, for `sanitize` to judge.
+inline glm::quat unit(const glm::quat& q) {
+  const float length = std::sqrt(glm::dot(q, q));
+  return length > 0.0f && std::isfinite(length) ? q / length : q;
+}
+
+}  // namespace catgs

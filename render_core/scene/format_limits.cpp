@@ -1,0 +1,24 @@
+#include "render_core/scene/format_limits.h"
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+
+void require_count(const ByteSource& file, std::string_view where, std::uint64_t count) {
+  if (count == 0) throw InputError(file.name(), where, "there are no Gaussians");
+  if (count > max_gaussians)
+    throw InputError(
+        file.name(), where,
+        fmt::format("{} Gaussians announced, at most {} are supported", count, max_gaussians),
+        "the header is wrong, or split the scene");
+}
+
+int sh_degree_of_rest(std::size_t coefficients) {
+  for (int degree = 0; degree <= 4; ++degree)
+    if (coefficients + 1 == static_cast<std::size_t>((degree + 1) * (degree + 1))) return degree;
+  return -1;
+}
+
+}  // namespace catgs

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+#include <span>
+#include <sstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/error.h"
+#include "render_core/scene/byte_source.h"
+#include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/load_context.h"
+
+namespace catgs::test {
+
+/// Values as in a trained capture of about 10 units: log-normal scales, every opacity above 1/255.
+inline GaussianCloud random_cloud(std::size_t count, int sh_degree, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal;
+  std::uniform_real_distribution<float> uniform(0.0f, 1.0f);
+  GaussianCloud cloud;
+  cloud.resize(count, sh_degree);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      cloud.mean[i][k] = 3.0f * normal(random);
+      cloud.scale[i][k] = std::exp(-4.0f + normal(random));
+    }
+    cloud.rotation[i] =
+        glm::normalize(glm::quat(normal(random), normal(random), normal(random), normal(random)));
+    cloud.opacity[i] = 0.01f + 0.98f * uniform(random);
+  }
+  for (std::size_t i = 0; i < cloud.sh.size(); ++i) {
+    const bool constant = i % static_cast<std::size_t>(cloud.sh_count()) == 0;
+    for (int k = 0; k < 3; ++k)
+      cloud.sh[i][k] = constant ? 3.0f * (uniform(random) - 0.5f) : 0.2f * normal(random);
+  }
+  return cloud;
+}
+
+inline std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+inline const LoadContext& two_threads() {
+  static ThreadPool pool(2);
+  static const LoadContext context(pool);
+  return context;
+}
+
+/// Message of the InputError that `call` throws; fails the test when it throws none.
+inline std::string input_error(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  ADD_FAILURE() << "no InputError was thrown";
+  return {};
+}
+
+/// Angle in radians between two orientations, whatever the quaternions' signs.
+inline float angle_between(const glm::quat& a, const glm::quat& b) {
+  const glm::quat d = glm::conjugate(a) * b;
+  return 2.0f * std::atan2(glm::length(glm::vec3(d.x, d.y, d.z)), std::abs(d.w));
+}
+
+/// A folder of its own for each test case, removed afterwards.
+class TemporaryFolder : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() /
+              (std::string("catgs_") + info->test_suite_name() + "_" + info->name() + "_" +
+               std::to_string(std::random_device{}()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path write(const std::string& name, const std::string& content) const {
+    const auto path = folder_ / name;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path, std::ios::binary) << content;
+    return path;
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace catgs::test
