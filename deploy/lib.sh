@@ -199,7 +199,7 @@ ensure_packages() {
     step_done "Packages: all $# present"
     return
   fi
-  if ((EUID != 0)); then
+  if (($(id -u) != 0)); then
     if command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [[ -t 0 ]]; }; then
       root_command=(sudo)
     else
@@ -210,7 +210,7 @@ ensure_packages() {
   echo "To be installed with apt-get:"
   fold -s -w 96 <<<"${missing[*]}" | sed 's/^/    /'
   # The password prompt belongs here, not in the middle of a running counter.
-  if ((EUID != 0)); then
+  if (($(id -u) != 0)); then
     sudo -v
   fi
   step "Install ${#missing[@]} packages" install_packages "${root_command[@]}" -- "${missing[@]}"
@@ -241,8 +241,9 @@ cuda_note=""
 choose_cuda() {
   gpu_name=$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | head -n 1 || true)
   nvcc_path=$(command -v nvcc || true)
-  if [[ -z $nvcc_path && -x /usr/local/cuda/bin/nvcc ]]; then
-    nvcc_path=/usr/local/cuda/bin/nvcc
+  local toolkit_nvcc=${CUDA_HOME:-/usr/local/cuda}/bin/nvcc
+  if [[ -z $nvcc_path && -x $toolkit_nvcc ]]; then
+    nvcc_path=$toolkit_nvcc
   fi
   if [[ -z $gpu_name ]]; then
     cuda_note="no NVIDIA GPU"
