@@ -28,7 +28,9 @@ enum class Pipeline {
 
 enum class PixelFormat {
   rgb_f32,  // one plane, 3 floats a pixel, display-referred, clamped to [0, 1]
-  i420,     // three planes, 8 bit, BT.709 limited range, 4:2:0 (the encoder's food)
+  // Three planes, 8 bit, BT.709 limited range (the encoder's food). 4:2:0 with chroma sited at the
+  // centre of its 2x2 pixels, as in JPEG; H.264 says so by chroma_sample_loc_type 1.
+  i420,
 };
 
 enum class MemorySpace { host, device };
@@ -47,6 +49,7 @@ struct FrameStats {
   std::uint64_t list_entries = 0;        // sum of all tile lists
   std::uint32_t list_max = 0;            // longest tile list
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
+  std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::array<float, stage_count> stage_ms{};
 };
 
@@ -80,7 +83,11 @@ struct RenderStatus {
 struct ViewSettings {
   Pipeline pipeline = Pipeline::exact;
   PixelFormat format = PixelFormat::rgb_f32;
+  bool count_pairs = false;  // fill FrameStats::blended_pairs; slower
 };
+
+/// What every core refuses before it renders: sizes, focal length, near plane or pose out of range.
+RenderStatus check_request(const FrameRequest& request, PixelFormat format);
 
 class View {
  public:

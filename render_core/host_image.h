@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "render_core/renderer.h"
+
+namespace catgs {
+
+/// The output image of a View in host memory. Planes are tightly packed; memory is kept when the
+/// image shrinks.
+class HostImage {
+ public:
+  /// Planes of an image of this size; contents are unspecified. i420 needs even sides.
+  void resize(PixelFormat format, glm::ivec2 size_px);
+
+  [[nodiscard]] PixelFormat format() const { return format_; }
+  [[nodiscard]] glm::ivec2 size_px() const { return size_px_; }
+  [[nodiscard]] const std::array<Plane, 3>& planes() const { return planes_; }
+
+  /// rgb_f32: row `y`, 3 floats a pixel.
+  [[nodiscard]] float* rgb_row(int y) const {
+    return reinterpret_cast<float*>(planes_[0].data + planes_[0].stride_bytes * y);
+  }
+  /// i420: row `y` of a plane; planes 1 and 2 have half the rows and columns.
+  [[nodiscard]] std::uint8_t* byte_row(int plane, int y) const {
+    return reinterpret_cast<std::uint8_t*>(planes_[plane].data + planes_[plane].stride_bytes * y);
+  }
+
+ private:
+  PixelFormat format_ = PixelFormat::rgb_f32;
+  glm::ivec2 size_px_{0};
+  std::vector<std::byte> bytes_;
+  std::array<Plane, 3> planes_{};
+};
+
+}  // namespace catgs

@@ -1,0 +1,68 @@
+#if defined(CATGS_MATH_BLEND_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CATGS_MATH_BLEND_INL_H
+#undef CATGS_MATH_BLEND_INL_H
+#else
+#define CATGS_MATH_BLEND_INL_H
+#endif
+
+#include "render_core/math/constants.h"
+#include "render_core/math/number-inl.h"
+
+CATGS_BEFORE_MATH();
+namespace catgs {
+namespace CATGS_MATH_NAMESPACE {
+
+/// A pixel while Gaussians are blended front to back.
+template <class T>
+struct PixelState {
+  Vec3<T> colour;
+  T transmittance;  // negative: the pixel is finished and its transmittance is the absolute value
+};
+
+template <class T>
+CATGS_HD_INLINE PixelState<T> empty_pixel() {
+  return {{T(0.0), T(0.0), T(0.0)}, T(1.0)};
+}
+
+/// Whether a contribution of alpha = 2^exponent is at least alpha_min.
+template <class T>
+CATGS_HD_INLINE auto contributes(T exponent) {
+  return exponent >= T(log2_alpha_min);
+}
+
+/// Blends one Gaussian with alpha = min(alpha_max, 2^exponent) over what lies behind, where it
+/// contributes and the pixel is not finished. A pixel that it would take below transmittance_min
+/// is finished without it. Returns the pixels finished now.
+template <class T>
+CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colour) {
+  const T alpha = min(T(alpha_max), exp2_of_alpha(exponent));
+  const T weight = alpha * pixel.transmittance;
+  const T behind = pixel.transmittance - weight;
+  const auto live = contributes(exponent) & (pixel.transmittance > T(0.0));
+  const auto enough = behind >= T(transmittance_min);
+  const auto blended = live & enough;
+  const auto finished = and_not(enough, live);
+  const T used = select(blended, weight, T(0.0));
+  pixel.colour.x = mul_add(used, colour.x, pixel.colour.x);
+  pixel.colour.y = mul_add(used, colour.y, pixel.colour.y);
+  pixel.colour.z = mul_add(used, colour.z, pixel.colour.z);
+  pixel.transmittance =
+      select(finished, -pixel.transmittance, select(blended, behind, pixel.transmittance));
+  return finished;
+}
+
+/// The pixel over its background, clamped to what a display can show.
+template <class T>
+CATGS_HD_INLINE Vec3<T> resolve(const PixelState<T>& pixel, const Vec3<T>& background) {
+  const T rest = abs(pixel.transmittance);
+  const T zero = T(0.0), one = T(1.0);
+  return {clamp(mul_add(rest, background.x, pixel.colour.x), zero, one),
+          clamp(mul_add(rest, background.y, pixel.colour.y), zero, one),
+          clamp(mul_add(rest, background.z, pixel.colour.z), zero, one)};
+}
+
+}  // namespace CATGS_MATH_NAMESPACE
+}  // namespace catgs
+CATGS_AFTER_MATH();
+
+#endif

@@ -1,0 +1,74 @@
+#if defined(CATGS_MATH_CAMERA_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CATGS_MATH_CAMERA_INL_H
+#undef CATGS_MATH_CAMERA_INL_H
+#else
+#define CATGS_MATH_CAMERA_INL_H
+#endif
+
+#include "render_core/camera.h"
+#include "render_core/math/constants.h"
+#include "render_core/math/number-inl.h"
+
+CATGS_BEFORE_MATH();
+namespace catgs {
+namespace CATGS_MATH_NAMESPACE {
+
+/// A Camera unfolded for projection. Rows of camera_from_world are camera axes in the world.
+template <class T>
+struct CameraModel {
+  Vec3<T> position;  // world
+  Vec3<T> right, down, forward;
+  Vec2<T> focal_px, principal_point_px;
+  T near_z;
+  // Range of x/z and y/z in which the projection is linearised (fov_clamp).
+  Vec2<T> slope_min, slope_max;
+};
+
+/// Built in double so that every core starts from the same numbers.
+inline CameraModel<double> make_camera_model(const Camera& camera) {
+  const glm::dquat q = glm::normalize(glm::dquat(camera.world_from_camera.orientation));
+  const glm::dmat3 world_from_camera = glm::mat3_cast(q);
+  const auto vec3 = [](const glm::dvec3& v) { return Vec3<double>{v.x, v.y, v.z}; };
+  const glm::dvec2 focal(camera.focal_px);
+  const glm::dvec2 centre(camera.principal_point_px);
+  const glm::dvec2 size(camera.size_px);
+  // With a centred principal point this is +-1.3 tan(fov / 2); else the same margin on both sides.
+  const glm::dvec2 margin = (fov_clamp - 1.0) * 0.5 * size / focal;
+  const glm::dvec2 low = -centre / focal - margin;
+  const glm::dvec2 high = (size - centre) / focal + margin;
+  return {vec3(glm::dvec3(camera.world_from_camera.position)),
+          vec3(world_from_camera[0]),
+          vec3(world_from_camera[1]),
+          vec3(world_from_camera[2]),
+          {focal.x, focal.y},
+          {centre.x, centre.y},
+          static_cast<double>(camera.near_z),
+          {low.x, low.y},
+          {high.x, high.y}};
+}
+
+template <class T, class S>
+CATGS_HD_INLINE CameraModel<T> convert(const CameraModel<S>& c) {
+  return {convert<T>(c.position),
+          convert<T>(c.right),
+          convert<T>(c.down),
+          convert<T>(c.forward),
+          convert<T>(c.focal_px),
+          convert<T>(c.principal_point_px),
+          T(c.near_z),
+          convert<T>(c.slope_min),
+          convert<T>(c.slope_max)};
+}
+
+/// Distance along the view axis, world units. Evaluated in double by every core and then rounded
+/// to float: blending order is decided by this number, and so it is the same everywhere.
+template <class T>
+CATGS_HD_INLINE T view_depth(const CameraModel<T>& camera, const Vec3<T>& mean) {
+  return dot(camera.forward, mean - camera.position);
+}
+
+}  // namespace CATGS_MATH_NAMESPACE
+}  // namespace catgs
+CATGS_AFTER_MATH();
+
+#endif

@@ -1,0 +1,33 @@
+#pragma once
+
+// The numbers that define what a frame must look like (Kerbl et al. 2023 and its reference
+// implementation), each with its reason. Doubles: every core rounds them to its own precision.
+
+namespace catgs {
+
+/// Contributions below one step of an 8-bit image are skipped. This also bounds every splat.
+inline constexpr double alpha_min = 1.0 / 255.0;
+inline constexpr double log2_alpha_min = -7.994353436858858;  // log2(1/255)
+
+/// No single splat is fully opaque, so that transmittance stays positive and training has a
+/// gradient behind every splat.
+inline constexpr double alpha_max = 0.99;
+
+/// A pixel is finished before its transmittance would fall below this.
+inline constexpr double transmittance_min = 1e-4;
+
+/// Added to both variances of a projected Gaussian, in px^2: keeps a splat about a pixel wide, so
+/// that it cannot slip between pixel centres.
+inline constexpr double low_pass_px2 = 0.3;
+
+/// The projection is linearised at the centre, clamped to this multiple of the half field of view:
+/// farther out the linearisation is meaningless and footprints explode.
+inline constexpr double fov_clamp = 1.3;
+
+/// sqrt(log2(e) / 2): exp(-q^2 / 2) = exp2(-(exponent_scale q)^2).
+inline constexpr double exponent_scale = 0.8493218002880191;
+
+/// Side of the square tiles that pixels are binned into.
+inline constexpr int tile_size_px = 16;
+
+}  // namespace catgs

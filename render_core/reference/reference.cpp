@@ -1,0 +1,225 @@
+#include "render_core/reference/reference.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "render_core/host_image.h"
+#include "render_core/math/blend-inl.h"
+#include "render_core/math/camera-inl.h"
+#include "render_core/math/colour-inl.h"
+#include "render_core/math/ellipse-inl.h"
+#include "render_core/math/projection-inl.h"
+#include "render_core/math/spherical_harmonics-inl.h"
+
+namespace catgs {
+namespace {
+
+/// A Gaussian in the image plane.
+struct Splat {
+  float depth;  // decides the order: rounded to float as in every core
+  math::Vec2<double> centre_px;
+  math::Whitening<double> whitening;
+  double log2_opacity;
+  double reach;
+  math::Vec3<double> colour;
+};
+
+math::Vec3<double> to_vec3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
+math::Vec3<double> shade(const GaussianCloud& cloud, std::size_t i,
+                         const math::Vec3<double>& camera_position) {
+  double basis[16];
+  math::sh_basis(math::view_direction(camera_position, to_vec3(cloud.mean[i])), cloud.sh_degree,
+                 basis);
+  glm::dvec3 sum(0.0);
+  for (int k = 0; k < cloud.sh_count(); ++k) sum += basis[k] * glm::dvec3(cloud.sh_of(i)[k]);
+  return {math::colour_from_sh_sum(sum.x), math::colour_from_sh_sum(sum.y),
+          math::colour_from_sh_sum(sum.z)};
+}
+
+/// Every Gaussian in front of the near plane that can reach alpha_min, front to back; equal depths
+/// keep the order of the scene.
+std::vector<Splat> project_all(const GaussianCloud& cloud, const Camera& request_camera) {
+  const auto camera = math::make_camera_model(request_camera);
+  std::vector<Splat> splats;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const auto mean = to_vec3(cloud.mean[i]);
+    const double depth = math::view_depth(camera, mean);
+    Splat splat;
+    splat.depth = static_cast<float>(depth);
+    splat.log2_opacity = std::log2(static_cast<double>(cloud.opacity[i]));
+    splat.reach = math::reach_of(splat.log2_opacity);
+    if (!(splat.depth > request_camera.near_z) || !(splat.reach >= 0.0)) continue;
+    const glm::quat& q = cloud.rotation[i];
+    const double rotation[4] = {q.x, q.y, q.z, q.w};
+    const auto factor = math::covariance_factor(rotation, to_vec3(cloud.scale[i]));
+    const auto projected = math::project(camera, mean, factor, depth);
+    splat.centre_px = projected.centre_px;
+    splat.whitening = math::whitening(projected);
+    splat.colour = shade(cloud, i, camera.position);
+    splats.push_back(splat);
+  }
+  std::ranges::stable_sort(splats, {}, &Splat::depth);
+  return splats;
+}
+
+glm::dvec3 render_pixel(std::span<const Splat> splats, glm::ivec2 pixel_px,
+                        const glm::vec3& background, std::uint64_t& pairs) {
+  auto pixel = math::empty_pixel<double>();
+  const math::Vec2<double> p{pixel_px.x + 0.5, pixel_px.y + 0.5};
+  for (const Splat& splat : splats) {
+    const double square =
+        math::whitened_square(splat.whitening, {p.x - splat.centre_px.x, p.y - splat.centre_px.y});
+    if (square > splat.reach) continue;
+    if (math::blend(pixel, splat.log2_opacity - square, splat.colour)) break;
+    ++pairs;
+  }
+  const auto colour = math::resolve(pixel, to_vec3(background));
+  return {colour.x, colour.y, colour.z};
+}
+
+void convert_to_i420(const std::vector<glm::dvec3>& rgb, const HostImage& image) {
+  const glm::ivec2 size = image.size_px();
+  const auto code = [](double v) { return static_cast<std::uint8_t>(std::lround(v)); };
+  const auto at = [&](int x, int y) { return rgb[static_cast<std::size_t>(y) * size.x + x]; };
+  for (int y = 0; y < size.y; ++y) {
+    for (int x = 0; x < size.x; ++x) {
+      const glm::dvec3 c = at(x, y);
+      image.byte_row(0, y)[x] = code(math::luma_code(math::Vec3<double>{c.x, c.y, c.z}));
+      if (x % 2 != 0 || y % 2 != 0) continue;
+      const glm::dvec3 mean = 0.25 * (c + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1));
+      const auto chroma = math::chroma_codes(math::Vec3<double>{mean.x, mean.y, mean.z});
+      image.byte_row(1, y / 2)[x / 2] = code(chroma.x);
+      image.byte_row(2, y / 2)[x / 2] = code(chroma.y);
+    }
+  }
+}
+
+struct PixelColours {
+  std::vector<glm::dvec3> colours;
+  FrameStats stats;
+};
+
+PixelColours render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
+                           std::span<const glm::ivec2> pixels, ThreadPool& pool) {
+  using Clock = std::chrono::steady_clock;
+  const auto ms_since = [](Clock::time_point start) {
+    return std::chrono::duration<float, std::milli>(Clock::now() - start).count();
+  };
+  PixelColours out;
+  const auto start = Clock::now();
+  const std::vector<Splat> splats = project_all(cloud, request.camera);
+  out.stats.visible = static_cast<std::uint32_t>(splats.size());
+  out.stats.stage_ms[static_cast<std::size_t>(Stage::project)] = ms_since(start);
+
+  const auto blend_start = Clock::now();
+  constexpr std::size_t run = 64;  // pixels a task takes
+  out.colours.resize(pixels.size());
+  std::atomic<std::uint64_t> pairs{0};
+  pool.parallel_for((pixels.size() + run - 1) / run, [&](std::size_t task) {
+    std::uint64_t blended = 0;
+    for (std::size_t i = task * run; i < std::min(pixels.size(), (task + 1) * run); ++i)
+      out.colours[i] = render_pixel(splats, pixels[i], request.background, blended);
+    pairs += blended;
+  });
+  out.stats.blended_pairs = pairs;
+  out.stats.stage_ms[static_cast<std::size_t>(Stage::blend)] = ms_since(blend_start);
+  return out;
+}
+
+class ReferenceView final : public View {
+ public:
+  ReferenceView(std::shared_ptr<const GaussianCloud> cloud, std::shared_ptr<ThreadPool> pool,
+                const ViewSettings& settings)
+      : cloud_(std::move(cloud)), pool_(std::move(pool)), settings_(settings) {}
+
+  RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
+    RenderStatus status = check_request(request, settings_.format);
+    if (!status.ok()) return status;
+    try {
+      return render_checked(request, frame);
+    } catch (const std::bad_alloc&) {
+      return {RenderStatus::Code::out_of_memory, "reference: no memory for the frame"};
+    }
+  }
+
+ private:
+  RenderStatus render_checked(const FrameRequest& request, FrameView& frame) {
+    const glm::ivec2 size = request.camera.size_px;
+    std::vector<glm::ivec2> pixels;
+    for (int y = 0; y < size.y; ++y)
+      for (int x = 0; x < size.x; ++x) pixels.emplace_back(x, y);
+    const PixelColours image = render_pixels(*cloud_, request, pixels, *pool_);
+
+    image_.resize(settings_.format, size);
+    if (settings_.format == PixelFormat::i420) {
+      convert_to_i420(image.colours, image_);
+    } else {
+      for (std::size_t i = 0; i < pixels.size(); ++i)
+        for (int c = 0; c < 3; ++c)
+          image_.rgb_row(pixels[i].y)[pixels[i].x * 3 + c] =
+              static_cast<float>(image.colours[i][c]);
+    }
+    frame = {settings_.format, MemorySpace::host, size, image_.planes(), image.stats};
+    return {};
+  }
+
+  std::shared_ptr<const GaussianCloud> cloud_;
+  std::shared_ptr<ThreadPool> pool_;
+  ViewSettings settings_;
+  HostImage image_;
+};
+
+class ReferenceRenderer final : public Renderer {
+ public:
+  ReferenceRenderer(std::shared_ptr<const GaussianCloud> cloud, std::shared_ptr<ThreadPool> pool)
+      : cloud_(std::move(cloud)), pool_(std::move(pool)) {}
+
+  std::string description() const override {
+    return "reference, double precision, " + std::to_string(pool_->threads()) + " threads";
+  }
+  std::size_t scene_bytes() const override { return cloud_->bytes(); }
+  std::unique_ptr<View> make_view(const ViewSettings& settings) override {
+    return std::make_unique<ReferenceView>(cloud_, pool_, settings);
+  }
+
+ private:
+  std::shared_ptr<const GaussianCloud> cloud_;
+  std::shared_ptr<ThreadPool> pool_;
+};
+
+}  // namespace
+
+std::vector<glm::dvec3> render_reference_pixels(const GaussianCloud& cloud,
+                                                const FrameRequest& request,
+                                                std::span<const glm::ivec2> pixels,
+                                                ThreadPool& pool) {
+  return render_pixels(cloud, request, pixels, pool).colours;
+}
+
+std::vector<glm::ivec2> random_pixels(glm::ivec2 size_px, std::size_t count, std::uint64_t seed) {
+  // Selection sampling (Knuth, TAOCP 3.4.2, algorithm S).
+  std::mt19937_64 random(seed);
+  std::vector<glm::ivec2> pixels;
+  std::size_t left = static_cast<std::size_t>(size_px.x) * static_cast<std::size_t>(size_px.y);
+  std::size_t wanted = std::min(count, left);
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < size_px.x && wanted > 0; ++x, --left) {
+      if (random() % left >= wanted) continue;
+      pixels.emplace_back(x, y);
+      --wanted;
+    }
+  }
+  return pixels;
+}
+
+std::unique_ptr<Renderer> make_reference_renderer(std::shared_ptr<const GaussianCloud> cloud,
+                                                  std::shared_ptr<ThreadPool> pool) {
+  return std::make_unique<ReferenceRenderer>(std::move(cloud), std::move(pool));
+}
+
+}  // namespace catgs
