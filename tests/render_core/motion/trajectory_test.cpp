@@ -1,0 +1,131 @@
+#include "render_core/motion/trajectory.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+class TumFile : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& text) const {
+    std::ofstream(path_, std::ios::binary) << text;
+    return path_;
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+
+  std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() /
+      (std::string("catgs_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+       ".tum");
+};
+
+TEST_F(TumFile, ReadsCommentsBlankLinesAndAnyWhiteSpace) {
+  const Trajectory trajectory =
+      read_tum(write("# timestamp tx ty tz qx qy qz qw\r\n\n"
+                     "0.5 1 2 3 0 0 0 1\n"
+                     "\t1.25  -1e-1 2 3   0 0.70710678 0 0.70710678  # turned\r\n"
+                     "1403636580.838555 0 0 0 0 0 0 1"));
+  ASSERT_EQ(trajectory.size(), 3u);
+  EXPECT_EQ(trajectory[0].time_us, 500'000);
+  EXPECT_EQ(trajectory[0].world_from_camera.position, glm::vec3(1, 2, 3));
+  EXPECT_FLOAT_EQ(trajectory[1].world_from_camera.position.x, -0.1f);
+  EXPECT_FLOAT_EQ(trajectory[1].world_from_camera.orientation.y, std::sqrt(0.5f));
+  EXPECT_EQ(trajectory[2].time_us, 1'403'636'580'838'555);
+}
+
+TEST_F(TumFile, NormalisesQuaternions) {
+  const Trajectory trajectory = read_tum(write("0 0 0 0 0.03 0 0 1.05\n"));
+  EXPECT_NEAR(glm::length(trajectory[0].world_from_camera.orientation), 1.0f, 1e-6f);
+}
+
+TEST_F(TumFile, ErrorsNameTheLine) {
+  const auto error_of = [&](const std::string& text) {
+    const auto path = write(text);
+    try {
+      read_tum(path);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  const std::string good = "0 0 0 0 0 0 0 1\n";
+  EXPECT_THAT(error_of(good + "1 0 0 0 0 0 1\n"), HasSubstr("line 2: 7 numbers instead of 8"));
+  EXPECT_THAT(error_of(good + "1 0 0 0 0 0 0 1 9\n"), HasSubstr("line 2: more than 8 numbers"));
+  EXPECT_THAT(error_of(good + "1 0 0 x 0 0 0 1\n"), HasSubstr("line 2: \"x\" is not a number"));
+  EXPECT_THAT(error_of("1 0 0 nan 0 0 0 1\n"), HasSubstr("line 1: \"nan\" is not a number"));
+  EXPECT_THAT(error_of("1 0 0 1e999 0 0 0 1\n"), HasSubstr("line 1: \"1e999\" is not a number"));
+  EXPECT_THAT(error_of("1 0 0 0 0 0 0 0\n"), HasSubstr("line 1: the quaternion has norm 0"));
+  EXPECT_THAT(error_of("1 0 0 0 1 1 1 1\n"), HasSubstr("line 1: the quaternion has norm 2"));
+  EXPECT_THAT(error_of(good + "\n" + good), HasSubstr("line 3: the time stamp does not increase"));
+  EXPECT_THAT(error_of("1e300 0 0 0 0 0 0 1\n"),
+              HasSubstr("line 1: the time stamp is out of range"));
+  EXPECT_THAT(error_of(good + std::string(5000, ' ')), HasSubstr("line 2: longer than 1023 bytes"));
+  EXPECT_THAT(error_of("# nothing\n"), HasSubstr("holds no pose"));
+  EXPECT_THAT([] { read_tum("/nonexistent/file.tum"); },
+              ThrowsMessage<InputError>(HasSubstr("/nonexistent/file.tum: cannot be opened")));
+}
+
+TEST_F(TumFile, RoundTripIsExact) {
+  Trajectory written;
+  for (int i = 0; i < 100; ++i) {
+    const float x = 0.1f * static_cast<float>(i) + 1e-7f;
+    written.push_back(
+        {i * 8'333, {glm::vec3(x, -x, x * x), glm::angleAxis(x, glm::vec3(0, 1, 0))}});
+  }
+  write_tum(path_, written);
+  const Trajectory read = read_tum(path_);
+  ASSERT_EQ(read.size(), written.size());
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].time_us, written[i].time_us);
+    EXPECT_EQ(read[i].world_from_camera.position, written[i].world_from_camera.position);
+    EXPECT_GT(
+        glm::dot(read[i].world_from_camera.orientation, written[i].world_from_camera.orientation),
+        1.0f - 1e-6f);
+  }
+}
+
+TEST(SharedTraces, AllAreRead) {
+  const char* shared = std::getenv("CATGS_SHARED_DIR");
+  const std::filesystem::path traces =
+      (shared != nullptr ? std::filesystem::path(shared)
+                         : std::filesystem::path(CATGS_SOURCE_DIR).parent_path() / "shared") /
+      "traces";
+  if (!std::filesystem::is_directory(traces)) GTEST_SKIP() << traces << " is not there";
+  int files = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(traces)) {
+    if (entry.path().extension() != ".tum") continue;
+    EXPECT_GE(read_tum(entry.path()).size(), 1000u) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 1);
+}
+
+TEST(Interpolate, IsLinearAndTakesTheShortWayAndClamps) {
+  const glm::quat start(1, 0, 0, 0);
+  const glm::quat turned = glm::angleAxis(0.8f, glm::vec3(0, 1, 0));
+  const Trajectory trajectory = {{100, {glm::vec3(0), start}},
+                                 {300, {glm::vec3(2, 0, 4), -turned}}};
+  const Pose middle = interpolate(trajectory, 200);
+  EXPECT_EQ(middle.position, glm::vec3(1, 0, 2));
+  const glm::quat expected = glm::angleAxis(0.4f, glm::vec3(0, 1, 0));
+  EXPECT_NEAR(std::abs(glm::dot(middle.orientation, expected)), 1.0f, 1e-6f);
+  EXPECT_EQ(interpolate(trajectory, 0).position, glm::vec3(0));
+  EXPECT_EQ(interpolate(trajectory, 100).position, glm::vec3(0));
+  EXPECT_EQ(interpolate(trajectory, 300).position, glm::vec3(2, 0, 4));
+  EXPECT_EQ(interpolate(trajectory, 900).position, glm::vec3(2, 0, 4));
+  EXPECT_THROW(interpolate({}, 0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace catgs
