@@ -60,9 +60,11 @@ class Encoder {
   virtual EncodeStatus encode(const FrameView& frame, bool force_idr,
                               EncodedFrame& out) noexcept = 0;
 
-  /// Takes effect with the next frame, without an IDR. Clamped to 100 kbit/s and to what the level
-  /// of the running stream allows (h264: at least the bitrate it was opened with).
-  virtual void set_bitrate(int bitrate_kbps) noexcept = 0;
+  /// From the next frame on, without an IDR: frames of at most bitrate / fps. `fps` is the rate
+  /// that the session really reaches, 1…settings.fps; the slower it runs, the more bits a frame
+  /// gets. The bitrate is clamped to 100 kbit/s and to what the level of the running stream allows
+  /// (h264: at least the bitrate it was opened with).
+  virtual void set_rate(int bitrate_kbps, int fps) noexcept = 0;
 
   [[nodiscard]] virtual Codec codec() const = 0;
   [[nodiscard]] virtual std::string_view name() const = 0;  // "libx264", "mjpeg", "h264_nvenc"

@@ -17,14 +17,18 @@ namespace catgs {
 
 namespace {
 
-/// One frame interval of the bitrate: no frame may take longer on a link of that rate. Rounded up
-/// to whole kbit, the unit in which libavcodec hands it to x264.
-int one_frame_vbv_bits(int bitrate_kbps, int fps) { return (bitrate_kbps + fps - 1) / fps * 1000; }
-
-void apply_bitrate(AVCodecContext& context, int bitrate_kbps, int fps) {
-  context.bit_rate = std::int64_t{bitrate_kbps} * 1000;
+/// A VBV of one frame interval: no frame may take longer on a link of this bitrate. The encoder
+/// counts time by the nominal rate it was opened with; a session that runs slower than that gets a
+/// higher bitrate per nominal second instead, for the same bits per real one.
+void apply_rate(AVCodecContext& context, int bitrate_kbps, int fps) {
+  // libavcodec hands whole kbit to x264: round up, a VBV of 0 would mean none.
+  const std::int64_t frame_kbit = (bitrate_kbps + fps - 1) / fps;
+  const std::int64_t nominal_kbps =
+      std::min<std::int64_t>(std::int64_t{bitrate_kbps} * context.framerate.num / fps,
+                             2'000'000);  // the most that x264 accepts
+  context.bit_rate = nominal_kbps * 1000;
   context.rc_max_rate = context.bit_rate;
-  context.rc_buffer_size = one_frame_vbv_bits(bitrate_kbps, fps);
+  context.rc_buffer_size = static_cast<int>(frame_kbit * 1000);
 }
 
 /// What every H.264 encoder is told, whoever makes it.
@@ -46,7 +50,7 @@ void apply_common(AVCodecContext& context, const EncoderSettings& settings, int 
   // Parameter sets come with the open encoder instead of inside its packets: they are then known,
   // and corrected, before the first frame.
   context.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  apply_bitrate(context, settings.bitrate_kbps, settings.fps);
+  apply_rate(context, settings.bitrate_kbps, settings.fps);
 }
 
 void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) {
@@ -85,7 +89,6 @@ class LibavH264Encoder final : public Encoder {
         input_(libav::make_frame()),
         packet_(libav::make_packet()),
         size_px_(settings.size_px),
-        fps_(settings.fps),
         max_bitrate_kbps_(h264::level_max_bitrate_kbps(level_idc).value()) {
     parameter_sets_ = read_parameter_sets(*context_, context_->codec->name, codec_string_);
   }
@@ -104,8 +107,9 @@ class LibavH264Encoder final : public Encoder {
     }
   }
 
-  void set_bitrate(int bitrate_kbps) noexcept override {
-    apply_bitrate(*context_, std::clamp(bitrate_kbps, min_bitrate_kbps, max_bitrate_kbps_), fps_);
+  void set_rate(int bitrate_kbps, int fps) noexcept override {
+    apply_rate(*context_, std::clamp(bitrate_kbps, min_bitrate_kbps, max_bitrate_kbps_),
+               std::clamp(fps, 1, context_->framerate.num));
   }
 
   [[nodiscard]] Codec codec() const override { return Codec::h264; }
@@ -152,7 +156,6 @@ class LibavH264Encoder final : public Encoder {
   libav::Frame input_;
   libav::Packet packet_;
   glm::ivec2 size_px_;
-  int fps_;
   int max_bitrate_kbps_;  // of the level that the SPS names
   std::int64_t next_pts_ = 0;
   std::string codec_string_;

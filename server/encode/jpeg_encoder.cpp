@@ -23,8 +23,8 @@ class LibavJpegEncoder final : public Encoder {
         input_(libav::make_frame()),
         packet_(libav::make_packet()),
         size_px_(settings.size_px),
-        rate_(settings.bitrate_kbps, settings.fps,
-              static_cast<std::size_t>(size_px_.x) * static_cast<std::size_t>(size_px_.y)) {
+        rate_(static_cast<std::size_t>(size_px_.x) * static_cast<std::size_t>(size_px_.y)) {
+    rate_.set_budget(settings.bitrate_kbps, settings.fps);
     input_->format = context_->pix_fmt;
     input_->width = size_px_.x;
     input_->height = size_px_.y;
@@ -44,8 +44,9 @@ class LibavJpegEncoder final : public Encoder {
     }
   }
 
-  void set_bitrate(int bitrate_kbps) noexcept override {
-    rate_.set_bitrate(std::clamp(bitrate_kbps, min_bitrate_kbps, max_bitrate_kbps));
+  void set_rate(int bitrate_kbps, int fps) noexcept override {
+    rate_.set_budget(std::clamp(bitrate_kbps, min_bitrate_kbps, max_bitrate_kbps),
+                     std::clamp(fps, 1, context_->time_base.den));
   }
 
   [[nodiscard]] Codec codec() const override { return Codec::mjpeg; }

@@ -9,19 +9,19 @@ namespace catgs {
 /// between neighbouring frames (the exponent was fitted on rendered scenes).
 class JpegRateControl {
  public:
-  static constexpr double finest_qscale = 2;
-  static constexpr double coarsest_qscale = 31;
+  static constexpr int finest_qscale = 2;
+  static constexpr int coarsest_qscale = 31;
 
-  JpegRateControl(int bitrate_kbps, int fps, std::size_t pixels);
+  /// `pixels` of a frame; set the budget before the first qscale().
+  explicit JpegRateControl(std::size_t pixels);
 
-  void set_bitrate(int bitrate_kbps);
-  /// Told after every frame: how large it became with this qscale().
-  void update(int qscale, std::size_t bytes);
+  void set_budget(int bitrate_kbps, int fps);
   /// libavcodec's quantiser scale for the next frame.
   [[nodiscard]] int qscale() const;
+  /// Told after every frame: how large it became.
+  void update(int qscale, std::size_t bytes);
 
  private:
-  int fps_;
   double budget_bytes_ = 0;
   double complexity_;  // forecast of bytes x qscale^0.7
 };
