@@ -96,7 +96,7 @@ check_system() {
   printf 'distribution: %s\ncores: %s\nCUDA: %s (%s)\n' "$distribution" "$(nproc)" \
     "$cuda_choice" "$cuda_note"
   df -h "$SOURCE_DIR"
-  free -h
+  grep -E "^Mem(Total|Available):" /proc/meminfo
 }
 
 make_demo_scene() {
