@@ -210,7 +210,7 @@ main() {
   steps_begin $((6 + lan)) "$log"
   step "System: $distribution, $(nproc) cores, $cuda_note" check_system
   ensure_packages "${build_packages[@]}"
-  configure_build run "-DCATGS_CUDA=$cuda_choice"
+  configure_build run "-DCATGS_CUDA=$cuda_choice" -DCMAKE_CUDA_ARCHITECTURES=native
   build_all run "Build server, tools and client"
   ensure_scene
   if ((lan)); then
