@@ -30,4 +30,7 @@ inline bool is_quiet(const CLI::App& command) {
   return app->get_option("--quiet")->count() > 0;
 }
 
+void add_compare_command(CLI::App& app);
+void add_trace_command(CLI::App& app);
+
 }  // namespace catgs

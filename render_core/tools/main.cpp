@@ -20,6 +20,9 @@ int run(int argc, char** argv) {
   app.add_flag("-q,--quiet", quiet, "No progress on the terminal");
   app.footer("Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal.");
 
+  add_compare_command(app);
+  add_trace_command(app);
+
   try {
     app.parse(argc, argv);
     return 0;

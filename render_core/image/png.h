@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+
+#include "render_core/image/image.h"
+#include "render_core/renderer.h"
+
+namespace catgs {
+
+/// Reads a PNG of up to max_image_side_px per side, any bit depth; alpha is composed over black.
+/// Throws InputError.
+Image read_png(const std::filesystem::path& path);
+
+/// Writes 8 bits per channel, rounded to nearest. Throws InputError when the file cannot be
+/// written.
+void write_png(const std::filesystem::path& path, const Image& image);
+
+/// Copies a finished rgb_f32 frame out of its View.
+Image copy_image(const FrameView& frame);
+
+}  // namespace catgs

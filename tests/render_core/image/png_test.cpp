@@ -1,0 +1,76 @@
+#include "render_core/image/png.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/error.h"
+#include "render_core/host_image.h"
+
+namespace catgs {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+class Png : public ::testing::Test {
+ protected:
+  void TearDown() override { std::filesystem::remove(path_); }
+  std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() /
+      (std::string("catgs_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+       ".png");
+};
+
+Image ramp(int width, int height) {
+  Image image{{width, height}, {}};
+  for (int i = 0; i < width * height * 3; ++i) {
+    image.rgb.push_back(static_cast<float>(i * 7 % 256) / 255.0f);
+  }
+  return image;
+}
+
+TEST_F(Png, KeepsEveryByteValue) {
+  const Image image = ramp(37, 21);
+  write_png(path_, image);
+  const Image read = read_png(path_);
+  EXPECT_EQ(read.size_px, image.size_px);
+  EXPECT_EQ(read.rgb, image.rgb);
+}
+
+TEST_F(Png, RoundsAndClamps) {
+  write_png(path_, {{2, 1}, {-1.0f, 0.5f, 2.0f, 0.49f / 255.0f, 0.51f / 255.0f, 1.0f}});
+  const std::vector<float> expected = {0, 128.0f / 255.0f, 1, 0, 1.0f / 255.0f, 1};
+  EXPECT_EQ(read_png(path_).rgb, expected);
+}
+
+TEST_F(Png, RefusesWhatIsNoPicture) {
+  EXPECT_THAT([&] { read_png(path_); }, ThrowsMessage<InputError>(HasSubstr(path_.string())));
+  std::ofstream(path_) << "no picture";
+  EXPECT_THAT([&] { read_png(path_); },
+              ThrowsMessage<InputError>(HasSubstr("a PNG picture is expected")));
+  write_png(path_, ramp(200, 100));
+  std::filesystem::resize_file(path_, std::filesystem::file_size(path_) / 2);
+  EXPECT_THROW(read_png(path_), InputError);
+  write_png(path_, ramp(max_image_side_px + 1, 1));
+  EXPECT_THAT([&] { read_png(path_); }, ThrowsMessage<InputError>(HasSubstr("at most 8192")));
+  EXPECT_THROW(write_png("/nonexistent/folder/a.png", ramp(1, 1)), InputError);
+}
+
+TEST(CopyImage, FollowsTheStride) {
+  const std::vector<float> pixels = {1, 2, 3, 4, 5, 6, -1, -1, 7, 8, 9, 10, 11, 12, -1, -1};
+  FrameView frame;
+  frame.size_px = {2, 2};
+  frame.planes[0] = {reinterpret_cast<std::byte*>(const_cast<float*>(pixels.data())),
+                     8 * sizeof(float)};
+  const std::vector<float> expected = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+  EXPECT_EQ(copy_image(frame).rgb, expected);
+  frame.format = PixelFormat::i420;
+  EXPECT_THROW(copy_image(frame), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace catgs
