@@ -210,7 +210,11 @@ main() {
   steps_begin $((6 + lan)) "$log"
   step "System: $distribution, $(nproc) cores, $cuda_note" check_system
   ensure_packages "${build_packages[@]}"
-  configure_build run "-DCATGS_CUDA=$cuda_choice" -DCMAKE_CUDA_ARCHITECTURES=native
+  local -a cuda_options=("-DCATGS_CUDA=$cuda_choice")
+  if [[ $cuda_choice == ON ]]; then
+    cuda_options+=(-DCMAKE_CUDA_ARCHITECTURES=native)
+  fi
+  configure_build run "${cuda_options[@]}"
   build_all run "Build server, tools and client"
   ensure_scene
   if ((lan)); then

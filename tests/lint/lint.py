@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Checks that hold for every source file; each subcommand is one CTest test.
 
-  lint.py rules              layering of includes, file length, marker words, include guards
+  lint.py rules              layering of includes, file length, marker words, include guards,
+                             links between documents
   lint.py shell              shellcheck over every script
   lint.py format             clang-format 14, the version whose output .clang-format was tuned for
   lint.py tidy --build DIR   clang-tidy 14 with DIR/compile_commands.json
@@ -67,6 +68,7 @@ LONGER_FILES: dict[str, int] = {}
 MARKER_WORDS = re.compile(r"\b(" + "|".join(a + b for a, b in
                                            [("TO", "DO"), ("FIX", "ME"), ("XX", "X"), ("HA", "CK")]) + r")\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+MARKDOWN_LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)")
 IMPORT = re.compile(r"""(?:\bfrom\s+|\bimport\s+|\bimport\()['"]([^'"]+)['"]""")
 
 
@@ -94,7 +96,8 @@ def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
         yield f"{path}:{len(lines)}: {len(lines)} lines, the limit is {limit}: split the file"
     if path in LONGER_FILES and len(lines) <= MAX_LINES:
         yield f"{path}:1: fits {MAX_LINES} lines again: take it out of LONGER_FILES"
-    if re.search(r"\.(h|cuh)$", path) and "#pragma once" not in lines:
+    # Highway includes its *-inl.h once per instruction set.
+    if re.search(r"(?<!-inl)\.(h|cuh)$", path) and "#pragma once" not in lines:
         yield f"{path}:1: no #pragma once"
     pattern, rules = (IMPORT, IMPORT_RULES) if path.endswith(".ts") else (INCLUDE, INCLUDE_RULES)
     rules = [rule for rule in rules if re.search(rule.where, path)]
@@ -107,10 +110,22 @@ def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
                 yield f"{path}:{number}: includes {target.group(1)}: {rule.reason}"
 
 
+def link_findings(root: pathlib.Path, path: str, lines: list[str]) -> Iterator[str]:
+    """Links of a Markdown file that lead to no file, as 'file:line: text'."""
+    for number, line in enumerate(lines, start=1):
+        for target in MARKDOWN_LINK.findall(line):
+            if not (root / path).parent.joinpath(target).exists():
+                yield f"{path}:{number}: links to {target}, which does not exist"
+
+
 def check_rules(root: pathlib.Path) -> int:
-    findings = [finding
-                for path in source_files(root) if SOURCE.search(path) or is_shell(root, path)
-                for finding in rule_findings(path, (root / path).read_text("utf-8").splitlines())]
+    findings = []
+    for path in source_files(root):
+        is_document = path.endswith(".md")
+        if not is_document and not SOURCE.search(path) and not is_shell(root, path):
+            continue
+        lines = (root / path).read_text("utf-8").splitlines()
+        findings += link_findings(root, path, lines) if is_document else rule_findings(path, lines)
     missing = [f"{path}:1: in LONGER_FILES, but there is no such file"
                for path in LONGER_FILES if not (root / path).is_file()]
     print("\n".join(findings + missing))

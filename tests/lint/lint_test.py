@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Plants one fault of each kind and requires that `lint.py rules` reports it, and nothing else."""
 
+import pathlib
 import subprocess
 import sys
 import unittest
@@ -51,6 +52,13 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("lines, the limit", "server/a.cpp", *["int x;"] * (lint.MAX_LINES + 1))
         self.expect_one("marker word", "server/a.cpp", "// TO" "DO: later")
         self.expect_one("#pragma once", "server/a.h", "int x;")
+
+    def test_links(self):
+        root = pathlib.Path(__file__).parent
+        lines = ["[here](lint.py) [web](https://x.org/y) [part](#a)", "![gone](media/gone.webp)"]
+        findings = list(lint.link_findings(root, "README.md", lines))
+        self.assertEqual(len(findings), 1, findings)
+        self.assertIn("README.md:2: links to media/gone.webp", findings[0])
 
     def test_missing_tool_is_a_skip(self):
         result = subprocess.run([sys.executable, lint.__file__, "shell"], env={"PATH": "/nonexistent"},
