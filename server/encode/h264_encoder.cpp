@@ -1,10 +1,12 @@
 #include "server/encode/h264_encoder.h"
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <limits>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "render_core/error.h"
@@ -162,6 +164,16 @@ class LibavH264Encoder final : public Encoder {
   std::vector<std::byte> parameter_sets_;
 };
 
+/// libx264 itself would complain on stderr. Slower presets than medium are no use live.
+void check_preset(const std::string& preset) {
+  constexpr std::array<std::string_view, 6> known = {"ultrafast", "superfast", "veryfast",
+                                                     "faster",    "fast",      "medium"};
+  if (std::find(known.begin(), known.end(), preset) != known.end()) return;
+  std::string names;
+  for (const std::string_view name : known) names.append(names.empty() ? "" : ", ").append(name);
+  throw InputError("libx264", "preset " + preset, "unknown", "one of " + names);
+}
+
 int level_or_throw(const char* name, const EncoderSettings& settings) {
   const auto level = h264::level(settings.size_px, settings.fps, settings.bitrate_kbps);
   if (!level) {
@@ -178,6 +190,7 @@ int level_or_throw(const char* name, const EncoderSettings& settings) {
 
 std::unique_ptr<Encoder> make_x264_encoder(const EncoderSettings& settings) {
   const AVCodec& codec = libav::find_encoder("libx264");
+  check_preset(settings.x264_preset);
   const int level_idc = level_or_throw(codec.name, settings);
   libav::CodecContext context = libav::make_context(codec);
   apply_common(*context, settings, level_idc);

@@ -1,20 +1,23 @@
 #include <algorithm>
-#include <random>
 #include <set>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "render_core/error.h"
 #include "server/encode/decoder.h"
 #include "server/encode/encoder.h"
 #include "server/encode/h264_bitstream.h"
-#include "tests/server/encode/moving_picture.h"
+#include "tests/server/encode/picture.h"
 
 namespace catgs {
 namespace {
 
 using test::moving_picture;
 using test::Picture;
+using testing::AllOf;
+using testing::HasSubstr;
 
 constexpr glm::ivec2 small_px(322, 182);  // no multiples of 16: the SPS must crop
 
@@ -126,6 +129,120 @@ TEST(X264Encoder, DecodesToWhatWentIn) {
     EXPECT_GT(test::psnr(decoded.planes[0], picture.planes[0]), 34) << "frame " << time;
     EXPECT_GT(test::psnr(decoded.planes[1], picture.planes[1]), 36) << "frame " << time;
     EXPECT_GT(test::psnr(decoded.planes[2], picture.planes[2]), 36) << "frame " << time;
+  }
+}
+
+double largest_share(Encoder& encoder, int first_time, int frames, double budget_bytes) {
+  EncodedFrame out;
+  double largest = 0;
+  for (int time = first_time; time < first_time + frames; ++time) {
+    Picture picture = moving_picture({640, 360}, time);
+    EXPECT_TRUE(encoder.encode(picture.view(), false, out).ok);
+    EXPECT_EQ(out.idr, time == 0);
+    if (time > 0) largest = std::max(largest, static_cast<double>(out.bytes.size()) / budget_bytes);
+  }
+  return largest;
+}
+
+// The one-frame VBV: no P-frame may take a link of that bitrate longer than its frame interval.
+TEST(X264Encoder, NoFrameOutgrowsItsShareOfTheBitrate) {
+  for (const int bitrate_kbps : {2000, 8000}) {
+    const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, bitrate_kbps, 60));
+    const double budget_bytes = bitrate_kbps * 125.0 / 60;
+    EXPECT_LE(largest_share(*encoder, 0, 60, budget_bytes), 1.1) << bitrate_kbps;
+  }
+}
+
+TEST(X264Encoder, IdrsFitTheirShareToo) {
+  const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, 8000, 60));
+  EncodedFrame out;
+  for (int time = 0; time < 20; ++time) {
+    Picture picture = moving_picture({640, 360}, 50 * time);
+    ASSERT_TRUE(encoder->encode(picture.view(), time % 5 == 0, out).ok);
+    EXPECT_LE(static_cast<double>(out.bytes.size()), 1.2 * 8000 * 125.0 / 60) << "frame " << time;
+  }
+}
+
+TEST(X264Encoder, RateChangesTakeEffectWithoutAnIdr) {
+  const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, 8000, 60));
+  const double budget_bytes = 8000 * 125.0 / 60;
+  EXPECT_GT(largest_share(*encoder, 0, 15, budget_bytes), 0.6);
+  encoder->set_rate(2000, 60);
+  EXPECT_LE(largest_share(*encoder, 15, 15, budget_bytes / 4), 1.1);
+  // A quarter of the frames: each may have four times the bits.
+  encoder->set_rate(2000, 15);
+  const double share = largest_share(*encoder, 30, 15, budget_bytes);
+  EXPECT_LE(share, 1.1);
+  EXPECT_GT(share, 0.6);
+  encoder->set_rate(8000, 60);
+  EXPECT_GT(largest_share(*encoder, 45, 15, budget_bytes), 0.6);
+}
+
+TEST(X264Encoder, RatesBeyondReasonAreClamped) {
+  const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, 8000, 60));
+  encoder->set_rate(-5, 0);
+  EXPECT_LE(largest_share(*encoder, 0, 5, 100 * 125.0), 1.1);  // 100 kbit/s in one frame a second
+  encoder->set_rate(2'000'000'000, 2'000'000'000);
+  // Level 3.1 ends at 14 Mbit/s.
+  EXPECT_LE(largest_share(*encoder, 5, 15, 14000 * 125.0 / 60), 1.1);
+}
+
+TEST(X264Encoder, AStillPictureIsRefinedByItself) {
+  const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, 4000, 60));
+  Decoder decoder(Codec::h264);
+  EncodedFrame out;
+  DecodedPicture decoded;
+  Picture picture = moving_picture({640, 360}, 0);
+  double first = 0;
+  for (int frame = 0; frame < 20; ++frame) {
+    ASSERT_TRUE(encoder->encode(picture.view(), false, out).ok);
+    ASSERT_TRUE(decoder.decode(out.bytes, decoded).ok);
+    if (frame == 0) first = test::psnr(decoded.planes[0], picture.planes[0]);
+  }
+  EXPECT_GT(test::psnr(decoded.planes[0], picture.planes[0]), first + 5);
+}
+
+TEST(X264Encoder, RefusesWhatNoLevelAdmits) {
+  try {
+    make_encoder(EncoderKind::x264, settings_of({8192, 8192}));
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("8192x8192 at 60 fps: more than any H.264 level admits"));
+  }
+}
+
+TEST(X264Encoder, RefusesAnUnknownPreset) {
+  EncoderSettings settings = settings_of(small_px);
+  settings.x264_preset = "fastest";
+  testing::internal::CaptureStderr();
+  try {
+    make_encoder(EncoderKind::x264, settings);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("libx264"), HasSubstr("fastest")));
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(X264Encoder, OtherPresetsKeepTheRules) {
+  EncoderSettings settings = settings_of(small_px);
+  settings.x264_preset = "veryfast";
+  const auto encoder = make_encoder(EncoderKind::x264, settings);
+  EXPECT_EQ(encoder->codec_string(), "avc1.64001E");  // High
+  Decoder decoder(Codec::h264);
+  EncodedFrame out;
+  DecodedPicture decoded;
+  for (int time = 0; time < 30; ++time) {
+    Picture picture = moving_picture(small_px, time < 15 ? time : time + 4000);
+    ASSERT_TRUE(encoder->encode(picture.view(), false, out).ok);
+    EXPECT_EQ(out.idr, time == 0);
+    const EncodeStatus status = decoder.decode(out.bytes, decoded);
+    ASSERT_TRUE(status.ok) << status.message;
+    for (const h264::NalUnit& unit : units_of(out)) {
+      if (const auto slice = h264::parse_slice_head(unit)) {
+        EXPECT_EQ(slice->type, time == 0 ? h264::SliceType::i : h264::SliceType::p);
+      }
+    }
   }
 }
 
