@@ -1,0 +1,107 @@
+// What the page says and does in each situation, against a server that follows a script.
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Browser } from 'playwright-core';
+import { Codec, Error_Code } from '#client/wire/wire';
+import { keep_screenshot, launch_browser, new_page } from './support/browser';
+import { start_fake_server, welcome, type FakeServer, type Peer } from './support/fake_server';
+
+let browser: Browser;
+let server: FakeServer | undefined;
+let jpeg: Uint8Array;
+
+beforeAll(async () => {
+  browser = await launch_browser();
+  jpeg = await painted_jpeg(browser);
+});
+
+afterAll(() => browser.close());
+
+afterEach(async () => {
+  await server?.close();
+  server = undefined;
+});
+
+/** A picture to stream: some blobs, so that a screenshot shows whether it is the right way up. */
+async function painted_jpeg(browser: Browser): Promise<Uint8Array> {
+  const page = await browser.newPage();
+  const url = await page.evaluate(() => {
+    const canvas = document.createElement('canvas');
+    canvas.width = 640;
+    canvas.height = 360;
+    const context = canvas.getContext('2d')!;
+    const sky = context.createLinearGradient(0, 0, 0, 360);
+    sky.addColorStop(0, '#7fb2e5');
+    sky.addColorStop(1, '#e8d9c0');
+    context.fillStyle = sky;
+    context.fillRect(0, 0, 640, 360);
+    for (let i = 0; i < 40; ++i) {
+      context.fillStyle = `hsl(${(i * 47) % 360} 45% 45%)`;
+      context.fillRect(i * 16, 200 - ((i * 37) % 90), 15, 160);
+    }
+    return canvas.toDataURL('image/jpeg', 0.9);
+  });
+  await page.close();
+  return Buffer.from(url.split(',')[1]!, 'base64');
+}
+
+/** Welcomes, and answers every pose with a picture of it. */
+function stream(peer: Peer, body: Peer['heard'][number]): void {
+  if (body.case === 'hello') peer.say(welcome());
+  if (body.case !== 'pose') return;
+  peer.frame(
+    {
+      frameId: BigInt(peer.heard.length),
+      poseId: body.value.poseId,
+      poseClientTimeUs: body.value.clientTimeUs,
+      fovYRad: body.value.fovYRad,
+      codec: Codec.MJPEG,
+      idr: true,
+      widthPx: 640,
+      heightPx: 360,
+      renderUs: 20_000,
+      encodeUs: 2000,
+    },
+    jpeg,
+  );
+}
+
+function refuse(code: Error_Code, message: string) {
+  return (peer: Peer, body: Peer['heard'][number]): void => {
+    if (body.case === 'hello') peer.say({ case: 'error', value: { code, message, fatal: true } });
+  };
+}
+
+describe('page', () => {
+  it('shows the picture, acknowledges it and reports statistics', async () => {
+    server = await start_fake_server(stream);
+    const { page, errors } = await new_page(browser);
+    await page.goto(server.url);
+    await page.waitForFunction(() => window.catgs?.settled().then(() => true));
+    expect(await page.locator('#card').isHidden()).toBe(true);
+    await page.keyboard.press('KeyI');
+    await page.locator('#stats-panel').getByText('mjpeg').waitFor();
+    await keep_screenshot(page, 'fake-streaming');
+    const heard = server.peers[0]!.heard;
+    const ack = heard.find((body) => body.case === 'ack');
+    expect(ack?.value).toMatchObject({ dropped: false });
+    expect(errors).toEqual([]);
+  });
+
+  it('asks for a token when its own is refused, and uses the one that is entered', async () => {
+    server = await start_fake_server((peer, body) => {
+      if (body.case === 'hello' && body.value.token !== 'right') {
+        refuse(Error_Code.UNAUTHORIZED, 'the access token is not valid')(peer, body);
+      } else {
+        stream(peer, body);
+      }
+    });
+    const { page } = await new_page(browser);
+    await page.goto(`${server.url}#token=wrong`);
+    await page.getByText('Access token needed').waitFor();
+    await keep_screenshot(page, 'fake-token');
+    expect(page.url()).not.toContain('token');
+    await page.getByLabel('Access token').fill('right');
+    await page.getByRole('button', { name: 'Connect' }).click();
+    await page.waitForFunction(() => window.catgs?.settled().then(() => true));
+  });
+});

@@ -1,0 +1,53 @@
+// Chromium as the tests use it, and a page that records everything that went wrong in it.
+import { existsSync, mkdirSync } from 'node:fs';
+import path from 'node:path';
+import { chromium, type Browser, type BrowserContextOptions, type Page } from 'playwright-core';
+
+const chromium_path = process.env['CATGS_CHROMIUM'] ?? '/usr/bin/chromium';
+
+/** Where screenshots go: the build folder under CTest, else a folder that git ignores. */
+const artefacts = process.env['CATGS_TEST_ARTEFACTS'] ?? path.resolve('build-artefacts');
+
+export async function launch_browser(): Promise<Browser> {
+  if (!existsSync(chromium_path)) {
+    throw new Error(`no Chromium at ${chromium_path}: apt install chromium, or set CATGS_CHROMIUM`);
+  }
+  return chromium.launch({
+    executablePath: chromium_path,
+    headless: true,
+    args: [
+      '--no-sandbox',
+      '--disable-gpu',
+      '--disable-quic',
+      '--no-first-run',
+      '--disable-background-networking',
+      '--disable-component-update',
+      '--disable-sync',
+    ],
+  });
+}
+
+export interface WatchedPage {
+  readonly page: Page;
+  /** Console errors, uncaught exceptions and violations of the CSP so far. */
+  readonly errors: string[];
+}
+
+export async function new_page(
+  browser: Browser,
+  options: BrowserContextOptions = { viewport: { width: 640, height: 360 } },
+): Promise<WatchedPage> {
+  const context = await browser.newContext(options);
+  const page = await context.newPage();
+  const errors: string[] = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error') errors.push(message.text());
+  });
+  page.on('pageerror', (error) => errors.push(String(error)));
+  return { page, errors };
+}
+
+export async function keep_screenshot(page: Page, name: string): Promise<void> {
+  mkdirSync(artefacts, { recursive: true });
+  await page.screenshot({ path: path.join(artefacts, `${name}.png`) });
+}

@@ -1,0 +1,153 @@
+// A server that says what a test wants it to say: the built client over HTTP with the real
+// server's Content-Security-Policy, and a WebSocket that speaks catgs.v1.
+import { createServer, type Server } from 'node:http';
+import { readFile } from 'node:fs/promises';
+import type { AddressInfo } from 'node:net';
+import path from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { WebSocketServer, type WebSocket } from 'ws';
+import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
+import {
+  ClientMessageSchema,
+  Codec,
+  FrameHeaderSchema,
+  ServerMessageSchema,
+  type ClientMessage,
+} from '#client/wire/wire';
+
+export const web_dist =
+  process.env['CATGS_WEB_DIST'] ??
+  fileURLToPath(new URL('../../../build/release/web_client/dist', import.meta.url));
+
+const policy =
+  "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; " +
+  "img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; frame-ancestors 'none'";
+
+const content_types: Readonly<Record<string, string>> = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript',
+  '.css': 'text/css',
+  '.svg': 'image/svg+xml',
+};
+
+export type ServerBody = NonNullable<MessageInitShape<typeof ServerMessageSchema>['body']>;
+type Body = ClientMessage['body'];
+
+/** One client's connection, as the test's script sees it. */
+export interface Peer {
+  say(body: ServerBody): void;
+  frame(header: MessageInitShape<typeof FrameHeaderSchema>, payload: Uint8Array): void;
+  close(): void;
+  readonly heard: Body[];
+}
+
+export interface FakeServer {
+  readonly url: string;
+  readonly port: number;
+  readonly peers: Peer[];
+  close(): Promise<void>;
+}
+
+/** Serves until closed; `script` is called for each message of each client. */
+export async function start_fake_server(
+  script: (peer: Peer, body: Body) => void,
+  port = 0,
+): Promise<FakeServer> {
+  const http = createServer((request, response) => {
+    const name = new URL(request.url ?? '/', 'http://localhost').pathname;
+    const file = path.join(web_dist, name === '/' ? 'index.html' : name);
+    readFile(file).then(
+      (body) => {
+        response.writeHead(200, {
+          'content-type': content_types[path.extname(file)] ?? 'application/octet-stream',
+          'content-security-policy': policy,
+        });
+        response.end(body);
+      },
+      () => response.writeHead(404).end(),
+    );
+  });
+  const peers: Peer[] = [];
+  const sockets = new WebSocketServer({ server: http, handleProtocols: () => 'catgs.v1' });
+  sockets.on('connection', (socket) => {
+    const peer = make_peer(socket);
+    peers.push(peer);
+    socket.on('message', (data) => {
+      const { body } = fromBinary(ClientMessageSchema, new Uint8Array(data as Buffer));
+      peer.heard.push(body);
+      script(peer, body);
+    });
+  });
+  await listen(http, port);
+  const bound = (http.address() as AddressInfo).port;
+  return {
+    url: `http://127.0.0.1:${bound}/`,
+    port: bound,
+    peers,
+    close: async () => {
+      for (const socket of sockets.clients) socket.terminate();
+      http.closeAllConnections();
+      await new Promise((resolve) => http.close(resolve));
+    },
+  };
+}
+
+function make_peer(socket: WebSocket): Peer {
+  return {
+    heard: [],
+    say(body) {
+      const bytes = toBinary(ServerMessageSchema, create(ServerMessageSchema, { body }));
+      socket.send(Buffer.concat([Buffer.of(1), bytes]));
+    },
+    frame(header, payload) {
+      const bytes = toBinary(FrameHeaderSchema, create(FrameHeaderSchema, header));
+      if (bytes.length > 16383) throw new Error('frame header too long for two varint bytes');
+      const length =
+        bytes.length < 128
+          ? Buffer.of(bytes.length)
+          : Buffer.of((bytes.length & 0x7f) | 0x80, bytes.length >> 7);
+      socket.send(Buffer.concat([Buffer.of(2), length, bytes, payload]));
+    },
+    close: () => socket.close(),
+  };
+}
+
+function listen(http: Server, port: number): Promise<void> {
+  return new Promise((resolve, reject) => {
+    http.once('error', reject);
+    http.listen(port, '127.0.0.1', resolve);
+  });
+}
+
+/** A welcome to a small scene whose pictures are JPEGs of 640x360. */
+export function welcome(): ServerBody {
+  return {
+    case: 'welcome',
+    value: {
+      version: 1,
+      sessionId: 's1',
+      resumeToken: 'resume-me',
+      scene: {
+        sceneId: 'city',
+        title: 'Demo city',
+        gaussians: 300_000n,
+        up: { x: 0, y: -1, z: 0 },
+        startPose: { position: { x: 0, y: 0, z: -5 }, orientation: { w: 1 } },
+        focus: {},
+        limitsMin: { x: -20, y: -20, z: -20 },
+        limitsMax: { x: 20, y: 20, z: 20 },
+        nearZ: 0.2,
+      },
+      config: {
+        codec: Codec.MJPEG,
+        widthPx: 640,
+        heightPx: 360,
+        fps: 60,
+        encoder: 'mjpeg (the client decodes nothing else)',
+      },
+      renderer: 'CPU, AVX2, 2 threads (no CUDA device)',
+      serverVersion: '0.1.0',
+      sceneIds: ['city'],
+    },
+  };
+}

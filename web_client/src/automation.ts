@@ -1,0 +1,74 @@
+// window.catgs: a small surface for tests and for pages that drive the viewer (README.md).
+import type { Pose } from './camera/camera_controller';
+import type { Snapshot } from './session/messages';
+import type { StatsSnapshot } from './stats/metrics';
+
+export interface Automation {
+  /** Puts the camera there. Camera axes: x right, y down, z forward; quaternion x, y, z, w. */
+  setPose(pose: Pose, fovYRad?: number): void;
+  pose(): Pose;
+  /** Resolves when the newest pose is shown and its picture has been refined. */
+  settled(): Promise<void>;
+  /** RGBA pixels of the shown picture at its native size, with the frame's header. */
+  snapshot(): Promise<Snapshot>;
+  stats(): Promise<StatsSnapshot>;
+}
+
+declare global {
+  interface Window {
+    catgs?: Automation;
+  }
+}
+
+// The server refines a still picture with a few more frames and then says nothing; it takes no
+// longer between two of them than this, or than a few of the intervals seen so far.
+const least_quiet_ms = 400;
+const quiet_intervals = 4;
+
+/** Knows when the picture has come to rest. */
+export class Settling {
+  private wanted_id_ = 0;
+  private shown_id_ = 0;
+  private last_shown_ms_ = 0;
+  private interval_ms_ = 0;
+  private waiting_: (() => void)[] = [];
+  private cancel_: () => void = () => undefined;
+
+  constructor(
+    private readonly now_ms_: () => number,
+    private readonly after_: (delay_ms: number, action: () => void) => () => void,
+  ) {}
+
+  pose_sent(pose_id: number): void {
+    this.wanted_id_ = pose_id;
+  }
+
+  presented(pose_id: number): void {
+    const now_ms = this.now_ms_();
+    this.interval_ms_ = this.shown_id_ > 0 ? now_ms - this.last_shown_ms_ : 0;
+    this.last_shown_ms_ = now_ms;
+    this.shown_id_ = pose_id;
+    this.look();
+  }
+
+  wait(): Promise<void> {
+    return new Promise((resolve) => {
+      this.waiting_.push(resolve);
+      this.look();
+    });
+  }
+
+  private look(): void {
+    this.cancel_();
+    if (this.waiting_.length === 0) return;
+    // Until the newest pose is shown, the next presented() looks again.
+    if (this.wanted_id_ === 0 || this.shown_id_ < this.wanted_id_) return;
+    const quiet_ms = Math.max(least_quiet_ms, Math.min(this.interval_ms_, 1000) * quiet_intervals);
+    const left_ms = this.last_shown_ms_ + quiet_ms - this.now_ms_();
+    if (left_ms <= 0) {
+      for (const resolve of this.waiting_.splice(0)) resolve();
+      return;
+    }
+    this.cancel_ = this.after_(left_ms, () => this.look());
+  }
+}

@@ -1,0 +1,319 @@
+// The viewer's own camera: what gestures and held keys do to a pose. Pure: no DOM, no clock.
+import {
+  add,
+  axis_angle,
+  cross,
+  dot,
+  forward,
+  length,
+  multiply,
+  normalize,
+  right,
+  rotate,
+  scale,
+  sub,
+  unit,
+  type Quat,
+  type Vec3,
+} from './vector';
+
+export type CameraMode = 'orbit' | 'fly';
+
+export interface Pose {
+  readonly position: Vec3;
+  readonly orientation: Quat;
+}
+
+/** What the camera needs to know of a scene. World units. */
+export interface SceneSetup {
+  readonly up: Vec3;
+  readonly start_pose: Pose;
+  readonly focus: Vec3;
+  readonly limits_min: Vec3;
+  readonly limits_max: Vec3;
+  readonly near_z: number;
+}
+
+/** One movement of pointer or wheel. Distances are fractions of the view's height, y down. */
+export type Gesture =
+  | { kind: 'look'; dx: number; dy: number } // the scene follows the pointer
+  | { kind: 'pan'; dx: number; dy: number } // the scene follows the pointer
+  | { kind: 'dolly'; steps: number }; // > 0: towards the scene; 1 = one notch of a wheel
+
+/** Held keys, each -1…1. */
+export interface Axes {
+  readonly right: number;
+  readonly up: number;
+  readonly forward: number;
+  readonly turn_right: number;
+  readonly turn_up: number;
+  readonly fast: boolean;
+}
+
+export const no_axes: Axes = {
+  right: 0,
+  up: 0,
+  forward: 0,
+  turn_right: 0,
+  turn_up: 0,
+  fast: false,
+};
+
+const steepest_rad = (88 * Math.PI) / 180; // at 90 degrees "up" has no direction in the image
+const orbit_rad_per_height = Math.PI;
+const turn_rad_per_s = 1.2;
+const dolly_per_step = 0.12; // share of the distance to the focus
+const fast_factor = 4;
+const level_time_s = 0.25;
+const rest_threshold = 1e-4;
+const fov_range_rad = [0.1, 2.8] as const; // the wire's
+export const default_fov_y_rad = (60 * Math.PI) / 180;
+
+/** Movement that was asked for and not made yet. */
+interface Pending {
+  yaw: number; // rad about up; > 0 turns left
+  pitch: number; // rad about the camera's x axis; > 0 looks up
+  pan: Vec3; // world units along camera axes
+  dolly: number; // steps
+}
+
+const nothing_pending = (): Pending => ({ yaw: 0, pitch: 0, pan: [0, 0, 0], dolly: 0 });
+
+export class CameraController {
+  private pose_: Pose = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
+  private mode_: CameraMode = 'orbit';
+  private fov_y_rad_ = default_fov_y_rad;
+  private up_: Vec3 = [0, -1, 0];
+  private focus_: Vec3 = [0, 0, 1];
+  private min_: Vec3 = [0, 0, 0];
+  private max_: Vec3 = [0, 0, 0];
+  private reach_ = 1; // distance from start to focus: the scene's scale to a visitor
+  private nearest_ = 0.1;
+  private scene_: SceneSetup | undefined;
+  private pending_ = nothing_pending();
+
+  /** Time constant of the glide after a gesture; 0 for people who asked for reduced motion. */
+  smoothing_s = 0.05;
+
+  get pose(): Pose {
+    return this.pose_;
+  }
+
+  get mode(): CameraMode {
+    return this.mode_;
+  }
+
+  get fov_y_rad(): number {
+    return this.fov_y_rad_;
+  }
+
+  set fov_y_rad(value: number) {
+    this.fov_y_rad_ = Math.min(Math.max(value, fov_range_rad[0]), fov_range_rad[1]);
+  }
+
+  load(scene: SceneSetup): void {
+    this.scene_ = scene;
+    this.up_ = normalize(scene.up, [0, -1, 0]);
+    const start = scene.start_pose;
+    this.pose_ = { position: start.position, orientation: unit(start.orientation) };
+    this.focus_ = scene.focus;
+    this.nearest_ = Math.max(scene.near_z, 1e-3) * 1.5;
+    const to_focus = length(sub(scene.focus, start.position));
+    this.reach_ = Math.max(to_focus, this.nearest_ * 2);
+    if (to_focus < this.nearest_) this.focus_ = this.ahead(this.reach_);
+    // The start is inside by definition; a scene without limits has min = max.
+    const unlimited = scene.limits_max.every((v, i) => v <= scene.limits_min[i]!);
+    this.min_ = unlimited ? [-Infinity, -Infinity, -Infinity] : min(scene.limits_min, start.position);
+    this.max_ = unlimited ? [Infinity, Infinity, Infinity] : max(scene.limits_max, start.position);
+    this.pending_ = nothing_pending();
+  }
+
+  /** Back to the start. */
+  reset(): void {
+    if (this.scene_) this.load(this.scene_);
+    this.fov_y_rad_ = default_fov_y_rad;
+  }
+
+  /** Puts the camera somewhere; limits are the caller's business. */
+  jump(pose: Pose): void {
+    this.pose_ = { position: pose.position, orientation: unit(pose.orientation) };
+    this.pending_ = nothing_pending();
+    this.focus_ = this.ahead(this.distance());
+  }
+
+  set_mode(mode: CameraMode): void {
+    if (mode === 'orbit' && this.mode_ === 'fly') this.focus_ = this.ahead(this.distance());
+    this.mode_ = mode;
+  }
+
+  /** For captures that came upside down. */
+  flip_up(): void {
+    this.up_ = scale(this.up_, -1);
+    const view = rotate(this.pose_.orientation, forward);
+    this.pose_ = {
+      position: this.pose_.position,
+      orientation: multiply(axis_angle(view, Math.PI), this.pose_.orientation),
+    };
+  }
+
+  gesture(gesture: Gesture): void {
+    const pending = this.pending_;
+    switch (gesture.kind) {
+      case 'look': {
+        // Flying, the scene stays under the pointer; orbiting, a full height is half a turn.
+        const rad = this.mode_ === 'fly' ? this.fov_y_rad_ : -orbit_rad_per_height;
+        pending.yaw += gesture.dx * rad;
+        pending.pitch += gesture.dy * rad;
+        break;
+      }
+      case 'pan': {
+        const height = 2 * this.distance() * Math.tan(this.fov_y_rad_ / 2);
+        pending.pan = add(pending.pan, [-gesture.dx * height, -gesture.dy * height, 0]);
+        break;
+      }
+      case 'dolly':
+        pending.dolly += gesture.steps;
+        break;
+    }
+  }
+
+  /** No movement is left to make. */
+  get at_rest(): boolean {
+    const { yaw, pitch, pan, dolly } = this.pending_;
+    return yaw === 0 && pitch === 0 && dolly === 0 && length(pan) === 0;
+  }
+
+  /** Moves by `dt_s`. Returns whether the camera moved. */
+  step(dt_s: number, axes: Axes = no_axes): boolean {
+    const before = this.pose_;
+    this.hold(dt_s, axes);
+    const share = this.smoothing_s > 0 ? 1 - Math.exp(-dt_s / this.smoothing_s) : 1;
+    const due = this.take(share);
+    this.turn(due.yaw, due.pitch);
+    if (due.yaw !== 0 || due.pitch !== 0) this.level(1 - Math.exp(-dt_s / level_time_s));
+    this.translate(rotate(this.pose_.orientation, due.pan));
+    this.dolly(due.dolly);
+    return before !== this.pose_;
+  }
+
+  private hold(dt_s: number, axes: Axes): void {
+    const speed = this.reach_ * 0.6 * (axes.fast ? fast_factor : 1) * dt_s;
+    const pending = this.pending_;
+    // Orbiting, turning right means to walk around the focus to the right: the view turns left.
+    const turn = turn_rad_per_s * dt_s * (this.mode_ === 'fly' ? 1 : -1);
+    pending.yaw -= axes.turn_right * turn;
+    pending.pitch += axes.turn_up * turn;
+    const world_up_in_camera = rotate(conjugate(this.pose_.orientation), this.up_);
+    pending.pan = add(pending.pan, [axes.right * speed, 0, axes.forward * speed]);
+    pending.pan = add(pending.pan, scale(world_up_in_camera, axes.up * speed));
+  }
+
+  /** Takes `share` of what is pending, or all of it once it is too little to be seen. */
+  private take(share: number): Pending {
+    const all = this.pending_;
+    const rest =
+      Math.abs(all.yaw) + Math.abs(all.pitch) + Math.abs(all.dolly) + length(all.pan) / this.reach_;
+    const s = rest < rest_threshold ? 1 : share;
+    const taken = {
+      yaw: all.yaw * s,
+      pitch: all.pitch * s,
+      pan: scale(all.pan, s),
+      dolly: all.dolly * s,
+    };
+    this.pending_ =
+      s === 1
+        ? nothing_pending()
+        : {
+            yaw: all.yaw - taken.yaw,
+            pitch: all.pitch - taken.pitch,
+            pan: sub(all.pan, taken.pan),
+            dolly: all.dolly - taken.dolly,
+          };
+    return taken;
+  }
+
+  private turn(yaw: number, pitch: number): void {
+    if (yaw !== 0) this.apply_turn(axis_angle(this.up_, yaw));
+    if (pitch === 0) return;
+    const view = rotate(this.pose_.orientation, forward);
+    const elevation = Math.asin(Math.min(1, Math.max(-1, dot(view, this.up_))));
+    const target = Math.min(Math.max(elevation + pitch, -steepest_rad), steepest_rad);
+    const allowed = target - elevation;
+    // Beyond the limit (a start pose that looks straight down) only the way back is open.
+    if (allowed * pitch <= 0) return;
+    this.apply_turn(axis_angle(rotate(this.pose_.orientation, right), allowed));
+  }
+
+  private apply_turn(turn: Quat): void {
+    const orientation = multiply(turn, this.pose_.orientation);
+    if (this.mode_ === 'fly') {
+      this.pose_ = { position: this.pose_.position, orientation };
+      return;
+    }
+    const position = add(this.focus_, rotate(turn, sub(this.pose_.position, this.focus_)));
+    if (this.inside(position)) this.pose_ = { position, orientation };
+  }
+
+  /** Lets the horizon of a tilted start pose become level while the visitor looks around. */
+  private level(share: number): void {
+    const { position, orientation } = this.pose_;
+    const view = rotate(orientation, forward);
+    if (Math.abs(dot(view, this.up_)) > Math.cos((5 * Math.PI) / 180)) return;
+    const level_right = normalize(cross(view, this.up_), right);
+    const now_right = rotate(orientation, right);
+    const roll = Math.atan2(dot(cross(now_right, level_right), view), dot(now_right, level_right));
+    if (Math.abs(roll) < 1e-6) return;
+    this.pose_ = { position, orientation: multiply(axis_angle(view, roll * share), orientation) };
+  }
+
+  /** Moves camera and focus together, as far as the limits allow. */
+  private translate(by: Vec3): void {
+    if (by[0] === 0 && by[1] === 0 && by[2] === 0) return;
+    const position = min(max(add(this.pose_.position, by), this.min_), this.max_);
+    const moved = sub(position, this.pose_.position);
+    if (length(moved) === 0) return;
+    this.focus_ = add(this.focus_, moved);
+    this.pose_ = { ...this.pose_, position };
+  }
+
+  private dolly(steps: number): void {
+    if (steps === 0) return;
+    if (this.mode_ === 'fly') {
+      this.translate(scale(rotate(this.pose_.orientation, forward), steps * this.reach_ * 0.08));
+      return;
+    }
+    const offset = sub(this.pose_.position, this.focus_);
+    const distance = Math.max(length(offset), 1e-9);
+    const wanted = distance * (1 - dolly_per_step) ** steps;
+    const target = steps > 0 ? Math.min(distance, Math.max(wanted, this.nearest_)) : wanted;
+    const position = add(this.focus_, scale(offset, target / distance));
+    if (this.inside(position)) this.pose_ = { ...this.pose_, position };
+  }
+
+  private inside(p: Vec3): boolean {
+    return p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9);
+  }
+
+  /** To the focus, and never so near that panning would stand still. */
+  private distance(): number {
+    const along = dot(
+      sub(this.focus_, this.pose_.position),
+      rotate(this.pose_.orientation, forward),
+    );
+    return along > this.nearest_ ? along : this.reach_;
+  }
+
+  private ahead(distance: number): Vec3 {
+    return add(this.pose_.position, scale(rotate(this.pose_.orientation, forward), distance));
+  }
+}
+
+function min(a: Vec3, b: Vec3): Vec3 {
+  return [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.min(a[2], b[2])];
+}
+
+function max(a: Vec3, b: Vec3): Vec3 {
+  return [Math.max(a[0], b[0]), Math.max(a[1], b[1]), Math.max(a[2], b[2])];
+}
+
+const conjugate = (q: Quat): Quat => [-q[0], -q[1], -q[2], q[3]];

@@ -1,0 +1,79 @@
+import type { Clock } from '../session/clock';
+import type { CameraSample } from '../session/messages';
+import type { Axes, CameraController } from './camera_controller';
+
+const longest_step_s = 0.1; // a page that was held up does not leap
+
+/**
+ * Steps the camera at display rate while there is movement, and hands out one sample per refresh
+ * and change. At rest it does not run at all.
+ */
+export class CameraLoop {
+  private running_ = false;
+  private enabled_ = false;
+  private changed_ = false;
+  private last_us_ = 0;
+  private pose_id_ = 0;
+
+  constructor(
+    private readonly camera_: CameraController,
+    private readonly axes_: () => Axes,
+    private readonly clock_: Clock,
+    private readonly send_: (sample: CameraSample) => void,
+  ) {}
+
+  /** Id of the newest sample; 0 before the first. */
+  get pose_id(): number {
+    return this.pose_id_;
+  }
+
+  /** Nothing is sent before the scene has told where the camera starts. */
+  enable(): void {
+    this.enabled_ = true;
+    this.changed();
+  }
+
+  /** The camera was put somewhere else, or its field of view changed. */
+  changed(): void {
+    this.changed_ = true;
+    this.wake();
+  }
+
+  /** A gesture or a key has come in. */
+  wake(): void {
+    if (this.running_ || !this.enabled_) return;
+    this.running_ = true;
+    this.last_us_ = this.clock_.now_us();
+    requestAnimationFrame(() => this.tick());
+  }
+
+  /** A sample of the camera as it is, at once. Returns its id. */
+  sample(): number {
+    this.changed_ = false;
+    this.pose_id_ += 1;
+    this.send_({
+      pose_id: this.pose_id_,
+      time_us: this.clock_.now_us(),
+      pose: this.camera_.pose,
+      fov_y_rad: this.camera_.fov_y_rad,
+    });
+    return this.pose_id_;
+  }
+
+  private tick(): void {
+    const now_us = this.clock_.now_us();
+    const dt_s = Math.min((now_us - this.last_us_) / 1e6, longest_step_s);
+    this.last_us_ = now_us;
+    const axes = this.axes_();
+    const moved = this.camera_.step(dt_s, axes);
+    if (moved || this.changed_) this.sample();
+    const held =
+      axes.right !== 0 ||
+      axes.up !== 0 ||
+      axes.forward !== 0 ||
+      axes.turn_right !== 0 ||
+      axes.turn_up !== 0;
+    this.running_ = held || moved || !this.camera_.at_rest;
+    if (this.running_) requestAnimationFrame(() => this.tick());
+  }
+}

@@ -1,0 +1,169 @@
+// From received bytes to the picture that is shown: decoder, newest-wins slot, presenter, and one
+// acknowledgement per frame, whatever became of it.
+import { Codec, type FrameHeader, type StreamConfig } from '../wire/wire';
+import type { AckInit } from '../session/session';
+import { Latest } from './latest';
+import type { Decoder, DecoderEvents, EncodedFrame, Frame, Picture } from './picture';
+
+export interface PipelineEnvironment {
+  now_us: () => number;
+  /** A new decoder for the stream; undefined when this browser has none (left). */
+  make_decoder: (
+    config: StreamConfig,
+    failures: number,
+    events: DecoderEvents,
+  ) => Promise<Decoder | undefined>;
+  /** Calls back before the next refresh of the display. */
+  on_refresh: (draw: () => void) => void;
+  draw: (picture: Picture) => void;
+}
+
+export interface PipelineListener {
+  ack(ack: AckInit): void;
+  presented(frame: Frame, presented_us: number): void;
+  dropped(frame: Frame): void;
+  /** The decoder needs a key frame to begin with. */
+  key_frame_wanted(): void;
+  /** No decoder of this browser can play the stream. */
+  undecodable(message: string): void;
+}
+
+const waiting_limit = 8; // frames that may wait for a decoder to be made
+
+export class FramePipeline {
+  private config_: StreamConfig | undefined;
+  private decoder_: Decoder | undefined;
+  private generation_ = 0; // a decoder of an older generation has nothing more to say
+  private failures_ = 0;
+  private needs_key_ = true;
+  private waiting_: EncodedFrame[] = [];
+  private drawing_ = false;
+  private readonly newest_: Latest<{ frame: Frame; picture: Picture }>;
+
+  constructor(
+    private readonly env_: PipelineEnvironment,
+    private readonly listener_: PipelineListener,
+  ) {
+    this.newest_ = new Latest(({ frame, picture }) => {
+      picture.close();
+      this.drop(frame);
+    });
+  }
+
+  configure(config: StreamConfig): void {
+    this.config_ = config;
+    this.failures_ = 0;
+    void this.renew_decoder();
+  }
+
+  push(header: FrameHeader, payload: Uint8Array): void {
+    const received_us = this.env_.now_us();
+    const frame = { header, payload, bytes: payload.length, received_us, decoded_us: 0 };
+    if (this.needs_key_ && !header.idr) {
+      this.drop(frame);
+      return;
+    }
+    this.needs_key_ = false;
+    if (this.decoder_) {
+      this.decoder_.decode(frame);
+    } else if (this.waiting_.length < waiting_limit) {
+      this.waiting_.push(frame);
+    } else {
+      this.drop(frame);
+      this.want_key_frame();
+    }
+  }
+
+  /** Forgets what is not shown yet: the page is hidden, and nothing will be drawn. */
+  discard_pending(): void {
+    this.newest_.clear();
+  }
+
+  private async renew_decoder(): Promise<void> {
+    const generation = ++this.generation_;
+    this.decoder_?.close();
+    this.decoder_ = undefined;
+    this.drop_waiting();
+    this.needs_key_ = true;
+    const config = this.config_;
+    if (!config) return;
+    const decoder = await this.env_.make_decoder(config, this.failures_, {
+      decoded: (frame, picture) => {
+        if (generation === this.generation_) this.decoded(frame, picture);
+        else picture.close();
+      },
+      skipped: (frame) => this.drop(frame),
+      failed: (error) => {
+        if (generation === this.generation_) this.failed(error);
+      },
+    });
+    if (generation !== this.generation_) {
+      decoder?.close();
+    } else if (!decoder) {
+      const codec = config.codec === Codec.H264 ? config.codecString : Codec[config.codec];
+      this.listener_.undecodable(`no decoder for ${codec}`);
+    } else {
+      this.decoder_ = decoder;
+      for (const frame of this.waiting_.splice(0)) decoder.decode(frame);
+    }
+  }
+
+  private failed(error: Error): void {
+    console.warn('video decoder failed', error);
+    this.failures_ += 1;
+    void this.renew_decoder();
+    this.listener_.key_frame_wanted();
+  }
+
+  private want_key_frame(): void {
+    this.drop_waiting();
+    this.needs_key_ = true;
+    this.listener_.key_frame_wanted();
+  }
+
+  private drop_waiting(): void {
+    for (const frame of this.waiting_.splice(0)) this.drop(frame);
+  }
+
+  private decoded(frame: Frame, picture: Picture): void {
+    this.newest_.put({ frame, picture });
+    if (this.drawing_) return;
+    this.drawing_ = true;
+    this.env_.on_refresh(() => {
+      this.drawing_ = false;
+      this.present();
+    });
+  }
+
+  private present(): void {
+    const newest = this.newest_.take();
+    if (!newest) return;
+    const { frame, picture } = newest;
+    try {
+      this.env_.draw(picture);
+    } finally {
+      picture.close();
+    }
+    const presented_us = this.env_.now_us();
+    this.ack(frame, presented_us);
+    this.listener_.presented(frame, presented_us);
+  }
+
+  private drop(frame: Frame): void {
+    this.ack(frame, 0);
+    this.listener_.dropped(frame);
+  }
+
+  private ack(frame: Frame, presented_us: number): void {
+    const age_us = presented_us - Number(frame.header.poseClientTimeUs);
+    this.listener_.ack({
+      frameId: frame.header.frameId,
+      receivedUs: BigInt(frame.received_us),
+      decodedUs: BigInt(frame.decoded_us),
+      presentedUs: BigInt(presented_us),
+      dropped: presented_us === 0,
+      poseAgeUs: presented_us === 0 ? 0 : Math.min(Math.max(age_us, 0), 0xffffffff),
+      decoderQueue: this.decoder_?.queue_length() ?? 0,
+    });
+  }
+}

@@ -1,0 +1,101 @@
+import type { StreamConfig } from '../wire/wire';
+import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
+
+/** Kinds of decoder in the order of our liking. */
+const acceleration_ladder: readonly HardwareAcceleration[] = [
+  'prefer-hardware',
+  'no-preference',
+  'prefer-software',
+];
+
+export function has_webcodecs(): boolean {
+  return typeof VideoDecoder !== 'undefined' && typeof EncodedVideoChunk !== 'undefined';
+}
+
+/** Annex B needs no `description`: parameter sets travel with every IDR. */
+export function decoder_config(
+  config: StreamConfig,
+  acceleration: HardwareAcceleration,
+): VideoDecoderConfig {
+  return {
+    codec: config.codecString,
+    codedWidth: config.widthPx,
+    codedHeight: config.heightPx,
+    optimizeForLatency: true,
+    hardwareAcceleration: acceleration,
+  };
+}
+
+/** The steps of the ladder that this browser offers for the stream. */
+export async function supported_accelerations(
+  config: StreamConfig,
+): Promise<HardwareAcceleration[]> {
+  const offers = await Promise.all(
+    acceleration_ladder.map(async (acceleration) => {
+      const { supported } = await VideoDecoder.isConfigSupported(
+        decoder_config(config, acceleration),
+      );
+      return supported ? [acceleration] : [];
+    }),
+  );
+  return offers.flat();
+}
+
+/** H.264 by WebCodecs. One frame in, one picture out; the frame id travels as the timestamp. */
+export class WebCodecsDecoder implements Decoder {
+  private readonly decoder_: VideoDecoder;
+  private readonly inside_ = new Map<number, EncodedFrame>();
+
+  constructor(
+    config: VideoDecoderConfig,
+    private readonly now_us_: () => number,
+    private readonly events_: DecoderEvents,
+  ) {
+    this.decoder_ = new VideoDecoder({
+      output: (picture) => this.output(picture),
+      error: (error) => this.events_.failed(error),
+    });
+    this.decoder_.configure(config);
+  }
+
+  decode(frame: EncodedFrame): void {
+    const timestamp = Number(frame.header.frameId);
+    this.inside_.set(timestamp, frame);
+    try {
+      this.decoder_.decode(
+        new EncodedVideoChunk({
+          type: frame.header.idr ? 'key' : 'delta',
+          timestamp,
+          data: frame.payload,
+        }),
+      );
+    } catch (error) {
+      this.events_.failed(error instanceof Error ? error : new Error(String(error)));
+    }
+  }
+
+  queue_length(): number {
+    return this.decoder_.decodeQueueSize;
+  }
+
+  close(): void {
+    this.inside_.clear();
+    if (this.decoder_.state !== 'closed') this.decoder_.close();
+  }
+
+  private output(picture: VideoFrame): void {
+    const frame = this.inside_.get(picture.timestamp);
+    if (!frame) {
+      picture.close();
+      return;
+    }
+    // Pictures come in decoding order: whatever is older and still inside gave none.
+    for (const [timestamp, older] of this.inside_) {
+      if (timestamp > picture.timestamp) break;
+      this.inside_.delete(timestamp);
+      if (older !== frame) this.events_.skipped(older);
+    }
+    frame.decoded_us = this.now_us_();
+    this.events_.decoded(frame, picture);
+  }
+}

@@ -1,0 +1,63 @@
+import { no_axes, type Axes } from '../camera/camera_controller';
+
+// By position on the keyboard (KeyboardEvent.code), so that WASD is a cross on every layout.
+const movement: Readonly<Record<string, Partial<Axes>>> = {
+  KeyW: { forward: 1 },
+  KeyS: { forward: -1 },
+  KeyA: { right: -1 },
+  KeyD: { right: 1 },
+  KeyE: { up: 1 },
+  KeyQ: { up: -1 },
+  ArrowLeft: { turn_right: -1 },
+  ArrowRight: { turn_right: 1 },
+  ArrowUp: { turn_up: 1 },
+  ArrowDown: { turn_up: -1 },
+};
+
+const clamp = (v: number): number => Math.min(1, Math.max(-1, v));
+
+/** Which movement keys are held, as camera axes. */
+export class HeldKeys {
+  private readonly held_ = new Set<string>();
+  private fast_ = false;
+
+  /** Returns whether the key is one of ours. */
+  down(code: string, shift: boolean): boolean {
+    this.fast_ = shift;
+    if (!(code in movement)) return false;
+    this.held_.add(code);
+    return true;
+  }
+
+  up(code: string, shift: boolean): void {
+    this.fast_ = shift;
+    this.held_.delete(code);
+  }
+
+  /** The page lost the keyboard: key-up events will not come. */
+  release_all(): void {
+    this.held_.clear();
+    this.fast_ = false;
+  }
+
+  axes(): Axes {
+    if (this.held_.size === 0) return no_axes;
+    const sum = { ...no_axes };
+    for (const code of this.held_) {
+      const axes = movement[code] ?? {};
+      sum.right += axes.right ?? 0;
+      sum.up += axes.up ?? 0;
+      sum.forward += axes.forward ?? 0;
+      sum.turn_right += axes.turn_right ?? 0;
+      sum.turn_up += axes.turn_up ?? 0;
+    }
+    return {
+      right: clamp(sum.right),
+      up: clamp(sum.up),
+      forward: clamp(sum.forward),
+      turn_right: clamp(sum.turn_right),
+      turn_up: clamp(sum.turn_up),
+      fast: this.fast_,
+    };
+  }
+}

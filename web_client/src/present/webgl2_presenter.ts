@@ -1,0 +1,87 @@
+import type { Picture } from '../decode/picture';
+import { size_of, type Pixels, type Presenter } from './presenter';
+
+// One triangle that covers the view; texture row 0 is the picture's top.
+const vertex_source = `#version 300 es
+out vec2 uv;
+void main() {
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0;
+  uv = vec2(corner.x, 1.0 - corner.y);
+  gl_Position = vec4(corner * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+const fragment_source = `#version 300 es
+precision mediump float;
+uniform sampler2D picture;
+in vec2 uv;
+out vec4 colour;
+void main() { colour = vec4(texture(picture, uv).rgb, 1.0); }`;
+
+/** The upload of a VideoFrame converts its YUV to RGB by the colour space of its bitstream. */
+export class WebGl2Presenter implements Presenter {
+  readonly description = 'WebGL2';
+
+  constructor(
+    private readonly canvas_: OffscreenCanvas,
+    private readonly gl_: WebGL2RenderingContext,
+  ) {
+    this.set_up();
+    // The canvas is an EventTarget in the worker too; a lost context comes back empty.
+    canvas_.addEventListener('webglcontextlost', (event) => event.preventDefault());
+    canvas_.addEventListener('webglcontextrestored', () => this.set_up());
+  }
+
+  draw(picture: Picture): void {
+    const gl = this.gl_;
+    const [width, height] = size_of(picture);
+    if (this.canvas_.width !== width || this.canvas_.height !== height) {
+      this.canvas_.width = width;
+      this.canvas_.height = height;
+      gl.viewport(0, 0, width, height);
+    }
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  read(): Pixels {
+    const gl = this.gl_;
+    const { width, height } = this.canvas_;
+    // The drawing buffer is gone after it was shown: draw the texture again.
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    const bottom_up = new Uint8Array(width * height * 4);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bottom_up);
+    const rgba = new Uint8ClampedArray(bottom_up.length);
+    const stride = width * 4;
+    for (let row = 0; row < height; ++row) {
+      const begin = (height - 1 - row) * stride;
+      rgba.set(bottom_up.subarray(begin, begin + stride), row * stride);
+    }
+    return { width_px: width, height_px: height, rgba };
+  }
+
+  private set_up(): void {
+    const gl = this.gl_;
+    const program = gl.createProgram();
+    for (const [type, source] of [
+      [gl.VERTEX_SHADER, vertex_source],
+      [gl.FRAGMENT_SHADER, fragment_source],
+    ] as const) {
+      const shader = gl.createShader(type);
+      if (!shader) return; // only while the context is lost
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      throw new Error(`presenter shader: ${gl.getProgramInfoLog(program) ?? ''}`);
+    }
+    gl.useProgram(program);
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
+      gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
+    }
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  }
+}

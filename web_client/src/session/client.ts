@@ -1,0 +1,53 @@
+// The page's end of the worker.
+import type { StatsSnapshot } from '../stats/metrics';
+import type { FromWorker, Snapshot, ToWorker } from './messages';
+
+type Answer = StatsSnapshot | Snapshot | undefined;
+type Said = Exclude<FromWorker, { kind: 'stats' } | { kind: 'snapshot' }>;
+
+export class WorkerClient {
+  private readonly worker_ = new Worker(new URL('./worker.ts', import.meta.url), {
+    type: 'module',
+    name: 'catgs',
+  });
+  private readonly waiting_ = new Map<number, (answer: Answer) => void>();
+  private requests_ = 0;
+
+  constructor(on_message: (message: Said) => void) {
+    this.worker_.onmessage = ({ data }: MessageEvent<FromWorker>) => {
+      if (data.kind === 'stats') this.answer(data.request, data.stats);
+      else if (data.kind === 'snapshot') this.answer(data.request, data.snapshot);
+      else on_message(data);
+    };
+    this.worker_.onerror = (event) => {
+      // A worker that could not be loaded at all says nothing more than that.
+      on_message({ kind: 'broken', message: event.message || 'the worker could not be loaded' });
+    };
+  }
+
+  post(message: ToWorker, transfer: Transferable[] = []): void {
+    this.worker_.postMessage(message, transfer);
+  }
+
+  stats(): Promise<StatsSnapshot> {
+    return this.ask('get_stats') as Promise<StatsSnapshot>;
+  }
+
+  /** Undefined before the first picture. */
+  snapshot(): Promise<Snapshot | undefined> {
+    return this.ask('get_snapshot') as Promise<Snapshot | undefined>;
+  }
+
+  private ask(kind: 'get_stats' | 'get_snapshot'): Promise<Answer> {
+    const request = ++this.requests_;
+    return new Promise((resolve) => {
+      this.waiting_.set(request, resolve);
+      this.post({ kind, request });
+    });
+  }
+
+  private answer(request: number, answer: Answer): void {
+    this.waiting_.get(request)?.(answer);
+    this.waiting_.delete(request);
+  }
+}

@@ -1,0 +1,362 @@
+// The life of a session: hello, welcome, frames, heartbeat, errors, drain, reconnect. It knows
+// neither WebSocket nor wall clock, so that tests drive it with fakes.
+import type { MessageInitShape } from '@bufbuild/protobuf';
+import type { OpenSocket, Socket } from '../transport/socket';
+import {
+  decode_server_message,
+  encode_client_message,
+  Error_Code,
+  wire_version,
+  type AckSchema,
+  type ClientBody,
+  type FrameHeader,
+  type HelloSchema,
+  type PoseSampleSchema,
+  type ServerBody,
+  type SettingsSchema,
+  type Stats,
+  type StreamConfig,
+  type Welcome,
+  type Error as ServerError,
+} from '../wire/wire';
+import { backoff_ms } from './backoff';
+import type { Clock, Timers } from './clock';
+import type { SessionState, WaitCause } from './state';
+
+export type HelloInit = MessageInitShape<typeof HelloSchema>;
+export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
+export type AckInit = MessageInitShape<typeof AckSchema>;
+export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
+
+/** What hello says, besides the things that the session itself knows. */
+export type Greeting = Omit<HelloInit, '$typeName' | 'version' | 'resume'>;
+
+export interface SessionListener {
+  state(state: SessionState): void;
+  welcome(welcome: Welcome): void;
+  /** Before the first frame it describes. The frame after it is an IDR. */
+  config(config: StreamConfig): void;
+  frame(header: FrameHeader, payload: Uint8Array): void;
+  stats(stats: Stats): void;
+  /** The server said something for people that does not end the session. */
+  notice(message: string): void;
+}
+
+export interface SessionEnvironment {
+  open: OpenSocket;
+  clock: Clock;
+  timers: Timers;
+  random: () => number;
+}
+
+export const silence_ms = 3000; // the server speaks at least once a second
+export const greeting_ms = 10_000; // to open the connection and to be answered the first time
+const stable_ms = 5000; // a connection that lived this long was a good one: backoff starts anew
+const keep_alive_ms = 10_000;
+const congested_bytes = 32 * 1024;
+const congestion_poll_ms = 20;
+
+/** One connection. During a drain there are two: the old one shows pictures until the new one can. */
+interface Link {
+  socket: Socket;
+  opened: boolean;
+  welcome?: Welcome;
+  config?: StreamConfig;
+  welcomed_us: number;
+  heard_us: number;
+  cancel_watch: () => void;
+}
+
+export class Session {
+  private link_: Link | undefined;
+  private successor_: Link | undefined;
+  private attempt_ = 0;
+  private cancel_retry_: () => void = () => undefined;
+  private cancel_successor_: () => void = () => undefined;
+  private cancel_pose_: () => void = () => undefined;
+  private cancel_keep_alive_: () => void = () => undefined;
+  private resume_token_ = '';
+  private last_pose_: PoseInit | undefined;
+  private paused_ = false;
+
+  constructor(
+    private readonly env_: SessionEnvironment,
+    private readonly listener_: SessionListener,
+    private greeting_: Greeting,
+  ) {}
+
+  start(): void {
+    this.connect();
+  }
+
+  /** Connects at once, whatever the session was waiting for. */
+  retry(): void {
+    this.attempt_ = 0;
+    this.connect();
+  }
+
+  /** For a new connection with other decoders, another token or another scene. */
+  greet_anew(change: Partial<Greeting>): void {
+    this.greeting_ = { ...this.greeting_, ...change };
+    this.retry();
+  }
+
+  /** The newest pose wins: on a congested connection older ones are never sent. */
+  send_pose(pose: PoseInit): void {
+    this.last_pose_ = pose;
+    this.flush_pose();
+  }
+
+  send_ack(ack: AckInit): void {
+    this.send({ case: 'ack', value: ack });
+  }
+
+  send_settings(settings: SettingsInit): void {
+    this.greeting_ = { ...this.greeting_, settings };
+    this.send({ case: 'settings', value: settings });
+  }
+
+  request_idr(): void {
+    this.send({ case: 'requestIdr', value: {} });
+  }
+
+  set_viewport(width_px: number, height_px: number, device_pixel_ratio: number): void {
+    this.greeting_ = {
+      ...this.greeting_,
+      viewportWidthPx: width_px,
+      viewportHeightPx: height_px,
+      devicePixelRatio: device_pixel_ratio,
+    };
+  }
+
+  /** A hidden page needs no pictures. */
+  set_paused(paused: boolean): void {
+    if (paused === this.paused_) return;
+    this.paused_ = paused;
+    this.send({ case: 'pause', value: { paused } });
+  }
+
+  /** Says good-bye; the session is over. */
+  stop(): void {
+    this.send({ case: 'bye', value: {} });
+    this.drop_links();
+  }
+
+  private connect(): void {
+    this.drop_links();
+    this.listener_.state({ phase: 'connecting', attempt: this.attempt_ });
+    this.link_ = this.open_link();
+  }
+
+  private drop_links(): void {
+    this.cancel_retry_();
+    this.cancel_successor_();
+    this.cancel_pose_();
+    this.cancel_keep_alive_();
+    close_link(this.link_);
+    close_link(this.successor_);
+    this.link_ = this.successor_ = undefined;
+  }
+
+  private open_link(): Link {
+    const now_us = this.env_.clock.now_us();
+    const link: Link = {
+      opened: false,
+      welcomed_us: 0,
+      heard_us: now_us,
+      cancel_watch: () => undefined,
+      socket: this.env_.open({
+        opened: () => {
+          link.opened = true;
+          link.socket.send(encode_client_message({ case: 'hello', value: this.hello() }));
+        },
+        message: (data) => this.heard(link, data),
+        closed: (_code, reason) =>
+          this.lost(link, link.opened ? 'lost' : 'unreachable', reason),
+      }),
+    };
+    this.watch(link);
+    return link;
+  }
+
+  private hello(): HelloInit {
+    return {
+      ...this.greeting_,
+      version: wire_version,
+      ...(this.resume_token_ && {
+        resume: {
+          token: this.resume_token_,
+          ...(this.last_pose_ && { pose: this.last_pose_ }),
+        },
+      }),
+    };
+  }
+
+  /** Ends a link that says nothing for too long. Looks again when the time could be up. */
+  private watch(link: Link): void {
+    const limit_ms = link.welcome ? silence_ms : greeting_ms;
+    const quiet_ms = (this.env_.clock.now_us() - link.heard_us) / 1000;
+    if (quiet_ms >= limit_ms) {
+      this.lost(link, link.opened ? 'silent' : 'unreachable', '');
+      return;
+    }
+    link.cancel_watch = this.env_.timers.after(limit_ms - quiet_ms, () => this.watch(link));
+  }
+
+  private lost(link: Link, cause: WaitCause, message: string): void {
+    close_link(link);
+    if (link === this.successor_) {
+      this.successor_ = undefined;
+      this.open_successor_later();
+    } else if (link === this.link_) {
+      const lived_ms = link.welcome ? (this.env_.clock.now_us() - link.welcomed_us) / 1000 : 0;
+      if (lived_ms >= stable_ms) this.attempt_ = 0;
+      this.wait(cause, message);
+    }
+  }
+
+  private wait(cause: WaitCause, message: string): void {
+    this.drop_links();
+    this.attempt_ += 1;
+    const retry_in_ms = backoff_ms(this.attempt_, this.env_.random);
+    this.listener_.state({ phase: 'waiting', cause, retry_in_ms, message });
+    this.cancel_retry_ = this.env_.timers.after(retry_in_ms, () => this.connect());
+  }
+
+  private heard(link: Link, data: ArrayBuffer): void {
+    link.heard_us = this.env_.clock.now_us();
+    let incoming;
+    try {
+      incoming = decode_server_message(data);
+    } catch (error) {
+      this.lost(link, 'lost', String(error));
+      return;
+    }
+    if (incoming.kind === 'frame') {
+      if (link === this.successor_) this.promote(link);
+      this.listener_.frame(incoming.header, incoming.payload);
+    } else if (incoming.kind === 'message') {
+      this.handle(link, incoming.body);
+    }
+  }
+
+  private handle(link: Link, body: ServerBody): void {
+    switch (body.case) {
+      case 'welcome':
+        this.welcomed(link, body.value);
+        break;
+      case 'config':
+        link.config = body.value;
+        if (link === this.link_) this.listener_.config(body.value);
+        break;
+      case 'queue':
+        if (link === this.link_) {
+          const { position, estimateS } = body.value;
+          this.listener_.state({ phase: 'queued', position, estimate_s: estimateS });
+        }
+        break;
+      case 'stats':
+        if (link === this.link_) this.listener_.stats(body.value);
+        break;
+      case 'error':
+        this.refused(link, body.value);
+        break;
+      case 'drain':
+        if (link === this.link_ && !this.successor_) this.successor_ = this.open_link();
+        break;
+      case 'heartbeat':
+        break;
+    }
+  }
+
+  private welcomed(link: Link, welcome: Welcome): void {
+    link.welcome = welcome;
+    link.welcomed_us = this.env_.clock.now_us();
+    if (welcome.config) link.config = welcome.config;
+    if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
+    if (link === this.link_) this.go_live(link);
+    else if (this.last_pose_) send_on(link, { case: 'pose', value: this.last_pose_ });
+  }
+
+  /** The successor has its first picture: it takes over, and the old connection goes. */
+  private promote(link: Link): void {
+    const old = this.link_;
+    this.link_ = link;
+    this.successor_ = undefined;
+    if (old) {
+      send_on(old, { case: 'bye', value: {} });
+      close_link(old);
+    }
+    this.go_live(link);
+  }
+
+  private go_live(link: Link): void {
+    if (link.welcome) this.listener_.welcome(link.welcome);
+    if (link.config) this.listener_.config(link.config);
+    this.listener_.state({ phase: 'live' });
+    if (this.paused_) this.send({ case: 'pause', value: { paused: true } });
+    this.flush_pose();
+    this.keep_alive();
+  }
+
+  private refused(link: Link, error: ServerError): void {
+    if (!error.fatal) {
+      this.listener_.notice(error.message);
+    } else if (link === this.successor_) {
+      this.lost(link, 'refused', error.message);
+    } else if (is_temporary(error.code)) {
+      this.wait('refused', error.message);
+    } else {
+      this.drop_links();
+      this.resume_token_ = '';
+      this.listener_.state({ phase: 'failed', code: error.code, message: error.message });
+    }
+  }
+
+  private open_successor_later(): void {
+    this.cancel_successor_ = this.env_.timers.after(backoff_ms(1, this.env_.random), () => {
+      if (this.link_ && !this.successor_) this.successor_ = this.open_link();
+    });
+  }
+
+  private flush_pose(): void {
+    this.cancel_pose_();
+    if (!this.last_pose_ || !this.link_?.welcome) return;
+    if (this.link_.socket.buffered_bytes() > congested_bytes) {
+      this.cancel_pose_ = this.env_.timers.after(congestion_poll_ms, () => this.flush_pose());
+      return;
+    }
+    this.send({ case: 'pose', value: this.last_pose_ });
+  }
+
+  /** Tells the server (and every proxy between) that somebody still looks at a still picture. */
+  private keep_alive(): void {
+    this.cancel_keep_alive_();
+    this.cancel_keep_alive_ = this.env_.timers.after(keep_alive_ms, () => {
+      if (!this.paused_) this.flush_pose();
+      this.keep_alive();
+    });
+  }
+
+  private send(body: ClientBody): void {
+    if (this.link_?.welcome) send_on(this.link_, body);
+  }
+}
+
+function send_on(link: Link, body: ClientBody): void {
+  link.socket.send(encode_client_message(body));
+}
+
+function close_link(link: Link | undefined): void {
+  link?.cancel_watch();
+  link?.socket.close();
+}
+
+/** Refusals that time may cure; all others need another link, token, scene or program. */
+function is_temporary(code: Error_Code): boolean {
+  return (
+    code === Error_Code.SERVER_FULL ||
+    code === Error_Code.RATE_LIMITED ||
+    code === Error_Code.INTERNAL
+  );
+}

@@ -1,0 +1,17 @@
+import type { Error_Code } from '../wire/wire';
+
+/** Where the session stands, for the page to show. */
+export type SessionState =
+  | { phase: 'connecting'; attempt: number }
+  | { phase: 'queued'; position: number; estimate_s: number }
+  | { phase: 'live' }
+  /** A new attempt follows by itself. */
+  | { phase: 'waiting'; cause: WaitCause; retry_in_ms: number; message: string }
+  /** Nothing follows until retry() or set_token(). */
+  | { phase: 'failed'; code: Error_Code; message: string };
+
+export type WaitCause =
+  | 'unreachable' // no connection could be opened
+  | 'lost' // an open connection was closed
+  | 'silent' // an open connection said nothing for too long
+  | 'refused'; // the server said why, and trying again makes sense

@@ -1,0 +1,133 @@
+// What the stats overlay, the automation surface and the tests read. Pure: fed with events.
+import type { Frame } from '../decode/picture';
+import type { Stats, StreamConfig } from '../wire/wire';
+import { PoseAge } from './pose_age';
+import { percentile, sum, TimeWindow } from './window';
+
+export interface Percentiles {
+  readonly p50: number;
+  readonly p95: number;
+}
+
+/** Over the last seconds; NaN where nothing was measured. */
+export interface StatsSnapshot {
+  readonly fps_shown: number;
+  /** Presented minus pose sample time, of the first picture of each pose. */
+  readonly motion_to_photon_ms: Percentiles;
+  readonly pose_age_ms: Percentiles;
+  readonly bitrate_kbps: number;
+  /** Means over frames, from the server's header and the client's clock. */
+  readonly stages_ms: {
+    readonly wait: number;
+    readonly render: number;
+    readonly encode: number;
+    readonly send: number;
+    readonly decode: number;
+    readonly present: number;
+  };
+  readonly width_px: number;
+  readonly height_px: number;
+  readonly frames_shown: number; // since the page was opened
+  readonly frames_dropped: number; // never shown by this client
+  readonly packets_dropped: number; // never sent by the server
+  readonly server_fps: number;
+  readonly sessions: number;
+}
+
+const rate_span_us = 2e6;
+const latency_span_us = 5e6;
+
+export class Metrics {
+  private readonly shown_ = new TimeWindow(rate_span_us);
+  private readonly bytes_ = new TimeWindow(rate_span_us);
+  private readonly motion_us_ = new TimeWindow(latency_span_us);
+  private readonly pose_age_ = new PoseAge(latency_span_us, 1e6 / 60);
+  private readonly stages_us_ = {
+    wait: new TimeWindow(rate_span_us),
+    render: new TimeWindow(rate_span_us),
+    encode: new TimeWindow(rate_span_us),
+    send: new TimeWindow(rate_span_us),
+    decode: new TimeWindow(rate_span_us),
+    present: new TimeWindow(rate_span_us),
+  };
+  private last_pose_id_ = -1n;
+  private frames_shown_ = 0;
+  private frames_dropped_ = 0;
+  private size_px_: readonly [number, number] = [0, 0];
+  private server_: Stats | undefined;
+
+  configured(config: StreamConfig): void {
+    this.pose_age_.set_rate(config.fps);
+  }
+
+  pose_sent(pose_id: bigint, time_us: number): void {
+    this.pose_age_.sent(pose_id, time_us);
+  }
+
+  received(bytes: number, now_us: number): void {
+    this.bytes_.push(now_us, bytes);
+  }
+
+  presented(frame: Frame, now_us: number): void {
+    const { header } = frame;
+    this.frames_shown_ += 1;
+    this.size_px_ = [header.widthPx, header.heightPx];
+    this.shown_.push(now_us, 1);
+    const pose_time_us = Number(header.poseClientTimeUs);
+    // Pictures that only refine a still view, or come before any pose, say nothing of motion.
+    if (header.poseId > 0n && header.poseId !== this.last_pose_id_) {
+      this.motion_us_.push(now_us, now_us - pose_time_us);
+      this.pose_age_.shown(header.poseId, pose_time_us, now_us);
+    }
+    this.last_pose_id_ = header.poseId;
+    const stages = this.stages_us_;
+    stages.wait.push(now_us, header.waitUs);
+    stages.render.push(now_us, header.renderUs);
+    stages.encode.push(now_us, header.encodeUs);
+    stages.send.push(now_us, header.sendWaitUs);
+    stages.decode.push(now_us, frame.decoded_us - frame.received_us);
+    stages.present.push(now_us, now_us - frame.decoded_us);
+  }
+
+  dropped(): void {
+    this.frames_dropped_ += 1;
+  }
+
+  server_said(stats: Stats): void {
+    this.server_ = stats;
+  }
+
+  snapshot(now_us: number): StatsSnapshot {
+    const per_second = 1e6 / rate_span_us;
+    const mean_ms = (window: TimeWindow): number => {
+      const values = window.values(now_us);
+      return sum(values) / values.length / 1000;
+    };
+    const percentiles_ms = (values: readonly number[]): Percentiles => ({
+      p50: percentile(values, 0.5) / 1000,
+      p95: percentile(values, 0.95) / 1000,
+    });
+    const stages = this.stages_us_;
+    return {
+      fps_shown: this.shown_.values(now_us).length * per_second,
+      motion_to_photon_ms: percentiles_ms(this.motion_us_.values(now_us)),
+      pose_age_ms: percentiles_ms(this.pose_age_.values(now_us)),
+      bitrate_kbps: (sum(this.bytes_.values(now_us)) * 8 * per_second) / 1000,
+      stages_ms: {
+        wait: mean_ms(stages.wait),
+        render: mean_ms(stages.render),
+        encode: mean_ms(stages.encode),
+        send: mean_ms(stages.send),
+        decode: mean_ms(stages.decode),
+        present: mean_ms(stages.present),
+      },
+      width_px: this.size_px_[0],
+      height_px: this.size_px_[1],
+      frames_shown: this.frames_shown_,
+      frames_dropped: this.frames_dropped_,
+      packets_dropped: this.server_?.droppedPackets ?? 0,
+      server_fps: this.server_?.fps ?? NaN,
+      sessions: this.server_?.sessions ?? 0,
+    };
+  }
+}

@@ -1,0 +1,50 @@
+// The only user of WebSocket: everything above it runs against these interfaces, also in tests.
+import { subprotocol } from '../wire/wire';
+
+export interface SocketEvents {
+  opened(): void;
+  message(data: ArrayBuffer): void;
+  /** Once, also when the connection never opened. `code` is the WebSocket close code. */
+  closed(code: number, reason: string): void;
+}
+
+export interface Socket {
+  send(bytes: Uint8Array): void;
+  /** Bytes accepted by send() that the network has not taken yet. */
+  buffered_bytes(): number;
+  /** No event follows. */
+  close(): void;
+}
+
+export type OpenSocket = (events: SocketEvents) => Socket;
+
+/** The WebSocket endpoint that belongs to a page: the folder that the page was loaded from. */
+export function endpoint_of(page_url: string): string {
+  const url = new URL('./', page_url);
+  url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+  url.search = '';
+  url.hash = '';
+  return url.href;
+}
+
+export function open_web_socket(url: string): OpenSocket {
+  return (events) => {
+    const socket = new WebSocket(url, subprotocol);
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => events.opened();
+    socket.onmessage = ({ data }) => {
+      if (data instanceof ArrayBuffer) events.message(data);
+    };
+    socket.onclose = ({ code, reason }) => events.closed(code, reason);
+    return {
+      send(bytes) {
+        if (socket.readyState === WebSocket.OPEN) socket.send(bytes as Uint8Array<ArrayBuffer>);
+      },
+      buffered_bytes: () => socket.bufferedAmount,
+      close() {
+        socket.onopen = socket.onmessage = socket.onclose = null;
+        socket.close(1000);
+      },
+    };
+  };
+}

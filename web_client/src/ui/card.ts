@@ -1,0 +1,43 @@
+import { by_id } from './dom';
+import type { Card } from './wording';
+
+export interface CardListener {
+  retry(): void;
+  token(token: string): void;
+}
+
+/** The one place where the page says what is going on when the picture does not. */
+export class CardView {
+  private readonly card_ = by_id('card', HTMLElement);
+  private readonly title_ = by_id('card-title', HTMLElement);
+  private readonly text_ = by_id('card-text', HTMLElement);
+  private readonly action_ = by_id('card-action', HTMLButtonElement);
+  private readonly form_ = by_id('token-form', HTMLFormElement);
+  private readonly token_ = by_id('token-input', HTMLInputElement);
+  private shown_: Card | undefined;
+
+  constructor(listener: CardListener) {
+    this.action_.addEventListener('click', () => {
+      if (this.shown_?.action?.does === 'reload') location.reload();
+      else listener.retry();
+    });
+    this.form_.addEventListener('submit', (event) => {
+      event.preventDefault();
+      const token = this.token_.value.trim();
+      this.token_.value = '';
+      if (token) listener.token(token);
+    });
+  }
+
+  show(card: Card | undefined): void {
+    this.shown_ = card;
+    this.card_.hidden = card === undefined;
+    if (!card) return;
+    this.card_.classList.toggle('settled', card.busy !== true);
+    this.title_.textContent = card.title;
+    this.text_.textContent = card.text;
+    this.form_.hidden = card.asks_token !== true;
+    this.action_.hidden = card.action === undefined;
+    this.action_.textContent = card.action?.label ?? '';
+  }
+}

@@ -1,0 +1,300 @@
+// The page: puts camera, input, worker and controls together.
+import { Settling, type Automation } from '../automation';
+import { CameraController, type Pose, type SceneSetup } from '../camera/camera_controller';
+import { CameraLoop } from '../camera/camera_loop';
+import { has_webcodecs } from '../decode/video_decoder';
+import { bind_view_input } from '../input/view_input';
+import { AutoHeight } from '../session/auto_height';
+import { WorkerClient } from '../session/client';
+import { browser_timers, clock_from } from '../session/clock';
+import type { FromWorker, Quality, View } from '../session/messages';
+import type { SessionState } from '../session/state';
+import { remember_token, session_storage, take_token } from '../session/token';
+import type { SceneFacts, StreamConfig, Welcome } from '../wire/wire';
+import type { CardView } from './card';
+import { by_id } from './dom';
+import { Notice } from './notice';
+import { StatsPanel, type Facts } from './stats_panel';
+import { Toolbar } from './toolbar';
+import { broken_card, card_for, jpeg_reason } from './wording';
+
+const resize_quiet_ms = 200;
+const stats_interval_ms = 250;
+const auto_interval_ms = 1000;
+const first_card_after_ms = 300; // a fast connection shows its picture without a flash of cards
+
+const degrees = 180 / Math.PI;
+
+export class Viewer {
+  private readonly clock_ = clock_from(performance.timeOrigin);
+  private readonly camera_ = new CameraController();
+  private readonly loop_: CameraLoop;
+  private readonly worker_: WorkerClient;
+  private readonly settling_: Settling;
+  private readonly notice_ = new Notice();
+  private readonly stats_panel_ = new StatsPanel();
+  private readonly toolbar_: Toolbar;
+  private readonly view_ = by_id('view', HTMLElement);
+  private readonly auto_height_ = new AutoHeight();
+  private state_: SessionState = { phase: 'connecting', attempt: 0 };
+  private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
+  private scene_id_: string | undefined;
+  private has_picture_ = false;
+  private chosen_height_px_: number | 'auto' = 'auto';
+  private max_fps_ = 0;
+  private stats_timer_: ReturnType<typeof setInterval> | undefined;
+
+  constructor(private readonly card_: CardView) {
+    const { clock_: clock } = this;
+    this.settling_ = new Settling(() => clock.now_us() / 1000, browser_timers.after);
+    this.worker_ = new WorkerClient((message) => this.heard(message));
+    const keys = bind_view_input(this.view_, {
+      gesture: (gesture) => {
+        this.camera_.gesture(gesture);
+        this.loop_.wake();
+      },
+      keys_changed: () => this.loop_.wake(),
+    });
+    this.loop_ = new CameraLoop(this.camera_, () => keys.axes(), clock, (sample) => {
+      this.settling_.pose_sent(sample.pose_id);
+      this.worker_.post({ kind: 'camera', sample });
+    });
+    this.toolbar_ = this.make_toolbar();
+    this.toolbar_.show_fov(this.camera_.fov_y_rad * degrees);
+    if (matchMedia('(prefers-reduced-motion: reduce)').matches) this.camera_.smoothing_s = 0;
+    this.start_worker();
+    this.watch_page();
+    window.catgs = this.automation();
+    const jpeg = jpeg_reason(has_webcodecs(), isSecureContext);
+    if (jpeg) this.notice_.show(jpeg);
+  }
+
+  retry(): void {
+    this.worker_.post({ kind: 'retry' });
+  }
+
+  use_token(token: string): void {
+    remember_token(token, session_storage());
+    this.worker_.post({ kind: 'token', token });
+  }
+
+  stop(): void {
+    clearInterval(this.stats_timer_);
+    this.worker_.post({ kind: 'stop' });
+  }
+
+  private start_worker(): void {
+    const canvas = by_id('picture', HTMLCanvasElement).transferControlToOffscreen();
+    this.worker_.post(
+      {
+        kind: 'start',
+        canvas,
+        url: location.href,
+        page_origin_ms: performance.timeOrigin,
+        token: take_token(location, history, session_storage()),
+        scene_id: new URLSearchParams(location.search).get('scene') ?? '',
+        view: this.view(),
+        quality: this.quality(),
+      },
+      [canvas],
+    );
+    setTimeout(() => this.show_state(), first_card_after_ms);
+  }
+
+  /** Size, visibility and network of the page. */
+  private watch_page(): void {
+    let cancel = (): void => undefined;
+    new ResizeObserver(() => {
+      cancel();
+      cancel = browser_timers.after(resize_quiet_ms, () => this.post_view());
+    }).observe(this.view_);
+    document.addEventListener('visibilitychange', () => {
+      this.worker_.post({ kind: 'hidden', hidden: document.hidden });
+    });
+    window.addEventListener('online', () => {
+      if (this.state_.phase === 'waiting') this.retry();
+    });
+    window.addEventListener('pagehide', (event) => {
+      if (!event.persisted) this.worker_.post({ kind: 'stop' });
+    });
+    setInterval(() => void this.look_at_height(), auto_interval_ms);
+  }
+
+  private make_toolbar(): Toolbar {
+    return new Toolbar({
+      toggle_mode: () => {
+        this.camera_.set_mode(this.camera_.mode === 'orbit' ? 'fly' : 'orbit');
+        this.toolbar_.show_mode(this.camera_.mode);
+      },
+      reset: () => {
+        this.camera_.reset();
+        this.camera_moved();
+      },
+      flip_up: () => {
+        this.camera_.flip_up();
+        this.camera_moved();
+      },
+      stats_shown: (shown) => {
+        clearInterval(this.stats_timer_);
+        if (!shown) return;
+        const show = (): void =>
+          void this.worker_.stats().then((stats) => this.stats_panel_.show(stats));
+        show();
+        this.stats_timer_ = setInterval(show, stats_interval_ms);
+      },
+      quality: (height_px, max_fps) => {
+        this.chosen_height_px_ = height_px;
+        this.max_fps_ = max_fps;
+        this.post_view();
+      },
+      fov_y_deg: (value) => {
+        this.camera_.fov_y_rad = value / degrees;
+        this.camera_moved();
+      },
+    });
+  }
+
+  private camera_moved(): void {
+    this.toolbar_.show_fov(this.camera_.fov_y_rad * degrees);
+    this.loop_.changed();
+  }
+
+  private heard(message: Parameters<ConstructorParameters<typeof WorkerClient>[0]>[0]): void {
+    switch (message.kind) {
+      case 'state':
+        this.state_ = message.state;
+        if (message.state.phase !== 'connecting' || message.state.attempt > 0) this.show_state();
+        break;
+      case 'welcome':
+        this.welcome(message.welcome);
+        break;
+      case 'config':
+        this.configured(message.config);
+        break;
+      case 'presented':
+        this.presented(message);
+        break;
+      case 'presenter':
+        this.show_facts({ presenter: message.description });
+        break;
+      case 'notice':
+        this.notice_.show(message.message);
+        break;
+      case 'fallback':
+        this.notice_.show(
+          `Video cannot be decoded here (${message.message}): pictures come as JPEG.`,
+        );
+        break;
+      case 'broken':
+        this.card_.show(broken_card(message.message));
+        break;
+    }
+  }
+
+  private show_state(): void {
+    this.card_.show(card_for(this.state_, this.has_picture_));
+    document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
+  }
+
+  private welcome(welcome: Welcome): void {
+    this.show_facts({ renderer: welcome.renderer, server_version: welcome.serverVersion });
+    const { scene } = welcome;
+    // After a reconnect the visitor stays where they were.
+    if (!scene || scene.sceneId === this.scene_id_) return;
+    this.scene_id_ = scene.sceneId;
+    this.show_title(scene);
+    this.camera_.load(scene_setup(scene));
+    this.loop_.enable();
+  }
+
+  private configured(config: StreamConfig): void {
+    this.show_facts({ encoder: config.encoder });
+  }
+
+  private presented({ pose_id }: Extract<FromWorker, { kind: 'presented' }>): void {
+    this.settling_.presented(pose_id);
+    if (this.has_picture_) return;
+    this.has_picture_ = true;
+    this.show_state();
+  }
+
+  private show_facts(facts: Partial<Facts>): void {
+    this.facts_ = { ...this.facts_, ...facts };
+    this.stats_panel_.show_facts(this.facts_);
+  }
+
+  private show_title(scene: SceneFacts): void {
+    const title = by_id('scene-title', HTMLElement);
+    const count = document.createElement('small');
+    count.textContent = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
+    const name = scene.title || scene.sceneId;
+    title.replaceChildren(name, count);
+    title.hidden = false;
+    document.title = `${name} – CaT-GS`;
+  }
+
+  private async look_at_height(): Promise<void> {
+    if (this.chosen_height_px_ !== 'auto' || this.state_.phase !== 'live') return;
+    const { stages_ms } = await this.worker_.stats();
+    const frame_ms = stages_ms.render + stages_ms.encode;
+    if (this.auto_height_.look(frame_ms, this.view().height_px)) this.post_view();
+  }
+
+  private post_view(): void {
+    this.worker_.post({ kind: 'view', view: this.view(), quality: this.quality() });
+  }
+
+  private view(): View {
+    const ratio = window.devicePixelRatio;
+    return {
+      width_px: Math.max(16, Math.round(this.view_.clientWidth * ratio)),
+      height_px: Math.max(16, Math.round(this.view_.clientHeight * ratio)),
+      device_pixel_ratio: ratio,
+    };
+  }
+
+  private quality(): Quality {
+    const height_px =
+      this.chosen_height_px_ === 'auto'
+        ? this.auto_height_.height_px(this.view().height_px)
+        : this.chosen_height_px_;
+    return { height_px, max_fps: this.max_fps_ };
+  }
+
+  private automation(): Automation {
+    return {
+      setPose: (pose: Pose, fov_y_rad?: number) => {
+        this.camera_.jump(pose);
+        if (fov_y_rad !== undefined) this.camera_.fov_y_rad = fov_y_rad;
+        this.toolbar_.show_fov(this.camera_.fov_y_rad * degrees);
+        this.loop_.sample();
+      },
+      pose: () => this.camera_.pose,
+      settled: () => this.settling_.wait(),
+      snapshot: async () => {
+        const snapshot = await this.worker_.snapshot();
+        if (!snapshot) throw new Error('no picture has been shown yet');
+        return snapshot;
+      },
+      stats: () => this.worker_.stats(),
+    };
+  }
+}
+
+/** Facts that a server left out are the wire's zeros; the camera needs a usable scene. */
+function scene_setup(scene: SceneFacts): SceneSetup {
+  const vec = (v: { x: number; y: number; z: number } | undefined) =>
+    [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0] as const;
+  const q = scene.startPose?.orientation;
+  return {
+    up: vec(scene.up),
+    start_pose: {
+      position: vec(scene.startPose?.position),
+      orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
+    },
+    focus: vec(scene.focus),
+    limits_min: vec(scene.limitsMin),
+    limits_max: vec(scene.limitsMax),
+    near_z: scene.nearZ,
+  };
+}
