@@ -7,13 +7,12 @@
 #include "render_core/error.h"
 #include "server/encode/decoder.h"
 #include "server/encode/encoder.h"
-#include "tests/server/encode/picture.h"
+#include "server/encode/test_picture.h"
+#include "tests/server/encode/colour.h"
 
 namespace catgs {
 namespace {
 
-using test::moving_picture;
-using test::Picture;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -47,7 +46,7 @@ TEST_P(AnyEncoder, ColoursComeOutAsTheyWentIn) {
     }
   }
   const int rows = static_cast<int>(colours.size()) / patches_x;
-  Picture picture(glm::ivec2(patches_x, rows) * patch_px);
+  I420Picture picture(glm::ivec2(patches_x, rows) * patch_px);
   const auto origin = [&](std::size_t i) {
     return glm::ivec2(static_cast<int>(i) % patches_x, static_cast<int>(i) / patches_x) * patch_px;
   };
@@ -88,7 +87,7 @@ TEST_P(AnyEncoder, TakesStridesAndSizesThatFillNoBlock) {
   for (const glm::ivec2 size : {glm::ivec2(16, 16), glm::ivec2(50, 34), glm::ivec2(642, 18)}) {
     const auto encoder = make_encoder(GetParam(), settings_of(size));
     Decoder decoder(encoder->codec());
-    Picture plain = moving_picture(size, 0);
+    I420Picture plain = moving_picture(size, 0);
     // The same picture in rows that are 24 bytes longer, with other content in between.
     FrameView padded = plain.view();
     std::array<std::vector<std::uint8_t>, 3> storage;
@@ -121,7 +120,7 @@ TEST_P(AnyEncoder, ReusesTheCallersMemory) {
   encoded.bytes.reserve(1 << 20);
   const std::byte* memory = encoded.bytes.data();
   for (int time = 0; time < 3; ++time) {
-    Picture picture = moving_picture(size, time);
+    I420Picture picture = moving_picture(size, time);
     ASSERT_TRUE(encoder->encode(picture.view(), false, encoded).ok);
     EXPECT_EQ(encoded.bytes.data(), memory);
     EXPECT_GT(encoded.bytes.size(), 0u);
@@ -154,7 +153,7 @@ TEST_P(AnyEncoder, FrameErrorsNameTheFaultAndPassAway) {
   const glm::ivec2 size(320, 192);
   const auto encoder = make_encoder(GetParam(), settings_of(size));
   EncodedFrame encoded;
-  Picture picture = moving_picture(size, 0);
+  I420Picture picture = moving_picture(size, 0);
   const auto fault = [&](FrameView frame) {
     const EncodeStatus status = encoder->encode(frame, false, encoded);
     EXPECT_FALSE(status.ok);
@@ -197,7 +196,7 @@ TEST(Decoder, SaysWhatIsWrongWithDamagedFrames) {
   settings.size_px = {320, 192};
   const auto encoder = make_encoder(EncoderKind::x264, settings);
   EncodedFrame encoded;
-  Picture picture = moving_picture(settings.size_px, 0);
+  I420Picture picture = moving_picture(settings.size_px, 0);
   ASSERT_TRUE(encoder->encode(picture.view(), false, encoded).ok);
   encoded.bytes.resize(encoded.bytes.size() / 2);
   Decoder decoder(Codec::h264);

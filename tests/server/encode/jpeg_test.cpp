@@ -8,24 +8,22 @@
 #include "server/encode/encoder.h"
 #include "server/encode/jpeg_color.h"
 #include "server/encode/jpeg_rate.h"
-#include "tests/server/encode/picture.h"
+#include "server/encode/test_picture.h"
+#include "tests/server/encode/colour.h"
 
 namespace catgs {
 namespace {
-
-using test::moving_picture;
-using test::Picture;
 
 // Every luma code against chroma codes in steps: the integer transform against BT.709 -> RGB ->
 // BT.601 in double precision.
 TEST(VideoToJfif, MatchesTheDefinitionsOnAllCodes) {
   for (int cb = 16; cb <= 240; cb += 7) {
     for (int cr = 16; cr <= 240; cr += 7) {
-      Picture video({512, 2});
+      I420Picture video({512, 2});
       for (std::size_t i = 0; i < 1024; ++i) video.planes[0][i] = static_cast<std::uint8_t>(i / 2);
       std::fill(video.planes[1].begin(), video.planes[1].end(), static_cast<std::uint8_t>(cb));
       std::fill(video.planes[2].begin(), video.planes[2].end(), static_cast<std::uint8_t>(cr));
-      Picture jfif({512, 2});
+      I420Picture jfif({512, 2});
       Yuv420Planes from;
       Yuv420Planes to;
       for (std::size_t i = 0; i < 3; ++i) {
@@ -63,7 +61,7 @@ TEST(JpegEncoder, WritesJfifFilesThatDecodeToThePicture) {
   EncodedFrame encoded;
   DecodedPicture decoded;
   for (int time = 0; time < 5; ++time) {
-    Picture picture = moving_picture(settings.size_px, time);
+    I420Picture picture = moving_picture(settings.size_px, time);
     const EncodeStatus status = encoder->encode(picture.view(), false, encoded);
     ASSERT_TRUE(status.ok) << status.message;
     EXPECT_TRUE(encoded.idr);
@@ -118,7 +116,7 @@ TEST(JpegEncoder, FollowsItsBitrate) {
   const auto size_at = [&](int bitrate_kbps) {
     encoder->set_rate(bitrate_kbps, settings.fps);
     for (int time = 0; time < 5; ++time) {
-      Picture picture = moving_picture(settings.size_px, time);
+      I420Picture picture = moving_picture(settings.size_px, time);
       EXPECT_TRUE(encoder->encode(picture.view(), false, encoded).ok);
     }
     return static_cast<double>(encoded.bytes.size());

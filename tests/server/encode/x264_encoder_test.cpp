@@ -9,13 +9,12 @@
 #include "server/encode/decoder.h"
 #include "server/encode/encoder.h"
 #include "server/encode/h264_bitstream.h"
-#include "tests/server/encode/picture.h"
+#include "server/encode/test_picture.h"
+#include "tests/server/encode/colour.h"
 
 namespace catgs {
 namespace {
 
-using test::moving_picture;
-using test::Picture;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -42,7 +41,7 @@ std::vector<h264::NalType> types_of(const EncodedFrame& frame) {
 TEST(X264Encoder, FirstFrameIsAnIdrBehindItsParameterSets) {
   const auto encoder = make_encoder(EncoderKind::x264, settings_of(small_px));
   EncodedFrame out;
-  Picture picture = moving_picture(small_px, 0);
+  I420Picture picture = moving_picture(small_px, 0);
   const EncodeStatus status = encoder->encode(picture.view(), false, out);
   ASSERT_TRUE(status.ok) << status.message;
   EXPECT_TRUE(out.idr);
@@ -56,7 +55,7 @@ TEST(X264Encoder, FirstFrameIsAnIdrBehindItsParameterSets) {
 TEST(X264Encoder, SpsSaysWhatTheStreamIs) {
   const auto encoder = make_encoder(EncoderKind::x264, settings_of(small_px));
   EncodedFrame out;
-  Picture picture = moving_picture(small_px, 0);
+  I420Picture picture = moving_picture(small_px, 0);
   ASSERT_TRUE(encoder->encode(picture.view(), false, out).ok);
   const auto sps = h264::parse_sps(units_of(out).at(0));
   ASSERT_TRUE(sps);
@@ -89,7 +88,7 @@ TEST(X264Encoder, EveryFrameIsOneAccessUnitAndIdrsComeOnlyOnDemand) {
     const std::set<int> wanted = {0, 1, 17, 18, 40};
     for (int time = 0; time < 60; ++time) {
       // A jump to another place of the scene at 30 must stay a P-frame.
-      Picture picture = moving_picture(small_px, time < 30 ? time : time + 4000);
+      I420Picture picture = moving_picture(small_px, time < 30 ? time : time + 4000);
       const EncodeStatus status = encoder->encode(picture.view(), wanted.contains(time), out);
       ASSERT_TRUE(status.ok) << status.message;
       EXPECT_EQ(out.idr, wanted.contains(time)) << "frame " << time;
@@ -119,16 +118,16 @@ TEST(X264Encoder, DecodesToWhatWentIn) {
   EncodedFrame out;
   DecodedPicture decoded;
   for (int time = 0; time < 30; ++time) {
-    Picture picture = moving_picture(small_px, time);
+    I420Picture picture = moving_picture(small_px, time);
     ASSERT_TRUE(encoder->encode(picture.view(), time == 11, out).ok);
     const EncodeStatus status = decoder.decode(out.bytes, decoded);
     ASSERT_TRUE(status.ok) << status.message;  // one in, one out: no reordering delay
     ASSERT_EQ(decoded.size_px, small_px);
     EXPECT_FALSE(decoded.full_range);
     EXPECT_EQ(decoded.idr, out.idr);
-    EXPECT_GT(test::psnr(decoded.planes[0], picture.planes[0]), 34) << "frame " << time;
-    EXPECT_GT(test::psnr(decoded.planes[1], picture.planes[1]), 36) << "frame " << time;
-    EXPECT_GT(test::psnr(decoded.planes[2], picture.planes[2]), 36) << "frame " << time;
+    EXPECT_GT(psnr(decoded.planes[0], picture.planes[0]), 34) << "frame " << time;
+    EXPECT_GT(psnr(decoded.planes[1], picture.planes[1]), 36) << "frame " << time;
+    EXPECT_GT(psnr(decoded.planes[2], picture.planes[2]), 36) << "frame " << time;
   }
 }
 
@@ -136,7 +135,7 @@ double largest_share(Encoder& encoder, int first_time, int frames, double budget
   EncodedFrame out;
   double largest = 0;
   for (int time = first_time; time < first_time + frames; ++time) {
-    Picture picture = moving_picture({640, 360}, time);
+    I420Picture picture = moving_picture({640, 360}, time);
     EXPECT_TRUE(encoder.encode(picture.view(), false, out).ok);
     EXPECT_EQ(out.idr, time == 0);
     if (time > 0) largest = std::max(largest, static_cast<double>(out.bytes.size()) / budget_bytes);
@@ -157,7 +156,7 @@ TEST(X264Encoder, IdrsFitTheirShareToo) {
   const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, 8000, 60));
   EncodedFrame out;
   for (int time = 0; time < 20; ++time) {
-    Picture picture = moving_picture({640, 360}, 50 * time);
+    I420Picture picture = moving_picture({640, 360}, 50 * time);
     ASSERT_TRUE(encoder->encode(picture.view(), time % 5 == 0, out).ok);
     EXPECT_LE(static_cast<double>(out.bytes.size()), 1.2 * 8000 * 125.0 / 60) << "frame " << time;
   }
@@ -192,14 +191,14 @@ TEST(X264Encoder, AStillPictureIsRefinedByItself) {
   Decoder decoder(Codec::h264);
   EncodedFrame out;
   DecodedPicture decoded;
-  Picture picture = moving_picture({640, 360}, 0);
+  I420Picture picture = moving_picture({640, 360}, 0);
   double first = 0;
   for (int frame = 0; frame < 20; ++frame) {
     ASSERT_TRUE(encoder->encode(picture.view(), false, out).ok);
     ASSERT_TRUE(decoder.decode(out.bytes, decoded).ok);
-    if (frame == 0) first = test::psnr(decoded.planes[0], picture.planes[0]);
+    if (frame == 0) first = psnr(decoded.planes[0], picture.planes[0]);
   }
-  EXPECT_GT(test::psnr(decoded.planes[0], picture.planes[0]), first + 5);
+  EXPECT_GT(psnr(decoded.planes[0], picture.planes[0]), first + 5);
 }
 
 TEST(X264Encoder, RefusesWhatNoLevelAdmits) {
@@ -233,7 +232,7 @@ TEST(X264Encoder, OtherPresetsKeepTheRules) {
   EncodedFrame out;
   DecodedPicture decoded;
   for (int time = 0; time < 30; ++time) {
-    Picture picture = moving_picture(small_px, time < 15 ? time : time + 4000);
+    I420Picture picture = moving_picture(small_px, time < 15 ? time : time + 4000);
     ASSERT_TRUE(encoder->encode(picture.view(), false, out).ok);
     EXPECT_EQ(out.idr, time == 0);
     const EncodeStatus status = decoder.decode(out.bytes, decoded);

@@ -1,18 +1,18 @@
-#include "tests/server/encode/picture.h"
+#include "server/encode/test_picture.h"
 
-#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
-namespace catgs::test {
+namespace catgs {
 
-Picture::Picture(glm::ivec2 size) : size_px(size) {
+I420Picture::I420Picture(glm::ivec2 size) : size_px(size) {
   const auto luma = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
   planes = {std::vector<std::uint8_t>(luma, 16), std::vector<std::uint8_t>(luma / 4, 128),
             std::vector<std::uint8_t>(luma / 4, 128)};
 }
 
-FrameView Picture::view() {
+FrameView I420Picture::view() {
   FrameView frame;
   frame.format = PixelFormat::i420;
   frame.size_px = size_px;
@@ -23,7 +23,7 @@ FrameView Picture::view() {
   return frame;
 }
 
-Picture moving_picture(glm::ivec2 size_px, int time) {
+I420Picture moving_picture(glm::ivec2 size_px, int time) {
   static const std::array<double, 1024> sine = [] {  // of turns / 1024
     std::array<double, 1024> table{};
     for (std::size_t i = 0; i < table.size(); ++i) {
@@ -32,7 +32,7 @@ Picture moving_picture(glm::ivec2 size_px, int time) {
     return table;
   }();
   const auto wave = [](int phase) { return sine[static_cast<unsigned>(phase) % sine.size()]; };
-  Picture picture(size_px);
+  I420Picture picture(size_px);
   for (int plane = 0; plane < 3; ++plane) {
     const int step = plane == 0 ? 1 : 2;
     const double scale = plane == 0 ? 1.0 : 0.5;
@@ -59,33 +59,4 @@ double psnr(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>&
   return 10 * std::log10(255.0 * 255.0 * static_cast<double>(a.size()) / sum);
 }
 
-glm::dvec3 video_codes(glm::dvec3 rgb) {
-  const double luma = 0.2126 * rgb.r + 0.7152 * rgb.g + 0.0722 * rgb.b;
-  return {16 + 219.0 / 255 * luma, 128 + 224.0 / 255 * (rgb.b - luma) / 1.8556,
-          128 + 224.0 / 255 * (rgb.r - luma) / 1.5748};
-}
-
-glm::dvec3 rgb_at(const DecodedPicture& picture, glm::ivec2 pixel) {
-  const auto at = [](glm::ivec2 place, int width) {
-    return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(place.x);
-  };
-  const std::size_t luma_at = at(pixel, picture.size_px.x);
-  const std::size_t chroma_at = at(pixel / 2, (picture.size_px.x + 1) / 2);
-  double luma = picture.planes[0][luma_at];
-  double cb = picture.planes[1][chroma_at] - 128.0;
-  double cr = picture.planes[2][chroma_at] - 128.0;
-  glm::dvec3 rgb;
-  if (picture.full_range) {  // BT.601, as JFIF prescribes
-    rgb = {luma + 1.402 * cr, luma - 0.344136 * cb - 0.714136 * cr, luma + 1.772 * cb};
-  } else {  // BT.709
-    luma = (luma - 16) * 255 / 219;
-    cb *= 255.0 / 224;
-    cr *= 255.0 / 224;
-    rgb = {luma + 1.5748 * cr, luma - 0.187324 * cb - 0.468124 * cr, luma + 1.8556 * cb};
-  }
-  return {std::clamp(rgb.r, 0.0, 255.0), std::clamp(rgb.g, 0.0, 255.0),
-          std::clamp(rgb.b, 0.0, 255.0)};
-}
-
-}  // namespace catgs::test
+}  // namespace catgs

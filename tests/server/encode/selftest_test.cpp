@@ -1,0 +1,26 @@
+#include "server/encode/selftest.h"
+
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(Selftest, PassesAndNamesEveryEncoder) {
+  std::ostringstream out;
+  EXPECT_EQ(run_selftest(out), 0) << out.str();
+  EXPECT_THAT(out.str(), Not(HasSubstr("FAILED")));
+  EXPECT_THAT(out.str(), HasSubstr("h264_nvenc"));
+  EXPECT_THAT(out.str(), ContainsRegex("libx264 +640x360 .* avc1\\.42C01F"));
+  EXPECT_THAT(out.str(), ContainsRegex("libx264 +1920x1080 .* avc1\\.42C02A"));
+  EXPECT_THAT(out.str(), ContainsRegex("mjpeg +1280x720 .* JFIF"));
+}
+
+}  // namespace
+}  // namespace catgs
