@@ -131,4 +131,21 @@ Pose interpolate(const Trajectory& trajectory, std::int64_t time_us) {
           glm::normalize(glm::slerp(a.orientation, b.orientation, fraction))};
 }
 
+Trajectory resample(const Trajectory& trajectory, double rate_hz) {
+  if (trajectory.empty()) return {};
+  const std::int64_t first_us = trajectory.front().time_us;
+  const auto span_us = static_cast<double>(trajectory.back().time_us - first_us);
+  const double count = std::floor(span_us * 1e-6 * rate_hz) + 1.0;
+  if (!(rate_hz > 0.0 && count <= static_cast<double>(max_poses))) {
+    throw InputError("--fps", "", fmt::format("{} Hz gives no or too many poses", rate_hz),
+                     fmt::format("at most {} poses", max_poses));
+  }
+  Trajectory resampled(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < resampled.size(); ++i) {
+    const std::int64_t time_us = first_us + std::llround(static_cast<double>(i) / rate_hz * 1e6);
+    resampled[i] = {time_us, interpolate(trajectory, time_us)};
+  }
+  return resampled;
+}
+
 }  // namespace catgs

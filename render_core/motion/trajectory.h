@@ -26,4 +26,7 @@ void write_tum(const std::filesystem::path& path, const Trajectory& trajectory);
 /// the sample after `time_us`, so it serves display and resampling, never a forecast.
 Pose interpolate(const Trajectory& trajectory, std::int64_t time_us);
 
+/// The trajectory sampled at `rate_hz` from its first to its last pose, by interpolate().
+Trajectory resample(const Trajectory& trajectory, double rate_hz);
+
 }  // namespace catgs

@@ -21,6 +21,7 @@ int run(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal.");
 
   add_compare_command(app);
+  add_frames_command(app);
   add_trace_command(app);
 
   try {

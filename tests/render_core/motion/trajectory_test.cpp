@@ -127,5 +127,21 @@ TEST(Interpolate, IsLinearAndTakesTheShortWayAndClamps) {
   EXPECT_THROW(interpolate({}, 0), std::invalid_argument);
 }
 
+TEST(Resample, KeepsTheEndsAndTheRate) {
+  const Trajectory trajectory = {{1'000'000, {glm::vec3(0), {1, 0, 0, 0}}},
+                                 {1'300'000, {glm::vec3(3, 0, 0), {1, 0, 0, 0}}},
+                                 {2'000'000, {glm::vec3(10, 0, 0), {1, 0, 0, 0}}}};
+  const Trajectory resampled = resample(trajectory, 10.0);
+  ASSERT_EQ(resampled.size(), 11u);
+  for (std::size_t i = 0; i < resampled.size(); ++i) {
+    EXPECT_EQ(resampled[i].time_us, 1'000'000 + 100'000 * static_cast<std::int64_t>(i));
+    EXPECT_NEAR(resampled[i].world_from_camera.position.x, static_cast<float>(i), 1e-5f);
+  }
+  EXPECT_THROW(resample(trajectory, 0.0), InputError);
+  EXPECT_THROW(resample(trajectory, std::nan("")), InputError);
+  EXPECT_THROW(resample(trajectory, 1e12), InputError);
+  EXPECT_TRUE(resample({}, 60.0).empty());
+}
+
 }  // namespace
 }  // namespace catgs

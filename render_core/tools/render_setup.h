@@ -1,0 +1,69 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "render_core/motion/script.h"
+#include "render_core/renderer.h"
+#include "render_core/scene/scene.h"
+#include "render_core/thread_pool.h"
+
+namespace catgs {
+
+/// What `frames` and `bench` have in common: a scene, a camera path and a renderer.
+struct RenderOptions {
+  std::string scene;
+  std::string trace;
+  ScriptOptions script;
+  std::string size = "1280x720";
+  std::optional<float> focal_px;
+  std::optional<float> fov_y_deg;
+  std::optional<float> near_z;
+  std::optional<double> fps;
+  std::string frames;
+  RendererKind renderer = RendererKind::automatic;
+  Pipeline pipeline = Pipeline::exact;
+  std::string simd = "auto";
+  int threads = 0;
+};
+
+/// The options belong to the caller and must outlive the command's callback.
+void add_render_options(CLI::App& command, RenderOptions& options);
+
+/// The options, loaded and checked.
+struct RenderSetup {
+  Scene scene;  // its cloud has moved to `cloud`
+  std::shared_ptr<const GaussianCloud> cloud;
+  std::shared_ptr<ThreadPool> pool;
+  MadeRenderer made;
+  Trajectory poses;       // one per frame
+  std::size_t first = 0;  // number of the first of them in the whole path
+  double fps = 0.0;       // of the path
+  Camera camera;          // without the pose
+
+  [[nodiscard]] FrameRequest request(std::size_t i) const;
+};
+
+/// Loads scene and path, makes the renderer. Throws InputError.
+RenderSetup prepare(const RenderOptions& options, bool quiet);
+
+/// "1920x1080" -> (1920, 1080); sides of 1…max_image_side_px. `flag` names the source in errors.
+glm::ivec2 parse_size(std::string_view flag, std::string_view text);
+
+/// "A:B" -> frames A to B - 1 of `count`; either may be left out; "" is all. Throws InputError when
+/// nothing is left.
+struct FrameRange {
+  std::size_t begin, end;
+};
+FrameRange parse_frame_range(std::string_view text, std::size_t count);
+
+/// Renders frame `i` of the path or throws: InputError for a request that the core refuses, else
+/// std::runtime_error.
+void render_or_throw(View& view, const FrameRequest& request, FrameView& frame);
+
+std::string_view pipeline_name(Pipeline pipeline);
+
+}  // namespace catgs
