@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -83,6 +84,7 @@ struct RenderStatus {
 struct ViewSettings {
   Pipeline pipeline = Pipeline::exact;
   PixelFormat format = PixelFormat::rgb_f32;
+  std::uint64_t max_list_entries = std::uint64_t{64} << 20;  // bounds the memory of tile lists
   bool count_pairs = false;  // fill FrameStats::blended_pairs; slower
 };
 
@@ -129,6 +131,10 @@ struct MadeRenderer {
   std::unique_ptr<Renderer> renderer;
   std::string reason;  // why this core was chosen, for people
 };
+
+/// Instruction sets that the CPU core can use on this machine, best first; the last one, "SCALAR",
+/// uses one lane.
+std::vector<std::string_view> simd_targets();
 
 /// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run.
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,

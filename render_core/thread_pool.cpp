@@ -7,13 +7,13 @@
 namespace catgs {
 
 struct ThreadPool::Loop {
-  Loop(std::size_t n, const std::function<void(std::size_t)>& f) : count(n), body(f) {}
+  Loop(std::size_t n, BodyRef f) : count(n), body(f) {}
 
   const std::size_t count;
-  const std::function<void(std::size_t)>& body;
+  const BodyRef body;
   std::atomic<std::size_t> next{0};
   int helpers = 0;  // workers inside run(); guarded by the pool's mutex
-  std::condition_variable_any left;
+  std::condition_variable left;
 
   void run() {
     for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i);
@@ -42,7 +42,7 @@ void ThreadPool::submit(std::function<void()> task) {
   wake_.notify_one();
 }
 
-void ThreadPool::parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+void ThreadPool::run_loop(std::size_t count, BodyRef body) {
   if (threads_ == 1 || count <= 1) {
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;

@@ -29,11 +29,22 @@ class ThreadPool {
 
   /// Calls body(i) once for every i in [0, count), on the calling thread and on idle workers, and
   /// returns when all calls have ended. Indices are handed out one by one: make a call worth a few
-  /// microseconds. May be called from inside a task. `body` must not throw.
-  void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
+  /// microseconds. May be called from inside a task. `body` must not throw. Allocates nothing.
+  template <class Body>
+  void parallel_for(std::size_t count, const Body& body) {
+    run_loop(count,
+             {&body, [](const void* b, std::size_t i) { (*static_cast<const Body*>(b))(i); }});
+  }
 
  private:
+  /// A borrowed callable: std::function would allocate for every frame stage.
+  struct BodyRef {
+    const void* body;
+    void (*call)(const void* body, std::size_t i);
+    void operator()(std::size_t i) const { call(body, i); }
+  };
   struct Loop;
+  void run_loop(std::size_t count, BodyRef body);
   [[nodiscard]] Loop* loop_to_help() const;  // mutex held
   void work(const std::stop_token& stop);
 

@@ -52,6 +52,14 @@ CATGS_HD_INLINE Vec2<T> half_extent(const ProjectedGaussian<T>& g, T reach) {
   return {sqrt(squared_sigmas * g.xx), sqrt(squared_sigmas * g.yy)};
 }
 
+/// The original's bound: three standard deviations along the longest axis, whole pixels.
+template <class T>
+CATGS_HD_INLINE T three_sigma_radius(const ProjectedGaussian<T>& g) {
+  const T middle = T(0.5) * (g.xx + g.yy);
+  const T largest = middle + sqrt(max(T(0.1), middle * middle - g.determinant));
+  return ceil(T(3.0) * sqrt(largest));
+}
+
 /// The ellipse {whitened_square <= reach} prepared for being cut into bands of rows.
 template <class T>
 struct Ellipse {

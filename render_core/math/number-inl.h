@@ -28,7 +28,8 @@ CATGS_HD_INLINE float sqrt(float a) { return std::sqrt(a); }
 CATGS_HD_INLINE double sqrt(double a) { return std::sqrt(a); }
 CATGS_HD_INLINE float abs(float a) { return std::fabs(a); }
 CATGS_HD_INLINE double abs(double a) { return std::fabs(a); }
-
+CATGS_HD_INLINE float ceil(float a) { return std::ceil(a); }
+CATGS_HD_INLINE double ceil(double a) { return std::ceil(a); }
 CATGS_HD_INLINE bool and_not(bool a, bool b) { return !a && b; }
 
 /// a * b + c, with one rounding where the machine has it for free.

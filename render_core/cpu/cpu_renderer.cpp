@@ -1,0 +1,219 @@
+#include "render_core/cpu/cpu_renderer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cctype>
+#include <chrono>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "render_core/cpu/kernels.h"
+#include "render_core/cpu/radix_sort.h"
+#include "render_core/cpu/scene_store.h"
+#include "render_core/cpu/tile_lists.h"
+#include "render_core/error.h"
+#include "render_core/host_image.h"
+#include "render_core/math/constants.h"
+
+namespace catgs {
+namespace {
+
+/// Adds the time from one call to the next to stages.
+class StageClock {
+ public:
+  void end(Stage stage, FrameStats& stats) {
+    const auto now = std::chrono::steady_clock::now();
+    stats.stage_ms[static_cast<std::size_t>(stage)] +=
+        std::chrono::duration<float, std::milli>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// What all Views of a renderer share; constant after construction.
+struct SharedScene {
+  SceneStore store;
+  std::shared_ptr<ThreadPool> pool;
+  SimdKernels kernels;
+};
+
+class CpuView final : public View {
+ public:
+  CpuView(std::shared_ptr<const SharedScene> shared, const ViewSettings& settings)
+      : shared_(std::move(shared)), settings_(settings) {}
+
+  RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
+    RenderStatus status = check_request(request, settings_.format);
+    if (!status.ok()) return status;
+    try {
+      frame = render_checked(request);
+    } catch (const std::bad_alloc&) {
+      return {RenderStatus::Code::out_of_memory, "CPU core: no memory for " +
+                                                     std::to_string(visible_clusters_.size()) +
+                                                     " clusters in view"};
+    }
+    return {};
+  }
+
+ private:
+  FrameView render_checked(const FrameRequest& request);
+  void cull_clusters(const Camera& camera);
+  void project(const Camera& camera);
+  void gather_keys();
+  std::uint64_t blend(const FrameRequest& request, glm::ivec2 grid);
+
+  std::shared_ptr<const SharedScene> shared_;
+  ViewSettings settings_;
+  HostImage image_;
+  // Buffers of a frame, kept for the next one. Slot = rank of a visible cluster x cluster_size +
+  // position among its visible Gaussians.
+  std::vector<std::uint32_t> visible_clusters_;
+  std::vector<std::uint32_t> visible_counts_;  // per visible cluster
+  std::vector<Splat> splats_;                  // [slot]
+  std::vector<DepthSlot> cluster_keys_;        // [slot]
+  std::vector<DepthSlot> order_, order_scratch_;
+  RadixSorter sorter_;
+  TileLists lists_;
+};
+
+FrameView CpuView::render_checked(const FrameRequest& request) {
+  ThreadPool& pool = *shared_->pool;
+  const Camera& camera = request.camera;
+  const glm::ivec2 grid = (camera.size_px + (tile_size_px - 1)) / tile_size_px;
+  image_.resize(settings_.format, camera.size_px);
+  FrameStats stats;
+  StageClock clock;
+
+  cull_clusters(camera);
+  project(camera);
+  gather_keys();
+  clock.end(Stage::project, stats);
+
+  if (settings_.pipeline == Pipeline::vanilla) {
+    lists_.build_by_keys(splats_, order_, grid, settings_.max_list_entries, pool);
+    clock.end(Stage::sort, stats);
+  } else {
+    sorter_.sort(order_, order_scratch_, 32, pool);
+    order_ties(splats_, std::span(order_));
+    clock.end(Stage::sort, stats);
+    lists_.build_exact(splats_, order_, grid, settings_.max_list_entries, pool);
+    clock.end(Stage::bin, stats);
+  }
+
+  stats.blended_pairs = blend(request, grid);
+  clock.end(Stage::blend, stats);
+
+  stats.visible = static_cast<std::uint32_t>(order_.size());
+  stats.list_entries = lists_.entries();
+  stats.list_max = lists_.longest();
+  stats.overflowed_entries = lists_.overflowed_entries();
+  return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats};
+}
+
+void CpuView::cull_clusters(const Camera& camera) {
+  const std::span<const Cluster> clusters = shared_->store.clusters();
+  const ClusterCuller culler(camera);
+  const bool cull = settings_.pipeline != Pipeline::vanilla;
+  visible_clusters_.clear();
+  for (std::size_t c = 0; c < clusters.size(); ++c)
+    if (!cull || !culler.outside(clusters[c]))
+      visible_clusters_.push_back(static_cast<std::uint32_t>(c));
+}
+
+void CpuView::project(const Camera& camera) {
+  const std::size_t slots = visible_clusters_.size() * cluster_size;
+  if (splats_.size() < slots) {
+    splats_.resize(slots);
+    cluster_keys_.resize(slots);
+  }
+  visible_counts_.resize(visible_clusters_.size());
+  shared_->pool->parallel_for(visible_clusters_.size(), [&](std::size_t rank) {
+    const std::size_t first = rank * cluster_size;
+    visible_counts_[rank] = shared_->kernels.project_cluster(
+        {&shared_->store, &camera, settings_.pipeline, visible_clusters_[rank],
+         splats_.data() + first, cluster_keys_.data() + first, static_cast<std::uint32_t>(first)});
+  });
+}
+
+/// Closes the gaps between the clusters' keys.
+void CpuView::gather_keys() {
+  order_.clear();
+  for (std::size_t rank = 0; rank < visible_clusters_.size(); ++rank) {
+    const auto first = cluster_keys_.begin() + static_cast<std::ptrdiff_t>(rank * cluster_size);
+    order_.insert(order_.end(), first, first + visible_counts_[rank]);
+  }
+  order_scratch_.resize(order_.size());
+}
+
+std::uint64_t CpuView::blend(const FrameRequest& request, glm::ivec2 grid) {
+  std::atomic<std::uint64_t> pairs{0};
+  shared_->pool->parallel_for(lists_.tiles(), [&](std::size_t tile) {
+    const auto index = static_cast<int>(tile);
+    const std::uint64_t blended =
+        shared_->kernels.blend_tile({splats_.data(),
+                                     lists_.list(tile),
+                                     {index % grid.x, index / grid.x},
+                                     request.background,
+                                     settings_.pipeline != Pipeline::vanilla,
+                                     settings_.count_pairs,
+                                     &image_});
+    if (settings_.count_pairs) pairs += blended;
+  });
+  return pairs;
+}
+
+class CpuRenderer final : public Renderer {
+ public:
+  explicit CpuRenderer(std::shared_ptr<const SharedScene> shared) : shared_(std::move(shared)) {}
+
+  std::string description() const override {
+    const int threads = shared_->pool->threads();
+    return "CPU, " + std::string(shared_->kernels.name) + ", " + std::to_string(threads) +
+           (threads == 1 ? " thread" : " threads");
+  }
+  std::size_t scene_bytes() const override { return shared_->store.bytes(); }
+  std::unique_ptr<View> make_view(const ViewSettings& settings) override {
+    return std::make_unique<CpuView>(shared_, settings);
+  }
+
+ private:
+  std::shared_ptr<const SharedScene> shared_;
+};
+
+const SimdKernels& choose_kernels(std::string_view simd) {
+  const std::span<const SimdKernels> all = simd_kernels();
+  const auto same = [](std::string_view a, std::string_view b) {
+    return std::ranges::equal(
+        a, b, {}, [](unsigned char c) { return std::tolower(c); },
+        [](unsigned char c) { return std::tolower(c); });
+  };
+  if (same(simd, "auto")) return all.front();
+  std::string names;
+  for (const SimdKernels& kernels : all) {
+    if (same(simd, kernels.name)) return kernels;
+    names.append(", ").append(kernels.name);
+  }
+  throw InputError("--simd", "", "this machine has no \"" + std::string(simd) + "\"",
+                   "use auto" + names);
+}
+
+}  // namespace
+
+std::vector<std::string_view> simd_targets() {
+  std::vector<std::string_view> names;
+  for (const SimdKernels& kernels : simd_kernels()) names.push_back(kernels.name);
+  return names;
+}
+
+std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
+                                            std::shared_ptr<ThreadPool> pool,
+                                            std::string_view simd) {
+  const SimdKernels& kernels = choose_kernels(simd);
+  auto shared = std::make_shared<const SharedScene>(SceneStore(cloud, *pool), pool, kernels);
+  return std::make_unique<CpuRenderer>(std::move(shared));
+}
+
+}  // namespace catgs

@@ -1,0 +1,67 @@
+#include "render_core/cpu/kernels.h"
+
+#include <glm/common.hpp>
+
+#include "render_core/camera.h"
+
+// One lane for comparison, and no SSSE3: what it adds to SSE4 runs on no machine of interest.
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS HWY_SSSE3
+
+// This file is compiled once per instruction set: foreach_target.h includes it again for each.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render_core/cpu/kernels.cpp"
+#include <hwy/foreach_target.h>
+// foreach_target.h comes before the headers it repeats.
+#include <hwy/highway.h>
+
+#include "render_core/cpu/blend-inl.h"
+#include "render_core/cpu/project-inl.h"
+
+#if HWY_ONCE
+
+namespace catgs {
+namespace {
+
+struct Target {
+  std::int64_t id;
+  SimdKernels kernels;
+};
+
+#define CATGS_TARGET(name)                                                 \
+  {                                                                        \
+    HWY_##name, { #name, N_##name::project_cluster, N_##name::blend_tile } \
+  }
+
+const Target compiled_targets[] = {
+#if HWY_TARGETS & HWY_AVX3
+    CATGS_TARGET(AVX3),
+#endif
+#if HWY_TARGETS & HWY_AVX2
+    CATGS_TARGET(AVX2),
+#endif
+#if HWY_TARGETS & HWY_SSE4
+    CATGS_TARGET(SSE4),
+#endif
+#if HWY_TARGETS & HWY_NEON
+    CATGS_TARGET(NEON),
+#endif
+    CATGS_TARGET(SCALAR),
+};
+
+}  // namespace
+
+std::span<const SimdKernels> simd_kernels() {
+  static const std::vector<SimdKernels> supported = [] {
+    std::vector<SimdKernels> kernels;
+    for (const Target& target : compiled_targets)
+      if (target.id == HWY_SCALAR || (hwy::SupportedTargets() & target.id) != 0)
+        kernels.push_back(target.kernels);
+    return kernels;
+  }();
+  return supported;
+}
+
+}  // namespace catgs
+
+#endif  // HWY_ONCE
