@@ -8,6 +8,8 @@
 
 namespace catgs {
 
+class ThreadPool;
+
 /// Procedural scenes with the statistics of a trained capture.
 /// city: streets and towers, the public demo; garden: fine vegetation; stress: what breaks
 /// renderers (huge, needle-like, nearly transparent, coincident Gaussians).
@@ -17,5 +19,7 @@ SynthKind parse_synth_kind(std::string_view name);  // throws InputError
 /// `gaussians` in 1'000…64'000'000; exactly that many come out. The same (kind, count, seed) gives
 /// the same bytes on every machine. SH degree 3. Hints hold a start pose worth looking at.
 Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed);
+/// The same on a given pool; its size changes the time alone.
+Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed, ThreadPool& pool);
 
 }  // namespace catgs

@@ -32,6 +32,7 @@ inline bool is_quiet(const CLI::App& command) {
 
 void add_compare_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
+void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 
 }  // namespace catgs

@@ -22,6 +22,7 @@ int run(int argc, char** argv) {
 
   add_compare_command(app);
   add_frames_command(app);
+  add_synth_command(app);
   add_trace_command(app);
 
   try {

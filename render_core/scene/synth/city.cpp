@@ -1,0 +1,164 @@
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "render_core/scene/first_sight.h"
+#include "render_core/scene/synth/backdrop.h"
+#include "render_core/scene/synth/city_houses.h"
+#include "render_core/scene/synth/city_plan.h"
+#include "render_core/scene/synth/city_props.h"
+#include "render_core/scene/synth/city_streets.h"
+#include "render_core/scene/synth/plants.h"
+#include "render_core/scene/synth/scenes.h"
+
+namespace catgs::synth {
+namespace {
+
+// Weights are Gaussians at full density, which a city has from this size on: a larger one spreads
+// further and keeps the same Gaussians in its middle; a smaller one is both smaller and coarser.
+constexpr std::size_t full_density_count = 1'000'000;
+constexpr double backdrop_share = 0.05;  // of at most full_density_count: sky, hills, skyline
+
+struct Cell {
+  int column;
+  int row;
+  float distance;  // of its middle from the city's centre
+  double weight;
+};
+
+/// Density of Gaussians here against that of the avenue and the park.
+float detail_at(const glm::vec2& place) {
+  const glm::vec2 d = place - city_centre;
+  const glm::vec2 stretched(d.x, d.y * 0.62f);  // along the avenue one sees further
+  return blend(1.0f, 0.30f, smooth_step(25.0f, 190.0f, glm::length(stretched)));
+}
+
+/// Everything of one cell of the plan: its block and the streets west and south of it.
+void paint_cell(Painter& painter, const Block& block, float haze) {
+  const float detail = detail_at(block.lot.middle());
+  paint_streets(painter, block, detail, haze);
+  paint_lot(painter, block, detail, haze);
+  for (const Building& b : block.buildings)
+    paint_building(painter, b, detail_at(b.base.middle()), haze);
+  for (const Tree& tree : block.trees) {
+    if (!painter.measuring()) {
+      const float r = 1.6f * tree.crown;
+      painter.shadows().focus({at(tree.place.x - r, tree.height + 2.0f * r, tree.place.y - r),
+                               at(tree.place.x + r, 0, tree.place.y + r)});
+    }
+    Random random(tree.key);
+    const glm::vec3 leaves = leaf_albedo(random);
+    paint_tree(painter, at(tree.place.x, 0, tree.place.y), tree.height, tree.crown, leaves, haze,
+               26.0 * tree.crown * tree.crown * detail_at(tree.place), tree.key);
+  }
+  paint_props(painter, block, detail, haze);
+  const glm::vec2 corner = block.lot.min - 10.0f;
+  paint_floaters(painter, at(corner.x, 26.0f, corner.y),
+                 at(corner.x + block_pitch_m, 0.3f, corner.y + block_pitch_m),
+                 0.015 * painter.measured(), child(block.key, 90));
+}
+
+double measure_cell(std::uint64_t seed, const Light& light, int column, int row) {
+  Shadows none(light.to_sun());
+  Painter painter(light, none);
+  paint_cell(painter, plan_block(seed, column, row), 0.0f);
+  return painter.measured();
+}
+
+/// Cells from the centre outwards until their weights reach `target`.
+std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double target,
+                               ThreadPool& pool) {
+  std::vector<Cell> chosen;
+  double sum = 0.0;
+  float done = 0.0f;  // all cells nearer than this are chosen
+  while (sum < target) {
+    const float ring = done + std::max(block_pitch_m, 0.5f * done);
+    std::vector<Cell> cells;
+    const int reach = static_cast<int>(ring / block_pitch_m) + 2;
+    for (int column = -reach; column <= reach; ++column) {
+      for (int row = -reach; row <= reach; ++row) {
+        const glm::vec2 middle = (glm::vec2(column, row) + 0.5f) * block_pitch_m;
+        const float distance = glm::length(middle - city_centre);
+        if (distance >= done && distance < ring) cells.push_back({column, row, distance, 0.0});
+      }
+    }
+    std::sort(cells.begin(), cells.end(), [](const Cell& a, const Cell& b) {
+      return std::tie(a.distance, a.column, a.row) < std::tie(b.distance, b.column, b.row);
+    });
+    pool.parallel_for(cells.size(), [&](std::size_t i) {
+      cells[i].weight = measure_cell(seed, light, cells[i].column, cells[i].row);
+    });
+    for (const Cell& cell : cells) {
+      if (sum >= target) break;
+      chosen.push_back(cell);
+      sum += cell.weight;
+    }
+    done = ring;
+  }
+  return chosen;
+}
+
+}  // namespace
+
+Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
+  const Light light(glm::normalize(glm::vec3(-0.847f, -0.42f, -0.342f)), child(seed, 1));
+  const std::size_t reference = std::min(count, full_density_count);
+  const auto backdrop = static_cast<std::size_t>(backdrop_share * static_cast<double>(reference));
+  const std::size_t in_cells = count - backdrop;
+  // Below full density the area shrinks with the square root of the count, the density likewise.
+  const double fill = std::sqrt(static_cast<double>(reference) / full_density_count);
+  const double target =
+      count < full_density_count ? fill * full_density_count : static_cast<double>(in_cells);
+  const std::vector<Cell> cells = choose_cells(seed, light, target, pool);
+  double total = 0.0;
+  for (const Cell& cell : cells) total += cell.weight;
+  const double density = count < full_density_count ? static_cast<double>(in_cells) / total : 1.0;
+
+  Scene scene;
+  scene.cloud.resize(count, max_sh_degree);
+  std::vector<std::size_t> first(cells.size() + 1, 0);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    sum += cells[i].weight;
+    first[i + 1] = std::min(in_cells, static_cast<std::size_t>(sum * density));
+  }
+  first.back() = in_cells;
+  const float radius = cells.back().distance + 0.5f * block_pitch_m;
+  pool.parallel_for(cells.size() + 1, [&](std::size_t i) {
+    Shadows shadows(light.to_sun());
+    if (i == cells.size()) {
+      const auto paint = [&](Painter& p) {
+        const glm::vec2 centre = city_centre;
+        const float sky = std::max(900.0f, 4.0f * radius);
+        paint_sky(p, centre, sky, 0.55, child(seed, 2));
+        paint_horizon(p, centre, 0.8f * radius, sky, {0.22f, 0.21f, 0.17f}, 0.18, child(seed, 3));
+        paint_skyline(p, centre, radius + 40.0f, 2.2f * radius + 150.0f, 0.27, child(seed, 4));
+      };
+      Painter painter(light, shadows, scene.cloud, in_cells, backdrop, 1.0);
+      const std::size_t n = painter.take(1.0);
+      painter.divide(n, paint);
+      return;
+    }
+    const Cell& cell = cells[i];
+    for (int dc = -2; dc <= 1; ++dc) {  // the sun stands to the west and south
+      for (int dr = -2; dr <= 1; ++dr)
+        add_shadows(plan_block(seed, cell.column + dc, cell.row + dr), shadows);
+    }
+    const float haze = 0.30f * smooth_step(0.35f, 1.0f, cell.distance / std::max(radius, 200.0f));
+    Painter painter(light, shadows, scene.cloud, first[i], first[i + 1] - first[i], cell.weight);
+    paint_cell(painter, plan_block(seed, cell.column, cell.row), haze);
+  });
+
+  scene.name = "city";
+  scene.format = "procedural";
+  scene.hints.start_pose = look_at(at(3.5f, 5.2f, -14.0f), at(-2.0f, 7.0f, 60.0f), up);
+  scene.hints.near_z = 0.2f;
+  scene.hints.limits = {at(city_centre.x - radius, 90.0f, city_centre.y - radius),
+                        at(city_centre.x + radius, 0.5f, city_centre.y + radius)};
+  scene.hints.focus = at(-6.0f, 4.0f, 30.0f);
+  scene.hints.source = "procedural";
+  return scene;
+}
+
+}  // namespace catgs::synth

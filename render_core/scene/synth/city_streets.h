@@ -1,0 +1,15 @@
+#pragma once
+
+#include "render_core/scene/synth/city_plan.h"
+#include "render_core/scene/synth/painter.h"
+
+namespace catgs::synth {
+
+/// Road, markings, kerbs and pavements of the streets west and south of a block and the crossing
+/// where they meet.
+void paint_streets(Painter& painter, const Block& block, float detail, float haze);
+
+/// The ground inside the block: courts, squares, a park's lawns, paths and pond.
+void paint_lot(Painter& painter, const Block& block, float detail, float haze);
+
+}  // namespace catgs::synth
