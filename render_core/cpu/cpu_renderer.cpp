@@ -5,11 +5,11 @@
 #include <cctype>
 #include <chrono>
 #include <new>
+#include <numeric>
 #include <string>
 #include <utility>
 
 #include "render_core/cpu/kernels.h"
-#include "render_core/cpu/radix_sort.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
 #include "render_core/error.h"
@@ -62,7 +62,6 @@ class CpuView final : public View {
   FrameView render_checked(const FrameRequest& request);
   void cull_clusters(const Camera& camera);
   void project(const Camera& camera);
-  void gather_keys();
   std::uint64_t blend(const FrameRequest& request, glm::ivec2 grid);
 
   std::shared_ptr<const SharedScene> shared_;
@@ -73,9 +72,6 @@ class CpuView final : public View {
   std::vector<std::uint32_t> visible_clusters_;
   std::vector<std::uint32_t> visible_counts_;  // per visible cluster
   std::vector<Splat> splats_;                  // [slot]
-  std::vector<DepthSlot> cluster_keys_;        // [slot]
-  std::vector<DepthSlot> order_, order_scratch_;
-  RadixSorter sorter_;
   TileLists lists_;
 };
 
@@ -89,24 +85,22 @@ FrameView CpuView::render_checked(const FrameRequest& request) {
 
   cull_clusters(camera);
   project(camera);
-  gather_keys();
   clock.end(Stage::project, stats);
 
   if (settings_.pipeline == Pipeline::vanilla) {
-    lists_.build_by_keys(splats_, order_, grid, settings_.max_list_entries, pool);
+    lists_.build_by_keys(splats_, visible_counts_, grid, settings_.max_list_entries, pool);
     clock.end(Stage::sort, stats);
   } else {
-    sorter_.sort(order_, order_scratch_, 32, pool);
-    order_ties(splats_, std::span(order_));
-    clock.end(Stage::sort, stats);
-    lists_.build_exact(splats_, order_, grid, settings_.max_list_entries, pool);
+    lists_.fill(splats_, visible_counts_, grid, settings_.max_list_entries, shared_->kernels, pool);
     clock.end(Stage::bin, stats);
+    lists_.sort(splats_, pool);
+    clock.end(Stage::sort, stats);
   }
 
   stats.blended_pairs = blend(request, grid);
   clock.end(Stage::blend, stats);
 
-  stats.visible = static_cast<std::uint32_t>(order_.size());
+  stats.visible = std::accumulate(visible_counts_.begin(), visible_counts_.end(), 0u);
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();
   stats.overflowed_entries = lists_.overflowed_entries();
@@ -125,27 +119,13 @@ void CpuView::cull_clusters(const Camera& camera) {
 
 void CpuView::project(const Camera& camera) {
   const std::size_t slots = visible_clusters_.size() * cluster_size;
-  if (splats_.size() < slots) {
-    splats_.resize(slots);
-    cluster_keys_.resize(slots);
-  }
+  if (splats_.size() < slots) splats_.resize(slots);
   visible_counts_.resize(visible_clusters_.size());
   shared_->pool->parallel_for(visible_clusters_.size(), [&](std::size_t rank) {
-    const std::size_t first = rank * cluster_size;
     visible_counts_[rank] = shared_->kernels.project_cluster(
         {&shared_->store, &camera, settings_.pipeline, visible_clusters_[rank],
-         splats_.data() + first, cluster_keys_.data() + first, static_cast<std::uint32_t>(first)});
+         splats_.data() + rank * cluster_size});
   });
-}
-
-/// Closes the gaps between the clusters' keys.
-void CpuView::gather_keys() {
-  order_.clear();
-  for (std::size_t rank = 0; rank < visible_clusters_.size(); ++rank) {
-    const auto first = cluster_keys_.begin() + static_cast<std::ptrdiff_t>(rank * cluster_size);
-    order_.insert(order_.end(), first, first + visible_counts_[rank]);
-  }
-  order_scratch_.resize(order_.size());
 }
 
 std::uint64_t CpuView::blend(const FrameRequest& request, glm::ivec2 grid) {

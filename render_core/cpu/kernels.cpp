@@ -15,6 +15,7 @@
 // foreach_target.h comes before the headers it repeats.
 #include <hwy/highway.h>
 
+#include "render_core/cpu/bin-inl.h"
 #include "render_core/cpu/blend-inl.h"
 #include "render_core/cpu/project-inl.h"
 
@@ -28,9 +29,9 @@ struct Target {
   SimdKernels kernels;
 };
 
-#define CATGS_TARGET(name)                                                 \
-  {                                                                        \
-    HWY_##name, { #name, N_##name::project_cluster, N_##name::blend_tile } \
+#define CATGS_TARGET(name)                                                                       \
+  {                                                                                              \
+    HWY_##name, { #name, N_##name::project_cluster, N_##name::list_tiles, N_##name::blend_tile } \
   }
 
 const Target compiled_targets[] = {

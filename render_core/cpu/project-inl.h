@@ -164,10 +164,7 @@ std::uint32_t project_cluster_of(const ProjectTask& task) {
                splats);
     for (; hits != 0; hits &= hits - 1) {
       const int lane = std::countr_zero(hits);
-      std::memcpy(&task.splats[visible], splats + lane * 16, sizeof(Splat));
-      task.keys[visible] = {std::bit_cast<std::uint32_t>(task.splats[visible].depth),
-                            task.first_slot + visible};
-      ++visible;
+      std::memcpy(&task.splats[visible++], splats + lane * 16, sizeof(Splat));
     }
   }
   return visible;

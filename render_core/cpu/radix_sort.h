@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -79,5 +80,24 @@ class RadixSorter {
 
   std::vector<Histogram> histograms_;
 };
+
+/// Sorts a list of up to a few thousand elements on the calling thread, stably: four bytes, least
+/// significant first, bytes that all keys share skipped. `scratch` has the size of `data`.
+inline void radix_sort_short(std::span<DepthSlot> data, std::span<DepthSlot> scratch) {
+  std::array<std::array<std::uint32_t, 256>, 4> counts{};
+  for (const DepthSlot& e : data)
+    for (int byte = 0; byte < 4; ++byte) ++counts[byte][(e.key >> (8 * byte)) & 255u];
+  std::span<DepthSlot> from = data, to = scratch;
+  for (int byte = 0; byte < 4; ++byte) {
+    std::array<std::uint32_t, 256>& next = counts[byte];
+    const auto digit = [byte](const DepthSlot& e) { return (e.key >> (8 * byte)) & 255u; };
+    if (data.empty() || next[digit(from[0])] == data.size()) continue;
+    std::uint32_t offset = 0;
+    for (std::uint32_t& n : next) offset += std::exchange(n, offset);
+    for (const DepthSlot& e : from) to[next[digit(e)]++] = e;
+    std::swap(from, to);
+  }
+  if (from.data() != data.data()) std::ranges::copy(from, data.begin());
+}
 
 }  // namespace catgs
