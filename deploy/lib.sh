@@ -1,4 +1,4 @@
-# shellcheck shell=bash disable=SC2034  # most variables are for the scripts that source this
+# shellcheck shell=bash disable=SC2034,SC2317  # variables and functions are for those who source this
 # What run.sh and test.sh share: distribution, packages, numbered steps, configure and build.
 # Sourced, never run. Needs bash 5 and nothing that a minimal Debian lacks: no curl, ss, ip, python.
 
@@ -59,10 +59,10 @@ steps_begin() {
 
 print_step() { printf '[%d/%d] %-62s %s\n' "$step_number" "$step_count" "$1" "$2"; }
 
-group=""
+groups=()
 
-# start_group LOG COMMAND...: runs it in the background as a process group of its own, `group`, so
-# that Ctrl-C reaches this script alone and everything the command started ends with stop_group.
+# start_group LOG COMMAND...: runs it in the background as a process group of its own, the last of
+# `groups`, so that Ctrl-C reaches this script alone and stop_groups ends all that it started.
 start_group() {
   local log=$1
   shift
@@ -72,26 +72,29 @@ start_group() {
     set -e
     "$@"
   ) >>"$log" 2>&1 &
-  group=$!
+  groups+=($!)
   set +m
 }
 
-# Ends the running group and waits for its leader.
-stop_group() {
-  [[ -n $group ]] || return 0
-  kill -TERM -- "-$group" 2>/dev/null || true
-  wait "$group" 2>/dev/null || true
-  group=""
+# Ends the running groups, the youngest first, and waits for each leader.
+stop_groups() {
+  local i
+  for ((i = ${#groups[@]} - 1; i >= 0; i--)); do
+    kill -TERM -- "-${groups[i]}" 2>/dev/null || true
+    wait "${groups[i]}" 2>/dev/null || true
+  done
+  groups=()
 }
 
 # Ctrl-C or TERM while a step runs.
 interrupted() {
   trap - INT TERM
-  stop_group
+  stop_groups
   printf '\nStopped.\n'
   exit 130
 }
 trap interrupted INT TERM
+trap stop_groups EXIT
 
 # step TITLE COMMAND...: runs the command with its output in the log. TITLE is printed with the
 # time it took; on a terminal a counter runs meanwhile. A failure shows the end of the log.
@@ -103,11 +106,12 @@ step() {
   begin_us=$(now_us)
   printf '\n==== [%d/%d] %s\n' "$step_number" "$step_count" "$title" >>"$step_log"
   start_group "$step_log" "$@"
+  local job=${groups[-1]}
   if [[ -t 1 ]]; then
-    show_running "$group" "$title" "$begin_us"
+    show_running "$job" "$title" "$begin_us"
   fi
-  wait "$group" || status=$?
-  group=""
+  wait "$job" || status=$?
+  unset 'groups[-1]'
   if ((status != 0)); then
     printf '[%d/%d] %s: FAILED (status %d)\n' "$step_number" "$step_count" "$title" "$status" >&2
     tac "$step_log" | sed '/^==== /q' | head -n 20 | tac | cut -c1-160 | sed 's/^/    /' >&2

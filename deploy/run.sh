@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the server and serves scenes to a browser: see usage below.
+# shellcheck source-path=SCRIPTDIR disable=SC2317  # `step` calls functions by name
 set -euo pipefail
-# shellcheck source-path=SCRIPTDIR
 source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 usage() {
@@ -158,6 +158,7 @@ make_lan_credentials() {
 # ---- serving ----------------------------------------------------------------------------------
 
 readonly server_log=$build_dir/server.log
+readonly admin_port=9090  # the server's default, and Prometheus' own
 
 start_server() {
   local -a options=(--scene "${scenes[@]}" --port "$port")
@@ -165,14 +166,31 @@ start_server() {
     options+=(--bind 0.0.0.0 --token-file "$lan_dir/token"
       --tls-cert "$lan_dir/cert.pem" --tls-key "$lan_dir/key.pem")
   fi
+  # Metrics are an extra here: a busy admin port must not keep the pictures away.
+  if [[ -n $(listening_inode "$admin_port") && " ${server_options[*]} " != *" --admin-bind"* ]]; then
+    options+=(--admin-bind off)
+  fi
   : >"$server_log"
   start_group "$server_log" "$bin_dir/catgs-server" "${options[@]}" "${server_options[@]}"
 }
 
-# The step that waits for it: fails when the server ends before it listens.
-wait_until_serving() {
+# Prints the first line of the server's answer to GET /readyz; nothing while nobody answers.
+readiness() {
+  local connection request=$'GET /readyz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n' status=""
+  if ((lan)); then
+    { printf '%s' "$request" && sleep 1; } |
+      timeout 3 openssl s_client -quiet -connect "127.0.0.1:$port" 2>/dev/null | head -n 1
+  elif exec {connection}<>"/dev/tcp/127.0.0.1/$port"; then
+    printf '%s' "$request" >&"$connection"
+    read -r -t 3 status <&"$connection" || true
+    exec {connection}>&-
+    printf '%s\n' "$status"
+  fi 2>/dev/null
+}
+
+wait_until_ready() {
   local server=$1
-  until [[ -n $(listening_inode "$port") ]]; do
+  until [[ $(readiness || true) == *" 200 "* ]]; do
     if ! kill -0 "$server" 2>/dev/null; then
       cat "$server_log"
       return 1
@@ -181,18 +199,40 @@ wait_until_serving() {
   done
 }
 
+# server_says KEY: what the server's log gives as "KEY: text", the last time it did.
+server_says() { sed -n "s/.*$1: \([^\"]*\).*/\1/p" "$server_log" | tail -n 1; }
+
 print_welcome() {
   local url="http://127.0.0.1:$port/"
-  echo
-  echo "CaT-GS serves ${scenes[*]##*/}"
   if ((lan)); then
     url="https://$lan_address:$port/#token=$(<"$lan_dir/token")"
-    qrencode -t ANSIUTF8 "$url"
-    echo "  The certificate is this machine's own: accept the browser's warning once."
+    qrencode -t ANSIUTF8 -m 2 "$url"
+    echo "Your phone warns once about the certificate, which this machine made for itself."
   fi
-  echo "  open      $url"
-  echo "  stop      Ctrl-C"
-  echo "  server's log: $server_log"
+  cat <<WELCOME
+
+  open      $url
+  renderer  $(server_says renderer)
+  encoder   $(server_says encoder)
+  log       $server_log
+  stop      Ctrl-C
+
+  Try       drag to look around, W A S D to fly, wheel or pinch to zoom
+            ./deploy/run.sh your_scene.ply      serve a scene of your own
+            ./deploy/run.sh --lan               open it on your phone
+WELCOME
+  if [[ -n $gpu_name && $cuda_choice == OFF ]] && ((allow_cuda)); then
+    echo "  Your $gpu_name waits for nvcc: install the CUDA toolkit"
+    echo "  (https://developer.nvidia.com/cuda-downloads) and start again."
+  fi
+}
+
+# Ctrl-C and TERM while serving: the server tells its clients and ends within seconds.
+stop_serving() {
+  trap - INT TERM
+  stop_groups
+  printf '\nStopped.\n'
+  exit 0
 }
 
 main() {
@@ -222,8 +262,14 @@ main() {
     step "Certificate and token for $lan_address" make_lan_credentials
   fi
   start_server
+  local server=${groups[-1]}
+  step "Start the server" wait_until_ready "$server"
+  trap stop_serving INT TERM
   print_welcome
-  wait "$group"
+  local status=0
+  wait "$server" || status=$?
+  fail "$EXIT_FAILED" "The server ended by itself (status $status). The end of $server_log:" \
+    "$(tail -n 10 "$server_log")"
 }
 
 main "$@"

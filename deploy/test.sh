@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds everything with its tests and runs them under one CTest summary: see usage below.
-set -euo pipefail
 # shellcheck source-path=SCRIPTDIR
+set -euo pipefail
 source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 usage() {
