@@ -2,11 +2,8 @@
 import { existsSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { chromium, type Browser, type BrowserContextOptions, type Page } from 'playwright-core';
+import { artefacts, chromium_path } from './paths';
 
-const chromium_path = process.env['CATGS_CHROMIUM'] ?? '/usr/bin/chromium';
-
-/** Where screenshots go: the build folder under CTest, else a folder that git ignores. */
-const artefacts = process.env['CATGS_TEST_ARTEFACTS'] ?? path.resolve('build-artefacts');
 
 export async function launch_browser(): Promise<Browser> {
   if (!existsSync(chromium_path)) {

@@ -4,7 +4,6 @@ import { createServer, type Server } from 'node:http';
 import { readFile } from 'node:fs/promises';
 import type { AddressInfo } from 'node:net';
 import path from 'node:path';
-import { fileURLToPath } from 'node:url';
 import { WebSocketServer, type WebSocket } from 'ws';
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
 import {
@@ -14,10 +13,9 @@ import {
   ServerMessageSchema,
   type ClientMessage,
 } from '#client/wire/wire';
+import { build_dir } from './paths';
 
-export const web_dist =
-  process.env['CATGS_WEB_DIST'] ??
-  fileURLToPath(new URL('../../../build/release/web_client/dist', import.meta.url));
+export const web_dist = path.join(build_dir, 'web_client/dist');
 
 const policy =
   "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; " +

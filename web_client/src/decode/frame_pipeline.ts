@@ -1,7 +1,6 @@
 // From received bytes to the picture that is shown: decoder, newest-wins slot, presenter, and one
 // acknowledgement per frame, whatever became of it.
-import { Codec, type FrameHeader, type StreamConfig } from '../wire/wire';
-import type { AckInit } from '../session/session';
+import { Codec, type AckInit, type FrameHeader, type StreamConfig } from '../wire/wire';
 import { Latest } from './latest';
 import type { Decoder, DecoderEvents, EncodedFrame, Frame, Picture } from './picture';
 
@@ -77,6 +76,17 @@ export class FramePipeline {
   /** Forgets what is not shown yet: the page is hidden, and nothing will be drawn. */
   discard_pending(): void {
     this.newest_.clear();
+  }
+
+  /** Drops every frame inside: the stream they belong to has ended. What is shown stays shown. */
+  end_stream(): void {
+    this.generation_ += 1;
+    this.decoder_?.close();
+    this.decoder_ = undefined;
+    this.drop_waiting();
+    this.newest_.clear();
+    this.config_ = undefined;
+    this.needs_key_ = true;
   }
 
   private async renew_decoder(): Promise<void> {

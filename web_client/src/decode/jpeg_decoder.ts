@@ -6,55 +6,52 @@ import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
  * context. Frames are independent, so while one decodes only the newest waits.
  */
 export class JpegDecoder implements Decoder {
-  private readonly next_: Latest<EncodedFrame>;
-  private busy_ = false;
-  private closed_ = false;
+  private readonly next_ = new Latest<EncodedFrame>((frame) => this.events_.skipped(frame));
+  private current_: EncodedFrame | undefined;
 
   constructor(
     private readonly now_us_: () => number,
     private readonly events_: DecoderEvents,
-  ) {
-    this.next_ = new Latest((frame) => {
-      if (!this.closed_) this.events_.skipped(frame);
-    });
-  }
+  ) {}
 
   decode(frame: EncodedFrame): void {
     this.next_.put(frame);
-    if (!this.busy_) void this.run();
+    if (!this.current_) void this.run();
   }
 
   queue_length(): number {
-    return this.busy_ ? 1 : 0;
+    return this.current_ ? 1 : 0;
   }
 
   close(): void {
-    this.closed_ = true;
     this.next_.clear();
+    const current = this.current_;
+    this.current_ = undefined;
+    if (current) this.events_.skipped(current);
   }
 
   private async run(): Promise<void> {
-    this.busy_ = true;
     for (let frame = this.next_.take(); frame; frame = this.next_.take()) {
+      this.current_ = frame;
       await this.decode_one(frame);
+      this.current_ = undefined;
     }
-    this.busy_ = false;
   }
 
   private async decode_one(frame: EncodedFrame): Promise<void> {
     const blob = new Blob([frame.payload as Uint8Array<ArrayBuffer>], { type: 'image/jpeg' });
     try {
       const picture = await createImageBitmap(blob, { colorSpaceConversion: 'none' });
-      if (this.closed_) {
-        picture.close();
+      if (this.current_ !== frame) {
+        picture.close(); // closed meanwhile
         return;
       }
       frame.decoded_us = this.now_us_();
       this.events_.decoded(frame, picture);
     } catch (error) {
       // A broken JPEG spoils itself only: no reset, no new key frame.
-      if (!this.closed_) this.events_.skipped(frame);
       console.warn('JPEG frame not decodable', error);
+      if (this.current_ === frame) this.events_.skipped(frame);
     }
   }
 }

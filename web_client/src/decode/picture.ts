@@ -29,6 +29,6 @@ export interface Decoder {
   decode(frame: EncodedFrame): void;
   /** Frames waiting in the decoder. */
   queue_length(): number;
-  /** No event follows. */
+  /** Every frame inside is skipped, at once; no event follows. */
   close(): void;
 }

@@ -79,6 +79,7 @@ export class WebCodecsDecoder implements Decoder {
   }
 
   close(): void {
+    for (const frame of this.inside_.values()) this.events_.skipped(frame);
     this.inside_.clear();
     if (this.decoder_.state !== 'closed') this.decoder_.close();
   }

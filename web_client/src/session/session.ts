@@ -1,19 +1,18 @@
 // The life of a session: hello, welcome, frames, heartbeat, errors, drain, reconnect. It knows
 // neither WebSocket nor wall clock, so that tests drive it with fakes.
-import type { MessageInitShape } from '@bufbuild/protobuf';
 import type { OpenSocket, Socket } from '../transport/socket';
 import {
   decode_server_message,
   encode_client_message,
   Error_Code,
   wire_version,
-  type AckSchema,
+  type AckInit,
   type ClientBody,
   type FrameHeader,
-  type HelloSchema,
-  type PoseSampleSchema,
+  type HelloInit,
+  type PoseInit,
   type ServerBody,
-  type SettingsSchema,
+  type SettingsInit,
   type Stats,
   type StreamConfig,
   type Welcome,
@@ -22,11 +21,6 @@ import {
 import { backoff_ms } from './backoff';
 import type { Clock, Timers } from './clock';
 import type { SessionState, WaitCause } from './state';
-
-export type HelloInit = MessageInitShape<typeof HelloSchema>;
-export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
-export type AckInit = MessageInitShape<typeof AckSchema>;
-export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 
 /** What hello says, besides the things that the session itself knows. */
 export type Greeting = Omit<HelloInit, '$typeName' | 'version' | 'resume'>;
@@ -37,6 +31,8 @@ export interface SessionListener {
   /** Before the first frame it describes. The frame after it is an IDR. */
   config(config: StreamConfig): void;
   frame(header: FrameHeader, payload: Uint8Array): void;
+  /** The frames so far belong to a connection that goes: acknowledge them now or never. */
+  stream_ended(): void;
   stats(stats: Stats): void;
   /** The server said something for people that does not end the session. */
   notice(message: string): void;
@@ -153,6 +149,7 @@ export class Session {
     this.cancel_successor_();
     this.cancel_pose_();
     this.cancel_keep_alive_();
+    if (this.link_?.welcome) this.listener_.stream_ended();
     close_link(this.link_);
     close_link(this.successor_);
     this.link_ = this.successor_ = undefined;
@@ -280,6 +277,7 @@ export class Session {
 
   /** The successor has its first picture: it takes over, and the old connection goes. */
   private promote(link: Link): void {
+    this.listener_.stream_ended();
     const old = this.link_;
     this.link_ = link;
     this.successor_ = undefined;

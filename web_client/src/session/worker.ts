@@ -4,10 +4,10 @@ import { available_codecs, make_decoder } from '../decode/make_decoder';
 import { make_presenter } from '../present/make_presenter';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import { Codec, type FrameHeader } from '../wire/wire';
+import { Codec, type FrameHeader, type PoseInit, type SettingsInit } from '../wire/wire';
 import { browser_timers, clock_from } from './clock';
 import type { CameraSample, FromWorker, Quality, ToWorker, View } from './messages';
-import { Session, type PoseInit, type SettingsInit } from './session';
+import { Session } from './session';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
 
@@ -133,6 +133,7 @@ class Client {
           this.metrics_.received(payload.length, this.clock_.now_us());
           this.pipeline_.push(header, payload);
         },
+        stream_ended: () => this.pipeline_.end_stream(),
         stats: (stats) => this.metrics_.server_said(stats),
         notice: (message) => scope.postMessage({ kind: 'notice', message }),
       },

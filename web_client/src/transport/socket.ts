@@ -38,7 +38,7 @@ export function open_web_socket(url: string): OpenSocket {
     socket.onclose = ({ code, reason }) => events.closed(code, reason);
     return {
       send(bytes) {
-        if (socket.readyState === WebSocket.OPEN) socket.send(bytes as Uint8Array<ArrayBuffer>);
+        if (socket.readyState === WebSocket.OPEN) socket.send(bytes);
       },
       buffered_bytes: () => socket.bufferedAmount,
       close() {

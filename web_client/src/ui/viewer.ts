@@ -46,7 +46,10 @@ export class Viewer {
 
   constructor(private readonly card_: CardView) {
     const { clock_: clock } = this;
-    this.settling_ = new Settling(() => clock.now_us() / 1000, browser_timers.after);
+    this.settling_ = new Settling(
+      () => clock.now_us() / 1000,
+      (delay_ms, action) => browser_timers.after(delay_ms, action),
+    );
     this.worker_ = new WorkerClient((message) => this.heard(message));
     const keys = bind_view_input(this.view_, {
       gesture: (gesture) => {

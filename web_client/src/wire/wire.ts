@@ -4,8 +4,12 @@ import {
   ClientMessageSchema,
   FrameHeaderSchema,
   ServerMessageSchema,
+  type AckSchema,
   type FrameHeader,
+  type HelloSchema,
+  type PoseSampleSchema,
   type ServerMessage,
+  type SettingsSchema,
 } from './generated/catgs_pb';
 
 export * from './generated/catgs_pb';
@@ -23,6 +27,12 @@ export class WireError extends Error {
 
 export type ServerBody = Exclude<ServerMessage['body'], { case: undefined }>;
 export type ClientBody = NonNullable<MessageInitShape<typeof ClientMessageSchema>['body']>;
+
+// What a message is made from: fields left out are the wire's zeros.
+export type HelloInit = MessageInitShape<typeof HelloSchema>;
+export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
+export type AckInit = MessageInitShape<typeof AckSchema>;
+export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 
 export type Incoming =
   | { kind: 'message'; body: ServerBody }

@@ -1,0 +1,14 @@
+// What CTest tells the tests through the environment; the defaults are for running them by hand.
+import path from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const source_dir = fileURLToPath(new URL('../../..', import.meta.url));
+
+export const build_dir =
+  process.env['CATGS_BUILD_DIR'] ?? path.join(source_dir, 'build', 'release');
+
+export const chromium_path = process.env['CATGS_CHROMIUM'] ?? '/usr/bin/chromium';
+
+/** Where screenshots go. */
+export const artefacts =
+  process.env['CATGS_TEST_ARTEFACTS'] ?? path.join(build_dir, 'tests', 'browser');

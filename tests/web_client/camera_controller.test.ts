@@ -1,0 +1,254 @@
+import { describe, expect, it } from 'vitest';
+import {
+  CameraController,
+  no_axes,
+  type Axes,
+  type CameraMode,
+  type SceneSetup,
+} from '#client/camera/camera_controller';
+import {
+  axis_angle,
+  cross,
+  dot,
+  forward,
+  length,
+  multiply,
+  right,
+  rotate,
+  sub,
+  type Quat,
+  type Vec3,
+} from '#client/camera/vector';
+
+const scene: SceneSetup = {
+  up: [0, -1, 0],
+  start_pose: { position: [0, 0, -5], orientation: [0, 0, 0, 1] },
+  focus: [0, 0, 0],
+  limits_min: [-20, -20, -20],
+  limits_max: [20, 20, 20],
+  near_z: 0.2,
+};
+
+const down: Vec3 = [0, 1, 0];
+
+function camera(mode: CameraMode = 'orbit', change: Partial<SceneSetup> = {}): CameraController {
+  const made = new CameraController();
+  made.smoothing_s = 0;
+  made.load({ ...scene, ...change });
+  made.set_mode(mode);
+  return made;
+}
+
+function hold(made: CameraController, axes: Partial<Axes>, seconds = 1): void {
+  for (let i = 0; i < 60; ++i) made.step(seconds / 60, { ...no_axes, ...axes });
+}
+
+const view_of = (made: CameraController): Vec3 => rotate(made.pose.orientation, forward);
+
+function expect_vec(actual: Vec3, expected: Vec3): void {
+  expect(length(sub(actual, expected)), `${String(actual)} is not ${String(expected)}`).toBeLessThan(
+    1e-6,
+  );
+}
+
+describe('quaternions', () => {
+  it('turn right-handed', () => {
+    expect_vec(cross(right, down), forward);
+    // About "up" (-y) by a quarter: from forward to the left.
+    expect_vec(rotate(axis_angle([0, -1, 0], Math.PI / 2), forward), [-1, 0, 0]);
+    // About the camera's x axis: from forward to up.
+    expect_vec(rotate(axis_angle(right, Math.PI / 2), forward), [0, -1, 0]);
+  });
+
+  it('multiply as rotations do: the right one first', () => {
+    const a = axis_angle([0, -1, 0], 0.7);
+    const b = axis_angle(right, -0.3);
+    expect_vec(rotate(multiply(a, b), [1, 2, 3]), rotate(a, rotate(b, [1, 2, 3])));
+  });
+});
+
+describe('flying', () => {
+  it('keeps the scene under the pointer', () => {
+    const made = camera('fly');
+    // Half a height to the right: the view turns left by half the field of view.
+    made.gesture({ kind: 'look', dx: 0.5, dy: 0 });
+    made.step(0.016);
+    const angle = made.fov_y_rad / 2;
+    expect_vec(view_of(made), [-Math.sin(angle), 0, Math.cos(angle)]);
+    expect_vec(made.pose.position, [0, 0, -5]);
+  });
+
+  it('looks up when dragged down, and never over the top', () => {
+    const made = camera('fly');
+    made.gesture({ kind: 'look', dx: 0, dy: 0.2 });
+    made.step(0.016);
+    expect(dot(view_of(made), scene.up)).toBeGreaterThan(0.1);
+    made.gesture({ kind: 'look', dx: 0, dy: 50 });
+    made.step(0.016);
+    const elevation = Math.asin(dot(view_of(made), scene.up));
+    expect(elevation).toBeCloseTo((88 * Math.PI) / 180, 6);
+    expect(dot(rotate(made.pose.orientation, down), scene.up)).toBeLessThan(0);
+  });
+
+  it('moves along its axes, up and down along the world', () => {
+    const made = camera('fly');
+    hold(made, { forward: 1 });
+    expect(made.pose.position[2]).toBeGreaterThan(-5);
+    const fast = camera('fly');
+    hold(fast, { forward: 1, fast: true });
+    expect((fast.pose.position[2] + 5) / (made.pose.position[2] + 5)).toBeCloseTo(4, 5);
+    const tilted = camera('fly');
+    tilted.gesture({ kind: 'look', dx: 0, dy: 0.3 });
+    tilted.step(0.016);
+    hold(tilted, { up: 1 });
+    expect_vec([tilted.pose.position[0], 0, tilted.pose.position[2]], [0, 0, -5]);
+    expect(tilted.pose.position[1]).toBeLessThan(-0.1);
+  });
+
+  it('is as fast as the scene is large', () => {
+    const small = camera('fly');
+    const large = camera('fly', {
+      start_pose: { position: [0, 0, -500], orientation: [0, 0, 0, 1] },
+      limits_min: [-2000, -2000, -2000],
+      limits_max: [2000, 2000, 2000],
+    });
+    hold(small, { right: 1 });
+    hold(large, { right: 1 });
+    expect(large.pose.position[0] / small.pose.position[0]).toBeCloseTo(100, 3);
+  });
+
+  it('stays inside the limits', () => {
+    const made = camera('fly');
+    hold(made, { forward: -1, fast: true }, 30);
+    expect(made.pose.position[2]).toBe(-20);
+    hold(made, { right: 1, fast: true }, 30);
+    expect(made.pose.position[0]).toBe(20);
+  });
+});
+
+describe('orbiting', () => {
+  it('goes around the focus and keeps looking at it', () => {
+    const made = camera();
+    made.gesture({ kind: 'look', dx: 0.5, dy: 0.1 });
+    made.step(0.016);
+    const to_focus = sub(scene.focus, made.pose.position);
+    expect(length(to_focus)).toBeCloseTo(5, 6);
+    expect(dot(to_focus, view_of(made))).toBeCloseTo(5, 6);
+    // Dragged to the right: the camera went to the left. Dragged down: it went up.
+    expect(made.pose.position[0]).toBeLessThan(-4);
+    expect(made.pose.position[1]).toBeLessThan(0);
+  });
+
+  it('comes closer by the wheel, but not through the focus', () => {
+    const made = camera();
+    made.gesture({ kind: 'dolly', steps: 1 });
+    made.step(0.016);
+    expect(made.pose.position[2]).toBeCloseTo(-5 * 0.88, 6);
+    made.gesture({ kind: 'dolly', steps: 500 });
+    made.step(0.016);
+    expect(made.pose.position[2]).toBeCloseTo(-scene.near_z * 1.5, 6);
+    made.gesture({ kind: 'dolly', steps: -1 });
+    made.step(0.016);
+    expect(made.pose.position[2]).toBeLessThan(-scene.near_z * 1.5);
+  });
+
+  it('pans with the pointer and takes the focus along', () => {
+    const made = camera();
+    made.gesture({ kind: 'pan', dx: 0.5, dy: 0 });
+    made.step(0.016);
+    const half_height = 5 * Math.tan(made.fov_y_rad / 2);
+    expect_vec(made.pose.position, [-half_height, 0, -5]);
+    made.gesture({ kind: 'look', dx: 0.5, dy: 0 });
+    made.step(0.016);
+    expect(length(sub(made.pose.position, [-half_height, 0, 0]))).toBeCloseTo(5, 6);
+  });
+
+  it('stops at the limits instead of leaving its circle', () => {
+    const made = camera('orbit', { limits_min: [-3, -20, -20], limits_max: [3, 20, 20] });
+    for (let i = 0; i < 100; ++i) {
+      made.gesture({ kind: 'look', dx: 0.01, dy: 0 });
+      made.step(0.016);
+    }
+    expect(made.pose.position[0]).toBeGreaterThanOrEqual(-3);
+    expect(length(made.pose.position)).toBeCloseTo(5, 6);
+  });
+
+  it('walks around by the arrow keys in their direction', () => {
+    const made = camera();
+    hold(made, { turn_right: 1 }, 0.5);
+    expect(made.pose.position[0]).toBeGreaterThan(1);
+    const above = camera();
+    hold(above, { turn_up: 1 }, 0.5);
+    expect(above.pose.position[1]).toBeLessThan(-1);
+  });
+
+  it('orbits what it looks at after a flight', () => {
+    const made = camera('fly');
+    made.gesture({ kind: 'look', dx: 0.6, dy: 0 });
+    made.step(0.016);
+    const ahead = view_of(made);
+    made.set_mode('orbit');
+    const before = made.pose.position;
+    made.gesture({ kind: 'dolly', steps: 1 });
+    made.step(0.016);
+    const moved = sub(made.pose.position, before);
+    expect(dot(moved, ahead)).toBeCloseTo(length(moved), 6);
+    expect(length(moved)).toBeGreaterThan(0.1);
+  });
+});
+
+describe('any mode', () => {
+  it('glides after a gesture, by the same amount, and comes to rest', () => {
+    const glide = camera('fly');
+    glide.smoothing_s = 0.05;
+    glide.gesture({ kind: 'look', dx: 0.5, dy: 0 });
+    expect(glide.step(0.016)).toBe(true);
+    const early = Math.acos(view_of(glide)[2]);
+    for (let i = 0; i < 120 && !glide.at_rest; ++i) glide.step(0.016);
+    expect(glide.at_rest).toBe(true);
+    expect(early).toBeLessThan(glide.fov_y_rad / 2);
+    expect(Math.acos(view_of(glide)[2])).toBeCloseTo(glide.fov_y_rad / 2, 5);
+    expect(glide.step(0.016)).toBe(false);
+  });
+
+  it('does not move without cause', () => {
+    const made = camera();
+    expect(made.step(0.016)).toBe(false);
+    expect(made.pose).toBe(made.pose);
+  });
+
+  it('levels a tilted start pose while turning', () => {
+    const tilted: Quat = axis_angle(forward, 0.4);
+    const made = camera('fly', { start_pose: { position: [0, 0, -5], orientation: tilted } });
+    expect(made.step(0.016)).toBe(false); // not by itself
+    for (let i = 0; i < 200; ++i) {
+      made.gesture({ kind: 'look', dx: 0.002, dy: 0 });
+      made.step(0.016);
+    }
+    expect(dot(rotate(made.pose.orientation, right), scene.up)).toBeCloseTo(0, 3);
+  });
+
+  it('flips up and down in place', () => {
+    const made = camera('fly');
+    made.flip_up();
+    expect_vec(view_of(made), forward);
+    expect_vec(rotate(made.pose.orientation, down), [0, -1, 0]);
+    hold(made, { up: 1 });
+    expect(made.pose.position[1]).toBeGreaterThan(0.1);
+  });
+
+  it('returns to the start', () => {
+    const made = camera('fly');
+    hold(made, { forward: 1, turn_right: 1 });
+    made.fov_y_rad = 2;
+    made.reset();
+    expect(made.pose).toEqual(scene.start_pose);
+    expect(made.fov_y_rad).toBeCloseTo(Math.PI / 3, 9);
+  });
+
+  it('knows no limits when the scene has none', () => {
+    const made = camera('fly', { limits_min: [0, 0, 0], limits_max: [0, 0, 0] });
+    hold(made, { forward: -1, fast: true }, 30);
+    expect(made.pose.position[2]).toBeLessThan(-100);
+  });
+});

@@ -1,0 +1,255 @@
+import { create, type MessageInitShape } from '@bufbuild/protobuf';
+import { beforeEach, describe, expect, it } from 'vitest';
+import { FramePipeline } from '#client/decode/frame_pipeline';
+import { Latest } from '#client/decode/latest';
+import type { Decoder, DecoderEvents, EncodedFrame, Picture } from '#client/decode/picture';
+import { Codec, FrameHeaderSchema, StreamConfigSchema, type AckInit } from '#client/wire/wire';
+
+interface FakePicture {
+  id: bigint;
+  closed: boolean;
+}
+
+class FakeDecoder implements Decoder {
+  readonly frames: EncodedFrame[] = [];
+  closed = false;
+
+  constructor(readonly events: DecoderEvents) {}
+
+  decode(frame: EncodedFrame): void {
+    this.frames.push(frame);
+  }
+
+  queue_length(): number {
+    return this.frames.length;
+  }
+
+  close(): void {
+    this.closed = true;
+    for (const frame of this.frames.splice(0)) {
+      if (frame.decoded_us === 0) this.events.skipped(frame);
+    }
+  }
+}
+
+let now_us: number;
+let decoders: FakeDecoder[];
+let failures_seen: number[];
+let has_decoder: boolean;
+let refresh: (() => void)[];
+let drawn: FakePicture[];
+let pictures: FakePicture[];
+let acks: AckInit[];
+let dropped: bigint[];
+let key_frames_wanted: number;
+let undecodable: string[];
+let pipeline: FramePipeline;
+
+beforeEach(() => {
+  now_us = 1000;
+  decoders = [];
+  failures_seen = [];
+  has_decoder = true;
+  refresh = [];
+  drawn = [];
+  pictures = [];
+  acks = [];
+  dropped = [];
+  key_frames_wanted = 0;
+  undecodable = [];
+  pipeline = new FramePipeline(
+    {
+      now_us: () => now_us,
+      make_decoder: (_config, failures, events) => {
+        failures_seen.push(failures);
+        if (!has_decoder) return Promise.resolve(undefined);
+        const decoder = new FakeDecoder(events);
+        decoders.push(decoder);
+        return Promise.resolve(decoder);
+      },
+      on_refresh: (draw) => refresh.push(draw),
+      draw: (picture) => drawn.push(picture as unknown as FakePicture),
+    },
+    {
+      ack: (ack) => acks.push(ack),
+      presented: () => undefined,
+      dropped: (frame) => dropped.push(frame.header.frameId),
+      key_frame_wanted: () => (key_frames_wanted += 1),
+      undecodable: (message) => undecodable.push(message),
+    },
+  );
+});
+
+const settle = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
+
+async function configure(): Promise<FakeDecoder> {
+  pipeline.configure(create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.42C01F' }));
+  await settle();
+  return decoder();
+}
+
+function decoder(): FakeDecoder {
+  const newest = decoders[decoders.length - 1];
+  if (!newest) throw new Error('no decoder was made');
+  return newest;
+}
+
+function push(id: bigint, change: MessageInitShape<typeof FrameHeaderSchema> = {}): void {
+  const header = create(FrameHeaderSchema, { frameId: id, idr: id === 1n, ...change });
+  pipeline.push(header, new Uint8Array(4));
+}
+
+function decode(from: FakeDecoder, id: bigint): FakePicture {
+  const frame = from.frames.find(({ header }) => header.frameId === id);
+  if (!frame) throw new Error(`frame ${id} is not in the decoder`);
+  const picture = { id, closed: false, close: () => (picture.closed = true) };
+  pictures.push(picture);
+  frame.decoded_us = now_us;
+  from.events.decoded(frame, picture as unknown as Picture);
+  return picture;
+}
+
+function display(): void {
+  for (const draw of refresh.splice(0)) draw();
+}
+
+describe('newest frame wins', () => {
+  it('draws the last of several pictures per refresh, closes all, acknowledges each', async () => {
+    const made = await configure();
+    for (const id of [1n, 2n, 3n]) push(id);
+    for (const id of [1n, 2n, 3n]) decode(made, id);
+    now_us = 5000;
+    expect(refresh).toHaveLength(1);
+    display();
+    expect(drawn.map(({ id }) => id)).toEqual([3n]);
+    expect(pictures.map(({ closed }) => closed)).toEqual([true, true, true]);
+    expect(dropped).toEqual([1n, 2n]);
+    expect(acks).toMatchObject([
+      { frameId: 1n, dropped: true, presentedUs: 0n },
+      { frameId: 2n, dropped: true, presentedUs: 0n },
+      { frameId: 3n, dropped: false, presentedUs: 5000n, receivedUs: 1000n, decodedUs: 1000n },
+    ]);
+  });
+
+  it('reports the age of the pose that it shows', async () => {
+    const made = await configure();
+    now_us = 40_000;
+    push(1n, { poseClientTimeUs: 10_000n });
+    decode(made, 1n);
+    now_us = 70_000;
+    display();
+    expect(acks).toMatchObject([{ poseAgeUs: 60_000 }]);
+  });
+
+  it('drops what a hidden page will not draw', async () => {
+    const made = await configure();
+    push(1n);
+    const picture = decode(made, 1n);
+    pipeline.discard_pending();
+    display();
+    expect(picture.closed).toBe(true);
+    expect(drawn).toEqual([]);
+    expect(acks).toMatchObject([{ frameId: 1n, dropped: true }]);
+  });
+});
+
+describe('key frames', () => {
+  it('are where decoding begins', async () => {
+    const made = await configure();
+    push(5n);
+    push(6n, { idr: true });
+    push(7n);
+    expect(made.frames.map(({ header }) => header.frameId)).toEqual([6n, 7n]);
+    expect(acks).toMatchObject([{ frameId: 5n, dropped: true }]);
+  });
+
+  it('wait for the decoder to be made', async () => {
+    pipeline.configure(create(StreamConfigSchema, { codec: Codec.H264 }));
+    push(1n);
+    push(2n);
+    await settle();
+    expect(decoder().frames.map(({ header }) => header.frameId)).toEqual([1n, 2n]);
+  });
+
+  it('are asked for again when too many frames wait', async () => {
+    pipeline.configure(create(StreamConfigSchema, { codec: Codec.H264 }));
+    for (let id = 1n; id <= 9n; ++id) push(id);
+    expect(key_frames_wanted).toBe(1);
+    await settle();
+    expect(decoder().frames).toEqual([]);
+    expect(acks).toHaveLength(9);
+    push(20n, { idr: true });
+    expect(decoder().frames).toHaveLength(1);
+  });
+});
+
+describe('the end of a stream', () => {
+  it('acknowledges everything that is inside, and nothing later', async () => {
+    const made = await configure();
+    for (const id of [1n, 2n, 3n]) push(id);
+    decode(made, 1n);
+    pipeline.end_stream();
+    expect([...dropped].sort()).toEqual([1n, 2n, 3n]);
+    display();
+    expect(drawn).toEqual([]);
+    expect(acks).toHaveLength(3);
+  });
+});
+
+describe('failures', () => {
+  it('renew the decoder and ask for a key frame', async () => {
+    const first = await configure();
+    push(1n);
+    first.events.failed(new Error('broken'));
+    await settle();
+    expect(first.closed).toBe(true);
+    expect(dropped).toEqual([1n]);
+    expect(decoders).toHaveLength(2);
+    expect(key_frames_wanted).toBe(1);
+    expect(failures_seen).toEqual([0, 1]);
+    push(2n);
+    push(3n, { idr: true });
+    expect(decoder().frames.map(({ header }) => header.frameId)).toEqual([3n]);
+  });
+
+  it('close pictures that an old decoder still gives', async () => {
+    const first = await configure();
+    push(1n);
+    push(2n);
+    const inside = [...first.frames];
+    first.events.failed(new Error('broken'));
+    first.frames.push(...inside);
+    const late = decode(first, 1n);
+    expect(late.closed).toBe(true);
+    expect(refresh).toEqual([]);
+  });
+
+  it('end with a word when no decoder is left', async () => {
+    has_decoder = false;
+    pipeline.configure(create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.64' }));
+    await settle();
+    expect(undecodable).toEqual(['no decoder for avc1.64']);
+  });
+
+  it('of a former stream do not count against the next', async () => {
+    const first = await configure();
+    first.events.failed(new Error('broken'));
+    await settle();
+    await configure();
+    expect(failures_seen).toEqual([0, 1, 0]);
+  });
+});
+
+describe('Latest', () => {
+  it('holds one value and hands out each exactly once', () => {
+    const discarded: number[] = [];
+    const latest = new Latest<number>((old) => discarded.push(old));
+    latest.put(1);
+    latest.put(2);
+    expect(latest.take()).toBe(2);
+    expect(latest.take()).toBeUndefined();
+    latest.put(3);
+    latest.clear();
+    expect(discarded).toEqual([1, 3]);
+  });
+});

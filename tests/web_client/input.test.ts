@@ -1,0 +1,121 @@
+import { describe, expect, it } from 'vitest';
+import { no_axes } from '#client/camera/camera_controller';
+import { HeldKeys } from '#client/input/keyboard';
+import { Pointers, wheel_gesture, type PointerSample } from '#client/input/pointers';
+
+const height_px = 400;
+
+const sample = (change: Partial<PointerSample>): PointerSample => ({
+  id: 1,
+  type: 'mouse',
+  x: 100,
+  y: 100,
+  buttons: 1,
+  shift: false,
+  ...change,
+});
+
+describe('keys', () => {
+  it('become axes, opposites cancel, unknown keys are left to the page', () => {
+    const keys = new HeldKeys();
+    expect(keys.down('KeyW', false)).toBe(true);
+    expect(keys.down('KeyD', true)).toBe(true);
+    expect(keys.down('Tab', true)).toBe(false);
+    expect(keys.axes()).toEqual({ ...no_axes, forward: 1, right: 1, fast: true });
+    keys.down('KeyS', false);
+    expect(keys.axes()).toEqual({ ...no_axes, right: 1 });
+    keys.up('KeyD', false);
+    keys.up('KeyW', false);
+    expect(keys.axes()).toEqual({ ...no_axes, forward: -1 });
+  });
+
+  it('are released when the page loses the keyboard', () => {
+    const keys = new HeldKeys();
+    keys.down('ArrowLeft', true);
+    keys.release_all();
+    expect(keys.axes()).toEqual(no_axes);
+  });
+});
+
+describe('mouse', () => {
+  it('looks with the primary button, in fractions of the height', () => {
+    const pointers = new Pointers();
+    pointers.down(sample({}));
+    expect(pointers.move(sample({ x: 140, y: 80 }), height_px)).toEqual([
+      { kind: 'look', dx: 0.1, dy: -0.05 },
+    ]);
+  });
+
+  it.each([
+    ['the right button', { buttons: 2 }],
+    ['the middle button', { buttons: 4 }],
+    ['shift', { shift: true }],
+  ])('pans with %s', (_name, change) => {
+    const pointers = new Pointers();
+    pointers.down(sample(change));
+    expect(pointers.move(sample({ ...change, x: 120 }), height_px)).toEqual([
+      { kind: 'pan', dx: 0.05, dy: 0 },
+    ]);
+  });
+
+  it('does nothing while no button is held', () => {
+    const pointers = new Pointers();
+    expect(pointers.move(sample({ buttons: 0 }), height_px)).toEqual([]);
+    pointers.down(sample({}));
+    pointers.up(1);
+    expect(pointers.move(sample({ x: 300 }), height_px)).toEqual([]);
+  });
+
+  it('zooms by the wheel, whatever its unit, and by the pinch of a trackpad', () => {
+    expect(wheel_gesture(-100, 0, false)).toEqual({ kind: 'dolly', steps: 1 });
+    expect(wheel_gesture(3, 1, false)).toEqual({ kind: 'dolly', steps: -0.99 });
+    expect(wheel_gesture(-1e6, 2, false)).toEqual({ kind: 'dolly', steps: 8 });
+    expect(wheel_gesture(-5, 0, true)).toEqual({ kind: 'dolly', steps: 0.4 });
+  });
+});
+
+describe('touch', () => {
+  const finger = (id: number, x: number, y: number): PointerSample =>
+    sample({ id, type: 'touch', x, y });
+
+  it('looks with one finger', () => {
+    const pointers = new Pointers();
+    pointers.down(finger(1, 10, 10));
+    expect(pointers.move(finger(1, 10, 50), height_px)).toEqual([{ kind: 'look', dx: 0, dy: 0.1 }]);
+  });
+
+  it('pans with two fingers by their mean', () => {
+    const pointers = new Pointers();
+    pointers.down(finger(1, 100, 100));
+    pointers.down(finger(2, 200, 100));
+    const moves = [
+      ...pointers.move(finger(1, 140, 100), height_px),
+      ...pointers.move(finger(2, 240, 100), height_px),
+    ];
+    const pan = moves.filter((gesture) => gesture.kind === 'pan');
+    expect(pan.reduce((sum, { dx }) => sum + dx, 0)).toBeCloseTo(0.1, 9);
+    const dolly = moves.filter((gesture) => gesture.kind === 'dolly');
+    expect(dolly.reduce((sum, { steps }) => sum + steps, 0)).toBeCloseTo(0, 9);
+  });
+
+  it('pinches: spreading comes closer', () => {
+    const pointers = new Pointers();
+    pointers.down(finger(1, 100, 100));
+    pointers.down(finger(2, 200, 100));
+    const moves = pointers.move(finger(2, 213, 100), height_px);
+    const dolly = moves.find((gesture) => gesture.kind === 'dolly');
+    expect(dolly?.steps).toBeCloseTo(1, 9);
+  });
+
+  it('ignores a third finger, and goes on looking when one of two is lifted', () => {
+    const pointers = new Pointers();
+    pointers.down(finger(1, 100, 100));
+    pointers.down(finger(2, 200, 100));
+    pointers.down(finger(3, 300, 100));
+    expect(pointers.move(finger(3, 310, 100), height_px)).toEqual([]);
+    pointers.up(1);
+    expect(pointers.move(finger(2, 240, 100), height_px)).toEqual([
+      { kind: 'look', dx: 0.1, dy: 0 },
+    ]);
+  });
+});

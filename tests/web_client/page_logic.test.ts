@@ -1,0 +1,165 @@
+// The parts of the page that decide something.
+import { describe, expect, it } from 'vitest';
+import { Settling } from '#client/automation';
+import { AutoHeight } from '#client/session/auto_height';
+import { take_token } from '#client/session/token';
+import { endpoint_of } from '#client/transport/socket';
+import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
+import { Error_Code } from '#client/wire/wire';
+import { FakeTime } from './fakes';
+
+function fake_storage(): Storage {
+  const values = new Map<string, string>();
+  return {
+    getItem: (key: string) => values.get(key) ?? null,
+    setItem: (key: string, value: string) => void values.set(key, value),
+  } as Storage;
+}
+
+describe('access token', () => {
+  it('moves from the fragment to the tab, and out of the address', () => {
+    const storage = fake_storage();
+    let shown = '';
+    const history = {
+      state: null,
+      replaceState: (_state: unknown, _title: string, url?: string | URL | null) => {
+        shown = String(url);
+      },
+    };
+    const href = 'http://host/page?scene=city#token=a%2Bb&pose=1';
+    expect(take_token({ href }, history, storage)).toBe('a+b');
+    expect(shown).toBe('http://host/page?scene=city#pose=1');
+    expect(take_token({ href: 'http://host/page' }, history, storage)).toBe('a+b');
+    expect(take_token({ href: 'http://host/page#token=c' }, history, storage)).toBe('c');
+    expect(shown).toBe('http://host/page');
+  });
+
+  it('works without storage', () => {
+    const history = { state: null, replaceState: () => undefined };
+    expect(take_token({ href: 'http://host/' }, history, undefined)).toBe('');
+    expect(take_token({ href: 'http://host/#token=x' }, history, undefined)).toBe('x');
+  });
+});
+
+describe('endpoint', () => {
+  it.each([
+    ['http://127.0.0.1:8080/', 'ws://127.0.0.1:8080/'],
+    ['https://host/tour/?scene=city#token=secret', 'wss://host/tour/'],
+    ['https://host/tour/index.html?x#y', 'wss://host/tour/'],
+  ])('of %s is %s', (page, endpoint) => {
+    expect(endpoint_of(page)).toBe(endpoint);
+  });
+});
+
+describe('automatic height', () => {
+  const look_often = (auto: AutoHeight, frame_ms: number, view_px = 1080): number[] => {
+    const heights = [];
+    for (let i = 0; i < 12; ++i) {
+      if (auto.look(frame_ms, view_px)) heights.push(auto.height_px(view_px));
+    }
+    return heights;
+  };
+
+  it('never exceeds the view', () => {
+    const auto = new AutoHeight();
+    expect(auto.height_px(360)).toBe(360);
+    look_often(auto, 1);
+    expect(auto.height_px(360)).toBe(360);
+  });
+
+  it('shrinks at once to what the server can keep up with, and only after several looks', () => {
+    const auto = new AutoHeight();
+    expect(auto.look(170, 1080)).toBe(false);
+    expect(auto.look(170, 1080)).toBe(false);
+    expect(auto.look(170, 1080)).toBe(true);
+    // A quarter of the pixels: 720 / 2.
+    expect(auto.height_px(1080)).toBe(300);
+  });
+
+  it('grows step by step while there is room', () => {
+    expect(look_often(new AutoHeight(), 5)).toEqual([900, 1080]);
+  });
+
+  it('stays where it is when a frame takes what it may, or when there is none', () => {
+    expect(look_often(new AutoHeight(), 40)).toEqual([]);
+    expect(look_often(new AutoHeight(), NaN)).toEqual([]);
+  });
+
+  it('forgets a vote that is followed by another opinion', () => {
+    const auto = new AutoHeight();
+    for (let i = 0; i < 10; ++i) {
+      expect(auto.look(170, 1080)).toBe(false);
+      expect(auto.look(40, 1080)).toBe(false);
+    }
+  });
+});
+
+describe('settling', () => {
+  it('waits for the newest pose and for the last refinement', async () => {
+    const time = new FakeTime();
+    const settling = new Settling(
+      () => time.now_us() / 1000,
+      (delay_ms, action) => time.after(delay_ms, action),
+    );
+    let settled = false;
+    settling.pose_sent(1);
+    settling.pose_sent(2);
+    const done = settling.wait().then(() => {
+      settled = true;
+    });
+    const after = async (ms: number): Promise<boolean> => {
+      time.advance(ms);
+      await Promise.resolve();
+      await Promise.resolve();
+      return settled;
+    };
+    settling.presented(1);
+    expect(await after(5000)).toBe(false);
+    settling.presented(2);
+    expect(await after(390)).toBe(false);
+    settling.presented(2); // a refinement begins the wait anew
+    expect(await after(1500)).toBe(false);
+    expect(await after(100)).toBe(true);
+    await done;
+  });
+});
+
+describe('wording', () => {
+  it('says nothing over a live picture', () => {
+    expect(card_for({ phase: 'live' }, true)).toBeUndefined();
+    expect(card_for({ phase: 'live' }, false)?.busy).toBe(true);
+  });
+
+  it('has a title and a way on for every refusal', () => {
+    const codes = Object.values(Error_Code).filter((code) => typeof code === 'number');
+    for (const code of codes) {
+      const card = card_for({ phase: 'failed', code, message: 'because' }, false);
+      expect(card?.title).toBeTruthy();
+      expect(card?.text).toContain('Because.');
+      expect(card?.action ?? card?.asks_token, Error_Code[code]).toBeTruthy();
+    }
+  });
+
+  it('tells what happened and when it tries again', () => {
+    const card = card_for(
+      { phase: 'waiting', cause: 'unreachable', retry_in_ms: 3000, message: '' },
+      true,
+    );
+    expect(card).toMatchObject({
+      title: 'The server does not answer',
+      text: 'Trying again in 3 s.',
+      action: { does: 'retry' },
+    });
+  });
+
+  it('explains JPEG by what is missing', () => {
+    expect(jpeg_reason(true, true)).toBeUndefined();
+    expect(jpeg_reason(false, false)).toContain('https://');
+    expect(jpeg_reason(false, true)).toContain('WebCodecs');
+  });
+
+  it('names what an old browser lacks', () => {
+    const scope = { Worker: globalThis.Object as never, WebSocket: globalThis.Object as never };
+    expect(unsupported_card(scope)?.text).toContain('OffscreenCanvas');
+  });
+});

@@ -1,0 +1,308 @@
+import { beforeEach, describe, expect, it } from 'vitest';
+import { backoff_ms } from '#client/session/backoff';
+import { greeting_ms, Session, silence_ms } from '#client/session/session';
+import type { SessionState } from '#client/session/state';
+import { Codec, Error_Code } from '#client/wire/wire';
+import { fake_network, FakeTime, type FakeSocket } from './fakes';
+
+const pose = (id: bigint) => ({
+  poseId: id,
+  clientTimeUs: id * 1000n,
+  worldFromCamera: { position: { x: Number(id) }, orientation: { w: 1 } },
+  fovYRad: 1,
+});
+
+let time: FakeTime;
+let sockets: FakeSocket[];
+let session: Session;
+let states: SessionState[];
+let frames: bigint[];
+let configs: string[];
+let notices: string[];
+let streams_ended: number;
+
+beforeEach(() => {
+  time = new FakeTime();
+  const network = fake_network();
+  sockets = network.sockets;
+  states = [];
+  frames = [];
+  configs = [];
+  notices = [];
+  streams_ended = 0;
+  session = new Session(
+    { open: network.open, clock: time, timers: time, random: () => 0.5 },
+    {
+      state: (state) => states.push(state),
+      welcome: () => undefined,
+      config: (config) => configs.push(config.encoder),
+      frame: (header) => frames.push(header.frameId),
+      stream_ended: () => {
+        streams_ended += 1;
+        session.send_ack({ frameId: 99n });
+      },
+      stats: () => undefined,
+      notice: (message) => notices.push(message),
+    },
+    {
+      sceneId: 'city',
+      viewportWidthPx: 640,
+      viewportHeightPx: 360,
+      devicePixelRatio: 1,
+      decoders: [Codec.H264],
+      token: 'secret',
+    },
+  );
+});
+
+const last_state = (): SessionState | undefined => states[states.length - 1];
+const socket = (i: number): FakeSocket => {
+  const found = sockets[i];
+  if (!found) throw new Error(`connection ${i} was not opened`);
+  return found;
+};
+
+function welcome(to: FakeSocket, encoder = 'x264'): void {
+  to.events.opened();
+  to.say({ case: 'welcome', value: { version: 1, resumeToken: 'again', config: { encoder } } });
+}
+
+function go_live(): FakeSocket {
+  session.start();
+  welcome(socket(0));
+  return socket(0);
+}
+
+describe('greeting', () => {
+  it('says hello first, and nothing else before the welcome', () => {
+    session.start();
+    session.send_pose(pose(1n));
+    session.request_idr();
+    expect(last_state()).toEqual({ phase: 'connecting', attempt: 0 });
+    socket(0).events.opened();
+    expect(socket(0).heard.map((body) => body.case)).toEqual(['hello']);
+    expect(socket(0).sent('hello')[0]).toMatchObject({
+      version: 1,
+      sceneId: 'city',
+      token: 'secret',
+      decoders: [Codec.H264],
+    });
+    socket(0).say({ case: 'welcome', value: { config: { encoder: 'x264' } } });
+    expect(last_state()).toEqual({ phase: 'live' });
+    expect(configs).toEqual(['x264']);
+    expect(socket(0).sent('pose').map((sample) => sample.poseId)).toEqual([1n]);
+  });
+
+  it('shows the queue while it waits for its turn', () => {
+    session.start();
+    socket(0).events.opened();
+    socket(0).say({ case: 'queue', value: { position: 3, estimateS: 40 } });
+    expect(last_state()).toEqual({ phase: 'queued', position: 3, estimate_s: 40 });
+  });
+
+  it('gives up a server that accepts and says nothing', () => {
+    session.start();
+    socket(0).events.opened();
+    time.advance(greeting_ms - 1);
+    expect(last_state()?.phase).toBe('connecting');
+    time.advance(1);
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'silent' });
+    expect(socket(0).closed).toBe(true);
+  });
+});
+
+describe('reconnecting', () => {
+  it('follows a closed connection, with the same pose and the resume token', () => {
+    const first = go_live();
+    session.send_pose(pose(7n));
+    first.events.closed(1006, '');
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'lost' });
+    time.advance(backoff_ms(1, () => 0.5));
+    socket(1).events.opened();
+    expect(socket(1).sent('hello')[0]?.resume).toMatchObject({
+      token: 'again',
+      pose: { poseId: 7n },
+    });
+    socket(1).say({ case: 'welcome', value: {} });
+    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([7n]);
+    expect(last_state()).toEqual({ phase: 'live' });
+  });
+
+  it('follows silence, but not a server that has a heartbeat', () => {
+    const first = go_live();
+    for (let i = 0; i < 10; ++i) {
+      time.advance(silence_ms - 1);
+      first.say({ case: 'heartbeat', value: {} });
+    }
+    expect(last_state()).toEqual({ phase: 'live' });
+    time.advance(silence_ms);
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'silent' });
+    expect(first.closed).toBe(true);
+  });
+
+  it('waits longer each time, up to a limit', () => {
+    session.start();
+    const waits = [];
+    for (let i = 0; i < 8; ++i) {
+      socket(i).events.closed(1006, '');
+      const state = last_state();
+      if (state?.phase !== 'waiting') throw new Error(`phase ${String(state?.phase)}`);
+      expect(state.cause).toBe('unreachable');
+      waits.push(state.retry_in_ms);
+      time.advance(state.retry_in_ms);
+    }
+    expect(waits).toEqual([375, 750, 1500, 3000, 6000, 7500, 7500, 7500]);
+  });
+
+  it('does not hurry back to a server that drops it after each welcome', () => {
+    const first = go_live();
+    first.events.closed(1006, '');
+    time.advance(375);
+    welcome(socket(1));
+    socket(1).events.closed(1006, '');
+    expect(last_state()).toMatchObject({ retry_in_ms: 750 });
+    time.advance(750);
+    welcome(socket(2));
+    for (let i = 0; i < 5; ++i) {
+      time.advance(1000);
+      socket(2).say({ case: 'heartbeat', value: {} });
+    }
+    socket(2).events.closed(1006, '');
+    expect(last_state()).toMatchObject({ retry_in_ms: 375 });
+  });
+
+  it('happens at once when asked for, and only once', () => {
+    const first = go_live();
+    first.events.closed(1006, '');
+    session.retry();
+    expect(sockets).toHaveLength(2);
+    welcome(socket(1));
+    time.advance(2000);
+    socket(1).say({ case: 'heartbeat', value: {} });
+    time.advance(2000);
+    expect(sockets).toHaveLength(2);
+  });
+
+  it('treats a message that breaks the contract as a lost connection', () => {
+    const first = go_live();
+    first.events.message(new Uint8Array([2, 0xff]).buffer);
+    expect(first.closed).toBe(true);
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'lost' });
+  });
+});
+
+describe('errors', () => {
+  it.each([Error_Code.SERVER_FULL, Error_Code.RATE_LIMITED, Error_Code.INTERNAL])(
+    'tries again after code %i',
+    (code) => {
+      session.start();
+      socket(0).events.opened();
+      socket(0).say({ case: 'error', value: { code, message: 'why', fatal: true } });
+      expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'refused', message: 'why' });
+      time.advance(10_000);
+      expect(sockets).toHaveLength(2);
+    },
+  );
+
+  it('stops after a refusal that time does not cure, until something changes', () => {
+    session.start();
+    socket(0).events.opened();
+    const value = { code: Error_Code.UNAUTHORIZED, message: 'bad token', fatal: true };
+    socket(0).say({ case: 'error', value });
+    time.advance(60_000);
+    expect(sockets).toHaveLength(1);
+    expect(last_state()).toEqual({
+      phase: 'failed',
+      code: Error_Code.UNAUTHORIZED,
+      message: 'bad token',
+    });
+    session.greet_anew({ token: 'better' });
+    socket(1).events.opened();
+    expect(socket(1).sent('hello')[0]?.token).toBe('better');
+  });
+
+  it('passes on what is not fatal and goes on', () => {
+    const first = go_live();
+    const value = { code: Error_Code.RATE_LIMITED, message: 'slow down', fatal: false };
+    first.say({ case: 'error', value });
+    expect(notices).toEqual(['slow down']);
+    expect(last_state()).toEqual({ phase: 'live' });
+  });
+});
+
+describe('drain', () => {
+  it('shows the old connection until the new one has a picture', () => {
+    const old = go_live();
+    session.send_pose(pose(4n));
+    old.say({ case: 'drain', value: { deadlineMs: 5000 } });
+    welcome(socket(1), 'nvenc');
+    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n]);
+    old.frame({ frameId: 10n });
+    expect(old.closed).toBe(false);
+    expect(configs).toEqual(['x264']);
+    socket(1).frame({ frameId: 1n, idr: true });
+    expect(old.closed).toBe(true);
+    expect(old.sent('bye')).toHaveLength(1);
+    expect(configs).toEqual(['x264', 'nvenc']);
+    expect(frames).toEqual([10n, 1n]);
+    // Frame numbers of the old connection mean nothing to the new one.
+    expect(streams_ended).toBe(1);
+    expect(old.sent('ack')).toHaveLength(1);
+    expect(socket(1).sent('ack')).toEqual([]);
+    session.send_pose(pose(5n));
+    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n, 4n, 5n]);
+  });
+
+  it('tries again when the new connection fails, and falls back to reconnecting', () => {
+    const old = go_live();
+    old.say({ case: 'drain', value: {} });
+    socket(1).events.closed(1006, '');
+    expect(old.closed).toBe(false);
+    time.advance(375);
+    expect(sockets).toHaveLength(3);
+    old.events.closed(1001, '');
+    expect(socket(2).closed).toBe(true);
+    time.advance(375);
+    welcome(socket(3));
+    expect(last_state()).toEqual({ phase: 'live' });
+  });
+});
+
+describe('poses', () => {
+  it('are skipped on a congested connection, except for the newest', () => {
+    const first = go_live();
+    first.buffered_bytes = 1e6;
+    session.send_pose(pose(1n));
+    session.send_pose(pose(2n));
+    time.advance(100);
+    expect(first.sent('pose')).toEqual([]);
+    first.buffered_bytes = 0;
+    time.advance(100);
+    expect(first.sent('pose').map((sample) => sample.poseId)).toEqual([2n]);
+  });
+
+  it('are repeated now and then, but not for a hidden page', () => {
+    const first = go_live();
+    session.send_pose(pose(1n));
+    const beat = (seconds: number): void => {
+      for (let i = 0; i < seconds; ++i) {
+        time.advance(1000);
+        first.say({ case: 'heartbeat', value: {} });
+      }
+    };
+    beat(25);
+    expect(first.sent('pose').map((sample) => sample.poseId)).toEqual([1n, 1n, 1n]);
+    session.set_paused(true);
+    expect(first.sent('pause')).toMatchObject([{ paused: true }]);
+    beat(25);
+    expect(first.sent('pose')).toHaveLength(3);
+  });
+});
+
+describe('backoff', () => {
+  it('is jittered between half and all of its ceiling', () => {
+    expect(backoff_ms(1, () => 0)).toBe(250);
+    expect(backoff_ms(1, () => 1)).toBe(500);
+    expect(backoff_ms(1000, () => 1)).toBe(10_000);
+  });
+});

@@ -1,0 +1,113 @@
+import { create } from '@bufbuild/protobuf';
+import { describe, expect, it } from 'vitest';
+import type { Frame } from '#client/decode/picture';
+import { Metrics } from '#client/stats/metrics';
+import { PoseAge } from '#client/stats/pose_age';
+import { percentile, TimeWindow } from '#client/stats/window';
+import { FrameHeaderSchema } from '#client/wire/wire';
+
+const ms = 1000;
+
+describe('TimeWindow', () => {
+  it('forgets what is older than its span, and never holds more than its capacity', () => {
+    const window = new TimeWindow(100, 3);
+    window.push(0, 1);
+    window.push(50, 2);
+    expect(window.values(100)).toEqual([1, 2]);
+    expect(window.values(101)).toEqual([2]);
+    for (let i = 0; i < 10; ++i) window.push(110, i);
+    expect(window.values(110)).toEqual([7, 8, 9]);
+  });
+});
+
+describe('percentile', () => {
+  it('is the nearest rank', () => {
+    const values = [5, 1, 4, 2, 3];
+    expect(percentile(values, 0.5)).toBe(3);
+    expect(percentile(values, 0.95)).toBe(5);
+    expect(percentile(values, 0)).toBe(1);
+    expect(percentile([], 0.5)).toBeNaN();
+  });
+});
+
+describe('pose age', () => {
+  const tick = 10 * ms;
+
+  it('is now minus the sample time of the shown pose, at every tick', () => {
+    const age = new PoseAge(1e9, tick);
+    age.sent(1n, 0);
+    age.shown(1n, 0, 5 * ms);
+    age.sent(2n, 10 * ms);
+    age.sent(3n, 20 * ms);
+    age.shown(2n, 10 * ms, 40 * ms);
+    // Pose 1 was shown at 10, 20, 30 and 40 ms.
+    expect(age.values(40 * ms)).toEqual([10, 20, 30, 40].map((v) => v * ms));
+    // From then on pose 2, sampled at 10 ms.
+    expect(age.values(60 * ms).slice(4)).toEqual([40, 50].map((v) => v * ms));
+  });
+
+  it('grows while the picture is frozen', () => {
+    const age = new PoseAge(1e9, tick);
+    age.sent(1n, 0);
+    age.shown(1n, 0, 0);
+    age.sent(2n, 10 * ms);
+    const ages = age.values(1010 * ms);
+    expect(ages).toHaveLength(101);
+    expect(Math.max(...ages)).toBe(1010 * ms);
+  });
+
+  it('does not count a rest with the newest pose shown', () => {
+    const age = new PoseAge(1e9, tick);
+    age.sent(1n, 0);
+    age.shown(1n, 0, 20 * ms);
+    expect(age.values(5000 * ms)).toEqual([]);
+    age.sent(2n, 5000 * ms);
+    age.shown(2n, 5000 * ms, 5030 * ms);
+    expect(age.values(6000 * ms)).toEqual([10, 20, 30, 40].map((v) => v * ms));
+  });
+});
+
+describe('metrics', () => {
+  const frame = (pose_id: bigint, pose_time_us: number, received_us: number): Frame => ({
+    header: create(FrameHeaderSchema, {
+      frameId: pose_id,
+      poseId: pose_id,
+      poseClientTimeUs: BigInt(pose_time_us),
+      widthPx: 640,
+      heightPx: 360,
+      renderUs: 12_000,
+    }),
+    bytes: 1000,
+    received_us,
+    decoded_us: received_us + 2 * ms,
+  });
+
+  it('count frames and bytes per second, and latency on the client clock', () => {
+    const metrics = new Metrics();
+    for (let i = 1; i <= 40; ++i) {
+      const now_us = i * 50 * ms;
+      metrics.received(1000, now_us - 10 * ms);
+      metrics.presented(frame(BigInt(i), now_us - 45 * ms, now_us - 10 * ms), now_us);
+    }
+    const stats = metrics.snapshot(2000 * ms);
+    expect(stats.fps_shown).toBe(20);
+    expect(stats.bitrate_kbps).toBe(160);
+    expect(stats.motion_to_photon_ms).toEqual({ p50: 45, p95: 45 });
+    expect(stats.stages_ms).toMatchObject({ render: 12, decode: 2, present: 8 });
+    expect([stats.width_px, stats.height_px]).toEqual([640, 360]);
+  });
+
+  it('do not take the refinement of a still picture for latency', () => {
+    const metrics = new Metrics();
+    metrics.presented(frame(1n, 0, 20 * ms), 30 * ms);
+    metrics.presented(frame(1n, 0, 500 * ms), 510 * ms);
+    expect(metrics.snapshot(600 * ms).motion_to_photon_ms).toEqual({ p50: 30, p95: 30 });
+  });
+
+  it('say so when nothing was measured', () => {
+    const stats = new Metrics().snapshot(0);
+    expect(stats.fps_shown).toBe(0);
+    expect(stats.motion_to_photon_ms.p50).toBeNaN();
+    expect(stats.stages_ms.render).toBeNaN();
+  });
+});
