@@ -32,6 +32,8 @@ struct EncoderSettings {
   int bitrate_kbps = 8000;  // 100…200000; h264: cap; mjpeg picks its quality to stay near it
   int threads = 1;          // 1…64, encoder-internal; h264: as many slices
   std::string x264_preset = "ultrafast";  // to "medium": smaller frames, more time
+
+  bool operator==(const EncoderSettings&) const = default;
 };
 
 /// One encoded frame. H.264: an Annex B access unit, SPS and PPS in front of every IDR.

@@ -1,0 +1,216 @@
+#include "server/access.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
+#include <openssl/sha.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+// Bound to its purpose, so that no other HMAC under the same key can be taken for a link.
+constexpr std::string_view mac_context = "catgs-link-v1\n";
+constexpr std::size_t min_key_bytes = 16;
+constexpr std::size_t min_token_bytes = 8;
+constexpr std::size_t max_token_bytes = 512;
+
+using Digest = std::array<unsigned char, SHA256_DIGEST_LENGTH>;
+
+const unsigned char* bytes_of(std::string_view text) {
+  return reinterpret_cast<const unsigned char*>(text.data());
+}
+
+Digest sha256(std::string_view text) {
+  Digest digest{};
+  SHA256(bytes_of(text), text.size(), digest.data());
+  return digest;
+}
+
+std::string hmac(std::string_view payload, std::string_view key) {
+  const std::string message = std::string(mac_context).append(payload);
+  Digest digest{};
+  unsigned int size = 0;
+  HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes_of(message), message.size(),
+       digest.data(), &size);
+  return {reinterpret_cast<const char*>(digest.data()), size};
+}
+
+std::string base64url(std::string_view bytes) {
+  std::string out((bytes.size() + 2) / 3 * 4 + 1, '\0');
+  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()), bytes_of(bytes),
+                                   static_cast<int>(bytes.size()));
+  out.resize(static_cast<std::size_t>(size));
+  while (out.ends_with('=')) out.pop_back();
+  std::ranges::replace(out, '+', '-');
+  std::ranges::replace(out, '/', '_');
+  return out;
+}
+
+std::optional<std::string> from_base64url(std::string_view text) {
+  std::string in(text);
+  if (in.find_first_of("+/=") != std::string::npos) return std::nullopt;
+  std::ranges::replace(in, '-', '+');
+  std::ranges::replace(in, '_', '/');
+  const std::size_t padding = (4 - in.size() % 4) % 4;
+  in.append(padding, '=');
+  std::string out(in.size() / 4 * 3, '\0');
+  const int size = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(out.data()), bytes_of(in),
+                                   static_cast<int>(in.size()));
+  if (size < 0 || padding == 3) return std::nullopt;
+  out.resize(static_cast<std::size_t>(size) - padding);
+  return out;
+}
+
+bool equal_in_constant_time(std::string_view a, std::string_view b) {
+  const Digest x = sha256(a);
+  const Digest y = sha256(b);
+  return CRYPTO_memcmp(x.data(), y.data(), x.size()) == 0;
+}
+
+bool is_role(std::string_view role) {
+  return !role.empty() && role.size() <= 32 && std::ranges::all_of(role, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+  });
+}
+
+std::string read_text(const std::filesystem::path& path, std::string_view flag) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(in), {});
+  if (!in.good() && !in.eof())
+    throw InputError(fmt::format("{} {}", flag, path.string()), {}, "cannot be read");
+  return text;
+}
+
+}  // namespace
+
+std::string make_link_token(const LinkGrant& grant, std::string_view key) {
+  if (!is_role(grant.role))
+    throw InputError("--role " + grant.role, {}, "is no role", "use a-z, 0-9 and -");
+  if (grant.scene_id.find('\n') != std::string::npos || grant.scene_id.size() > 128)
+    throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
+  const std::string payload =
+      fmt::format("{}\n{}\n{}", grant.scene_id, grant.role, grant.expires_unix_s);
+  return base64url(payload) + "." + base64url(hmac(payload, key));
+}
+
+std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key) {
+  const auto dot = token.find('.');
+  if (dot == std::string_view::npos) return std::nullopt;
+  const auto payload = from_base64url(token.substr(0, dot));
+  const auto mac = from_base64url(token.substr(dot + 1));
+  if (!payload || !mac || !equal_in_constant_time(*mac, hmac(*payload, key))) return std::nullopt;
+  LinkGrant grant;
+  std::istringstream lines(*payload);
+  std::string expires;
+  std::getline(lines, grant.scene_id);
+  std::getline(lines, grant.role);
+  std::getline(lines, expires);
+  const char* end = expires.data() + expires.size();
+  if (std::from_chars(expires.data(), end, grant.expires_unix_s).ptr != end) return std::nullopt;
+  return grant;
+}
+
+std::string read_key_file(const std::filesystem::path& path) {
+  std::string key = read_text(path, "--token-key-file");
+  while (!key.empty() && (key.back() == '\n' || key.back() == '\r')) key.pop_back();
+  if (key.size() < min_key_bytes)
+    throw InputError(
+        "--token-key-file " + path.string(), {},
+        fmt::format("the key has {} bytes, at least {} are needed", key.size(), min_key_bytes),
+        "make one: openssl rand -hex 32");
+  return key;
+}
+
+std::chrono::seconds parse_duration(std::string_view text) {
+  std::int64_t count = 0;
+  const char* end = text.data() + text.size();
+  const auto [at, error] = std::from_chars(text.data(), end, count);
+  const std::string_view units = "smhd";
+  constexpr std::array<std::int64_t, 4> unit_s = {1, 60, 3600, 86'400};
+  const auto unit = at + 1 == end ? units.find(*at) : std::string_view::npos;
+  if (error != std::errc() || unit == std::string_view::npos || count < 1 || count > 1'000'000)
+    throw InputError("--expires " + std::string(text), {}, "is no duration",
+                     "give 90s, 30m, 12h or 7d");
+  return std::chrono::seconds(count * unit_s[unit]);
+}
+
+AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::path key_file)
+    : token_file_(std::move(token_file)) {
+  if (!key_file.empty()) key_ = read_key_file(key_file);
+  if (!token_file_.empty()) {
+    token_file_time_ = std::filesystem::last_write_time(token_file_);
+    read_token_file();
+  }
+}
+
+std::optional<std::string> AccessControl::refusal(std::string_view token, std::string_view scene_id,
+                                                  std::int64_t now_unix_s) {
+  if (token_file_.empty() && key_.empty()) return std::nullopt;
+  if (token.empty()) return "this server needs an access token: open the link you were given";
+  if (!token_file_.empty()) {
+    reload_when_changed();
+    if (is_static_token(token)) return std::nullopt;
+  }
+  if (!key_.empty()) {
+    if (const auto grant = read_link_token(token, key_)) {
+      if (now_unix_s >= grant->expires_unix_s) return "this link has expired: ask for a new one";
+      if (!grant->scene_id.empty() && grant->scene_id != scene_id)
+        return "this link is for another scene";
+      return std::nullopt;
+    }
+  }
+  return "the access token is not valid here";
+}
+
+bool AccessControl::is_static_token(std::string_view token) const {
+  bool found = false;
+  for (const auto& known : tokens_) found |= equal_in_constant_time(known, token);
+  return found;
+}
+
+void AccessControl::reload_when_changed() {
+  std::error_code error;
+  const auto time = std::filesystem::last_write_time(token_file_, error);
+  if (error || time == token_file_time_) return;
+  token_file_time_ = time;
+  try {
+    read_token_file();
+    spdlog::info("--token-file was read again: {} tokens", tokens_.size());
+  } catch (const InputError& bad) {
+    spdlog::error("{}; the tokens read before stay in force", bad.what());
+  }
+}
+
+void AccessControl::read_token_file() {
+  const std::string source = "--token-file " + token_file_.string();
+  std::istringstream lines(read_text(token_file_, "--token-file"));
+  std::vector<std::string> tokens;
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    if (line.empty() || line.front() == '#') continue;
+    if (line.size() < min_token_bytes || line.size() > max_token_bytes)
+      throw InputError(
+          fmt::format("{}:{}", source, number), {},
+          fmt::format("a token has {} to {} characters", min_token_bytes, max_token_bytes),
+          "make one: openssl rand -hex 16");
+    tokens.push_back(std::move(line));
+  }
+  if (tokens.empty())
+    throw InputError(source, {}, "no token in it", "make one: openssl rand -hex 16");
+  tokens_ = std::move(tokens);
+}
+
+}  // namespace catgs

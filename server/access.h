@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace catgs {
+
+/// What an expiring link allows.
+struct LinkGrant {
+  std::string scene_id;         // empty: every scene
+  std::string role = "viewer";  // [a-z0-9-]{1,32}; for logs today
+  std::int64_t expires_unix_s = 0;
+};
+
+/// `payload.mac`, both base64url: the grant in clear and its HMAC-SHA256 under `key`, so that every
+/// server with the key can check it. Throws InputError on a bad role or scene.
+std::string make_link_token(const LinkGrant& grant, std::string_view key);
+/// The grant, if the token was made with `key`; says nothing about its expiry.
+std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key);
+
+/// Reads a key of at least 16 bytes; trailing line ends are not part of it. Throws InputError.
+std::string read_key_file(const std::filesystem::path& path);
+
+/// "90s", "30m", "12h", "7d". Throws InputError.
+std::chrono::seconds parse_duration(std::string_view text);
+
+/// Who may open a session. Without a token file and a key file: everybody. Not thread-safe.
+class AccessControl {
+ public:
+  /// Empty path: this kind of token is not used. Throws InputError when a file cannot be read.
+  AccessControl(std::filesystem::path token_file, std::filesystem::path key_file);
+
+  /// Why `token` does not admit to the scene, for people; nothing: it does. The token file is read
+  /// again when it has changed; when that fails, its last good content stays in force.
+  std::optional<std::string> refusal(std::string_view token, std::string_view scene_id,
+                                     std::int64_t now_unix_s);
+
+ private:
+  void reload_when_changed();
+  void read_token_file();
+  [[nodiscard]] bool is_static_token(std::string_view token) const;
+
+  std::filesystem::path token_file_;
+  std::filesystem::file_time_type token_file_time_{};
+  std::vector<std::string> tokens_;
+  std::string key_;
+};
+
+}  // namespace catgs

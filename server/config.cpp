@@ -1,0 +1,317 @@
+#include "server/config.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+using Values = std::vector<std::string>;
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
+}
+
+const std::string& single(const Values& values) {
+  if (values.size() != 1) throw std::invalid_argument("one value is expected");
+  return values.front();
+}
+
+int parse_int(std::string_view text, int low, int high) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < low || value > high)
+    throw std::invalid_argument(
+        fmt::format("\"{}\" is not a whole number in {}…{}", text, low, high));
+  return value;
+}
+
+Setting integer(std::string name, std::string value_name, std::string help,
+                int ServerConfig::*member, int low, int high) {
+  return {std::move(name),
+          Setting::Kind::number,
+          std::move(value_name),
+          std::move(help),
+          [=](ServerConfig& c, const Values& v) { c.*member = parse_int(single(v), low, high); },
+          [=](const ServerConfig& c) { return std::to_string(c.*member); }};
+}
+
+Setting text(std::string name, std::string value_name, std::string help,
+             std::string ServerConfig::*member) {
+  return {std::move(name),
+          Setting::Kind::text,
+          std::move(value_name),
+          std::move(help),
+          [=](ServerConfig& c, const Values& v) { c.*member = single(v); },
+          [=](const ServerConfig& c) { return quoted(c.*member); }};
+}
+
+Setting list(std::string name, std::string value_name, std::string help,
+             std::vector<std::string> ServerConfig::*member) {
+  return {std::move(name),
+          Setting::Kind::list,
+          std::move(value_name),
+          std::move(help),
+          [=](ServerConfig& c, const Values& v) { c.*member = v; },
+          [=](const ServerConfig& c) {
+            std::vector<std::string> items;
+            for (const auto& item : c.*member) items.push_back(quoted(item));
+            return fmt::format("[{}]", fmt::join(items, ", "));
+          }};
+}
+
+Setting flag(std::string name, std::string help, bool ServerConfig::*member) {
+  return {std::move(name),
+          Setting::Kind::flag,
+          "",
+          std::move(help),
+          [=](ServerConfig& c, const Values& v) {
+            const std::string& value = single(v);
+            if (value != "true" && value != "false")
+              throw std::invalid_argument("\"" + value + "\" is neither true nor false");
+            c.*member = value == "true";
+          },
+          [=](const ServerConfig& c) { return c.*member ? "true" : "false"; }};
+}
+
+template <typename T>
+using Choices = std::vector<std::pair<std::string, T>>;
+
+template <typename T>
+Setting choice(std::string name, std::string help, T ServerConfig::*member, Choices<T> choices) {
+  std::string names;
+  for (const auto& c : choices) names += (names.empty() ? "" : "|") + c.first;
+  return {std::move(name),
+          Setting::Kind::text,
+          names,
+          std::move(help),
+          [=](ServerConfig& config, const Values& v) {
+            const auto it =
+                std::ranges::find(choices, single(v), &std::pair<std::string, T>::first);
+            if (it == choices.end())
+              throw std::invalid_argument("\"" + v.front() + "\" is not one of " + names);
+            config.*member = it->second;
+          },
+          [=](const ServerConfig& config) {
+            const auto it =
+                std::ranges::find(choices, config.*member, &std::pair<std::string, T>::second);
+            return quoted(it->first);
+          }};
+}
+
+Choices<std::string> words(std::initializer_list<const char*> list_of_words) {
+  Choices<std::string> choices;
+  for (const char* word : list_of_words) choices.emplace_back(word, word);
+  return choices;
+}
+
+Setting admin_bind() {
+  Setting setting =
+      text("admin-bind", "ADDRESS:PORT", "Address of /metrics and /api/sessions, or off",
+           &ServerConfig::admin_bind);
+  setting.set = [](ServerConfig& c, const Values& v) {
+    if (single(v) != "off") parse_endpoint(v.front());
+    c.admin_bind = v.front();
+  };
+  return setting;
+}
+
+std::vector<Setting> make_settings() {
+  using C = ServerConfig;
+  return {
+      list("scene", "PATH", "Scene files or folders, or synth:KIND:COUNT[:SEED] (city, garden)",
+           &C::scenes),
+      text("bind", "ADDRESS", "Address to listen on; 0.0.0.0 or :: is every interface", &C::bind),
+      integer("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
+      admin_bind(),
+      text("client-dir", "DIR", "Built browser client; by default found beside the program",
+           &C::client_dir),
+      choice<RendererKind>("renderer", "Core that renders", &C::renderer,
+                           {{"auto", RendererKind::automatic},
+                            {"cpu", RendererKind::cpu},
+                            {"cuda", RendererKind::cuda},
+                            {"reference", RendererKind::reference}}),
+      text("simd", "TARGET", "SIMD target of the CPU core: auto, scalar, …", &C::simd),
+      integer("threads", "N", "Threads that render and encode; 0: one per core", &C::threads, 0,
+              1024),
+      choice<EncoderKind>("encoder", "Video encoder", &C::encoder,
+                          {{"auto", EncoderKind::automatic},
+                           {"nvenc", EncoderKind::nvenc},
+                           {"x264", EncoderKind::x264},
+                           {"jpeg", EncoderKind::jpeg}}),
+      integer("fps", "N", "Nominal frame rate of a session", &C::fps, 1, 240),
+      integer("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
+              200'000),
+      integer("max-sessions", "N", "Sessions at the same time", &C::max_sessions, 1, 10'000),
+      integer("max-sessions-per-address", "N", "Connections at the same time from one address",
+              &C::max_sessions_per_address, 1, 10'000),
+      integer("idle-timeout", "SECONDS", "Close a session in which nothing moved; 0: never",
+              &C::idle_timeout_s, 0, 86'400),
+      flag("open", "Serve other machines without a token", &C::open),
+      text("token-file", "FILE", "Access tokens, one per line; read again when it changes",
+           &C::token_file),
+      text("token-key-file", "FILE", "Key of the expiring links made by 'catgs-server token'",
+           &C::token_key_file),
+      text("tls-cert", "FILE", "Certificate chain, PEM: serve https and wss", &C::tls_cert),
+      text("tls-key", "FILE", "Private key of the certificate, PEM", &C::tls_key),
+      list("allow-origin", "ORIGIN",
+           "Other sites whose pages may connect, https://a.example; *: all", &C::allow_origins),
+      list("embed-origin", "ORIGIN", "Sites that may show the client in a frame",
+           &C::embed_origins),
+      choice<std::string>("log-format", "Form of the log on standard error", &C::log_format,
+                          words({"human", "json"})),
+      choice<std::string>("log-level", "Least level that is logged", &C::log_level,
+                          words({"debug", "info", "warn", "error"})),
+  };
+}
+
+const Setting* find_setting(std::string_view name) {
+  const auto& all = settings();
+  const auto it = std::ranges::find(all, name, &Setting::name);
+  return it == all.end() ? nullptr : &*it;
+}
+
+void apply(const Setting& setting, const Values& values, const std::string& source,
+           ServerConfig& config, ConfigSources& sources) {
+  try {
+    setting.set(config, values);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(source, setting.name, error.what());
+  }
+  sources[setting.name] = source;
+}
+
+std::string variable_of(const Setting& setting) {
+  std::string variable = "CATGS_" + setting.name;
+  for (char& c : variable)
+    c = c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return variable;
+}
+
+Values split_at_commas(std::string_view text_value) {
+  Values values;
+  while (!text_value.empty()) {
+    const auto comma = std::min(text_value.find(','), text_value.size());
+    if (comma > 0) values.emplace_back(text_value.substr(0, comma));
+    text_value.remove_prefix(std::min(comma + 1, text_value.size()));
+  }
+  return values;
+}
+
+std::string scalar_text(const toml::node& node) {
+  if (const auto s = node.value_exact<std::string>()) return *s;
+  if (const auto b = node.value_exact<bool>()) return *b ? "true" : "false";
+  if (const auto i = node.value_exact<std::int64_t>()) return std::to_string(*i);
+  throw std::invalid_argument("a text, a whole number or true/false is expected");
+}
+
+Values toml_values(const toml::node& node) {
+  Values values;
+  if (const auto* array = node.as_array())
+    for (const auto& item : *array) values.push_back(scalar_text(item));
+  else
+    values.push_back(scalar_text(node));
+  return values;
+}
+
+}  // namespace
+
+const std::vector<Setting>& settings() {
+  static const std::vector<Setting> all = make_settings();
+  return all;
+}
+
+void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& sources) {
+  toml::table table;
+  try {
+    table = toml::parse_file(path);
+  } catch (const toml::parse_error& error) {
+    const auto line = error.source().begin.line;
+    throw InputError(line ? fmt::format("{}:{}", path, line) : path, {}, error.description());
+  }
+  for (const auto& [key, node] : table) {
+    const std::string source = fmt::format("{}:{}", path, key.source().begin.line);
+    const Setting* setting = find_setting(key.str());
+    if (!setting)
+      throw InputError(source, std::string(key.str()), "there is no such setting",
+                       "catgs-server --help lists them");
+    Values values;
+    try {
+      values = toml_values(node);
+    } catch (const std::invalid_argument& error) {
+      throw InputError(source, setting->name, error.what());
+    }
+    apply(*setting, values, source, config, sources);
+  }
+}
+
+void apply_environment(const std::function<const char*(const char*)>& lookup, ServerConfig& config,
+                       ConfigSources& sources) {
+  for (const auto& setting : settings()) {
+    const std::string variable = variable_of(setting);
+    const char* value = lookup(variable.c_str());
+    if (!value) continue;
+    const Values values =
+        setting.kind == Setting::Kind::list ? split_at_commas(value) : Values{value};
+    apply(setting, values, variable, config, sources);
+  }
+}
+
+void apply_flag(const Setting& setting, const std::vector<std::string>& values,
+                ServerConfig& config, ConfigSources& sources) {
+  apply(setting, values, "--" + setting.name, config, sources);
+}
+
+void validate(const ServerConfig& config) {
+  if (config.scenes.empty())
+    throw InputError("--scene", {}, "no scene is given",
+                     "give a file, or try --scene synth:city:300000");
+  if (config.tls_cert.empty() != config.tls_key.empty())
+    throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
+                     "--tls-cert and --tls-key belong together");
+  const bool guarded = !config.token_file.empty() || !config.token_key_file.empty();
+  if (!is_loopback(config.bind) && !guarded && !config.open)
+    throw InputError("--bind " + config.bind, {}, "other machines could connect without a token",
+                     "give --token-file or --token-key-file, or --open if everybody may");
+}
+
+std::string print_config(const ServerConfig& config, const ConfigSources& sources) {
+  std::string out;
+  for (const auto& setting : settings()) {
+    const auto it = sources.find(setting.name);
+    out += fmt::format("{} = {}  # {}\n", setting.name, setting.get(config),
+                       it == sources.end() ? "default" : it->second);
+  }
+  return out;
+}
+
+Endpoint parse_endpoint(std::string_view text_value) {
+  const auto colon = text_value.rfind(':');
+  if (colon == std::string_view::npos || colon == 0)
+    throw std::invalid_argument("\"" + std::string(text_value) + "\" is not ADDRESS:PORT");
+  std::string_view address = text_value.substr(0, colon);
+  if (address.starts_with('[') && address.ends_with(']'))
+    address = address.substr(1, address.size() - 2);
+  return {std::string(address), parse_int(text_value.substr(colon + 1), 0, 65535)};
+}
+
+bool is_loopback(std::string_view address) {
+  return address == "localhost" || address == "::1" || address.starts_with("127.");
+}
+
+}  // namespace catgs

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render_core/renderer.h"
+#include "server/encode/encoder.h"
+#include "server/net/net_server.h"
+
+namespace catgs {
+
+/// Everything that an operator can set. Each value comes from the strongest of: flag, environment
+/// variable CATGS_<NAME>, TOML file, default.
+struct ServerConfig {
+  std::vector<std::string> scenes;  // paths, or synth:KIND:COUNT[:SEED]
+  std::string bind = "127.0.0.1";
+  int port = 8080;
+  std::string admin_bind = "127.0.0.1:9090";  // address:port or "off"
+  std::string client_dir;                     // empty: found beside the program
+  RendererKind renderer = RendererKind::automatic;
+  std::string simd = "auto";
+  int threads = 0;  // 0: one per core
+  EncoderKind encoder = EncoderKind::automatic;
+  int fps = 60;
+  int bitrate_kbps = 8000;
+  int max_sessions = 16;
+  int max_sessions_per_address = 64;
+  int idle_timeout_s = 900;  // 0: never
+  bool open = false;
+  std::string token_file;
+  std::string token_key_file;
+  std::string tls_cert;
+  std::string tls_key;
+  std::vector<std::string> allow_origins;
+  std::vector<std::string> embed_origins;
+  std::string log_format = "human";
+  std::string log_level = "info";
+};
+
+/// One setting: its name is the flag (--max-sessions), the TOML key (max-sessions) and the
+/// environment variable (CATGS_MAX_SESSIONS).
+struct Setting {
+  enum class Kind { text, number, flag, list };
+
+  std::string name;
+  Kind kind;
+  std::string value_name;  // in --help: "PORT"
+  std::string help;
+  /// Takes the value as text (a list setting: all its values); throws std::invalid_argument.
+  std::function<void(ServerConfig&, const std::vector<std::string>&)> set;
+  /// The value as a TOML literal.
+  std::function<std::string(const ServerConfig&)> get;
+};
+
+const std::vector<Setting>& settings();
+
+/// Where each value came from, by setting name: "default", "catgs.toml:7", "CATGS_PORT", "--port".
+using ConfigSources = std::map<std::string, std::string, std::less<>>;
+
+/// Applies one layer. Each throws InputError that names file and line, variable or flag.
+void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& sources);
+/// `lookup` is getenv, or a fake.
+void apply_environment(const std::function<const char*(const char*)>& lookup, ServerConfig& config,
+                       ConfigSources& sources);
+void apply_flag(const Setting& setting, const std::vector<std::string>& values,
+                ServerConfig& config, ConfigSources& sources);
+
+/// What no single value shows: missing scenes, half a TLS pair, an open door to the network.
+/// Throws InputError with the remedy.
+void validate(const ServerConfig& config);
+
+/// The effective configuration as a TOML file, each line with its source.
+std::string print_config(const ServerConfig& config, const ConfigSources& sources);
+
+/// "127.0.0.1:9090" or "[::1]:9090". Throws std::invalid_argument.
+Endpoint parse_endpoint(std::string_view text);
+/// 127.0.0.0/8, ::1, localhost.
+bool is_loopback(std::string_view address);
+
+}  // namespace catgs

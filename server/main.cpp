@@ -1,0 +1,112 @@
+// catgs-server: renders 3D Gaussian Splatting scenes and streams them to browsers.
+
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "render_core/error.h"
+#include "server/commands.h"
+#include "server/config.h"
+#include "server/log.h"
+#include "server/server.h"
+#include "server/version.h"
+
+namespace catgs {
+namespace {
+
+constexpr int exit_ok = 0;
+constexpr int exit_failure = 1;
+constexpr int exit_usage = 2;
+
+/// Flags as they were given, by setting name; applied after the file and the environment.
+struct CommandLine {
+  std::string config_file;
+  bool print_config = false;
+  std::map<std::string, std::vector<std::string>> values;
+  std::map<std::string, bool> flags;
+};
+
+void add_options(CLI::App& app, CommandLine& line) {
+  app.add_option("--config", line.config_file, "TOML file: KEY = VALUE, keys as the flags")
+      ->envname("CATGS_CONFIG")
+      ->option_text("FILE");
+  app.add_flag("--print-config", line.print_config,
+               "Print the settings in force and where each comes from, then exit");
+  for (const auto& setting : settings()) {
+    const std::string name = "--" + setting.name;
+    if (setting.kind == Setting::Kind::flag) {
+      app.add_flag(name, line.flags[setting.name], setting.help);
+      continue;
+    }
+    auto* option = app.add_option(name, line.values[setting.name], setting.help)
+                       ->option_text(setting.value_name);
+    if (setting.kind == Setting::Kind::list)
+      option->option_text(setting.value_name + "...")->expected(1, -1);
+    else
+      option->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  }
+}
+
+ServerConfig effective_config(const CommandLine& line, ConfigSources& sources) {
+  ServerConfig config;
+  if (!line.config_file.empty()) apply_toml(line.config_file, config, sources);
+  apply_environment([](const char* name) { return std::getenv(name); }, config, sources);
+  for (const auto& setting : settings()) {
+    const auto values = line.values.find(setting.name);
+    if (values != line.values.end() && !values->second.empty())
+      apply_flag(setting, values->second, config, sources);
+    const auto flag = line.flags.find(setting.name);
+    if (flag != line.flags.end() && flag->second) apply_flag(setting, {"true"}, config, sources);
+  }
+  return config;
+}
+
+int serve(const CommandLine& line) {
+  ConfigSources sources;
+  const ServerConfig config = effective_config(line, sources);
+  if (line.print_config) {
+    std::cout << print_config(config, sources);
+    return exit_ok;
+  }
+  validate(config);
+  set_up_log(config.log_format, config.log_level);
+  Server server(config);
+  server.run();
+  return exit_ok;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
+  app.set_version_flag("--version", server_version);
+  app.footer(
+      "Settings come from defaults, then --config FILE (TOML), then CATGS_<NAME> variables, then\n"
+      "flags. Exit codes: 0 ended as asked, 1 failed, 2 bad usage, scene or configuration.\n"
+      "Example: catgs-server --scene synth:city:300000");
+  CommandLine line;
+  add_options(app, line);
+  int exit_code = exit_ok;
+  add_selftest_command(app, exit_code);
+  add_token_command(app, exit_code);
+  try {
+    app.parse(argc, argv);
+    return app.get_subcommands().empty() ? serve(line) : exit_code;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? exit_ok : exit_usage;
+  } catch (const InputError& error) {
+    std::cerr << "catgs-server: " << error.what() << '\n';
+    return exit_usage;
+  } catch (const std::exception& error) {
+    std::cerr << "catgs-server: " << error.what() << '\n';
+    return exit_failure;
+  }
+}
+
+}  // namespace
+}  // namespace catgs
+
+int main(int argc, char** argv) { return catgs::run(argc, argv); }

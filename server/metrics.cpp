@@ -1,0 +1,94 @@
+#include "server/metrics.h"
+
+#include <prometheus/text_serializer.h>
+
+namespace catgs {
+namespace {
+
+using prometheus::Counter;
+using prometheus::Gauge;
+using prometheus::Histogram;
+using prometheus::Registry;
+
+// From a tenth of a frame at 120 Hz to a frozen picture.
+const Histogram::BucketBoundaries latency_buckets_s = {
+    0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.1, 0.15, 0.25, 0.5, 1.0, 2.0};
+
+Gauge& gauge(Registry& registry, const char* name, const char* help) {
+  return prometheus::BuildGauge().Name(name).Help(help).Register(registry).Add({});
+}
+
+Counter& counter(Registry& registry, const char* name, const char* help,
+                 const prometheus::Labels& labels = {}) {
+  return prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add(labels);
+}
+
+Histogram& stage(Registry& registry, const char* name) {
+  return prometheus::BuildHistogram()
+      .Name("catgs_frame_stage_seconds")
+      .Help(
+          "Duration of a frame's stages: wait (pose received to render start), render, encode, "
+          "send (encoded to handed to the socket)")
+      .Register(registry)
+      .Add({{"stage", name}}, latency_buckets_s);
+}
+
+double seconds(TimePoint from, TimePoint to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+}  // namespace
+
+Metrics::Metrics()
+    : connections(gauge(registry_, "catgs_connections", "Open websockets")),
+      sessions(gauge(registry_, "catgs_sessions", "Admitted sessions")),
+      frames_running(gauge(registry_, "catgs_frames_running", "Frames being rendered or encoded")),
+      frames_queued(
+          gauge(registry_, "catgs_frames_queued", "Encoded frames waiting for their sockets")),
+      frames_in_flight(gauge(registry_, "catgs_frames_in_flight",
+                             "Frames sent and neither presented nor dropped")),
+      sessions_admitted(counter(registry_, "catgs_sessions_admitted_total", "Sessions admitted")),
+      sessions_refused(counter(registry_, "catgs_sessions_refused_total",
+                               "Sessions refused or closed for an error")),
+      frames_rendered(counter(registry_, "catgs_frames_rendered_total", "Frames rendered")),
+      frames_refined(counter(registry_, "catgs_frames_refined_total",
+                             "Frames that sharpened a still picture, not rendered again")),
+      frames_sent(counter(registry_, "catgs_frames_sent_total", "Frames handed to their sockets")),
+      frames_failed(counter(registry_, "catgs_frames_failed_total",
+                            "Frames that failed in rendering or encoding")),
+      frames_dropped_by_server(counter(registry_, "catgs_frames_dropped_total",
+                                       "Frames dropped before they were shown",
+                                       {{"by", "server"}})),
+      frames_dropped_by_client(counter(registry_, "catgs_frames_dropped_total",
+                                       "Frames dropped before they were shown",
+                                       {{"by", "client"}})),
+      bytes_sent(counter(registry_, "catgs_frame_bytes_sent_total", "Bytes of frame packets")),
+      poses_received(counter(registry_, "catgs_poses_received_total", "Pose samples received")),
+      poses_superseded(counter(registry_, "catgs_poses_superseded_total",
+                               "Pose samples replaced by a newer one before they were used")),
+      bad_messages(
+          counter(registry_, "catgs_bad_messages_total", "Messages that closed their session")),
+      list_entries_overflowed(counter(registry_, "catgs_list_entries_overflowed_total",
+                                      "Tile list entries that found no memory")),
+      wait_seconds(stage(registry_, "wait")),
+      render_seconds(stage(registry_, "render")),
+      encode_seconds(stage(registry_, "encode")),
+      send_seconds(stage(registry_, "send")),
+      pose_age_seconds(prometheus::BuildHistogram()
+                           .Name("catgs_pose_age_seconds")
+                           .Help("Age of a frame's pose when the client showed it")
+                           .Register(registry_)
+                           .Add({}, latency_buckets_s)) {}
+
+std::string Metrics::scrape() const {
+  return prometheus::TextSerializer().Serialize(registry_.Collect());
+}
+
+void Metrics::observe_frame(const FrameTicket& ticket, TimePoint now) {
+  wait_seconds.Observe(seconds(ticket.pose_received, ticket.render_start));
+  render_seconds.Observe(seconds(ticket.render_start, ticket.render_end));
+  encode_seconds.Observe(seconds(ticket.render_end, ticket.encode_end));
+  send_seconds.Observe(seconds(ticket.encode_end, now));
+}
+
+}  // namespace catgs

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include <prometheus/counter.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+
+#include "server/pipeline/frame_ticket.h"
+
+namespace catgs {
+
+/// What the server counts, for Prometheus. No label names a session, so their number does not grow
+/// with the visitors. Every member may be used from any thread.
+class Metrics {
+ public:
+  Metrics();
+
+  /// The text format of a scrape.
+  [[nodiscard]] std::string scrape() const;
+
+  /// Stage durations of a frame that was handed to the socket at `now`.
+  void observe_frame(const FrameTicket& ticket, TimePoint now);
+
+ private:
+  prometheus::Registry registry_;
+
+ public:
+  prometheus::Gauge& connections;
+  prometheus::Gauge& sessions;
+  prometheus::Gauge& frames_running;  // being rendered or encoded
+  prometheus::Gauge& frames_queued;   // encoded, waiting for their sockets
+  prometheus::Gauge& frames_in_flight;
+  prometheus::Counter& sessions_admitted;
+  prometheus::Counter& sessions_refused;
+  prometheus::Counter& frames_rendered;
+  prometheus::Counter& frames_refined;
+  prometheus::Counter& frames_sent;
+  prometheus::Counter& frames_failed;
+  prometheus::Counter& frames_dropped_by_server;  // overflow of a packet ring
+  prometheus::Counter& frames_dropped_by_client;
+  prometheus::Counter& bytes_sent;
+  prometheus::Counter& poses_received;
+  prometheus::Counter& poses_superseded;  // replaced by a newer one before they were looked at
+  prometheus::Counter& bad_messages;
+  prometheus::Counter& list_entries_overflowed;
+  prometheus::Histogram& wait_seconds;
+  prometheus::Histogram& render_seconds;
+  prometheus::Histogram& encode_seconds;
+  prometheus::Histogram& send_seconds;
+  prometheus::Histogram& pose_age_seconds;  // on the client's clock, when the frame was shown
+};
+
+}  // namespace catgs

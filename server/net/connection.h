@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/pipeline/frame_ticket.h"
+
+namespace catgs {
+
+/// WebSocket close codes (RFC 6455, 7.4.1) that this server sends.
+enum class CloseCode : std::uint16_t {
+  normal = 1000,
+  going_away = 1001,
+  unsupported_data = 1003,
+  policy_violation = 1008,
+  too_big = 1009,
+  try_again_later = 1013,
+};
+
+/// One open websocket. Every function may be called from any thread and none waits; after the peer
+/// has gone they do nothing.
+class Connection {
+ public:
+  virtual ~Connection() = default;
+  Connection() = default;
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  /// Queues a serialised message. A peer that lets its messages pile up is closed.
+  virtual void send(std::vector<std::byte> message) = 0;
+  /// Queues a frame; returns the ids of the frames dropped for it (PacketRing).
+  virtual std::vector<std::uint64_t> send(OutgoingFrame frame) = 0;
+  /// Closes once everything queued is out, two seconds from now at the latest.
+  virtual void close(CloseCode code, std::string_view reason) = 0;
+
+  [[nodiscard]] virtual std::string peer_address() const = 0;
+  [[nodiscard]] virtual std::size_t queued_frames() const = 0;
+};
+
+/// Who listens to a Connection. Called on the network thread: answer at once and never wait.
+class ConnectionListener {
+ public:
+  virtual ~ConnectionListener() = default;
+  /// One whole binary message within the size limit.
+  virtual void on_message(std::span<const std::byte> bytes) = 0;
+  /// The frame was handed to the socket.
+  virtual void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
+                             TimePoint now) = 0;
+  virtual void on_close() = 0;  // last call
+};
+
+/// Makes the listener of a new connection. Called on the network thread.
+using ConnectionAcceptor =
+    std::function<std::shared_ptr<ConnectionListener>(std::shared_ptr<Connection>)>;
+
+}  // namespace catgs

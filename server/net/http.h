@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace catgs {
+
+/// A GET or HEAD request; other methods are answered before a handler sees them.
+struct HttpRequest {
+  std::string_view path;  // decoded, starts with '/', no query
+  std::string_view if_none_match;
+  bool accepts_gzip = false;
+};
+
+struct HttpResponse {
+  int status = 200;
+  std::string content_type = "text/plain; charset=utf-8";
+  std::string cache_control = "no-store";
+  std::string etag;   // empty: none
+  bool gzip = false;  // `body` is compressed
+  std::shared_ptr<const std::string> body;
+};
+
+inline HttpResponse text_response(int status, std::string body,
+                                  std::string content_type = "text/plain; charset=utf-8") {
+  HttpResponse response;
+  response.status = status;
+  response.content_type = std::move(content_type);
+  response.body = std::make_shared<const std::string>(std::move(body));
+  return response;
+}
+
+/// Called on the network thread: answers at once and never waits.
+using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
+
+/// May a page of `origin` ("https://a.example:8443", empty when the client is no browser) open a
+/// websocket here? Yes when it was served by this host (`host` is the Host header) or is listed;
+/// "*" lists every origin.
+bool origin_allowed(std::string_view origin, std::string_view host,
+                    const std::vector<std::string>& allowed);
+
+/// Security headers of every page. `embed_origins`: who may show it in a frame.
+std::string content_security_policy(const std::vector<std::string>& embed_origins);
+
+}  // namespace catgs

@@ -1,0 +1,90 @@
+#include "server/net/lws_http.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string_view>
+
+namespace catgs {
+namespace {
+
+constexpr std::size_t chunk_bytes = 64 * 1024;
+
+/// Appends response headers to a fixed buffer; remembers whether everything found room.
+class HeaderWriter {
+ public:
+  HeaderWriter(lws* wsi, int status, std::string_view content_type, std::size_t length)
+      : wsi_(wsi) {
+    ok_ = lws_add_http_common_headers(wsi, static_cast<unsigned>(status),
+                                      std::string(content_type).c_str(), length, &at_, end()) == 0;
+  }
+  void add(const char* name_with_colon, std::string_view value) {
+    ok_ = ok_ &&
+          lws_add_http_header_by_name(wsi_, reinterpret_cast<const unsigned char*>(name_with_colon),
+                                      reinterpret_cast<const unsigned char*>(value.data()),
+                                      static_cast<int>(value.size()), &at_, end()) == 0;
+  }
+  int finish() {
+    return ok_ && lws_finalize_write_http_header(wsi_, start(), &at_, end()) == 0 ? 0 : -1;
+  }
+
+ private:
+  unsigned char* start() { return buffer_.data() + LWS_PRE; }
+  unsigned char* end() { return buffer_.data() + buffer_.size() - 1; }
+
+  lws* wsi_;
+  std::array<unsigned char, LWS_PRE + 4096> buffer_{};
+  unsigned char* at_ = buffer_.data() + LWS_PRE;
+  bool ok_ = true;
+};
+
+}  // namespace
+
+std::string request_header(lws* wsi, lws_token_indexes token) {
+  const int length = lws_hdr_total_length(wsi, token);
+  if (length <= 0) return {};
+  std::string value(static_cast<std::size_t>(length) + 1, '\0');
+  const int copied = lws_hdr_copy(wsi, value.data(), length + 1, token);
+  value.resize(static_cast<std::size_t>(std::max(copied, 0)));
+  return value;
+}
+
+int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& policy,
+                           bool tls, bool& finished) {
+  head_only_ = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+  const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
+  const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
+  const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
+  response_ = handler({path, if_none_match, encodings.find("gzip") != std::string::npos});
+  finished = head_only_ || !response_.body || response_.body->empty();
+  return write_headers(wsi, policy, tls);
+}
+
+int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy, bool tls) {
+  HeaderWriter headers(wsi, response_.status, response_.content_type,
+                       response_.body ? response_.body->size() : 0);
+  headers.add("cache-control:", response_.cache_control);
+  if (!response_.etag.empty()) headers.add("etag:", response_.etag);
+  if (response_.gzip) headers.add("content-encoding:", "gzip");
+  headers.add("vary:", "accept-encoding");
+  headers.add("content-security-policy:", policy);
+  headers.add("x-content-type-options:", "nosniff");
+  headers.add("referrer-policy:", "no-referrer");
+  headers.add("cross-origin-resource-policy:", "same-origin");
+  if (tls) headers.add("strict-transport-security:", "max-age=31536000");
+  return headers.finish();
+}
+
+int LwsHttpExchange::write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished) {
+  const std::string& body = *response_.body;
+  const std::size_t size = std::min(chunk_bytes, body.size() - written_);
+  scratch.resize(LWS_PRE + size);
+  std::memcpy(scratch.data() + LWS_PRE, body.data() + written_, size);
+  written_ += size;
+  finished = written_ == body.size();
+  auto* payload = reinterpret_cast<unsigned char*>(scratch.data()) + LWS_PRE;
+  const auto protocol = finished ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP;
+  return lws_write(wsi, payload, size, protocol) == static_cast<int>(size) ? 0 : -1;
+}
+
+}  // namespace catgs

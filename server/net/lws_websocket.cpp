@@ -1,0 +1,176 @@
+#include "server/net/lws_websocket.h"
+
+#include <array>
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include "server/net/wire.h"
+
+namespace catgs {
+namespace {
+
+constexpr int close_timeout_s = 2;
+
+std::string peer_address_of(lws* wsi) {
+  std::array<char, 64> name{};
+  lws_get_peer_simple(wsi, name.data(), name.size());
+  std::string address = name.data();
+  // One spelling for one host: an IPv4 peer of a dual-stack socket.
+  if (address.starts_with("::ffff:")) address.erase(0, 7);
+  return address;
+}
+
+/// Small writes leave at once, and the kernel keeps at most about one frame of unsent bytes: what
+/// waits, waits in the ring, where it is counted and can be dropped.
+void tune_socket(int fd) {
+  const int on = 1;
+  const int lowat_bytes = 128 * 1024;
+  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &lowat_bytes, sizeof lowat_bytes);
+}
+
+}  // namespace
+
+void LwsWaker::attach(lws_context* context) {
+  const std::lock_guard lock(mutex_);
+  context_ = context;
+}
+
+void LwsWaker::detach() {
+  const std::lock_guard lock(mutex_);
+  context_ = nullptr;
+  pending_.clear();
+}
+
+void LwsWaker::wake(std::shared_ptr<LwsWebsocket> connection) {
+  const std::lock_guard lock(mutex_);
+  if (!context_) return;
+  pending_.push_back(std::move(connection));
+  lws_cancel_service(context_);
+}
+
+void LwsWaker::wake() {
+  const std::lock_guard lock(mutex_);
+  if (context_) lws_cancel_service(context_);
+}
+
+std::vector<std::shared_ptr<LwsWebsocket>> LwsWaker::take() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(pending_, {});
+}
+
+LwsWebsocket::LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker)
+    : waker_(std::move(waker)), peer_address_(peer_address_of(wsi)), wsi_(wsi) {
+  tune_socket(lws_get_socket_fd(wsi));
+}
+
+void LwsWebsocket::send(std::vector<std::byte> message) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || closing_) return;
+    if (!ring_.push(std::move(message)))
+      closing_ = {CloseCode::policy_violation, "messages are not read"};
+  }
+  waker_->wake(shared_from_this());
+}
+
+std::vector<std::uint64_t> LwsWebsocket::send(OutgoingFrame frame) {
+  std::vector<std::uint64_t> dropped;
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || closing_) return {frame.ticket.frame_id};
+    dropped = ring_.push(std::move(frame));
+  }
+  waker_->wake(shared_from_this());
+  return dropped;
+}
+
+void LwsWebsocket::close(CloseCode code, std::string_view reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || closing_) return;
+    closing_ = {code, std::string(reason)};
+  }
+  waker_->wake(shared_from_this());
+}
+
+std::size_t LwsWebsocket::queued_frames() const {
+  const std::lock_guard lock(mutex_);
+  return ring_.frames();
+}
+
+void LwsWebsocket::service_listen(std::shared_ptr<ConnectionListener> listener) {
+  listener_ = std::move(listener);
+}
+
+void LwsWebsocket::service_woken() {
+  if (!wsi_) return;
+  bool closing = false;
+  {
+    const std::lock_guard lock(mutex_);
+    closing = closing_.has_value();
+  }
+  if (closing) lws_set_timeout(wsi_, PENDING_TIMEOUT_CLOSE_SEND, close_timeout_s);
+  lws_callback_on_writable(wsi_);
+}
+
+int LwsWebsocket::service_receive(std::span<const std::byte> fragment) {
+  if (!lws_frame_is_binary(wsi_))
+    return close_now(CloseCode::unsupported_data, "binary messages only");
+  if (received_.size() + fragment.size() > wire::max_client_message_bytes)
+    return close_now(CloseCode::too_big, "message over 64 KiB");
+  received_.insert(received_.end(), fragment.begin(), fragment.end());
+  if (lws_is_final_fragment(wsi_) && lws_remaining_packet_payload(wsi_) == 0) {
+    listener_->on_message(received_);
+    received_.clear();
+  }
+  return 0;
+}
+
+int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
+  std::optional<PacketRing::Packet> packet;
+  std::optional<Closing> closing;
+  bool more = false;
+  {
+    const std::lock_guard lock(mutex_);
+    packet = ring_.pop();
+    more = !ring_.empty() || closing_;
+    if (!packet) closing = closing_;
+  }
+  if (closing) return close_now(closing->code, closing->reason);
+  if (!packet) return 0;
+
+  // libwebsockets writes its own framing into the bytes before the payload.
+  scratch.assign(LWS_PRE, std::byte{0});
+  const TimePoint now = Clock::now();
+  if (packet->frame) wire::append_frame_header(*packet->frame, now, scratch);
+  scratch.insert(scratch.end(), packet->bytes.begin(), packet->bytes.end());
+  const std::size_t size = scratch.size() - LWS_PRE;
+  auto* payload = reinterpret_cast<unsigned char*>(scratch.data()) + LWS_PRE;
+  if (lws_write(wsi_, payload, size, LWS_WRITE_BINARY) < static_cast<int>(size)) return -1;
+  if (packet->frame) listener_->on_frame_sent(*packet->frame, size, now);
+  if (more) lws_callback_on_writable(wsi_);
+  return 0;
+}
+
+void LwsWebsocket::service_closed() {
+  wsi_ = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    ring_ = PacketRing();
+  }
+  if (listener_) listener_->on_close();
+  listener_.reset();
+}
+
+int LwsWebsocket::close_now(CloseCode code, std::string_view reason) {
+  std::string text(reason.substr(0, 120));  // a close frame has room for 123 bytes
+  lws_close_reason(wsi_, static_cast<lws_close_status>(code),
+                   reinterpret_cast<unsigned char*>(text.data()), text.size());
+  return -1;
+}
+
+}  // namespace catgs

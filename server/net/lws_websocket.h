@@ -1,0 +1,72 @@
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <libwebsockets.h>
+
+#include "server/net/connection.h"
+#include "server/pipeline/packet_ring.h"
+
+namespace catgs {
+
+class LwsWebsocket;
+
+/// How other threads reach the network thread: they list the connection that has something to do
+/// and wake the poll loop, the only call into libwebsockets that is allowed from outside.
+class LwsWaker {
+ public:
+  void attach(lws_context* context);
+  void detach();  // wake() does nothing from here on
+  void wake(std::shared_ptr<LwsWebsocket> connection);
+  void wake();
+  std::vector<std::shared_ptr<LwsWebsocket>> take();
+
+ private:
+  std::mutex mutex_;
+  lws_context* context_ = nullptr;
+  std::vector<std::shared_ptr<LwsWebsocket>> pending_;
+};
+
+/// A websocket of libwebsockets. Functions beginning with `service_` run on the network thread and
+/// are the only ones to touch `wsi_`.
+class LwsWebsocket final : public Connection, public std::enable_shared_from_this<LwsWebsocket> {
+ public:
+  LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker);
+
+  void send(std::vector<std::byte> message) override;
+  std::vector<std::uint64_t> send(OutgoingFrame frame) override;
+  void close(CloseCode code, std::string_view reason) override;
+  [[nodiscard]] std::string peer_address() const override { return peer_address_; }
+  [[nodiscard]] std::size_t queued_frames() const override;
+
+  void service_listen(std::shared_ptr<ConnectionListener> listener);
+  void service_woken();
+  /// Nonzero: libwebsockets shall close the socket, as its callbacks say it.
+  int service_receive(std::span<const std::byte> fragment);
+  int service_writeable(std::vector<std::byte>& scratch);
+  void service_closed();
+
+ private:
+  struct Closing {
+    CloseCode code;
+    std::string reason;
+  };
+  int close_now(CloseCode code, std::string_view reason);
+
+  const std::shared_ptr<LwsWaker> waker_;
+  const std::string peer_address_;
+  lws* wsi_;
+  std::shared_ptr<ConnectionListener> listener_;
+  std::vector<std::byte> received_;
+
+  mutable std::mutex mutex_;  // guards what follows
+  PacketRing ring_;
+  std::optional<Closing> closing_;
+  bool closed_ = false;
+};
+
+}  // namespace catgs

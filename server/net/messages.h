@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "render_core/camera.h"
+#include "server/encode/encoder.h"
+
+namespace catgs {
+
+// The wire contract (proto/catgs.proto) as plain structs: what the rest of the server knows of it.
+// Client messages come out of parse_client_message() validated: every number finite and within the
+// limits written beside the fields of the contract, every quaternion of unit length.
+
+struct PoseSample {
+  std::uint64_t pose_id = 0;
+  std::int64_t client_time_us = 0;  // client's clock
+  Pose world_from_camera;
+  float fov_y_rad = 0.0f;
+};
+
+struct PosePath {
+  std::vector<PoseSample> samples;  // in time order
+};
+
+struct Settings {
+  glm::ivec2 size_px{0};  // 0: the viewport's
+  int max_fps = 0;        // 0: the server's default
+  int max_bitrate_kbps = 0;
+};
+
+struct Hello {
+  std::uint32_t version = 0;
+  std::string scene_id;
+  glm::ivec2 viewport_px{0};
+  float device_pixel_ratio = 1.0f;
+  std::vector<Codec> decoders;  // best first
+  std::string token;
+  std::string resume_token;
+  Settings settings;
+};
+
+struct Ack {
+  std::uint64_t frame_id = 0;
+  std::int64_t received_us = 0;  // client's clock, as the next two; 0: did not happen
+  std::int64_t decoded_us = 0;
+  std::int64_t presented_us = 0;
+  bool dropped = false;
+  std::uint32_t pose_age_us = 0;
+  std::uint32_t decoder_queue = 0;
+};
+
+struct SelectScene {
+  std::string scene_id;
+};
+struct RequestIdr {};
+struct Pause {
+  bool paused = false;
+};
+struct Bye {};
+/// A message of a newer wire version, ignored by rule.
+struct UnknownMessage {};
+
+using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
+                                   SelectScene, RequestIdr, Pause, Bye>;
+
+struct SceneFacts {
+  std::string scene_id;
+  std::string title;
+  std::uint64_t gaussians = 0;
+  glm::vec3 up{0.0f, -1.0f, 0.0f};
+  Pose start_pose;
+  glm::vec3 focus{0.0f};
+  glm::vec3 limits_min{0.0f};
+  glm::vec3 limits_max{0.0f};
+  float near_z = 0.2f;
+};
+
+struct StreamConfig {
+  Codec codec = Codec::h264;
+  std::string codec_string;
+  glm::ivec2 size_px{0};
+  int fps = 0;
+  int bitrate_kbps = 0;
+  std::string encoder;
+};
+
+struct Welcome {
+  std::string session_id;
+  std::string resume_token;
+  SceneFacts scene;
+  StreamConfig config;
+  std::string renderer;
+  std::string server_version;
+  std::vector<std::string> scene_ids;
+};
+
+struct Stats {
+  float fps = 0.0f;
+  float bitrate_kbps = 0.0f;
+  std::uint32_t key_frames = 0;
+  std::uint32_t sub_frames = 0;
+  std::uint32_t dropped_packets = 0;
+  std::uint32_t sessions = 0;
+};
+
+struct Heartbeat {
+  std::int64_t server_time_us = 0;
+};
+
+enum class ErrorCode {
+  bad_message = 1,
+  unauthorized,
+  unknown_scene,
+  unsupported_version,
+  no_common_codec,
+  server_full,
+  rate_limited,
+  render_failed,
+  idle_timeout,
+  internal,
+};
+
+struct ErrorMessage {
+  ErrorCode code = ErrorCode::internal;
+  std::string message;
+  bool fatal = true;
+};
+
+struct Drain {
+  std::uint32_t deadline_ms = 0;
+};
+
+using ServerMessage = std::variant<Welcome, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain>;
+
+}  // namespace catgs

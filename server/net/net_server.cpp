@@ -1,0 +1,291 @@
+#include "server/net/net_server.h"
+
+#include <atomic>
+#include <csignal>
+#include <exception>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <libwebsockets.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/error.h"
+#include "server/net/lws_http.h"
+#include "server/net/lws_websocket.h"
+#include "server/net/wire.h"
+
+namespace catgs {
+namespace {
+
+constexpr int request_timeout_s = 10;  // a peer that is slow to send its request
+constexpr int keep_alive_timeout_s = 15;
+constexpr std::uint16_t ping_after_s = 20;  // of silence; hung up ten seconds later
+constexpr std::uint16_t hang_up_after_s = 30;
+
+/// What one listening port serves; the vhost's user pointer.
+struct Site {
+  HttpHandler http;
+  ConnectionAcceptor accept;  // null: no websockets
+  std::vector<std::string> allowed_origins;
+  std::string policy;
+  bool tls = false;
+};
+
+/// Per-connection memory that libwebsockets owns, zeroed at its birth.
+struct HttpSlot {
+  LwsHttpExchange* exchange;
+};
+struct WebsocketSlot {
+  std::shared_ptr<LwsWebsocket>* connection;
+};
+
+/// The context's user pointer: what callbacks need besides their site.
+struct Service {
+  std::shared_ptr<LwsWaker> waker = std::make_shared<LwsWaker>();
+  std::vector<std::byte> scratch;  // outgoing bytes of the packet being written
+};
+
+Service& service_of(lws* wsi) {
+  return *static_cast<Service*>(lws_context_user(lws_get_context(wsi)));
+}
+
+const Site& site_of(lws* wsi) {
+  return *static_cast<const Site*>(lws_get_vhost_user(lws_get_vhost(wsi)));
+}
+
+void forget(HttpSlot& slot) { delete std::exchange(slot.exchange, nullptr); }
+
+bool is_get_or_head(lws* wsi) {
+  return lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 ||
+         lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+}
+
+/// An answered request leaves the connection open for the next one.
+int finish_request(lws* wsi, HttpSlot& slot) {
+  forget(slot);
+  return lws_http_transaction_completed(wsi) ? -1 : 0;
+}
+
+int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
+  switch (reason) {
+    case LWS_CALLBACK_HTTP: {
+      if (!is_get_or_head(wsi)) {
+        lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
+        return -1;
+      }
+      const Site& site = site_of(wsi);
+      forget(*slot);
+      slot->exchange = new LwsHttpExchange;
+      bool finished = false;
+      if (slot->exchange->begin(wsi, site.http, site.policy, site.tls, finished) != 0) return -1;
+      if (finished) return finish_request(wsi, *slot);
+      lws_callback_on_writable(wsi);
+      return 0;
+    }
+    case LWS_CALLBACK_HTTP_WRITEABLE: {
+      if (!slot || !slot->exchange) return 0;
+      bool finished = false;
+      if (slot->exchange->write_body(wsi, service_of(wsi).scratch, finished) != 0) return -1;
+      if (finished) return finish_request(wsi, *slot);
+      lws_callback_on_writable(wsi);
+      return 0;
+    }
+    case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
+    case LWS_CALLBACK_CLOSED_HTTP:
+      if (slot) forget(*slot);
+      return 0;
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:  // a websocket that did not ask for catgs.v1
+      lws_return_http_status(wsi, 400, "ask for subprotocol catgs.v1");
+      return -1;
+    case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
+      for (const auto& connection : service_of(wsi).waker->take()) connection->service_woken();
+      return 0;
+    default:
+      return lws_callback_http_dummy(wsi, reason, slot, in, length);
+  }
+}
+
+int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
+                 std::span<const std::byte> bytes) {
+  switch (reason) {
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
+      const Site& site = site_of(wsi);
+      const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
+      if (site.accept &&
+          origin_allowed(origin, request_header(wsi, WSI_TOKEN_HOST), site.allowed_origins))
+        return 0;
+      spdlog::warn("websocket refused: origin {} is not allowed (--allow-origin)", origin);
+      lws_return_http_status(wsi, 403, "this origin is not allowed");
+      return -1;
+    }
+    case LWS_CALLBACK_ESTABLISHED: {
+      auto connection = std::make_shared<LwsWebsocket>(wsi, service_of(wsi).waker);
+      slot->connection = new std::shared_ptr<LwsWebsocket>(connection);
+      connection->service_listen(site_of(wsi).accept(connection));
+      return 0;
+    }
+    case LWS_CALLBACK_RECEIVE:
+      return (*slot->connection)->service_receive(bytes);
+    case LWS_CALLBACK_SERVER_WRITEABLE:
+      return (*slot->connection)->service_writeable(service_of(wsi).scratch);
+    case LWS_CALLBACK_CLOSED:
+      if (slot && slot->connection) {
+        (*slot->connection)->service_closed();
+        delete std::exchange(slot->connection, nullptr);
+      }
+      return 0;
+    default:
+      return 0;
+  }
+}
+
+/// No exception may pass through C: it costs its own connection only.
+template <typename Function>
+int guarded(Function&& function) {
+  try {
+    return function();
+  } catch (const std::exception& error) {
+    spdlog::error("network: {}", error.what());
+    return -1;
+  }
+}
+
+int http_callback(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
+  return guarded([&] { return on_http(wsi, reason, static_cast<HttpSlot*>(user), in, length); });
+}
+
+int websocket_callback(lws* wsi, lws_callback_reasons reason, void* user, void* in,
+                       std::size_t length) {
+  return guarded([&] {
+    return on_websocket(wsi, reason, static_cast<WebsocketSlot*>(user),
+                        {static_cast<const std::byte*>(in), length});
+  });
+}
+
+// A socket buffer of one whole message at most: larger ones arrive in pieces and are refused.
+const lws_protocols protocols[] = {
+    {"http", http_callback, sizeof(HttpSlot), 0, 0, nullptr, 0},
+    {"catgs.v1", websocket_callback, sizeof(WebsocketSlot), wire::max_client_message_bytes, 0,
+     nullptr, 0},
+    {nullptr, nullptr, 0, 0, 0, nullptr, 0},
+};
+
+void forward_log(int level, const char* line) {
+  std::string_view text(line);
+  while (text.ends_with('\n')) text.remove_suffix(1);
+  spdlog::log(level == LLL_ERR ? spdlog::level::err : spdlog::level::debug, "libwebsockets: {}",
+              text);
+}
+
+}  // namespace
+
+struct NetServer::State {
+  Site site;
+  Site admin_site;
+  Service service;
+  lws_retry_bo_t idle_policy{};
+  lws_context* context = nullptr;
+  int port = 0;
+  int admin_port = 0;
+  std::atomic<bool> stopping{false};
+  std::thread thread;
+
+  /// Returns the port that was really bound.
+  int listen(const char* name, const Endpoint& endpoint, const char* flag, Site& on,
+             const NetOptions* tls);
+};
+
+int NetServer::State::listen(const char* name, const Endpoint& endpoint, const char* flag, Site& on,
+                             const NetOptions* tls) {
+  const bool all = endpoint.address == "0.0.0.0" || endpoint.address == "::";
+  lws_context_creation_info info{};
+  info.vhost_name = name;
+  info.port = endpoint.port;
+  info.iface = all ? nullptr : endpoint.address.c_str();
+  info.protocols = protocols;
+  info.user = &on;
+  info.keepalive_timeout = keep_alive_timeout_s;
+  info.timeout_secs = request_timeout_s;
+  info.retry_and_idle_policy = &idle_policy;
+  info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
+  if (endpoint.address.find(':') == std::string::npos)
+    info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
+  if (tls) {
+    info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+    info.ssl_cert_filepath = tls->tls_certificate.c_str();
+    info.ssl_private_key_filepath = tls->tls_key.c_str();
+    info.alpn = "http/1.1";
+    on.tls = true;
+  }
+  lws_vhost* made = lws_create_vhost(context, &info);
+  if (!made)
+    throw InputError(
+        fmt::format("{} {}:{}", flag, endpoint.address, endpoint.port), {},
+        tls ? "cannot listen: the port is busy or the certificate files do not fit together"
+            : "cannot listen: the port is busy or the address is not of this machine",
+        "stop the other program or choose another port");
+  return lws_get_vhost_listen_port(made);
+}
+
+NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
+  // A peer that goes away while it is written to is an error code, not a signal.
+  std::signal(SIGPIPE, SIG_IGN);
+  lws_set_log_level(LLL_ERR | LLL_WARN, forward_log);
+  State& s = *state_;
+  s.site = {std::move(options.http), std::move(options.accept), options.allowed_origins,
+            content_security_policy(options.embed_origins), false};
+  s.admin_site = {std::move(options.admin_http), nullptr, {}, content_security_policy({}), false};
+  s.idle_policy.secs_since_valid_ping = ping_after_s;
+  s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
+
+  const bool tls = !options.tls_certificate.empty();
+  lws_context_creation_info info{};
+  info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
+  if (tls) info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+  info.user = &s.service;
+  info.gid = static_cast<gid_t>(-1);
+  info.uid = static_cast<uid_t>(-1);
+  s.context = lws_create_context(&info);
+  if (!s.context) throw InputError("libwebsockets", {}, "cannot create its context");
+  try {
+    s.port = s.listen("public", options.listen, "--bind", s.site, tls ? &options : nullptr);
+    if (options.admin)
+      s.admin_port = s.listen("admin", options.admin_listen, "--admin-bind", s.admin_site, nullptr);
+  } catch (...) {
+    lws_context_destroy(s.context);
+    throw;
+  }
+  s.service.waker->attach(s.context);
+}
+
+NetServer::~NetServer() { stop(); }
+
+void NetServer::start() {
+  State& s = *state_;
+  s.thread = std::thread([&s] {
+    while (!s.stopping.load() && lws_service(s.context, 0) >= 0) {
+    }
+    s.service.waker->detach();
+    lws_context_destroy(s.context);  // calls the callbacks of what is still open
+  });
+}
+
+void NetServer::stop() {
+  State& s = *state_;
+  if (s.thread.joinable()) {
+    s.stopping.store(true);
+    s.service.waker->wake();
+    s.thread.join();
+  } else if (s.context) {
+    s.service.waker->detach();
+    lws_context_destroy(s.context);
+  }
+  s.context = nullptr;
+}
+
+int NetServer::port() const { return state_->port; }
+
+int NetServer::admin_port() const { return state_->admin_port; }
+
+}  // namespace catgs

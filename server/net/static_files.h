@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "server/net/http.h"
+
+namespace catgs {
+
+/// The browser client, read into memory once: requests look names up in a map and never touch the
+/// file system, so no path from the wire can leave the folder.
+class StaticFiles {
+ public:
+  StaticFiles() = default;
+  /// Reads every regular file under `folder`. Throws InputError when it is no folder, has no
+  /// index.html or exceeds 4,096 files or 256 MiB.
+  explicit StaticFiles(const std::filesystem::path& folder);
+
+  /// 200, 304 or 404. "/" is index.html. Names with a content hash (assets/) are cached for a year,
+  /// the others are revalidated by their ETag.
+  [[nodiscard]] HttpResponse respond(const HttpRequest& request) const;
+
+  [[nodiscard]] bool empty() const { return files_.empty(); }
+
+ private:
+  struct File {
+    std::string content_type;
+    std::string cache_control;
+    std::string etag;
+    std::shared_ptr<const std::string> body;
+    std::shared_ptr<const std::string> gzip_body;  // null: not worth it
+  };
+  std::map<std::string, File, std::less<>> files_;  // by request path, "/assets/x.js"
+};
+
+}  // namespace catgs

@@ -1,0 +1,291 @@
+#include "server/net/wire.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "proto/catgs.pb.h"
+
+namespace catgs::wire {
+namespace {
+
+/// Positions beyond this are no place in a scene, and their squares overflow a float's precision.
+constexpr float max_coordinate = 1.0e9f;
+constexpr int max_path_samples = 256;
+constexpr int max_decoders = 8;
+
+/// Thrown and caught inside this file only: the path out of nested message parts.
+struct Invalid : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+template <typename T>
+T checked(std::string_view field, T value, T low, T high) {
+  // Written so that a NaN fails.
+  if (!(value >= low && value <= high))
+    throw Invalid(fmt::format("{}: {} is not in {}…{}", field, value, low, high));
+  return value;
+}
+
+int checked_or_zero(std::string_view field, std::uint32_t value, std::uint32_t low,
+                    std::uint32_t high) {
+  return value == 0 ? 0 : static_cast<int>(checked(field, value, low, high));
+}
+
+const std::string& checked_length(std::string_view field, const std::string& text,
+                                  std::size_t max_bytes) {
+  if (text.size() > max_bytes)
+    throw Invalid(fmt::format("{}: {} bytes, at most {}", field, text.size(), max_bytes));
+  return text;
+}
+
+Pose parse(const v1::Pose& message) {
+  Pose pose;
+  const auto& p = message.position();
+  pose.position = {checked("pose.position.x", p.x(), -max_coordinate, max_coordinate),
+                   checked("pose.position.y", p.y(), -max_coordinate, max_coordinate),
+                   checked("pose.position.z", p.z(), -max_coordinate, max_coordinate)};
+  const auto& q = message.orientation();
+  const glm::quat orientation(q.w(), q.x(), q.y(), q.z());
+  const float norm = glm::length(orientation);
+  checked("pose.orientation norm", norm, 0.9f, 1.1f);
+  pose.orientation = orientation / norm;
+  return pose;
+}
+
+PoseSample parse(const v1::PoseSample& message) {
+  PoseSample sample;
+  sample.pose_id = message.pose_id();
+  sample.client_time_us = message.client_time_us();
+  sample.world_from_camera = parse(message.world_from_camera());
+  sample.fov_y_rad = checked("pose.fov_y_rad", message.fov_y_rad(), 0.1f, 2.8f);
+  return sample;
+}
+
+PosePath parse(const v1::PosePath& message) {
+  checked("path.samples count", message.samples_size(), 0, max_path_samples);
+  PosePath path;
+  for (const auto& sample : message.samples()) {
+    path.samples.push_back(parse(sample));
+    const auto n = path.samples.size();
+    if (n > 1 && path.samples[n - 1].client_time_us < path.samples[n - 2].client_time_us)
+      throw Invalid("path.samples: not in time order");
+  }
+  return path;
+}
+
+Settings parse(const v1::Settings& message) {
+  Settings settings;
+  settings.size_px = {checked_or_zero("settings.width_px", message.width_px(), 16, 8192),
+                      checked_or_zero("settings.height_px", message.height_px(), 16, 8192)};
+  if ((settings.size_px.x == 0) != (settings.size_px.y == 0))
+    throw Invalid("settings: width_px and height_px must be given together");
+  settings.max_fps = checked_or_zero("settings.max_fps", message.max_fps(), 1, 240);
+  settings.max_bitrate_kbps =
+      checked_or_zero("settings.max_bitrate_kbps", message.max_bitrate_kbps(), 100, 200'000);
+  return settings;
+}
+
+Hello parse(const v1::Hello& message) {
+  Hello hello;
+  hello.version = message.version();
+  hello.scene_id = checked_length("hello.scene_id", message.scene_id(), 128);
+  hello.viewport_px = {
+      static_cast<int>(checked("hello.viewport_width_px", message.viewport_width_px(), 16u, 8192u)),
+      static_cast<int>(
+          checked("hello.viewport_height_px", message.viewport_height_px(), 16u, 8192u))};
+  hello.device_pixel_ratio =
+      checked("hello.device_pixel_ratio", message.device_pixel_ratio(), 0.25f, 8.0f);
+  checked("hello.decoders count", message.decoders_size(), 0, max_decoders);
+  for (const int codec : message.decoders()) {
+    if (codec == v1::CODEC_H264) hello.decoders.push_back(Codec::h264);
+    if (codec == v1::CODEC_MJPEG) hello.decoders.push_back(Codec::mjpeg);
+  }
+  hello.token = checked_length("hello.token", message.token(), 512);
+  hello.resume_token = checked_length("hello.resume.token", message.resume().token(), 512);
+  hello.settings = parse(message.settings());
+  return hello;
+}
+
+Ack parse(const v1::Ack& message) {
+  return {message.frame_id(), message.received_us(), message.decoded_us(),   message.presented_us(),
+          message.dropped(),  message.pose_age_us(), message.decoder_queue()};
+}
+
+ClientMessage parse(const v1::ClientMessage& message) {
+  switch (message.body_case()) {
+    case v1::ClientMessage::kHello:
+      return parse(message.hello());
+    case v1::ClientMessage::kPose:
+      return parse(message.pose());
+    case v1::ClientMessage::kPath:
+      return parse(message.path());
+    case v1::ClientMessage::kAck:
+      return parse(message.ack());
+    case v1::ClientMessage::kSettings:
+      return parse(message.settings());
+    case v1::ClientMessage::kSelectScene:
+      return SelectScene{
+          checked_length("select_scene.scene_id", message.select_scene().scene_id(), 128)};
+    case v1::ClientMessage::kRequestIdr:
+      return RequestIdr{};
+    case v1::ClientMessage::kPause:
+      return Pause{message.pause().paused()};
+    case v1::ClientMessage::kBye:
+      return Bye{};
+    case v1::ClientMessage::BODY_NOT_SET:
+      break;
+  }
+  return UnknownMessage{};
+}
+
+v1::Codec to_wire(Codec codec) { return codec == Codec::h264 ? v1::CODEC_H264 : v1::CODEC_MJPEG; }
+
+void fill(const glm::vec3& value, v1::Vec3& out) {
+  out.set_x(value.x);
+  out.set_y(value.y);
+  out.set_z(value.z);
+}
+
+void fill(const Pose& pose, v1::Pose& out) {
+  fill(pose.position, *out.mutable_position());
+  auto& q = *out.mutable_orientation();
+  q.set_x(pose.orientation.x);
+  q.set_y(pose.orientation.y);
+  q.set_z(pose.orientation.z);
+  q.set_w(pose.orientation.w);
+}
+
+void fill(const StreamConfig& config, v1::StreamConfig& out) {
+  out.set_codec(to_wire(config.codec));
+  out.set_codec_string(config.codec_string);
+  out.set_width_px(static_cast<std::uint32_t>(config.size_px.x));
+  out.set_height_px(static_cast<std::uint32_t>(config.size_px.y));
+  out.set_fps(static_cast<std::uint32_t>(config.fps));
+  out.set_bitrate_kbps(static_cast<std::uint32_t>(config.bitrate_kbps));
+  out.set_encoder(config.encoder);
+}
+
+void fill(const SceneFacts& scene, v1::SceneFacts& out) {
+  out.set_scene_id(scene.scene_id);
+  out.set_title(scene.title);
+  out.set_gaussians(scene.gaussians);
+  fill(scene.up, *out.mutable_up());
+  fill(scene.start_pose, *out.mutable_start_pose());
+  fill(scene.focus, *out.mutable_focus());
+  fill(scene.limits_min, *out.mutable_limits_min());
+  fill(scene.limits_max, *out.mutable_limits_max());
+  out.set_near_z(scene.near_z);
+}
+
+void fill(const Welcome& welcome, v1::ServerMessage& out) {
+  auto& message = *out.mutable_welcome();
+  message.set_version(version);
+  message.set_session_id(welcome.session_id);
+  message.set_resume_token(welcome.resume_token);
+  fill(welcome.scene, *message.mutable_scene());
+  fill(welcome.config, *message.mutable_config());
+  message.set_renderer(welcome.renderer);
+  message.set_server_version(welcome.server_version);
+  for (const auto& id : welcome.scene_ids) message.add_scene_ids(id);
+}
+
+void fill(const StreamConfig& config, v1::ServerMessage& out) {
+  fill(config, *out.mutable_config());
+}
+
+void fill(const Stats& stats, v1::ServerMessage& out) {
+  auto& message = *out.mutable_stats();
+  message.set_fps(stats.fps);
+  message.set_bitrate_kbps(stats.bitrate_kbps);
+  message.set_key_frames(stats.key_frames);
+  message.set_sub_frames(stats.sub_frames);
+  message.set_dropped_packets(stats.dropped_packets);
+  message.set_sessions(stats.sessions);
+}
+
+void fill(const Heartbeat& heartbeat, v1::ServerMessage& out) {
+  out.mutable_heartbeat()->set_server_time_us(heartbeat.server_time_us);
+}
+
+void fill(const ErrorMessage& error, v1::ServerMessage& out) {
+  auto& message = *out.mutable_error();
+  message.set_code(static_cast<v1::Error::Code>(error.code));
+  message.set_message(error.message);
+  message.set_fatal(error.fatal);
+}
+
+void fill(const Drain& drain, v1::ServerMessage& out) {
+  out.mutable_drain()->set_deadline_ms(drain.deadline_ms);
+}
+
+std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
+  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
+  return static_cast<std::uint32_t>(std::clamp<std::int64_t>(us, 0, UINT32_MAX));
+}
+
+v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
+  v1::FrameHeader header;
+  header.set_frame_id(ticket.frame_id);
+  header.set_pose_id(ticket.pose_id);
+  header.set_pose_client_time_us(ticket.pose_client_time_us);
+  fill(ticket.render_pose, *header.mutable_render_pose());
+  header.set_fov_y_rad(ticket.fov_y_rad);
+  header.set_codec(to_wire(ticket.codec));
+  header.set_idr(ticket.idr);
+  header.set_width_px(static_cast<std::uint32_t>(ticket.size_px.x));
+  header.set_height_px(static_cast<std::uint32_t>(ticket.size_px.y));
+  header.set_wait_us(elapsed_us(ticket.pose_received, ticket.render_start));
+  header.set_render_us(elapsed_us(ticket.render_start, ticket.render_end));
+  header.set_encode_us(elapsed_us(ticket.render_end, ticket.encode_end));
+  header.set_send_wait_us(elapsed_us(ticket.encode_end, now));
+  header.set_speculated(ticket.speculated);
+  header.set_window(ticket.window);
+  return header;
+}
+
+}  // namespace
+
+std::variant<ClientMessage, ParseError> parse_client_message(std::span<const std::byte> bytes) {
+  if (bytes.size() > max_client_message_bytes)
+    return ParseError{
+        fmt::format("message: {} bytes, at most {}", bytes.size(), max_client_message_bytes)};
+  v1::ClientMessage message;
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+    return ParseError{"message: not a ClientMessage of catgs.v1"};
+  try {
+    return parse(message);
+  } catch (const Invalid& error) {
+    return ParseError{error.what()};
+  }
+}
+
+std::vector<std::byte> serialize(const ServerMessage& message) {
+  v1::ServerMessage out;
+  std::visit([&](const auto& body) { fill(body, out); }, message);
+  const std::size_t size = out.ByteSizeLong();
+  std::vector<std::byte> bytes(1 + size);
+  bytes[0] = static_cast<std::byte>(Kind::message);
+  out.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(bytes.data() + 1));
+  return bytes;
+}
+
+void append_frame_header(const FrameTicket& ticket, TimePoint now, std::vector<std::byte>& out) {
+  const v1::FrameHeader header = frame_header(ticket, now);
+  const std::size_t header_size = header.ByteSizeLong();
+  out.push_back(static_cast<std::byte>(Kind::frame));
+  for (std::size_t rest = header_size;; rest >>= 7) {
+    const bool last = rest < 0x80;
+    out.push_back(static_cast<std::byte>((rest & 0x7f) | (last ? 0 : 0x80)));
+    if (last) break;
+  }
+  const std::size_t header_at = out.size();
+  out.resize(header_at + header_size);
+  header.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(out.data() + header_at));
+}
+
+}  // namespace catgs::wire

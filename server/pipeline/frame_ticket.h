@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include <glm/vec2.hpp>
+
+#include "render_core/camera.h"
+#include "server/encode/encoder.h"
+
+namespace catgs {
+
+using Clock = std::chrono::steady_clock;
+using TimePoint = Clock::time_point;
+
+/// Identity and history of one frame, from the pose that asked for it to the socket.
+struct FrameTicket {
+  std::uint64_t frame_id = 0;            // 1, 2, … within the session
+  std::uint64_t pose_id = 0;             // newest pose sample that the frame is rendered from
+  std::int64_t pose_client_time_us = 0;  // that sample's time on the client's clock
+  Pose render_pose;
+  float fov_y_rad = 0.0f;
+
+  Codec codec = Codec::h264;
+  bool idr = false;
+  glm::ivec2 size_px{0};
+  bool speculated = false;   // a sub-frame
+  std::uint32_t window = 0;  // W of its key frame
+
+  TimePoint pose_received{};
+  TimePoint render_start{};
+  TimePoint render_end{};
+  TimePoint encode_end{};
+};
+
+/// An encoded frame on its way to the socket.
+struct OutgoingFrame {
+  FrameTicket ticket;
+  std::vector<std::byte> bitstream;
+};
+
+}  // namespace catgs

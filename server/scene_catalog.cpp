@@ -1,0 +1,121 @@
+#include "server/scene_catalog.h"
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/error.h"
+#include "render_core/scene/scene.h"
+#include "render_core/scene/synth.h"
+#include "render_core/thread_pool.h"
+
+namespace catgs {
+namespace {
+
+template <typename T>
+T parse_number(const std::string& spec, std::string_view text) {
+  T value{};
+  const char* end = text.data() + text.size();
+  if (text.empty() || std::from_chars(text.data(), end, value).ptr != end)
+    throw InputError("--scene " + spec, {}, fmt::format("\"{}\" is not a number", text),
+                     "give synth:city:300000 or synth:city:300000:SEED");
+  return value;
+}
+
+/// synth:KIND:COUNT[:SEED]
+Scene synthesize(const std::string& spec) {
+  std::vector<std::string_view> parts;
+  for (std::string_view rest = spec; !rest.empty();) {
+    const auto colon = std::min(rest.find(':'), rest.size());
+    parts.push_back(rest.substr(0, colon));
+    rest.remove_prefix(std::min(colon + 1, rest.size()));
+  }
+  if (parts.size() < 3 || parts.size() > 4)
+    throw InputError("--scene " + spec, {}, "is incomplete", "give synth:city:300000");
+  const auto count = parse_number<std::size_t>(spec, parts[2]);
+  const std::uint64_t seed = parts.size() == 4 ? parse_number<std::uint64_t>(spec, parts[3]) : 1;
+  return synthesize(parse_synth_kind(parts[1]), count, seed);
+}
+
+Scene load(const std::string& spec, int threads) {
+  if (spec.starts_with("synth:")) return synthesize(spec);
+  LoadOptions options;
+  options.threads = threads;
+  return load_scene(spec, options);
+}
+
+/// Scene ids are names that people can read in a link; a second scene of a name gets a number.
+std::string unique_id(const std::string& name,
+                      const std::vector<std::shared_ptr<const SceneEntry>>& taken) {
+  std::string base = name.empty() ? "scene" : name.substr(0, 100);
+  std::string id = base;
+  for (int n = 2;
+       std::ranges::any_of(taken, [&](const auto& entry) { return entry->facts.scene_id == id; });
+       ++n)
+    id = fmt::format("{}-{}", base, n);
+  return id;
+}
+
+SceneFacts facts_of(const Scene& scene, std::string id) {
+  SceneFacts facts;
+  facts.scene_id = std::move(id);
+  facts.title = scene.name;
+  facts.gaussians = scene.cloud.size();
+  facts.up = scene.hints.up;
+  facts.start_pose = scene.hints.start_pose;
+  facts.focus = scene.hints.focus;
+  facts.limits_min = scene.hints.limits.min;
+  facts.limits_max = scene.hints.limits.max;
+  facts.near_z = scene.hints.near_z;
+  return facts;
+}
+
+}  // namespace
+
+std::vector<std::shared_ptr<const SceneEntry>> load_scenes(
+    const ServerConfig& config, const std::shared_ptr<ThreadPool>& pool) {
+  std::vector<std::shared_ptr<const SceneEntry>> entries;
+  for (const auto& spec : config.scenes) {
+    spdlog::info("loading {}", spec);
+    Scene scene = load(spec, pool->threads());
+    auto entry = std::make_shared<SceneEntry>();
+    entry->facts = facts_of(scene, unique_id(scene.name, entries));
+    auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)),
+                              {config.renderer, pool, config.simd});
+    entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
+    entry->renderer = std::move(made.renderer);
+    spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB on the device, view from {}",
+                 entry->facts.scene_id, entry->facts.gaussians, scene.format,
+                 static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
+std::vector<EncoderChoice> usable_encoders(EncoderKind wanted,
+                                           const std::vector<EncoderProbe>& probes) {
+  std::vector<EncoderChoice> choices;
+  std::string unusable;
+  for (const auto& probe : probes) {
+    const bool admitted =
+        wanted == EncoderKind::automatic || probe.kind == wanted || probe.kind == EncoderKind::jpeg;
+    if (!admitted) continue;
+    if (!probe.usable) {
+      unusable += fmt::format("; {}: {}", probe.name, probe.reason);
+      if (probe.kind == wanted)
+        throw InputError("--encoder " + probe.name, {}, probe.reason, "try --encoder auto");
+      continue;
+    }
+    // The reason of a choice is also why the better ones were not chosen.
+    choices.push_back({probe.kind, probe.kind == EncoderKind::jpeg ? Codec::mjpeg : Codec::h264,
+                       fmt::format("{} ({}{})", probe.name, probe.reason, unusable)});
+  }
+  if (choices.empty()) throw InputError("--encoder", {}, "no encoder works here" + unusable);
+  return choices;
+}
+
+}  // namespace catgs

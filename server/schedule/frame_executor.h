@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "render_core/renderer.h"
+#include "server/encode/encoder.h"
+#include "server/pipeline/frame_ticket.h"
+
+namespace catgs {
+
+/// What one client's stream is made of.
+struct StreamSettings {
+  std::shared_ptr<Renderer> renderer;  // of the scene that is shown
+  EncoderKind encoder = EncoderKind::x264;
+  EncoderSettings encoding;
+};
+
+/// One client's share of a device: its View (caches, image) and its Encoder. Owned by the session,
+/// used by one job at a time.
+struct Stream {
+  StreamSettings settings;
+  std::unique_ptr<View> view;
+  std::unique_ptr<Encoder> encoder;
+  FrameView picture;  // borrowed from `view`: the last one rendered
+};
+
+struct StreamOpened {
+  bool ok = false;
+  std::string message;  // why not, for people
+  Codec codec = Codec::h264;
+  std::string codec_string;
+  std::string encoder_name;
+};
+
+struct FrameJob {
+  std::shared_ptr<Stream> stream;
+  FrameTicket ticket;
+  FrameRequest request;
+  int real_fps = 1;  // what the session reaches: shares the bitrate out
+  bool force_idr = false;
+  bool refine = false;  // encode the last picture once more instead of rendering
+};
+
+struct FrameResult {
+  bool ok = false;
+  std::string message;  // stage and cause of a failure
+  OutgoingFrame frame;
+  FrameStats stats;
+  bool refined = false;
+};
+
+/// A device that renders and encodes: the CPU's thread pool, or a GPU with its render thread and
+/// encoders. `done` is called once per call, on a thread of the executor. Between submit() and its
+/// `done` the job's stream belongs to the executor.
+class FrameExecutor {
+ public:
+  virtual ~FrameExecutor() = default;
+  FrameExecutor() = default;
+  FrameExecutor(const FrameExecutor&) = delete;
+  FrameExecutor& operator=(const FrameExecutor&) = delete;
+
+  /// Frames that are worth having under way at the same time.
+  [[nodiscard]] virtual int slots() const = 0;
+  /// Makes the stream's view and encoder for `settings`, keeping what still fits.
+  virtual void open(std::shared_ptr<Stream> stream, StreamSettings settings,
+                    std::function<void(StreamOpened)> done) = 0;
+  virtual void submit(FrameJob job, std::function<void(FrameResult)> done) = 0;
+};
+
+}  // namespace catgs

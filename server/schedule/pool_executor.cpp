@@ -1,0 +1,76 @@
+#include "server/schedule/pool_executor.h"
+
+#include <exception>
+#include <utility>
+
+namespace catgs {
+namespace {
+
+StreamOpened open_now(Stream& stream, StreamSettings settings) {
+  StreamOpened opened;
+  try {
+    if (!stream.view || stream.settings.renderer != settings.renderer) {
+      stream.view.reset();  // its memory first: two views of a large scene may not fit
+      stream.view = settings.renderer->make_view({Pipeline::exact, PixelFormat::i420});
+    }
+    if (!stream.encoder || stream.settings.encoder != settings.encoder ||
+        stream.settings.encoding != settings.encoding)
+      stream.encoder = make_encoder(settings.encoder, settings.encoding);
+  } catch (const std::exception& error) {
+    opened.message = error.what();
+    return opened;
+  }
+  stream.picture = {};
+  stream.settings = std::move(settings);
+  opened.ok = true;
+  opened.codec = stream.encoder->codec();
+  opened.codec_string = stream.encoder->codec_string();
+  opened.encoder_name = stream.encoder->name();
+  return opened;
+}
+
+FrameResult run_now(FrameJob& job) {
+  FrameResult result;
+  FrameTicket& ticket = result.frame.ticket;
+  ticket = job.ticket;
+  Stream& stream = *job.stream;
+  result.refined = job.refine;
+  ticket.render_start = Clock::now();
+  if (!job.refine) {
+    const RenderStatus rendered = stream.view->render(job.request, stream.picture);
+    if (!rendered.ok()) {
+      result.message = rendered.message;
+      return result;
+    }
+    result.stats = stream.picture.stats;
+  }
+  ticket.render_end = Clock::now();
+  EncodedFrame encoded;
+  stream.encoder->set_rate(stream.settings.encoding.bitrate_kbps, job.real_fps);
+  const EncodeStatus status = stream.encoder->encode(stream.picture, job.force_idr, encoded);
+  ticket.encode_end = Clock::now();
+  if (!status.ok) {
+    result.message = status.message;
+    return result;
+  }
+  ticket.codec = stream.encoder->codec();
+  ticket.idr = encoded.idr;
+  result.frame.bitstream = std::move(encoded.bytes);
+  result.ok = true;
+  return result;
+}
+
+}  // namespace
+
+void PoolExecutor::open(std::shared_ptr<Stream> stream, StreamSettings settings,
+                        std::function<void(StreamOpened)> done) {
+  pool_->submit(
+      [stream = std::move(stream), settings = std::move(settings),
+       done = std::move(done)]() mutable { done(open_now(*stream, std::move(settings))); });
+}
+
+void PoolExecutor::submit(FrameJob job, std::function<void(FrameResult)> done) {
+  pool_->submit([job = std::move(job), done = std::move(done)]() mutable { done(run_now(job)); });
+}
+
+}  // namespace catgs

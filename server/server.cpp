@@ -1,0 +1,223 @@
+#include "server/server.h"
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include "render_core/error.h"
+#include "render_core/thread_pool.h"
+#include "server/access.h"
+#include "server/metrics.h"
+#include "server/net/net_server.h"
+#include "server/net/static_files.h"
+#include "server/scene_catalog.h"
+#include "server/schedule/pool_executor.h"
+#include "server/session/session_registry.h"
+#include "server/version.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto drain_deadline = 1000ms;
+constexpr auto drain_poll = 20ms;
+
+constexpr std::string_view no_client_page =
+    "CaT-GS server: the browser client was not built with this server.\n"
+    "Configure with -DCATGS_WEB=ON, or give --client-dir.\n";
+
+/// The built client of an installation (prefix/bin) or of a build tree (build/bin).
+StaticFiles find_client(const std::string& client_dir) {
+  namespace fs = std::filesystem;
+  if (!client_dir.empty()) return StaticFiles(client_dir);
+  std::error_code error;
+  const fs::path bin = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (const char* folder : {"../share/catgs/web", "../web_client/dist"})
+    if (fs::exists(bin / folder / "index.html", error)) return StaticFiles(bin / folder);
+  return {};
+}
+
+std::int64_t unix_now_s() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::seconds>(now).count();
+}
+
+RegistryOptions registry_options(const ServerConfig& config) {
+  RegistryOptions options;
+  options.policy.idle_timeout = std::chrono::seconds(config.idle_timeout_s);
+  options.policy.default_fps = config.fps;
+  options.policy.default_bitrate_kbps = config.bitrate_kbps;
+  options.max_sessions = config.max_sessions;
+  options.max_sessions_per_address = config.max_sessions_per_address;
+  return options;
+}
+
+std::string scenes_json(const std::vector<std::shared_ptr<const SceneEntry>>& scenes) {
+  auto list = nlohmann::json::array();
+  for (const auto& scene : scenes)
+    list.push_back({{"id", scene->facts.scene_id},
+                    {"title", scene->facts.title},
+                    {"gaussians", scene->facts.gaussians}});
+  return nlohmann::json{{"scenes", list}}.dump();
+}
+
+}  // namespace
+
+struct Server::State {
+  explicit State(const ServerConfig& configuration)
+      : config(configuration),
+        access(config.token_file, config.token_key_file),
+        client(find_client(config.client_dir)),
+        net(net_options()),
+        pool(std::make_shared<ThreadPool>(config.threads)),
+        stop_signals(io, SIGINT, SIGTERM),
+        drain_timer(io) {}
+
+  NetOptions net_options();
+  HttpResponse respond(const HttpRequest& request) const;
+  HttpResponse respond_admin(const HttpRequest& request) const;
+  void print_banner() const;
+  void wait_for_signal();
+  void begin_stop();
+  void finish_stop_when_empty(TimePoint deadline);
+
+  const ServerConfig config;
+  AccessControl access;
+  Metrics metrics;
+  const StaticFiles client;
+  std::atomic<bool> ready{false};
+  NetServer net;
+  std::shared_ptr<ThreadPool> pool;
+  std::string scene_list;
+  std::vector<std::shared_ptr<const SceneEntry>> scenes;
+  std::vector<EncoderChoice> encoders;
+  boost::asio::io_context io{1};
+  boost::asio::signal_set stop_signals;
+  boost::asio::steady_timer drain_timer;
+  std::unique_ptr<SessionRegistry> registry;
+  bool stopping = false;
+};
+
+NetOptions Server::State::net_options() {
+  NetOptions options;
+  options.listen = {config.bind, config.port};
+  options.http = [this](const HttpRequest& request) { return respond(request); };
+  options.accept = [this](std::shared_ptr<Connection> connection) {
+    return registry->accept(std::move(connection));
+  };
+  options.allowed_origins = config.allow_origins;
+  options.embed_origins = config.embed_origins;
+  options.tls_certificate = config.tls_cert;
+  options.tls_key = config.tls_key;
+  if (config.admin_bind != "off") {
+    options.admin = true;
+    options.admin_listen = parse_endpoint(config.admin_bind);
+    options.admin_http = [this](const HttpRequest& request) { return respond_admin(request); };
+  }
+  return options;
+}
+
+HttpResponse Server::State::respond(const HttpRequest& request) const {
+  if (request.path == "/healthz") return text_response(200, "ok\n");
+  if (request.path == "/readyz")
+    return ready ? text_response(200, "ready\n") : text_response(503, "not ready\n");
+  if (request.path == "/api/scenes") return text_response(200, scene_list, "application/json");
+  if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
+  return client.respond(request);
+}
+
+HttpResponse Server::State::respond_admin(const HttpRequest& request) const {
+  if (request.path == "/metrics")
+    return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
+  if (request.path == "/api/sessions")
+    return text_response(200, registry->published_json(), "application/json");
+  return text_response(404, "404: /metrics and /api/sessions are here\n");
+}
+
+Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(config)) {
+  State& s = *state_;
+  s.scenes = load_scenes(s.config, s.pool);
+  s.scene_list = scenes_json(s.scenes);
+  s.encoders = usable_encoders(s.config.encoder, probe_encoders());
+  auto authorize = [&s](const std::string& token, const std::string& scene_id) {
+    return s.access.refusal(token, scene_id, unix_now_s());
+  };
+  s.registry = std::make_unique<SessionRegistry>(s.io, registry_options(s.config),
+                                                 std::make_shared<PoolExecutor>(s.pool), s.scenes,
+                                                 s.encoders, std::move(authorize), s.metrics);
+}
+
+Server::~Server() = default;
+
+void Server::run() {
+  State& s = *state_;
+  s.wait_for_signal();
+  s.net.start();
+  s.ready = true;
+  s.print_banner();
+  s.io.run();
+  spdlog::info("stopped");
+}
+
+void Server::stop() {
+  boost::asio::post(state_->io, [this] { state_->begin_stop(); });
+}
+
+int Server::port() const { return state_->net.port(); }
+int Server::admin_port() const { return state_->net.admin_port(); }
+
+void Server::State::print_banner() const {
+  const std::string host = config.bind == "0.0.0.0" || config.bind == "::" ? "localhost"
+                           : config.bind.find(':') != std::string::npos    ? "[" + config.bind + "]"
+                                                                           : config.bind;
+  spdlog::info("renderer: {}", scenes.front()->renderer_text);
+  spdlog::info("encoder: {}", encoders.front().text);
+  if (net.admin_port() != 0)
+    spdlog::info("metrics: http://{}/metrics",
+                 fmt::format("{}:{}", parse_endpoint(config.admin_bind).address, net.admin_port()));
+  spdlog::info("open {}://{}:{}/ in a browser; Ctrl-C stops the server",
+               config.tls_cert.empty() ? "http" : "https", host, net.port());
+}
+
+void Server::State::wait_for_signal() {
+  stop_signals.async_wait([this](const boost::system::error_code& error, int) {
+    if (error) return;
+    if (stopping) ::_exit(1);
+    wait_for_signal();
+    begin_stop();
+  });
+}
+
+void Server::State::begin_stop() {
+  if (std::exchange(stopping, true)) return;
+  spdlog::info("stopping: {} connections are told", registry->connections());
+  ready = false;
+  registry->drain(drain_deadline);
+  finish_stop_when_empty(Clock::now() + drain_deadline);
+}
+
+void Server::State::finish_stop_when_empty(TimePoint deadline) {
+  if (registry->connections() > 0 && Clock::now() < deadline) {
+    drain_timer.expires_after(drain_poll);
+    drain_timer.async_wait(
+        [this, deadline](const boost::system::error_code&) { finish_stop_when_empty(deadline); });
+    return;
+  }
+  net.stop();
+  registry->stop_timers();
+  stop_signals.cancel();  // nothing is left to wait for but frames under way: io.run() returns
+}
+
+}  // namespace catgs

@@ -1,0 +1,167 @@
+#include "server/session/client.h"
+
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/prefer.hpp>
+#include <spdlog/spdlog.h>
+
+#include "server/net/wire.h"
+#include "server/session/session_registry.h"
+
+namespace catgs {
+namespace {
+
+// Poses and acks at 240 Hz each, and room for bursts after a stall.
+constexpr double messages_per_second = 600.0;
+constexpr double message_burst = 1200.0;
+
+}  // namespace
+
+Client::Client(SessionRegistry& registry, std::shared_ptr<Connection> connection,
+               std::string session_id)
+    : registry_(registry),
+      connection_(std::move(connection)),
+      rate_(messages_per_second, message_burst, Clock::now()),
+      session_(std::move(session_id), registry.options_.policy, *this, Clock::now()) {}
+
+template <typename Handle>
+void Client::post(Handle handle) {
+  boost::asio::post(registry_.io_,
+                    [self = shared_from_this(), handle = std::move(handle)]() mutable {
+                      handle(*self);
+                      self->registry_.session_changed();
+                    });
+}
+
+void Client::on_message(std::span<const std::byte> bytes) {
+  if (refused_) return;
+  const TimePoint now = Clock::now();
+  if (!rate_.take(now)) {
+    refused_ = true;
+    return post([](Client& c) { c.session_.fail(ErrorCode::rate_limited, "too many messages"); });
+  }
+  auto parsed = wire::parse_client_message(bytes);
+  if (auto* error = std::get_if<wire::ParseError>(&parsed)) {
+    refused_ = true;
+    registry_.metrics_.bad_messages.Increment();
+    return post([what = std::move(error->what)](Client& c) { c.session_.on_bad_message(what); });
+  }
+  auto& message = std::get<ClientMessage>(parsed);
+  if (const auto* sample = std::get_if<PoseSample>(&message)) {
+    registry_.metrics_.poses_received.Increment();
+    if (latest_pose_.store({*sample, now}))
+      post([](Client& c) { c.take_pose(); });
+    else
+      registry_.metrics_.poses_superseded.Increment();
+    return;
+  }
+  post([message = std::move(message), now](Client& c) {
+    if (const auto* ack = std::get_if<Ack>(&message)) {
+      if (ack->presented_us > 0)
+        c.registry_.metrics_.pose_age_seconds.Observe(1e-6 * ack->pose_age_us);
+      if (ack->dropped) c.registry_.metrics_.frames_dropped_by_client.Increment();
+    }
+    c.session_.on_message(message, now);
+  });
+}
+
+void Client::take_pose() {
+  if (const auto pose = latest_pose_.take()) session_.on_message(pose->sample, pose->received);
+}
+
+void Client::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) {
+  Metrics& metrics = registry_.metrics_;
+  metrics.frames_sent.Increment();
+  metrics.bytes_sent.Increment(static_cast<double>(packet_bytes));
+  metrics.observe_frame(ticket, now);
+}
+
+void Client::on_close() {
+  post([](Client& c) {
+    c.session_.on_disconnected();
+    c.registry_.remove(c);
+  });
+}
+
+std::variant<Admission, ErrorMessage> Client::admit(const Hello& hello) {
+  auto result = registry_.admit(*this, hello);
+  if (const auto* admission = std::get_if<Admission>(&result)) {
+    admitted_ = true;
+    ++registry_.admitted_;
+    registry_.metrics_.sessions_admitted.Increment();
+    spdlog::info("session {}: {} looks at {}, {}x{}, {}", session_.id(),
+                 connection_->peer_address(), admission->scene->facts.scene_id, hello.viewport_px.x,
+                 hello.viewport_px.y, admission->encoder.text);
+  }
+  return result;
+}
+
+std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> Client::find_scene(
+    const std::string& scene_id) {
+  if (auto scene = registry_.find_scene(scene_id)) return scene;
+  return ErrorMessage{ErrorCode::unknown_scene, "there is no scene \"" + scene_id + "\" here",
+                      false};
+}
+
+std::vector<std::string> Client::scene_ids() {
+  std::vector<std::string> ids;
+  for (const auto& scene : registry_.scenes_) ids.push_back(scene->facts.scene_id);
+  return ids;
+}
+
+std::uint32_t Client::session_count() { return registry_.admitted_; }
+
+void Client::send(const ServerMessage& message) {
+  if (const auto* error = std::get_if<ErrorMessage>(&message)) {
+    spdlog::warn("session {}: {}", session_.id(), error->message);
+    if (error->fatal) registry_.metrics_.sessions_refused.Increment();
+  }
+  connection_->send(wire::serialize(message));
+}
+
+std::vector<std::uint64_t> Client::send(OutgoingFrame frame) {
+  auto dropped = connection_->send(std::move(frame));
+  registry_.metrics_.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));
+  return dropped;
+}
+
+void Client::close(CloseCode code, std::string_view reason) { connection_->close(code, reason); }
+
+void Client::open_stream(StreamSettings settings) {
+  // Tracked work: the session thread does not end while an executor still owes an answer.
+  auto executor = boost::asio::prefer(registry_.io_.get_executor(),
+                                      boost::asio::execution::outstanding_work.tracked);
+  registry_.executor_->open(stream_, std::move(settings),
+                            [self = shared_from_this(), executor](StreamOpened opened) {
+                              boost::asio::post(executor, [self, opened = std::move(opened)] {
+                                self->session_.on_stream_opened(opened, Clock::now());
+                                self->registry_.session_changed();
+                              });
+                            });
+}
+
+void Client::start_frame(TimePoint now) {
+  FrameOrder order = session_.start_frame(now);
+  FrameJob job{stream_, order.ticket, order.request, order.real_fps, order.force_idr, order.refine};
+  auto executor = boost::asio::prefer(registry_.io_.get_executor(),
+                                      boost::asio::execution::outstanding_work.tracked);
+  registry_.scheduler_.frame_started();
+  registry_.executor_->submit(
+      std::move(job), [self = shared_from_this(), executor](FrameResult result) {
+        boost::asio::post(executor, [self, result = std::move(result)]() mutable {
+          SessionRegistry& registry = self->registry_;
+          registry.scheduler_.frame_ended();
+          Metrics& metrics = registry.metrics_;
+          (result.ok ? (result.refined ? metrics.frames_refined : metrics.frames_rendered)
+                     : metrics.frames_failed)
+              .Increment();
+          metrics.list_entries_overflowed.Increment(
+              static_cast<double>(result.stats.overflowed_entries));
+          self->session_.on_frame(std::move(result), Clock::now());
+          registry.session_changed();
+        });
+      });
+}
+
+}  // namespace catgs

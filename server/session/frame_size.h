@@ -1,0 +1,22 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/vec2.hpp>
+
+namespace catgs {
+
+/// Frame size for a wish: scaled down with its shape to at most `max_pixels`, sides even (4:2:0)
+/// and 16…8192.
+inline glm::ivec2 frame_size(glm::ivec2 wish_px, int max_pixels) {
+  const double pixels = static_cast<double>(wish_px.x) * wish_px.y;
+  const double scale = std::min(1.0, std::sqrt(max_pixels / std::max(1.0, pixels)));
+  const auto side = [scale](int wish) {
+    const int scaled = static_cast<int>(wish * scale);
+    return std::clamp(scaled - scaled % 2, 16, 8192);
+  };
+  return {side(wish_px.x), side(wish_px.y)};
+}
+
+}  // namespace catgs

@@ -1,0 +1,312 @@
+#include "server/session/session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/session/frame_size.h"
+#include "server/version.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint32_t wire_version = 1;
+constexpr auto speak_at_least_every = 1s;
+constexpr auto min_idr_request_interval = 250ms;
+constexpr int max_failures_in_a_row = 3;
+
+/// Do two poses show the same picture? The bounds are a hundredth of a pixel for a focal length of
+/// 1000 px, turned, or moved beside something at the near plane.
+bool same_view(const PoseSample& a, const PoseSample& b, float near_z) {
+  constexpr float tolerance = 1.0e-5f;
+  const Pose& p = a.world_from_camera;
+  const Pose& q = b.world_from_camera;
+  // For unit quaternions |qa - ±qb| is half the angle between them.
+  const glm::quat delta = p.orientation - q.orientation;
+  const glm::quat sum = p.orientation + q.orientation;
+  const float half_angle = std::min(glm::length(delta), glm::length(sum));
+  return 2.0f * half_angle <= tolerance && std::abs(a.fov_y_rad - b.fov_y_rad) <= tolerance &&
+         glm::length(p.position - q.position) <= tolerance * near_z;
+}
+
+}  // namespace
+
+Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host, TimePoint now)
+    : id_(std::move(id)),
+      policy_(policy),
+      host_(host),
+      created_(now),
+      credit_(std::chrono::microseconds(1'000'000 / policy.default_fps)),
+      last_said_(now),
+      last_activity_(now),
+      second_start_(now) {}
+
+void Session::on_message(const ClientMessage& message, TimePoint now) {
+  if (state_ == State::closed) return;
+  const bool is_hello = std::holds_alternative<Hello>(message);
+  if (std::holds_alternative<Bye>(message) || std::holds_alternative<UnknownMessage>(message) ||
+      is_hello == (state_ == State::awaiting_hello))
+    std::visit([&](const auto& body) { on(body, now); }, message);
+  else
+    on_bad_message(is_hello ? "a second hello" : "the first message has to be a hello");
+}
+
+void Session::on_bad_message(std::string_view what) { fail(ErrorCode::bad_message, what); }
+
+void Session::fail(ErrorCode code, std::string_view message) {
+  if (state_ == State::closed) return;
+  state_ = State::closed;
+  host_.send(ErrorMessage{code, std::string(message), true});
+  const bool later = code == ErrorCode::server_full || code == ErrorCode::internal;
+  host_.close(later ? CloseCode::try_again_later : CloseCode::policy_violation, message);
+}
+
+void Session::on(const Hello& hello, TimePoint now) {
+  last_activity_ = now;
+  if (hello.version < wire_version)
+    return fail(ErrorCode::unsupported_version,
+                fmt::format("this server speaks catgs wire version {}, the client at most {}: "
+                            "reload the page or update the client",
+                            wire_version, hello.version));
+  auto admitted = host_.admit(hello);
+  if (const auto* error = std::get_if<ErrorMessage>(&admitted))
+    return fail(error->code, error->message);
+  admission_ = std::get<Admission>(std::move(admitted));
+  viewport_px_ = hello.viewport_px;
+  settings_ = hello.settings;
+  welcome_due_ = true;
+  state_ = State::opening;
+  request_stream();
+}
+
+void Session::on(const PoseSample& sample, TimePoint now) {
+  // Ids increase; an older sample has been overtaken.
+  if (pose_ && sample.pose_id <= pose_->pose_id) return;
+  if (!pose_ || !same_view(*pose_, sample, admission_.scene->facts.near_z)) {
+    last_activity_ = now;
+    idle_warned_ = false;
+  }
+  pose_ = sample;
+  pose_received_ = now;
+}
+
+void Session::on(const Ack& ack, TimePoint now) {
+  if (!credit_.acknowledged(ack.frame_id, ack.dropped, now)) return;
+  if (ack.dropped) ++frames_dropped_;
+}
+
+void Session::on(const Settings& settings, TimePoint now) {
+  last_activity_ = now;
+  settings_ = settings;
+  request_stream();
+}
+
+void Session::on(const SelectScene& select, TimePoint now) {
+  last_activity_ = now;
+  auto found = host_.find_scene(select.scene_id);
+  if (const auto* error = std::get_if<ErrorMessage>(&found)) return say(*error, now);
+  admission_.scene = std::get<std::shared_ptr<const SceneEntry>>(std::move(found));
+  welcome_due_ = true;
+  // A pose in the old scene means nothing in the new one.
+  pose_.reset();
+  request_stream();
+}
+
+void Session::on(const RequestIdr&, TimePoint now) {
+  if (now - last_idr_request_ < min_idr_request_interval) return;
+  last_idr_request_ = now;
+  idr_due_ = true;
+}
+
+void Session::on(const Pause& pause, TimePoint now) {
+  last_activity_ = now;
+  if (paused_ && !pause.paused) {
+    // A hidden page presents nothing, so its frames in flight were never acknowledged.
+    credit_.reset();
+    idr_due_ = true;
+  }
+  paused_ = pause.paused;
+}
+
+void Session::on(const Bye&, TimePoint) {
+  state_ = State::closed;
+  host_.close(CloseCode::normal, "bye");
+}
+
+void Session::request_stream() {
+  if (opening_stream_ || rendering_) {
+    stream_outdated_ = true;
+    return;
+  }
+  opening_stream_ = true;
+  stream_outdated_ = false;
+  const int fps = settings_.max_fps > 0 ? settings_.max_fps : policy_.default_fps;
+  const int kbps =
+      settings_.max_bitrate_kbps > 0 ? settings_.max_bitrate_kbps : policy_.default_bitrate_kbps;
+  const glm::ivec2 wish = settings_.size_px.x > 0 ? settings_.size_px : viewport_px_;
+  EncoderSettings encoding;
+  encoding.size_px = frame_size(wish, policy_.max_pixels);
+  encoding.fps = std::min(fps, policy_.max_fps);
+  encoding.bitrate_kbps = std::min(kbps, policy_.max_bitrate_kbps);
+  config_.size_px = encoding.size_px;
+  config_.fps = encoding.fps;
+  config_.bitrate_kbps = encoding.bitrate_kbps;
+  host_.open_stream({admission_.scene->renderer, admission_.encoder.kind, encoding});
+}
+
+void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
+  opening_stream_ = false;
+  if (state_ == State::closed) return;
+  if (!opened.ok)
+    return fail(ErrorCode::internal, "the stream cannot be opened: " + opened.message);
+  if (stream_outdated_) return request_stream();
+  config_.codec = opened.codec;
+  config_.codec_string = opened.codec_string;
+  config_.encoder = admission_.encoder.text;
+  credit_.set_frame_interval(frame_interval());
+  state_ = State::live;
+  idr_due_ = true;
+  say_config(now);
+}
+
+void Session::say_config(TimePoint now) {
+  if (!std::exchange(welcome_due_, false)) return say(config_, now);
+  Welcome welcome;
+  welcome.session_id = id_;
+  welcome.scene = admission_.scene->facts;
+  welcome.config = config_;
+  welcome.renderer = admission_.scene->renderer_text;
+  welcome.server_version = server_version;
+  welcome.scene_ids = host_.scene_ids();
+  say(welcome, now);
+}
+
+std::chrono::microseconds Session::frame_interval() const {
+  return std::chrono::microseconds(1'000'000 / std::max(1, config_.fps));
+}
+
+bool Session::picture_is_stale() const {
+  return idr_due_ || !shown_ || !same_view(*shown_, *pose_, admission_.scene->facts.near_z);
+}
+
+std::optional<FrameCandidate> Session::next_frame() const {
+  if (state_ != State::live || paused_ || rendering_ || opening_stream_ || !pose_ ||
+      !credit_.available() || (!picture_is_stale() && refinements_left_ == 0))
+    return std::nullopt;
+  return FrameCandidate{next_start_, next_start_ + frame_interval()};
+}
+
+FrameOrder Session::start_frame(TimePoint now) {
+  // The nominal rate is kept on average; what is lost is not caught up.
+  next_start_ = std::max(next_start_, now - frame_interval()) + frame_interval();
+  rendering_ = true;
+  FrameOrder order;
+  order.refine = !picture_is_stale();
+  order.force_idr = std::exchange(idr_due_, false);
+  order.real_fps = std::clamp(real_fps_, 1, config_.fps);
+  if (order.refine)
+    --refinements_left_;
+  else
+    refinements_left_ = config_.codec == Codec::h264 ? policy_.refine_frames : 0;
+  shown_ = pose_;
+
+  const Pose& pose = pose_->world_from_camera;
+  order.ticket.frame_id = ++frames_started_;
+  order.ticket.pose_id = pose_->pose_id;
+  order.ticket.pose_client_time_us = pose_->client_time_us;
+  order.ticket.render_pose = pose;
+  order.ticket.fov_y_rad = pose_->fov_y_rad;
+  order.ticket.size_px = config_.size_px;
+  order.ticket.pose_received = pose_received_;
+  order.request.camera =
+      make_camera(pose, config_.size_px, focal_from_fov_y(pose_->fov_y_rad, config_.size_px.y),
+                  admission_.scene->facts.near_z);
+  return order;
+}
+
+void Session::on_frame(FrameResult result, TimePoint now) {
+  rendering_ = false;
+  if (state_ == State::closed) return;
+  if (stream_outdated_) request_stream();
+  if (!result.ok) {
+    shown_.reset();
+    idr_due_ = true;
+    if (++failures_ >= max_failures_in_a_row)
+      fail(ErrorCode::render_failed, "rendering failed: " + result.message);
+    return;
+  }
+  failures_ = 0;
+  const std::uint64_t frame_id = result.frame.ticket.frame_id;
+  const std::size_t bytes = result.frame.bitstream.size();
+  count_sent(result, bytes);
+  last_said_ = now;
+  credit_.sent(frame_id, now);
+  const auto dropped = host_.send(std::move(result.frame));
+  for (const std::uint64_t id : dropped) credit_.lost(id);
+  if (dropped.empty()) return;
+  idr_due_ = true;
+  frames_dropped_ += dropped.size();
+  stats_.dropped_packets += static_cast<std::uint32_t>(dropped.size());
+}
+
+void Session::count_sent(const FrameResult& result, std::size_t bytes) {
+  ++frames_sent_;
+  bytes_sent_ += bytes;
+  ++second_frames_;
+  second_bytes_ += bytes;
+  if (!result.refined) ++(result.frame.ticket.speculated ? stats_.sub_frames : stats_.key_frames);
+}
+
+void Session::say(const ServerMessage& message, TimePoint now) {
+  last_said_ = now;
+  host_.send(message);
+}
+
+void Session::on_tick(TimePoint now) {
+  if (state_ == State::awaiting_hello && now - created_ >= policy_.hello_timeout)
+    return fail(ErrorCode::bad_message, "no hello within the time limit");
+  if (state_ == State::closed) return;
+  if (policy_.idle_timeout > 0ms) {
+    const auto idle = now - last_activity_;
+    if (idle >= policy_.idle_timeout)
+      return fail(ErrorCode::idle_timeout, "nothing moved for a long time: reload to continue");
+    if (!idle_warned_ && idle >= policy_.idle_timeout - policy_.idle_warning) {
+      idle_warned_ = true;
+      say(ErrorMessage{ErrorCode::idle_timeout, "nothing moves: this session will be closed soon",
+                       false},
+          now);
+    }
+  }
+  if (now - second_start_ >= 1s) send_statistics(now);
+  if (now - last_said_ >= speak_at_least_every) {
+    const auto since_epoch = now.time_since_epoch();
+    say(Heartbeat{std::chrono::duration_cast<std::chrono::microseconds>(since_epoch).count()}, now);
+  }
+}
+
+void Session::send_statistics(TimePoint now) {
+  const float seconds = std::chrono::duration<float>(now - second_start_).count();
+  second_start_ = now;
+  if (second_frames_ == 0) return;  // the heartbeat speaks for a still picture
+  stats_.fps = static_cast<float>(second_frames_) / seconds;
+  stats_.bitrate_kbps = static_cast<float>(second_bytes_) * 8e-3f / seconds;
+  stats_.sessions = host_.session_count();
+  real_fps_ = std::max(1, static_cast<int>(std::lround(stats_.fps)));
+  say(stats_, now);
+  stats_ = {};
+  second_frames_ = 0;
+  second_bytes_ = 0;
+}
+
+void Session::drain(std::chrono::milliseconds deadline) {
+  if (state_ == State::closed) return;
+  host_.send(Drain{static_cast<std::uint32_t>(deadline.count())});
+  state_ = State::closed;
+  host_.close(CloseCode::going_away, "the server is shutting down");
+}
+
+}  // namespace catgs

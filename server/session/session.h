@@ -1,0 +1,178 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "server/net/connection.h"
+#include "server/net/messages.h"
+#include "server/schedule/frame_executor.h"
+#include "server/schedule/scheduler.h"
+#include "server/session/credit.h"
+
+namespace catgs {
+
+/// A scene as sessions see it: one copy, shared by all.
+struct SceneEntry {
+  SceneFacts facts;
+  std::shared_ptr<Renderer> renderer;
+  std::string renderer_text;  // description and reason, for people
+};
+
+/// An encoder that the start-up probe found usable.
+struct EncoderChoice {
+  EncoderKind kind = EncoderKind::x264;
+  Codec codec = Codec::h264;
+  std::string text;  // name and reason, for people
+};
+
+/// What a session got at its admission.
+struct Admission {
+  std::shared_ptr<const SceneEntry> scene;
+  EncoderChoice encoder;
+};
+
+struct SessionPolicy {
+  std::chrono::milliseconds hello_timeout{5000};
+  std::chrono::milliseconds idle_timeout{15 * 60 * 1000};  // 0: never
+  std::chrono::milliseconds idle_warning{30'000};          // before the timeout
+  int default_fps = 60;
+  int max_fps = 120;
+  int default_bitrate_kbps = 8000;
+  int max_bitrate_kbps = 100'000;
+  int max_pixels = 3840 * 2160;  // larger wishes are scaled down
+  int refine_frames = 6;         // sent after motion stops, so that the still picture sharpens
+};
+
+/// What a session needs from the server around it. Its owner implements it; tests fake it.
+class SessionHost {
+ public:
+  virtual ~SessionHost() = default;
+  virtual std::variant<Admission, ErrorMessage> admit(const Hello& hello) = 0;
+  virtual std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
+      const std::string& scene_id) = 0;
+  virtual std::vector<std::string> scene_ids() = 0;
+  virtual std::uint32_t session_count() = 0;
+  virtual void send(const ServerMessage& message) = 0;
+  /// Returns the ids of the frames that were dropped for it.
+  virtual std::vector<std::uint64_t> send(OutgoingFrame frame) = 0;
+  virtual void close(CloseCode code, std::string_view reason) = 0;
+  /// Answered by Session::on_stream_opened().
+  virtual void open_stream(StreamSettings settings) = 0;
+};
+
+/// Frame of a session that its owner hands to an executor, with a stream of its own.
+struct FrameOrder {
+  FrameTicket ticket;
+  FrameRequest request;
+  int real_fps = 1;
+  bool force_idr = false;
+  bool refine = false;
+};
+
+/// One client's life: hello -> admission -> welcome -> poses, frames, acks -> bye. It knows no
+/// socket, no thread and no clock: events come with their time, effects leave through the host.
+/// Rendering is on demand: a frame is due when the newest pose shows another picture than the last
+/// frame and the client has credit. Not thread-safe.
+class Session {
+ public:
+  enum class State { awaiting_hello, opening, live, closed };
+
+  Session(std::string id, const SessionPolicy& policy, SessionHost& host, TimePoint now);
+
+  void on_message(const ClientMessage& message, TimePoint now);
+  /// A message that could not be parsed: says why and closes.
+  void on_bad_message(std::string_view what);
+  void on_stream_opened(const StreamOpened& opened, TimePoint now);
+  void on_frame(FrameResult result, TimePoint now);
+  /// At least four times a second: timeouts, statistics, heartbeat.
+  void on_tick(TimePoint now);
+  /// Tells the client why and closes; for reasons outside the session.
+  void fail(ErrorCode code, std::string_view message);
+  void drain(std::chrono::milliseconds deadline);
+  void on_disconnected() { state_ = State::closed; }
+
+  /// When the next frame may start; none: there is nothing to show or no credit.
+  [[nodiscard]] std::optional<FrameCandidate> next_frame() const;
+  /// Starts the frame that next_frame() announced; on_frame() ends it.
+  FrameOrder start_frame(TimePoint now);
+
+  [[nodiscard]] State state() const { return state_; }
+  [[nodiscard]] const std::string& id() const { return id_; }
+  [[nodiscard]] const CreditWindow& credit() const { return credit_; }
+  [[nodiscard]] const StreamConfig& config() const { return config_; }
+  [[nodiscard]] const SceneEntry* scene() const { return admission_.scene.get(); }
+  [[nodiscard]] std::uint64_t frames_sent() const { return frames_sent_; }
+  [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
+  [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
+  [[nodiscard]] bool paused() const { return paused_; }
+
+ private:
+  void on(const UnknownMessage&, TimePoint) {}
+  void on(const Hello& hello, TimePoint now);
+  void on(const PoseSample& sample, TimePoint now);
+  void on(const PosePath&, TimePoint now) { last_activity_ = now; }
+  void on(const Ack& ack, TimePoint now);
+  void on(const Settings& settings, TimePoint now);
+  void on(const SelectScene& select, TimePoint now);
+  void on(const RequestIdr&, TimePoint now);
+  void on(const Pause& pause, TimePoint now);
+  void on(const Bye&, TimePoint);
+
+  void say(const ServerMessage& message, TimePoint now);
+  void say_config(TimePoint now);
+  void request_stream();
+  void count_sent(const FrameResult& result, std::size_t bytes);
+  void send_statistics(TimePoint now);
+  [[nodiscard]] bool picture_is_stale() const;
+  [[nodiscard]] std::chrono::microseconds frame_interval() const;
+
+  const std::string id_;
+  const SessionPolicy& policy_;
+  SessionHost& host_;
+  State state_ = State::awaiting_hello;
+  const TimePoint created_;
+
+  Admission admission_;
+  glm::ivec2 viewport_px_{0};
+  Settings settings_;
+  StreamConfig config_;
+  bool opening_stream_ = false;
+  bool stream_outdated_ = false;  // settings changed while the stream was busy
+  bool welcome_due_ = false;      // the scene is new to the client
+
+  CreditWindow credit_;
+  std::optional<PoseSample> pose_;  // newest
+  TimePoint pose_received_{};
+  std::optional<PoseSample> shown_;  // pose of the last picture rendered
+  int refinements_left_ = 0;
+  bool rendering_ = false;
+  bool idr_due_ = false;
+  bool paused_ = false;
+  int failures_ = 0;  // of rendering or encoding, in a row
+  TimePoint next_start_{};
+  std::uint64_t frames_started_ = 0;
+
+  TimePoint last_said_{};
+  TimePoint last_activity_;
+  TimePoint last_idr_request_{};
+  bool idle_warned_ = false;
+
+  // Since the last Stats message.
+  TimePoint second_start_{};
+  std::uint32_t second_frames_ = 0;
+  std::uint64_t second_bytes_ = 0;
+  int real_fps_ = 1;
+  Stats stats_;
+
+  std::uint64_t frames_sent_ = 0;
+  std::uint64_t frames_dropped_ = 0;
+  std::uint64_t bytes_sent_ = 0;
+};
+
+}  // namespace catgs
