@@ -30,6 +30,7 @@ inline bool is_quiet(const CLI::App& command) {
   return app->get_option("--quiet")->count() > 0;
 }
 
+void add_bench_command(CLI::App& app);
 void add_compare_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
 void add_synth_command(CLI::App& app);

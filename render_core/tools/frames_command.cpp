@@ -6,10 +6,10 @@
 
 #include "render_core/error.h"
 #include "render_core/metrics/image_quality.h"
-#include "render_core/reference/reference.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/frame_sink.h"
 #include "render_core/tools/progress.h"
+#include "render_core/tools/reference_check.h"
 #include "render_core/tools/render_setup.h"
 
 namespace catgs {
@@ -20,24 +20,6 @@ struct FramesOptions {
   std::string out;
   std::size_t checked_pixels = 0;
 };
-
-/// Mean squared error of a rendered frame against the reference at random pixels.
-double reference_error(const RenderSetup& setup, std::size_t i, const FrameView& frame,
-                       std::size_t count) {
-  const auto pixels = random_pixels(frame.size_px, count, setup.first + i);
-  const auto truth = render_reference_pixels(*setup.cloud, setup.request(i), pixels, *setup.pool);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < pixels.size(); ++k) {
-    const auto* row = reinterpret_cast<const float*>(frame.planes[0].data +
-                                                     frame.planes[0].stride_bytes *
-                                                         static_cast<std::size_t>(pixels[k].y));
-    for (int c = 0; c < 3; ++c) {
-      const double error = static_cast<double>(row[pixels[k].x * 3 + c]) - truth[k][c];
-      sum += error * error;
-    }
-  }
-  return sum / static_cast<double>(3 * pixels.size());
-}
 
 std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderSetup& setup) {
   if (options.out.empty()) {
@@ -61,9 +43,8 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
 void render_frames(const FramesOptions& options, bool quiet) {
   const RenderSetup setup = prepare(options.render, quiet);
   const auto sink = make_sink(options, setup);
-  const auto view =
-      setup.made.renderer->make_view({.pipeline = options.render.pipeline,
-                                      .format = sink ? sink->format() : PixelFormat::rgb_f32});
+  const auto view = setup.made.renderer->make_view(
+      {.pipeline = setup.pipeline, .format = sink ? sink->format() : PixelFormat::rgb_f32});
   if (!quiet) {
     fmt::print(stderr, "{} ({})\n", setup.made.renderer->description(), setup.made.reason);
   }

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "render_core/build_info.h"
 #include "render_core/error.h"
 #include "render_core/tools/commands.h"
 
@@ -13,13 +14,17 @@ namespace {
 
 int run(int argc, char** argv) {
   CLI::App app("Inspects, renders and measures 3D Gaussian Splatting scenes.", "catgs-render");
-  app.set_version_flag("--version", CATGS_VERSION);
+  app.set_version_flag("--version", build_version);
   app.require_subcommand(1);
   app.fallthrough();
   bool quiet = false;  // read back by is_quiet()
   app.add_flag("-q,--quiet", quiet, "No progress on the terminal");
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return fmt::format("catgs-render: {} (see --help)\n", error.what());
+  });
   app.footer("Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal.");
 
+  add_bench_command(app);
   add_compare_command(app);
   add_frames_command(app);
   add_synth_command(app);

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <map>
+#include <initializer_list>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -17,13 +18,29 @@ namespace {
 
 constexpr float default_fov_y_deg = 60.0f;
 
-const std::map<std::string, RendererKind> renderer_kinds = {{"auto", RendererKind::automatic},
-                                                            {"cpu", RendererKind::cpu},
-                                                            {"cuda", RendererKind::cuda},
-                                                            {"reference", RendererKind::reference}};
+template <typename Value>
+Value parse_name(std::string_view flag, std::string_view name,
+                 std::initializer_list<std::pair<std::string_view, Value>> known) {
+  std::string names;
+  for (const auto& [known_name, value] : known) {
+    if (name == known_name) return value;
+    names += fmt::format("{}{}", names.empty() ? "one of " : ", ", known_name);
+  }
+  throw InputError(flag, "", fmt::format("unknown \"{}\"", name), names);
+}
 
-const std::map<std::string, Pipeline> pipelines = {{"exact", Pipeline::exact},
-                                                   {"vanilla", Pipeline::vanilla}};
+RendererKind parse_renderer(std::string_view name) {
+  return parse_name<RendererKind>("--renderer", name,
+                                  {{"auto", RendererKind::automatic},
+                                   {"cpu", RendererKind::cpu},
+                                   {"cuda", RendererKind::cuda},
+                                   {"reference", RendererKind::reference}});
+}
+
+Pipeline parse_pipeline(std::string_view name) {
+  return parse_name<Pipeline>("--pipeline", name,
+                              {{"exact", Pipeline::exact}, {"vanilla", Pipeline::vanilla}});
+}
 
 template <typename T>
 bool parse_whole(std::string_view text, T& value) {
@@ -93,11 +110,9 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--near", options.near_z,
                      "Near plane, world units (default: the scene's hint)");
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
-      ->transform(CLI::Transformer(renderer_kinds))
-      ->default_str("auto");
+      ->capture_default_str();
   command.add_option("--pipeline", options.pipeline, "exact or vanilla (the original 3DGS)")
-      ->transform(CLI::Transformer(pipelines))
-      ->default_str("exact");
+      ->capture_default_str();
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
   command.add_option("--threads", options.threads, "0: one per core")
@@ -115,7 +130,9 @@ FrameRequest RenderSetup::request(std::size_t i) const {
 RenderSetup prepare(const RenderOptions& options, bool quiet) {
   const glm::ivec2 size_px = parse_size("--size", options.size);
   const float focal_px = focal_px_of(options, size_px.y);
+  const RendererKind kind = parse_renderer(options.renderer);
   RenderSetup setup;
+  setup.pipeline = parse_pipeline(options.pipeline);
   setup.scene = load_with_progress(options, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   const Trajectory path = make_path(options, setup.scene.hints);
@@ -127,8 +144,7 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
   setup.camera =
       make_camera({}, size_px, focal_px, options.near_z.value_or(setup.scene.hints.near_z));
   setup.pool = std::make_shared<ThreadPool>(options.threads);
-  setup.made = make_renderer(setup.cloud,
-                             {.kind = options.renderer, .pool = setup.pool, .simd = options.simd});
+  setup.made = make_renderer(setup.cloud, {.kind = kind, .pool = setup.pool, .simd = options.simd});
   return setup;
 }
 
@@ -170,10 +186,6 @@ void render_or_throw(View& view, const FrameRequest& request, FrameView& frame) 
   if (status.ok()) return;
   if (status.code == RenderStatus::Code::invalid_request) throw InputError("", "", status.message);
   throw std::runtime_error(status.message);
-}
-
-std::string_view pipeline_name(Pipeline pipeline) {
-  return pipeline == Pipeline::exact ? "exact" : "vanilla";
 }
 
 }  // namespace catgs

@@ -24,8 +24,8 @@ struct RenderOptions {
   std::optional<float> near_z;
   std::optional<double> fps;
   std::string frames;
-  RendererKind renderer = RendererKind::automatic;
-  Pipeline pipeline = Pipeline::exact;
+  std::string renderer = "auto";
+  std::string pipeline = "exact";
   std::string simd = "auto";
   int threads = 0;
 };
@@ -39,6 +39,7 @@ struct RenderSetup {
   std::shared_ptr<const GaussianCloud> cloud;
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
+  Pipeline pipeline = Pipeline::exact;
   Trajectory poses;       // one per frame
   std::size_t first = 0;  // number of the first of them in the whole path
   double fps = 0.0;       // of the path
@@ -63,7 +64,5 @@ FrameRange parse_frame_range(std::string_view text, std::size_t count);
 /// Renders frame `i` of the path or throws: InputError for a request that the core refuses, else
 /// std::runtime_error.
 void render_or_throw(View& view, const FrameRequest& request, FrameView& frame);
-
-std::string_view pipeline_name(Pipeline pipeline);
 
 }  // namespace catgs

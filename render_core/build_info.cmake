@@ -1,0 +1,18 @@
+# Run at every build: writes OUTPUT only when the commit has changed, so that nothing is compiled
+# without need.
+execute_process(COMMAND git describe --always --dirty --abbrev=12 --exclude=*
+                WORKING_DIRECTORY ${SOURCE_DIR} OUTPUT_VARIABLE commit RESULT_VARIABLE result
+                OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+if(NOT result EQUAL 0)
+  set(commit unknown)
+endif()
+file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
+#include "render_core/build_info.h"
+
+namespace catgs {
+
+const char* const build_version = "@VERSION@";
+const char* const build_commit = "@commit@";
+
+}  // namespace catgs
+]] @ONLY)

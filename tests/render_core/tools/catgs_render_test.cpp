@@ -1,0 +1,189 @@
+// Runs the program itself: exit codes, messages, files.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "render_core/image/png.h"
+#include "render_core/motion/trajectory.h"
+#include "render_core/scene/save_scene.h"
+
+namespace catgs {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string out;  // stdout and stderr together
+};
+
+Outcome run(const std::string& arguments) {
+  Outcome outcome;
+  FILE* pipe = popen(fmt::format("{} {} 2>&1", CATGS_RENDER, arguments).c_str(), "r");
+  if (pipe == nullptr) return outcome;
+  char buffer[4096];
+  for (std::size_t n = 0; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
+    outcome.out.append(buffer, n);
+  }
+  outcome.exit_code = WEXITSTATUS(pclose(pipe));
+  return outcome;
+}
+
+/// A ball of opaque Gaussians around the origin, seen from outside.
+GaussianCloud ball() {
+  constexpr std::size_t count = 400;
+  GaussianCloud cloud;
+  cloud.resize(count, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float t = static_cast<float>(i) + 0.5f;
+    const float z = 1.0f - 2.0f * t / count;
+    const float r = std::sqrt(1.0f - z * z);
+    cloud.mean[i] = glm::vec3(r * std::cos(2.4f * t), r * std::sin(2.4f * t), z);
+    cloud.rotation[i] = glm::quat(1, 0, 0, 0);
+    cloud.scale[i] = glm::vec3(0.08f);
+    cloud.opacity[i] = 0.9f;
+    cloud.sh[i] = cloud.mean[i];
+  }
+  return cloud;
+}
+
+class CatgsRender : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              (std::string("catgs_render_") +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    save_scene(ball(), folder_ / "ball.ply");
+    write_tum(path("path.tum"), {{0, {glm::vec3(0, 0, -4), {1, 0, 0, 0}}},
+                                 {500'000, {glm::vec3(0.2f, 0, -4), {1, 0, 0, 0}}},
+                                 {1'000'000, {glm::vec3(0.4f, 0, -4), {1, 0, 0, 0}}}});
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string scene() const { return path("ball.ply"); }
+  Outcome frames(const std::string& arguments) const {
+    return run(fmt::format("frames {} --size 64x48 {}", scene(), arguments));
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(CatgsRender, FramesOfATraceAreItsSamples) {
+  const Outcome outcome = frames(fmt::format("--trace {} --out {}", path("path.tum"), path("out")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_TRUE(std::filesystem::exists(path("out/frame_000000.png")));
+  EXPECT_TRUE(std::filesystem::exists(path("out/frame_000002.png")));
+  EXPECT_FALSE(std::filesystem::exists(path("out/frame_000003.png")));
+  const Image image = read_png(path("out/frame_000000.png"));
+  EXPECT_EQ(image.size_px, glm::ivec2(64, 48));
+  const float* centre = image.row(24) + 32 * 3;
+  EXPECT_GT(centre[0] + centre[1] + centre[2], 0.2f);  // the ball, not the background
+  EXPECT_EQ(image.row(0)[0], 0.0f);
+}
+
+TEST_F(CatgsRender, ARangeOfAResampledTraceKeepsItsNumbers) {
+  const Outcome outcome = frames(
+      fmt::format("--trace {} --fps 10 --frames 4:6 --out {}", path("path.tum"), path("out")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_TRUE(std::filesystem::exists(path("out/frame_000004.png")));
+  EXPECT_TRUE(std::filesystem::exists(path("out/frame_000005.png")));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 2);
+}
+
+TEST_F(CatgsRender, ChecksPixelsAgainstTheReference) {
+  const Outcome outcome =
+      frames(fmt::format("--trace {} --frames :1 --pixels 200 --renderer cpu", path("path.tum")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const std::size_t line = outcome.out.find("all frames");
+  ASSERT_NE(line, std::string::npos) << outcome.out;
+  EXPECT_GE(std::stod(outcome.out.substr(line + 10)), 60.0) << outcome.out;
+}
+
+TEST_F(CatgsRender, CompareExitsWithOneWhereTheRequirementFails) {
+  const Outcome outcome = frames(fmt::format("--trace {} --out {}", path("path.tum"), path("out")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const std::string pair = path("out/frame_000000.png") + " " + path("out/frame_000002.png");
+  const std::string same = path("out/frame_000000.png") + " " + path("out/frame_000000.png");
+  EXPECT_EQ(run("compare " + pair).exit_code, 0);
+  const Outcome failed = run("compare --require-psnr 60 " + pair);
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.out, HasSubstr("below the required 60.00 dB"));
+  EXPECT_EQ(run("compare --require-psnr 60 " + same).exit_code, 0);
+  const auto json = nlohmann::json::parse(run("compare --json " + same).out);
+  EXPECT_TRUE(json.at("psnr_db").is_null());
+  EXPECT_EQ(json.at("ssim"), 1.0);
+}
+
+TEST_F(CatgsRender, BenchReportsEveryFrame) {
+  const Outcome outcome =
+      run(fmt::format("bench {} --size 64x48 --script orbit --duration 0.1 --quality --json {}",
+                      scene(), path("bench.json")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  std::ifstream file(path("bench.json"));
+  const auto json = nlohmann::json::parse(file);
+  EXPECT_EQ(json.at("key_frames").get<int>() + json.at("sub_frames").get<int>(), 12);
+  EXPECT_EQ(json.at("scene").at("gaussians"), 400);
+  EXPECT_EQ(json.at("settings").at("size_px"), (nlohmann::json{64, 48}));
+  EXPECT_GT(json.at("fps_mean").get<double>(), 0.0);
+  EXPECT_GE(json.at("frame_ms").at("max"), json.at("frame_ms").at("p50"));
+  EXPECT_GT(json.at("blended_pairs_mean").get<double>(), 64.0);
+  EXPECT_GE(json.at("quality").at("key").at("psnr_db").at("min").get<double>(), 60.0);
+  for (const char* field :
+       {"commit", "device", "flatness", "stage_ms", "list_length", "window_histogram",
+        "ns_per_gaussian", "ns_per_blended_pair", "device_bytes"}) {
+    EXPECT_TRUE(json.contains(field)) << field;
+  }
+}
+
+TEST_F(CatgsRender, WritesAScriptedTrace) {
+  const Outcome outcome =
+      run(fmt::format("trace script {} --script head --seed 4 --duration 2 --fps 60 --out {}",
+                      scene(), path("head.tum")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_EQ(read_tum(path("head.tum")).size(), 120u);
+}
+
+TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
+  const auto expect = [](const Outcome& outcome, const std::string& message) {
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    EXPECT_THAT(outcome.out, HasSubstr(message));
+  };
+  const std::string still = "--script still --frames :1 ";
+  expect(run(""), "catgs-render: A subcommand is required");
+  expect(run("frames"), "scene is required");
+  expect(run(fmt::format("frames {} --script still --out x", path("none.ply"))),
+         "catgs-render: " + path("none.ply"));
+  expect(frames("--out x"), "--trace, --script: one of them is needed");
+  expect(frames(still), "--out: is missing");
+  expect(frames("--script jump --out x"), "unknown script \"jump\"");
+  expect(frames("--script still --trace x --out x"), "--trace excludes --script");
+  expect(run("frames x.ply --size 64 --out x"), "--size: \"64\" is not a picture size");
+  expect(frames(still + "--fov-deg 180 --out x"), "the focal length must be positive");
+  expect(frames(still + "--renderer gpu --out x"), "--renderer: unknown \"gpu\" (one of auto, cpu");
+  expect(frames("--script still --out " + path("a.png")), "one picture for 1200 frames");
+  expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
+  expect(run("compare " + path("none.png") + " " + path("none.png")), path("none.png"));
+}
+
+TEST_F(CatgsRender, IsSilentInAPipe) {
+  const Outcome outcome = run(fmt::format(
+      "--quiet frames {} --size 64x48 --script still --frames :2 --out {}", scene(), path("out")));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.out, "");
+}
+
+}  // namespace
+}  // namespace catgs
