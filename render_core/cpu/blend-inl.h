@@ -24,13 +24,19 @@ namespace HWY_NAMESPACE {
 inline constexpr int tile_px = tile_size_px;
 inline constexpr int lanes = static_cast<int>(Floats::count);
 
+/// A block is the part of a row that is culled as one: a register where that is wide enough. Block
+/// y + 16 k of a tile holds columns k block_px… of row y.
+inline constexpr int block_px = lanes == 1 ? tile_px : std::max(lanes, 8);
+inline constexpr int blocks_per_row = tile_px / block_px;
+static_assert(blocks_per_row <= 2, "a tile's blocks fit the bits of a word");
+
 /// The pixels of a tile while they are blended; rows of 16.
 struct alignas(64) TileState {
   float red[tile_px * tile_px];
   float green[tile_px * tile_px];
   float blue[tile_px * tile_px];
   float transmittance[tile_px * tile_px];  // as in PixelState
-  std::uint32_t live_rows = 0;             // bit y: row y has unfinished pixels
+  std::uint32_t live_blocks = 0;           // bit per block: it has unfinished pixels
 
   HWY_INLINE PixelState<Floats> load(int at) const {
     return {{Floats::load(red + at), Floats::load(green + at), Floats::load(blue + at)},
@@ -41,11 +47,6 @@ struct alignas(64) TileState {
     pixel.colour.y.store(green + at);
     pixel.colour.z.store(blue + at);
     pixel.transmittance.store(transmittance + at);
-  }
-  HWY_INLINE bool row_is_finished(int y) const {
-    for (int x = 0; x < tile_px; x += lanes)
-      if (!none(Floats::load(transmittance + y * tile_px + x) > Floats(0.0))) return false;
-    return true;
   }
 };
 
@@ -60,76 +61,82 @@ inline void clear(TileState& state, glm::ivec2 size_px) {
       pixel.transmittance = select(inside, pixel.transmittance, -pixel.transmittance);
       state.store(y * tile_px + x, pixel);
     }
+    for (int k = 0; k < blocks_per_row; ++k)
+      if (y < size_px.y && k * block_px < size_px.x) state.live_blocks |= 1u << (y + k * tile_px);
   }
-  state.live_rows = (1u << size_px.y) - 1u;
 }
 
 /// A splat's exponent along the rows of a tile: at column x of row y it is
-/// row_exponent[y] - (start[y] + whitening_xx x)^2.
+/// exponent[y] - (start[y] + whitening_xx x)^2.
 struct alignas(64) RowTerms {
   float start[tile_px];
   float exponent[tile_px];
 };
 
-/// Fills the terms; bit y of the result says whether the ellipse alpha >= alpha_min meets the
-/// segment of row y inside the tile. `first` is the tile's first pixel centre.
+/// Fills the terms; returns the blocks whose line of pixel centres meets the ellipse alpha >=
+/// alpha_min. `first` is the tile's first pixel centre.
 HWY_INLINE std::uint32_t row_terms(const Splat& s, Vec2<float> first, RowTerms& terms) {
   const Floats xx(s.whitening_xx), xy(s.whitening_xy), yy(s.whitening_yy);
   const Floats left_x(s.whitening_xx * (first.x - s.centre_x));
-  const Floats width = xx * Floats(static_cast<float>(tile_px - 1));
-  std::uint32_t rows = 0;
+  const Floats width = xx * Floats(static_cast<float>(block_px - 1));
+  const Floats block = xx * Floats(static_cast<float>(block_px));
+  std::uint32_t blocks = 0;
   for (int y = 0; y < tile_px; y += lanes) {
-    const Floats dy = Floats::iota(first.y - s.centre_y + static_cast<float>(y));
+    const Floats dy = Floats::iota(static_cast<float>(y)) + Floats(first.y - s.centre_y);
     const Floats v = yy * dy;
     const Floats exponent = Floats(s.log2_opacity) - v * v;
-    const Floats left = mul_add(xy, dy, left_x);
-    left.store(terms.start + y);
+    Floats start = mul_add(xy, dy, left_x);
+    start.store(terms.start + y);
     exponent.store(terms.exponent + y);
-    // |start + xx x| over the segment; the margin covers its rounding.
-    const Floats nearest = max(max(left, -(left + width)), Floats(0.0));
-    const auto met = nearest * nearest <= reach_of(exponent) + Floats(1e-4);
-    rows |= bits(met) << y;
+    const Floats reach = reach_of(exponent) + Floats(1e-4);  // wider than rounding errs below
+    for (int k = 0; k < blocks_per_row; ++k, start = start + block) {
+      const Floats nearest = max(max(start, -(start + width)), Floats(0.0));
+      blocks |= bits(nearest * nearest <= reach) << (y + k * tile_px);
+    }
   }
-  return rows;
+  return blocks;
 }
 
-/// Blends one row of a tile; returns the number of pairs when asked to.
+/// Blends one block; returns the number of pairs when asked to.
 template <bool count_pairs>
-HWY_INLINE std::uint32_t blend_row(TileState& state, int y, const Splat& s, const RowTerms& terms,
-                                   const Vec3<Floats>& colour) {
+HWY_INLINE std::uint32_t blend_block(TileState& state, int block, const Splat& s,
+                                     const RowTerms& terms, const Vec3<Floats>& colour) {
+  alignas(64) static constexpr float columns[tile_px] = {0, 1, 2,  3,  4,  5,  6,  7,
+                                                         8, 9, 10, 11, 12, 13, 14, 15};
+  const int y = block % tile_px;
   const Floats start(terms.start[y]), row_exponent(terms.exponent[y]), xx(s.whitening_xx);
   std::uint32_t pairs = 0;
-  for (int x = 0; x < tile_px; x += lanes) {
-    const Floats u = mul_add(xx, Floats::iota(static_cast<float>(x)), start);
+  bool finished = true;
+  for (int x = 0; x < block_px; x += lanes) {
+    const int column = block / tile_px * block_px + x;
+    const Floats u = mul_add(xx, Floats::load(columns + column), start);
     const Floats exponent = row_exponent - u * u;
-    if (lanes < tile_px && none(contributes(exponent))) continue;
-    PixelState<Floats> pixel = state.load(y * tile_px + x);
-    [[maybe_unused]] const Floats before = pixel.transmittance;
-    const auto finished = blend(pixel, exponent, colour);
-    state.store(y * tile_px + x, pixel);
-    if constexpr (count_pairs)
-      pairs += std::popcount(bits(pixel.transmittance < before) & ~bits(finished));
-    if (!none(finished) && state.row_is_finished(y)) state.live_rows &= ~(1u << y);
+    PixelState<Floats> pixel = state.load(y * tile_px + column);
+    const auto live = blend(pixel, exponent, colour);
+    state.store(y * tile_px + column, pixel);
+    finished &= none(live);
+    if constexpr (count_pairs) pairs += std::popcount(bits(live & contributes(exponent)));
   }
+  if (finished) state.live_blocks &= ~(1u << block);
   return pairs;
 }
 
-template <bool cull_rows, bool count_pairs>
+template <bool cull_blocks, bool count_pairs>
 std::uint64_t blend_list(TileState& state, const BlendTask& task) {
   const Vec2<float> first{static_cast<float>(task.tile.x * tile_px) + 0.5f,
                           static_cast<float>(task.tile.y * tile_px) + 0.5f};
   constexpr std::size_t prefetch_distance = 8;  // list entries; splats lie scattered
   std::uint64_t pairs = 0;
   RowTerms terms;
-  for (std::size_t i = 0; i < task.list.size() && state.live_rows != 0; ++i) {
+  for (std::size_t i = 0; i < task.list.size() && state.live_blocks != 0; ++i) {
     if (i + prefetch_distance < task.list.size())
-      hwy::Prefetch(&task.splats[task.list[i + prefetch_distance].value]);
-    const Splat& s = task.splats[task.list[i].value];
+      hwy::Prefetch(&task.splats[task.list[i + prefetch_distance]]);
+    const Splat& s = task.splats[task.list[i]];
     const std::uint32_t met = row_terms(s, first, terms);
     const Vec3<Floats> colour{Floats(s.red), Floats(s.green), Floats(s.blue)};
-    for (std::uint32_t rows = state.live_rows & (cull_rows ? met : ~0u); rows != 0;
-         rows &= rows - 1)
-      pairs += blend_row<count_pairs>(state, std::countr_zero(rows), s, terms, colour);
+    for (std::uint32_t blocks = state.live_blocks & (cull_blocks ? met : ~0u); blocks != 0;
+         blocks &= blocks - 1)
+      pairs += blend_block<count_pairs>(state, std::countr_zero(blocks), s, terms, colour);
   }
   return pairs;
 }
@@ -213,11 +220,11 @@ inline std::uint64_t blend_tile(const BlendTask& task) {
   clear(state, size_px);
   std::uint64_t pairs = 0;
   if (task.count_pairs) {
-    pairs =
-        task.cull_rows ? blend_list<true, true>(state, task) : blend_list<false, true>(state, task);
+    pairs = task.cull_blocks ? blend_list<true, true>(state, task)
+                             : blend_list<false, true>(state, task);
   } else {
-    pairs = task.cull_rows ? blend_list<true, false>(state, task)
-                           : blend_list<false, false>(state, task);
+    pairs = task.cull_blocks ? blend_list<true, false>(state, task)
+                             : blend_list<false, false>(state, task);
   }
   resolve_tile(state, task.background);
   if (task.image->format() == PixelFormat::rgb_f32) {

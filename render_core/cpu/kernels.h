@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -30,29 +29,25 @@ struct alignas(64) Splat {
   float reserved;
 };
 
-/// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,
-/// which has room for the whole cluster; returns how many.
+/// Projects and shades the Gaussians of one cluster. The visible ones go to the first free slots of
+/// `splats` and `keys`, which have room for the whole cluster; returns how many.
 struct ProjectTask {
   const SceneStore* scene;
   const Camera* camera;
   Pipeline pipeline;
   std::size_t cluster;
   Splat* splats;
-};
-
-/// Neighbouring tiles of one row that list the same splat.
-struct TileRun {
-  std::uint16_t row, begin, end;  // tiles; end exclusive
-  DepthSlot entry;
+  DepthSlot* keys;  // key: bits of the depth; value: first_slot + position in `splats`
+  std::uint32_t first_slot;
 };
 
 /// Blends one tile and writes its part of the image.
 struct BlendTask {
   const Splat* splats;
-  std::span<const DepthSlot> list;  // front to back
+  std::span<const std::uint32_t> list;  // slots, front to back
   glm::ivec2 tile;
   glm::vec3 background;
-  bool cull_rows;    // skip pixel rows that a splat's ellipse does not meet; same image
+  bool cull_blocks;  // skip parts of rows that a splat's ellipse does not meet; same image
   bool count_pairs;  // else the result is 0
   const HostImage* image;
 };
@@ -61,9 +56,6 @@ struct BlendTask {
 struct SimdKernels {
   std::string_view name;
   std::uint32_t (*project_cluster)(const ProjectTask& task);
-  // Appends the runs of tiles that the splats' ellipses meet; slots count up from first_slot.
-  void (*list_tiles)(std::span<const Splat> splats, std::uint32_t first_slot,
-                     std::vector<TileRun>& runs);
   std::uint64_t (*blend_tile)(const BlendTask& task);  // (Gaussian, pixel) pairs blended
 };
 

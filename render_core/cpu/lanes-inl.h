@@ -74,12 +74,6 @@ CATGS_HD_INLINE LaneMask<D> operator&(const LaneMask<D>& a, const LaneMask<D>& b
   return {hn::And(a.mask, b.mask)};
 }
 
-/// !a & b
-template <class D>
-CATGS_HD_INLINE LaneMask<D> and_not(const LaneMask<D>& a, const LaneMask<D>& b) {
-  return {hn::AndNot(a.mask, b.mask)};
-}
-
 template <class D>
 CATGS_HD_INLINE bool none(const LaneMask<D>& m) {
   return hn::AllFalse(D(), m.mask);

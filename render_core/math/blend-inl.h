@@ -31,24 +31,21 @@ CATGS_HD_INLINE auto contributes(T exponent) {
 }
 
 /// Blends one Gaussian with alpha = min(alpha_max, 2^exponent) over what lies behind, where it
-/// contributes and the pixel is not finished. A pixel that it would take below transmittance_min
-/// is finished without it. Returns the pixels finished now.
+/// contributes and the pixel is not finished. A pixel that it would take below transmittance_min is
+/// finished without it. Returns which pixels are not finished.
 template <class T>
 CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colour) {
-  const T alpha = min(T(alpha_max), exp2_of_alpha(exponent));
+  const T alpha = select(contributes(exponent), min(T(alpha_max), exp2_of_alpha(exponent)), T(0.0));
   const T weight = alpha * pixel.transmittance;
   const T behind = pixel.transmittance - weight;
-  const auto live = contributes(exponent) & (pixel.transmittance > T(0.0));
-  const auto enough = behind >= T(transmittance_min);
-  const auto blended = live & enough;
-  const auto finished = and_not(enough, live);
-  const T used = select(blended, weight, T(0.0));
+  // Negative, hence false, for pixels finished before; true for live ones that it does not reach.
+  const auto live = behind >= T(transmittance_min);
+  const T used = select(live, weight, T(0.0));
   pixel.colour.x = mul_add(used, colour.x, pixel.colour.x);
   pixel.colour.y = mul_add(used, colour.y, pixel.colour.y);
   pixel.colour.z = mul_add(used, colour.z, pixel.colour.z);
-  pixel.transmittance =
-      select(finished, -pixel.transmittance, select(blended, behind, pixel.transmittance));
-  return finished;
+  pixel.transmittance = select(live, behind, -abs(pixel.transmittance));
+  return live;
 }
 
 /// The pixel over its background, clamped to what a display can show.

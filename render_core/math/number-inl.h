@@ -30,7 +30,6 @@ CATGS_HD_INLINE float abs(float a) { return std::fabs(a); }
 CATGS_HD_INLINE double abs(double a) { return std::fabs(a); }
 CATGS_HD_INLINE float ceil(float a) { return std::ceil(a); }
 CATGS_HD_INLINE double ceil(double a) { return std::ceil(a); }
-CATGS_HD_INLINE bool and_not(bool a, bool b) { return !a && b; }
 
 /// a * b + c, with one rounding where the machine has it for free.
 CATGS_HD_INLINE float mul_add(float a, float b, float c) { return a * b + c; }

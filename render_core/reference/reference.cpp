@@ -75,7 +75,7 @@ glm::dvec3 render_pixel(std::span<const Splat> splats, glm::ivec2 pixel_px,
     const double square =
         math::whitened_square(splat.whitening, {p.x - splat.centre_px.x, p.y - splat.centre_px.y});
     if (square > splat.reach) continue;
-    if (math::blend(pixel, splat.log2_opacity - square, splat.colour)) break;
+    if (!math::blend(pixel, splat.log2_opacity - square, splat.colour)) break;
     ++pairs;
   }
   const auto colour = math::resolve(pixel, to_vec3(background));
