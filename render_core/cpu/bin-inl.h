@@ -17,56 +17,63 @@ HWY_BEFORE_NAMESPACE();
 namespace catgs {
 namespace HWY_NAMESPACE {
 
-/// Appends the runs of tiles that the ellipse of a splat meets, for Floats::count rows of tiles
-/// from `row` on at once.
-HWY_INLINE void list_rows(const Splat& s, const Ellipse<Floats>& ellipse, int row,
-                          std::uint32_t slot, std::vector<TileRun>& runs) {
+/// Tile rows tested at once: few, because most splats touch two or three.
+using RowLanes = Lanes<hn::CappedTag<float, 4>>;
+
+/// Appends to `runs` the tiles that a splat's ellipse meets in RowLanes::count rows of tiles from
+/// `row` on; returns the new end.
+HWY_INLINE TileRun* list_rows(const Splat& s, const Ellipse<float>& ellipse, int row,
+                              std::uint32_t slot, TileRun* runs) {
+  using L = RowLanes;
   constexpr auto side = static_cast<float>(tile_size_px);
-  const Floats low_y =
-      mul_add(Floats::iota(static_cast<float>(row)), Floats(side), Floats(0.5f - s.centre_y));
-  const Interval<Floats> columns = columns_in_band(ellipse, low_y, low_y + Floats(side - 1.0f));
+  const L low_y = mul_add(L::iota(static_cast<float>(row)), L(side), L(0.5f - s.centre_y));
+  const Interval<L> columns = columns_in_band(convert<L>(ellipse), low_y, low_y + L(side - 1.0f));
   // Pixel columns with centres inside, then tiles, both inside the splat's box of tiles.
-  const Floats slack = Floats(listing_slack_px);
-  const Floats offset = Floats(s.centre_x - 0.5f);
-  const Floats leftmost = Floats(static_cast<float>(s.tile_x) * side);
-  const Floats rightmost = Floats(static_cast<float>(s.tile_end_x) * side - 1.0f);
-  const Floats first = max(ceil(offset + columns.low - slack), leftmost);
-  const Floats last = min(floor(offset + columns.high + slack), rightmost);
+  const L first =
+      max(ceil(columns.low + L(s.centre_x - 0.5f - static_cast<float>(listing_slack_px))),
+          L(static_cast<float>(s.tile_x) * side));
+  const L last =
+      min(floor(columns.high + L(s.centre_x - 0.5f + static_cast<float>(listing_slack_px))),
+          L(static_cast<float>(s.tile_end_x) * side - 1.0f));
   const auto hit = (columns.low <= columns.high) & (first <= last);
-  const Floats per_px = Floats(1.0 / tile_size_px);
-  alignas(64) float begin[Floats::count], end[Floats::count];
-  (first * per_px).store(begin);
-  (last * per_px).store(end);
+  alignas(16) float begin[L::count], end[L::count];
+  (first * L(1.0 / tile_size_px)).store(begin);
+  (last * L(1.0 / tile_size_px)).store(end);
 
   const int rows_left = s.tile_end_y - row;
   std::uint32_t hits = bits(hit);
-  if (rows_left < static_cast<int>(Floats::count)) hits &= (1u << rows_left) - 1u;
+  if (rows_left < static_cast<int>(L::count)) hits &= (1u << rows_left) - 1u;
   for (; hits != 0; hits &= hits - 1) {
     const int lane = std::countr_zero(hits);
-    runs.push_back({static_cast<std::uint16_t>(row + lane),
-                    static_cast<std::uint16_t>(static_cast<int>(begin[lane])),
-                    static_cast<std::uint16_t>(static_cast<int>(end[lane]) + 1),
-                    {std::bit_cast<std::uint32_t>(s.depth), slot}});
+    *runs++ = {static_cast<std::uint16_t>(row + lane),
+               static_cast<std::uint16_t>(static_cast<int>(begin[lane])),
+               static_cast<std::uint16_t>(static_cast<int>(end[lane]) + 1),
+               {std::bit_cast<std::uint32_t>(s.depth), slot}};
   }
+  return runs;
 }
 
 inline void list_tiles(std::span<const Splat> splats, std::uint32_t first_slot,
                        std::vector<TileRun>& runs) {
+  std::size_t most = 0;
+  for (const Splat& s : splats) most += s.tile_end_y - s.tile_y;
+  const std::size_t known = runs.size();
+  runs.resize(known + most);
+  TileRun* end = runs.data() + known;
   std::uint32_t slot = first_slot;
   for (const Splat& s : splats) {
     if (s.tile_end_x - s.tile_x == 1 && s.tile_end_y - s.tile_y == 1) {
-      runs.push_back(
-          {s.tile_y, s.tile_x, s.tile_end_x, {std::bit_cast<std::uint32_t>(s.depth), slot}});
+      *end++ = {s.tile_y, s.tile_x, s.tile_end_x, {std::bit_cast<std::uint32_t>(s.depth), slot}};
     } else {
-      const Whitening<Floats> w{Floats(s.whitening_xx), Floats(s.whitening_xy),
-                                Floats(s.whitening_yy)};
-      const Ellipse<Floats> ellipse =
-          make_ellipse(w, reach_of(Floats(s.log2_opacity)), Floats(s.half_extent_x));
-      for (int row = s.tile_y; row < s.tile_end_y; row += static_cast<int>(Floats::count))
-        list_rows(s, ellipse, row, slot, runs);
+      const Whitening<float> w{s.whitening_xx, s.whitening_xy, s.whitening_yy};
+      const Ellipse<float> ellipse =
+          make_ellipse(w, reach_of(s.log2_opacity), s.half_extent_x, s.rightmost_y);
+      for (int row = s.tile_y; row < s.tile_end_y; row += static_cast<int>(RowLanes::count))
+        end = list_rows(s, ellipse, row, slot, end);
     }
     ++slot;
   }
+  runs.resize(static_cast<std::size_t>(end - runs.data()));
 }
 
 }  // namespace HWY_NAMESPACE

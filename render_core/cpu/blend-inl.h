@@ -130,8 +130,8 @@ std::uint64_t blend_list(TileState& state, const BlendTask& task) {
   RowTerms terms;
   for (std::size_t i = 0; i < task.list.size() && state.live_blocks != 0; ++i) {
     if (i + prefetch_distance < task.list.size())
-      hwy::Prefetch(&task.splats[task.list[i + prefetch_distance]]);
-    const Splat& s = task.splats[task.list[i]];
+      hwy::Prefetch(&task.splats[task.list[i + prefetch_distance].value]);
+    const Splat& s = task.splats[task.list[i].value];
     const std::uint32_t met = row_terms(s, first, terms);
     const Vec3<Floats> colour{Floats(s.red), Floats(s.green), Floats(s.blue)};
     for (std::uint32_t blocks = state.live_blocks & (cull_blocks ? met : ~0u); blocks != 0;

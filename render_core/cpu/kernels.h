@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -26,25 +27,29 @@ struct alignas(64) Splat {
   float depth;  // world units along the view axis
   std::uint32_t original_index;
   std::uint16_t tile_x, tile_y, tile_end_x, tile_end_y;  // tiles its box touches, end exclusive
-  float reserved;
+  float rightmost_y;  // px below the centre: where the ellipse alpha >= alpha_min is rightmost
 };
 
-/// Projects and shades the Gaussians of one cluster. The visible ones go to the first free slots of
-/// `splats` and `keys`, which have room for the whole cluster; returns how many.
+/// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,
+/// which has room for the whole cluster; returns how many.
 struct ProjectTask {
   const SceneStore* scene;
   const Camera* camera;
   Pipeline pipeline;
   std::size_t cluster;
   Splat* splats;
-  DepthSlot* keys;  // key: bits of the depth; value: first_slot + position in `splats`
-  std::uint32_t first_slot;
+};
+
+/// Neighbouring tiles of one row that list the same splat.
+struct TileRun {
+  std::uint16_t row, begin, end;  // tiles; end exclusive
+  DepthSlot entry;
 };
 
 /// Blends one tile and writes its part of the image.
 struct BlendTask {
   const Splat* splats;
-  std::span<const std::uint32_t> list;  // slots, front to back
+  std::span<const DepthSlot> list;  // front to back
   glm::ivec2 tile;
   glm::vec3 background;
   bool cull_blocks;  // skip parts of rows that a splat's ellipse does not meet; same image
@@ -56,6 +61,9 @@ struct BlendTask {
 struct SimdKernels {
   std::string_view name;
   std::uint32_t (*project_cluster)(const ProjectTask& task);
+  // Appends the runs of tiles that the splats' ellipses meet; slots count up from first_slot.
+  void (*list_tiles)(std::span<const Splat> splats, std::uint32_t first_slot,
+                     std::vector<TileRun>& runs);
   std::uint64_t (*blend_tile)(const BlendTask& task);  // (Gaussian, pixel) pairs blended
 };
 

@@ -158,10 +158,11 @@ std::uint32_t project_cluster_of(const ProjectTask& task) {
     const Vec3<Floats> colour = shade<degree>(scene, i, mean, context.camera.position);
     const Floats index(hn::BitCast(d, hn::Load(du, scene.original_index() + i)));
     alignas(64) float splats[16 * Floats::count];
-    interleave({projected.centre_px.x, projected.centre_px.y, w.xx, w.xy, w.yy, log2_opacity,
-                half.x, half.y, colour.x, colour.y, colour.z, depth, index,
-                pack_pair(columns.low, rows.low), pack_pair(columns.end, rows.end), Floats(0.0)},
-               splats);
+    interleave(
+        {projected.centre_px.x, projected.centre_px.y, w.xx, w.xy, w.yy, log2_opacity, half.x,
+         half.y, colour.x, colour.y, colour.z, depth, index, pack_pair(columns.low, rows.low),
+         pack_pair(columns.end, rows.end), rightmost_y(w, max(reach, Floats(0.0)))},
+        splats);
     for (; hits != 0; hits &= hits - 1) {
       const int lane = std::countr_zero(hits);
       std::memcpy(&task.splats[visible++], splats + lane * 16, sizeof(Splat));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -81,23 +82,46 @@ class RadixSorter {
   std::vector<Histogram> histograms_;
 };
 
-/// Sorts a list of up to a few thousand elements on the calling thread, stably: four bytes, least
-/// significant first, bytes that all keys share skipped. `scratch` has the size of `data`.
-inline void radix_sort_short(std::span<DepthSlot> data, std::span<DepthSlot> scratch) {
-  std::array<std::array<std::uint32_t, 256>, 4> counts{};
-  for (const DepthSlot& e : data)
-    for (int byte = 0; byte < 4; ++byte) ++counts[byte][(e.key >> (8 * byte)) & 255u];
-  std::span<DepthSlot> from = data, to = scratch;
-  for (int byte = 0; byte < 4; ++byte) {
-    std::array<std::uint32_t, 256>& next = counts[byte];
-    const auto digit = [byte](const DepthSlot& e) { return (e.key >> (8 * byte)) & 255u; };
-    if (data.empty() || next[digit(from[0])] == data.size()) continue;
-    std::uint32_t offset = 0;
-    for (std::uint32_t& n : next) offset += std::exchange(n, offset);
-    for (const DepthSlot& e : from) to[next[digit(e)]++] = e;
-    std::swap(from, to);
+/// Sorts a list of up to some thousands of elements on the calling thread by key; `before` orders
+/// elements of equal keys. `scratch` has the size of `data`.
+///
+/// Two passes over the keys' leading 16 bits within their range bring nearly all elements into
+/// place; what shares those bits is sorted by comparison.
+template <class Before>
+void sort_list(std::span<DepthSlot> data, std::span<DepthSlot> scratch, const Before& before) {
+  const auto in_order = [&](const DepthSlot& a, const DepthSlot& b) {
+    return a.key != b.key ? a.key < b.key : before(a, b);
+  };
+  constexpr std::size_t short_list = 24;  // where comparing beats clearing histograms
+  if (data.size() <= short_list) return std::sort(data.begin(), data.end(), in_order);
+
+  std::uint32_t low = data.front().key, high = low;
+  for (const DepthSlot& e : data) {
+    low = std::min(low, e.key);
+    high = std::max(high, e.key);
   }
-  if (from.data() != data.data()) std::ranges::copy(from, data.begin());
+  const int shift = std::max(0, static_cast<int>(std::bit_width(high - low)) - 16);
+  const auto leading = [=](const DepthSlot& e) { return (e.key - low) >> shift; };
+
+  std::array<std::uint32_t, 256> next_low{}, next_high{};
+  for (const DepthSlot& e : data) {
+    ++next_low[leading(e) & 255u];
+    ++next_high[leading(e) >> 8];
+  }
+  std::uint32_t offset_low = 0, offset_high = 0;
+  for (std::size_t digit = 0; digit < 256; ++digit) {
+    offset_low += std::exchange(next_low[digit], offset_low);
+    offset_high += std::exchange(next_high[digit], offset_high);
+  }
+  for (const DepthSlot& e : data) scratch[next_low[leading(e) & 255u]++] = e;
+  for (const DepthSlot& e : scratch) data[next_high[leading(e) >> 8]++] = e;
+
+  for (auto first = data.begin(); first != data.end();) {
+    auto last = first + 1;
+    while (last != data.end() && leading(*last) == leading(*first)) ++last;
+    if (last - first > 1) std::sort(first, last, in_order);
+    first = last;
+  }
 }
 
 }  // namespace catgs

@@ -9,9 +9,8 @@ namespace catgs {
 namespace {
 
 /// Puts runs of equal keys into the order of the scene.
-template <class Element>
-void order_ties(std::span<const Splat> splats, std::span<Element> sorted) {
-  const auto original = [&](const Element& e) { return splats[e.value].original_index; };
+void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
+  const auto original = [&](const CodedIndex& e) { return splats[e.value].original_index; };
   for (auto first = sorted.begin(); first != sorted.end();) {
     auto last = first + 1;
     while (last != sorted.end() && last->key == first->key) ++last;
@@ -107,8 +106,10 @@ void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
       const std::span<DepthSlot> list(entries_.data() + starts_[tile],
                                       entries_.data() + starts_[tile + 1]);
       if (scratch.size() < list.size()) scratch.resize(list.size());
-      radix_sort_short(list, std::span(scratch).first(list.size()));
-      order_ties(splats, list);
+      sort_list(list, std::span(scratch).first(list.size()),
+                [&](const DepthSlot& a, const DepthSlot& b) {
+                  return splats[a.value].original_index < splats[b.value].original_index;
+                });
     }
   });
 }

@@ -60,22 +60,33 @@ CATGS_HD_INLINE T three_sigma_radius(const ProjectedGaussian<T>& g) {
   return ceil(T(3.0) * sqrt(largest));
 }
 
+/// dy of the rightmost point of {whitened_square <= reach}; the leftmost is at the opposite.
+template <class T>
+CATGS_HD_INLINE T rightmost_y(const Whitening<T>& w, T reach) {
+  const T steepness = mul_add(w.xy, w.xy, w.yy * w.yy);
+  return -w.xy * sqrt(reach / steepness) / w.yy;
+}
+
 /// The ellipse {whitened_square <= reach} prepared for being cut into bands of rows.
 template <class T>
 struct Ellipse {
   Whitening<T> w;
   T reach;
   T inverse_xx;
-  T rightmost_y;  // dy of the rightmost point; the leftmost is at -rightmost_y
+  T rightmost_y;
 };
 
-/// `reach` is widened by what rounding can add to it in `w`, so that a listed set misses no pixel.
+/// `reach` is widened by what rounding can add to it in `w` (it is 8 at most), so that a listed set
+/// misses no pixel.
 template <class T>
-CATGS_HD_INLINE Ellipse<T> make_ellipse(const Whitening<T>& w, T reach, T half_extent_x) {
-  const T root = sqrt(reach);
-  const T widened = reach + T(1e-4) + T(1e-6) * w.xx * half_extent_x * root;
-  const T y = -root * w.xy / (w.yy * sqrt(mul_add(w.xy, w.xy, w.yy * w.yy)));
-  return {w, widened, T(1.0) / w.xx, y};
+CATGS_HD_INLINE Ellipse<T> make_ellipse(const Whitening<T>& w, T reach, T half_extent_x,
+                                        T rightmost) {
+  return {w, reach + T(1e-4) + T(3e-6) * w.xx * half_extent_x, T(1.0) / w.xx, rightmost};
+}
+
+template <class T, class S>
+CATGS_HD_INLINE Ellipse<T> convert(const Ellipse<S>& e) {
+  return {{T(e.w.xx), T(e.w.xy), T(e.w.yy)}, T(e.reach), T(e.inverse_xx), T(e.rightmost_y)};
 }
 
 template <class T>
