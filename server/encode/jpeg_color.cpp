@@ -3,17 +3,19 @@
 #include <algorithm>
 #include <array>
 
+#include "render_core/math/colour-inl.h"
+
 namespace catgs {
 
 namespace {
 
-/// Luma weights of red and blue (ITU-R BT.709-6 item 3.2, BT.601-7 item 2.5.1); green has the rest.
+/// Luma weights of red and blue; green has the rest.
 struct LumaWeights {
   double red;
   double blue;
 };
-constexpr LumaWeights bt709 = {0.2126, 0.0722};
-constexpr LumaWeights bt601 = {0.299, 0.114};
+constexpr LumaWeights bt709 = {math::luma_red, math::luma_blue};
+constexpr LumaWeights bt601 = {0.299, 0.114};  // ITU-R BT.601-7, item 2.5.1
 
 // With E' = (R', G', B') in 0…1: Y = Kr R + Kg G + Kb B, Cb = (B - Y) / (2 (1 - Kb)),
 // Cr = (R - Y) / (2 (1 - Kr)); limited range codes Y as 16 + 219 Y and Cb, Cr as 128 + 224 C, full

@@ -17,8 +17,8 @@ TEST(Selftest, PassesAndNamesEveryEncoder) {
   EXPECT_EQ(run_selftest(out), 0) << out.str();
   EXPECT_THAT(out.str(), Not(HasSubstr("FAILED")));
   EXPECT_THAT(out.str(), HasSubstr("h264_nvenc"));
-  EXPECT_THAT(out.str(), ContainsRegex("libx264 +640x360 .* avc1\\.42C01F"));
-  EXPECT_THAT(out.str(), ContainsRegex("libx264 +1920x1080 .* avc1\\.42C02A"));
+  EXPECT_THAT(out.str(), ContainsRegex("libx264 +640x360 .* avc1\\.64001F"));
+  EXPECT_THAT(out.str(), ContainsRegex("libx264 +1920x1080 .* avc1\\.64002A"));
   EXPECT_THAT(out.str(), ContainsRegex("mjpeg +1280x720 .* JFIF"));
 }
 
