@@ -14,34 +14,42 @@ float haze_at(float distance, float radius) {
   return 0.93f * (1.0f - exp_exact(-distance / (1.6f * radius)));
 }
 
-}  // namespace
-
-void paint_sky(Painter& painter, const glm::vec2& centre, float radius, double weight,
-               std::uint64_t key) {
+/// Discs that cover the sky down to a little below the horizon, denser there, where one looks.
+void paint_shell(Painter& painter, const glm::vec2& centre, float radius, double weight,
+                 float overlap, std::uint64_t key) {
   const std::size_t count = painter.take(weight);
-  if (count == 0) return;
   Random random(key);
   const auto n = static_cast<float>(count);
   constexpr float lowest = -0.06f;
-  const float area = 6.2832f * (1.0f - lowest);  // steradians
+  constexpr float area = 6.2832f * (1.0f - lowest);  // steradians
   for (std::size_t i = 0; i < count; ++i) {
-    // Denser towards the horizon, where one looks: heights follow t^1.5.
+    // Heights follow t^1.5: against an even spread that is 1 / (1.5 sqrt(t)) as dense.
     const float t = (static_cast<float>(i) + 0.5f) / n;
-    const float height = lowest + (1.0f - lowest) * t * std::sqrt(t);
-    const float density = 1.0f / (1.5f * std::sqrt(t));  // against an even spread
+    const float root = std::sqrt(t);
+    const float height = lowest + (1.0f - lowest) * t * root;
     const float level = std::sqrt(std::max(0.0f, 1.0f - height * height));
     const SinCos turn = sin_cos_turns(static_cast<float>(i) * 0.61803399f);
     const glm::vec3 d(level * turn.cos, -height, level * turn.sin);
-    const glm::vec3 helper = level > 0.1f ? glm::vec3(0, -1, 0) : glm::vec3(1, 0, 0);
+    const glm::vec3 helper = level > 0.1f ? up : glm::vec3(1, 0, 0);
     const glm::vec3 side = glm::normalize(glm::cross(d, helper));
-    const float size =
-        radius * std::sqrt(area / (n * std::max(density, 0.67f))) * 0.64f * random.spread(0.05f);
+    const float size = radius * std::sqrt(area * 1.5f * root / n) * overlap * random.spread(0.05f);
     painter.put({.mean = at(centre.x, 0.0f, centre.y) + d * radius,
                  .rotation = rotation_of(side, glm::cross(d, side)),
                  .scale = {size, size, 0.06f * size},
                  .opacity = random.uniform(0.965f, 0.99f),
                  .colour = painter.light().sky(d)});
   }
+}
+
+}  // namespace
+
+void paint_sky(Painter& painter, const glm::vec2& centre, float radius, double weight,
+               std::uint64_t key) {
+  painter.divide(painter.take(weight), [&](Painter& p) {
+    paint_shell(p, centre, radius, 0.94, 0.66f, child(key, 1));
+    // Few and wide behind them, so that nothing black shows between.
+    paint_shell(p, centre, 1.06f * radius, 0.06, 0.9f, child(key, 2));
+  });
 }
 
 void paint_horizon(Painter& painter, const glm::vec2& centre, float inner, float outer,

@@ -6,6 +6,7 @@
 #include "render_core/scene/first_sight.h"
 #include "render_core/scene/synth/backdrop.h"
 #include "render_core/scene/synth/city_houses.h"
+#include "render_core/scene/synth/city_park.h"
 #include "render_core/scene/synth/city_plan.h"
 #include "render_core/scene/synth/city_props.h"
 #include "render_core/scene/synth/city_streets.h"
@@ -27,18 +28,10 @@ struct Cell {
   double weight;
 };
 
-/// Density of Gaussians here against that of the avenue and the park.
-float detail_at(const glm::vec2& place) {
-  const glm::vec2 d = place - city_centre;
-  const glm::vec2 stretched(d.x, d.y * 0.62f);  // along the avenue one sees further
-  return blend(1.0f, 0.30f, smooth_step(25.0f, 190.0f, glm::length(stretched)));
-}
-
 /// Everything of one cell of the plan: its block and the streets west and south of it.
 void paint_cell(Painter& painter, const Block& block, float haze) {
-  const float detail = detail_at(block.lot.middle());
-  paint_streets(painter, block, detail, haze);
-  paint_lot(painter, block, detail, haze);
+  paint_streets(painter, block, haze);
+  paint_lot(painter, block, haze);
   for (const Building& b : block.buildings)
     paint_building(painter, b, detail_at(b.base.middle()), haze);
   for (const Tree& tree : block.trees) {
@@ -50,9 +43,9 @@ void paint_cell(Painter& painter, const Block& block, float haze) {
     Random random(tree.key);
     const glm::vec3 leaves = leaf_albedo(random);
     paint_tree(painter, at(tree.place.x, 0, tree.place.y), tree.height, tree.crown, leaves, haze,
-               26.0 * tree.crown * tree.crown * detail_at(tree.place), tree.key);
+               110.0 * tree.crown * tree.crown * detail_at(tree.place), tree.key);
   }
-  paint_props(painter, block, detail, haze);
+  paint_props(painter, block, haze);
   const glm::vec2 corner = block.lot.min - 10.0f;
   paint_floaters(painter, at(corner.x, 26.0f, corner.y),
                  at(corner.x + block_pitch_m, 0.3f, corner.y + block_pitch_m),
@@ -102,14 +95,13 @@ std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double ta
 }  // namespace
 
 Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
-  const Light light(glm::normalize(glm::vec3(-0.847f, -0.42f, -0.342f)), child(seed, 1));
+  const Light light(glm::normalize(glm::vec3(-0.88f, -0.41f, -0.20f)), child(seed, 1));
   const std::size_t reference = std::min(count, full_density_count);
   const auto backdrop = static_cast<std::size_t>(backdrop_share * static_cast<double>(reference));
   const std::size_t in_cells = count - backdrop;
-  // Below full density the area shrinks with the square root of the count, the density likewise.
-  const double fill = std::sqrt(static_cast<double>(reference) / full_density_count);
-  const double target =
-      count < full_density_count ? fill * full_density_count : static_cast<double>(in_cells);
+  // Below full density the area shrinks with the count to the power 3/4, the density by the rest.
+  const double fill = std::sqrt(std::sqrt(static_cast<double>(reference) / full_density_count));
+  const double target = static_cast<double>(in_cells) / fill;
   const std::vector<Cell> cells = choose_cells(seed, light, target, pool);
   double total = 0.0;
   for (const Cell& cell : cells) total += cell.weight;
@@ -145,6 +137,9 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
       for (int dr = -2; dr <= 1; ++dr)
         add_shadows(plan_block(seed, cell.column + dc, cell.row + dr), shadows);
     }
+    const glm::vec2 corner = glm::vec2(cell.column, cell.row) * block_pitch_m;
+    shadows.keep({at(corner.x - 15.0f, 100.0f, corner.y - 15.0f),
+                  at(corner.x + block_pitch_m, 0.0f, corner.y + block_pitch_m)});
     const float haze = 0.30f * smooth_step(0.35f, 1.0f, cell.distance / std::max(radius, 200.0f));
     Painter painter(light, shadows, scene.cloud, first[i], first[i + 1] - first[i], cell.weight);
     paint_cell(painter, plan_block(seed, cell.column, cell.row), haze);
@@ -152,7 +147,8 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
 
   scene.name = "city";
   scene.format = "procedural";
-  scene.hints.start_pose = look_at(at(3.5f, 5.2f, -14.0f), at(-2.0f, 7.0f, 60.0f), up);
+  scene.hints.start_pose =
+      look_at(at(start_place.x, 4.0f, start_place.y), at(-3.0f, 8.5f, 60.0f), up);
   scene.hints.near_z = 0.2f;
   scene.hints.limits = {at(city_centre.x - radius, 90.0f, city_centre.y - radius),
                         at(city_centre.x + radius, 0.5f, city_centre.y + radius)};

@@ -10,27 +10,27 @@
 namespace catgs::synth {
 namespace {
 
-constexpr double facade_density = 5.0;  // Gaussians per square metre at detail 1
-constexpr double court_density = 1.6;
-constexpr double roof_density = 1.1;
+constexpr double facade_density = 12.0;  // Gaussians per square metre at detail 1
+constexpr double court_density = 3.0;
+constexpr double roof_density = 2.2;
 
 struct Palette {
   glm::vec3 wall, trim, shutter, roof;
 };
 
 constexpr std::array<glm::vec3, 9> stucco_walls = {
-    glm::vec3(0.62f, 0.47f, 0.28f), glm::vec3(0.66f, 0.56f, 0.40f), glm::vec3(0.58f, 0.33f, 0.20f),
-    glm::vec3(0.60f, 0.42f, 0.33f), glm::vec3(0.68f, 0.62f, 0.50f), glm::vec3(0.44f, 0.46f, 0.36f),
-    glm::vec3(0.50f, 0.51f, 0.53f), glm::vec3(0.64f, 0.50f, 0.36f), glm::vec3(0.52f, 0.25f, 0.17f)};
+    glm::vec3(0.62f, 0.47f, 0.28f), glm::vec3(0.56f, 0.45f, 0.30f), glm::vec3(0.58f, 0.33f, 0.20f),
+    glm::vec3(0.60f, 0.42f, 0.33f), glm::vec3(0.57f, 0.50f, 0.38f), glm::vec3(0.56f, 0.44f, 0.28f),
+    glm::vec3(0.60f, 0.43f, 0.35f), glm::vec3(0.56f, 0.41f, 0.28f), glm::vec3(0.52f, 0.25f, 0.17f)};
 constexpr std::array<glm::vec3, 4> stone_walls = {
-    glm::vec3(0.58f, 0.50f, 0.39f), glm::vec3(0.62f, 0.55f, 0.44f), glm::vec3(0.50f, 0.45f, 0.38f),
-    glm::vec3(0.66f, 0.60f, 0.51f)};
+    glm::vec3(0.50f, 0.42f, 0.31f), glm::vec3(0.54f, 0.46f, 0.35f), glm::vec3(0.50f, 0.45f, 0.38f),
+    glm::vec3(0.56f, 0.50f, 0.41f)};
 constexpr std::array<glm::vec3, 3> brick_walls = {glm::vec3(0.36f, 0.15f, 0.095f),
                                                   glm::vec3(0.42f, 0.20f, 0.12f),
                                                   glm::vec3(0.30f, 0.15f, 0.11f)};
 constexpr std::array<glm::vec3, 5> shutters = {
-    glm::vec3(0.06f, 0.13f, 0.10f), glm::vec3(0.10f, 0.16f, 0.22f), glm::vec3(0.25f, 0.08f, 0.05f),
-    glm::vec3(0.20f, 0.19f, 0.17f), glm::vec3(0.11f, 0.19f, 0.16f)};
+    glm::vec3(0.045f, 0.085f, 0.07f), glm::vec3(0.07f, 0.10f, 0.14f),
+    glm::vec3(0.17f, 0.06f, 0.04f), glm::vec3(0.15f, 0.13f, 0.11f), glm::vec3(0.30f, 0.27f, 0.22f)};
 constexpr std::array<glm::vec3, 6> awnings = {
     glm::vec3(0.45f, 0.07f, 0.05f), glm::vec3(0.07f, 0.20f, 0.14f), glm::vec3(0.09f, 0.14f, 0.30f),
     glm::vec3(0.60f, 0.52f, 0.40f), glm::vec3(0.55f, 0.30f, 0.07f), glm::vec3(0.28f, 0.08f, 0.14f)};
@@ -47,11 +47,12 @@ Palette palette_of(const Building& b) {
            : b.style == Style::brick ? pick(brick_walls, random)
                                      : pick(stucco_walls, random);
   if (b.style == Style::curtain) p.wall = {0.16f, 0.19f, 0.22f};
-  p.trim = blend(p.wall, glm::vec3(0.74f, 0.68f, 0.58f), 0.65f);
+  p.trim = blend(p.wall, glm::vec3(0.62f, 0.56f, 0.46f), 0.65f);
   p.shutter = pick(shutters, random);
   p.roof = b.roof == Roof::hip       ? blend(glm::vec3(0.36f, 0.15f, 0.08f),
                                              glm::vec3(0.46f, 0.22f, 0.12f), random.uniform())
            : b.roof == Roof::mansard ? glm::vec3(0.14f, 0.15f, 0.18f)
+           : b.roof == Roof::spire   ? glm::vec3(0.13f, 0.23f, 0.20f)  // copper
                                      : glm::vec3(0.30f, 0.29f, 0.27f);
   return p;
 }
@@ -93,7 +94,7 @@ Finish pane_finish(const Wall& wall, Random& random, float height, float lit_cha
   if (u < lit_chance) {
     f.glow = glm::vec3(0.95f, 0.52f, 0.20f) * random.uniform(0.45f, 1.25f);
     f.gloss_gain *= 0.5f;
-  } else if (u < lit_chance + 0.22f) {
+  } else if (u < lit_chance + 0.12f) {
     f.albedo = {0.30f, 0.28f, 0.25f};  // curtains
     f.gloss_gain *= 0.6f;
   }
@@ -105,60 +106,59 @@ struct Bay {
   float floor, height, sill, window_height;
 };
 
-/// Wall around one window, its glass, and as much joinery as the budget allows.
+/// The joinery of a window: frame, ledge, and with a larger budget its glazing bars.
+void paint_frame(Painter& p, const Wall& wall, float x0, float x1, float y0, float y1, bool bars,
+                 std::uint64_t key) {
+  const Finish trim = wall.finish(wall.palette.trim, y0, 0.02f);
+  paint_line(p, wall.point(x0 - 0.12f, y0 - 0.06f, 0.08f),
+             wall.point(x1 + 0.12f, y0 - 0.06f, 0.08f), 0.16f, trim, 1.6, child(key, 1));
+  paint_line(p, wall.point(x0, y1, 0.03f), wall.point(x1, y1, 0.03f), 0.13f, trim, 1.2,
+             child(key, 2));
+  paint_line(p, wall.point(x0, y0, 0.02f), wall.point(x0, y1, 0.02f), 0.1f, trim, 1.2,
+             child(key, 3));
+  paint_line(p, wall.point(x1, y0, 0.02f), wall.point(x1, y1, 0.02f), 0.1f, trim, 1.2,
+             child(key, 4));
+  if (!bars) return;
+  const Finish white = wall.finish({0.50f, 0.48f, 0.44f}, y0, 0.0f);
+  const float middle = (x0 + x1) * 0.5f, rail = y0 + 0.68f * (y1 - y0);
+  paint_line(p, wall.point(middle, y0, -0.04f), wall.point(middle, y1, -0.04f), 0.06f, white, 1.5,
+             child(key, 5));
+  paint_line(p, wall.point(x0, rail, -0.04f), wall.point(x1, rail, -0.04f), 0.06f, white, 1.2,
+             child(key, 6));
+}
+
+/// Wall around one window, its glass, and as much joinery as the budget of `budget` Gaussians
+/// allows. The pieces tile the bay: one lying on another would be hidden by it from the side, where
+/// whichever centre is nearer comes first.
 void paint_bay(Painter& p, const Wall& wall, const Bay& bay, float budget, std::uint64_t key) {
   Random random(key);
-  const Palette& colours = wall.palette;
-  const float pier = bay.window_start - bay.start;
-  const float right = bay.start + bay.width - bay.window_start - bay.window_width;
-  const float top = bay.sill + bay.window_height;
-  const Finish plaster = wall.finish(colours.wall, bay.floor);
   const bool framed = budget >= 12.0f;
   const bool shuttered =
       wall.building.style == Style::stucco && (wall.building.key & 3) != 0 && budget >= 10.0f;
   const double fine = std::max(0.0f, budget - (framed ? 14.0f : 7.0f)) / (bay.width * bay.height);
-  const auto weight = [&](double least, float w, float h) { return least + fine * w * h; };
-
-  paint_patch(p, wall.patch(bay.start, bay.floor, pier, bay.height), plaster,
-              weight(2, pier, bay.height), child(key, 1));
-  paint_patch(p, wall.patch(bay.start + bay.width - right, bay.floor, right, bay.height), plaster,
-              weight(2, right, bay.height), child(key, 2));
-  paint_patch(p, wall.patch(bay.window_start, bay.floor, bay.window_width, bay.sill), plaster,
-              weight(1, bay.window_width, bay.sill), child(key, 3));
-  paint_patch(p, wall.patch(bay.window_start, bay.floor + top, bay.window_width, bay.height - top),
-              plaster, weight(1, bay.window_width, bay.height - top), child(key, 4));
-  const Finish pane = pane_finish(wall, random, bay.floor, 0.16f);
-  paint_patch(p,
-              wall.patch(bay.window_start, bay.floor + bay.sill, bay.window_width,
-                         bay.window_height, -0.08f),
-              pane, weight(2, bay.window_width, bay.window_height) * 1.3, child(key, 5), 0.5f);
-  if (!framed) return;
-  const Finish trim = wall.finish(colours.trim, bay.floor, 0.02f);
+  const auto piece = [&](const Finish& finish, float a, float h, float width, float tall,
+                         double least, std::uint64_t index, float out = 0.0f) {
+    paint_patch(p, wall.patch(a, h, width, tall, out), finish, least + fine * width * tall,
+                child(key, index), 0.57f);
+  };
   const float x0 = bay.window_start, x1 = x0 + bay.window_width;
-  const float y0 = bay.floor + bay.sill, y1 = bay.floor + top;
-  paint_line(p, wall.point(x0 - 0.12f, y0 - 0.06f, 0.08f),
-             wall.point(x1 + 0.12f, y0 - 0.06f, 0.08f), 0.16f, trim, 1.6, child(key, 6));
-  paint_line(p, wall.point(x0, y1, 0.03f), wall.point(x1, y1, 0.03f), 0.13f, trim, 1.2,
-             child(key, 7));
-  paint_line(p, wall.point(x0, y0, 0.02f), wall.point(x0, y1, 0.02f), 0.1f, trim, 1.2,
-             child(key, 8));
-  paint_line(p, wall.point(x1, y0, 0.02f), wall.point(x1, y1, 0.02f), 0.1f, trim, 1.2,
-             child(key, 9));
+  const float shutter =
+      shuttered ? std::min(0.5f * bay.window_width, x0 - bay.start - 0.15f) : 0.0f;
+  const float left = x0 - shutter, right = x1 + shutter, end = bay.start + bay.width;
+  const float y0 = bay.floor + bay.sill, y1 = y0 + bay.window_height;
+  const Finish plaster = wall.finish(wall.palette.wall, bay.floor);
+  piece(plaster, bay.start, bay.floor, left - bay.start, bay.height, 2, 1);
+  piece(plaster, right, bay.floor, end - right, bay.height, 2, 2);
+  piece(plaster, left, bay.floor, right - left, bay.sill, 1, 3);
+  piece(plaster, left, y1, right - left, bay.floor + bay.height - y1, 1, 4);
+  piece(pane_finish(wall, random, bay.floor, 0.16f), x0, y0, bay.window_width, bay.window_height,
+        2.6, 5, -0.08f);
   if (shuttered) {
-    const Finish wood = wall.finish(colours.shutter, bay.floor, 0.1f);
-    const float w = std::min(0.55f, pier - 0.1f);
-    paint_patch(p, wall.patch(x0 - w - 0.03f, y0, w, y1 - y0, 0.05f), wood, weight(1.5, w, y1 - y0),
-                child(key, 10), 0.42f);
-    paint_patch(p, wall.patch(x1 + 0.03f, y0, w, y1 - y0, 0.05f), wood, weight(1.5, w, y1 - y0),
-                child(key, 11), 0.42f);
+    const Finish wood = wall.finish(wall.palette.shutter, bay.floor, 0.1f);
+    piece(wood, left, y0, shutter, y1 - y0, 1.5, 6, 0.04f);
+    piece(wood, x1, y0, shutter, y1 - y0, 1.5, 7, 0.04f);
   }
-  if (budget < 17.0f) return;
-  const Finish bars = wall.finish({0.55f, 0.53f, 0.49f}, bay.floor, 0.0f);
-  const float middle = (x0 + x1) * 0.5f;
-  paint_line(p, wall.point(middle, y0, -0.04f), wall.point(middle, y1, -0.04f), 0.06f, bars, 1.5,
-             child(key, 12));
-  paint_line(p, wall.point(x0, y0 + 0.68f * (y1 - y0), -0.04f),
-             wall.point(x1, y0 + 0.68f * (y1 - y0), -0.04f), 0.06f, bars, 1.2, child(key, 13));
+  if (framed) paint_frame(p, wall, x0, x1, y0, y1, budget >= 17.0f, child(key, 8));
 }
 
 /// A storey as a band of glass and a band of wall: from far away that is what remains of it.
@@ -218,13 +218,19 @@ void paint_shops(Painter& p, const Wall& wall) {
     const float a = static_cast<float>(i) * width;
     const float front = height - 1.2f;
     paint_patch(p, wall.patch(a, 0, 0.5f, height - 0.55f, 0.05f), stone, 2.2, child(key, 1));
+    // What is on display below, the lit room above it.
+    const float glow = random.chance(0.75f) ? random.uniform(0.25f, 0.7f) : 0.05f;
     Finish glass = pane_finish(wall, random, 0.0f, 0.0f);
-    glass.albedo = {0.05f, 0.045f, 0.04f};
-    glass.glow = glm::vec3(1.0f, 0.62f, 0.28f) *
-                 (random.chance(0.75f) ? random.uniform(0.30f, 0.9f) : 0.06f);
-    glass.mottle = 0.4f;
-    paint_patch(p, wall.patch(a + 0.5f, 0.55f, width - 0.5f, front - 0.55f, -0.1f), glass, 9.0,
-                child(key, 2), 0.5f);
+    glass.mottle = 0.5f;
+    glass.albedo = pick(awnings, random) * 0.5f;
+    glass.glow = pick(awnings, random) * (0.3f * glow) + glm::vec3(0.10f, 0.06f, 0.02f) * glow;
+    const float split = 0.55f + 0.42f * (front - 0.55f);
+    paint_patch(p, wall.patch(a + 0.5f, 0.55f, width - 0.5f, split - 0.55f, -0.1f), glass, 5.0,
+                child(key, 2), 0.62f);
+    glass.albedo = {0.04f, 0.035f, 0.03f};
+    glass.glow = glm::vec3(0.85f, 0.47f, 0.18f) * glow;
+    paint_patch(p, wall.patch(a + 0.5f, split, width - 0.5f, front - split, -0.1f), glass, 5.0,
+                child(key, 8), 0.62f);
     const glm::vec3 paint = pick(awnings, random);
     const Finish panel = wall.finish(paint * 0.7f, 0.0f);
     paint_patch(p, wall.patch(a + 0.5f, 0, width - 0.5f, 0.55f, -0.02f), panel, 2.5, child(key, 3));
@@ -315,9 +321,10 @@ void paint_roof(Painter& painter, const Building& b, const Palette& palette, flo
   const glm::vec2 size = b.base.size();
   const float e = b.eaves();
   const float rise = b.roof_height();
-  const float run = b.roof == Roof::mansard
-                        ? 1.5f
-                        : (b.roof == Roof::hip ? 0.499f * std::min(size.x, size.y) : 0.0f);
+  const float run = b.roof == Roof::mansard ? 1.5f
+                                            : (b.roof == Roof::hip || b.roof == Roof::spire
+                                                   ? 0.499f * std::min(size.x, size.y)
+                                                   : 0.0f);
   std::array<float, 4> inset{};
   for (std::size_t s = 0; s < 4; ++s) inset[s] = b.sides[s] == SideUse::party ? 0.0f : run;
   const float x0 = b.base.min.x, x1 = b.base.max.x, z0 = b.base.min.y, z1 = b.base.max.y;
@@ -356,16 +363,15 @@ void paint_roof(Painter& painter, const Building& b, const Palette& palette, flo
   }
   if (flat) {  // a parapet
     const Finish coping{.albedo = palette.trim, .sky_visibility = 0.9f, .haze = haze};
-    const float p = 0.9f;
-    paint_box(painter, at(x0, e + p, z0), at(x1, e, z0 + 0.3f), coping, density * size.x * 1.6,
-              child(b.key, 511));
-    paint_box(painter, at(x0, e + p, z1 - 0.3f), at(x1, e, z1), coping, density * size.x * 1.6,
-              child(b.key, 512));
-    paint_box(painter, at(x0, e + p, z0), at(x0 + 0.3f, e, z1), coping, density * size.y * 1.6,
-              child(b.key, 513));
-    paint_box(painter, at(x1 - 0.3f, e + p, z0), at(x1, e, z1), coping, density * size.y * 1.6,
-              child(b.key, 514));
+    const float h = e + 0.45f;
+    const std::array<glm::vec3, 5> corners = {at(x0, h, z0), at(x1, h, z0), at(x1, h, z1),
+                                              at(x0, h, z1), at(x0, h, z0)};
+    for (std::size_t s = 0; s < 4; ++s) {
+      paint_line(painter, corners[s], corners[s + 1], 0.9f, coping, 4.0 + density * size.x * 1.5,
+                 child(b.key, 511 + s));
+    }
   }
+  if (b.roof == Roof::spire) return;
   // Chimneys, stair heads, ventilation.
   Random random(child(b.key, 515));
   const int things = 2 + random.below(3);
@@ -394,7 +400,7 @@ void paint_dormers(Painter& painter, const Wall& wall, float detail) {
   const float step = wall.length / static_cast<float>(count);
   for (int i = 0; i < count; ++i) {
     const std::uint64_t key = child(wall.key, 600 + static_cast<std::uint64_t>(i));
-    const std::size_t n = painter.take(16.0 * detail);
+    const std::size_t n = painter.take(34.0 * detail);
     painter.divide(n, [&](Painter& p) {
       Random random(key);
       const float a = (static_cast<float>(i) + 0.5f) * step - 0.65f;

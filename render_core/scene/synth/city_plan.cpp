@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "render_core/scene/synth/painter.h"
@@ -9,8 +10,6 @@
 
 namespace catgs::synth {
 namespace {
-
-constexpr float row_depth_m = 12.5f;  // of the houses around a court
 
 BlockUse use_of(std::uint64_t key, int column, int row) {
   if ((column == -1 || column == -2) && (row == 0 || row == 1)) return BlockUse::park;
@@ -77,7 +76,7 @@ void add_row(Block& block, std::uint64_t key, float start, float end, Side stree
 
 void plan_houses(Block& block) {
   const Rect& lot = block.lot;
-  const float d = row_depth_m;
+  const float d = house_depth_m;
   add_row(block, child(block.key, 10), lot.min.y, lot.max.y, Side::west, Side::south, Side::north,
           true, [&](float a, float b) {
             return Rect{{lot.min.x, a}, {lot.min.x + d, b}};
@@ -159,10 +158,10 @@ void plan_square(Block& block) {
   hall.sides.fill(SideUse::street);
   Building tower =
       make_house(child(block.key, 41), {m + glm::vec2(11, -14), m + glm::vec2(19, -6)});
-  tower.floors = 11;
+  tower.floors = 12;
   tower.floor_height = 3.4f;
   tower.style = Style::stone;
-  tower.roof = Roof::hip;
+  tower.roof = Roof::spire;
   tower.sides.fill(SideUse::street);
   block.buildings = {hall, tower};
   Random random(child(block.key, 42));
@@ -222,11 +221,22 @@ float Building::roof_height() const {
   switch (roof) {
     case Roof::mansard:
       return 3.4f;
+    case Roof::spire:
+      return 1.7f * std::min(base.size().x, base.size().y);
     case Roof::hip:
       return 0.32f * std::min(base.size().x, base.size().y);
     default:
       return 1.0f;
   }
+}
+
+float detail_at(const glm::vec2& place) {
+  const glm::vec2 nearest(0.0f, glm::clamp(place.y, -5.0f, 60.0f));
+  const glm::vec2 d = (place - nearest) / 27.0f;
+  const glm::vec2 from_start = (place - start_place) / 9.0f;
+  const float underfoot =
+      2.0f / (1.0f + glm::dot(from_start, from_start) * glm::dot(from_start, from_start));
+  return std::max(0.09f, 1.7f / (1.0f + glm::dot(d, d))) + underfoot;
 }
 
 float street_width_x(int column) { return column == 0 ? 28.0f : 17.0f; }

@@ -20,7 +20,7 @@ struct Rect {
   [[nodiscard]] glm::vec2 middle() const { return (min + max) * 0.5f; }
 };
 
-enum class Roof { mansard, hip, terrace, tower };
+enum class Roof { mansard, hip, spire, terrace, tower };
 enum class Style { stucco, stone, brick, curtain };  // curtain: a glass front
 
 /// Sides of a rectangle, in the order of the arrays below: -x, +x, -z, +z.
@@ -77,9 +77,17 @@ struct Block {
 };
 
 inline constexpr float block_pitch_m = 84.0f;
+inline constexpr float house_depth_m = 12.5f;  // of the row of houses around a court
+inline constexpr float pond_share = 0.42f;     // of half a park's width
 
-/// Where the pictures are taken: the avenue at x = 0, its first crossing at z = 0.
+/// The city grows around this place on the avenue at x = 0, beyond its first crossing at z = 0.
 inline constexpr glm::vec2 city_centre(-8.0f, 62.0f);
+inline constexpr glm::vec2 start_place(1.6f, -0.5f);  // of the first view
+
+/// Density of Gaussians here against that of the stretch of the avenue where a visit starts. It
+/// falls like the pixels that a square metre covers from there, down to a floor that still shows
+/// windows.
+float detail_at(const glm::vec2& place);
 
 /// From building line to building line of the street at x = 84 column (or z = 84 row).
 float street_width_x(int column);

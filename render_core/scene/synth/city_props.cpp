@@ -15,8 +15,11 @@ constexpr std::array<glm::vec3, 8> car_paints = {
     glm::vec3(0.05f, 0.10f, 0.24f), glm::vec3(0.20f, 0.21f, 0.22f),
     glm::vec3(0.50f, 0.36f, 0.08f), glm::vec3(0.07f, 0.16f, 0.12f)};
 
+/// Small things stay recognisable where walls and ground are already coarse.
+float prop_detail(const glm::vec2& place) { return glm::clamp(detail_at(place), 0.25f, 1.4f); }
+
 void paint_car(Painter& painter, const Car& car, float detail, float haze) {
-  painter.divide(painter.take(90.0 * detail), [&](Painter& p) {
+  painter.divide(painter.take(170.0 * detail), [&](Painter& p) {
     Random random(car.key);
     const float direction = car.forward ? 1.0f : -1.0f;
     const glm::vec2 ahead = car.along_x ? glm::vec2(direction, 0) : glm::vec2(0, direction);
@@ -73,7 +76,7 @@ void paint_car(Painter& painter, const Car& car, float detail, float haze) {
 }
 
 void paint_lamp(Painter& painter, const Lamp& lamp, float detail, float haze) {
-  painter.divide(painter.take(16.0 * detail), [&](Painter& p) {
+  painter.divide(painter.take(24.0 * detail), [&](Painter& p) {
     const std::uint64_t key = 7;
     const Finish iron{
         .albedo = glm::vec3(0.05f, 0.055f, 0.05f), .sky_visibility = 0.8f, .haze = haze};
@@ -87,11 +90,11 @@ void paint_lamp(Painter& painter, const Lamp& lamp, float detail, float haze) {
                2.0, key);
     const Finish light{.albedo = glm::vec3(0.6f), .glow = {2.4f, 1.7f, 0.8f}, .haze = haze};
     paint_blob(p, head, {0.24f, 0.2f, 0.24f}, light, 5.0, key);
-    if (p.take(1.0) > 0) {
+    for (std::size_t halo = p.take(1.0); halo > 0; --halo) {
       p.put({.mean = head,
              .rotation = {1, 0, 0, 0},
              .scale = glm::vec3(0.7f),
-             .opacity = 0.16f,
+             .opacity = 0.12f,
              .colour = {1.0f, 0.82f, 0.52f}});
     }
   });
@@ -99,7 +102,7 @@ void paint_lamp(Painter& painter, const Lamp& lamp, float detail, float haze) {
 
 void paint_person(Painter& painter, const glm::vec2& place, float detail, float haze,
                   std::uint64_t key) {
-  painter.divide(painter.take(18.0 * detail), [&](Painter& p) {
+  painter.divide(painter.take(36.0 * detail), [&](Painter& p) {
     Random random(key);
     const float h = random.uniform(0.93f, 1.08f);
     const glm::vec3 coat = car_paints[static_cast<std::size_t>(random.below(8))] * 0.7f + 0.02f;
@@ -135,14 +138,14 @@ void paint_person(Painter& painter, const glm::vec2& place, float detail, float 
 
 }  // namespace
 
-void paint_props(Painter& painter, const Block& block, float detail, float haze) {
+void paint_props(Painter& painter, const Block& block, float haze) {
   if (!painter.measuring()) {
     const float x = block_pitch_m * static_cast<float>(block.column),
                 z = block_pitch_m * static_cast<float>(block.row);
     painter.shadows().focus({at(x - 14, 6, z - 14), at(x + block_pitch_m, 0, z + block_pitch_m)});
   }
-  for (const Car& car : block.cars) paint_car(painter, car, detail, haze);
-  for (const Lamp& lamp : block.lamps) paint_lamp(painter, lamp, detail, haze);
+  for (const Car& car : block.cars) paint_car(painter, car, prop_detail(car.place), haze);
+  for (const Lamp& lamp : block.lamps) paint_lamp(painter, lamp, prop_detail(lamp.place), haze);
   Random random(child(block.key, 80));
   const float x = block_pitch_m * static_cast<float>(block.column),
               z = block_pitch_m * static_cast<float>(block.row);
@@ -155,7 +158,7 @@ void paint_props(Painter& painter, const Block& block, float detail, float haze)
     const float across = side * (half - random.uniform(0.7f, pavement_width(2.0f * half) - 1.2f));
     const glm::vec2 place = on_west ? glm::vec2(x + across, z + south + along * 0.8f)
                                     : glm::vec2(x + west + along * 0.8f, z + across);
-    paint_person(painter, place, detail, haze,
+    paint_person(painter, place, prop_detail(place), haze,
                  child(block.key, 1000 + static_cast<std::uint64_t>(i)));
   }
 }

@@ -6,6 +6,6 @@
 namespace catgs::synth {
 
 /// Cars, street lamps and passers-by of a block's streets.
-void paint_props(Painter& painter, const Block& block, float detail, float haze);
+void paint_props(Painter& painter, const Block& block, float haze);
 
 }  // namespace catgs::synth

@@ -7,9 +7,6 @@ namespace catgs::synth {
 
 /// Road, markings, kerbs and pavements of the streets west and south of a block and the crossing
 /// where they meet.
-void paint_streets(Painter& painter, const Block& block, float detail, float haze);
-
-/// The ground inside the block: courts, squares, a park's lawns, paths and pond.
-void paint_lot(Painter& painter, const Block& block, float detail, float haze);
+void paint_streets(Painter& painter, const Block& block, float haze);
 
 }  // namespace catgs::synth

@@ -5,8 +5,8 @@
 namespace catgs::synth {
 namespace {
 
-const glm::vec3 sun_radiance(2.9f, 1.80f, 0.82f);
-const glm::vec3 sky_radiance(0.29f, 0.36f, 0.52f);
+const glm::vec3 sun_radiance(2.25f, 1.42f, 0.66f);
+const glm::vec3 sky_radiance(0.25f, 0.32f, 0.48f);
 const glm::vec3 bounce_radiance(0.25f, 0.17f, 0.10f);  // from sunlit ground and walls
 
 float filmic(float x) {  // Narkowicz 2015, "ACES filmic tone mapping curve"
@@ -138,8 +138,8 @@ glm::vec3 Light::clear_sky(const glm::vec3& d) const {
       blend(glm::vec3(0.52f, 0.62f, 0.79f), glm::vec3(0.74f, 0.74f, 0.74f), toward);
   const glm::vec3 horizon =
       blend(glm::vec3(0.82f, 0.70f, 0.69f), glm::vec3(1.0f, 0.82f, 0.55f), toward);
-  const glm::vec3 low = blend(horizon, middle, smooth_step(0.0f, 0.30f, height));
-  const glm::vec3 gradient = blend(low, zenith, smooth_step(0.15f, 0.85f, height));
+  const glm::vec3 low = blend(horizon, middle, smooth_step(0.02f, 0.42f, height));
+  const glm::vec3 gradient = blend(low, zenith, smooth_step(0.22f, 0.95f, height));
   const float cosine = clamp01(glm::dot(d, to_sun_));
   const float glow = 0.30f * power(cosine, 2) + 0.35f * power(cosine, 5) + 0.6f * power(cosine, 9);
   return glm::min(gradient + glm::vec3(1.0f, 0.80f, 0.48f) * glow * 0.55f, glm::vec3(1.0f));
@@ -161,14 +161,14 @@ glm::vec3 Light::sky(const glm::vec3& d) const {
   const float density = fractal_noise(key_, x + 11.0f, z + 5.0f, 5);
   const float ahead =
       fractal_noise(key_, x + 11.0f + 0.25f * to_sun_.x, z + 5.0f + 0.25f * to_sun_.z, 4);
-  const float cover = smooth_step(0.50f, 0.72f, density) * smooth_step(0.03f, 0.22f, height);
+  const float cover = smooth_step(0.46f, 0.66f, density) * smooth_step(0.02f, 0.16f, height);
   const float lit = clamp01(0.62f + 2.2f * (density - ahead));
   const float toward = clamp01(glm::dot(d, to_sun_));
   const glm::vec3 shade_colour =
       blend(glm::vec3(0.62f, 0.58f, 0.68f), glm::vec3(0.80f, 0.64f, 0.55f), toward);
   const glm::vec3 lit_colour =
       blend(glm::vec3(0.98f, 0.88f, 0.80f), glm::vec3(1.0f, 0.93f, 0.76f), toward);
-  return blend(colour, blend(shade_colour, lit_colour, lit), 0.85f * cover);
+  return blend(colour, blend(shade_colour, lit_colour, lit), 0.9f * cover);
 }
 
 /// What a mirror in a street shows: sky above, walls at eye level, paving below.

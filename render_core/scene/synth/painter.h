@@ -62,7 +62,7 @@ class Painter {
   [[nodiscard]] const Light& light() const { return light_; }
   [[nodiscard]] Shadows& shadows() { return shadows_; }
 
-  /// Gaussians that a piece of this weight is to put.
+  /// Gaussians that a piece of this weight (>= 0) is to put.
   std::size_t take(double weight);
 
   void put(const Splat& splat);

@@ -34,7 +34,7 @@ std::array<Clump, clump_count> grow_crown(const glm::vec3& centre, float crown, 
     const float out = crown * random.uniform(0.45f, 0.62f) * std::sqrt(1.0f - 0.7f * lift * lift);
     clumps[static_cast<std::size_t>(i)] = {
         centre + glm::vec3(out * turn.cos, -lift * crown, out * turn.sin),
-        crown * random.uniform(0.34f, 0.50f)};
+        crown * random.uniform(0.36f, 0.50f)};
   }
   return clumps;
 }
@@ -43,8 +43,8 @@ std::array<Clump, clump_count> grow_crown(const glm::vec3& centre, float crown, 
 
 glm::vec3 leaf_albedo(Random& random) {
   const float u = random.uniform();
-  if (u < 0.10f) return {0.34f, 0.17f, 0.035f};
-  if (u < 0.22f) return {0.30f, 0.24f, 0.05f};
+  if (u < 0.07f) return {0.30f, 0.145f, 0.035f};
+  if (u < 0.17f) return {0.25f, 0.20f, 0.05f};
   return blend(glm::vec3(0.085f, 0.15f, 0.035f), glm::vec3(0.17f, 0.21f, 0.05f), random.uniform());
 }
 
@@ -58,7 +58,7 @@ void paint_tree(Painter& painter, const glm::vec3& foot, float height, float cro
   const Light& light = painter.light();
 
   const std::size_t wood = count >= 12 ? 3 + count / 40 : 0;
-  const std::size_t core = (count - wood) / 7;
+  const std::size_t core = (count - wood) / 9;
   const std::size_t leaves = count - wood - core;
   const Finish bark{.albedo = {0.13f, 0.095f, 0.07f}, .sky_visibility = 0.6f, .haze = haze};
   painter.divide(wood, [&](Painter& p) {
@@ -96,22 +96,22 @@ void paint_tree(Painter& painter, const glm::vec3& foot, float height, float cro
     }
     const Clump& clump = clumps[which];
     const glm::vec3 out = unit_vector(random);
-    const glm::vec3 point = clump.centre + out * (clump.radius * random.uniform(0.80f, 1.04f));
+    const glm::vec3 point = clump.centre + out * (clump.radius * random.uniform(0.72f, 1.10f));
     const glm::vec3 from_centre = (point - centre) / crown;
     const glm::vec3 normal =
         glm::normalize(out * 0.8f + from_centre * 0.7f + glm::vec3(0, -0.15f, 0));
     const float facing = glm::dot(normal, light.to_sun());
     const float lit = sun * smooth_step(-0.35f, 0.55f, facing);
     const float open = 0.45f + 0.45f * clamp01(0.5f + 0.5f * -normal.y);
-    const glm::vec3 tone = albedo * random.spread(0.30f);
+    const glm::vec3 tone = albedo * random.spread(0.34f);
     const glm::vec3 colour = light.shade(tone, light.to_sun(), 0.62f * lit, open);
     const bool fringe = random.chance(0.10f);
-    const float size = share * (fringe ? 0.6f : 0.44f) * random.spread(0.35f);
-    const glm::vec3 tilt = glm::normalize(normal + unit_vector(random) * 0.75f);
+    const float size = share * (fringe ? 0.45f : 0.31f) * random.spread(0.40f);
+    const glm::vec3 tilt = glm::normalize(normal + unit_vector(random) * 1.1f);
     const glm::vec3 side = glm::normalize(glm::cross(tilt, glm::vec3(0.36f, 0.48f, 0.8f)));
     painter.put({.mean = point,
                  .rotation = rotation_of(side, glm::cross(tilt, side)),
-                 .scale = {size * 1.2f, size * 0.8f, size * 0.16f},
+                 .scale = {size * 1.25f, size * 0.85f, size * 0.2f},
                  .opacity = fringe ? random.uniform(0.06f, 0.45f) : random.uniform(0.90f, 0.985f),
                  .colour = haze > 0.0f ? blend(colour, light.haze(point), haze) : colour,
                  .lobe = &light.lobe(Gloss::leaf, up),
@@ -120,7 +120,8 @@ void paint_tree(Painter& painter, const glm::vec3& foot, float height, float cro
 }
 
 void paint_blades(Painter& painter, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v,
-                  float height, const glm::vec3& albedo, double weight, std::uint64_t key) {
+                  float height, const glm::vec3& albedo, float haze, double weight,
+                  std::uint64_t key) {
   const std::size_t count = painter.take(weight);
   const Light& light = painter.light();
   Random random(key);
@@ -132,15 +133,16 @@ void paint_blades(Painter& painter, const glm::vec3& corner, const glm::vec3& u,
         glm::normalize(glm::cross(along, unit_vector(random) + glm::vec3(1e-3f)));
     const float length = height * random.spread(0.3f);
     const float sun = painter.shadows().sun_visibility(foot + along * length);
-    painter.put(
-        {.mean = foot + along * (0.45f * length),
-         .rotation = rotation_of(along, side),
-         .scale = {0.36f * length, 0.05f * length, 0.012f * length},
-         .opacity =
-             random.chance(0.12f) ? random.uniform(0.06f, 0.45f) : random.uniform(0.91f, 0.985f),
-         .colour = light.shade(albedo * random.spread(0.2f), light.to_sun(), 0.55f * sun, 0.8f),
-         .lobe = &light.lobe(Gloss::leaf, {0, -1, 0}),
-         .lobe_gain = 0.3f + 0.7f * sun});
+    const glm::vec3 colour =
+        light.shade(albedo * random.spread(0.2f), light.to_sun(), 0.55f * sun, 0.8f);
+    painter.put({.mean = foot + along * (0.45f * length),
+                 .rotation = rotation_of(along, side),
+                 .scale = {0.36f * length, 0.05f * length, 0.012f * length},
+                 .opacity = random.chance(0.12f) ? random.uniform(0.06f, 0.45f)
+                                                 : random.uniform(0.91f, 0.985f),
+                 .colour = haze > 0.0f ? blend(colour, light.haze(foot), haze) : colour,
+                 .lobe = &light.lobe(Gloss::leaf, up),
+                 .lobe_gain = (0.3f + 0.7f * sun) * (1.0f - haze)});
   }
 }
 

@@ -15,6 +15,7 @@ glm::vec3 leaf_albedo(Random& random);
 
 /// Upright blades or stems over a patch of ground.
 void paint_blades(Painter& painter, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v,
-                  float height, const glm::vec3& albedo, double weight, std::uint64_t key);
+                  float height, const glm::vec3& albedo, float haze, double weight,
+                  std::uint64_t key);
 
 }  // namespace catgs::synth

@@ -26,6 +26,12 @@ bool Shadows::may_shade(const glm::vec3& min, const glm::vec3& max, const Bounds
          glm::min(min.z, min.z + dz) <= region.max.z && glm::max(max.z, max.z + dz) >= region.min.z;
 }
 
+void Shadows::keep(const Bounds& region) {
+  focus(region);
+  boxes_ = near_boxes_;
+  balls_ = near_balls_;
+}
+
 void Shadows::focus(const Bounds& region) {
   near_boxes_.clear();
   near_balls_.clear();

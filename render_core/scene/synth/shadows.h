@@ -17,6 +17,9 @@ class Shadows {
   /// A ball that swallows `density` of the light through its middle and less towards its rim.
   void add_ball(const glm::vec3& centre, float radius, float density);
 
+  /// Forgets for good what shades nothing of `region`.
+  void keep(const Bounds& region);
+
   /// Keeps only what may shade `region` in mind, until the next call. Queries outside are wrong.
   void focus(const Bounds& region);
 

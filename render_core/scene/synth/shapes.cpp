@@ -47,12 +47,12 @@ Spacing space_out(std::size_t count, float overlap, float inset) {
 }  // namespace
 
 void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, double weight,
-                 std::uint64_t key, float overlap) {
-  paint_patch(painter, patch, finish, painter.take(weight), key, overlap);
+                 std::uint64_t key, float overlap, float inset) {
+  paint_patch(painter, patch, finish, painter.take(weight), key, overlap, inset);
 }
 
 void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, std::size_t count,
-                 std::uint64_t key, float overlap) {
+                 std::uint64_t key, float overlap, float inset) {
   if (count == 0) return;
   const float width = glm::length(patch.u);
   const float height = glm::length(patch.v);
@@ -66,12 +66,12 @@ void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, std
   const auto n = static_cast<float>(count);
   const auto rows = static_cast<std::size_t>(
       glm::clamp(std::floor(std::sqrt(n * height / width) + 0.5f), 1.0f, n));
-  const Spacing down = space_out(rows, overlap, 1.1f);
+  const Spacing down = space_out(rows, overlap, inset);
   const float step_v = height * down.step;
   Random random(key);
   for (std::size_t row = 0; row < rows; ++row) {
     const std::size_t columns = (row + 1) * count / rows - row * count / rows;
-    const Spacing across_row = space_out(columns, overlap, 1.1f);
+    const Spacing across_row = space_out(columns, overlap, inset);
     const float middle = down.first + down.step * static_cast<float>(row);
     const float step_u =
         width * (1.0f - (patch.cut_start + patch.cut_end) * middle) * across_row.step;
@@ -117,7 +117,7 @@ void paint_line(Painter& painter, const glm::vec3& a, const glm::vec3& b, float 
                      glm::vec3(1e-3f, 0, 0));
   const Lobe& lobe = painter.light().lobe(finish.gloss, normal);
   Random random(key);
-  const Spacing spacing = space_out(count, 0.46f, 1.4f);
+  const Spacing spacing = space_out(count, 0.46f, 1.6f);
   for (std::size_t i = 0; i < count; ++i) {
     const float t = spacing.first + spacing.step * static_cast<float>(i);
     const glm::vec3 point = a + along * t;
@@ -145,7 +145,7 @@ void paint_box(Painter& painter, const glm::vec3& min, const glm::vec3& max, con
                                         Patch{min + x, y, z}};  // +x
     for (std::size_t f = 0; f < faces.size(); ++f) {
       const double area = glm::length(faces[f].u) * glm::length(faces[f].v);
-      paint_patch(p, faces[f], finish, area, child(key, f));
+      paint_patch(p, faces[f], finish, area, child(key, f), 0.56f, 1.4f);
     }
   });
 }

@@ -31,13 +31,14 @@ struct Patch {
 };
 
 /// Flat Gaussians in rows over the patch, overlapping so that it looks closed at any count.
-/// `overlap` is a Gaussian's standard deviation over its share of an edge.
+/// `overlap` is a Gaussian's standard deviation over its share of an edge; the outermost stay
+/// `inset` standard deviations inside: about 1 where another patch goes on, more at a silhouette.
 void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, std::size_t count,
-                 std::uint64_t key, float overlap = 0.56f);
+                 std::uint64_t key, float overlap = 0.60f, float inset = 0.9f);
 
 /// The same for a piece of this weight.
 void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, double weight,
-                 std::uint64_t key, float overlap = 0.56f);
+                 std::uint64_t key, float overlap = 0.60f, float inset = 0.9f);
 
 /// Needle-like Gaussians from a to b: poles, rails, frames, lines.
 void paint_line(Painter& painter, const glm::vec3& a, const glm::vec3& b, float thickness,
