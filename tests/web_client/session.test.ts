@@ -253,18 +253,34 @@ describe('drain', () => {
     expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n, 4n, 5n]);
   });
 
-  it('tries again when the new connection fails, and falls back to reconnecting', () => {
+  it('tries again when the new connection fails, while the old one lives', () => {
     const old = go_live();
     old.say({ case: 'drain', value: {} });
     socket(1).events.closed(1006, '');
     expect(old.closed).toBe(false);
+    expect(last_state()).toEqual({ phase: 'live' });
     time.advance(375);
     expect(sockets).toHaveLength(3);
+  });
+
+  it('goes on with the new connection when the old one ends first', () => {
+    const old = go_live();
+    session.send_pose(pose(4n));
+    old.say({ case: 'drain', value: {} });
     old.events.closed(1001, '');
-    expect(socket(2).closed).toBe(true);
-    time.advance(375);
-    welcome(socket(3));
+    expect(last_state()?.phase).toBe('connecting');
+    welcome(socket(1));
     expect(last_state()).toEqual({ phase: 'live' });
+    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n]);
+    expect(sockets).toHaveLength(2);
+  });
+
+  it('reconnects like after any loss when the new connection is lost as well', () => {
+    const old = go_live();
+    old.say({ case: 'drain', value: {} });
+    old.events.closed(1001, '');
+    socket(1).events.closed(1006, '');
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'unreachable' });
   });
 });
 

@@ -4,15 +4,25 @@ import { WebGl2Presenter } from './webgl2_presenter';
 
 /** WebGL2 where a GPU does it, a 2D canvas everywhere else. Throws when the browser has neither. */
 export function make_presenter(canvas: OffscreenCanvas): Presenter {
-  const gl = canvas.getContext('webgl2', {
-    alpha: false,
-    antialias: false,
-    depth: false,
-    failIfMajorPerformanceCaveat: true, // no WebGL in software
-    powerPreference: 'low-power',
-  });
-  if (gl) return new WebGl2Presenter(canvas, gl);
+  const attributes: WebGLContextAttributes = { alpha: false, antialias: false, depth: false };
+  if (has_hardware_webgl2()) {
+    const gl = canvas.getContext('webgl2', attributes);
+    if (gl) return new WebGl2Presenter(canvas, gl);
+  }
   const context = canvas.getContext('2d', { alpha: false });
   if (context) return new Canvas2dPresenter(canvas, context);
   throw new Error('this browser offers neither WebGL2 nor a 2D canvas to a worker');
+}
+
+/**
+ * Asks a canvas of its own, because a canvas that has given one kind of context gives no other.
+ * failIfMajorPerformanceCaveat alone is not enough: Chromium grants it to its software renderer.
+ */
+function has_hardware_webgl2(): boolean {
+  const gl = new OffscreenCanvas(1, 1).getContext('webgl2', { failIfMajorPerformanceCaveat: true });
+  if (!gl) return false;
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  const renderer = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return !/swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
 }

@@ -206,6 +206,10 @@ export class Session {
       this.successor_ = undefined;
       this.open_successor_later();
     } else if (link === this.link_) {
+      if (this.successor_) {
+        this.succeed(this.successor_);
+        return;
+      }
       const lived_ms = link.welcome ? (this.env_.clock.now_us() - link.welcomed_us) / 1000 : 0;
       if (lived_ms >= stable_ms) this.attempt_ = 0;
       this.wait(cause, message);
@@ -230,7 +234,7 @@ export class Session {
       return;
     }
     if (incoming.kind === 'frame') {
-      if (link === this.successor_) this.promote(link);
+      if (link === this.successor_) this.succeed(link);
       this.listener_.frame(incoming.header, incoming.payload);
     } else if (incoming.kind === 'message') {
       this.handle(link, incoming.body);
@@ -275,17 +279,17 @@ export class Session {
     else if (this.last_pose_) send_on(link, { case: 'pose', value: this.last_pose_ });
   }
 
-  /** The successor has its first picture: it takes over, and the old connection goes. */
-  private promote(link: Link): void {
+  /** The successor has its first picture, or the old connection went before that. */
+  private succeed(link: Link): void {
     this.listener_.stream_ended();
-    const old = this.link_;
+    if (this.link_) {
+      send_on(this.link_, { case: 'bye', value: {} });
+      close_link(this.link_);
+    }
     this.link_ = link;
     this.successor_ = undefined;
-    if (old) {
-      send_on(old, { case: 'bye', value: {} });
-      close_link(old);
-    }
-    this.go_live(link);
+    if (link.welcome) this.go_live(link);
+    else this.listener_.state({ phase: 'connecting', attempt: this.attempt_ });
   }
 
   private go_live(link: Link): void {

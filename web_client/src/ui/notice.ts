@@ -1,7 +1,10 @@
 import { by_id } from './dom';
 
-/** A line at the top that stays until it is dismissed. */
+const passing_ms = 20_000;
+
+/** A line at the top. It can be dismissed; what concerns the moment only goes by itself. */
 export class Notice {
+  private timer_: ReturnType<typeof setTimeout> | undefined;
   private readonly notice_ = by_id('notice', HTMLElement);
   private readonly text_ = by_id('notice-text', HTMLElement);
 
@@ -11,7 +14,13 @@ export class Notice {
     });
   }
 
-  show(message: string): void {
+  show(message: string, passing = false): void {
+    clearTimeout(this.timer_);
+    if (passing) {
+      this.timer_ = setTimeout(() => {
+        this.notice_.hidden = true;
+      }, passing_ms);
+    }
     this.text_.textContent = message;
     this.notice_.hidden = false;
   }

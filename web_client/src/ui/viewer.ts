@@ -181,7 +181,7 @@ export class Viewer {
         this.show_facts({ presenter: message.description });
         break;
       case 'notice':
-        this.notice_.show(message.message);
+        this.notice_.show(message.message, true);
         break;
       case 'fallback':
         this.notice_.show(

@@ -41,7 +41,7 @@ const waiting_title = {
   unreachable: 'The server does not answer',
   lost: 'Connection lost',
   silent: 'The server has gone silent',
-  refused: 'Not now',
+  refused: 'The server is busy',
 } as const;
 
 function failed_card(code: Error_Code, message: string): Card {

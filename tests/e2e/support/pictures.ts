@@ -1,0 +1,99 @@
+// Pixels of the shown picture and of PNG files, and how far they are apart.
+import { readFileSync } from 'node:fs';
+import type { Page } from 'playwright-core';
+
+export interface Picture {
+  readonly width: number;
+  readonly height: number;
+  readonly rgba: Uint8Array;
+}
+
+interface Encoded {
+  width: number;
+  height: number;
+  base64: string;
+}
+
+const decoded = ({ width, height, base64 }: Encoded): Picture => ({
+  width,
+  height,
+  rgba: Buffer.from(base64, 'base64'),
+});
+
+/** The picture that the page shows, once it has come to rest. */
+export async function settled_picture(page: Page): Promise<Picture> {
+  const encoded = await page.evaluate(async (): Promise<Encoded> => {
+    const { catgs } = window;
+    if (!catgs) throw new Error('the page has no window.catgs');
+    await catgs.settled();
+    const { width_px, height_px, rgba } = await catgs.snapshot();
+    const url = await new Promise<string>((resolve) => {
+      const reader = new FileReader();
+      reader.onload = () => resolve(reader.result as string);
+      reader.readAsDataURL(new Blob([rgba]));
+    });
+    return { width: width_px, height: height_px, base64: url.slice(url.indexOf(',') + 1) };
+  });
+  return decoded(encoded);
+}
+
+/** `page` may be any page: only its decoder is used. */
+export async function read_png(page: Page, file: string): Promise<Picture> {
+  const base64 = readFileSync(file).toString('base64');
+  const encoded = await page.evaluate(async (png): Promise<Encoded> => {
+    const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }), {
+      colorSpaceConversion: 'none',
+    });
+    const { width, height } = bitmap;
+    const context = new OffscreenCanvas(width, height).getContext('2d')!;
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, width, height);
+    let text = '';
+    for (let i = 0; i < data.length; i += 8192) {
+      text += String.fromCharCode(...data.subarray(i, i + 8192));
+    }
+    return { width, height, base64: btoa(text) };
+  }, base64);
+  return decoded(encoded);
+}
+
+/** Over the RGB values of all pixels. */
+export function psnr_db(a: Picture, b: Picture): number {
+  if (a.width !== b.width || a.height !== b.height) {
+    throw new Error(`${a.width}x${a.height} against ${b.width}x${b.height}`);
+  }
+  let sum = 0;
+  for (let i = 0; i < a.rgba.length; ++i) {
+    if (i % 4 !== 3) sum += (a.rgba[i]! - b.rgba[i]!) ** 2;
+  }
+  const mean = sum / (a.width * a.height * 3);
+  return 10 * Math.log10(255 ** 2 / mean);
+}
+
+/** Share of the pixels that are not the black background. */
+export function coverage(picture: Picture): number {
+  let covered = 0;
+  for (let i = 0; i < picture.rgba.length; i += 4) {
+    if (Math.max(picture.rgba[i]!, picture.rgba[i + 1]!, picture.rgba[i + 2]!) > 8) covered += 1;
+  }
+  return covered / (picture.width * picture.height);
+}
+
+/** Mean colour of the square of side 2 * radius + 1 around a pixel. */
+export function mean_colour(
+  picture: Picture,
+  x: number,
+  y: number,
+  radius: number,
+): [number, number, number] {
+  const sum: [number, number, number] = [0, 0, 0];
+  for (let row = y - radius; row <= y + radius; ++row) {
+    for (let column = x - radius; column <= x + radius; ++column) {
+      const at = (row * picture.width + column) * 4;
+      for (const c of [0, 1, 2] as const) sum[c] += picture.rgba[at + c]!;
+    }
+  }
+  const count = (2 * radius + 1) ** 2;
+  return [sum[0] / count, sum[1] / count, sum[2] / count];
+}

@@ -1,0 +1,63 @@
+// The real programs: catgs-render, and catgs-server on a port that the system chooses.
+import { execFileSync, spawn, type ChildProcess } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import path from 'node:path';
+import { build_dir } from './paths';
+
+function program(name: string): string {
+  const file = path.join(build_dir, 'bin', name);
+  if (!existsSync(file)) throw new Error(`${file} is missing: ninja -C ${build_dir} ${name}`);
+  return file;
+}
+
+/** Runs catgs-render; throws with its error output when it fails. */
+export function catgs_render(...args: string[]): void {
+  execFileSync(program('catgs-render'), args, { stdio: ['ignore', 'ignore', 'pipe'] });
+}
+
+export interface RunningServer {
+  readonly url: string;
+  readonly port: number;
+  /** What it has logged so far. */
+  log(): string;
+  /** Ends it as a crash does, or as an operator does; resolves when it has gone. */
+  stop(signal?: 'SIGKILL' | 'SIGTERM'): Promise<void>;
+}
+
+/** Resolves when the server says where it listens; rejects with its log when it ends before. */
+export async function start_server(scene: string, args: string[] = []): Promise<RunningServer> {
+  const child = spawn(
+    program('catgs-server'),
+    ['--scene', scene, '--port', '0', '--admin-bind', 'off', ...args],
+    { stdio: ['ignore', 'pipe', 'pipe'] },
+  );
+  let log = '';
+  const url = await new Promise<string>((resolve, reject) => {
+    const read = (chunk: Buffer): void => {
+      log += chunk.toString();
+      const match = /open (https?:\/\/\S+?:\d+\/)/.exec(log);
+      if (match?.[1]) resolve(match[1]);
+    };
+    child.stdout.on('data', read);
+    child.stderr.on('data', read);
+    child.once('error', reject);
+    child.once('exit', (code) => reject(new Error(`catgs-server ended with ${code}:\n${log}`)));
+  });
+  return {
+    url,
+    port: Number(new URL(url).port),
+    log: () => log,
+    stop: (signal = 'SIGTERM') => end(child, signal),
+  };
+}
+
+function end(child: ChildProcess, signal: 'SIGKILL' | 'SIGTERM'): Promise<void> {
+  return new Promise((resolve) => {
+    if (child.exitCode !== null || child.signalCode !== null) {
+      resolve();
+      return;
+    }
+    child.once('exit', () => resolve());
+    child.kill(signal);
+  });
+}

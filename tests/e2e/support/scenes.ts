@@ -1,0 +1,57 @@
+// Scenes and camera paths that tests write for themselves.
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import path from 'node:path';
+import type { Pose } from '#client/camera/camera_controller';
+
+/** A folder of its own, and what removes it. */
+export function scratch_folder(): { folder: string; remove: () => void } {
+  const folder = mkdtempSync(path.join(tmpdir(), 'catgs-e2e-'));
+  return { folder, remove: () => rmSync(folder, { recursive: true, force: true }) };
+}
+
+/** `timestamp tx ty tz qx qy qz qw`, one line per pose. */
+export function write_tum(file: string, poses: readonly Pose[]): void {
+  const lines = poses.map(({ position, orientation }, i) =>
+    [i, ...position, ...orientation].join(' '),
+  );
+  writeFileSync(file, `${lines.join('\n')}\n`);
+}
+
+export interface Patch {
+  readonly name: string;
+  readonly rgb: readonly [number, number, number]; // 0…255
+  /** Centre in the plane that the camera at the origin looks at, in units of its distance. */
+  readonly x: number;
+  readonly y: number;
+}
+
+const sh_c0 = 0.28209479177387814; // value of the constant basis function
+const layers = 4; // a Gaussian covers at most 99 %; four of them all but 1e-8
+const properties = [
+  ...['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity'],
+  ...['scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3'],
+];
+
+/**
+ * A trained-scene .ply with one flat, opaque, round spot per patch at distance `z`, of standard
+ * deviation `sigma` (in units of the distance).
+ */
+export function write_patches(file: string, patches: readonly Patch[], z: number, sigma: number): void {
+  const rows = patches.flatMap(({ rgb, x, y }) =>
+    Array.from({ length: layers }, (_, layer) => {
+      const depth = z + layer * 0.01;
+      const dc = rgb.map((value) => (value / 255 - 0.5) / sh_c0);
+      const scale = Math.log(sigma * z);
+      return [x * depth, y * depth, depth, ...dc, 12, scale, scale, Math.log(1e-3), 1, 0, 0, 0];
+    }),
+  );
+  const header = [
+    'ply',
+    'format binary_little_endian 1.0',
+    `element vertex ${rows.length}`,
+    ...properties.map((name) => `property float ${name}`),
+    'end_header\n',
+  ].join('\n');
+  writeFileSync(file, Buffer.concat([Buffer.from(header), Buffer.from(Float32Array.from(rows.flat()).buffer)]));
+}

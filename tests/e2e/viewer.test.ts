@@ -1,0 +1,227 @@
+// The client against the real server: what a visitor does, and what happens when things go wrong.
+import { writeFileSync } from 'node:fs';
+import path from 'node:path';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
+import type { Pose } from '#client/camera/camera_controller';
+import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { psnr_db, settled_picture } from './support/pictures';
+import { catgs_render, start_server, type RunningServer } from './support/programs';
+import { scratch_folder } from './support/scenes';
+
+const { folder, remove } = scratch_folder();
+const scene = path.join(folder, 'city.ply');
+
+let browser: Browser;
+let server: RunningServer;
+let open_pages: WatchedPage[] = [];
+
+beforeAll(async () => {
+  catgs_render('synth', 'city', scene, '--gaussians', '30000');
+  browser = await launch_browser();
+  server = await start_server(scene);
+});
+
+afterEach(async () => {
+  for (const { page } of open_pages.splice(0)) await page.context().close();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await server.stop();
+  remove();
+});
+
+async function open_viewer(options?: BrowserContextOptions, url = server.url): Promise<WatchedPage> {
+  const watched = await new_page(browser, options);
+  open_pages.push(watched);
+  await watched.page.goto(url);
+  return watched;
+}
+
+const settle = (page: Page): Promise<void> => page.evaluate(() => window.catgs!.settled());
+const pose_of = (page: Page): Promise<Pose> => page.evaluate(() => window.catgs!.pose());
+const shown = (page: Page): Promise<number> =>
+  page.evaluate(async () => (await window.catgs!.stats()).frames_shown);
+
+function distance(a: Pose, b: Pose): number {
+  return Math.hypot(...a.position.map((v, i) => v - b.position[i]!));
+}
+
+/** Angle between two orientations, rad. */
+function turned(a: Pose, b: Pose): number {
+  const dot = a.orientation.reduce((sum, v, i) => sum + v * b.orientation[i]!, 0);
+  return 2 * Math.acos(Math.min(1, Math.abs(dot)));
+}
+
+describe('a visit', () => {
+  it('shows a moving picture, with video, without an error', async () => {
+    const { page, errors } = await open_viewer();
+    const first = await settled_picture(page);
+    expect([first.width, first.height]).toEqual([640, 360]);
+    await page.keyboard.down('ArrowRight');
+    await page.waitForFunction(async () => (await window.catgs!.stats()).frames_shown > 20);
+    await page.keyboard.up('ArrowRight');
+    expect(psnr_db(first, await settled_picture(page))).toBeLessThan(30);
+    await page.keyboard.press('KeyI');
+    const panel = page.locator('#stats-panel');
+    await panel.getByText(/264/).waitFor();
+    await panel.getByText(/CPU|CUDA/).waitFor();
+    expect(await panel.innerText()).toMatch(/640 × 360/);
+    await keep_screenshot(page, 'visit');
+    expect(errors).toEqual([]);
+  });
+
+  it('goes where mouse, wheel and keys say', async () => {
+    const { page } = await open_viewer();
+    await settle(page);
+    const start = await pose_of(page);
+    const drag = async (button: 'left' | 'right'): Promise<void> => {
+      await page.mouse.move(320, 180);
+      await page.mouse.down({ button });
+      await page.mouse.move(400, 200, { steps: 4 });
+      await page.mouse.up({ button });
+      await settle(page);
+    };
+    await drag('left');
+    const orbited = await pose_of(page);
+    expect(turned(start, orbited)).toBeGreaterThan(0.2);
+    await drag('right');
+    const panned = await pose_of(page);
+    expect(turned(orbited, panned)).toBeCloseTo(0, 3);
+    expect(distance(orbited, panned)).toBeGreaterThan(0);
+    await page.mouse.wheel(0, -300);
+    await settle(page);
+    const closer = await pose_of(page);
+    expect(distance(panned, closer)).toBeGreaterThan(0);
+    await page.keyboard.press('KeyM');
+    await page.getByText('Fly', { exact: true }).waitFor();
+    await page.keyboard.press('KeyR');
+    await settle(page);
+    expect(distance(start, await pose_of(page))).toBeCloseTo(0, 6);
+    await page.keyboard.down('KeyW');
+    await page.waitForFunction(
+      (z) => window.catgs!.pose().position.some((v, i) => v !== z[i]),
+      start.position,
+    );
+    await page.keyboard.up('KeyW');
+  });
+
+  it('goes where fingers say', async () => {
+    const { page } = await open_viewer({
+      viewport: { width: 390, height: 640 },
+      hasTouch: true,
+      isMobile: true,
+    });
+    await settle(page);
+    const touch = await page.context().newCDPSession(page);
+    const fingers = async (path_of: (t: number) => { x: number; y: number }[]): Promise<void> => {
+      await touch.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: path_of(0) });
+      for (const t of [0.25, 0.5, 0.75, 1]) {
+        await touch.send('Input.dispatchTouchEvent', { type: 'touchMove', touchPoints: path_of(t) });
+      }
+      await touch.send('Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] });
+      await settle(page);
+    };
+    const start = await pose_of(page);
+    await fingers((t) => [{ x: 150 + 80 * t, y: 300 }]);
+    const looked = await pose_of(page);
+    expect(turned(start, looked)).toBeGreaterThan(0.1);
+    await fingers((t) => [
+      { x: 150 - 60 * t, y: 300 },
+      { x: 240 + 60 * t, y: 300 },
+    ]);
+    const pinched = await pose_of(page);
+    expect(turned(looked, pinched)).toBeCloseTo(0, 2);
+    expect(distance(looked, pinched)).toBeGreaterThan(0);
+    await keep_screenshot(page, 'phone');
+  });
+
+  it('asks for the size that the view and the quality menu say', async () => {
+    const { page } = await open_viewer();
+    await settle(page);
+    await page.setViewportSize({ width: 800, height: 450 });
+    await page.waitForFunction(async () => (await window.catgs!.stats()).width_px === 800);
+    await page.getByRole('button', { name: 'Quality and view' }).click();
+    await page.getByLabel('Picture').selectOption('240');
+    await page.waitForFunction(async () => (await window.catgs!.stats()).height_px === 240);
+    const picture = await settled_picture(page);
+    expect([picture.width, picture.height]).toEqual([426, 240]);
+  });
+
+  it('reports how long a movement takes to become a picture', async () => {
+    const { page } = await open_viewer();
+    await settle(page);
+    const before = await shown(page);
+    await page.keyboard.down('ArrowRight');
+    await page.waitForFunction(
+      async (count) => (await window.catgs!.stats()).frames_shown > count + 60,
+      before,
+    );
+    const stats = await page.evaluate(() => window.catgs!.stats());
+    await page.keyboard.up('ArrowRight');
+    const { motion_to_photon_ms: motion, pose_age_ms: age } = stats;
+    console.log(
+      `${stats.fps_shown.toFixed(1)} fps shown; ` +
+        `motion to photon p50 ${motion.p50.toFixed(0)} ms, p95 ${motion.p95.toFixed(0)} ms; ` +
+        `pose age p50 ${age.p50.toFixed(0)} ms, p95 ${age.p95.toFixed(0)} ms`,
+    );
+    expect(motion.p50).toBeGreaterThan(0);
+    expect(motion.p95).toBeGreaterThanOrEqual(motion.p50);
+    expect(age.p95).toBeGreaterThan(0);
+  });
+});
+
+describe('trouble', () => {
+  it('a server that crashed and came back is found again, without a reload, at the same place', async () => {
+    const first = await start_server(scene);
+    const { page } = await open_viewer(undefined, first.url);
+    await settle(page);
+    await page.evaluate(() => {
+      document.body.dataset['visit'] = 'first';
+      const { position, orientation } = window.catgs!.pose();
+      window.catgs!.setPose({ position: [position[0] + 0.5, position[1], position[2]], orientation });
+    });
+    await settle(page);
+    const before = await pose_of(page);
+    const picture = await settled_picture(page);
+    const frames = await shown(page);
+    await first.stop('SIGKILL');
+    await page.getByRole('button', { name: 'Try now' }).waitFor();
+    await keep_screenshot(page, 'reconnecting');
+    const second = await start_server(scene, ['--port', String(first.port)]);
+    await page.waitForFunction(
+      async (count) => (await window.catgs!.stats()).frames_shown > count,
+      frames,
+    );
+    expect(await pose_of(page)).toEqual(before);
+    expect(psnr_db(picture, await settled_picture(page))).toBeGreaterThan(30);
+    expect(await page.evaluate(() => document.body.dataset['visit'])).toBe('first');
+    expect(await page.locator('#card').isHidden()).toBe(true);
+    await second.stop();
+  });
+
+  it('a refused token is said, a right one works, and neither stays in the address', async () => {
+    const token_file = path.join(folder, 'token');
+    writeFileSync(token_file, 'a-long-and-secret-token\n', { mode: 0o600 });
+    const guarded = await start_server(scene, ['--token-file', token_file]);
+    const { page } = await open_viewer(undefined, `${guarded.url}#token=wrong`);
+    await page.getByText('Access token needed').waitFor();
+    expect(page.url()).toBe(guarded.url);
+    const { page: invited } = await open_viewer(
+      undefined,
+      `${guarded.url}#token=a-long-and-secret-token`,
+    );
+    await settle(invited);
+    expect(invited.url()).toBe(guarded.url);
+    await invited.reload();
+    await settle(invited);
+    expect(guarded.log()).not.toContain('a-long-and-secret-token');
+    await guarded.stop();
+  });
+
+  it('an unknown scene is said', async () => {
+    const { page } = await open_viewer(undefined, `${server.url}?scene=atlantis`);
+    await page.getByText('No such scene').waitFor();
+  });
+});
