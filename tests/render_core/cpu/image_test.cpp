@@ -1,7 +1,12 @@
 // Whole images of the CPU core against the reference.
 
+#include <cstdlib>
+#include <limits>
+#include <thread>
+
 #include <gtest/gtest.h>
 
+#include "render_core/error.h"
 #include "render_core/renderer.h"
 #include "render_core/thread_pool.h"
 #include "tests/support/test_scenes.h"
@@ -61,6 +66,211 @@ TEST_P(SmallScenes, ThreadsDoNotChangeTheImage) {
 
 INSTANTIATE_TEST_SUITE_P(, SmallScenes, testing::ValuesIn(test::small_scenes()),
                          [](const auto& test) { return test.param.name; });
+
+std::vector<std::uint8_t> copy_bytes(const FrameView& frame) {
+  std::vector<std::uint8_t> bytes;
+  for (int plane = 0; plane < 3; ++plane) {
+    const glm::ivec2 size = plane == 0 ? frame.size_px : frame.size_px / 2;
+    for (int y = 0; y < size.y; ++y) {
+      const auto* row = reinterpret_cast<const std::uint8_t*>(frame.planes[plane].data) +
+                        frame.planes[plane].stride_bytes * y;
+      bytes.insert(bytes.end(), row, row + size.x);
+    }
+  }
+  return bytes;
+}
+
+TEST(I420, BackgroundPatchesHaveTheCodesOfBt709) {
+  struct Patch {
+    glm::vec3 rgb;
+    int y, cb, cr;
+  };
+  // Bars of 100 % and 75 % and a grey, by the formulas of ITU-R BT.709-6 in rational arithmetic.
+  const Patch patches[] = {
+      {{1, 1, 1}, 235, 128, 128},          {{0, 0, 0}, 16, 128, 128},
+      {{1, 0, 0}, 63, 102, 240},           {{0, 1, 0}, 173, 42, 26},
+      {{0, 0, 1}, 32, 240, 118},           {{1, 1, 0}, 219, 16, 138},
+      {{0.5f, 0.5f, 0.5f}, 126, 128, 128}, {{0.75f, 0, 0.75f}, 63, 193, 204},
+  };
+  for (const std::string_view simd : simd_targets()) {
+    const auto renderer = make_renderer(std::make_shared<const GaussianCloud>(),
+                                        {RendererKind::cpu, pool_of(2), std::string(simd)})
+                              .renderer;
+    const auto view = renderer->make_view({.format = PixelFormat::i420});
+    for (const Patch& patch : patches) {
+      FrameView frame;
+      ASSERT_TRUE(view->render({make_camera({}, {38, 22}, 30.0f), patch.rgb}, frame).ok());
+      const auto bytes = copy_bytes(frame);
+      const std::size_t luma = 38 * 22;
+      ASSERT_EQ(bytes.size(), luma * 3 / 2);
+      for (std::size_t i = 0; i < bytes.size(); ++i) {
+        const int expected = i < luma ? patch.y : i < luma * 5 / 4 ? patch.cb : patch.cr;
+        ASSERT_EQ(bytes[i], expected) << simd << " byte " << i;
+      }
+    }
+  }
+}
+
+TEST(I420, MatchesReferenceWithinOneCode) {
+  for (const TestScene& scene : test::small_scenes()) {
+    const glm::ivec2 size = scene.request.camera.size_px;
+    if (size.x % 2 != 0 || size.y % 2 != 0) continue;
+    std::vector<std::vector<std::uint8_t>> images;
+    std::vector<RendererOptions> cores = {{RendererKind::reference, pool_of(2), "auto"}};
+    for (const std::string_view simd : simd_targets())
+      cores.push_back({RendererKind::cpu, pool_of(2), std::string(simd)});
+    for (const RendererOptions& core : cores) {
+      const auto renderer = make_renderer(scene.cloud, core).renderer;
+      const auto view = renderer->make_view({.format = PixelFormat::i420});
+      FrameView frame;
+      ASSERT_TRUE(view->render(scene.request, frame).ok());
+      images.push_back(copy_bytes(frame));
+    }
+    for (const auto& image : images)
+      for (std::size_t i = 0; i < image.size(); ++i)
+        ASSERT_LE(std::abs(image[i] - images.front()[i]), 1) << scene.name << " byte " << i;
+  }
+}
+
+TEST(CpuView, ViewsRenderAtTheSameTime) {
+  const TestScene scene = test::small_scenes().front();
+  const auto renderer =
+      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
+  const auto expected = render(scene, {RendererKind::cpu, pool_of(1), "auto"}).rgb;
+  const auto loop = [&] {
+    const auto view = renderer->make_view({});
+    for (int i = 0; i < 20; ++i) {
+      FrameView frame;
+      ASSERT_TRUE(view->render(scene.request, frame).ok());
+      ASSERT_EQ(test::copy_rgb(frame), expected);
+    }
+  };
+  const std::jthread other(loop);
+  loop();
+}
+
+TEST(CpuView, FramesDoNotDependOnTheOnesBefore) {
+  const std::vector<TestScene> scenes = test::small_scenes();
+  const auto renderer =
+      make_renderer(scenes.front().cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
+  const auto view = renderer->make_view({});
+  for (const glm::ivec2 size : {glm::ivec2(200, 150), glm::ivec2(17, 300), glm::ivec2(64, 64)}) {
+    TestScene scene = scenes.front();
+    scene.request.camera = make_camera(scene.request.camera.world_from_camera, size, 140.0f);
+    FrameView frame;
+    ASSERT_TRUE(view->render(scene.request, frame).ok());
+    EXPECT_EQ(frame.size_px, size);
+    EXPECT_EQ(test::copy_rgb(frame), render(scene, {RendererKind::cpu, pool_of(2), "auto"}).rgb);
+  }
+}
+
+TEST(CpuView, CountsThePairsOfTheReference) {
+  for (const TestScene& scene : test::small_scenes()) {
+    const auto reference = render(scene, {RendererKind::reference, pool_of(2), "auto"});
+    for (const std::string_view simd : simd_targets()) {
+      const auto exact =
+          render(scene, {RendererKind::cpu, pool_of(2), std::string(simd)}, {.count_pairs = true});
+      // The reference counts what it blends or skips in front of saturation; rounding moves rims.
+      const auto expected = static_cast<double>(reference.stats.blended_pairs);
+      EXPECT_NEAR(static_cast<double>(exact.stats.blended_pairs), expected, 2.0 + 1e-3 * expected);
+    }
+  }
+}
+
+TEST(CpuView, ListMemoryIsBounded) {
+  const TestScene scene = test::small_scenes().front();
+  for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla}) {
+    const auto bounded = render(scene, {RendererKind::cpu, pool_of(2), "auto"},
+                                {.pipeline = pipeline, .max_list_entries = 1000});
+    EXPECT_LE(bounded.stats.list_entries, 1000u);
+    EXPECT_GT(bounded.stats.overflowed_entries, 0u);
+  }
+}
+
+TEST(CpuView, RefusesImpossibleRequests) {
+  const TestScene scene = test::small_scenes().front();
+  const auto renderer =
+      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(1), "auto"}).renderer;
+  const auto rgb = renderer->make_view({});
+  const auto i420 = renderer->make_view({.format = PixelFormat::i420});
+  const auto expect_refusal = [&](View& view, auto change, const char* word) {
+    FrameRequest request = scene.request;
+    change(request);
+    FrameView frame;
+    const RenderStatus status = view.render(request, frame);
+    EXPECT_EQ(status.code, RenderStatus::Code::invalid_request) << word;
+    EXPECT_NE(status.message.find(word), std::string::npos) << status.message;
+    EXPECT_EQ(frame.planes[0].data, nullptr);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  expect_refusal(
+      *rgb,
+      [](FrameRequest& r) {
+        r.camera.size_px = {0, 5};
+      },
+      "size");
+  expect_refusal(
+      *rgb,
+      [](FrameRequest& r) {
+        r.camera.size_px = {8193, 5};
+      },
+      "size");
+  expect_refusal(
+      *i420,
+      [](FrameRequest& r) {
+        r.camera.size_px = {33, 20};
+      },
+      "even");
+  expect_refusal(
+      *rgb,
+      [](FrameRequest& r) {
+        r.camera.focal_px = {0, 5};
+      },
+      "focal");
+  expect_refusal(
+      *rgb,
+      [=](FrameRequest& r) {
+        r.camera.focal_px = {nan, 5};
+      },
+      "focal");
+  expect_refusal(
+      *rgb, [](FrameRequest& r) { r.camera.near_z = 0; }, "near");
+  expect_refusal(
+      *rgb, [=](FrameRequest& r) { r.camera.principal_point_px.x = nan; }, "principal");
+  expect_refusal(
+      *rgb, [=](FrameRequest& r) { r.camera.world_from_camera.position.y = nan; }, "position");
+  expect_refusal(
+      *rgb,
+      [](FrameRequest& r) {
+        r.camera.world_from_camera.orientation = {0, 0, 0, 0};
+      },
+      "orientation");
+  expect_refusal(
+      *rgb, [=](FrameRequest& r) { r.background.x = nan; }, "background");
+}
+
+TEST(MakeRenderer, SaysWhatItChoseAndWhy) {
+  const auto cloud = std::make_shared<const GaussianCloud>(test::random_cloud(10, 0, 1));
+  const MadeRenderer made = make_renderer(cloud, {RendererKind::automatic, pool_of(2), "auto"});
+  EXPECT_EQ(made.renderer->description(),
+            "CPU, " + std::string(simd_targets().front()) + ", 2 threads");
+  EXPECT_FALSE(made.reason.empty());
+  EXPECT_GT(made.renderer->scene_bytes(), 0u);
+
+  const MadeRenderer scalar = make_renderer(cloud, {RendererKind::cpu, pool_of(1), "scalar"});
+  EXPECT_EQ(scalar.renderer->description(), "CPU, SCALAR, 1 thread");
+}
+
+TEST(MakeRenderer, RefusesWhatThisMachineLacks) {
+  const auto cloud = std::make_shared<const GaussianCloud>();
+  EXPECT_THROW(make_renderer(cloud, {RendererKind::cuda, pool_of(1), "auto"}), InputError);
+  try {
+    make_renderer(cloud, {RendererKind::cpu, pool_of(1), "mmx"});
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("SCALAR"), std::string::npos) << e.what();
+  }
+}
 
 }  // namespace
 }  // namespace catgs
