@@ -64,6 +64,10 @@ parse_arguments() {
     esac
     shift
   done
+  if [[ " ${server_options[*]} " =~ " --log-level"[=\ ](warn|error) ]]; then
+    fail "$EXIT_USAGE" "--log-level: run.sh reads the server's start lines, which are of level info." \
+      "For a quieter log start $bin_dir/catgs-server yourself."
+  fi
   if [[ ! $port =~ ^[1-9][0-9]{0,4}$ ]] || ((port > 65535)); then
     fail "$EXIT_USAGE" "--port $port: a port is a number from 1 to 65535."
   fi
@@ -161,7 +165,7 @@ readonly server_log=$build_dir/server.log
 readonly admin_port=9090  # the server's default, and Prometheus' own
 
 start_server() {
-  local -a options=(--scene "${scenes[@]}" --port "$port")
+  local -a options=(--scene "${scenes[@]}" --port "$port" --log-level info)
   if ((lan)); then
     options+=(--bind 0.0.0.0 --token-file "$lan_dir/token"
       --tls-cert "$lan_dir/cert.pem" --tls-key "$lan_dir/key.pem")
@@ -174,23 +178,12 @@ start_server() {
   start_group "$server_log" "$bin_dir/catgs-server" "${options[@]}" "${server_options[@]}"
 }
 
-# Prints the first line of the server's answer to GET /readyz; nothing while nobody answers.
-readiness() {
-  local connection request=$'GET /readyz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n' status=""
-  if ((lan)); then
-    { printf '%s' "$request" && sleep 1; } |
-      timeout 3 openssl s_client -quiet -connect "127.0.0.1:$port" 2>/dev/null | head -n 1
-  elif exec {connection}<>"/dev/tcp/127.0.0.1/$port"; then
-    printf '%s' "$request" >&"$connection"
-    read -r -t 3 status <&"$connection" || true
-    exec {connection}>&-
-    printf '%s\n' "$status"
-  fi 2>/dev/null
-}
+# The server's last words before it serves, in either log format, whatever address and TLS it was given.
+readonly serving_pattern='s#.*open \(https\{0,1\}://[^ ]*\) in a browser.*#\1#p'
 
-wait_until_ready() {
+wait_until_serving() {
   local server=$1
-  until [[ $(readiness || true) == *" 200 "* ]]; do
+  until [[ -n $(sed -n "$serving_pattern" "$server_log") ]]; do
     if ! kill -0 "$server" 2>/dev/null; then
       cat "$server_log"
       return 1
@@ -203,7 +196,8 @@ wait_until_ready() {
 server_says() { sed -n "s/.*$1: \([^\"]*\).*/\1/p" "$server_log" | tail -n 1; }
 
 print_welcome() {
-  local url="http://127.0.0.1:$port/"
+  local url
+  url=$(sed -n "$serving_pattern" "$server_log")
   if ((lan)); then
     url="https://$lan_address:$port/#token=$(<"$lan_dir/token")"
     qrencode -t ANSIUTF8 -m 2 "$url"
@@ -263,7 +257,7 @@ main() {
   fi
   start_server
   local server=${groups[-1]}
-  step "Start the server" wait_until_ready "$server"
+  step "Start the server" wait_until_serving "$server"
   trap stop_serving INT TERM
   print_welcome
   local status=0

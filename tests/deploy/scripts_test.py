@@ -111,6 +111,7 @@ class Scripts(unittest.TestCase):
     def test_wrong_usage(self):
         for arguments, text in ((["--port", "http"], "--port http"), (["--port"], "needs a value"),
                                 (["--port", "70000"], "1 to 65535"),
+                                (["--log-level", "warn"], "--log-level"),
                                 (["nowhere.ply"], "nowhere.ply")):
             result = self.run_script(RUN, *arguments)
             self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
