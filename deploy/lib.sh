@@ -88,12 +88,12 @@ stop_groups() {
 
 # Ctrl-C or TERM while a step runs.
 interrupted() {
-  trap - INT TERM
+  trap - INT TERM HUP
   stop_groups
   printf '\nStopped.\n'
   exit 130
 }
-trap interrupted INT TERM
+trap interrupted INT TERM HUP
 trap stop_groups EXIT
 
 # step TITLE COMMAND...: runs the command with its output in the log. TITLE is printed with the

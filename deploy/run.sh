@@ -223,7 +223,7 @@ WELCOME
 
 # Ctrl-C and TERM while serving: the server tells its clients and ends within seconds.
 stop_serving() {
-  trap - INT TERM
+  trap - INT TERM HUP
   stop_groups
   printf '\nStopped.\n'
   exit 0
@@ -258,7 +258,7 @@ main() {
   start_server
   local server=${groups[-1]}
   step "Start the server" wait_until_serving "$server"
-  trap stop_serving INT TERM
+  trap stop_serving INT TERM HUP
   print_welcome
   local status=0
   wait "$server" || status=$?
