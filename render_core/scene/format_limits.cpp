@@ -15,6 +15,16 @@ void require_count(const ByteSource& file, std::string_view where, std::uint64_t
         "the header is wrong, or split the scene");
 }
 
+void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
+                             std::uint64_t compressed_bytes) {
+  require_count(file, where, count);
+  if (count > (1 << 16) && count / 64 > compressed_bytes)
+    throw InputError(
+        file.name(), where,
+        fmt::format("{} Gaussians cannot be in {} compressed bytes", count, compressed_bytes),
+        "the file is cut off or its header is wrong");
+}
+
 int sh_degree_of_rest(std::size_t coefficients) {
   for (int degree = 0; degree <= 4; ++degree)
     if (coefficients + 1 == static_cast<std::size_t>((degree + 1) * (degree + 1))) return degree;

@@ -12,12 +12,15 @@ namespace catgs {
 /// already 15 GB without SH.
 inline constexpr std::uint64_t max_gaussians = std::uint64_t{1} << 28;
 
-/// What a byte of a compressed file can expand to: deflate reaches 1:1032, and no scene comes near
-/// it. Bounds the memory that a lying header can make us allocate.
-inline constexpr std::uint64_t max_compression_ratio = 1032;
-
 /// Throws InputError when a file announces no Gaussians or more than max_gaussians.
 void require_count(const ByteSource& file, std::string_view where, std::uint64_t count);
+
+/// The same for compressed files, where the count cannot be checked against the size: refuses more
+/// than 64 Gaussians per compressed byte (2^16 are always allowed). Deflate can reach that with its
+/// 1032:1 on Gaussians of 16 bytes, but no real scene comes near; it bounds the memory that a lying
+/// header can make us take.
+void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
+                             std::uint64_t compressed_bytes);
 
 /// SH degree with `coefficients` per channel beyond the constant one: 0, 3, 8, 15 or 24 (degree 4);
 /// -1 for any other number.

@@ -7,11 +7,17 @@
 
 #include "render_core/error.h"
 #include "render_core/scene/byte_source.h"
-#include "render_core/scene/first_sight.h"
+#include "render_core/scene/compressed_ply.h"
+#include "render_core/scene/file_set.h"
 #include "render_core/scene/load_context.h"
+#include "render_core/scene/locate_scene.h"
 #include "render_core/scene/ply.h"
 #include "render_core/scene/sanitize.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/sog.h"
+#include "render_core/scene/splat.h"
+#include "render_core/scene/spz.h"
+#include "render_core/scene/streamed_sog.h"
 
 namespace catgs {
 
@@ -22,19 +28,43 @@ struct Decoded {
   GaussianCloud cloud;
 };
 
-constexpr std::string_view supported = "supported: .ply (3DGS)";
+Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
+  const PlyHeader header = read_ply_header(file);
+  if (is_compressed_ply(header))
+    return {"compressed ply", read_compressed_ply(file, header, context)};
+  return {"3DGS ply", read_ply(file, header, context)};
+}
 
+/// Files are told apart by their first bytes; .splat has none of its own and goes by its name.
 Decoded read_file(const std::filesystem::path& path, const LoadContext& context) {
   const FileSource file(path);
   std::array<char, 4> magic{};
-  file.read(
-      0, std::as_writable_bytes(std::span(magic).first(std::min<std::uint64_t>(4, file.size()))));
-  const std::string_view start(magic.data(), magic.size());
-  if (start.starts_with("ply")) {
-    const PlyHeader header = read_ply_header(file);
-    return {"3DGS ply", read_ply(file, header, context)};
+  const auto start = std::span(magic).first(std::min<std::uint64_t>(4, file.size()));
+  file.read(0, std::as_writable_bytes(start));
+  const std::string_view begins(start.data(), start.size());
+  if (begins.starts_with("ply")) return read_any_ply(file, context);
+  if (begins == "PK\x03\x04") {
+    SogFile sog = read_sog(ZipFiles(file), "meta.json", context);
+    return {fmt::format("sog v{} (zip)", sog.version), std::move(sog.cloud)};
   }
-  throw InputError(path.string(), "", "is no scene of a known format", supported);
+  if (is_spz(file)) {
+    SpzFile spz = read_spz(file, context);
+    return {fmt::format("spz v{}", spz.version), std::move(spz.cloud)};
+  }
+  if (path.extension() == ".splat") return {"splat", read_splat(file, context)};
+  throw InputError(path.string(), "", "is no scene of a known format", supported_scenes);
+}
+
+Decoded read_location(const SceneLocation& location, const LoadOptions& options,
+                      const LoadContext& context) {
+  if (location.kind == SceneLocation::Kind::file) return read_file(location.path, context);
+  const FolderFiles folder(location.path);
+  if (location.kind == SceneLocation::Kind::sog_folder) {
+    SogFile sog = read_sog(folder, "meta.json", context);
+    return {fmt::format("sog v{} (folder)", sog.version), std::move(sog.cloud)};
+  }
+  StreamedSog sog = read_streamed_sog(folder, options.lod, options.gaussian_budget, context);
+  return {fmt::format("streamed sog ({})", sog.detail), std::move(sog.cloud)};
 }
 
 }  // namespace
@@ -42,18 +72,22 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) {
   ThreadPool pool(options.threads);
   const LoadContext context(pool, options.progress);
-  if (!std::filesystem::exists(path)) throw InputError(path.string(), "", "does not exist");
+  const SceneLocation location = locate_scene(path);
+  const bool streamed = location.kind == SceneLocation::Kind::streamed_sog_folder;
+  if (!streamed && (options.lod || options.gaussian_budget))
+    throw InputError(path.string(), "", "has no levels of detail to choose from",
+                     "levels and budgets are for streamed SOG folders");
 
-  Decoded decoded = read_file(path, context.part(0.0, 0.9));
   Scene scene;
-  scene.name = path.stem().string();
+  scene.name = location.name;
+  Decoded decoded = read_location(location, options, context.part(0.0, 0.9));
   scene.format = std::move(decoded.format);
   scene.cloud = std::move(decoded.cloud);
   scene.report = sanitize(scene.cloud, context.part(0.9, 1.0));
   if (scene.cloud.empty())
     throw InputError(path.string(), "",
                      fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
-  scene.hints = estimate_hints(scene.cloud);
+  scene.hints = find_hints(scene.cloud, location.hints, scene.notes);
   context.report(1.0);
   return scene;
 }

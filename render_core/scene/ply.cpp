@@ -90,7 +90,7 @@ void store(const Row& row, GaussianCloud& cloud, std::size_t i) {
   cloud.rotation[i] =
       unit(glm::quat(row.rotation[0], row.rotation[1], row.rotation[2], row.rotation[3]));
   cloud.scale[i] = exp(glm::vec3(row.log_scale[0], row.log_scale[1], row.log_scale[2]));
-  cloud.opacity[i] = sigmoid(row.opacity_logit);
+  cloud.opacity[i] = opacity_from_logit(row.opacity_logit);
   const std::size_t rest = cloud.sh_count() - 1;
   glm::vec3* sh = cloud.sh.data() + i * cloud.sh_count();
   sh[0] = {row.dc[0], row.dc[1], row.dc[2]};

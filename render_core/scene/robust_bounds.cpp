@@ -9,7 +9,7 @@ namespace catgs {
 
 namespace {
 
-constexpr std::size_t max_sample = std::size_t{1} << 19;
+constexpr std::size_t max_sample = std::size_t{1} << 16;
 
 using WeightedValue = std::pair<float, float>;  // value, weight
 

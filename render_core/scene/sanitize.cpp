@@ -10,17 +10,19 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "render_core/math/constants.h"
+#include "render_core/scene/activations.h"
+#include "render_core/scene/keep_if.h"
 #include "render_core/scene/robust_bounds.h"
 
 namespace catgs {
 
 namespace {
 
-constexpr float invisible_opacity = 1.0f / 255.0f;
+constexpr float invisible_opacity = static_cast<float>(alpha_min);
 constexpr float absurd_value = 1e9f;
 constexpr float absurd_diagonals = 1e4f;
 constexpr float min_scale = 1e-10f;
-constexpr float max_opacity = 1.0f - 0x1p-24f;  // the largest float below 1
 
 enum class Verdict : std::uint8_t { keep, repaired, not_finite, invisible, absurd };
 
@@ -96,24 +98,6 @@ Verdict judge(GaussianCloud& cloud, std::size_t i, const Reach& reach, Repairs& 
   return repaired ? Verdict::repaired : Verdict::keep;
 }
 
-/// Moves the kept Gaussians to the front, in order.
-void compact(GaussianCloud& cloud, const std::vector<Verdict>& verdicts) {
-  const std::size_t sh_count = cloud.sh_count();
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    if (verdicts[i] > Verdict::repaired) continue;
-    if (kept != i) {
-      cloud.mean[kept] = cloud.mean[i];
-      cloud.rotation[kept] = cloud.rotation[i];
-      cloud.scale[kept] = cloud.scale[i];
-      cloud.opacity[kept] = cloud.opacity[i];
-      std::copy_n(cloud.sh.begin() + i * sh_count, sh_count, cloud.sh.begin() + kept * sh_count);
-    }
-    ++kept;
-  }
-  cloud.resize(kept, cloud.sh_degree);
-}
-
 }  // namespace
 
 SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context) {
@@ -151,7 +135,8 @@ SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context) {
   report.zero_rotations = zero_rotations;
   report.clamped = clamped;
   report.zeroed_sh = zeroed_sh;
-  if (report.dropped > 0) compact(cloud, verdicts);
+  if (report.dropped > 0)
+    keep_if(cloud, [&](std::size_t i) { return verdicts[i] <= Verdict::repaired; });
   return report;
 }
 

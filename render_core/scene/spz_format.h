@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <glm/vec3.hpp>
+
+// Constants of the .spz format that its reader and its writer share.
+namespace catgs::spz {
+
+inline constexpr std::uint32_t magic = 0x5053474e;     // "NGSP"
+inline constexpr std::size_t gzip_header_bytes = 16;   // versions 1 to 3, inside the gzip stream
+inline constexpr std::size_t plain_header_bytes = 32;  // version 4
+inline constexpr std::uint8_t extensions_flag = 0x2;
+inline constexpr std::uint32_t coordinate_system_extension = 0xadbe0003;
+
+/// The constant SH coefficient is stored with less contrast than a colour, so that values a bit
+/// outside of [0, 1] fit.
+inline constexpr float colour_scale = 0.15f;
+
+/// Quaternion components are a sign and this magnitude, in units that end at sqrt(1/2).
+inline constexpr std::uint32_t max_magnitude = 511;
+inline constexpr float magnitude_unit = 0.70710678f / static_cast<float>(max_magnitude);
+
+/// Right, up, back, the axes of every file without an extension.
+inline constexpr glm::vec3 right_up_back(1.0f, -1.0f, -1.0f);  // signs to right, down, front
+
+/// Signs for the systems 1…8 of the coordinate system extension, which are numbered in binary:
+/// bit 0 right (not left), bit 1 up (not down), bit 2 front (not back).
+inline glm::vec3 signs_to_right_down_front(std::uint32_t system) {
+  const std::uint32_t bits = system - 1;
+  return {bits & 1 ? 1.0f : -1.0f, bits & 2 ? -1.0f : 1.0f, bits & 4 ? 1.0f : -1.0f};
+}
+
+}  // namespace catgs::spz

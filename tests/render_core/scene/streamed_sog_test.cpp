@@ -1,0 +1,140 @@
+#include "render_core/scene/streamed_sog.h"
+
+#include <nlohmann/json.hpp>
+
+#include "tests/render_core/scene/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+using Json = nlohmann::json;
+
+Json piece(int file, int offset, int count) {
+  return {{"file", file}, {"offset", offset}, {"count", count}};
+}
+
+/// Three nodes; level 0 has 100 + 200 + 300, level 1 has 40 + 50 (the third node lacks it), level 2
+/// 10 + 11 + 12 Gaussians.
+class StreamedSogTest : public TemporaryFolder {
+ protected:
+  void SetUp() override {
+    TemporaryFolder::SetUp();
+    write_sog("fine", 600, 2);
+    write_sog("middle", 90, 1);
+    write_sog("coarse", 33, 1);
+    meta_ = {
+        {"version", 1},
+        {"lodLevels", 3},
+        {"filenames", {"fine/meta.json", "middle/meta.json", "coarse/meta.json"}},
+        {"tree",
+         {{"children",
+           {{{"lods", {{"0", piece(0, 0, 100)}, {"1", piece(1, 0, 40)}, {"2", piece(2, 0, 10)}}}},
+            {{"children",
+              {{{"lods",
+                 {{"0", piece(0, 100, 200)}, {"1", piece(1, 40, 50)}, {"2", piece(2, 10, 11)}}}},
+               {{"lods", {{"0", piece(0, 300, 300)}, {"2", piece(2, 21, 12)}}}}}}}}}}}};
+  }
+
+  GaussianCloud write_sog(const std::string& name, std::size_t count, int degree) {
+    const GaussianCloud cloud = random_cloud(count, degree, static_cast<unsigned>(count));
+    for (const auto& [file, content] : encode_sog(cloud, 2)) write(name + "/" + file, content);
+    return cloud;
+  }
+
+  StreamedSog load(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
+    write("lod-meta.json", meta_.dump());
+    return read_streamed_sog(FolderFiles(folder_), level, budget, two_threads());
+  }
+
+  Json meta_;
+};
+
+TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
+  EXPECT_EQ(load().cloud.size(), 600u);
+  EXPECT_EQ(load(0).cloud.size(), 600u);
+  EXPECT_EQ(load(1).cloud.size(), 40u + 50 + 12);  // the third node's next coarser one
+  EXPECT_EQ(load(2).cloud.size(), 33u);
+  EXPECT_EQ(load(0).detail, "level 0 of 0…2");
+  EXPECT_EQ(load(1).detail, "levels 1 and 2 of 0…2");
+  const GaussianCloud coarse = random_cloud(33, 1, 33);
+  const GaussianCloud read = load(2).cloud;
+  for (std::size_t i = 0; i < 33; ++i)
+    EXPECT_LT(glm::distance(read.mean[i], coarse.mean[i]), 0.001f);
+}
+
+TEST_F(StreamedSogTest, MixedDegreesGiveTheHighest) {
+  meta_["tree"]["children"][0]["lods"].erase("1");
+  meta_["tree"]["children"][0]["lods"].erase("2");
+  const GaussianCloud cloud = load(2).cloud;
+  EXPECT_EQ(cloud.sh_degree, 2);
+  EXPECT_EQ(cloud.size(), 100u + 11 + 12);
+}
+
+TEST_F(StreamedSogTest, TheBudgetBuysTheFinestLevelsThatFit) {
+  EXPECT_EQ(load({}, 600).cloud.size(), 600u);
+  EXPECT_EQ(load({}, 33).cloud.size(), 33u);
+  EXPECT_EQ(load({}, 63).cloud.size(), 63u);  // the first node's level 1 costs 30 more
+  EXPECT_EQ(load({}, 62).cloud.size(), 33u);
+  EXPECT_EQ(load({}, 102).cloud.size(), 102u);
+  EXPECT_EQ(load({}, 162).cloud.size(), 162u);  // and its level 0 another 60
+  EXPECT_THAT(input_error([&] { load({}, 32); }), HasSubstr("33 of the coarsest level"));
+}
+
+TEST_F(StreamedSogTest, TheEnvironmentComesWithEveryLevel) {
+  write_sog("sky", 25, 1);
+  meta_["environment"] = "sky/meta.json";
+  EXPECT_EQ(load(2).cloud.size(), 58u);
+  EXPECT_EQ(load({}, 62).cloud.size(), 58u);
+  EXPECT_THAT(input_error([&] { load({}, 57); }), HasSubstr("Gaussian budget"));
+}
+
+TEST_F(StreamedSogTest, BundledSogFilesAreRead) {
+  const GaussianCloud cloud = random_cloud(600, 2, 600);
+  write("fine.sog", zip(encode_sog(cloud, 2)));
+  meta_["filenames"][0] = "fine.sog";
+  EXPECT_LT(glm::distance(load(0).cloud.mean[599], cloud.mean[599]), 0.001f);
+}
+
+TEST_F(StreamedSogTest, ErrorsNameTheField) {
+  EXPECT_THAT(input_error([&] { load(3); }), HasSubstr("there is no level 3; 0 (finest) to 2 are"));
+  EXPECT_THAT(input_error([&] { load(-1); }), HasSubstr("there is no level -1"));
+  EXPECT_THAT(input_error([&] { load(1, 100); }), HasSubstr("give one"));
+  const Json good = meta_;
+  const auto error = [&](const std::function<void(Json&)>& change) {
+    meta_ = good;
+    change(meta_);
+    return input_error([&] { load(); });
+  };
+  const auto first = [](Json& m) -> Json& { return m["tree"]["children"][0]["lods"]["0"]; };
+  EXPECT_THAT(error([](Json& m) { m["version"] = 2; }), HasSubstr("lod-meta.json: version"));
+  EXPECT_THAT(error([](Json& m) { m["lodLevels"] = 0; }), HasSubstr("lodLevels"));
+  EXPECT_THAT(error([](Json& m) { m["lodLevels"] = 2; }), HasSubstr("'2' is no level in 0…1"));
+  EXPECT_THAT(error([&](Json& m) { first(m)["file"] = 3; }),
+              HasSubstr("tree.children[0].lods.0.file: there are 3"));
+  EXPECT_THAT(error([&](Json& m) { first(m)["count"] = -1; }),
+              HasSubstr("tree.children[0].lods.0.count"));
+  EXPECT_THAT(error([&](Json& m) { first(m)["offset"] = 601; }), HasSubstr("fine/meta.json"));
+  EXPECT_THAT(error([&](Json& m) { first(m)["count"] = 101; }), HasSubstr("overlap"));
+  EXPECT_THAT(error([](Json& m) { m["tree"] = Json::object(); }), HasSubstr("tree: has no levels"));
+  EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "../x/meta.json"; }), HasSubstr("leads out"));
+  EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "absent/meta.json"; }),
+              AllOf(HasSubstr("absent"), HasSubstr("cannot be opened")));
+}
+
+TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
+  constexpr int depth = 200000;
+  std::string text = R"({"lodLevels": 1, "filenames": [], "tree": )";
+  for (int i = 0; i < depth; ++i) text += R"({"children":[)";
+  for (int i = 0; i < depth; ++i) text += "]}";
+  const std::string document = text + "}";
+  EXPECT_THAT(
+      input_error([&] { read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))); }),
+      HasSubstr("lies deeper than 64"));
+}
+
+}  // namespace
+}  // namespace catgs::test
