@@ -32,7 +32,9 @@ inline bool is_quiet(const CLI::App& command) {
 
 void add_bench_command(CLI::App& app);
 void add_compare_command(CLI::App& app);
+void add_convert_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
+void add_info_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 

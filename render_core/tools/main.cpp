@@ -26,7 +26,9 @@ int run(int argc, char** argv) {
 
   add_bench_command(app);
   add_compare_command(app);
+  add_convert_command(app);
   add_frames_command(app);
+  add_info_command(app);
   add_synth_command(app);
   add_trace_command(app);
 

@@ -1,0 +1,85 @@
+// catgs-render convert: a scene in, another format out.
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+#include "render_core/scene/hints.h"
+#include "render_core/scene/prune.h"
+#include "render_core/scene/save_scene.h"
+#include "render_core/scene/scene.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/progress.h"
+
+namespace catgs {
+namespace {
+
+struct ConvertOptions {
+  std::string in, out;
+  std::optional<int> lod;
+  std::optional<std::size_t> budget;
+  double keep_fraction = 1.0;
+  int threads = 0;
+};
+
+/// Estimated hints can be estimated again; others would be lost with the files they came from.
+void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
+  if (hints.source == "estimated") return;
+  const auto sidecar = std::filesystem::path(out).replace_extension(".json");
+  write_sidecar(hints, sidecar);
+  fmt::print("{}: first sight, from {}\n", sidecar.string(), hints.source);
+}
+
+void convert(const ConvertOptions& options, bool quiet) {
+  if (!(options.keep_fraction > 0.0 && options.keep_fraction <= 1.0))
+    throw InputError("--keep-fraction", "",
+                     fmt::format("{} is not in (0, 1]", options.keep_fraction));
+  LoadOptions load;
+  load.lod = options.lod;
+  load.gaussian_budget = options.budget;
+  load.threads = options.threads;
+  Scene scene;
+  {
+    Progress progress("Reading " + options.in, quiet);
+    load.progress = [&](double fraction) { progress.update(fraction); };
+    scene = load_scene(options.in, load);
+  }
+  const std::size_t loaded = scene.cloud.size();
+  keep_most_important(scene.cloud, options.keep_fraction);
+  save_scene(scene.cloud, options.out);
+  fmt::print("{}: {} of {} Gaussians, SH degree {}, {:.1f} MB, from {}\n", options.out,
+             scene.cloud.size(), scene.report.read, scene.cloud.sh_degree,
+             1e-6 * static_cast<double>(std::filesystem::file_size(options.out)), scene.format);
+  if (scene.report.dropped > 0)
+    fmt::print("{} could not be drawn and were dropped (catgs-render info says why)\n",
+               scene.report.dropped);
+  if (scene.cloud.size() < loaded)
+    fmt::print("{} of least importance were pruned\n", loaded - scene.cloud.size());
+  for (const std::string& note : scene.notes) fmt::print(stderr, "note: {}\n", note);
+  write_hints_beside(scene.hints, options.out);
+}
+
+}  // namespace
+
+void add_convert_command(CLI::App& app) {
+  auto options = std::make_shared<ConvertOptions>();
+  CLI::App* command = app.add_subcommand("convert", "Converts a scene to .ply, .splat or .spz");
+  command->add_option("in", options->in, "Any scene that can be rendered")->required();
+  command->add_option("out", options->out, "File to write: .ply, .splat or .spz")->required();
+  auto* lod = command->add_option("--lod", options->lod,
+                                  "Streamed SOG: this level of detail; 0 is the finest");
+  command
+      ->add_option("--budget", options->budget,
+                   "Streamed SOG: the finest levels with at most so many Gaussians")
+      ->excludes(lod);
+  command
+      ->add_option("--keep-fraction", options->keep_fraction,
+                   "Keep this share of the Gaussians, by opacity times mean projected area")
+      ->capture_default_str();
+  command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
+  command->callback([options, command] { convert(*options, is_quiet(*command)); });
+}
+
+}  // namespace catgs
