@@ -52,8 +52,8 @@ struct FrameResult {
 };
 
 /// A device that renders and encodes: the CPU's thread pool, or a GPU with its render thread and
-/// encoders. `done` is called once per call, on a thread of the executor. Between submit() and its
-/// `done` the job's stream belongs to the executor.
+/// encoders. `done` is called once per call, on a thread of the executor. Until then the stream
+/// belongs to the executor, which keeps no reference to it afterwards.
 class FrameExecutor {
  public:
   virtual ~FrameExecutor() = default;

@@ -62,15 +62,25 @@ FrameResult run_now(FrameJob& job) {
 
 }  // namespace
 
+// A worker lets go of the stream before it reports: the stream may hold the last reference to this
+// very pool, which none of its own threads can join.
+
 void PoolExecutor::open(std::shared_ptr<Stream> stream, StreamSettings settings,
                         std::function<void(StreamOpened)> done) {
-  pool_->submit(
-      [stream = std::move(stream), settings = std::move(settings),
-       done = std::move(done)]() mutable { done(open_now(*stream, std::move(settings))); });
+  pool_->submit([stream = std::move(stream), settings = std::move(settings),
+                 done = std::move(done)]() mutable {
+    StreamOpened opened = open_now(*stream, std::move(settings));
+    stream.reset();
+    done(std::move(opened));
+  });
 }
 
 void PoolExecutor::submit(FrameJob job, std::function<void(FrameResult)> done) {
-  pool_->submit([job = std::move(job), done = std::move(done)]() mutable { done(run_now(job)); });
+  pool_->submit([job = std::move(job), done = std::move(done)]() mutable {
+    FrameResult result = run_now(job);
+    job.stream.reset();
+    done(std::move(result));
+  });
 }
 
 }  // namespace catgs

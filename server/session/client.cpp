@@ -128,40 +128,44 @@ std::vector<std::uint64_t> Client::send(OutgoingFrame frame) {
 
 void Client::close(CloseCode code, std::string_view reason) { connection_->close(code, reason); }
 
-void Client::open_stream(StreamSettings settings) {
-  // Tracked work: the session thread does not end while an executor still owes an answer.
+template <typename Result, typename Handle>
+std::function<void(Result)> Client::on_session_thread(Handle handle) {
+  // Tracked work: the session thread does not end while an executor still owes an answer. The
+  // client is moved on to it, so that its last reference never dies on a thread of the executor.
   auto executor = boost::asio::prefer(registry_.io_.get_executor(),
                                       boost::asio::execution::outstanding_work.tracked);
-  registry_.executor_->open(stream_, std::move(settings),
-                            [self = shared_from_this(), executor](StreamOpened opened) {
-                              boost::asio::post(executor, [self, opened = std::move(opened)] {
-                                self->session_.on_stream_opened(opened, Clock::now());
-                                self->registry_.session_changed();
-                              });
-                            });
+  return [self = shared_from_this(), executor, handle](Result result) mutable {
+    boost::asio::post(executor,
+                      [self = std::move(self), handle, result = std::move(result)]() mutable {
+                        handle(*self, std::move(result));
+                        self->registry_.session_changed();
+                      });
+  };
+}
+
+void Client::open_stream(StreamSettings settings) {
+  registry_.executor_->open(
+      stream_, std::move(settings),
+      on_session_thread<StreamOpened>([](Client& client, const StreamOpened& opened) {
+        client.session_.on_stream_opened(opened, Clock::now());
+      }));
 }
 
 void Client::start_frame(TimePoint now) {
   FrameOrder order = session_.start_frame(now);
   FrameJob job{stream_, order.ticket, order.request, order.real_fps, order.force_idr, order.refine};
-  auto executor = boost::asio::prefer(registry_.io_.get_executor(),
-                                      boost::asio::execution::outstanding_work.tracked);
   registry_.scheduler_.frame_started();
   registry_.executor_->submit(
-      std::move(job), [self = shared_from_this(), executor](FrameResult result) {
-        boost::asio::post(executor, [self, result = std::move(result)]() mutable {
-          SessionRegistry& registry = self->registry_;
-          registry.scheduler_.frame_ended();
-          Metrics& metrics = registry.metrics_;
-          (result.ok ? (result.refined ? metrics.frames_refined : metrics.frames_rendered)
-                     : metrics.frames_failed)
-              .Increment();
-          metrics.list_entries_overflowed.Increment(
-              static_cast<double>(result.stats.overflowed_entries));
-          self->session_.on_frame(std::move(result), Clock::now());
-          registry.session_changed();
-        });
-      });
+      std::move(job), on_session_thread<FrameResult>([](Client& client, FrameResult result) {
+        client.registry_.scheduler_.frame_ended();
+        Metrics& metrics = client.registry_.metrics_;
+        (result.ok ? (result.refined ? metrics.frames_refined : metrics.frames_rendered)
+                   : metrics.frames_failed)
+            .Increment();
+        metrics.list_entries_overflowed.Increment(
+            static_cast<double>(result.stats.overflowed_entries));
+        client.session_.on_frame(std::move(result), Clock::now());
+      }));
 }
 
 }  // namespace catgs

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <atomic>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -54,6 +54,9 @@ class Client final : public ConnectionListener,
   /// Posts `handle(*this)` to the session thread, then lets the registry look for work.
   template <typename Handle>
   void post(Handle handle);
+  /// An executor's `done` that posts `handle(*this, result)` in the same way.
+  template <typename Result, typename Handle>
+  std::function<void(Result)> on_session_thread(Handle handle);
 
   SessionRegistry& registry_;
   const std::shared_ptr<Connection> connection_;

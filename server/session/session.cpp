@@ -88,6 +88,7 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   if (pose_ && sample.pose_id <= pose_->pose_id) return;
   if (!pose_ || !same_view(*pose_, sample, admission_.scene->facts.near_z)) {
     last_activity_ = now;
+    last_motion_ = now;
     idle_warned_ = false;
   }
   pose_ = sample;
@@ -195,9 +196,15 @@ bool Session::picture_is_stale() const {
 
 std::optional<FrameCandidate> Session::next_frame() const {
   if (state_ != State::live || paused_ || rendering_ || opening_stream_ || !pose_ ||
-      !credit_.available() || (!picture_is_stale() && refinements_left_ == 0))
+      !credit_.available())
     return std::nullopt;
-  return FrameCandidate{next_start_, next_start_ + frame_interval()};
+  TimePoint ready = next_start_;
+  if (!picture_is_stale()) {
+    if (refinements_left_ == 0) return std::nullopt;
+    // Between two poses of a moving camera a refinement would only be in the next one's way.
+    ready = std::max(ready, last_motion_ + policy_.still_after);
+  }
+  return FrameCandidate{ready, ready + frame_interval()};
 }
 
 FrameOrder Session::start_frame(TimePoint now) {

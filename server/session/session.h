@@ -47,6 +47,7 @@ struct SessionPolicy {
   int max_bitrate_kbps = 100'000;
   int max_pixels = 3840 * 2160;  // larger wishes are scaled down
   int refine_frames = 6;         // sent after motion stops, so that the still picture sharpens
+  std::chrono::milliseconds still_after{100};  // without another view: motion has stopped
 };
 
 /// What a session needs from the server around it. Its owner implements it; tests fake it.
@@ -149,6 +150,7 @@ class Session {
   CreditWindow credit_;
   std::optional<PoseSample> pose_;  // newest
   TimePoint pose_received_{};
+  TimePoint last_motion_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
   int refinements_left_ = 0;
   bool rendering_ = false;

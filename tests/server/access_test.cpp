@@ -1,0 +1,105 @@
+#include "server/access.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+using testing::HasSubstr;
+using testing::Optional;
+
+constexpr std::string_view key = "0123456789abcdef0123456789abcdef";
+
+class AccessTest : public testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& name, const std::string& text) {
+    const auto path = folder / name;
+    std::ofstream(path) << text;
+    return path;
+  }
+  void SetUp() override {
+    folder = std::filesystem::path(testing::TempDir()) / ("access-" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder); }
+
+  std::filesystem::path folder;
+};
+
+TEST_F(AccessTest, LinksCarryTheirGrant) {
+  const std::string token = make_link_token({"city", "viewer", 1000}, key);
+  const auto grant = read_link_token(token, key);
+  ASSERT_TRUE(grant);
+  EXPECT_EQ(grant->scene_id, "city");
+  EXPECT_EQ(grant->role, "viewer");
+  EXPECT_EQ(grant->expires_unix_s, 1000);
+  EXPECT_FALSE(read_link_token(token, "another key of some length"));
+}
+
+TEST_F(AccessTest, AChangedLinkIsNoLink) {
+  const std::string token = make_link_token({"city", "viewer", 1000}, key);
+  for (std::size_t i = 0; i < token.size(); ++i) {
+    std::string changed = token;
+    changed[i] = changed[i] == 'A' ? 'B' : 'A';
+    const auto grant = read_link_token(changed, key);
+    // The last base64 digit of a part carries bits that mean nothing.
+    if (grant) {
+      EXPECT_EQ(grant->expires_unix_s, 1000) << i;
+    }
+  }
+  for (const char* nonsense : {"", ".", "a", "a.b", "=.=", "....", "!!!.!!!"})
+    EXPECT_FALSE(read_link_token(nonsense, key)) << nonsense;
+}
+
+TEST_F(AccessTest, LinksExpireAndBelongToAScene) {
+  AccessControl access({}, write("key", std::string(key) + "\n"));
+  const std::string token = make_link_token({"city", "viewer", 1000}, key);
+  EXPECT_FALSE(access.refusal(token, "city", 999));
+  EXPECT_THAT(access.refusal(token, "city", 1000), Optional(HasSubstr("expired")));
+  EXPECT_THAT(access.refusal(token, "garden", 999), Optional(HasSubstr("another scene")));
+  EXPECT_FALSE(access.refusal(make_link_token({"", "viewer", 1000}, key), "garden", 999));
+  EXPECT_TRUE(access.refusal("", "city", 0));
+  EXPECT_TRUE(access.refusal("guess", "city", 0));
+}
+
+TEST_F(AccessTest, StaticTokensAreReadAgain) {
+  const auto path = write("tokens", "# first\nalpha-alpha\n");
+  AccessControl access(path, {});
+  EXPECT_FALSE(access.refusal("alpha-alpha", "city", 0));
+  EXPECT_TRUE(access.refusal("alpha-alph", "city", 0));
+  EXPECT_TRUE(access.refusal("# first", "city", 0));
+
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  write("tokens", "beta-beta\n");
+  std::filesystem::last_write_time(path, later);
+  EXPECT_TRUE(access.refusal("alpha-alpha", "city", 0));
+  EXPECT_FALSE(access.refusal("beta-beta", "city", 0));
+
+  write("tokens", "x\n");  // too short: the good ones stay
+  std::filesystem::last_write_time(path, later + std::chrono::seconds(2));
+  EXPECT_FALSE(access.refusal("beta-beta", "city", 0));
+}
+
+TEST_F(AccessTest, WithoutFilesEverybodyMayEnter) {
+  AccessControl access({}, {});
+  EXPECT_FALSE(access.refusal("", "city", 0));
+}
+
+TEST_F(AccessTest, NamesWhatIsWrong) {
+  EXPECT_THROW(read_key_file(write("short", "abc")), InputError);
+  EXPECT_THROW(AccessControl(write("empty", "# nothing\n"), {}), InputError);
+  EXPECT_THROW(make_link_token({"city", "A B", 0}, key), InputError);
+  for (const char* text : {"", "7", "d", "7x", "-1d", "0s", "7d ", "99999999d"})
+    EXPECT_THROW(parse_duration(text), InputError) << text;
+  EXPECT_EQ(parse_duration("7d"), std::chrono::hours(168));
+  EXPECT_EQ(parse_duration("90s"), std::chrono::seconds(90));
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,128 @@
+#include "server/config.h"
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+class ConfigTest : public testing::Test {
+ protected:
+  ConfigTest() : path(testing::TempDir() + "catgs-" + std::to_string(::getpid()) + ".toml") {}
+  ~ConfigTest() override { std::filesystem::remove(path); }
+
+  void read_toml(const std::string& text) {
+    std::ofstream(path) << text;
+    apply_toml(path, config, sources);
+  }
+  void read_environment(const std::map<std::string, std::string>& variables) {
+    apply_environment(
+        [&](const char* name) {
+          const auto it = variables.find(name);
+          return it == variables.end() ? nullptr : it->second.c_str();
+        },
+        config, sources);
+  }
+  void read_flag(const std::string& name, const std::vector<std::string>& values) {
+    const auto it = std::ranges::find(settings(), name, &Setting::name);
+    ASSERT_NE(it, settings().end());
+    apply_flag(*it, values, config, sources);
+  }
+
+  std::string path;
+  ServerConfig config;
+  ConfigSources sources;
+};
+
+TEST_F(ConfigTest, LaterLayersWin) {
+  read_toml("port = 1000\nfps = 30\nscene = [\"a.ply\", \"b.ply\"]\nopen = true\n");
+  EXPECT_EQ(config.port, 1000);
+  EXPECT_TRUE(config.open);
+  EXPECT_THAT(config.scenes, ElementsAre("a.ply", "b.ply"));
+  read_environment({{"CATGS_PORT", "2000"}, {"CATGS_SCENE", "c.ply,d.ply"}});
+  EXPECT_EQ(config.port, 2000);
+  EXPECT_THAT(config.scenes, ElementsAre("c.ply", "d.ply"));
+  read_flag("port", {"3000"});
+  EXPECT_EQ(config.port, 3000);
+  EXPECT_EQ(config.fps, 30);
+  EXPECT_THAT(print_config(config, sources),
+              AllOf(HasSubstr("port = 3000  # --port\n"), HasSubstr("fps = 30  # " + path + ":2\n"),
+                    HasSubstr("scene = [\"c.ply\", \"d.ply\"]  # CATGS_SCENE\n"),
+                    HasSubstr("bitrate = 8000  # default\n")));
+}
+
+TEST_F(ConfigTest, PrintedConfigReadsBackTheSame) {
+  read_flag("scene", {"with \"quotes\".ply", "back\\slash.ply"});
+  read_flag("encoder", {"jpeg"});
+  const std::string printed = print_config(config, sources);
+  ServerConfig again;
+  ConfigSources ignored;
+  std::ofstream(path) << printed;
+  apply_toml(path, again, ignored);
+  EXPECT_EQ(again.scenes, config.scenes);
+  EXPECT_EQ(again.encoder, EncoderKind::jpeg);
+  EXPECT_EQ(again.admin_bind, config.admin_bind);
+}
+
+TEST_F(ConfigTest, MistakesNameTheirPlace) {
+  EXPECT_THAT([&] { read_toml("port = 80\nfsp = 30\n"); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr(path + ":2"), HasSubstr("fsp"))));
+  EXPECT_THAT([&] { read_toml("\n\nport = \"x\"\n"); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr(path + ":3"), HasSubstr("port"))));
+  EXPECT_THAT([&] { read_toml("port = [\n"); }, ThrowsMessage<InputError>(HasSubstr(path)));
+  EXPECT_THAT([&] { read_toml("port = 1.5\n"); }, ThrowsMessage<InputError>(HasSubstr(":1")));
+  EXPECT_THAT(
+      [&] {
+        read_environment({{"CATGS_FPS", "0"}});
+      },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("CATGS_FPS"), HasSubstr("1…240"))));
+  EXPECT_THAT([&] { read_flag("encoder", {"vp9"}); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--encoder"), HasSubstr("x264"))));
+  EXPECT_THAT([&] { read_flag("admin-bind", {"9090"}); },
+              ThrowsMessage<InputError>(HasSubstr("ADDRESS:PORT")));
+  EXPECT_THAT([&] { apply_toml("/nowhere.toml", config, sources); },
+              ThrowsMessage<InputError>(HasSubstr("/nowhere.toml")));
+}
+
+TEST_F(ConfigTest, RefusesAnOpenDoor) {
+  config.scenes = {"synth:city:1000"};
+  EXPECT_NO_THROW(validate(config));
+  config.bind = "0.0.0.0";
+  EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--open")));
+  config.open = true;
+  EXPECT_NO_THROW(validate(config));
+  config.open = false;
+  config.token_file = "tokens";
+  EXPECT_NO_THROW(validate(config));
+}
+
+TEST_F(ConfigTest, RefusesHalfATlsPairAndNoScene) {
+  EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--scene")));
+  config.scenes = {"a.ply"};
+  config.tls_cert = "cert.pem";
+  EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--tls-key")));
+}
+
+TEST(Endpoint, IsAddressAndPort) {
+  EXPECT_EQ(parse_endpoint("[::1]:9090").address, "::1");
+  EXPECT_EQ(parse_endpoint("127.0.0.1:0").port, 0);
+  EXPECT_THROW(parse_endpoint(":80"), std::invalid_argument);
+  EXPECT_THROW(parse_endpoint("host:99999"), std::invalid_argument);
+  EXPECT_TRUE(is_loopback("127.8.9.1"));
+  EXPECT_FALSE(is_loopback("::"));
+}
+
+}  // namespace
+}  // namespace catgs

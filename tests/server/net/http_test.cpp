@@ -1,0 +1,64 @@
+#include "server/net/http.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "render_core/error.h"
+#include "server/net/static_files.h"
+
+namespace catgs {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Origin, OwnPagesAndListedOnesMayConnect) {
+  EXPECT_TRUE(origin_allowed("", "a.example", {})) << "no browser";
+  EXPECT_TRUE(origin_allowed("https://a.example", "a.example", {}));
+  EXPECT_TRUE(origin_allowed("http://a.example:8080", "a.example:8080", {}));
+  EXPECT_FALSE(origin_allowed("http://a.example:8081", "a.example:8080", {}));
+  EXPECT_FALSE(origin_allowed("https://evil.example", "a.example", {}));
+  EXPECT_FALSE(origin_allowed("https://a.example.evil.example", "a.example", {}));
+  EXPECT_FALSE(origin_allowed("null", "a.example", {}));
+  EXPECT_TRUE(origin_allowed("https://b.example", "a.example", {"https://b.example"}));
+  EXPECT_TRUE(origin_allowed("null", "a.example", {"*"}));
+}
+
+TEST(ContentSecurityPolicy, NamesWhoMayEmbed) {
+  EXPECT_THAT(content_security_policy({}), HasSubstr("frame-ancestors 'none'"));
+  EXPECT_THAT(content_security_policy({"https://museum.example"}),
+              HasSubstr("frame-ancestors https://museum.example"));
+}
+
+TEST(StaticFiles, CompressesTextAndKeepsTypes) {
+  const auto folder =
+      std::filesystem::path(testing::TempDir()) / ("static-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder / "assets");
+  std::ofstream(folder / "index.html") << std::string(5000, 'a');
+  std::ofstream(folder / "assets" / "x.mjs") << "export {}";
+  const StaticFiles files(folder);
+  const auto plain = files.respond({"/", "", false});
+  EXPECT_EQ(plain.body->size(), 5000u);
+  EXPECT_FALSE(plain.gzip);
+  const auto zipped = files.respond({"/index.html", "", true});
+  EXPECT_TRUE(zipped.gzip);
+  EXPECT_LT(zipped.body->size(), 500u);
+  EXPECT_EQ(zipped.etag, plain.etag);
+  EXPECT_EQ(files.respond({"/", plain.etag, true}).status, 304);
+  EXPECT_THAT(files.respond({"/assets/x.mjs", "", true}).content_type,
+              HasSubstr("text/javascript"));
+  EXPECT_EQ(files.respond({"/assets/../index.html", "", true}).status, 404);
+  EXPECT_EQ(files.respond({"/assets", "", true}).status, 404);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(StaticFiles, NamesAFolderThatIsNoClient) {
+  EXPECT_THROW(StaticFiles("/nonexistent"), InputError);
+  EXPECT_THROW(StaticFiles(std::filesystem::path("/proc/self/fdinfo")), InputError);
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,318 @@
+// Integration: real sockets on loopback, a whole server in this process.
+
+#include "server/server.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include <boost/system/system_error.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "render_core/error.h"
+#include "tests/support/server_client.h"
+
+namespace catgs::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+std::string sessions_json(const RunningServer& server) {
+  return http_get(server.admin_port(), "/api/sessions").body;
+}
+
+TEST(Server, StreamsTheNewestPose) {
+  RunningServer server;
+  WireClient client(server.port());
+  const v1::Welcome welcome = client.greet(160, 96);
+  EXPECT_EQ(welcome.version(), 1u);
+  EXPECT_EQ(welcome.scene().scene_id(), "city");
+  EXPECT_EQ(welcome.scene().gaussians(), 2000u);
+  EXPECT_THAT(welcome.config().codec_string(), HasSubstr("avc1."));
+  EXPECT_EQ(welcome.config().width_px(), 160u);
+
+  std::uint64_t last_frame_id = 0;
+  for (std::uint64_t id = 1; id <= 5; ++id) {
+    client.send_pose(id, 0.1f * static_cast<float>(id));
+    ReceivedFrame frame;
+    do {  // frames that refine the still picture may come between
+      frame = client.receive_frame();
+      EXPECT_GT(frame.header.frame_id(), last_frame_id);
+      EXPECT_EQ(frame.header.idr(), last_frame_id == 0);
+      EXPECT_FALSE(frame.bitstream.empty());
+      last_frame_id = frame.header.frame_id();
+      client.send_ack(last_frame_id);
+    } while (frame.header.pose_id() != id);
+    EXPECT_EQ(frame.header.pose_client_time_us(), static_cast<std::int64_t>(id) * 1000);
+    EXPECT_EQ(frame.header.width_px(), 160u);
+  }
+  v1::ClientMessage bye;
+  bye.mutable_bye();
+  client.send(bye);
+  EXPECT_EQ(client.receive_until_closed().close_code, 1000);
+}
+
+TEST(Server, SendsJpegToAClientThatDecodesNothingElse) {
+  RunningServer server;
+  WireClient client(server.port());
+  const auto welcome = client.greet(64, 48, v1::CODEC_MJPEG);
+  EXPECT_EQ(welcome.config().codec(), v1::CODEC_MJPEG);
+  client.send_pose(1);
+  const ReceivedFrame frame = client.receive_frame();
+  ASSERT_GE(frame.bitstream.size(), 2u);
+  EXPECT_EQ(frame.bitstream[0], std::byte{0xff});
+  EXPECT_EQ(frame.bitstream[1], std::byte{0xd8});
+}
+
+TEST(Server, NewSettingsGiveANewConfigAndThenAnIdr) {
+  RunningServer server;
+  WireClient client(server.port());
+  client.greet(160, 96);
+  client.send_pose(1);
+  client.send_ack(client.receive_frame().header.frame_id());
+  v1::ClientMessage settings;
+  settings.mutable_settings()->set_width_px(320);
+  settings.mutable_settings()->set_height_px(181);
+  client.send(settings);
+  const auto config = client.receive_message(v1::ServerMessage::kConfig).config();
+  EXPECT_EQ(config.width_px(), 320u);
+  EXPECT_EQ(config.height_px(), 180u);
+  const ReceivedFrame frame = client.receive_frame();
+  EXPECT_TRUE(frame.header.idr());
+  EXPECT_EQ(frame.header.width_px(), 320u);
+}
+
+TEST(Server, CreditBoundsWhatIsInFlight) {
+  RunningServer server;
+  WireClient client(server.port());
+  client.greet();
+  // Never acknowledged: at most eight frames, however many poses come.
+  std::set<std::uint64_t> frames;
+  for (std::uint64_t id = 1; id <= 40; ++id) client.send_pose(id, 0.05f * static_cast<float>(id));
+  for (int heartbeats = 0; heartbeats < 2;) {
+    const Received received = client.receive();
+    ASSERT_FALSE(received.closed);
+    if (received.frame) frames.insert(received.frame->header.frame_id());
+    if (received.message && received.message->has_heartbeat()) ++heartbeats;
+  }
+  EXPECT_GE(frames.size(), 1u);
+  EXPECT_LE(frames.size(), 8u);
+  EXPECT_THAT(sessions_json(server), HasSubstr("\"frames_queued\":0"));
+}
+
+TEST(Server, SeveralSessionsShareOneScene) {
+  RunningServer server;
+  std::vector<std::unique_ptr<WireClient>> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.push_back(std::make_unique<WireClient>(server.port()));
+    clients.back()->greet(64 + 16 * i, 48);
+  }
+  for (std::uint64_t id = 1; id <= 5; ++id) {
+    for (auto& client : clients) client->send_pose(id, 0.1f * static_cast<float>(id));
+    for (std::size_t i = 0; i < clients.size(); ++i) {
+      const ReceivedFrame frame = clients[i]->receive_frame();
+      EXPECT_EQ(frame.header.width_px(), 64 + 16 * i);
+      clients[i]->send_ack(frame.header.frame_id());
+    }
+  }
+}
+
+TEST(Server, ABadMessageClosesItsSessionOnly) {
+  RunningServer server;
+  WireClient good(server.port());
+  good.greet();
+  WireClient bad(server.port());
+  bad.greet();
+  v1::ClientMessage message;
+  message.mutable_pose()->set_fov_y_rad(9.0f);
+  bad.send(message);
+  std::optional<v1::Error> error;
+  EXPECT_EQ(bad.receive_until_closed(&error).close_code, 1008);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::BAD_MESSAGE);
+  EXPECT_TRUE(error->fatal());
+  EXPECT_THAT(error->message(), HasSubstr("pose"));
+
+  good.send_pose(1);
+  EXPECT_FALSE(good.receive_frame().bitstream.empty());
+}
+
+TEST(Server, RefusesWhatIsNoMessage) {
+  RunningServer server;
+  std::optional<v1::Error> error;
+  WireClient garbage(server.port());
+  garbage.send_bytes(std::string("\xff\xff\xff\xff", 4));
+  garbage.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::BAD_MESSAGE);
+
+  WireClient early(server.port());
+  early.send_pose(1);
+  error.reset();
+  early.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_THAT(error->message(), HasSubstr("hello"));
+
+  WireClient text(server.port());
+  text.send_bytes("hello", false);
+  EXPECT_EQ(text.receive_until_closed().close_code, 1003);
+
+  WireClient huge(server.port());
+  huge.send_bytes(std::string(65 * 1024, 'x'));
+  EXPECT_EQ(huge.receive_until_closed().close_code, 1009);
+}
+
+TEST(Server, RefusesAnUnknownSceneAndAFullHouse) {
+  RunningServer server([](ServerConfig& config) { config.max_sessions = 1; });
+  std::optional<v1::Error> error;
+  WireClient lost(server.port());
+  auto hello = hello_message(64, 64, v1::CODEC_H264);
+  hello.mutable_hello()->set_scene_id("atlantis");
+  lost.send(hello);
+  lost.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::UNKNOWN_SCENE);
+
+  WireClient first(server.port());
+  first.greet();
+  WireClient second(server.port());
+  second.send(hello_message(64, 64, v1::CODEC_H264));
+  EXPECT_EQ(second.receive_until_closed(&error).close_code, 1013);
+  EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+}
+
+TEST(Server, LimitsConnectionsOfOneAddress) {
+  RunningServer server([](ServerConfig& config) { config.max_sessions_per_address = 1; });
+  WireClient first(server.port());
+  first.greet();
+  WireClient second(server.port());
+  std::optional<v1::Error> error;
+  second.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+}
+
+TEST(Server, RefusesForeignOriginsAndProtocols) {
+  RunningServer server(
+      [](ServerConfig& config) { config.allow_origins = {"https://friend.example"}; });
+  const std::string own = "http://127.0.0.1:" + std::to_string(server.port());
+  EXPECT_NO_THROW(WireClient(server.port(), {own, "catgs.v1"}));
+  EXPECT_NO_THROW(WireClient(server.port(), {"https://friend.example", "catgs.v1"}));
+  EXPECT_THROW(WireClient(server.port(), {"https://evil.example", "catgs.v1"}),
+               boost::system::system_error);
+  EXPECT_THROW(WireClient(server.port(), {"", "catgs.v99"}), boost::system::system_error);
+  EXPECT_THROW(WireClient(server.port(), {"", ""}), boost::system::system_error);
+}
+
+TEST(Server, AdmitsByTokenAndNeverSaysIt) {
+  const auto folder = std::filesystem::path(testing::TempDir());
+  const auto token_file = folder / ("tokens-" + std::to_string(::getpid()));
+  std::ofstream(token_file) << "# museum\nopen-sesame-1\n";
+  RunningServer server([&](ServerConfig& config) { config.token_file = token_file.string(); });
+  WireClient stranger(server.port());
+  stranger.send(hello_message(64, 64, v1::CODEC_H264));
+  std::optional<v1::Error> error;
+  stranger.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::UNAUTHORIZED);
+
+  WireClient guest(server.port());
+  guest.greet(64, 64, v1::CODEC_H264, "open-sesame-1");
+  EXPECT_THAT(sessions_json(server), Not(HasSubstr("sesame")));
+  std::filesystem::remove(token_file);
+}
+
+TEST(Server, ServesPagesAndNothingElse) {
+  const auto folder =
+      std::filesystem::path(testing::TempDir()) / ("client-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder / "web" / "assets");
+  std::ofstream(folder / "web" / "index.html") << "<!doctype html>";
+  std::ofstream(folder / "web" / "assets" / "a.wasm") << "wasm";
+  std::ofstream(folder / "secret.txt") << "secret";
+  RunningServer server([&](ServerConfig& c) { c.client_dir = (folder / "web").string(); });
+
+  const HttpReply page = http_get(server.port(), "/");
+  EXPECT_EQ(page.status, 200);
+  EXPECT_EQ(page.body, "<!doctype html>");
+  EXPECT_THAT(page.headers.at("content-security-policy"), HasSubstr("default-src 'none'"));
+  EXPECT_EQ(page.headers.at("cache-control"), "no-cache");
+  const HttpReply asset = http_get(server.port(), "/assets/a.wasm");
+  EXPECT_EQ(asset.headers.at("content-type"), "application/wasm");
+  EXPECT_THAT(asset.headers.at("cache-control"), HasSubstr("immutable"));
+  EXPECT_EQ(http_get(server.port(), "/", {{"if-none-match", page.headers.at("etag")}}).status, 304);
+
+  for (const char* target : {"/../secret.txt", "/assets/../../secret.txt", "/%2e%2e/secret.txt",
+                             "/..%2fsecret.txt", "//etc/passwd", "/nowhere"}) {
+    const HttpReply reply = http_get(server.port(), target);
+    EXPECT_GE(reply.status, 400) << target;
+    EXPECT_THAT(reply.body, Not(HasSubstr("secret"))) << target;
+  }
+  EXPECT_EQ(http_get(server.port(), "/healthz").status, 200);
+  EXPECT_EQ(http_get(server.port(), "/readyz").status, 200);
+  EXPECT_THAT(http_get(server.port(), "/api/scenes").body, HasSubstr("\"id\":\"city\""));
+  EXPECT_EQ(http_get(server.port(), "/metrics").status, 404);
+  EXPECT_THAT(http_get(server.admin_port(), "/metrics").body, HasSubstr("catgs_sessions 0"));
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Server, NamesABusyPort) {
+  RunningServer server;
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = server.port();
+  config.admin_bind = "off";
+  try {
+    Server second(config);
+    FAIL() << "two servers on one port";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr(std::to_string(server.port())));
+    EXPECT_THAT(error.what(), HasSubstr("busy"));
+  }
+}
+
+TEST(Server, TellsClientsWhenItStops) {
+  RunningServer server;
+  WireClient client(server.port());
+  client.greet();
+  client.send_pose(1);
+  server.stop();
+  client.receive_message(v1::ServerMessage::kDrain);
+  EXPECT_EQ(client.receive_until_closed().close_code, 1001);
+  server.join();
+}
+
+TEST(ServerProgram, EndsCleanlyOnSigterm) {
+  int ports[2];
+  ASSERT_EQ(::pipe(ports), 0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ::dup2(ports[1], STDERR_FILENO);
+    ::execl(CATGS_SERVER_PROGRAM, "catgs-server", "--scene", "synth:city:2000", "--port", "0",
+            "--admin-bind", "off", static_cast<char*>(nullptr));
+    ::_exit(127);
+  }
+  ::close(ports[1]);
+  std::string log;
+  char buffer[512];
+  for (ssize_t n; log.find("Ctrl-C") == std::string::npos &&
+                  (n = ::read(ports[0], buffer, sizeof buffer)) > 0;)
+    log.append(buffer, static_cast<std::size_t>(n));
+  EXPECT_THAT(log, HasSubstr("http://127.0.0.1:"));
+  EXPECT_THAT(log, HasSubstr("renderer: CPU"));
+  EXPECT_EQ(::kill(child, SIGTERM), 0);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  ::close(ports[0]);
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,223 @@
+#include "server/net/wire.h"
+
+#include <fstream>
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "proto/catgs.pb.h"
+
+namespace catgs {
+namespace {
+
+using testing::HasSubstr;
+using namespace std::chrono_literals;
+
+std::string hex(const std::vector<std::byte>& bytes) {
+  std::string text;
+  for (const std::byte b : bytes) {
+    constexpr char digits[] = "0123456789abcdef";
+    text += digits[std::to_integer<unsigned>(b) >> 4];
+    text += digits[std::to_integer<unsigned>(b) & 15];
+  }
+  return text;
+}
+
+std::vector<std::byte> unhex(const std::string& text) {
+  std::vector<std::byte> bytes;
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2)
+    bytes.push_back(static_cast<std::byte>(std::stoi(text.substr(i, 2), nullptr, 16)));
+  return bytes;
+}
+
+/// Bytes that both sides of the wire agree on, made by neither.
+std::string golden(const std::string& name) {
+  std::ifstream in(CATGS_WIRE_GOLDEN);
+  return nlohmann::json::parse(in).at(name).get<std::string>();
+}
+
+template <typename T>
+T parsed(const std::vector<std::byte>& bytes) {
+  const auto result = wire::parse_client_message(bytes);
+  const auto* message = std::get_if<ClientMessage>(&result);
+  if (!message) throw std::runtime_error(std::get<wire::ParseError>(result).what);
+  return std::get<T>(*message);
+}
+
+/// What parsing says against a message; empty: nothing.
+std::string complaint(const v1::ClientMessage& message) {
+  const std::string text = message.SerializeAsString();
+  const auto* data = reinterpret_cast<const std::byte*>(text.data());
+  const auto result = wire::parse_client_message({data, text.size()});
+  const auto* error = std::get_if<wire::ParseError>(&result);
+  return error ? error->what : "";
+}
+
+v1::ClientMessage good_hello() {
+  v1::ClientMessage message;
+  auto& hello = *message.mutable_hello();
+  hello.set_version(1);
+  hello.set_viewport_width_px(640);
+  hello.set_viewport_height_px(360);
+  hello.set_device_pixel_ratio(1.0f);
+  return message;
+}
+
+v1::ClientMessage good_pose() {
+  v1::ClientMessage message;
+  message.mutable_pose()->mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
+  message.mutable_pose()->set_fov_y_rad(1.0f);
+  return message;
+}
+
+TEST(Wire, ParsesGoldenClientMessages) {
+  const auto hello = parsed<Hello>(unhex(golden("client_hello")));
+  EXPECT_EQ(hello.version, 1u);
+  EXPECT_EQ(hello.scene_id, "city");
+  EXPECT_EQ(hello.viewport_px, glm::ivec2(640, 360));
+  EXPECT_EQ(hello.device_pixel_ratio, 1.5f);
+  EXPECT_THAT(hello.decoders, testing::ElementsAre(Codec::h264, Codec::mjpeg));
+  EXPECT_EQ(hello.token, "secret");
+  EXPECT_EQ(hello.settings.max_fps, 30);
+
+  const auto pose = parsed<PoseSample>(unhex(golden("client_pose")));
+  EXPECT_EQ(pose.pose_id, 300u);
+  EXPECT_EQ(pose.client_time_us, 1234567890123);
+  EXPECT_EQ(pose.world_from_camera.position, glm::vec3(1.0f, -2.5f, 0.125f));
+  EXPECT_FLOAT_EQ(pose.world_from_camera.orientation.y, 0.6f);
+  EXPECT_FLOAT_EQ(pose.world_from_camera.orientation.w, 0.8f);
+
+  const auto ack = parsed<Ack>(unhex(golden("client_ack")));
+  EXPECT_EQ(ack.frame_id, 7u);
+  EXPECT_EQ(ack.presented_us, 3000);
+  EXPECT_EQ(ack.pose_age_us, 2500u);
+  EXPECT_FALSE(ack.dropped);
+}
+
+TEST(Wire, WritesGoldenServerMessages) {
+  EXPECT_EQ(hex(wire::serialize(
+                ErrorMessage{ErrorCode::server_full, "8 of 8 sessions are in use", true})),
+            golden("server_error"));
+  EXPECT_EQ(hex(wire::serialize(
+                StreamConfig{Codec::h264, "avc1.42C01F", {1280, 720}, 60, 8000, "libx264"})),
+            golden("server_config"));
+}
+
+TEST(Wire, WritesTheGoldenFrame) {
+  FrameTicket ticket;
+  ticket.frame_id = 9;
+  ticket.pose_id = 300;
+  ticket.pose_client_time_us = 1234567890123;
+  ticket.render_pose.position.x = 1.0f;
+  ticket.fov_y_rad = 1.0f;
+  ticket.idr = true;
+  ticket.size_px = {640, 360};
+  ticket.pose_received = TimePoint{} + 1s;
+  ticket.render_start = ticket.pose_received + 400us;
+  ticket.render_end = ticket.render_start + 20ms;
+  ticket.encode_end = ticket.render_end + 3ms;
+  std::vector<std::byte> packet;
+  wire::append_frame_header(ticket, ticket.encode_end + 50us, packet);
+  EXPECT_EQ(hex(packet) + "000000016742c01f", golden("server_frame"));
+}
+
+TEST(Wire, EveryServerMessageReadsBack) {
+  const auto reread = [](const ServerMessage& message) {
+    const auto bytes = wire::serialize(message);
+    EXPECT_EQ(bytes.at(0), std::byte{1});
+    v1::ServerMessage out;
+    EXPECT_TRUE(out.ParseFromArray(bytes.data() + 1, static_cast<int>(bytes.size()) - 1));
+    return out;
+  };
+  Welcome welcome;
+  welcome.session_id = "abc";
+  welcome.scene.scene_id = "city";
+  welcome.scene.focus = {1.0f, 2.0f, 3.0f};
+  welcome.scene_ids = {"city", "garden"};
+  const auto greeting = reread(welcome).welcome();
+  EXPECT_EQ(greeting.version(), 1u);
+  EXPECT_EQ(greeting.scene().focus().z(), 3.0f);
+  EXPECT_EQ(greeting.scene().start_pose().orientation().w(), 1.0f);
+  EXPECT_EQ(greeting.scene_ids(1), "garden");
+  EXPECT_EQ(reread(Stats{12.5f, 800.0f, 3, 0, 1, 4}).stats().sessions(), 4u);
+  EXPECT_EQ(reread(Heartbeat{77}).heartbeat().server_time_us(), 77);
+  EXPECT_EQ(reread(Drain{1000}).drain().deadline_ms(), 1000u);
+}
+
+TEST(Wire, NamesTheFieldThatIsWrong) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(complaint(good_hello()), "");
+  EXPECT_EQ(complaint(good_pose()), "");
+
+  auto hello = good_hello();
+  hello.mutable_hello()->set_viewport_width_px(15);
+  EXPECT_THAT(complaint(hello), HasSubstr("hello.viewport_width_px"));
+  hello = good_hello();
+  hello.mutable_hello()->set_device_pixel_ratio(nan);
+  EXPECT_THAT(complaint(hello), HasSubstr("hello.device_pixel_ratio"));
+  hello = good_hello();
+  hello.mutable_hello()->set_token(std::string(513, 'x'));
+  EXPECT_THAT(complaint(hello), HasSubstr("hello.token"));
+  hello = good_hello();
+  hello.mutable_hello()->mutable_settings()->set_width_px(640);
+  EXPECT_THAT(complaint(hello), HasSubstr("settings"));
+  hello = good_hello();
+  for (int i = 0; i < 9; ++i) hello.mutable_hello()->add_decoders(v1::CODEC_H264);
+  EXPECT_THAT(complaint(hello), HasSubstr("hello.decoders"));
+
+  for (const float bad : {nan, infinity, -infinity, 1.0e30f}) {
+    auto pose = good_pose();
+    pose.mutable_pose()->mutable_world_from_camera()->mutable_position()->set_y(bad);
+    EXPECT_THAT(complaint(pose), HasSubstr("pose.position.y")) << bad;
+  }
+  for (const float w : {0.0f, 0.5f, 1.2f, nan}) {
+    auto pose = good_pose();
+    pose.mutable_pose()->mutable_world_from_camera()->mutable_orientation()->set_w(w);
+    EXPECT_THAT(complaint(pose), HasSubstr("pose.orientation")) << w;
+  }
+  for (const float fov : {0.0f, 3.0f, nan}) {
+    auto pose = good_pose();
+    pose.mutable_pose()->set_fov_y_rad(fov);
+    EXPECT_THAT(complaint(pose), HasSubstr("pose.fov_y_rad")) << fov;
+  }
+}
+
+TEST(Wire, NormalisesQuaternions) {
+  auto message = good_pose();
+  message.mutable_pose()->mutable_world_from_camera()->mutable_orientation()->set_w(1.05f);
+  const std::string text = message.SerializeAsString();
+  const auto* data = reinterpret_cast<const std::byte*>(text.data());
+  const auto pose = parsed<PoseSample>({data, data + text.size()});
+  EXPECT_FLOAT_EQ(glm::length(pose.world_from_camera.orientation), 1.0f);
+}
+
+TEST(Wire, PathsAreInTimeOrderAndBounded) {
+  v1::ClientMessage message;
+  for (int i = 0; i < 3; ++i) {
+    auto& sample = *message.mutable_path()->add_samples();
+    sample = good_pose().pose();
+    sample.set_client_time_us(i == 2 ? 0 : i + 1);
+  }
+  EXPECT_THAT(complaint(message), HasSubstr("time order"));
+  message.mutable_path()->clear_samples();
+  for (int i = 0; i < 257; ++i) *message.mutable_path()->add_samples() = good_pose().pose();
+  EXPECT_THAT(complaint(message), HasSubstr("path.samples"));
+}
+
+TEST(Wire, IgnoresWhatIsNewAndRefusesWhatIsBroken) {
+  EXPECT_NO_THROW(parsed<UnknownMessage>({}));
+  EXPECT_NO_THROW(parsed<UnknownMessage>(unhex("a20600")));  // field 100 of a later version
+  for (const char* broken : {"ff", "0a05", "1a02ffff"}) {
+    const auto result = wire::parse_client_message(unhex(broken));
+    EXPECT_TRUE(std::holds_alternative<wire::ParseError>(result)) << broken;
+  }
+  const std::vector<std::byte> huge(wire::max_client_message_bytes + 1);
+  EXPECT_TRUE(std::holds_alternative<wire::ParseError>(wire::parse_client_message(huge)));
+}
+
+}  // namespace
+}  // namespace catgs

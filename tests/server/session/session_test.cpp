@@ -1,0 +1,320 @@
+// A Session with a fake clock and a fake server around it.
+
+#include "server/session/session.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+struct FakeHost final : SessionHost {
+  std::variant<Admission, ErrorMessage> admission = Admission{};
+  std::vector<ServerMessage> said;
+  std::vector<OutgoingFrame> frames;
+  std::vector<StreamSettings> opened;
+  std::vector<std::uint64_t> drop_next;
+  std::optional<CloseCode> closed;
+
+  std::variant<Admission, ErrorMessage> admit(const Hello&) override { return admission; }
+  std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
+      const std::string& id) override {
+    auto scene = std::make_shared<SceneEntry>();
+    scene->facts.scene_id = id;
+    return scene;
+  }
+  std::vector<std::string> scene_ids() override { return {"a"}; }
+  std::uint32_t session_count() override { return 1; }
+  void send(const ServerMessage& message) override { said.push_back(message); }
+  std::vector<std::uint64_t> send(OutgoingFrame frame) override {
+    frames.push_back(std::move(frame));
+    return std::exchange(drop_next, {});
+  }
+  void close(CloseCode code, std::string_view) override { closed = code; }
+  void open_stream(StreamSettings settings) override { opened.push_back(std::move(settings)); }
+
+  template <typename T>
+  int count() const {
+    return static_cast<int>(std::ranges::count_if(
+        said, [](const ServerMessage& m) { return std::holds_alternative<T>(m); }));
+  }
+  const ErrorMessage& last_error() const {
+    for (auto it = said.rbegin(); it != said.rend(); ++it)
+      if (const auto* error = std::get_if<ErrorMessage>(&*it)) return *error;
+    throw std::logic_error("no error was said");
+  }
+};
+
+class SessionTest : public testing::Test {
+ protected:
+  SessionTest() {
+    auto scene = std::make_shared<SceneEntry>();
+    scene->facts.scene_id = "a";
+    scene->facts.near_z = 0.2f;
+    host.admission = Admission{scene, {EncoderKind::x264, Codec::h264, "libx264"}};
+  }
+
+  void greet(Settings settings = {}) {
+    Hello hello;
+    hello.version = 1;
+    hello.viewport_px = {640, 361};
+    hello.decoders = {Codec::h264};
+    hello.settings = settings;
+    session.on_message(hello, now);
+    session.on_stream_opened({true, "", Codec::h264, "avc1.42C01F", "libx264"}, now);
+  }
+  void pose(std::uint64_t id, float x) {
+    PoseSample sample;
+    sample.pose_id = id;
+    sample.world_from_camera.position.x = x;
+    sample.fov_y_rad = 1.0f;
+    session.on_message(sample, now);
+  }
+  bool frame_is_due() const {
+    const auto candidate = session.next_frame();
+    return candidate && candidate->ready <= now;
+  }
+  /// Starts and ends one frame; returns its order.
+  FrameOrder run_frame() {
+    const FrameOrder order = session.start_frame(now);
+    finish(order);
+    return order;
+  }
+  void finish(const FrameOrder& order) {
+    FrameResult result;
+    result.ok = true;
+    result.refined = order.refine;
+    result.frame.ticket = order.ticket;
+    result.frame.bitstream.resize(100);
+    session.on_frame(std::move(result), now);
+  }
+  void ack(std::uint64_t id) {
+    Ack message;
+    message.frame_id = id;
+    message.presented_us = 1;
+    session.on_message(message, now);
+  }
+
+  TimePoint now = TimePoint{} + 1h;
+  SessionPolicy policy;
+  FakeHost host;
+  Session session{"test", policy, host, now};
+};
+
+TEST_F(SessionTest, WelcomesAfterItsStreamIsOpen) {
+  greet();
+  ASSERT_EQ(host.opened.size(), 1u);
+  EXPECT_EQ(host.opened[0].encoding.size_px, glm::ivec2(640, 360));  // made even
+  ASSERT_EQ(host.count<Welcome>(), 1);
+  EXPECT_EQ(std::get<Welcome>(host.said.back()).config.codec_string, "avc1.42C01F");
+  EXPECT_EQ(session.state(), Session::State::live);
+  EXPECT_FALSE(session.next_frame()) << "no pose, no frame";
+}
+
+TEST_F(SessionTest, ClosesWithoutAHelloInTime) {
+  now += policy.hello_timeout - 1ms;
+  session.on_tick(now);
+  EXPECT_FALSE(host.closed);
+  now += 1ms;
+  session.on_tick(now);
+  EXPECT_EQ(host.closed, CloseCode::policy_violation);
+}
+
+TEST_F(SessionTest, RefusesAnOldVersionAndASecondHello) {
+  Session old("old", policy, host, now);
+  old.on_message(Hello{}, now);
+  EXPECT_EQ(host.last_error().code, ErrorCode::unsupported_version);
+  greet();
+  session.on_message(Hello{}, now);
+  EXPECT_EQ(host.last_error().code, ErrorCode::bad_message);
+  EXPECT_EQ(session.state(), Session::State::closed);
+}
+
+TEST_F(SessionTest, SaysWhyItIsNotAdmitted) {
+  host.admission = ErrorMessage{ErrorCode::unauthorized, "no token", true};
+  greet();
+  EXPECT_EQ(host.last_error().code, ErrorCode::unauthorized);
+  EXPECT_TRUE(host.closed);
+  EXPECT_TRUE(host.opened.empty());
+}
+
+TEST_F(SessionTest, RendersOnDemandAndRefinesAStillPicture) {
+  greet();
+  pose(1, 0.0f);
+  ASSERT_TRUE(frame_is_due());
+  FrameOrder order = run_frame();
+  EXPECT_TRUE(order.force_idr);
+  EXPECT_FALSE(order.refine);
+  EXPECT_EQ(order.ticket.pose_id, 1u);
+  ack(order.ticket.frame_id);
+
+  pose(2, 0.0f);  // the same view: nothing to render
+  now += 50ms;
+  EXPECT_FALSE(frame_is_due()) << "motion may go on";
+  int refinements = 0;
+  for (int i = 0; i < 200; ++i) {
+    now += 17ms;
+    if (!frame_is_due()) continue;
+    order = run_frame();
+    EXPECT_TRUE(order.refine);
+    EXPECT_FALSE(order.force_idr);
+    ack(order.ticket.frame_id);
+    ++refinements;
+  }
+  EXPECT_EQ(refinements, policy.refine_frames);
+
+  pose(3, 1.0f);
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_FALSE(run_frame().refine);
+}
+
+TEST_F(SessionTest, KeepsTheNominalRateAndUsesTheNewestPose) {
+  greet();
+  int frames = 0;
+  for (std::uint64_t ms = 1; ms <= 1000; ++ms) {
+    now += 1ms;
+    pose(ms, 0.01f * static_cast<float>(ms));
+    if (!frame_is_due()) continue;
+    const FrameOrder order = run_frame();
+    EXPECT_EQ(order.ticket.pose_id, ms);
+    ack(order.ticket.frame_id);
+    ++frames;
+  }
+  EXPECT_GE(frames, policy.default_fps - 1);
+  EXPECT_LE(frames, policy.default_fps + 1);
+}
+
+TEST_F(SessionTest, IgnoresAPoseThatWasOvertaken) {
+  greet();
+  pose(5, 1.0f);
+  pose(4, 2.0f);
+  EXPECT_EQ(run_frame().ticket.pose_id, 5u);
+}
+
+TEST_F(SessionTest, NeedsCredit) {
+  greet();
+  pose(1, 0.0f);
+  const std::uint64_t first = run_frame().ticket.frame_id;
+  pose(2, 1.0f);
+  now += 1s;
+  EXPECT_FALSE(session.next_frame()) << "one frame in flight, and no round trip measured yet";
+  ack(first);
+  EXPECT_TRUE(frame_is_due());
+}
+
+TEST_F(SessionTest, AsksForAnIdrAfterADrop) {
+  greet();
+  pose(1, 0.0f);
+  host.drop_next = {1};
+  run_frame();
+  pose(2, 1.0f);
+  now += 1s;
+  ASSERT_TRUE(frame_is_due()) << "a dropped frame is not in flight";
+  EXPECT_TRUE(run_frame().force_idr);
+  EXPECT_EQ(session.frames_dropped(), 1u);
+}
+
+TEST_F(SessionTest, PauseStopsFramesAndBeginsAnewWithAnIdr) {
+  greet();
+  pose(1, 0.0f);
+  run_frame();  // never acknowledged: the page is hidden
+  session.on_message(Pause{true}, now);
+  pose(2, 1.0f);
+  now += 1s;
+  EXPECT_FALSE(session.next_frame());
+  session.on_message(Pause{false}, now);
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_TRUE(run_frame().force_idr);
+}
+
+TEST_F(SessionTest, SettingsDuringAFrameReopenTheStreamAfterIt) {
+  greet();
+  pose(1, 0.0f);
+  const FrameOrder order = session.start_frame(now);
+  Settings settings;
+  settings.size_px = {320, 180};
+  settings.max_fps = 30;
+  session.on_message(settings, now);
+  EXPECT_EQ(host.opened.size(), 1u) << "the stream is busy";
+  finish(order);
+  ASSERT_EQ(host.opened.size(), 2u);
+  EXPECT_EQ(host.opened[1].encoding.size_px, glm::ivec2(320, 180));
+  EXPECT_EQ(host.opened[1].encoding.fps, 30);
+  EXPECT_FALSE(session.next_frame()) << "not before the stream is open";
+  session.on_stream_opened({true, "", Codec::h264, "avc1.42C00D", "libx264"}, now);
+  ASSERT_EQ(host.count<StreamConfig>(), 1);
+  now += 1s;
+  ack(order.ticket.frame_id);
+  EXPECT_TRUE(run_frame().force_idr);
+}
+
+TEST_F(SessionTest, SpeaksAtLeastOnceASecond) {
+  greet();
+  const auto before = host.said.size();
+  for (int i = 0; i < 20; ++i) {
+    now += 250ms;
+    session.on_tick(now);
+  }
+  EXPECT_EQ(host.said.size() - before, 5u);
+  EXPECT_EQ(host.count<Heartbeat>(), 5);
+}
+
+TEST_F(SessionTest, ReportsStatisticsWhileFramesFlow) {
+  greet();
+  pose(1, 0.0f);
+  run_frame();
+  now += 1s;
+  session.on_tick(now);
+  ASSERT_EQ(host.count<Stats>(), 1);
+  const auto& stats = std::get<Stats>(host.said.back());
+  EXPECT_FLOAT_EQ(stats.fps, 1.0f);
+  EXPECT_FLOAT_EQ(stats.bitrate_kbps, 0.8f);
+}
+
+TEST_F(SessionTest, WarnsAndThenReleasesAnIdleSession) {
+  greet();
+  pose(1, 0.0f);
+  now += policy.idle_timeout - policy.idle_warning;
+  pose(2, 0.0f);  // the same view: not alive
+  session.on_tick(now);
+  EXPECT_EQ(host.last_error().code, ErrorCode::idle_timeout);
+  EXPECT_FALSE(host.last_error().fatal);
+  EXPECT_FALSE(host.closed);
+  now += policy.idle_warning;
+  session.on_tick(now);
+  EXPECT_TRUE(host.last_error().fatal);
+  EXPECT_TRUE(host.closed);
+}
+
+TEST_F(SessionTest, AFewFailedFramesEndItWithTheirCause) {
+  greet();
+  for (int i = 0; i < 3; ++i) {
+    pose(static_cast<std::uint64_t>(i) + 1, static_cast<float>(i));
+    now += 1s;
+    ASSERT_TRUE(frame_is_due());
+    session.start_frame(now);
+    FrameResult failed;
+    failed.message = "blend: out of memory";
+    session.on_frame(std::move(failed), now);
+  }
+  EXPECT_EQ(host.last_error().code, ErrorCode::render_failed);
+  EXPECT_THAT(host.last_error().message, HasSubstr("out of memory"));
+  EXPECT_TRUE(host.closed);
+}
+
+TEST_F(SessionTest, AnotherSceneWelcomesAgain) {
+  greet();
+  pose(1, 0.0f);
+  session.on_message(SelectScene{"b"}, now);
+  EXPECT_FALSE(session.next_frame());
+  session.on_stream_opened({true, "", Codec::h264, "avc1.42C01F", "libx264"}, now);
+  ASSERT_EQ(host.count<Welcome>(), 2);
+  EXPECT_EQ(std::get<Welcome>(host.said.back()).scene.scene_id, "b");
+  EXPECT_FALSE(session.next_frame()) << "a pose of the old scene shows nothing of the new one";
+}
+
+}  // namespace
+}  // namespace catgs

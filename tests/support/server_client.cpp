@@ -1,0 +1,217 @@
+#include "tests/support/server_client.h"
+
+#include <algorithm>
+#include <cctype>
+#include <functional>
+#include <stdexcept>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+
+namespace catgs::test {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using tcp = asio::ip::tcp;
+
+constexpr std::chrono::seconds patience{20};
+
+tcp::endpoint loopback(int port) {
+  return {asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port)};
+}
+
+ReceivedFrame parse_frame(const std::string& bytes) {
+  std::size_t at = 1;
+  std::size_t size = 0;
+  for (int shift = 0;; shift += 7) {
+    const auto byte = static_cast<unsigned char>(bytes.at(at++));
+    size |= static_cast<std::size_t>(byte & 0x7f) << shift;
+    if ((byte & 0x80) == 0) break;
+  }
+  ReceivedFrame frame;
+  if (!frame.header.ParseFromString(bytes.substr(at, size)))
+    throw std::runtime_error("no FrameHeader");
+  const auto* rest = reinterpret_cast<const std::byte*>(bytes.data()) + at + size;
+  frame.bitstream.assign(rest, reinterpret_cast<const std::byte*>(bytes.data()) + bytes.size());
+  return frame;
+}
+
+}  // namespace
+
+RunningServer::RunningServer(const std::function<void(ServerConfig&)>& change) {
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "127.0.0.1:0";
+  config.threads = 2;
+  if (change) change(config);
+  server_ = std::make_unique<Server>(config);
+  thread_ = std::thread([this] { server_->run(); });
+}
+
+RunningServer::~RunningServer() {
+  if (thread_.joinable()) {
+    stop();
+    join();
+  }
+}
+
+void RunningServer::join() { thread_.join(); }
+
+HttpReply http_get(int port, const std::string& target,
+                   const std::map<std::string, std::string>& headers) {
+  asio::io_context io;
+  beast::tcp_stream stream(io);
+  stream.expires_after(patience);
+  stream.connect(loopback(port));
+  http::request<http::empty_body> request(http::verb::get, target, 11);
+  request.set(http::field::host, "127.0.0.1:" + std::to_string(port));
+  for (const auto& [name, value] : headers) request.set(name, value);
+  http::write(stream, request);
+  beast::flat_buffer buffer;
+  http::response<http::string_body> response;
+  http::read(stream, buffer, response);
+  HttpReply reply;
+  reply.status = static_cast<int>(response.result_int());
+  reply.body = response.body();
+  for (const auto& field : response) {
+    std::string name(field.name_string());
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+    reply.headers[name] = std::string(field.value());
+  }
+  return reply;
+}
+
+struct WireClient::State {
+  asio::io_context io;
+  websocket::stream<beast::tcp_stream> socket{io};
+
+  /// Runs one asynchronous operation to its end, with Beast's own time limit.
+  template <typename Start>
+  beast::error_code run(Start start) {
+    beast::error_code result;
+    beast::get_lowest_layer(socket).expires_after(patience);
+    start([&](beast::error_code error, std::size_t) { result = error; });
+    io.restart();
+    io.run();
+    return result;
+  }
+};
+
+WireClient::WireClient(int port, const Options& options) : state_(std::make_unique<State>()) {
+  auto& socket = state_->socket;
+  beast::get_lowest_layer(socket).connect(loopback(port));
+  socket.read_message_max(64u << 20);
+  socket.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
+    if (!options.origin.empty()) request.set(http::field::origin, options.origin);
+    if (!options.subprotocol.empty())
+      request.set(http::field::sec_websocket_protocol, options.subprotocol);
+  }));
+  socket.handshake("127.0.0.1:" + std::to_string(port), "/");
+}
+
+WireClient::~WireClient() = default;
+
+void WireClient::send(const v1::ClientMessage& message) { send_bytes(message.SerializeAsString()); }
+
+void WireClient::send_bytes(std::string_view bytes, bool binary) {
+  state_->socket.binary(binary);
+  const auto error = state_->run([&](auto done) {
+    state_->socket.async_write(asio::buffer(bytes.data(), bytes.size()), std::move(done));
+  });
+  if (error) throw beast::system_error(error);
+}
+
+Received WireClient::receive() {
+  beast::flat_buffer buffer;
+  const auto error =
+      state_->run([&](auto done) { state_->socket.async_read(buffer, std::move(done)); });
+  Received received;
+  if (error == beast::error::timeout) throw std::runtime_error("nothing was received");
+  if (error) {
+    received.closed = true;
+    received.close_code = state_->socket.reason().code;
+    return received;
+  }
+  const std::string bytes = beast::buffers_to_string(buffer.data());
+  if (bytes.empty()) throw std::runtime_error("an empty message");
+  if (bytes[0] == 2) {
+    received.frame = parse_frame(bytes);
+  } else {
+    received.message.emplace();
+    if (bytes[0] != 1 || !received.message->ParseFromString(bytes.substr(1)))
+      throw std::runtime_error("no ServerMessage");
+  }
+  return received;
+}
+
+v1::ServerMessage WireClient::receive_message(v1::ServerMessage::BodyCase kind) {
+  for (;;) {
+    Received received = receive();
+    if (received.closed) throw std::runtime_error("closed instead of a message");
+    if (received.message && received.message->body_case() == kind) return *received.message;
+  }
+}
+
+ReceivedFrame WireClient::receive_frame() {
+  for (;;) {
+    Received received = receive();
+    if (received.closed) throw std::runtime_error("closed instead of a frame");
+    if (received.frame) return *received.frame;
+  }
+}
+
+Received WireClient::receive_until_closed(std::optional<v1::Error>* error) {
+  for (;;) {
+    Received received = receive();
+    if (received.closed) return received;
+    if (error && received.message && received.message->has_error())
+      *error = received.message->error();
+  }
+}
+
+v1::Welcome WireClient::greet(int width_px, int height_px, v1::Codec codec,
+                              const std::string& token) {
+  auto message = hello_message(width_px, height_px, codec);
+  message.mutable_hello()->set_token(token);
+  send(message);
+  return receive_message(v1::ServerMessage::kWelcome).welcome();
+}
+
+void WireClient::send_pose(std::uint64_t pose_id, float x) {
+  v1::ClientMessage message;
+  auto& pose = *message.mutable_pose();
+  pose.set_pose_id(pose_id);
+  pose.set_client_time_us(static_cast<std::int64_t>(pose_id) * 1000);
+  pose.mutable_world_from_camera()->mutable_position()->set_x(x);
+  pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
+  pose.set_fov_y_rad(1.0f);
+  send(message);
+}
+
+void WireClient::send_ack(std::uint64_t frame_id, bool dropped) {
+  v1::ClientMessage message;
+  auto& ack = *message.mutable_ack();
+  ack.set_frame_id(frame_id);
+  ack.set_dropped(dropped);
+  if (!dropped) ack.set_presented_us(1);
+  send(message);
+}
+
+v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec) {
+  v1::ClientMessage message;
+  auto& hello = *message.mutable_hello();
+  hello.set_version(1);
+  hello.set_viewport_width_px(static_cast<std::uint32_t>(width_px));
+  hello.set_viewport_height_px(static_cast<std::uint32_t>(height_px));
+  hello.set_device_pixel_ratio(1.0f);
+  hello.add_decoders(codec);
+  return message;
+}
+
+}  // namespace catgs::test

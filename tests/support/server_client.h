@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "proto/catgs.pb.h"
+#include "server/config.h"
+#include "server/server.h"
+
+namespace catgs::test {
+
+/// A whole server in this process on ports of the system's choice, serving synth:city.
+class RunningServer {
+ public:
+  /// `change` may alter the configuration before the start.
+  explicit RunningServer(const std::function<void(ServerConfig&)>& change = {});
+  ~RunningServer();  // stop() and join
+
+  [[nodiscard]] int port() const { return server_->port(); }
+  [[nodiscard]] int admin_port() const { return server_->admin_port(); }
+  void stop() { server_->stop(); }
+  void join();
+
+ private:
+  std::unique_ptr<Server> server_;
+  std::thread thread_;
+};
+
+struct HttpReply {
+  int status = 0;
+  std::map<std::string, std::string> headers;  // lower-case names
+  std::string body;
+};
+
+/// `target` goes out as it is, unnormalised.
+HttpReply http_get(int port, const std::string& target,
+                   const std::map<std::string, std::string>& headers = {});
+
+struct ReceivedFrame {
+  v1::FrameHeader header;
+  std::vector<std::byte> bitstream;
+};
+
+/// One thing that the server said: a message, a frame, or the end.
+struct Received {
+  std::optional<v1::ServerMessage> message;
+  std::optional<ReceivedFrame> frame;
+  bool closed = false;
+  int close_code = 0;
+};
+
+/// A blocking websocket client. Throws std::runtime_error when nothing comes for twenty seconds: a
+/// bound against hanging, not a measurement.
+class WireClient {
+ public:
+  struct Options {
+    std::string origin;
+    std::string subprotocol = "catgs.v1";
+  };
+  /// Throws boost::system::system_error when the handshake is refused.
+  explicit WireClient(int port) : WireClient(port, Options()) {}
+  WireClient(int port, const Options& options);
+  ~WireClient();
+
+  void send(const v1::ClientMessage& message);
+  void send_bytes(std::string_view bytes, bool binary = true);
+  Received receive();
+  /// Skips to the next thing of a kind; throws when the connection closes before.
+  v1::ServerMessage receive_message(v1::ServerMessage::BodyCase kind);
+  ReceivedFrame receive_frame();
+  /// Skips to the end of the connection; the last error message is kept.
+  Received receive_until_closed(std::optional<v1::Error>* error = nullptr);
+
+  /// hello -> welcome. `token` may be empty.
+  v1::Welcome greet(int width_px = 160, int height_px = 96, v1::Codec codec = v1::CODEC_H264,
+                    const std::string& token = {});
+  void send_pose(std::uint64_t pose_id, float x = 0.0f);
+  void send_ack(std::uint64_t frame_id, bool dropped = false);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec);
+
+}  // namespace catgs::test
