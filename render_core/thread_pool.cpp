@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <utility>
 
 namespace catgs {
@@ -14,9 +15,16 @@ struct ThreadPool::Loop {
   std::atomic<std::size_t> next{0};
   int helpers = 0;  // workers inside run(); guarded by the pool's mutex
   std::condition_variable left;
+  std::exception_ptr failure;  // the first; guarded by the pool's mutex
 
-  void run() {
-    for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i);
+  void run(std::mutex& mutex) {
+    try {
+      for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i);
+    } catch (...) {
+      next.store(count, std::memory_order_relaxed);
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::current_exception();
+    }
   }
 };
 
@@ -53,10 +61,11 @@ void ThreadPool::run_loop(std::size_t count, BodyRef body) {
     loops_.push_back(&loop);
   }
   wake_.notify_all();
-  loop.run();
+  loop.run(mutex_);
   std::unique_lock lock(mutex_);
   std::erase(loops_, &loop);
   loop.left.wait(lock, [&] { return loop.helpers == 0; });
+  if (loop.failure) std::rethrow_exception(loop.failure);
 }
 
 ThreadPool::Loop* ThreadPool::loop_to_help() const {
@@ -80,7 +89,7 @@ void ThreadPool::work(const std::stop_token& stop) {
     } else if (Loop* loop = loop_to_help()) {
       ++loop->helpers;
       lock.unlock();
-      loop->run();
+      loop->run(mutex_);
       lock.lock();
       // Its indices are handed out: nobody else needs to look at it.
       std::erase(loops_, loop);

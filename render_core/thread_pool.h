@@ -29,7 +29,8 @@ class ThreadPool {
 
   /// Calls body(i) once for every i in [0, count), on the calling thread and on idle workers, and
   /// returns when all calls have ended. Indices are handed out one by one: make a call worth a few
-  /// microseconds. May be called from inside a task. `body` must not throw. Allocates nothing.
+  /// microseconds. May be called from inside a task. When a call throws, indices not yet handed out
+  /// are dropped and the first exception is thrown again here. Allocates nothing.
   template <class Body>
   void parallel_for(std::size_t count, const Body& body) {
     run_loop(count,

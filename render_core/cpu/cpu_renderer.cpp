@@ -61,7 +61,9 @@ class CpuView final : public View {
  private:
   FrameView render_checked(const FrameRequest& request);
   void cull_clusters(const Camera& camera);
-  void project(const Camera& camera);
+  [[nodiscard]] std::size_t segments() const;
+  template <class Done>
+  void project(const Camera& camera, const Done& done);
   std::uint64_t blend(const FrameRequest& request, glm::ivec2 grid);
 
   std::shared_ptr<const SharedScene> shared_;
@@ -84,14 +86,21 @@ FrameView CpuView::render_checked(const FrameRequest& request) {
   StageClock clock;
 
   cull_clusters(camera);
-  project(camera);
-  clock.end(Stage::project, stats);
-
   if (settings_.pipeline == Pipeline::vanilla) {
+    project(camera, [](std::size_t, std::size_t) {});
+    clock.end(Stage::project, stats);
     lists_.build_by_keys(splats_, visible_counts_, grid, settings_.max_list_entries, pool);
     clock.end(Stage::sort, stats);
   } else {
-    lists_.fill(splats_, visible_counts_, grid, settings_.max_list_entries, shared_->kernels, pool);
+    lists_.begin(grid, segments(), settings_.max_list_entries);
+    // Listed while they are in cache: reading them again would cost as much as the listing.
+    project(camera, [&](std::size_t segment, std::size_t rank) {
+      const std::size_t first = rank * cluster_size;
+      lists_.add(segment, std::span(splats_).subspan(first, visible_counts_[rank]),
+                 static_cast<std::uint32_t>(first), shared_->kernels);
+    });
+    clock.end(Stage::project, stats);
+    lists_.finish(pool);
     clock.end(Stage::bin, stats);
     lists_.sort(splats_, pool);
     clock.end(Stage::sort, stats);
@@ -117,20 +126,35 @@ void CpuView::cull_clusters(const Camera& camera) {
       visible_clusters_.push_back(static_cast<std::uint32_t>(c));
 }
 
-void CpuView::project(const Camera& camera) {
-  const std::size_t slots = visible_clusters_.size() * cluster_size;
-  if (splats_.size() < slots) splats_.resize(slots);
-  visible_counts_.resize(visible_clusters_.size());
-  shared_->pool->parallel_for(visible_clusters_.size(), [&](std::size_t rank) {
-    visible_counts_[rank] = shared_->kernels.project_cluster(
-        {&shared_->store, &camera, settings_.pipeline, visible_clusters_[rank],
-         splats_.data() + rank * cluster_size});
+/// Shares of the visible clusters that threads take: more than threads, because some regions hold
+/// far more that is visible than others.
+std::size_t CpuView::segments() const {
+  return std::min<std::size_t>(static_cast<std::size_t>(shared_->pool->threads()) * 8,
+                               1 + visible_clusters_.size() / 8);
+}
+
+/// Projects the visible clusters and calls done(segment, rank) after each.
+template <class Done>
+void CpuView::project(const Camera& camera, const Done& done) {
+  const std::size_t ranks = visible_clusters_.size();
+  if (splats_.size() < ranks * cluster_size) splats_.resize(ranks * cluster_size);
+  visible_counts_.resize(ranks);
+  const std::size_t shares = segments();
+  shared_->pool->parallel_for(shares, [&](std::size_t share) {
+    for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
+      visible_counts_[rank] = shared_->kernels.project_cluster(
+          {&shared_->store, &camera, settings_.pipeline, visible_clusters_[rank],
+           splats_.data() + rank * cluster_size});
+      done(share, rank);
+    }
   });
 }
 
 std::uint64_t CpuView::blend(const FrameRequest& request, glm::ivec2 grid) {
   std::atomic<std::uint64_t> pairs{0};
-  shared_->pool->parallel_for(lists_.tiles(), [&](std::size_t tile) {
+  const std::span<const std::uint32_t> tiles = lists_.tiles_by_length();
+  shared_->pool->parallel_for(tiles.size(), [&](std::size_t i) {
+    const std::uint32_t tile = tiles[i];
     const auto index = static_cast<int>(tile);
     const std::uint64_t blended =
         shared_->kernels.blend_tile({splats_.data(),

@@ -1,6 +1,7 @@
 #include "render_core/cpu/tile_lists.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <numeric>
 #include <utility>
@@ -21,40 +22,45 @@ void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
 
 }  // namespace
 
-void TileLists::fill(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                     glm::ivec2 grid, std::uint64_t max_entries, const SimdKernels& kernels,
-                     ThreadPool& pool) {
+void TileLists::begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries) {
+  grid_ = grid;
+  max_entries_ = max_entries;
+  runs_ = 0;
   const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
-  // More segments than threads: some regions of the scene touch many more tiles than others.
-  const std::size_t segments =
-      std::min<std::size_t>(static_cast<std::size_t>(pool.threads()) * 4, 1 + counts.size() / 8);
-  if (segments_.size() < segments) segments_.resize(segments);
   starts_.resize(tile_count + 1);
-
-  pool.parallel_for(segments, [&](std::size_t k) {
-    Segment& segment = segments_[k];
+  segments_.resize(segments);
+  for (Segment& segment : segments_) {
     segment.runs.clear();
     segment.positions.assign(tile_count, 0);
-    const std::size_t end = counts.size() * (k + 1) / segments;
-    for (std::size_t rank = counts.size() * k / segments; rank < end; ++rank) {
-      const std::size_t first = rank * cluster_size;
-      const std::size_t known = segment.runs.size();
-      kernels.list_tiles(splats.subspan(first, counts[rank]), static_cast<std::uint32_t>(first),
-                         segment.runs);
-      for (std::size_t i = known; i < segment.runs.size(); ++i) {
-        const TileRun& run = segment.runs[i];
-        std::uint32_t* const row = segment.positions.data() + run.row * grid.x;
-        for (int column = run.begin; column < run.end; ++column) ++row[column];
-      }
-    }
-  });
-  const std::uint64_t longest_kept = place_lists(segments, max_entries);
+    segment.dropped = 0;
+  }
+}
+
+void TileLists::add(std::size_t segment_index, std::span<const Splat> splats,
+                    std::uint32_t first_slot, const SimdKernels& kernels) {
+  Segment& segment = segments_[segment_index];
+  const std::size_t known = segment.runs.size();
+  kernels.list_tiles(splats, first_slot, segment.runs);
+  const std::span added = std::span(segment.runs).subspan(known);
+  if (runs_.fetch_add(added.size(), std::memory_order_relaxed) + added.size() > max_entries_) {
+    for (const TileRun& run : added) segment.dropped += run.end - run.begin;
+    segment.runs.resize(known);
+    return;
+  }
+  for (const TileRun& run : added) {
+    std::uint32_t* const row = segment.positions.data() + run.row * grid_.x;
+    for (int column = run.begin; column < run.end; ++column) ++row[column];
+  }
+}
+
+void TileLists::finish(ThreadPool& pool) {
+  const std::uint64_t longest_kept = place_lists();
   if (entries_.size() < entries()) entries_.resize(entries());
 
-  pool.parallel_for(segments, [&](std::size_t k) {
+  pool.parallel_for(segments_.size(), [&](std::size_t k) {
     Segment& segment = segments_[k];
     for (const TileRun& run : segment.runs) {
-      const auto row = static_cast<std::size_t>(run.row * grid.x);
+      const auto row = static_cast<std::size_t>(run.row * grid_.x);
       for (std::size_t tile = row + run.begin; tile < row + run.end; ++tile) {
         const std::uint32_t position = segment.positions[tile]++;
         if (position < longest_kept) entries_[starts_[tile] + position] = run.entry;
@@ -65,20 +71,19 @@ void TileLists::fill(std::span<const Splat> splats, std::span<const std::uint32_
 
 /// Turns counts per segment and tile into each segment's first position in the tile's list, and
 /// sets starts_. Returns the length that lists are cut to.
-std::uint64_t TileLists::place_lists(std::size_t segments, std::uint64_t max_entries) {
+std::uint64_t TileLists::place_lists() {
   const std::size_t tile_count = tiles();
   std::uint64_t total = 0, longest_list = 0;
   for (std::size_t tile = 0; tile < tile_count; ++tile) {
     std::uint32_t length = 0;
-    for (std::size_t k = 0; k < segments; ++k)
-      length += std::exchange(segments_[k].positions[tile], length);
+    for (Segment& segment : segments_) length += std::exchange(segment.positions[tile], length);
     starts_[tile + 1] = length;
     total += length;
     longest_list = std::max<std::uint64_t>(longest_list, length);
   }
 
   std::uint64_t kept_length = longest_list;
-  if (total > max_entries) {
+  if (total > max_entries_) {
     const auto total_if_cut = [&](std::uint64_t length) {
       std::uint64_t sum = 0;
       for (std::size_t tile = 0; tile < tile_count; ++tile)
@@ -87,13 +92,14 @@ std::uint64_t TileLists::place_lists(std::size_t segments, std::uint64_t max_ent
     };
     std::uint64_t fits = 0;
     for (std::uint64_t step = std::bit_floor(longest_list); step != 0; step /= 2)
-      if (total_if_cut(fits + step) <= max_entries) fits += step;
+      if (total_if_cut(fits + step) <= max_entries_) fits += step;
     kept_length = fits;
   }
   starts_[0] = 0;
   for (std::size_t tile = 0; tile < tile_count; ++tile)
     starts_[tile + 1] = starts_[tile] + std::min(starts_[tile + 1], kept_length);
   overflowed_ = total - starts_[tile_count];
+  for (const Segment& segment : segments_) overflowed_ += segment.dropped;
   return kept_length;
 }
 
@@ -156,6 +162,20 @@ void TileLists::build_by_keys(std::span<const Splat> splats, std::span<const std
     ++starts_[(keys_[i].key >> 32) + 1];
   }
   std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+}
+
+std::span<const std::uint32_t> TileLists::tiles_by_length() {
+  // A counting sort by the number of bits in the length.
+  const auto length_class = [&](std::size_t tile) {
+    return 64 - std::bit_width(starts_[tile + 1] - starts_[tile]);
+  };
+  std::array<std::uint32_t, 66> next{};
+  for (std::size_t tile = 0; tile < tiles(); ++tile) ++next[length_class(tile) + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  tiles_by_length_.resize(tiles());
+  for (std::size_t tile = 0; tile < tiles(); ++tile)
+    tiles_by_length_[next[length_class(tile)]++] = static_cast<std::uint32_t>(tile);
+  return tiles_by_length_;
 }
 
 std::uint32_t TileLists::longest() const {

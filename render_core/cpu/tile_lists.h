@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,15 +13,22 @@
 
 namespace catgs {
 
-/// Which splats each tile blends. Filling decides membership, sorting the order. Memory is kept
+/// Which splats each tile blends. Listing decides membership, sorting the order. Memory is kept
 /// from frame to frame.
 class TileLists {
  public:
-  /// Lists each visible splat for the tiles whose rectangle of pixel centres meets its ellipse
-  /// alpha >= alpha_min. The splats of cluster rank r are splats[r * cluster_size + 0…counts[r]).
-  /// Entries beyond `max_entries` are left out of the longest lists and counted.
-  void fill(std::span<const Splat> splats, std::span<const std::uint32_t> counts, glm::ivec2 grid,
-            std::uint64_t max_entries, const SimdKernels& kernels, ThreadPool& pool);
+  /// Starts lists for a grid of tiles. Splats come in `segments` shares, each from one thread at a
+  /// time, in parallel with the others. At most `max_entries` entries are kept, and as many runs.
+  void begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries);
+
+  /// Lists splats for the tiles whose rectangle of pixel centres meets their ellipse alpha >=
+  /// alpha_min. Slots count up from `first_slot`.
+  void add(std::size_t segment, std::span<const Splat> splats, std::uint32_t first_slot,
+           const SimdKernels& kernels);
+
+  /// Builds the lists of what was added. Entries beyond the bound are left out of the longest lists
+  /// and counted.
+  void finish(ThreadPool& pool);
 
   /// Brings each list into depth order; equal depths keep the order of the scene.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
@@ -35,22 +43,30 @@ class TileLists {
   [[nodiscard]] std::span<const DepthSlot> list(std::size_t tile) const {
     return {entries_.data() + starts_[tile], entries_.data() + starts_[tile + 1]};
   }
+  /// All tile indices, those with long lists first: a long one started last would keep one thread
+  /// busy while the others wait. Neighbours stay together among lists of similar length.
+  [[nodiscard]] std::span<const std::uint32_t> tiles_by_length();
+
   [[nodiscard]] std::uint64_t entries() const { return starts_.back(); }
   [[nodiscard]] std::uint64_t overflowed_entries() const { return overflowed_; }
   [[nodiscard]] std::uint32_t longest() const;
 
  private:
-  /// A share of the splats that one thread lists at a time.
   struct Segment {
     std::vector<TileRun> runs;
     std::vector<std::uint32_t> positions;  // [tile]: entries, then next position in its list
+    std::uint64_t dropped = 0;             // entries of runs beyond the bound
   };
-  std::uint64_t place_lists(std::size_t segments, std::uint64_t max_entries);
+  std::uint64_t place_lists();
 
+  glm::ivec2 grid_{0};
+  std::uint64_t max_entries_ = 0;
+  std::vector<Segment> segments_;
+  std::atomic<std::uint64_t> runs_{0};
   std::vector<std::uint64_t> starts_ = {0};  // tiles + 1
   std::vector<DepthSlot> entries_;
   std::uint64_t overflowed_ = 0;
-  std::vector<Segment> segments_;
+  std::vector<std::uint32_t> tiles_by_length_;
   // build_by_keys()
   std::vector<std::uint64_t> key_offsets_;  // [cluster rank]
   std::vector<CodedIndex> keys_, key_scratch_;

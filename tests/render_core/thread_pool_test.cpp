@@ -3,6 +3,7 @@
 #include <atomic>
 #include <latch>
 #include <numeric>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -31,6 +32,23 @@ TEST(ThreadPool, LoopsRunInsideTasks) {
   }
   done.wait();
   EXPECT_EQ(sum.load(), 8u * 4950u);
+}
+
+TEST(ThreadPool, LoopRethrowsTheFirstException) {
+  for (const int threads : {1, 3}) {
+    ThreadPool pool(threads);
+    std::atomic<int> calls{0};
+    const auto loop = [&] {
+      pool.parallel_for(100000, [&](std::size_t i) {
+        ++calls;
+        if (i == 10) throw std::runtime_error("tenth");
+      });
+    };
+    EXPECT_THROW(loop(), std::runtime_error);
+    EXPECT_LT(calls.load(), 100000);
+    pool.parallel_for(10, [&](std::size_t) { calls = 0; });  // the pool lives on
+    EXPECT_EQ(calls.load(), 0);
+  }
 }
 
 TEST(ThreadPool, DestructorFinishesSubmittedTasks) {

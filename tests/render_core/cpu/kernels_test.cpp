@@ -46,6 +46,19 @@ Projected project_all(const SceneStore& store, const Camera& camera, const SimdK
   return out;
 }
 
+void fill(TileLists& lists, const Projected& projected, glm::ivec2 grid, std::uint64_t max_entries,
+          const SimdKernels& kernels, ThreadPool& pool) {
+  constexpr std::size_t segments = 3;
+  lists.begin(grid, segments, max_entries);
+  for (std::size_t rank = 0; rank < projected.counts.size(); ++rank) {
+    const std::size_t first = rank * cluster_size;
+    lists.add(rank * segments / projected.counts.size(),
+              std::span(projected.splats).subspan(first, projected.counts[rank]),
+              static_cast<std::uint32_t>(first), kernels);
+  }
+  lists.finish(pool);
+}
+
 math::Vec3<double> to_double(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
 /// Exponent of a splat at a pixel centre, in double from its stored numbers.
@@ -137,7 +150,7 @@ TEST_P(Kernels, ListsMissNoTileAndAddFew) {
     SCOPED_TRACE(std::string(kernels.name));
     const Projected projected = project_all(store_, camera_, kernels);
     TileLists lists;
-    lists.fill(projected.splats, projected.counts, grid_, 1u << 30, kernels, pool_);
+    fill(lists, projected, grid_, 1u << 30, kernels, pool_);
     std::set<std::pair<std::size_t, std::uint32_t>> listed;
     for (std::size_t tile = 0; tile < lists.tiles(); ++tile)
       for (const DepthSlot& entry : lists.list(tile))
@@ -166,7 +179,7 @@ TEST_P(Kernels, ListsMissNoTileAndAddFew) {
 TEST_P(Kernels, ListsAreInDepthOrderWithTiesInSceneOrder) {
   const Projected projected = project_all(store_, camera_, simd_kernels().front());
   TileLists filled, keyed;
-  filled.fill(projected.splats, projected.counts, grid_, 1u << 30, simd_kernels().front(), pool_);
+  fill(filled, projected, grid_, 1u << 30, simd_kernels().front(), pool_);
   filled.sort(projected.splats, pool_);
   keyed.build_by_keys(projected.splats, projected.counts, grid_, 1u << 30, pool_);
   for (const TileLists* lists : {&filled, &keyed}) {
@@ -195,10 +208,10 @@ TEST(TileListsBound, OverflowIsCountedAndNeverWritten) {
   const Projected projected = project_all(store, camera, kernels);
 
   TileLists all, bounded;
-  all.fill(projected.splats, projected.counts, grid, 1u << 30, kernels, pool);
+  fill(all, projected, grid, 1u << 30, kernels, pool);
   for (const std::uint64_t bound : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{500},
                                     all.entries() / 2, all.entries() - 1, all.entries()}) {
-    bounded.fill(projected.splats, projected.counts, grid, bound, kernels, pool);
+    fill(bounded, projected, grid, bound, kernels, pool);
     EXPECT_LE(bounded.entries(), bound);
     EXPECT_EQ(bounded.entries() + bounded.overflowed_entries(), all.entries());
 
