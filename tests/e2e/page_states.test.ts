@@ -76,7 +76,7 @@ describe('page', () => {
     server = await start_fake_server(stream);
     const { page, errors } = await new_page(browser);
     await page.goto(server.url);
-    await page.waitForFunction(() => window.catgs?.settled().then(() => true));
+    await page.evaluate(() => window.catgs!.settled());
     expect(await page.locator('#card').isHidden()).toBe(true);
     await page.keyboard.press('KeyI');
     await page.locator('#stats-panel').getByText('mjpeg').waitFor();
@@ -102,6 +102,6 @@ describe('page', () => {
     expect(page.url()).not.toContain('token');
     await page.getByLabel('Access token').fill('right');
     await page.getByRole('button', { name: 'Connect' }).click();
-    await page.waitForFunction(() => window.catgs?.settled().then(() => true));
+    await page.evaluate(() => window.catgs!.settled());
   });
 });

@@ -54,6 +54,9 @@ describe('stills', () => {
     catgs_render('synth', 'city', scene, '--gaussians', '100000');
     const server = await start_server(scene);
     const page = await open(server.url);
+    await page.mouse.move(size[0] / 2, size[1] / 2);
+    await page.mouse.wheel(0, -800); // from the first sight of the whole city into it
+    await page.evaluate(() => window.catgs!.settled());
     const start = await page.evaluate(() => window.catgs!.pose());
     const turned = (yaw: number, pitch: number): Pose => ({
       position: start.position,

@@ -6,6 +6,7 @@ import {
   type CameraMode,
   type SceneSetup,
 } from '#client/camera/camera_controller';
+import { same_view } from '#client/camera/same_view';
 import {
   axis_angle,
   cross,
@@ -194,6 +195,27 @@ describe('orbiting', () => {
     const moved = sub(made.pose.position, before);
     expect(dot(moved, ahead)).toBeCloseTo(length(moved), 6);
     expect(length(moved)).toBeGreaterThan(0.1);
+  });
+});
+
+describe('same view', () => {
+  const at = scene.start_pose;
+
+  it('holds through the rounding of the wire and for either sign of the quaternion', () => {
+    const [x, y, z, w] = multiply(axis_angle(right, 0.3), axis_angle(forward, 1));
+    const pose = { position: [100.1, -7.7, 3.3] as const, orientation: [x, y, z, w] as const };
+    const rounded = {
+      position: pose.position.map(Math.fround) as unknown as Vec3,
+      orientation: [x, y, z, w].map((v) => -Math.fround(v)) as unknown as Quat,
+    };
+    expect(same_view(rounded, pose, 0.2)).toBe(true);
+  });
+
+  it('ends where a movement can be seen', () => {
+    const turned = { ...at, orientation: axis_angle(right, 1e-4) };
+    const moved = { ...at, position: [0, 1e-4, -5] as const };
+    expect(same_view(turned, at, 0.2)).toBe(false);
+    expect(same_view(moved, at, 0.2)).toBe(false);
   });
 });
 

@@ -68,7 +68,10 @@ beforeEach(() => {
         return Promise.resolve(decoder);
       },
       on_refresh: (draw) => refresh.push(draw),
-      draw: (picture) => drawn.push(picture as unknown as FakePicture),
+      draw: (picture) => {
+        drawn.push(picture as unknown as FakePicture);
+        return Promise.resolve();
+      },
     },
     {
       ack: (ack) => acks.push(ack),
@@ -109,8 +112,9 @@ function decode(from: FakeDecoder, id: bigint): FakePicture {
   return picture;
 }
 
-function display(): void {
+async function display(): Promise<void> {
   for (const draw of refresh.splice(0)) draw();
+  await settle();
 }
 
 describe('newest frame wins', () => {
@@ -120,7 +124,7 @@ describe('newest frame wins', () => {
     for (const id of [1n, 2n, 3n]) decode(made, id);
     now_us = 5000;
     expect(refresh).toHaveLength(1);
-    display();
+    await display();
     expect(drawn.map(({ id }) => id)).toEqual([3n]);
     expect(pictures.map(({ closed }) => closed)).toEqual([true, true, true]);
     expect(dropped).toEqual([1n, 2n]);
@@ -137,7 +141,7 @@ describe('newest frame wins', () => {
     push(1n, { poseClientTimeUs: 10_000n });
     decode(made, 1n);
     now_us = 70_000;
-    display();
+    await display();
     expect(acks).toMatchObject([{ poseAgeUs: 60_000 }]);
   });
 
@@ -146,7 +150,7 @@ describe('newest frame wins', () => {
     push(1n);
     const picture = decode(made, 1n);
     pipeline.discard_pending();
-    display();
+    await display();
     expect(picture.closed).toBe(true);
     expect(drawn).toEqual([]);
     expect(acks).toMatchObject([{ frameId: 1n, dropped: true }]);
@@ -190,7 +194,7 @@ describe('the end of a stream', () => {
     decode(made, 1n);
     pipeline.end_stream();
     expect([...dropped].sort()).toEqual([1n, 2n, 3n]);
-    display();
+    await display();
     expect(drawn).toEqual([]);
     expect(acks).toHaveLength(3);
   });

@@ -97,13 +97,13 @@ describe('automatic height', () => {
 describe('settling', () => {
   it('waits for the newest pose and for the last refinement', async () => {
     const time = new FakeTime();
+    let current = false;
     const settling = new Settling(
+      () => current,
       () => time.now_us() / 1000,
       (delay_ms, action) => time.after(delay_ms, action),
     );
     let settled = false;
-    settling.pose_sent(1);
-    settling.pose_sent(2);
     const done = settling.wait().then(() => {
       settled = true;
     });
@@ -113,11 +113,15 @@ describe('settling', () => {
       await Promise.resolve();
       return settled;
     };
-    settling.presented(1);
+    time.advance(1);
+    settling.presented();
     expect(await after(5000)).toBe(false);
-    settling.presented(2);
+    current = true;
+    settling.presented();
+    time.advance(1);
+    settling.presented();
     expect(await after(390)).toBe(false);
-    settling.presented(2); // a refinement begins the wait anew
+    settling.presented(); // a refinement begins the wait anew
     expect(await after(1500)).toBe(false);
     expect(await after(100)).toBe(true);
     await done;

@@ -27,27 +27,22 @@ const quiet_intervals = 4;
 
 /** Knows when the picture has come to rest. */
 export class Settling {
-  private wanted_id_ = 0;
-  private shown_id_ = 0;
   private last_shown_ms_ = 0;
   private interval_ms_ = 0;
   private waiting_: (() => void)[] = [];
   private cancel_: () => void = () => undefined;
 
+  /** `is_current`: the shown picture is the one of the camera as it is. */
   constructor(
+    private readonly is_current_: () => boolean,
     private readonly now_ms_: () => number,
     private readonly after_: (delay_ms: number, action: () => void) => () => void,
   ) {}
 
-  pose_sent(pose_id: number): void {
-    this.wanted_id_ = pose_id;
-  }
-
-  presented(pose_id: number): void {
+  presented(): void {
     const now_ms = this.now_ms_();
-    this.interval_ms_ = this.shown_id_ > 0 ? now_ms - this.last_shown_ms_ : 0;
+    this.interval_ms_ = this.last_shown_ms_ > 0 ? now_ms - this.last_shown_ms_ : 0;
     this.last_shown_ms_ = now_ms;
-    this.shown_id_ = pose_id;
     this.look();
   }
 
@@ -61,8 +56,7 @@ export class Settling {
   private look(): void {
     this.cancel_();
     if (this.waiting_.length === 0) return;
-    // Until the newest pose is shown, the next presented() looks again.
-    if (this.wanted_id_ === 0 || this.shown_id_ < this.wanted_id_) return;
+    if (!this.is_current_()) return; // the next presented() looks again
     const quiet_ms = Math.max(least_quiet_ms, Math.min(this.interval_ms_, 1000) * quiet_intervals);
     const left_ms = this.last_shown_ms_ + quiet_ms - this.now_ms_();
     if (left_ms <= 0) {

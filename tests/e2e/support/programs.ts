@@ -4,6 +4,12 @@ import { existsSync } from 'node:fs';
 import path from 'node:path';
 import { build_dir } from './paths';
 
+// A test that fails half-way, or runs out of time, leaves no server behind.
+const running = new Set<ChildProcess>();
+process.once('exit', () => {
+  for (const child of running) child.kill('SIGKILL');
+});
+
 function program(name: string): string {
   const file = path.join(build_dir, 'bin', name);
   if (!existsSync(file)) throw new Error(`${file} is missing: ninja -C ${build_dir} ${name}`);
@@ -31,6 +37,8 @@ export async function start_server(scene: string, args: string[] = []): Promise<
     ['--scene', scene, '--port', '0', '--admin-bind', 'off', ...args],
     { stdio: ['ignore', 'pipe', 'pipe'] },
   );
+  running.add(child);
+  child.once('exit', () => running.delete(child));
   let log = '';
   const url = await new Promise<string>((resolve, reject) => {
     const read = (chunk: Buffer): void => {

@@ -27,6 +27,11 @@ export class CameraLoop {
     return this.pose_id_;
   }
 
+  /** The newest sample is not yet what the camera will be at the next refresh. */
+  get pending(): boolean {
+    return this.running_;
+  }
+
   /** Nothing is sent before the scene has told where the camera starts. */
   enable(): void {
     this.enabled_ = true;

@@ -14,7 +14,8 @@ export interface PipelineEnvironment {
   ) => Promise<Decoder | undefined>;
   /** Calls back before the next refresh of the display. */
   on_refresh: (draw: () => void) => void;
-  draw: (picture: Picture) => void;
+  /** One at a time; the picture is free when the promise resolves. */
+  draw: (picture: Picture) => Promise<void>;
 }
 
 export interface PipelineListener {
@@ -33,6 +34,7 @@ export class FramePipeline {
   private config_: StreamConfig | undefined;
   private decoder_: Decoder | undefined;
   private generation_ = 0; // a decoder of an older generation has nothing more to say
+  private streams_ended_ = 0;
   private failures_ = 0;
   private needs_key_ = true;
   private waiting_: EncodedFrame[] = [];
@@ -81,6 +83,7 @@ export class FramePipeline {
   /** Drops every frame inside: the stream they belong to has ended. What is shown stays shown. */
   end_stream(): void {
     this.generation_ += 1;
+    this.streams_ended_ += 1;
     this.decoder_?.close();
     this.decoder_ = undefined;
     this.drop_waiting();
@@ -137,23 +140,31 @@ export class FramePipeline {
 
   private decoded(frame: Frame, picture: Picture): void {
     this.newest_.put({ frame, picture });
-    if (this.drawing_) return;
+    if (!this.drawing_) this.draw_at_refresh();
+  }
+
+  private draw_at_refresh(): void {
     this.drawing_ = true;
     this.env_.on_refresh(() => {
-      this.drawing_ = false;
-      this.present();
+      void this.present().finally(() => {
+        this.drawing_ = false;
+        if (this.newest_.full) this.draw_at_refresh();
+      });
     });
   }
 
-  private present(): void {
+  private async present(): Promise<void> {
     const newest = this.newest_.take();
     if (!newest) return;
     const { frame, picture } = newest;
+    const streams_ended = this.streams_ended_;
     try {
-      this.env_.draw(picture);
+      await this.env_.draw(picture);
     } finally {
       picture.close();
     }
+    // The connection went while the picture was drawn: nobody waits for the acknowledgement.
+    if (this.streams_ended_ !== streams_ended) return;
     const presented_us = this.env_.now_us();
     this.ack(frame, presented_us);
     this.listener_.presented(frame, presented_us);

@@ -13,6 +13,10 @@ export class Latest<T> {
     if (old !== undefined) this.discard_(old);
   }
 
+  get full(): boolean {
+    return this.value_ !== undefined;
+  }
+
   take(): T | undefined {
     const value = this.value_;
     this.value_ = undefined;

@@ -14,7 +14,8 @@ export interface Pixels {
 export interface Presenter {
   /** For people: how pictures get on the canvas. */
   readonly description: string;
-  draw(picture: Picture): void;
+  /** The picture is free again when the promise resolves; one draw at a time. */
+  draw(picture: Picture): Promise<void>;
   /** What draw() drew last. */
   read(): Pixels;
 }

@@ -31,7 +31,7 @@ export class WebGl2Presenter implements Presenter {
     canvas_.addEventListener('webglcontextrestored', () => this.set_up());
   }
 
-  draw(picture: Picture): void {
+  draw(picture: Picture): Promise<void> {
     const gl = this.gl_;
     const [width, height] = size_of(picture);
     if (this.canvas_.width !== width || this.canvas_.height !== height) {
@@ -41,6 +41,7 @@ export class WebGl2Presenter implements Presenter {
     }
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    return Promise.resolve();
   }
 
   read(): Pixels {

@@ -57,7 +57,7 @@ export type FromWorker =
   | { kind: 'notice'; message: string }
   /** The decoders are at their end: the stream is asked for as JPEG pictures. */
   | { kind: 'fallback'; message: string }
-  | { kind: 'presented'; pose_id: number; frame_id: number }
+  | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }
   | { kind: 'stats'; request: number; stats: StatsSnapshot }
   | { kind: 'snapshot'; request: number; snapshot: Snapshot | undefined }
   | { kind: 'broken'; message: string };

@@ -1,4 +1,5 @@
 // The worker: everything between socket and canvas, so that a busy page delays no picture.
+import type { Pose } from '../camera/camera_controller';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { available_codecs, make_decoder } from '../decode/make_decoder';
 import { make_presenter } from '../present/make_presenter';
@@ -102,7 +103,8 @@ class Client {
           scope.postMessage({
             kind: 'presented',
             pose_id: Number(frame.header.poseId),
-            frame_id: Number(frame.header.frameId),
+            pose: plain_pose(frame.header.renderPose),
+            fov_y_rad: frame.header.fovYRad,
           });
         },
         dropped: () => this.metrics_.dropped(),
@@ -195,5 +197,14 @@ function pose_message({ pose_id, time_us, pose, fov_y_rad }: CameraSample): Pose
       orientation: { x, y, z, w },
     },
     fovYRad: fov_y_rad,
+  };
+}
+
+function plain_pose(pose: FrameHeader['renderPose']): Pose {
+  const p = pose?.position;
+  const q = pose?.orientation;
+  return {
+    position: [p?.x ?? 0, p?.y ?? 0, p?.z ?? 0],
+    orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
   };
 }

@@ -1,6 +1,7 @@
 // The page: puts camera, input, worker and controls together.
 import { Settling, type Automation } from '../automation';
 import { CameraController, type Pose, type SceneSetup } from '../camera/camera_controller';
+import { same_angle_rad, same_view } from '../camera/same_view';
 import { CameraLoop } from '../camera/camera_loop';
 import { has_webcodecs } from '../decode/video_decoder';
 import { bind_view_input } from '../input/view_input';
@@ -38,8 +39,9 @@ export class Viewer {
   private readonly auto_height_ = new AutoHeight();
   private state_: SessionState = { phase: 'connecting', attempt: 0 };
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
+  private near_z_ = 0;
   private scene_id_: string | undefined;
-  private has_picture_ = false;
+  private shown_: Extract<FromWorker, { kind: 'presented' }> | undefined;
   private chosen_height_px_: number | 'auto' = 'auto';
   private max_fps_ = 0;
   private stats_timer_: ReturnType<typeof setInterval> | undefined;
@@ -47,6 +49,7 @@ export class Viewer {
   constructor(private readonly card_: CardView) {
     const { clock_: clock } = this;
     this.settling_ = new Settling(
+      () => this.shows_camera(),
       () => clock.now_us() / 1000,
       (delay_ms, action) => browser_timers.after(delay_ms, action),
     );
@@ -58,10 +61,9 @@ export class Viewer {
       },
       keys_changed: () => this.loop_.wake(),
     });
-    this.loop_ = new CameraLoop(this.camera_, () => keys.axes(), clock, (sample) => {
-      this.settling_.pose_sent(sample.pose_id);
-      this.worker_.post({ kind: 'camera', sample });
-    });
+    this.loop_ = new CameraLoop(this.camera_, () => keys.axes(), clock, (sample) =>
+      this.worker_.post({ kind: 'camera', sample }),
+    );
     this.toolbar_ = this.make_toolbar();
     this.toolbar_.show_fov(this.camera_.fov_y_rad * degrees);
     if (matchMedia('(prefers-reduced-motion: reduce)').matches) this.camera_.smoothing_s = 0;
@@ -195,8 +197,9 @@ export class Viewer {
   }
 
   private show_state(): void {
-    this.card_.show(card_for(this.state_, this.has_picture_));
-    document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
+    const has_picture = this.shown_ !== undefined;
+    this.card_.show(card_for(this.state_, has_picture));
+    document.body.classList.toggle('stale', has_picture && this.state_.phase !== 'live');
   }
 
   private welcome(welcome: Welcome): void {
@@ -205,6 +208,7 @@ export class Viewer {
     // After a reconnect the visitor stays where they were.
     if (!scene || scene.sceneId === this.scene_id_) return;
     this.scene_id_ = scene.sceneId;
+    this.near_z_ = scene.nearZ;
     this.show_title(scene);
     this.camera_.load(scene_setup(scene));
     this.loop_.enable();
@@ -214,11 +218,25 @@ export class Viewer {
     this.show_facts({ encoder: config.encoder });
   }
 
-  private presented({ pose_id }: Extract<FromWorker, { kind: 'presented' }>): void {
-    this.settling_.presented(pose_id);
-    if (this.has_picture_) return;
-    this.has_picture_ = true;
-    this.show_state();
+  private presented(message: Extract<FromWorker, { kind: 'presented' }>): void {
+    const is_first = this.shown_ === undefined;
+    this.shown_ = message;
+    this.settling_.presented();
+    if (is_first) this.show_state();
+  }
+
+  /**
+   * The server renders nothing anew for a pose that shows the same picture, so that its number may
+   * never come back.
+   */
+  private shows_camera(): boolean {
+    const { shown_: shown, camera_: camera } = this;
+    if (!shown || this.loop_.pending) return false;
+    if (shown.pose_id >= this.loop_.pose_id) return true;
+    return (
+      Math.abs(shown.fov_y_rad - camera.fov_y_rad) < same_angle_rad &&
+      same_view(shown.pose, camera.pose, this.near_z_)
+    );
   }
 
   private show_facts(facts: Partial<Facts>): void {
