@@ -50,17 +50,17 @@ std::string request_header(lws* wsi, lws_token_indexes token) {
 }
 
 int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& policy,
-                           bool tls, bool& finished) {
+                           bool& finished) {
   head_only_ = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
   const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
   response_ = handler({path, if_none_match, encodings.find("gzip") != std::string::npos});
   finished = head_only_ || !response_.body || response_.body->empty();
-  return write_headers(wsi, policy, tls);
+  return write_headers(wsi, policy);
 }
 
-int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy, bool tls) {
+int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy) {
   HeaderWriter headers(wsi, response_.status, response_.content_type,
                        response_.body ? response_.body->size() : 0);
   headers.add("cache-control:", response_.cache_control);
@@ -71,7 +71,6 @@ int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy, bool tls
   headers.add("x-content-type-options:", "nosniff");
   headers.add("referrer-policy:", "no-referrer");
   headers.add("cross-origin-resource-policy:", "same-origin");
-  if (tls) headers.add("strict-transport-security:", "max-age=31536000");
   return headers.finish();
 }
 

@@ -15,13 +15,12 @@ class LwsHttpExchange {
   /// Reads the request, asks `handler` and writes the response's headers. `policy` is the
   /// Content-Security-Policy. Sets `finished` when there is no body to follow.
   /// The int results below are libwebsockets': nonzero closes the connection.
-  int begin(lws* wsi, const HttpHandler& handler, const std::string& policy, bool tls,
-            bool& finished);
+  int begin(lws* wsi, const HttpHandler& handler, const std::string& policy, bool& finished);
   /// Writes the next piece of the body.
   int write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished);
 
  private:
-  int write_headers(lws* wsi, const std::string& policy, bool tls);
+  int write_headers(lws* wsi, const std::string& policy);
 
   HttpResponse response_;
   bool head_only_ = false;

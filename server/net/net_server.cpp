@@ -29,7 +29,6 @@ struct Site {
   ConnectionAcceptor accept;  // null: no websockets
   std::vector<std::string> allowed_origins;
   std::string policy;
-  bool tls = false;
 };
 
 /// Per-connection memory that libwebsockets owns, zeroed at its birth.
@@ -78,7 +77,7 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       forget(*slot);
       slot->exchange = new LwsHttpExchange;
       bool finished = false;
-      if (slot->exchange->begin(wsi, site.http, site.policy, site.tls, finished) != 0) return -1;
+      if (slot->exchange->begin(wsi, site.http, site.policy, finished) != 0) return -1;
       if (finished) return finish_request(wsi, *slot);
       lws_callback_on_writable(wsi);
       return 0;
@@ -216,7 +215,6 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
     info.ssl_cert_filepath = tls->tls_certificate.c_str();
     info.ssl_private_key_filepath = tls->tls_key.c_str();
     info.alpn = "http/1.1";
-    on.tls = true;
   }
   lws_vhost* made = lws_create_vhost(context, &info);
   if (!made)
@@ -234,8 +232,8 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   lws_set_log_level(LLL_ERR | LLL_WARN, forward_log);
   State& s = *state_;
   s.site = {std::move(options.http), std::move(options.accept), options.allowed_origins,
-            content_security_policy(options.embed_origins), false};
-  s.admin_site = {std::move(options.admin_http), nullptr, {}, content_security_policy({}), false};
+            content_security_policy(options.embed_origins)};
+  s.admin_site = {std::move(options.admin_http), nullptr, {}, content_security_policy({})};
   s.idle_policy.secs_since_valid_ping = ping_after_s;
   s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
 

@@ -114,7 +114,7 @@ std::uint32_t Client::session_count() { return registry_.admitted_; }
 
 void Client::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message)) {
-    spdlog::warn("session {}: {}", session_.id(), error->message);
+    spdlog::warn("session {} ({}): {}", session_.id(), connection_->peer_address(), error->message);
     if (error->fatal) registry_.metrics_.sessions_refused.Increment();
   }
   connection_->send(wire::serialize(message));

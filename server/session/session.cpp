@@ -15,7 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::uint32_t wire_version = 1;
-constexpr auto speak_at_least_every = 1s;
+// Ticks come every 250 ms, and a client hears something at least once a second.
+constexpr auto speak_at_least_every = 750ms;
 constexpr auto min_idr_request_interval = 250ms;
 constexpr int max_failures_in_a_row = 3;
 
@@ -210,11 +211,12 @@ std::optional<FrameCandidate> Session::next_frame() const {
 FrameOrder Session::start_frame(TimePoint now) {
   // The nominal rate is kept on average; what is lost is not caught up.
   next_start_ = std::max(next_start_, now - frame_interval()) + frame_interval();
+  const int real_fps = measure_rate(now);
   rendering_ = true;
   FrameOrder order;
   order.refine = !picture_is_stale();
   order.force_idr = std::exchange(idr_due_, false);
-  order.real_fps = std::clamp(real_fps_, 1, config_.fps);
+  order.real_fps = real_fps;
   if (order.refine)
     --refinements_left_;
   else
@@ -233,6 +235,15 @@ FrameOrder Session::start_frame(TimePoint now) {
       make_camera(pose, config_.size_px, focal_from_fov_y(pose_->fov_y_rad, config_.size_px.y),
                   admission_.scene->facts.near_z);
   return order;
+}
+
+int Session::measure_rate(TimePoint now) {
+  // Over about eight frames. A longer gap is a pause of the motion, not a slow renderer.
+  constexpr auto longest_interval = 500ms;
+  const std::chrono::duration<double> interval = now - std::exchange(last_start_, now);
+  if (interval < longest_interval) mean_interval_ += (interval - mean_interval_) / 8.0;
+  const double fps = 1.0 / std::max(mean_interval_.count(), 1e-3);
+  return std::clamp(static_cast<int>(std::lround(fps)), 1, config_.fps);
 }
 
 void Session::on_frame(FrameResult result, TimePoint now) {
@@ -302,7 +313,6 @@ void Session::send_statistics(TimePoint now) {
   stats_.fps = static_cast<float>(second_frames_) / seconds;
   stats_.bitrate_kbps = static_cast<float>(second_bytes_) * 8e-3f / seconds;
   stats_.sessions = host_.session_count();
-  real_fps_ = std::max(1, static_cast<int>(std::lround(stats_.fps)));
   say(stats_, now);
   stats_ = {};
   second_frames_ = 0;

@@ -128,6 +128,8 @@ class Session {
   void say(const ServerMessage& message, TimePoint now);
   void say_config(TimePoint now);
   void request_stream();
+  /// Notes that a frame starts; returns the rate that the session really reaches.
+  int measure_rate(TimePoint now);
   void count_sent(const FrameResult& result, std::size_t bytes);
   void send_statistics(TimePoint now);
   [[nodiscard]] bool picture_is_stale() const;
@@ -158,6 +160,8 @@ class Session {
   bool paused_ = false;
   int failures_ = 0;  // of rendering or encoding, in a row
   TimePoint next_start_{};
+  TimePoint last_start_{};
+  std::chrono::duration<double> mean_interval_{0.05};  // between starts of frames in a row
   std::uint64_t frames_started_ = 0;
 
   TimePoint last_said_{};
@@ -169,7 +173,6 @@ class Session {
   TimePoint second_start_{};
   std::uint32_t second_frames_ = 0;
   std::uint64_t second_bytes_ = 0;
-  int real_fps_ = 1;
   Stats stats_;
 
   std::uint64_t frames_sent_ = 0;

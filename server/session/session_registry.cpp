@@ -67,6 +67,8 @@ void SessionRegistry::add(const std::shared_ptr<Client>& client) {
   clients_.push_back(client);
   if (draining_)
     client->session().fail(ErrorCode::server_full, "this server is shutting down");
+  else if (clients_.size() > static_cast<std::size_t>(options_.max_sessions + options_.max_waiting))
+    client->session().fail(ErrorCode::server_full, "too many connections: try again in a minute");
   else if (same_address >= options_.max_sessions_per_address)
     client->session().fail(
         ErrorCode::server_full,

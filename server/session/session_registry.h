@@ -20,6 +20,7 @@ struct RegistryOptions {
   SessionPolicy policy;
   int max_sessions = 16;
   int max_sessions_per_address = 64;  // a museum behind one address
+  int max_waiting = 64;               // connections beyond the sessions: not greeted, or refused
 };
 
 /// Why a token does not admit to a scene, for people; nothing: it does.
