@@ -49,9 +49,9 @@ void convert(const ConvertOptions& options, bool quiet) {
   const std::size_t loaded = scene.cloud.size();
   keep_most_important(scene.cloud, options.keep_fraction);
   save_scene(scene.cloud, options.out);
-  fmt::print("{}: {} of {} Gaussians, SH degree {}, {:.1f} MB, from {}\n", options.out,
-             scene.cloud.size(), scene.report.read, scene.cloud.sh_degree,
-             1e-6 * static_cast<double>(std::filesystem::file_size(options.out)), scene.format);
+  fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
+             scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),
+             scene.format);
   if (scene.report.dropped > 0)
     fmt::print("{} could not be drawn and were dropped (catgs-render info says why)\n",
                scene.report.dropped);

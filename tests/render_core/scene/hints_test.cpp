@@ -98,7 +98,15 @@ TEST(FirstSight, ObjectsAreSeenFromOutside) {
     EXPECT_GT(distance, 1.3f * radius);
     EXPECT_LT(distance, 5.0f * radius);
     EXPECT_GT(glm::dot(forward(hints.start_pose), -hints.start_pose.position), 0.95f * distance);
+    EXPECT_LT(hints.start_pose.position.z, 0.0f) << "not from the usual front";
     EXPECT_LT(hints.near_z, 0.1f * radius);
+    std::size_t inside = 0;  // of an image of 16:9, 53 degrees high
+    for (const glm::vec3& mean : cloud.mean) {
+      const glm::vec3 p =
+          camera_from_world_rotation(hints.start_pose) * (mean - hints.start_pose.position);
+      inside += std::abs(p.x) < 0.889f * p.z && std::abs(p.y) < 0.5f * p.z;
+    }
+    EXPECT_GT(inside, cloud.size() * 9 / 10) << "cut off by the border of the image";
     EXPECT_GE(up(hints.start_pose).y, -1.0f);
     EXPECT_LT(up(hints.start_pose).y, -0.5f);
     EXPECT_EQ(hints.source, "estimated");
