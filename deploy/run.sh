@@ -105,10 +105,7 @@ check_system() {
 
 make_demo_scene() {
   mkdir -p "$(dirname "$demo_scene")"
-  # A name of its own until it is whole: an interrupted run leaves no half scene behind.
-  local partial=${demo_scene%.ply}.partial.ply
-  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$partial"
-  mv "$partial" "$demo_scene"
+  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$demo_scene"
 }
 
 ensure_scene() {

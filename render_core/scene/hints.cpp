@@ -161,6 +161,10 @@ Sidecar read_sidecar(const ByteSource& file) {
   return sidecar;
 }
 
+std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
+  return std::filesystem::path(scene_file).replace_extension(".json");
+}
+
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
   const auto triple = [](const glm::vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
   const glm::quat& q = hints.start_pose.orientation;

@@ -37,6 +37,9 @@ struct Sidecar {
 /// Throws InputError naming the field, also for fields that are not known.
 Sidecar read_sidecar(const ByteSource& file);
 
+/// Where the sidecar of a scene file is: "city.ply" -> "city.json".
+std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
+
 /// Writes all of the hints as a sidecar. Throws InputError when that fails.
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path);
 

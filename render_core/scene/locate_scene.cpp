@@ -79,7 +79,7 @@ SceneLocation at_file(const fs::path& file) {
   const auto training = training_of(file);
   const fs::path folder = training.value_or(file.parent_path());
   location.name = training ? training->filename().string() : file.stem().string();
-  location.hints.sidecar = fs::path(file).replace_extension(".json");
+  location.hints.sidecar = sidecar_of(file);
   location.hints.cameras = folder / "cameras.json";
   location.hints.transforms = folder / "transforms.json";
   return location;

@@ -27,7 +27,7 @@ struct ConvertOptions {
 /// Estimated hints can be estimated again; others would be lost with the files they came from.
 void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
   if (hints.source == "estimated") return;
-  const auto sidecar = std::filesystem::path(out).replace_extension(".json");
+  const auto sidecar = sidecar_of(out);
   write_sidecar(hints, sidecar);
   fmt::print("{}: first sight, from {}\n", sidecar.string(), hints.source);
 }

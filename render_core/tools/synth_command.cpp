@@ -1,8 +1,9 @@
-// catgs-render synth: writes a procedural scene.
+// catgs-render synth: writes a procedural scene and, beside it, how to look at it.
 #include <memory>
 
 #include <fmt/format.h>
 
+#include "render_core/scene/hints.h"
 #include "render_core/scene/save_scene.h"
 #include "render_core/scene/synth.h"
 #include "render_core/tools/commands.h"
@@ -29,7 +30,10 @@ void add_synth_command(CLI::App& app) {
       ->capture_default_str();
   synth->callback([options] {
     const SynthKind kind = parse_synth_kind(options->kind);
-    save_scene(synthesize(kind, options->gaussians, options->seed).cloud, options->out);
+    const Scene scene = synthesize(kind, options->gaussians, options->seed);
+    // The sidecar first: where the scene is, its start pose is too.
+    write_sidecar(scene.hints, sidecar_of(options->out));
+    save_scene(scene.cloud, options->out);
   });
 }
 

@@ -185,5 +185,43 @@ TEST_F(CatgsRender, IsSilentInAPipe) {
   EXPECT_EQ(outcome.out, "");
 }
 
+TEST_F(CatgsRender, InfoDescribesTheScene) {
+  const Outcome text = run("info " + scene());
+  ASSERT_EQ(text.exit_code, 0) << text.out;
+  EXPECT_THAT(text.out, AllOf(HasSubstr("3DGS ply"), HasSubstr("400, SH degree 0"),
+                              HasSubstr("first sight     estimated")));
+  const auto json = nlohmann::json::parse(run("info --json " + scene()).out);
+  EXPECT_EQ(json.at("gaussians"), 400);
+  EXPECT_EQ(json.at("sanitize").at("dropped"), 0);
+  EXPECT_NEAR(json.at("opacity").at("p50").get<double>(), 0.9, 1e-6);
+  EXPECT_NEAR(json.at("robust_bounds").at("min")[2].get<double>(), -0.9, 0.02);
+  EXPECT_GT(json.at("peak_rss_bytes").get<double>(), json.at("bytes").get<double>());
+  const Outcome failed = run("info " + path("absent.ply"));
+  EXPECT_EQ(failed.exit_code, 2);
+  EXPECT_THAT(failed.out, HasSubstr("absent.ply: does not exist"));
+}
+
+TEST_F(CatgsRender, ConvertPrunesAndKeepsTheHints) {
+  std::ofstream(path("ball.json")) << R"({"near": 0.125})";
+  const Outcome outcome =
+      run(fmt::format("convert {} {} --keep-fraction 0.25", scene(), path("small.spz")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, HasSubstr("100 of 400 Gaussians"));
+  const auto json = nlohmann::json::parse(run("info --json " + path("small.spz")).out);
+  EXPECT_EQ(json.at("format"), "spz v3");
+  EXPECT_EQ(json.at("gaussians"), 100);
+  EXPECT_EQ(json.at("hints").at("near"), 0.125);
+  EXPECT_EQ(run(fmt::format("convert {} {}", scene(), path("a.obj"))).exit_code, 2);
+  EXPECT_EQ(run(fmt::format("convert {} {} --keep-fraction 0", scene(), path("a.ply"))).exit_code,
+            2);
+}
+
+TEST_F(CatgsRender, SynthesizedScenesKeepTheirStartPose) {
+  const Outcome outcome = run("synth city --gaussians 1000 " + path("city.ply"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const auto json = nlohmann::json::parse(run("info --json " + path("city.ply")).out);
+  EXPECT_EQ(json.at("hints").at("source"), "sidecar city.json");
+}
+
 }  // namespace
 }  // namespace catgs
