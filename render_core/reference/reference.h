@@ -9,7 +9,7 @@
 
 namespace catgs {
 
-/// The oracle (DESIGN §4.1): every pixel against every Gaussian, in double precision, no tiles. Its
+/// The oracle: every pixel against every Gaussian, in double precision, no tiles. Its
 /// cost is pixels x visible Gaussians; judge large scenes by a subset of pixels.
 ///
 /// Returns the colour of each pixel (column, row), clamped to [0, 1]. The request must pass
