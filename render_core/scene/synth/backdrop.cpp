@@ -58,19 +58,19 @@ void paint_horizon(Painter& painter, const glm::vec2& centre, float inner, float
     const Light& light = p.light();
     Random random(key);
     const std::size_t land = p.take(0.7);
+    // Radii grow exponentially with t^2: fine where the land meets the place itself, so that no
+    // disc reaches over what stands there, and wider with the distance.
+    const float growth = outer > 4.0f * inner ? 3.7f : 2.3f;
     for (std::size_t i = 0; i < land; ++i) {
-      // Even in log(radius): a ring's Gaussians grow with its distance.
       const float t = (static_cast<float>(i) + 0.5f) / static_cast<float>(land);
-      const float r =
-          inner * exp_exact(t * 2.303f * 0.30103f * 3.3219f * (outer / inner > 4.0f ? 1.6f : 1.0f));
-      const float growth = outer / inner > 4.0f ? 1.6f * 2.303f : 2.303f;
-      const float size = r * std::sqrt(6.2832f * growth / static_cast<float>(land)) * 0.62f;
+      const float r = inner * exp_exact(growth * t * t);
+      const float size =
+          std::min(0.62f * r * std::sqrt(12.566f * growth * t / static_cast<float>(land)),
+                   0.04f * inner + 0.33f * (r - inner));
       const SinCos turn = sin_cos_turns(static_cast<float>(i) * 0.61803399f);
-      const glm::vec3 point =
-          at(centre.x + r * turn.cos, -0.25f - 0.02f * size, centre.y + r * turn.sin);
       const glm::vec3 d(turn.cos, 0, turn.sin);
       const glm::vec3 colour = light.shade(albedo * random.spread(0.15f), {0, -1, 0}, 0.7f, 0.9f);
-      p.put({.mean = point,
+      p.put({.mean = at(centre.x + r * d.x, -0.3f - 0.05f * size, centre.y + r * d.z),
              .rotation = rotation_of({1, 0, 0}, {0, 0, -1}),
              .scale = {size, size, 0.03f * size},
              .opacity = 0.97f,
@@ -98,11 +98,12 @@ void paint_horizon(Painter& painter, const glm::vec2& centre, float inner, float
 
 void paint_skyline(Painter& painter, const glm::vec2& centre, float inner, float outer,
                    double weight, std::uint64_t key) {
-  painter.divide(painter.take(weight), [&](Painter& p) {
+  const std::size_t count = painter.take(weight);
+  painter.divide(count, [&](Painter& p) {
     Random random(key);
-    constexpr int houses = 420;
+    const int houses = std::min(420, 12 + static_cast<int>(count / 10));
     for (int i = 0; i < houses; ++i) {
-      const float t = (static_cast<float>(i) + random.uniform()) / houses;
+      const float t = (static_cast<float>(i) + random.uniform()) / static_cast<float>(houses);
       const float r = inner + (outer - inner) * t;
       const SinCos turn =
           sin_cos_turns(static_cast<float>(i) * 0.61803399f + 0.01f * random.uniform());

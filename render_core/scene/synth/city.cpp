@@ -19,7 +19,12 @@ namespace {
 // Weights are Gaussians at full density, which a city has from this size on: a larger one spreads
 // further and keeps the same Gaussians in its middle; a smaller one is both smaller and coarser.
 constexpr std::size_t full_density_count = 1'000'000;
-constexpr double backdrop_share = 0.05;  // of at most full_density_count: sky, hills, skyline
+
+/// Gaussians of the sky, the hills and the skyline: a few thousand show them, more sharpen them.
+std::size_t backdrop_count(std::size_t count) {
+  return std::min<std::size_t>(count * 3 / 20, 4'500) +
+         std::min(count, full_density_count) * 7 / 200;
+}
 
 struct Cell {
   int column;
@@ -59,13 +64,15 @@ double measure_cell(std::uint64_t seed, const Light& light, int column, int row)
   return painter.measured();
 }
 
-/// Cells from the centre outwards until their weights reach `target`.
+/// Cells from the centre outwards until their weights reach `target`; at least those around the
+/// first crossings, whatever their density.
 std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double target,
                                ThreadPool& pool) {
   std::vector<Cell> chosen;
   double sum = 0.0;
   float done = 0.0f;  // all cells nearer than this are chosen
-  while (sum < target) {
+  constexpr std::size_t fewest = 8;
+  while (sum < target || chosen.size() < fewest) {
     const float ring = done + std::max(block_pitch_m, 0.5f * done);
     std::vector<Cell> cells;
     const int reach = static_cast<int>(ring / block_pitch_m) + 2;
@@ -83,7 +90,7 @@ std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double ta
       cells[i].weight = measure_cell(seed, light, cells[i].column, cells[i].row);
     });
     for (const Cell& cell : cells) {
-      if (sum >= target) break;
+      if (sum >= target && chosen.size() >= fewest) break;
       chosen.push_back(cell);
       sum += cell.weight;
     }
@@ -97,7 +104,7 @@ std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double ta
 Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   const Light light(glm::normalize(glm::vec3(-0.88f, -0.41f, -0.20f)), child(seed, 1));
   const std::size_t reference = std::min(count, full_density_count);
-  const auto backdrop = static_cast<std::size_t>(backdrop_share * static_cast<double>(reference));
+  const std::size_t backdrop = backdrop_count(count);
   const std::size_t in_cells = count - backdrop;
   // Below full density the area shrinks with the count to the power 3/4, the density by the rest.
   const double fill = std::sqrt(std::sqrt(static_cast<double>(reference) / full_density_count));
@@ -124,7 +131,9 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
         const glm::vec2 centre = city_centre;
         const float sky = std::max(900.0f, 4.0f * radius);
         paint_sky(p, centre, sky, 0.55, child(seed, 2));
-        paint_horizon(p, centre, 0.8f * radius, sky, {0.22f, 0.21f, 0.17f}, 0.18, child(seed, 3));
+        // From within the outermost cells: their ring has gaps.
+        paint_horizon(p, centre, std::max(0.55f * radius, radius - 1.2f * block_pitch_m), sky,
+                      {0.22f, 0.21f, 0.17f}, 0.18, child(seed, 3));
         paint_skyline(p, centre, radius + 40.0f, 2.2f * radius + 150.0f, 0.27, child(seed, 4));
       };
       Painter painter(light, shadows, scene.cloud, in_cells, backdrop, 1.0);
@@ -140,7 +149,7 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
     const glm::vec2 corner = glm::vec2(cell.column, cell.row) * block_pitch_m;
     shadows.keep({at(corner.x - 15.0f, 100.0f, corner.y - 15.0f),
                   at(corner.x + block_pitch_m, 0.0f, corner.y + block_pitch_m)});
-    const float haze = 0.30f * smooth_step(0.35f, 1.0f, cell.distance / std::max(radius, 200.0f));
+    const float haze = 0.30f * smooth_step(0.4f, 1.0f, cell.distance / std::max(radius, 220.0f));
     Painter painter(light, shadows, scene.cloud, first[i], first[i + 1] - first[i], cell.weight);
     paint_cell(painter, plan_block(seed, cell.column, cell.row), haze);
   });
@@ -148,11 +157,12 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   scene.name = "city";
   scene.format = "procedural";
   scene.hints.start_pose =
-      look_at(at(start_place.x, 4.0f, start_place.y), at(-3.0f, 8.5f, 60.0f), up);
+      look_at(at(start_place.x, 11.0f, start_place.y), at(-8.0f, 4.0f, 40.0f), up);
   scene.hints.near_z = 0.2f;
   scene.hints.limits = {at(city_centre.x - radius, 90.0f, city_centre.y - radius),
                         at(city_centre.x + radius, 0.5f, city_centre.y + radius)};
-  scene.hints.focus = at(-6.0f, 4.0f, 30.0f);
+  // On the view axis, over the middle of the crossing: an orbit stays between the houses.
+  scene.hints.focus = at(-0.4f, 7.0f, -2.7f);
   scene.hints.source = "procedural";
   return scene;
 }

@@ -5,18 +5,13 @@
 
 #include <glm/geometric.hpp>
 
-#include "render_core/scene/synth/shapes.h"
+#include "render_core/scene/synth/city_wall.h"
 
 namespace catgs::synth {
 namespace {
 
 constexpr double facade_density = 12.0;  // Gaussians per square metre at detail 1
 constexpr double court_density = 3.0;
-constexpr double roof_density = 2.2;
-
-struct Palette {
-  glm::vec3 wall, trim, shutter, roof;
-};
 
 constexpr std::array<glm::vec3, 9> stucco_walls = {
     glm::vec3(0.62f, 0.47f, 0.28f), glm::vec3(0.56f, 0.45f, 0.30f), glm::vec3(0.58f, 0.33f, 0.20f),
@@ -51,54 +46,10 @@ Palette palette_of(const Building& b) {
   p.shutter = pick(shutters, random);
   p.roof = b.roof == Roof::hip       ? blend(glm::vec3(0.36f, 0.15f, 0.08f),
                                              glm::vec3(0.46f, 0.22f, 0.12f), random.uniform())
-           : b.roof == Roof::mansard ? glm::vec3(0.14f, 0.15f, 0.18f)
+           : b.roof == Roof::mansard ? glm::vec3(0.085f, 0.095f, 0.12f)
            : b.roof == Roof::spire   ? glm::vec3(0.13f, 0.23f, 0.20f)  // copper
                                      : glm::vec3(0.30f, 0.29f, 0.27f);
   return p;
-}
-
-/// One wall of a building: an origin at its foot, metres along and up.
-struct Wall {
-  const Building& building;
-  const Palette& palette;
-  glm::vec3 foot;
-  glm::vec3 along;  // unit
-  glm::vec3 normal;
-  float length;
-  SideUse use;
-  float haze;
-  std::uint64_t key;
-
-  [[nodiscard]] glm::vec3 point(float a, float height, float out = 0.0f) const {
-    return foot + along * a + up * height + normal * out;
-  }
-  [[nodiscard]] Patch patch(float a, float height, float width, float tall,
-                            float out = 0.0f) const {
-    return {point(a, height, out), along * width, up * tall};
-  }
-  /// Streets are darker below than above.
-  [[nodiscard]] float openness(float height) const {
-    return 0.50f + 0.42f * smooth_step(0.0f, 16.0f, height);
-  }
-  [[nodiscard]] Finish finish(const glm::vec3& albedo, float height, float mottle = 0.07f) const {
-    return {.albedo = albedo, .sky_visibility = openness(height), .mottle = mottle, .haze = haze};
-  }
-};
-
-/// What one sees in a window: its glass, and a room that may be lit.
-Finish pane_finish(const Wall& wall, Random& random, float height, float lit_chance) {
-  Finish f = wall.finish({0.025f, 0.028f, 0.033f}, height, 0.25f);
-  f.gloss = Gloss::glass;
-  f.gloss_gain = random.uniform(0.65f, 1.0f);
-  const float u = random.uniform();
-  if (u < lit_chance) {
-    f.glow = glm::vec3(0.95f, 0.52f, 0.20f) * random.uniform(0.45f, 1.25f);
-    f.gloss_gain *= 0.5f;
-  } else if (u < lit_chance + 0.12f) {
-    f.albedo = {0.30f, 0.28f, 0.25f};  // curtains
-    f.gloss_gain *= 0.6f;
-  }
-  return f;
 }
 
 struct Bay {
@@ -315,114 +266,22 @@ void paint_wall(Painter& painter, const Wall& wall, float bottom, float detail) 
   });
 }
 
-/// Slopes on the open sides, gables on party walls, a flat top where the slopes leave one.
-void paint_roof(Painter& painter, const Building& b, const Palette& palette, float detail,
-                float haze) {
-  const glm::vec2 size = b.base.size();
-  const float e = b.eaves();
-  const float rise = b.roof_height();
-  const float run = b.roof == Roof::mansard ? 1.5f
-                                            : (b.roof == Roof::hip || b.roof == Roof::spire
-                                                   ? 0.499f * std::min(size.x, size.y)
-                                                   : 0.0f);
-  std::array<float, 4> inset{};
-  for (std::size_t s = 0; s < 4; ++s) inset[s] = b.sides[s] == SideUse::party ? 0.0f : run;
-  const float x0 = b.base.min.x, x1 = b.base.max.x, z0 = b.base.min.y, z1 = b.base.max.y;
-  const Finish tiles{.albedo = palette.roof,
-                     .gloss = b.roof == Roof::mansard ? Gloss::paint : Gloss::matte,
-                     .gloss_gain = 0.45f,
-                     .sky_visibility = 0.95f,
-                     .mottle = 0.16f,
-                     .haze = haze};
-  const double density = roof_density * detail;
-  const bool flat = run == 0.0f;
-  const float top = flat ? e : e + rise;
-  if (!flat) {
-    const auto slope = [&](std::size_t side, const glm::vec3& corner, const glm::vec3& u,
-                           const glm::vec3& v, float cut_start, float cut_end) {
-      const float length = glm::length(u);
-      const double area = length * glm::length(v) * (1.0f - 0.5f * (cut_start + cut_end) / length);
-      paint_patch(painter, {corner, u, v, cut_start / length, cut_end / length}, tiles,
-                  density * 1.6 * area + 1.0, child(b.key, 500 + side), 0.6f);
-    };
-    const glm::vec3 lift = up * rise;
-    slope(0, at(x0, e, z1), {0, 0, z0 - z1}, lift + glm::vec3(inset[0], 0, 0), inset[3], inset[2]);
-    slope(1, at(x1, e, z0), {0, 0, z1 - z0}, lift - glm::vec3(inset[1], 0, 0), inset[2], inset[3]);
-    slope(2, at(x0, e, z0), {x1 - x0, 0, 0}, lift + glm::vec3(0, 0, inset[2]), inset[0], inset[1]);
-    slope(3, at(x1, e, z1), {x0 - x1, 0, 0}, lift - glm::vec3(0, 0, inset[3]), inset[1], inset[0]);
-  }
-  const glm::vec2 low(x0 + inset[0], z0 + inset[2]);
-  const glm::vec2 high(x1 - inset[1], z1 - inset[3]);
-  const glm::vec2 span = high - low;
-  if (span.x > 0.5f && span.y > 0.5f) {
-    Finish deck = tiles;
-    deck.albedo = {0.30f, 0.28f, 0.26f};
-    deck.gloss = Gloss::matte;
-    paint_patch(painter, {at(low.x, top, low.y), {span.x, 0, 0}, {0, 0, span.y}}, deck,
-                density * 0.7 * span.x * span.y + 1.0, child(b.key, 510), 0.62f);
-  }
-  if (flat) {  // a parapet
-    const Finish coping{.albedo = palette.trim, .sky_visibility = 0.9f, .haze = haze};
-    const float h = e + 0.45f;
-    const std::array<glm::vec3, 5> corners = {at(x0, h, z0), at(x1, h, z0), at(x1, h, z1),
-                                              at(x0, h, z1), at(x0, h, z0)};
-    for (std::size_t s = 0; s < 4; ++s) {
-      paint_line(painter, corners[s], corners[s + 1], 0.9f, coping, 4.0 + density * size.x * 1.5,
-                 child(b.key, 511 + s));
-    }
-  }
-  if (b.roof == Roof::spire) return;
-  // Chimneys, stair heads, ventilation.
-  Random random(child(b.key, 515));
-  const int things = 2 + random.below(3);
-  for (int i = 0; i < things; ++i) {
-    const bool chimney = !flat;
-    const glm::vec3 s = chimney ? glm::vec3(0.7f, random.uniform(1.6f, 2.4f), 1.3f)
-                                : glm::vec3(random.uniform(1.2f, 3.2f), random.uniform(0.9f, 2.4f),
-                                            random.uniform(1.2f, 2.8f));
-    const float x = random.uniform(x0 + 1.2f, x1 - 1.2f - s.x);
-    const float z = random.uniform(z0 + 1.2f, z1 - 1.2f - s.z);
-    const float foot = chimney ? e + rise * 0.35f : e;
-    const Finish body{
-        .albedo = chimney ? glm::vec3(0.40f, 0.24f, 0.17f) : glm::vec3(0.42f, 0.42f, 0.41f),
-        .sky_visibility = 0.9f,
-        .haze = haze};
-    paint_box(painter, at(x, foot + s.y + (chimney ? rise * 0.65f : 0.0f), z),
-              at(x + s.x, foot, z + s.z), body, density * 14.0,
-              child(b.key, 520 + static_cast<std::uint64_t>(i)));
-  }
-}
-
-/// Windows that stand out of the steep part of a mansard roof.
-void paint_dormers(Painter& painter, const Wall& wall, float detail) {
-  const Building& b = wall.building;
-  const int count = std::max(1, static_cast<int>(std::floor(wall.length / 3.4f)));
-  const float step = wall.length / static_cast<float>(count);
-  for (int i = 0; i < count; ++i) {
-    const std::uint64_t key = child(wall.key, 600 + static_cast<std::uint64_t>(i));
-    const std::size_t n = painter.take(34.0 * detail);
-    painter.divide(n, [&](Painter& p) {
-      Random random(key);
-      const float a = (static_cast<float>(i) + 0.5f) * step - 0.65f;
-      const float h = b.eaves() + 0.5f;
-      const Finish zinc = wall.finish({0.24f, 0.25f, 0.27f}, 16.0f);
-      const Finish trim = wall.finish(wall.palette.trim, 16.0f, 0.02f);
-      paint_patch(p, wall.patch(a + 0.2f, h + 0.15f, 0.9f, 1.35f, -0.15f),
-                  pane_finish(wall, random, 16.0f, 0.2f), 3.0, child(key, 1), 0.5f);
-      paint_line(p, wall.point(a + 0.1f, h, -0.1f), wall.point(a + 0.1f, h + 1.6f, -0.1f), 0.22f,
-                 trim, 2.0, child(key, 2));
-      paint_line(p, wall.point(a + 1.2f, h, -0.1f), wall.point(a + 1.2f, h + 1.6f, -0.1f), 0.22f,
-                 trim, 2.0, child(key, 3));
-      paint_line(p, wall.point(a, h + 1.7f, -0.05f), wall.point(a + 1.3f, h + 1.7f, -0.05f), 0.28f,
-                 trim, 2.0, child(key, 4));
-      paint_patch(
-          p, {wall.point(a, h + 1.75f, 0.0f), wall.along * 1.3f, wall.normal * -1.3f + up * 0.1f},
-          zinc, 2.5, child(key, 5));
-    });
-  }
-}
-
 }  // namespace
+
+Finish pane_finish(const Wall& wall, Random& random, float height, float lit_chance) {
+  Finish f = wall.finish({0.025f, 0.028f, 0.033f}, height, 0.25f);
+  f.gloss = Gloss::glass;
+  f.gloss_gain = random.uniform(0.65f, 1.0f);
+  const float u = random.uniform();
+  if (u < lit_chance) {
+    f.glow = glm::vec3(0.95f, 0.52f, 0.20f) * random.uniform(0.45f, 1.25f);
+    f.gloss_gain *= 0.5f;
+  } else if (u < lit_chance + 0.12f) {
+    f.albedo = {0.30f, 0.28f, 0.25f};  // curtains
+    f.gloss_gain *= 0.6f;
+  }
+  return f;
+}
 
 void paint_building(Painter& painter, const Building& b, float detail, float haze) {
   const Palette palette = palette_of(b);

@@ -143,7 +143,7 @@ void plan_park(Block& block) {
     if (std::abs(from_middle.x) < 0.09f || std::abs(from_middle.y) < 0.09f) continue;
     if (!is_free(block, place, 5.5f)) continue;
     block.trees.push_back(
-        {random.bits(), place, random.uniform(7.5f, 13.0f), random.uniform(2.6f, 4.2f)});
+        {random.bits(), place, random.uniform(7.0f, 11.0f), random.uniform(2.5f, 3.9f)});
   }
 }
 
@@ -233,9 +233,9 @@ float Building::roof_height() const {
 float detail_at(const glm::vec2& place) {
   const glm::vec2 nearest(0.0f, glm::clamp(place.y, -5.0f, 60.0f));
   const glm::vec2 d = (place - nearest) / 27.0f;
-  const glm::vec2 from_start = (place - start_place) / 9.0f;
+  const glm::vec2 from_start = (place - start_place - glm::vec2(0.0f, 17.0f)) / 13.0f;
   const float underfoot =
-      2.0f / (1.0f + glm::dot(from_start, from_start) * glm::dot(from_start, from_start));
+      1.6f / (1.0f + glm::dot(from_start, from_start) * glm::dot(from_start, from_start));
   return std::max(0.09f, 1.7f / (1.0f + glm::dot(d, d))) + underfoot;
 }
 

@@ -81,8 +81,8 @@ inline constexpr float house_depth_m = 12.5f;  // of the row of houses around a 
 inline constexpr float pond_share = 0.42f;     // of half a park's width
 
 /// The city grows around this place on the avenue at x = 0, beyond its first crossing at z = 0.
-inline constexpr glm::vec2 city_centre(-8.0f, 62.0f);
-inline constexpr glm::vec2 start_place(1.6f, -0.5f);  // of the first view
+inline constexpr glm::vec2 city_centre(-6.0f, 44.0f);
+inline constexpr glm::vec2 start_place(2.0f, -16.0f);  // of the first view
 
 /// Density of Gaussians here against that of the stretch of the avenue where a visit starts. It
 /// falls like the pixels that a square metre covers from there, down to a floor that still shows

@@ -156,12 +156,12 @@ glm::vec3 Light::sky(const glm::vec3& d) const {
   if (height <= 0.02f) return colour;
   // Clouds on a plane overhead: near the horizon they lie closer together and dissolve in haze.
   const float reach = 1.0f / (height + 0.18f);
-  const float x = d.x * reach * 2.2f;
-  const float z = d.z * reach * 3.4f;
+  const float x = d.x * reach * 1.7f;
+  const float z = d.z * reach * 2.6f;
   const float density = fractal_noise(key_, x + 11.0f, z + 5.0f, 5);
   const float ahead =
       fractal_noise(key_, x + 11.0f + 0.25f * to_sun_.x, z + 5.0f + 0.25f * to_sun_.z, 4);
-  const float cover = smooth_step(0.46f, 0.66f, density) * smooth_step(0.02f, 0.16f, height);
+  const float cover = smooth_step(0.45f, 0.60f, density) * smooth_step(0.02f, 0.16f, height);
   const float lit = clamp01(0.62f + 2.2f * (density - ahead));
   const float toward = clamp01(glm::dot(d, to_sun_));
   const glm::vec3 shade_colour =

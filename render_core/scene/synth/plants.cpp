@@ -60,7 +60,7 @@ void paint_tree(Painter& painter, const glm::vec3& foot, float height, float cro
   const std::size_t wood = count >= 12 ? 3 + count / 40 : 0;
   const std::size_t core = (count - wood) / 9;
   const std::size_t leaves = count - wood - core;
-  const Finish bark{.albedo = {0.13f, 0.095f, 0.07f}, .sky_visibility = 0.6f, .haze = haze};
+  const Finish bark{.albedo = {0.095f, 0.078f, 0.065f}, .sky_visibility = 0.6f, .haze = haze};
   painter.divide(wood, [&](Painter& p) {
     paint_line(p, foot, foot + up * (height - 1.4f * crown), 0.42f, bark, 3.0, child(key, 1));
     for (std::size_t i = 1; i < 5; ++i) {

@@ -38,7 +38,8 @@ void paint_room(Painter& painter, double weight, std::uint64_t key) {
                 child(key, 1));
     Random random(key);
     for (std::uint64_t i = 0; i < 24; ++i) {
-      const glm::vec3 foot = random_point(random, room_m - 1.0f) * glm::vec3(1, 0, 1);
+      glm::vec3 foot = random_point(random, room_m - 1.0f) * glm::vec3(1, 0, 1);
+      if (foot.z < -1.5f) foot.z += room_m;  // not before the start pose's eye
       const float r = random.uniform(0.15f, 0.45f);
       const Finish finish{.albedo = random_colour(random) * 0.6f,
                           .gloss = i % 2 == 0 ? Gloss::paint : Gloss::matte};
@@ -53,11 +54,13 @@ void paint_room(Painter& painter, double weight, std::uint64_t key) {
   });
 }
 
-void paint_stress(Painter& painter, std::uint64_t seed) {
-  paint_sky(painter, {0, 0}, 40.0f, 0.04, child(seed, 2));
-  paint_room(painter, 0.50, child(seed, 3));
+/// What no capture should contain and some do; `count` Gaussians, one of several such parts.
+void paint_extremes(Painter& painter, std::size_t count, std::uint64_t seed) {
+  // Of what covers the whole picture a few are enough, however large the scene is: more would leave
+  // nothing else to see.
+  const double few = 1.2 / static_cast<double>(count);
   // Huge and faint: they touch every tile of every picture, from inside too.
-  paint_each(painter, 0.01, child(seed, 4), [](Random& r, std::size_t) {
+  paint_each(painter, few, child(seed, 4), [](Random& r, std::size_t) {
     return Splat{
         .mean = random_point(r, room_m),
         .rotation = random_rotation(r),
@@ -66,8 +69,8 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
         .colour = random_colour(r)};
   });
   // Needles: one axis up to 10^4 times another.
-  paint_each(painter, 0.10, child(seed, 5), [](Random& r, std::size_t) {
-    const float length = 0.4f * r.spread(0.8f);
+  paint_each(painter, 0.16, child(seed, 5), [](Random& r, std::size_t) {
+    const float length = 0.15f * r.spread(0.8f);
     return Splat{.mean = random_point(r, room_m),
                  .rotation = random_rotation(r),
                  .scale = {length, length * r.uniform(1e-4f, 1e-2f), length * 1e-4f},
@@ -75,7 +78,7 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
                  .colour = random_colour(r)};
   });
   // Just above the smallest alpha that counts.
-  paint_each(painter, 0.10, child(seed, 6), [](Random& r, std::size_t) {
+  paint_each(painter, 0.26, child(seed, 6), [](Random& r, std::size_t) {
     return Splat{.mean = random_point(r, room_m),
                  .rotation = random_rotation(r),
                  .scale = glm::vec3(0.2f, 0.1f, 0.02f) * r.spread(0.5f),
@@ -83,7 +86,7 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
                  .colour = random_colour(r)};
   });
   // Coincident: equal depths to the bit, in crowds of 64.
-  paint_each(painter, 0.06, child(seed, 7), [seed](Random& r, std::size_t i) {
+  paint_each(painter, 0.17, child(seed, 7), [seed](Random& r, std::size_t i) {
     Random crowd(child(seed, 0x10000 + i / 64));
     const glm::vec3 place = random_point(crowd, room_m - 1.0f);
     return Splat{.mean = place,
@@ -93,7 +96,7 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
                  .colour = random_colour(r)};
   });
   // A wall of thousands of thin layers: long lists that never become opaque.
-  paint_each(painter, 0.06, child(seed, 8), [](Random& r, std::size_t) {
+  paint_each(painter, 0.17, child(seed, 8), [](Random& r, std::size_t) {
     return Splat{.mean = at(r.uniform(1.0f, 3.0f), r.uniform(0.2f, 2.2f), r.uniform(-1.0f, 1.0f)),
                  .rotation = random_rotation(r),
                  .scale = glm::vec3(0.25f, 0.2f, 0.05f),
@@ -101,7 +104,7 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
                  .colour = random_colour(r)};
   });
   // Across the near plane of the start pose, before, in and behind the eye.
-  paint_each(painter, 0.03, child(seed, 9), [](Random& r, std::size_t) {
+  paint_each(painter, few, child(seed, 9), [](Random& r, std::size_t) {
     return Splat{
         .mean = at(0, 1.6f, -5.0f) +
                 glm::vec3(r.uniform(-0.5f, 0.5f), r.uniform(-0.5f, 0.5f), r.uniform(-2.0f, 0.6f)),
@@ -111,7 +114,7 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
         .colour = random_colour(r)};
   });
   // Far smaller than a pixel, and far away.
-  paint_each(painter, 0.06, child(seed, 10), [](Random& r, std::size_t i) {
+  paint_each(painter, 0.18, child(seed, 10), [](Random& r, std::size_t i) {
     const bool distant = i % 4 == 0;
     return Splat{.mean = distant ? random_point(r, room_m) * 5.5f : random_point(r, room_m),
                  .rotation = random_rotation(r),
@@ -121,11 +124,11 @@ void paint_stress(Painter& painter, std::uint64_t seed) {
   });
   // View dependence far outside [0, 1].
   Lobe lobe;
-  paint_each(painter, 0.04, child(seed, 11), [&lobe](Random& r, std::size_t) {
-    for (glm::vec3& c : lobe) c = {r.normal() * 3.0f, r.normal() * 3.0f, r.normal() * 3.0f};
+  paint_each(painter, 0.06, child(seed, 11), [&lobe](Random& r, std::size_t) {
+    for (glm::vec3& c : lobe) c = {r.normal() * 1.5f, r.normal() * 1.5f, r.normal() * 1.5f};
     return Splat{.mean = random_point(r, room_m),
                  .rotation = random_rotation(r),
-                 .scale = glm::vec3(0.12f, 0.08f, 0.01f) * r.spread(0.4f),
+                 .scale = glm::vec3(0.05f, 0.04f, 0.01f) * r.spread(0.4f),
                  .opacity = r.uniform(0.3f, 0.99f),
                  .colour = random_colour(r),
                  .lobe = &lobe};
@@ -138,15 +141,24 @@ Scene make_stress(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   const Light light(glm::normalize(glm::vec3(-0.5f, -0.7f, -0.5f)), child(seed, 1));
   Scene scene;
   scene.cloud.resize(count, max_sh_degree);
-  // Parts of equal content, each with its own numbers.
-  const std::size_t parts = 16;
-  pool.parallel_for(parts, [&](std::size_t part) {
+  constexpr std::size_t parts = 16;  // of the extremes, each with its own numbers
+  const std::size_t ordinary = count * 7 / 10;
+  const auto first_of = [&](std::size_t part) {
+    return ordinary + (count - ordinary) * part / parts;
+  };
+  pool.parallel_for(parts + 1, [&](std::size_t part) {
     Shadows shadows(light.to_sun());
-    const std::size_t first = count * part / parts;
-    const std::size_t last = count * (part + 1) / parts;
+    const std::size_t first = part == parts ? 0 : first_of(part);
+    const std::size_t last = part == parts ? ordinary : first_of(part + 1);
     Painter painter(light, shadows, scene.cloud, first, last - first, 1.0);
-    painter.divide(painter.take(1.0),
-                   [&](Painter& p) { paint_stress(p, child(seed, 100 + part)); });
+    painter.divide(painter.take(1.0), [&](Painter& p) {
+      if (part == parts) {
+        paint_sky(p, {0, 0}, 40.0f, 0.05, child(seed, 2));
+        paint_room(p, 0.95, child(seed, 3));
+      } else {
+        paint_extremes(p, last - first, child(seed, 100 + part));
+      }
+    });
   });
   scene.name = "stress";
   scene.format = "procedural";
