@@ -110,7 +110,7 @@ void paint_skyline(Painter& painter, const glm::vec2& centre, float inner, float
       const glm::vec2 place = centre + r * glm::vec2(turn.cos, turn.sin);
       const float high =
           random.chance(0.10f) ? random.uniform(30.0f, 75.0f) : random.uniform(13.0f, 24.0f);
-      const glm::vec2 half = glm::vec2(random.uniform(8.0f, 22.0f), random.uniform(8.0f, 22.0f)) *
+      const glm::vec2 half = glm::vec2{random.uniform(8.0f, 22.0f), random.uniform(8.0f, 22.0f)} *
                              (high > 30.0f ? 0.6f : 1.0f + t);
       const glm::vec3 wall =
           blend(glm::vec3(0.40f, 0.32f, 0.24f), glm::vec3(0.50f, 0.44f, 0.37f), random.uniform());
@@ -134,7 +134,7 @@ void paint_floaters(Painter& painter, const glm::vec3& min, const glm::vec3& max
   Random random(key);
   const glm::vec3 size = max - min;
   for (std::size_t i = 0; i < count; ++i) {
-    const glm::vec3 t(random.uniform(), random.uniform(), random.uniform());
+    const glm::vec3 t{random.uniform(), random.uniform(), random.uniform()};
     const glm::vec3 point = min + size * glm::vec3(t.x, 1.0f - t.y * t.y, t.z);
     const float scale = 0.16f * random.spread(0.6f);
     painter.put({.mean = point,

@@ -97,7 +97,7 @@ void plan_houses(Block& block) {
   const glm::vec2 court = lot.size() - 2.0f * d - 10.0f;
   for (int i = 0; i < 5; ++i) {
     block.trees.push_back(
-        {random.bits(), lot.min + d + 5.0f + court * glm::vec2(random.uniform(), random.uniform()),
+        {random.bits(), lot.min + d + 5.0f + court * glm::vec2{random.uniform(), random.uniform()},
          random.uniform(6.0f, 10.0f), random.uniform(2.2f, 3.2f)});
   }
 }
@@ -135,7 +135,7 @@ void plan_park(Block& block) {
   Random random(child(block.key, 30));
   const glm::vec2 size = block.lot.size();
   for (int attempt = 0; attempt < 90 && block.trees.size() < 34; ++attempt) {
-    const glm::vec2 t(random.uniform(), random.uniform());
+    const glm::vec2 t{random.uniform(), random.uniform()};
     const glm::vec2 place = block.lot.min + 3.0f + (size - 6.0f) * t;
     const glm::vec2 from_middle = (t - 0.5f) * 2.0f;
     // A lawn with its pond in the middle, two paths that cross there, trees around.

@@ -106,8 +106,8 @@ void paint_person(Painter& painter, const glm::vec2& place, float detail, float 
     Random random(key);
     const float h = random.uniform(0.93f, 1.08f);
     const glm::vec3 coat = car_paints[static_cast<std::size_t>(random.below(8))] * 0.7f + 0.02f;
-    const glm::vec3 trousers(random.uniform(0.02f, 0.16f), random.uniform(0.03f, 0.12f),
-                             random.uniform(0.04f, 0.15f));
+    const glm::vec3 trousers{random.uniform(0.02f, 0.16f), random.uniform(0.03f, 0.12f),
+                             random.uniform(0.04f, 0.15f)};
     const Finish cloth{.albedo = coat, .sky_visibility = 0.75f, .haze = haze};
     const Finish legs{.albedo = trousers, .sky_visibility = 0.6f, .haze = haze};
     const Finish skin{.albedo = blend(glm::vec3(0.55f, 0.36f, 0.27f),

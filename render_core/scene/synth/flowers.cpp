@@ -105,18 +105,18 @@ void paint_flower_tuft(Painter& painter, const glm::vec3& foot, double weight, s
     const bool stem = i < leaves / 5;
     const glm::vec3 along = tilted(random, stem ? 0.25f : 1.3f);
     const float length = kind.height * (stem ? 1.0f : 0.42f) * random.spread(0.25f);
-    const glm::vec3 base =
-        foot + up * (stem ? 0.0f : random.uniform(0.0f, 0.55f) * kind.height) +
-        glm::vec3(random.uniform(-0.05f, 0.05f), 0, random.uniform(-0.05f, 0.05f));
+    const float start = stem ? 0.0f : random.uniform(0.0f, 0.55f) * kind.height;
+    const glm::vec3 aside{random.uniform(-0.05f, 0.05f), 0.0f, random.uniform(-0.05f, 0.05f)};
+    const glm::vec3 base = foot + up * start + aside;
     const float width = stem ? 0.004f : 0.011f;
     painter.put(leaf_like(light, sun, base + along * (0.45f * length), along,
                           {0.34f * length, width, 0.25f * width}, green, random));
   }
   for (std::size_t b = 0; b < blossoms; ++b) {
     const glm::vec3 lean = tilted(random, 0.35f);
-    const glm::vec3 centre =
-        foot + lean * (kind.height * random.uniform(0.8f, 1.15f)) +
-        glm::vec3(random.uniform(-0.06f, 0.06f), 0, random.uniform(-0.06f, 0.06f));
+    const float reach = kind.height * random.uniform(0.8f, 1.15f);
+    const glm::vec3 aside{random.uniform(-0.06f, 0.06f), 0.0f, random.uniform(-0.06f, 0.06f)};
+    const glm::vec3 centre = foot + lean * reach + aside;
     paint_blossom(painter, kind, sun, centre, tilted(random, 0.9f), per_blossom, random);
   }
 }

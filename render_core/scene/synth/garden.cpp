@@ -44,7 +44,7 @@ void paint_plot(Painter& p, const glm::vec2& corner, float size, std::uint64_t k
   Random random(child(key, 2));
   constexpr int tufts = 26;
   for (int i = 0; i < tufts; ++i) {
-    const glm::vec2 place = corner + size * glm::vec2(random.uniform(), random.uniform());
+    const glm::vec2 place = corner + size * glm::vec2{random.uniform(), random.uniform()};
     const std::uint64_t tuft = random.bits();
     if (glm::abs(place.x - path_x(place.y)) < path_half_width) continue;
     const double weight = 900.0 / tufts * area;
@@ -94,10 +94,8 @@ void paint_furniture(Painter& p, double weight, std::uint64_t key) {
     paint_blob(q, at(0.08f, 0.82f, 0.05f), {0.12f, 0.11f, 0.12f}, clay, 1.8, child(key, 4));
     for (std::uint64_t i = 0; i < 14; ++i) {
       Random random(child(key, 20 + i));
-      paint_flower_tuft(
-          q,
-          at(0.08f + random.uniform(-0.08f, 0.08f), 0.88f, 0.05f + random.uniform(-0.08f, 0.08f)),
-          0.7, random.bits());
+      const glm::vec3 aside{random.uniform(-0.08f, 0.08f), 0.0f, random.uniform(-0.08f, 0.08f)};
+      paint_flower_tuft(q, at(0.08f, 0.88f, 0.05f) + aside, 0.7, random.bits());
     }
     const Finish enamel{
         .albedo = glm::vec3(0.10f, 0.22f, 0.30f), .gloss = Gloss::paint, .sky_visibility = 0.9f};
@@ -125,8 +123,10 @@ void paint_backdrop(Painter& p, std::uint64_t seed) {
     const SinCos turn = sin_cos_turns((static_cast<float>(i) + 0.6f * random.uniform()) / trees);
     const float r = half_m + random.uniform(1.5f, 9.0f);
     const glm::vec3 leaves = leaf_albedo(random);
-    paint_tree(p, at(r * turn.cos, 0, r * turn.sin), random.uniform(3.5f, 8.0f),
-               random.uniform(1.6f, 2.6f), leaves, 0.02f * r - 0.12f, 0.72 / trees, random.bits());
+    const float height = random.uniform(3.5f, 8.0f);
+    const float crown = random.uniform(1.6f, 2.6f);
+    paint_tree(p, at(r * turn.cos, 0, r * turn.sin), height, crown, leaves, 0.02f * r - 0.12f,
+               0.72 / trees, random.bits());
   }
 }
 

@@ -126,7 +126,8 @@ void paint_blades(Painter& painter, const glm::vec3& corner, const glm::vec3& u,
   const Light& light = painter.light();
   Random random(key);
   for (std::size_t i = 0; i < count; ++i) {
-    const glm::vec3 foot = corner + u * random.uniform() + v * random.uniform();
+    const glm::vec2 t{random.uniform(), random.uniform()};
+    const glm::vec3 foot = corner + u * t.x + v * t.y;
     const glm::vec3 lean = unit_vector(random) * 0.5f;
     const glm::vec3 along = glm::normalize(glm::vec3(lean.x, -1.0f, lean.z));
     const glm::vec3 side =

@@ -19,7 +19,9 @@ constexpr std::uint64_t child(std::uint64_t key, std::uint64_t index) {
 }
 
 /// Counter-based random numbers: draw n of a key is a pure function of (key, n), so that every part
-/// of a scene can be made alone, in any order, on any thread.
+/// of a scene can be made alone, in any order, on any thread. C++ leaves open in which order a
+/// call's arguments and an operator's operands are evaluated: draw twice in one expression only
+/// inside braces.
 class Random {
  public:
   explicit Random(std::uint64_t key) : state_(key) {}

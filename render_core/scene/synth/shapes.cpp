@@ -28,7 +28,8 @@ glm::vec3 hazed(const Painter& painter, const glm::vec3& colour, const glm::vec3
 }
 
 float solid_opacity(Random& random, float opacity) {
-  return opacity * (1.0f - 0.05f * random.uniform() * random.uniform());
+  const float u = random.uniform();
+  return opacity * (1.0f - 0.05f * u * u);
 }
 
 /// Centres of `count` Gaussians over an edge of length 1: the outermost stay `inset` standard

@@ -13,7 +13,7 @@ namespace {
 constexpr float room_m = 6.0f;  // half the side of the room that everything stands in
 
 glm::vec3 random_point(Random& random, float half) {
-  return at(random.uniform(-half, half), random.uniform(0.1f, 4.0f), random.uniform(-half, half));
+  return {random.uniform(-half, half), -random.uniform(0.1f, 4.0f), random.uniform(-half, half)};
 }
 
 glm::vec3 random_colour(Random& random) {
@@ -64,7 +64,7 @@ void paint_extremes(Painter& painter, std::size_t count, std::uint64_t seed) {
     return Splat{
         .mean = random_point(r, room_m),
         .rotation = random_rotation(r),
-        .scale = glm::vec3(r.uniform(4.0f, 30.0f), r.uniform(1.0f, 8.0f), r.uniform(0.5f, 4.0f)),
+        .scale = glm::vec3{r.uniform(4.0f, 30.0f), r.uniform(1.0f, 8.0f), r.uniform(0.5f, 4.0f)},
         .opacity = r.uniform(0.006f, 0.03f),
         .colour = random_colour(r)};
   });
@@ -97,17 +97,18 @@ void paint_extremes(Painter& painter, std::size_t count, std::uint64_t seed) {
   });
   // A wall of thousands of thin layers: long lists that never become opaque.
   paint_each(painter, 0.17, child(seed, 8), [](Random& r, std::size_t) {
-    return Splat{.mean = at(r.uniform(1.0f, 3.0f), r.uniform(0.2f, 2.2f), r.uniform(-1.0f, 1.0f)),
-                 .rotation = random_rotation(r),
-                 .scale = glm::vec3(0.25f, 0.2f, 0.05f),
-                 .opacity = r.uniform(0.005f, 0.02f),
-                 .colour = random_colour(r)};
+    return Splat{
+        .mean = glm::vec3{r.uniform(1.0f, 3.0f), -r.uniform(0.2f, 2.2f), r.uniform(-1.0f, 1.0f)},
+        .rotation = random_rotation(r),
+        .scale = glm::vec3(0.25f, 0.2f, 0.05f),
+        .opacity = r.uniform(0.005f, 0.02f),
+        .colour = random_colour(r)};
   });
   // Across the near plane of the start pose, before, in and behind the eye.
   paint_each(painter, few, child(seed, 9), [](Random& r, std::size_t) {
     return Splat{
         .mean = at(0, 1.6f, -5.0f) +
-                glm::vec3(r.uniform(-0.5f, 0.5f), r.uniform(-0.5f, 0.5f), r.uniform(-2.0f, 0.6f)),
+                glm::vec3{r.uniform(-0.5f, 0.5f), r.uniform(-0.5f, 0.5f), r.uniform(-2.0f, 0.6f)},
         .rotation = random_rotation(r),
         .scale = glm::vec3(r.uniform(0.02f, 0.5f), 0.03f, 0.01f),
         .opacity = r.uniform(0.02f, 0.3f),

@@ -223,5 +223,13 @@ TEST_F(CatgsRender, SynthesizedScenesKeepTheirStartPose) {
   EXPECT_EQ(json.at("hints").at("source"), "sidecar city.json");
 }
 
+TEST_F(CatgsRender, SynthRefusesWhatItCannotMake) {
+  const Outcome unknown = run(fmt::format("synth castle {}", path("castle.ply")));
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.out, AllOf(HasSubstr("castle"), HasSubstr("city, garden, stress")));
+  EXPECT_EQ(run(fmt::format("synth city {} --gaussians 10", path("few.ply"))).exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(path("few.ply")));
+}
+
 }  // namespace
 }  // namespace catgs
