@@ -18,9 +18,7 @@ export function bind_view_input(view: HTMLElement, listener: ViewInputListener):
 function bind_pointers(view: HTMLElement, listener: ViewInputListener): void {
   const pointers = new Pointers();
   view.addEventListener('pointerdown', (event) => {
-    // The middle button would start the browser's own scrolling; the view takes the keyboard.
-    event.preventDefault();
-    view.focus({ preventScroll: true });
+    if (event.button === 1) event.preventDefault(); // no scrolling by the middle button
     view.setPointerCapture(event.pointerId);
     pointers.down(sample_of(event));
   });
