@@ -37,13 +37,17 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->option_text("FILE");
   app.add_flag("--print-config", line.print_config,
                "Print the settings in force and where each comes from, then exit");
+  const ServerConfig defaults;
   for (const auto& setting : settings()) {
     const std::string name = "--" + setting.name;
     if (setting.kind == Setting::Kind::flag) {
       app.add_flag(name, line.flags[setting.name], setting.help);
       continue;
     }
-    auto* option = app.add_option(name, line.values[setting.name], setting.help)
+    const std::string value = setting.get(defaults);
+    const bool has_default = value != "\"\"" && value != "[]";
+    auto* option = app.add_option(name, line.values[setting.name],
+                                  has_default ? setting.help + " [" + value + "]" : setting.help)
                        ->option_text(setting.value_name);
     if (setting.kind == Setting::Kind::list)
       option->option_text(setting.value_name + "...")->expected(1, -1);

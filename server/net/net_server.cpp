@@ -3,6 +3,7 @@
 #include <atomic>
 #include <csignal>
 #include <exception>
+#include <fstream>
 #include <thread>
 #include <utility>
 
@@ -170,6 +171,11 @@ const lws_protocols protocols[] = {
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
 
+void require_readable(const char* flag, const std::string& path) {
+  if (!std::ifstream(path))
+    throw InputError(fmt::format("{} {}", flag, path), {}, "cannot be read");
+}
+
 void forward_log(int level, const char* line) {
   std::string_view text(line);
   while (text.ends_with('\n')) text.remove_suffix(1);
@@ -220,8 +226,8 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   if (!made)
     throw InputError(
         fmt::format("{} {}:{}", flag, endpoint.address, endpoint.port), {},
-        tls ? "cannot listen: the port is busy or the certificate files do not fit together"
-            : "cannot listen: the port is busy or the address is not of this machine",
+        tls ? "cannot listen: the port is busy, or certificate and key do not belong together"
+            : "cannot listen: the port is busy, or the address is not of this machine",
         "stop the other program or choose another port");
   return lws_get_vhost_listen_port(made);
 }
@@ -230,6 +236,11 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   // A peer that goes away while it is written to is an error code, not a signal.
   std::signal(SIGPIPE, SIG_IGN);
   lws_set_log_level(LLL_ERR | LLL_WARN, forward_log);
+  const bool tls = !options.tls_certificate.empty();
+  if (tls) {
+    require_readable("--tls-cert", options.tls_certificate);
+    require_readable("--tls-key", options.tls_key);
+  }
   State& s = *state_;
   s.site = {std::move(options.http), std::move(options.accept), options.allowed_origins,
             content_security_policy(options.embed_origins)};
@@ -237,7 +248,6 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   s.idle_policy.secs_since_valid_ping = ping_after_s;
   s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
 
-  const bool tls = !options.tls_certificate.empty();
   lws_context_creation_info info{};
   info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
   if (tls) info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
