@@ -80,7 +80,7 @@ std::vector<std::uint64_t> LwsWebsocket::send(OutgoingFrame frame) {
   std::vector<std::uint64_t> dropped;
   {
     const std::lock_guard lock(mutex_);
-    if (closed_ || closing_) return {frame.ticket.frame_id};
+    if (closed_ || closing_) return {};
     dropped = ring_.push(std::move(frame));
   }
   waker_->wake(shared_from_this());
