@@ -30,7 +30,7 @@ void Client::post(Handle handle) {
   boost::asio::post(registry_.io_,
                     [self = shared_from_this(), handle = std::move(handle)]() mutable {
                       handle(*self);
-                      self->registry_.session_changed();
+                      self->registry_.give_frames();
                     });
 }
 
@@ -85,7 +85,7 @@ void Client::on_close() {
 }
 
 std::variant<Admission, ErrorMessage> Client::admit(const Hello& hello) {
-  auto result = registry_.admit(*this, hello);
+  auto result = registry_.admit(hello);
   if (const auto* admission = std::get_if<Admission>(&result)) {
     admitted_ = true;
     ++registry_.admitted_;
@@ -138,7 +138,7 @@ std::function<void(Result)> Client::on_session_thread(Handle handle) {
     boost::asio::post(executor,
                       [self = std::move(self), handle, result = std::move(result)]() mutable {
                         handle(*self, std::move(result));
-                        self->registry_.session_changed();
+                        self->registry_.give_frames();
                       });
   };
 }

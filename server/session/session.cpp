@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "server/net/wire.h"
 #include "server/session/frame_size.h"
 #include "server/version.h"
 
@@ -14,7 +15,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::uint32_t wire_version = 1;
 // Ticks come every 250 ms, and a client hears something at least once a second.
 constexpr auto speak_at_least_every = 750ms;
 constexpr auto min_idr_request_interval = 250ms;
@@ -68,11 +68,11 @@ void Session::fail(ErrorCode code, std::string_view message) {
 
 void Session::on(const Hello& hello, TimePoint now) {
   last_activity_ = now;
-  if (hello.version < wire_version)
+  if (hello.version < wire::version)
     return fail(ErrorCode::unsupported_version,
                 fmt::format("this server speaks catgs wire version {}, the client at most {}: "
                             "reload the page or update the client",
-                            wire_version, hello.version));
+                            wire::version, hello.version));
   auto admitted = host_.admit(hello);
   if (const auto* error = std::get_if<ErrorMessage>(&admitted))
     return fail(error->code, error->message);

@@ -94,7 +94,7 @@ std::shared_ptr<const SceneEntry> SessionRegistry::find_scene(const std::string&
   return it == scenes_.end() ? nullptr : *it;
 }
 
-std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Client&, const Hello& hello) {
+std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Hello& hello) {
   const auto scene = find_scene(hello.scene_id);
   // The token first: whoever has none does not learn which scenes exist.
   const std::string& wanted_scene = scene ? scene->facts.scene_id : hello.scene_id;

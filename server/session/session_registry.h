@@ -51,11 +51,10 @@ class SessionRegistry {
 
  private:
   friend class Client;
-  std::variant<Admission, ErrorMessage> admit(const Client& client, const Hello& hello);
+  std::variant<Admission, ErrorMessage> admit(const Hello& hello);
   std::shared_ptr<const SceneEntry> find_scene(const std::string& scene_id) const;
   void add(const std::shared_ptr<Client>& client);
   void remove(const Client& client);
-  void session_changed() { give_frames(); }
   /// Starts frames while a slot is free and a session is ready; sets the timer for the next one.
   void give_frames();
   void tick();
