@@ -16,6 +16,7 @@
 
 #include "render_core/error.h"
 #include "tests/support/server_client.h"
+#include "tests/support/tls.h"
 
 namespace catgs::test {
 namespace {
@@ -259,6 +260,36 @@ TEST(Server, ServesPagesAndNothingElse) {
   EXPECT_EQ(http_get(server.port(), "/metrics").status, 404);
   EXPECT_THAT(http_get(server.admin_port(), "/metrics").body, HasSubstr("catgs_sessions 0"));
   std::filesystem::remove_all(folder);
+}
+
+TEST(Server, ServesTlsWithTheGivenCertificate) {
+  const auto folder = std::filesystem::path(testing::TempDir());
+  const auto certificate = folder / ("cert-" + std::to_string(::getpid()) + ".pem");
+  const auto key = folder / ("key-" + std::to_string(::getpid()) + ".pem");
+  write_self_signed(certificate, key);
+  {
+    RunningServer server([&](ServerConfig& config) {
+      config.tls_cert = certificate.string();
+      config.tls_key = key.string();
+    });
+    const TlsReply reply = tls_get(server.port(), "/healthz");
+    EXPECT_EQ(reply.protocol, "http/1.1");
+    EXPECT_THAT(reply.text, testing::StartsWith("HTTP/1.1 200"));
+  }
+  std::filesystem::remove(key);
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "off";
+  config.tls_cert = certificate.string();
+  config.tls_key = key.string();
+  try {
+    Server keyless(config);
+    FAIL() << "a certificate without its key";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("--tls-key"));
+  }
+  std::filesystem::remove(certificate);
 }
 
 TEST(Server, NamesABusyPort) {
