@@ -31,6 +31,7 @@ class SceneFrame {
   [[nodiscard]] glm::dvec3 right() const { return right_; }
   [[nodiscard]] glm::dvec3 up() const { return up_; }
   [[nodiscard]] glm::dvec3 forward() const { return forward_; }
+  [[nodiscard]] glm::dquat world_from_ground() const { return level_; }
   /// Start pose as it is, rotation included.
   [[nodiscard]] glm::dquat start_orientation() const { return start_orientation_; }
   /// The start pose's view, its image made upright, then turned in radians: yaw about the scene's

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "render_core/motion/trajectory.h"
+#include "render_core/scene/scene.h"
+
+namespace catgs {
+
+/// The motion of a trajectory, moved into a scene: it begins at the scene's start pose with the
+/// same heading, and what was up in it (-y, as in TUM files of this project) is the scene's up.
+/// Elevation and roll stay as recorded. Distances are kept; poses may leave the scene's limits.
+Trajectory anchored(const Trajectory& trajectory, const SceneHints& hints);
+
+}  // namespace catgs

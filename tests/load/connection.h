@@ -1,0 +1,83 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <boost/asio/steady_timer.hpp>
+
+#include "server/encode/decoder.h"
+#include "tests/load/channel.h"
+#include "tests/load/session.h"
+#include "tests/load/wire_client.h"
+
+namespace catgs::load {
+
+/// What survives a lost connection.
+struct SessionState {
+  std::string resume_token;
+  std::optional<v1::PoseSample> last_pose;
+  std::uint64_t next_pose_id = 1;
+};
+
+/// One connection of a session. Four coroutines on one executor: poses, outbox, inbox, decoding.
+class Connection {
+ public:
+  enum class End { finished, lost, refused };
+
+  Connection(const SessionSettings& settings, SessionContext context, SessionState& state,
+             SessionReport& report, const boost::asio::any_io_executor& executor);
+
+  /// Lives until the session's stop time or the connection's end. Never throws.
+  boost::asio::awaitable<End> run();
+
+ private:
+  struct EncodedMessage {
+    std::vector<std::byte> bitstream;
+    Codec codec = Codec::h264;
+    bool idr = false;
+    glm::ivec2 size_px{0};
+    v1::Ack ack;
+  };
+
+  boost::asio::awaitable<void> send_poses();
+  boost::asio::awaitable<void> write_outbox();
+  boost::asio::awaitable<void> read_inbox();
+  boost::asio::awaitable<void> decode_frames();
+  boost::asio::awaitable<void> attempt(boost::asio::awaitable<void> part);
+
+  void say_hello();
+  void say(const v1::ClientMessage& message);
+  void acknowledge(v1::Ack ack, std::int64_t presented_us);
+  void take_message(const v1::ServerMessage& message);
+  void take_welcome(const v1::Welcome& welcome);
+  void take_frame(const FrameMessage& frame);
+  void queue_for_decoding(const FrameMessage& frame, const v1::Ack& ack);
+  boost::asio::awaitable<void> decode_one(EncodedMessage& message);
+
+  const SessionSettings& settings_;
+  SessionContext context_;
+  SessionState& state_;
+  SessionReport& report_;
+  std::unique_ptr<Channel> channel_;
+  boost::asio::steady_timer welcomed_;       // cancelled when the Welcome is there
+  boost::asio::steady_timer outbox_filled_;  // cancelled when there is something to write
+  boost::asio::steady_timer frame_queued_;   // cancelled when there is something to decode
+  std::deque<std::string> outbox_;
+  std::deque<EncodedMessage> to_decode_;
+  std::unique_ptr<Decoder> decoder_;
+  std::optional<Codec> decoder_codec_;
+  bool wait_for_idr_ = true;
+  bool bye_said_ = false;
+  std::shared_ptr<const Trajectory> trajectory_;
+  std::int64_t begin_us_ = 0;  // of the poses
+  bool failed_ = false;
+  End end_ = End::lost;
+};
+
+/// Microseconds on the clock of all sessions.
+std::int64_t now_us();
+
+}  // namespace catgs::load

@@ -1,0 +1,178 @@
+// catgs-load against a real server in this process: counts, decodability, bounded queues. No
+// milliseconds: those belong to benchmarks.
+#include "tests/load/load.h"
+
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/error.h"
+#include "server/server.h"
+
+namespace catgs::load {
+namespace {
+
+/// A server on a free port, and the thread that runs it.
+class RunningServer {
+ public:
+  explicit RunningServer(const ServerConfig& config)
+      : server_(config), thread_([this] { server_.run(); }) {}
+  ~RunningServer() {
+    server_.stop();
+    thread_.join();
+  }
+  RunningServer(const RunningServer&) = delete;
+  RunningServer& operator=(const RunningServer&) = delete;
+
+  [[nodiscard]] std::string url() const {
+    return "ws://127.0.0.1:" + std::to_string(server_.port());
+  }
+
+ private:
+  Server server_;
+  std::thread thread_;
+};
+
+ServerConfig small_server(EncoderKind encoder = EncoderKind::automatic) {
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "off";
+  config.encoder = encoder;
+  config.log_level = "warn";
+  return config;
+}
+
+LoadOptions small_load(const std::string& url) {
+  LoadOptions options;
+  options.url = url;
+  options.sessions = 3;
+  options.script.script = "head";
+  options.duration_s = 3.0;
+  options.size = "160x90";
+  options.fps = 30;
+  options.decode = true;
+  return options;
+}
+
+/// What went wrong, for the test's log.
+std::string errors_of(const SessionReports& reports) {
+  return to_json(reports, collect_metrics(reports, 30.0)).at("error_counts").dump(2);
+}
+
+void expect_clean(const SessionReports& reports) {
+  for (const auto& report : reports) {
+    const SessionStats& stats = report->stats;
+    EXPECT_TRUE(stats.connected);
+    EXPECT_EQ(stats.errors, 0u) << errors_of(reports);
+    EXPECT_EQ(stats.reconnects, 0u);
+    EXPECT_GE(stats.frames, 5u);
+    EXPECT_GE(stats.idrs, 1u);
+    EXPECT_GT(stats.poses_sent, 30u);
+    EXPECT_EQ(stats.decode_errors, 0u);
+    EXPECT_EQ(stats.frames_skipped, 0u);
+    // All but the frames on their way at the end were decoded; credits bound those.
+    EXPECT_GE(stats.decode.count() + 8, stats.frames);
+    EXPECT_GT(stats.pose_to_frame.count(), 0u);
+    EXPECT_GT(stats.pose_age.count(), 0u);
+  }
+}
+
+TEST(Load, SessionsGetFramesThatDecode) {
+  const RunningServer server(small_server());
+  expect_clean(run_load(small_load(server.url())));
+}
+
+TEST(Load, MjpegDecodesToo) {
+  const RunningServer server(small_server(EncoderKind::jpeg));
+  const SessionReports reports = run_load(small_load(server.url()));
+  expect_clean(reports);
+  for (const auto& report : reports) EXPECT_THAT(report->encoder, ::testing::HasSubstr("jpeg"));
+}
+
+TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
+  const RunningServer server(small_server());
+  LoadOptions options = small_load(server.url());
+  options.acknowledge = false;
+  options.decode = false;
+  for (const auto& report : run_load(options)) {
+    EXPECT_TRUE(report->stats.connected);
+    EXPECT_GE(report->stats.frames, 1u);
+    EXPECT_LE(report->stats.frames, 8u);
+    EXPECT_GT(report->stats.poses_sent, 30u);
+  }
+}
+
+TEST(Load, OneSilentClientDisturbsNobody) {
+  const RunningServer server(small_server());
+  LoadOptions silent = small_load(server.url());
+  silent.acknowledge = false;
+  silent.decode = false;
+  silent.sessions = 1;
+  std::jthread stalled([&] { run_load(silent); });
+  expect_clean(run_load(small_load(server.url())));
+}
+
+TEST(Load, ARefusedSessionDoesNotComeBack) {
+  const RunningServer server(small_server());
+  LoadOptions options = small_load(server.url());
+  options.scene = "no such scene";
+  options.sessions = 1;
+  const SessionReports reports = run_load(options);
+  EXPECT_FALSE(reports[0]->stats.connected);
+  EXPECT_EQ(reports[0]->stats.errors, 1u) << errors_of(reports);
+  EXPECT_EQ(reports[0]->stats.reconnects, 0u);
+}
+
+TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
+  std::string url;
+  {
+    const RunningServer server(small_server());
+    url = server.url();  // nobody listens there once it is gone
+  }
+  LoadOptions options = small_load(url);
+  options.sessions = 2;
+  const SessionReports reports = run_load(options);
+  for (const auto& report : reports) {
+    EXPECT_FALSE(report->stats.connected);
+    EXPECT_GE(report->stats.reconnects, 1u);
+    EXPECT_EQ(report->stats.errors, report->stats.reconnects + 1);
+  }
+  EXPECT_EQ(collect_metrics(reports, 30.0)[1],
+            (std::pair<std::string, double>{"sessions_connected", 0.0}));
+}
+
+TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
+  auto server = std::make_unique<RunningServer>(small_server());
+  LoadOptions options = small_load(server->url());
+  options.sessions = 1;
+  SessionReports reports;
+  std::jthread load([&] { reports = run_load(options); });
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  server.reset();
+  load.join();
+  EXPECT_TRUE(reports[0]->stats.connected);
+  EXPECT_GE(reports[0]->stats.errors, 1u);
+  EXPECT_GE(reports[0]->stats.reconnects, 1u);
+}
+
+TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {
+  const auto refused = [](auto change) {
+    LoadOptions options = small_load("ws://127.0.0.1:1");
+    change(options);
+    EXPECT_THROW(run_load(options), InputError);
+  };
+  refused([](LoadOptions& options) { options.url = "http://x"; });
+  refused([](LoadOptions& options) { options.size = "big"; });
+  refused([](LoadOptions& options) { options.script.script = "jump"; });
+  refused([](LoadOptions& options) { options.script.script = ""; });
+  refused([](LoadOptions& options) { options.traces = {"/nonexistent.tum"}; });
+  refused([](LoadOptions& options) { options.duration_s = 0.0; });
+  refused([](LoadOptions& options) { options.ramp_s = 3.0; });
+  refused([](LoadOptions& options) { options.fov_y_deg = 0.0f; });
+}
+
+}  // namespace
+}  // namespace catgs::load

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace catgs::load {
+
+/// Named results of a run, in the order of the report.
+using Metrics = std::vector<std::pair<std::string, double>>;
+
+/// A bound on one metric: METRIC OP NUMBER with OP of < <= > >= == !=, like
+/// "pose_to_frame_p95_ms<33".
+class Requirement {
+ public:
+  /// Throws InputError on bad grammar.
+  explicit Requirement(std::string_view text);
+
+  /// Throws InputError that lists the metrics when there is none of this name: to be called with an
+  /// empty run's metrics first, so that a slip of the pen is found before the load, not after it.
+  void check_name(const Metrics& metrics) const;
+  [[nodiscard]] bool holds(const Metrics& metrics) const;
+  /// "pose_to_frame_p95_ms<33: is 41.2".
+  [[nodiscard]] std::string explain(const Metrics& metrics) const;
+
+ private:
+  enum class Operator { less, less_equal, greater, greater_equal, equal, not_equal };
+  [[nodiscard]] double value(const Metrics& metrics) const;
+
+  std::string text_;
+  std::string metric_;
+  Operator operator_ = Operator::less;
+  double bound_ = 0.0;
+};
+
+}  // namespace catgs::load

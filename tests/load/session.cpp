@@ -1,0 +1,38 @@
+#include "tests/load/session.h"
+
+#include <algorithm>
+#include <random>
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "tests/load/connection.h"
+
+namespace catgs::load {
+
+boost::asio::awaitable<void> run_session(SessionSettings settings, SessionContext context,
+                                         SessionReport& report) {
+  constexpr std::chrono::milliseconds first_pause{250}, longest_pause{4000};
+  const auto executor = co_await boost::asio::this_coro::executor;
+  std::minstd_rand jitter(static_cast<unsigned>(settings.offset * 1e6) + 1);
+  SessionState state;
+  std::chrono::milliseconds pause = first_pause;
+  while (Clock::now() < settings.stop) {
+    const std::uint64_t frames_before = report.stats.frames;
+    Connection connection(settings, context, state, report, executor);
+    const Connection::End end = co_await connection.run();
+    if (end != Connection::End::lost) break;
+    if (report.stats.frames > frames_before) pause = first_pause;
+    // Half of the pause is jitter: a fleet of clients must not come back at once.
+    const auto wait = pause / 2 + std::chrono::milliseconds(jitter() % (pause.count() / 2 + 1));
+    pause = std::min(2 * pause, longest_pause);
+    if (Clock::now() + wait >= settings.stop) break;
+    boost::asio::steady_timer timer(executor, wait);
+    co_await timer.async_wait(boost::asio::use_awaitable);
+    ++report.stats.reconnects;
+  }
+  report.stats.finished(now_us());
+}
+
+}  // namespace catgs::load
