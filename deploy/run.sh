@@ -208,7 +208,7 @@ print_welcome() {
   log       $server_log
   stop      Ctrl-C
 
-  Try       drag to look around, W A S D to fly, wheel or pinch to zoom
+  Try       drag to turn, wheel or pinch to zoom, M to fly with W A S D
             ./deploy/run.sh your_scene.ply      serve a scene of your own
             ./deploy/run.sh --lan               open it on your phone
 WELCOME

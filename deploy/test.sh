@@ -23,7 +23,7 @@ USAGE
 
 readonly build_dir=$SOURCE_DIR/build/release
 log=$build_dir/test.log
-selection=(--label-exclude '^$')
+selection=()
 
 parse_arguments() {
   while (($# > 0)); do
