@@ -10,13 +10,13 @@ readonly SOURCE_DIR
 build_packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
   libwebsockets-dev libssl-dev libprotobuf-dev protobuf-compiler
-  libavcodec-dev libavformat-dev libavutil-dev libswscale-dev
+  libavcodec-dev libavformat-dev libavutil-dev
   libglm-dev libhwy-dev libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev
   nlohmann-json3-dev prometheus-cpp-dev
-  libwebp-dev libpng-dev zlib1g-dev libzstd-dev libarchive-dev libminizip-dev
+  libwebp-dev libpng-dev zlib1g-dev libzstd-dev libarchive-dev
 )
 lan_packages=(openssl qrencode iproute2)
-test_packages=(libgtest-dev libgmock-dev libbenchmark-dev python3 shellcheck clang-format-14 ffmpeg)
+test_packages=(libgtest-dev libgmock-dev python3 shellcheck clang-format-14)
 
 # ---- messages ---------------------------------------------------------------------------------
 
