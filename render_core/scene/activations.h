@@ -43,10 +43,12 @@ inline unsigned char to_byte(float value) {
 inline float sh_from_colour(float colour) { return (colour - 0.5f) / sh_c0; }
 inline float colour_from_sh(float sh) { return 0.5f + sh_c0 * sh; }
 
-/// Unit quaternion. Zero and non-finite ones are returned as they are, for `sanitize` to judge.
+/// Unit quaternion. Those that are one up to rounding stay bit for bit; zero and non-finite ones
+/// are returned as they are, for `sanitize` to judge.
 inline glm::quat unit(const glm::quat& q) {
-  const float length = std::sqrt(glm::dot(q, q));
-  return length > 0.0f && std::isfinite(length) ? q / length : q;
+  const float squared = glm::dot(q, q);
+  if (std::abs(squared - 1.0f) < 1e-6f || !(squared > 0.0f) || !std::isfinite(squared)) return q;
+  return q / std::sqrt(squared);
 }
 
 }  // namespace catgs

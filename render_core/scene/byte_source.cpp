@@ -36,7 +36,8 @@ std::vector<std::byte> ByteSource::read_all(std::uint64_t limit) const {
 }
 
 FileSource::Opened FileSource::open(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // O_NONBLOCK: opening a named pipe by mistake must not wait for a writer.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) throw InputError(path.string(), "", "cannot be opened: " + last_error());
   struct stat info {};
   const bool known = ::fstat(descriptor, &info) == 0;

@@ -16,8 +16,8 @@ namespace catgs {
 /// The result is not sanitized. Throws InputError.
 GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header, const LoadContext& context);
 
-/// Writes the original's layout: binary little-endian, all float, zero normals. Means, rotations
-/// and SH are kept bit for bit; scales to 1e-6 (relative) and opacities to 1e-7 (absolute).
+/// Writes the original's layout: binary little-endian, all float, zero normals. Means, unit
+/// rotations and SH are kept bit for bit, scales to 1e-6 (relative), opacities to 1e-7 (absolute).
 void write_ply(const GaussianCloud& cloud, std::ostream& to);
 
 }  // namespace catgs

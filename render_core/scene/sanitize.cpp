@@ -47,9 +47,9 @@ struct Repairs {
 };
 
 bool repair_rotation(glm::quat& q, Repairs& repairs) {
-  const float length = std::sqrt(glm::dot(q, q));
-  if (length > 1e-12f && std::isfinite(length)) {
-    if (std::abs(length - 1.0f) > 1e-6f) q = q / length;
+  const float squared = glm::dot(q, q);
+  if (squared > 1e-24f && std::isfinite(squared)) {
+    q = unit(q);
     return false;
   }
   const float largest = std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z), std::abs(q.w)});

@@ -11,8 +11,9 @@ namespace catgs {
 ///
 /// Dropped:
 ///  1. mean, scale, rotation or opacity is NaN or infinite;
-///  2. peak alpha under 1/255: every pipeline skips such contributions (render_core/README.md), so
-///     no pixel changes, and the memory and the culling time are saved;
+///  2. peak alpha under 1/255: every pipeline skips such contributions (math/constants.h:
+///  alpha_min),
+///     so no pixel changes, and the memory and the culling time are saved;
 ///  3. absurd: a coordinate or scale over 1e9 (its fourth power, a 2D covariance's determinant,
 ///     would overflow), or farther from the middle of the robust bounds, or larger, than 1e4 times
 ///     their diagonal. What lies that far out is a float that escaped in training, and one such

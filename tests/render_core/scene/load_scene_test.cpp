@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <vector>
 
+#include <sys/stat.h>
+
 #include "render_core/scene/locate_scene.h"
 #include "render_core/scene/ply.h"
 #include "render_core/scene/prune.h"
@@ -124,6 +126,12 @@ TEST_F(LoadScene, UnknownFilesAreRefusedWithTheListOfFormats) {
   EXPECT_THAT(
       input_error([&] { load_scene(write("a.ply", ply_bytes(random_cloud(3, 0))), level); }),
       HasSubstr("no levels of detail"));
+}
+
+TEST_F(LoadScene, NamedPipesDoNotHang) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.ply").c_str(), 0600), 0);
+  EXPECT_THAT(input_error([&] { load_scene(folder_ / "pipe.ply"); }),
+              HasSubstr("not a regular file"));
 }
 
 TEST_F(LoadScene, CloudsWithNothingToDrawAreRefused) {

@@ -33,7 +33,7 @@ void expect_same_up_to_activations(const GaussianCloud& a, const GaussianCloud& 
   EXPECT_EQ(a.mean, b.mean);
   EXPECT_EQ(a.sh, b.sh);
   for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_LT(angle_between(a.rotation[i], b.rotation[i]), 1e-6f);
+    EXPECT_EQ(a.rotation[i], b.rotation[i]);
     EXPECT_NEAR(a.opacity[i], b.opacity[i], 1e-7f + 1e-7f * a.opacity[i]);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(a.scale[i][k], b.scale[i][k], 1e-6f * a.scale[i][k]);
   }
