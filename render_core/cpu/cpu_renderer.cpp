@@ -216,7 +216,8 @@ std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
                                             std::shared_ptr<ThreadPool> pool,
                                             std::string_view simd) {
   const SimdKernels& kernels = choose_kernels(simd);
-  auto shared = std::make_shared<const SharedScene>(SceneStore(cloud, *pool), pool, kernels);
+  auto shared = std::make_shared<const SharedScene>(
+      SharedScene{SceneStore(cloud, *pool), std::move(pool), kernels});
   return std::make_unique<CpuRenderer>(std::move(shared));
 }
 

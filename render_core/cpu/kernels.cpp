@@ -1,12 +1,26 @@
-#include "render_core/cpu/kernels.h"
+// Which instruction sets: one lane for comparison (Highway's emulation of four is not that), and
+// none that adds nothing for us to the ones below. Later versions of Highway know more names.
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_BROKEN_EMU128 1
+#define HWY_DISABLED_TARGETS                                                                  \
+  (HWY_SSE2 | HWY_SSSE3 | HWY_AVX3_DL | HWY_AVX3_ZEN4 | HWY_AVX3_SPR | HWY_NEON_WITHOUT_AES | \
+   HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128)
+#include <hwy/detect_targets.h>
+#ifndef HWY_SSE2
+#define HWY_SSE2 0
+#define HWY_NEON_WITHOUT_AES 0
+#endif
+#ifndef HWY_AVX3_ZEN4
+#define HWY_AVX3_ZEN4 0
+#endif
+#ifndef HWY_AVX3_SPR
+#define HWY_AVX3_SPR 0
+#endif
 
 #include <glm/common.hpp>
 
 #include "render_core/camera.h"
-
-// One lane for comparison, and no SSSE3: what it adds to SSE4 runs on no machine of interest.
-#define HWY_COMPILE_ALL_ATTAINABLE
-#define HWY_DISABLED_TARGETS HWY_SSSE3
+#include "render_core/cpu/kernels.h"
 
 // This file is compiled once per instruction set: foreach_target.h includes it again for each.
 #undef HWY_TARGET_INCLUDE

@@ -60,7 +60,7 @@ void TileLists::finish(ThreadPool& pool) {
   pool.parallel_for(segments_.size(), [&](std::size_t k) {
     Segment& segment = segments_[k];
     for (const TileRun& run : segment.runs) {
-      const auto row = static_cast<std::size_t>(run.row * grid_.x);
+      const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(grid_.x);
       for (std::size_t tile = row + run.begin; tile < row + run.end; ++tile) {
         const std::uint32_t position = segment.positions[tile]++;
         if (position < longest_kept) entries_[starts_[tile] + position] = run.entry;
