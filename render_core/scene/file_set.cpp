@@ -47,15 +47,18 @@ struct ArchiveInput {
   }
 };
 
+std::string_view why(archive* zip) {
+  const char* message = archive_error_string(zip);
+  return message ? message : "cannot be unpacked";
+}
+
 std::vector<std::byte> unpack_entry(archive* zip, std::uint64_t limit, const ByteSource& file,
                                     const std::string& name) {
   std::vector<std::byte> bytes;
   std::vector<std::byte> piece(256 * 1024);
   for (;;) {
     const la_ssize_t got = archive_read_data(zip, piece.data(), piece.size());
-    if (got < 0)
-      throw InputError(file.name(), "entry " + name, archive_error_string(zip),
-                       "the archive is damaged");
+    if (got < 0) throw InputError(file.name(), "entry " + name, why(zip), "the archive is damaged");
     if (got == 0) return bytes;
     if (bytes.size() + static_cast<std::size_t>(got) > limit)
       throw InputError(file.name(), "entry " + name, "unpacks to more than a scene can hold");
@@ -90,7 +93,7 @@ ZipFiles::ZipFiles(const ByteSource& file) : name_(file.name()) {
   const auto check = [&](int result) {
     if (result >= ARCHIVE_WARN) return;
     if (input.failure) std::rethrow_exception(input.failure);
-    throw InputError(file.name(), "", archive_error_string(zip.get()), "the archive is damaged");
+    throw InputError(file.name(), "", why(zip.get()), "the archive is damaged");
   };
   check(archive_read_open1(zip.get()));
   std::uint64_t room = 4 * file.size() + (1 << 20);
