@@ -127,10 +127,11 @@ void CpuView::cull_clusters(const Camera& camera) {
 }
 
 /// Shares of the visible clusters that threads take: more than threads, because some regions hold
-/// far more that is visible than others.
+/// far more that is visible than others, but each share costs a counter per tile.
 std::size_t CpuView::segments() const {
-  return std::min<std::size_t>(static_cast<std::size_t>(shared_->pool->threads()) * 8,
-                               1 + visible_clusters_.size() / 8);
+  const auto threads = static_cast<std::size_t>(shared_->pool->threads());
+  return std::min(
+      {threads * 8, std::max<std::size_t>(threads, 64), 1 + visible_clusters_.size() / 8});
 }
 
 /// Projects the visible clusters and calls done(segment, rank) after each.
