@@ -16,6 +16,10 @@ class ThreadPool;
 enum class SynthKind { city, garden, stress };
 SynthKind parse_synth_kind(std::string_view name);  // throws InputError
 
+/// A city of 1 M Gaussians or more has full density and grows outwards: what lies in its middle is
+/// the same at every size. A smaller one is both smaller and coarser, its surfaces still closed.
+/// Units are metres, y points down, the ground lies at y = 0.
+///
 /// `gaussians` in 1'000…64'000'000; exactly that many come out. The same (kind, count, seed) gives
 /// the same bytes on every machine. SH degree 3. Hints hold a start pose worth looking at.
 Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed);

@@ -204,7 +204,6 @@ void paint_shops(Painter& p, const Wall& wall) {
 /// Ledges between storeys, the cornice, and iron balconies along one or two floors.
 void paint_ledges(Painter& p, const Wall& wall) {
   const Building& b = wall.building;
-  if (b.style == Style::curtain) return;
   const Finish trim = wall.finish(wall.palette.trim, 10.0f, 0.03f);
   const double per_line = wall.length * 0.55;
   paint_line(p, wall.point(0, b.ground_height, 0.12f),
@@ -256,7 +255,7 @@ void paint_wall(Painter& painter, const Wall& wall, float bottom, float detail) 
       paint_patch(p, wall.patch(0, 0, wall.length, b.ground_height),
                   wall.finish(wall.palette.wall * 0.8f, 0.0f), ground_area, child(wall.key, 2));
     }
-    if (per_m2 > 0.8f) {
+    if (per_m2 > 0.8f && b.style != Style::curtain) {
       const std::size_t ledges = p.take(0.09 * area);
       p.divide(ledges, [&](Painter& q) { paint_ledges(q, wall); });
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 
@@ -78,7 +79,9 @@ class Painter {
     paint(*this);
     measuring_ = false;
     share_ = {count, share_.sum};
+    const std::size_t end = next_ + count;
     paint(*this);
+    assert(next_ == end && "a piece took Gaussians and did not put them");
     share_ = outer;
   }
 

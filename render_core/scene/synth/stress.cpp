@@ -54,29 +54,8 @@ void paint_room(Painter& painter, double weight, std::uint64_t key) {
   });
 }
 
-/// What no capture should contain and some do; `count` Gaussians, one of several such parts.
-void paint_extremes(Painter& painter, std::size_t count, std::uint64_t seed) {
-  // Of what covers the whole picture a few are enough, however large the scene is: more would leave
-  // nothing else to see.
-  const double few = 1.2 / static_cast<double>(count);
-  // Huge and faint: they touch every tile of every picture, from inside too.
-  paint_each(painter, few, child(seed, 4), [](Random& r, std::size_t) {
-    return Splat{
-        .mean = random_point(r, room_m),
-        .rotation = random_rotation(r),
-        .scale = glm::vec3{r.uniform(4.0f, 30.0f), r.uniform(1.0f, 8.0f), r.uniform(0.5f, 4.0f)},
-        .opacity = r.uniform(0.006f, 0.03f),
-        .colour = random_colour(r)};
-  });
-  // Needles: one axis up to 10^4 times another.
-  paint_each(painter, 0.16, child(seed, 5), [](Random& r, std::size_t) {
-    const float length = 0.15f * r.spread(0.8f);
-    return Splat{.mean = random_point(r, room_m),
-                 .rotation = random_rotation(r),
-                 .scale = {length, length * r.uniform(1e-4f, 1e-2f), length * 1e-4f},
-                 .opacity = r.uniform(0.4f, 0.99f),
-                 .colour = random_colour(r)};
-  });
+/// Alpha and order: faint, coincident, layered.
+void paint_hard_to_blend(Painter& painter, std::uint64_t seed) {
   // Just above the smallest alpha that counts.
   paint_each(painter, 0.26, child(seed, 6), [](Random& r, std::size_t) {
     return Splat{.mean = random_point(r, room_m),
@@ -104,15 +83,18 @@ void paint_extremes(Painter& painter, std::size_t count, std::uint64_t seed) {
         .opacity = r.uniform(0.005f, 0.02f),
         .colour = random_colour(r)};
   });
-  // Across the near plane of the start pose, before, in and behind the eye.
-  paint_each(painter, few, child(seed, 9), [](Random& r, std::size_t) {
-    return Splat{
-        .mean = at(0, 1.6f, -5.0f) +
-                glm::vec3{r.uniform(-0.5f, 0.5f), r.uniform(-0.5f, 0.5f), r.uniform(-2.0f, 0.6f)},
-        .rotation = random_rotation(r),
-        .scale = glm::vec3(r.uniform(0.02f, 0.5f), 0.03f, 0.01f),
-        .opacity = r.uniform(0.02f, 0.3f),
-        .colour = random_colour(r)};
+}
+
+/// Shape and colour: thin, tiny, far, out of range.
+void paint_hard_to_project(Painter& painter, std::uint64_t seed) {
+  // Needles: one axis up to 10^4 times another.
+  paint_each(painter, 0.16, child(seed, 5), [](Random& r, std::size_t) {
+    const float length = 0.15f * r.spread(0.8f);
+    return Splat{.mean = random_point(r, room_m),
+                 .rotation = random_rotation(r),
+                 .scale = {length, length * r.uniform(1e-4f, 1e-2f), length * 1e-4f},
+                 .opacity = r.uniform(0.4f, 0.99f),
+                 .colour = random_colour(r)};
   });
   // Far smaller than a pixel, and far away.
   paint_each(painter, 0.18, child(seed, 10), [](Random& r, std::size_t i) {
@@ -133,6 +115,30 @@ void paint_extremes(Painter& painter, std::size_t count, std::uint64_t seed) {
                  .opacity = r.uniform(0.3f, 0.99f),
                  .colour = random_colour(r),
                  .lobe = &lobe};
+  });
+}
+
+/// Of what covers the whole picture a few are enough, however large the scene is: more would leave
+/// nothing else to see.
+void paint_covers(Painter& painter, double weight, std::uint64_t seed) {
+  // Huge and faint: they touch every tile of every picture, from inside too.
+  paint_each(painter, weight, child(seed, 4), [](Random& r, std::size_t) {
+    return Splat{
+        .mean = random_point(r, room_m),
+        .rotation = random_rotation(r),
+        .scale = glm::vec3{r.uniform(4.0f, 30.0f), r.uniform(1.0f, 8.0f), r.uniform(0.5f, 4.0f)},
+        .opacity = r.uniform(0.006f, 0.03f),
+        .colour = random_colour(r)};
+  });
+  // Across the near plane of the start pose, before, in and behind the eye.
+  paint_each(painter, weight, child(seed, 9), [](Random& r, std::size_t) {
+    return Splat{
+        .mean = at(0, 1.6f, -5.0f) +
+                glm::vec3{r.uniform(-0.5f, 0.5f), r.uniform(-0.5f, 0.5f), r.uniform(-2.0f, 0.6f)},
+        .rotation = random_rotation(r),
+        .scale = glm::vec3(r.uniform(0.02f, 0.5f), 0.03f, 0.01f),
+        .opacity = r.uniform(0.02f, 0.3f),
+        .colour = random_colour(r)};
   });
 }
 
@@ -157,7 +163,10 @@ Scene make_stress(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
         paint_sky(p, {0, 0}, 40.0f, 0.05, child(seed, 2));
         paint_room(p, 0.95, child(seed, 3));
       } else {
-        paint_extremes(p, last - first, child(seed, 100 + part));
+        const std::uint64_t key = child(seed, 100 + part);
+        paint_covers(p, 1.2 / static_cast<double>(last - first), key);
+        paint_hard_to_blend(p, key);
+        paint_hard_to_project(p, key);
       }
     });
   });
