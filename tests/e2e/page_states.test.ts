@@ -1,9 +1,12 @@
 // What the page says and does in each situation, against a server that follows a script.
+import { readdir, readFile } from 'node:fs/promises';
+import path from 'node:path';
+import { gzipSync } from 'node:zlib';
 import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser } from 'playwright-core';
 import { Codec, Error_Code } from '#client/wire/wire';
 import { keep_screenshot, launch_browser, new_page } from './support/browser';
-import { start_fake_server, welcome, type FakeServer, type Peer } from './support/fake_server';
+import { start_fake_server, web_dist, welcome, type FakeServer, type Peer } from './support/fake_server';
 
 let browser: Browser;
 let server: FakeServer | undefined;
@@ -71,6 +74,20 @@ function refuse(code: Error_Code, message: string) {
   };
 }
 
+describe('files', () => {
+  it('are small, and nothing is inline that the policy of the server would block', async () => {
+    const folder = path.join(web_dist, 'assets');
+    const files = (await readdir(folder)).map((name) => path.join(folder, name));
+    const index = await readFile(path.join(web_dist, 'index.html'), 'utf8');
+    const packed = await Promise.all(files.map(async (file) => gzipSync(await readFile(file)).length));
+    const total = packed.reduce((sum, bytes) => sum + bytes, gzipSync(index).length);
+    console.log(`the whole client is ${(total / 1000).toFixed(1)} kB (gzip)`);
+    expect(total).toBeLessThanOrEqual(150_000);
+    expect(index).not.toMatch(/<style|\sstyle=|\son[a-z]+=|<script(?![^>]*\ssrc=)/);
+    expect(index).not.toMatch(/https?:\/\//);
+  });
+});
+
 describe('page', () => {
   it('shows the picture, acknowledges it and reports statistics', async () => {
     server = await start_fake_server(stream);
@@ -85,6 +102,54 @@ describe('page', () => {
     const ack = heard.find((body) => body.case === 'ack');
     expect(ack?.value).toMatchObject({ dropped: false });
     expect(errors).toEqual([]);
+  });
+
+  it.each([
+    [Error_Code.SERVER_FULL, '16 of 16 sessions are in use', 'The server is busy', 'Try now'],
+    [Error_Code.UNSUPPORTED_VERSION, 'too new', 'Page and server do not fit together', 'Reload'],
+    [Error_Code.RENDER_FAILED, 'out of memory', 'The server could not render', 'Try again'],
+    [Error_Code.IDLE_TIMEOUT, 'nothing moved', 'Paused', 'Continue'],
+  ])('says what error %i means and what to do', async (code, message, title, action) => {
+    server = await start_fake_server(refuse(code, message));
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.getByText(title).waitFor();
+    await page.locator('#card-text').getByText(message, { exact: false }).waitFor();
+    await page.getByRole('button', { name: action }).waitFor();
+  });
+
+  it('shows the place in the queue', async () => {
+    server = await start_fake_server((peer, body) => {
+      if (body.case === 'hello') peer.say({ case: 'queue', value: { position: 2, estimateS: 45 } });
+    });
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.getByText('Number 2 in the queue').waitFor();
+  });
+
+  it('keeps the last picture while the server is away, and says so', async () => {
+    server = await start_fake_server(stream);
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.evaluate(() => window.catgs!.settled());
+    await server.close();
+    server = undefined;
+    await page.getByText('The server does not answer').waitFor();
+    const { width_px } = await page.evaluate(() => window.catgs!.snapshot());
+    expect(width_px).toBe(640);
+  });
+
+  it('says that it is broken when it is', async () => {
+    server = await start_fake_server(stream);
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.evaluate(() => {
+      // Thrown from here it would come muted ("Script error."), as from another site.
+      window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' }));
+    });
+    await page.getByText('This page ran into an error').waitFor();
+    await page.getByText('a planted fault').waitFor();
+    await page.getByRole('button', { name: 'Reload' }).waitFor();
   });
 
   it('asks for a token when its own is refused, and uses the one that is entered', async () => {

@@ -5,7 +5,13 @@ import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import type { Pose } from '#client/camera/camera_controller';
 import type { StatsSnapshot } from '#client/stats/metrics';
-import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import {
+  insecure_host,
+  keep_screenshot,
+  launch_browser,
+  new_page,
+  type WatchedPage,
+} from './support/browser';
 import { psnr_db, settled_picture } from './support/pictures';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
 import { scratch_folder } from './support/scenes';
@@ -239,6 +245,16 @@ describe('trouble', () => {
     await settle(invited);
     expect(guarded.log()).not.toContain('a-long-and-secret-token');
     await guarded.stop();
+  });
+
+  it('a page that is no secure context gets JPEG pictures and says how to get video', async () => {
+    const { page } = await open_viewer(undefined, server.url.replace('127.0.0.1', insecure_host));
+    await page.getByText('browsers offer their video decoder (WebCodecs) on https://').waitFor();
+    const picture = await settled_picture(page);
+    expect([picture.width, picture.height]).toEqual([640, 360]);
+    await page.getByRole('button', { name: 'Dismiss' }).click();
+    await page.keyboard.press('KeyI');
+    await page.locator('#stats-panel').getByText(/jpeg/).waitFor();
   });
 
   it('an unknown scene is said', async () => {

@@ -8,11 +8,14 @@ function main(): void {
     token: (token) => viewer?.use_token(token),
   });
   const broken = (message: string): void => {
-    viewer?.stop();
-    card.show(broken_card(message));
+    if (viewer) viewer.break_off(message);
+    else card.show(broken_card(message));
   };
   let viewer: Viewer | undefined;
-  window.addEventListener('error', (event) => broken(event.message));
+  window.addEventListener('error', (event) => {
+    // Not an error: a size changed again within one frame, and is reported in the next.
+    if (!event.message.startsWith('ResizeObserver loop')) broken(event.message);
+  });
   window.addEventListener('unhandledrejection', (event) => broken(String(event.reason)));
 
   const unsupported = unsupported_card(globalThis);

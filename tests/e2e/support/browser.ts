@@ -5,6 +5,8 @@ import { chromium, type Browser, type BrowserContextOptions, type Page } from 'p
 import { artefacts, chromium_path } from './paths';
 
 
+export const insecure_host = 'plain.test';
+
 export async function launch_browser(): Promise<Browser> {
   if (!existsSync(chromium_path)) {
     throw new Error(`no Chromium at ${chromium_path}: apt install chromium, or set CATGS_CHROMIUM`);
@@ -20,6 +22,8 @@ export async function launch_browser(): Promise<Browser> {
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',
+      // A name that is no secure context, although it is this machine.
+      `--host-resolver-rules=MAP ${insecure_host} 127.0.0.1`,
     ],
   });
 }

@@ -16,9 +16,15 @@ const scope = self as unknown as {
   postMessage(message: FromWorker, transfer?: Transferable[]): void;
   onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
   requestAnimationFrame(callback: () => void): number;
+  onunhandledrejection: ((event: PromiseRejectionEvent) => void) | null;
 };
 
 let client: Client | undefined;
+
+// Uncaught exceptions reach the page as the worker's error event; rejections do not.
+scope.onunhandledrejection = ({ reason }) => {
+  scope.postMessage({ kind: 'broken', message: String(reason) });
+};
 
 scope.onmessage = ({ data }) => {
   if (data.kind !== 'start') {

@@ -39,6 +39,7 @@ export class Viewer {
   private readonly auto_height_ = new AutoHeight();
   private state_: SessionState = { phase: 'connecting', attempt: 0 };
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
+  private broken_ = false;
   private near_z_ = 0;
   private scene_id_: string | undefined;
   private shown_: Extract<FromWorker, { kind: 'presented' }> | undefined;
@@ -83,9 +84,12 @@ export class Viewer {
     this.worker_.post({ kind: 'token', token });
   }
 
-  stop(): void {
+  /** For good: something broke, and the card that says so must stay. */
+  break_off(message: string): void {
+    this.broken_ = true;
     clearInterval(this.stats_timer_);
     this.worker_.post({ kind: 'stop' });
+    this.card_.show(broken_card(message));
   }
 
   private start_worker(): void {
@@ -191,12 +195,13 @@ export class Viewer {
         );
         break;
       case 'broken':
-        this.card_.show(broken_card(message.message));
+        this.break_off(message.message);
         break;
     }
   }
 
   private show_state(): void {
+    if (this.broken_) return;
     const has_picture = this.shown_ !== undefined;
     this.card_.show(card_for(this.state_, has_picture));
     document.body.classList.toggle('stale', has_picture && this.state_.phase !== 'live');
