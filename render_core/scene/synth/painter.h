@@ -79,7 +79,7 @@ class Painter {
     paint(*this);
     measuring_ = false;
     share_ = {count, share_.sum};
-    const std::size_t end = next_ + count;
+    [[maybe_unused]] const std::size_t end = next_ + count;
     paint(*this);
     assert(next_ == end && "a piece took Gaussians and did not put them");
     share_ = outer;
