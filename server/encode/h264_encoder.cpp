@@ -44,7 +44,7 @@ void apply_common(AVCodecContext& context, const EncoderSettings& settings, int 
   context.color_trc = AVCOL_TRC_BT709;
   context.colorspace = AVCOL_SPC_BT709;
   context.color_range = AVCOL_RANGE_MPEG;
-  context.chroma_sample_location = AVCHROMA_LOC_LEFT;
+  context.chroma_sample_location = AVCHROMA_LOC_CENTER;  // renderers average 2x2 pixels
   context.level = level_idc;
   context.max_b_frames = 0;
   context.gop_size = std::numeric_limits<int>::max();  // an IDR only when asked for

@@ -13,9 +13,8 @@ struct Yuv420Planes {
   std::ptrdiff_t stride_bytes[3] = {};
 };
 
-/// Video samples (BT.709, limited range) to what JFIF prescribes (BT.601, full range). Even sides.
-/// The planes must not overlap. JFIF centres chroma between luma columns where the video's sits on
-/// the left one: that quarter of a chroma sample is not resampled.
+/// Video samples (BT.709, limited range) to what JFIF prescribes (BT.601, full range). Even sides;
+/// chroma keeps its place in the middle of 2x2 pixels. The planes must not overlap.
 void video_to_jfif(const Yuv420Planes& video, const Yuv420Planes& jfif, glm::ivec2 size_px);
 
 }  // namespace catgs

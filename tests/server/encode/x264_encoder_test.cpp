@@ -66,7 +66,7 @@ TEST(X264Encoder, SpsSaysWhatTheStreamIs) {
   EXPECT_EQ(encoder->codec_string(), "avc1.64001E");  // High, level 3.0
   ASSERT_TRUE(sps->vui);
   EXPECT_FALSE(sps->vui->has_hrd);
-  EXPECT_EQ(sps->vui->chroma_sample_loc_type.value_or(0), 0u);
+  EXPECT_EQ(sps->vui->chroma_sample_loc_type, 1u);  // in the middle of 2x2 pixels
   ASSERT_TRUE(sps->vui->video_signal);
   EXPECT_FALSE(sps->vui->video_signal->full_range);
   EXPECT_EQ(sps->vui->video_signal->primaries, 1);
