@@ -1,5 +1,5 @@
 // BT.709 limited-range 4:2:0 to RGB, exact to the last bit but one. Browsers do this on a GPU; on a
-// CPU Chromium's conversion loses up to 13/255 of blue (its coefficient 2.11 does not fit the eight
+// CPU Chromium's conversion misses saturated blue by 12/255 (its coefficient 2.11 does not fit the eight
 // bits it has there), so software presenting brings its own.
 
 // Recommendation ITU-R BT.709: Kr = 0.2126, Kb = 0.0722; limited range: luma 16…235, chroma 16…240.
