@@ -94,6 +94,7 @@ Json settings_json(const BenchOptions& options, const RenderSetup& setup) {
     json["seed"] = render.script.seed;
   } else {
     json["trace"] = render.trace;
+    json["anchor"] = render.anchor;
   }
   json["fps"] = setup.fps;
   json["frames"] = {setup.first, setup.first + setup.poses.size()};

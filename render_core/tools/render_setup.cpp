@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "render_core/error.h"
+#include "render_core/motion/anchor.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
@@ -58,7 +59,8 @@ Trajectory make_path(const RenderOptions& options, const SceneHints& hints) {
     script.rate_hz = options.fps.value_or(script.rate_hz);
     return make_script(script, hints);
   }
-  const Trajectory trace = read_tum(options.trace);
+  Trajectory trace = read_tum(options.trace);
+  if (options.anchor) trace = anchored(trace, hints);
   return options.fps ? resample(trace, *options.fps) : trace;
 }
 
@@ -95,6 +97,8 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   auto* script = command.add_option("--script", options.script.script,
                                     "Camera path: orbit, walk, head, drone, still or tour:FILE");
   trace->excludes(script);
+  command.add_flag("--anchor", options.anchor, "Move the trace to the scene's start pose")
+      ->needs(trace);
   command.add_option("--seed", options.script.seed, "Of the script")->capture_default_str();
   command.add_option("--duration", options.script.duration_s, "Of the script, seconds")
       ->capture_default_str();

@@ -17,6 +17,7 @@ namespace catgs {
 struct RenderOptions {
   std::string scene;
   std::string trace;
+  bool anchor = false;
   ScriptOptions script;
   std::string size = "1280x720";
   std::optional<float> focal_px;

@@ -2,6 +2,7 @@
 // milliseconds: those belong to benchmarks.
 #include "tests/load/load.h"
 
+#include <filesystem>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -9,40 +10,16 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/error.h"
-#include "server/server.h"
+#include "tests/support/server_client.h"
+#include "tests/support/tls.h"
 
 namespace catgs::load {
 namespace {
 
-/// A server on a free port, and the thread that runs it.
-class RunningServer {
- public:
-  explicit RunningServer(const ServerConfig& config)
-      : server_(config), thread_([this] { server_.run(); }) {}
-  ~RunningServer() {
-    server_.stop();
-    thread_.join();
-  }
-  RunningServer(const RunningServer&) = delete;
-  RunningServer& operator=(const RunningServer&) = delete;
+using test::RunningServer;
 
-  [[nodiscard]] std::string url() const {
-    return "ws://127.0.0.1:" + std::to_string(server_.port());
-  }
-
- private:
-  Server server_;
-  std::thread thread_;
-};
-
-ServerConfig small_server(EncoderKind encoder = EncoderKind::automatic) {
-  ServerConfig config;
-  config.scenes = {"synth:city:2000"};
-  config.port = 0;
-  config.admin_bind = "off";
-  config.encoder = encoder;
-  config.log_level = "warn";
-  return config;
+std::string url_of(const RunningServer& server) {
+  return "ws://127.0.0.1:" + std::to_string(server.port());
 }
 
 LoadOptions small_load(const std::string& url) {
@@ -81,20 +58,38 @@ void expect_clean(const SessionReports& reports) {
 }
 
 TEST(Load, SessionsGetFramesThatDecode) {
-  const RunningServer server(small_server());
-  expect_clean(run_load(small_load(server.url())));
+  const RunningServer server;
+  expect_clean(run_load(small_load(url_of(server))));
 }
 
 TEST(Load, MjpegDecodesToo) {
-  const RunningServer server(small_server(EncoderKind::jpeg));
-  const SessionReports reports = run_load(small_load(server.url()));
+  const RunningServer server([](ServerConfig& config) { config.encoder = EncoderKind::jpeg; });
+  const SessionReports reports = run_load(small_load(url_of(server)));
   expect_clean(reports);
   for (const auto& report : reports) EXPECT_THAT(report->encoder, ::testing::HasSubstr("jpeg"));
 }
 
+TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
+  const auto folder = std::filesystem::temp_directory_path() / "catgs_load_tls";
+  std::filesystem::create_directories(folder);
+  test::write_self_signed(folder / "certificate.pem", folder / "key.pem");
+  const RunningServer server([&](ServerConfig& config) {
+    config.tls_cert = folder / "certificate.pem";
+    config.tls_key = folder / "key.pem";
+  });
+  LoadOptions options = small_load("wss://127.0.0.1:" + std::to_string(server.port()));
+  options.insecure = true;
+  expect_clean(run_load(options));
+  options.insecure = false;
+  const SessionReports refused = run_load(options);
+  EXPECT_FALSE(refused[0]->stats.connected);
+  EXPECT_THAT(errors_of(refused), ::testing::HasSubstr("certificate verify failed"));
+  std::filesystem::remove_all(folder);
+}
+
 TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
-  const RunningServer server(small_server());
-  LoadOptions options = small_load(server.url());
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
   options.acknowledge = false;
   options.decode = false;
   for (const auto& report : run_load(options)) {
@@ -106,18 +101,18 @@ TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
 }
 
 TEST(Load, OneSilentClientDisturbsNobody) {
-  const RunningServer server(small_server());
-  LoadOptions silent = small_load(server.url());
+  const RunningServer server;
+  LoadOptions silent = small_load(url_of(server));
   silent.acknowledge = false;
   silent.decode = false;
   silent.sessions = 1;
   std::jthread stalled([&] { run_load(silent); });
-  expect_clean(run_load(small_load(server.url())));
+  expect_clean(run_load(small_load(url_of(server))));
 }
 
 TEST(Load, ARefusedSessionDoesNotComeBack) {
-  const RunningServer server(small_server());
-  LoadOptions options = small_load(server.url());
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
   options.scene = "no such scene";
   options.sessions = 1;
   const SessionReports reports = run_load(options);
@@ -129,8 +124,8 @@ TEST(Load, ARefusedSessionDoesNotComeBack) {
 TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
   std::string url;
   {
-    const RunningServer server(small_server());
-    url = server.url();  // nobody listens there once it is gone
+    const RunningServer server;
+    url = url_of(server);  // nobody listens there once it is gone
   }
   LoadOptions options = small_load(url);
   options.sessions = 2;
@@ -145,8 +140,8 @@ TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
 }
 
 TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
-  auto server = std::make_unique<RunningServer>(small_server());
-  LoadOptions options = small_load(server->url());
+  auto server = std::make_unique<RunningServer>();
+  LoadOptions options = small_load(url_of(*server));
   options.sessions = 1;
   SessionReports reports;
   std::jthread load([&] { reports = run_load(options); });

@@ -160,6 +160,7 @@ std::string to_table(const SessionReports& sessions, const Metrics& metrics) {
   fmt::format_to(out, "{:<34}{:>9}{:>9}{:>9}{:>9}\n", "milliseconds", "p50", "p95", "p99", "max");
   for (const NamedHistogram& histogram : histograms) {
     const std::string name = histogram.name;
+    if (value(name + "_max_ms") == 0.0) continue;  // not measured, as decoding without --decode
     fmt::format_to(out, "{:<34}{:9.1f}{:9.1f}{:9.1f}{:9.1f}\n", histogram.meaning,
                    value(name + "_p50_ms"), value(name + "_p95_ms"), value(name + "_p99_ms"),
                    value(name + "_max_ms"));

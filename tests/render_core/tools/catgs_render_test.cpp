@@ -1,4 +1,5 @@
 // Runs the program itself: exit codes, messages, files.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -101,6 +102,19 @@ TEST_F(CatgsRender, ARangeOfAResampledTraceKeepsItsNumbers) {
   EXPECT_TRUE(std::filesystem::exists(path("out/frame_000004.png")));
   EXPECT_TRUE(std::filesystem::exists(path("out/frame_000005.png")));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 2);
+}
+
+TEST_F(CatgsRender, AnAnchoredTraceLooksAtTheScene) {
+  write_tum(path("far.tum"), {{0, {glm::vec3(500, 0, 0), {1, 0, 0, 0}}}});
+  const auto brightest = [&](const std::string& flags) {
+    const Outcome outcome =
+        frames(fmt::format("--trace {} {} --out {}", path("far.tum"), flags, path("a.png")));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+    const Image image = read_png(path("a.png"));
+    return *std::max_element(image.rgb.begin(), image.rgb.end());
+  };
+  EXPECT_EQ(brightest(""), 0.0f);
+  EXPECT_GT(brightest("--anchor"), 0.2f);
 }
 
 TEST_F(CatgsRender, ChecksPixelsAgainstTheReference) {
