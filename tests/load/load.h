@@ -28,8 +28,7 @@ struct LoadOptions {
   bool insecure = false;
 };
 
-/// Runs the sessions to their end and returns their reports. Throws InputError on bad options and
-/// std::runtime_error when an interrupt ended the run early.
+/// Runs the sessions to their end and returns their reports. Throws InputError on bad options.
 SessionReports run_load(const LoadOptions& options);
 
 }  // namespace catgs::load
