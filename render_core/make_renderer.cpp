@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "render_core/cpu/cpu_renderer.h"
-#include "render_core/error.h"
+#include "render_core/cuda/cuda_renderer.h"
 #include "render_core/reference/reference.h"
 #include "render_core/renderer.h"
 #include "render_core/thread_pool.h"
@@ -11,18 +11,23 @@ namespace catgs {
 
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
                            const RendererOptions& options) {
-  auto pool = options.pool ? options.pool : std::make_shared<ThreadPool>();
+  const auto pool = [&options] {
+    return options.pool ? options.pool : std::make_shared<ThreadPool>();
+  };
   switch (options.kind) {
     case RendererKind::reference:
-      return {make_reference_renderer(std::move(cloud), std::move(pool)), "asked for"};
+      return {make_reference_renderer(std::move(cloud), pool()), "asked for"};
     case RendererKind::cpu:
-      return {make_cpu_renderer(*cloud, std::move(pool), options.simd), "asked for"};
+      return {make_cpu_renderer(*cloud, pool(), options.simd), "asked for"};
     case RendererKind::cuda:
-      throw InputError("--renderer cuda", "", "this build has no CUDA core", "use auto or cpu");
+      return {make_cuda_renderer(*cloud), "asked for"};
     case RendererKind::automatic:
       break;
   }
-  return {make_cpu_renderer(*cloud, std::move(pool), options.simd), "this build has no CUDA core"};
+  if (const std::string obstacle = cuda_obstacle(); !obstacle.empty()) {
+    return {make_cpu_renderer(*cloud, pool(), options.simd), obstacle};
+  }
+  return {make_cuda_renderer(*cloud), "a CUDA device is there"};
 }
 
 }  // namespace catgs

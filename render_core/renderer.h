@@ -84,6 +84,7 @@ struct RenderStatus {
 struct ViewSettings {
   Pipeline pipeline = Pipeline::exact;
   PixelFormat format = PixelFormat::rgb_f32;
+  MemorySpace space = MemorySpace::host;  // of rgb_f32; device: stay where the core made it
   std::uint64_t max_list_entries = std::uint64_t{64} << 20;  // bounds the memory of tile lists
   bool count_pairs = false;  // fill FrameStats::blended_pairs; slower
 };

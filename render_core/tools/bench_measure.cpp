@@ -39,8 +39,8 @@ double Measurement::mean_stage_ms(Stage stage) const {
 }
 
 Measurement measure(const RenderSetup& setup, std::size_t warmup, const ProgressReport& report) {
-  const auto view =
-      setup.made.renderer->make_view({.pipeline = setup.pipeline, .format = PixelFormat::rgb_f32});
+  const auto view = setup.made.renderer->make_view(
+      {.pipeline = setup.pipeline, .format = PixelFormat::rgb_f32, .space = MemorySpace::device});
   FrameView frame;
   for (std::size_t i = 0; i < std::min(warmup, setup.poses.size()); ++i) {
     render_or_throw(*view, setup.request(i), frame);

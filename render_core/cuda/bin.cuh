@@ -1,0 +1,28 @@
+#pragma once
+
+#include "render_core/cuda/frame_arrays.cuh"
+
+namespace catgs::cuda {
+
+/// Writes the tile list entries of all visible splats in depth order, then pads up to the bound.
+struct EmitParams {
+  FrameShape shape;
+  const FrameCounts* counts;
+  const SplatRecord* records;
+  const std::uint32_t* order;       // [visible_bound], slots front to back
+  const std::uint32_t* first;       // [visible_bound], where the k-th splat's entries begin
+  const std::uint32_t* tile_count;  // [visible_bound], by slot
+  std::uint32_t* tile;              // [list_bound], tile index; shape.tiles() in the padding
+  std::uint32_t* slot;              // [list_bound]
+};
+void launch_emit(const EmitParams& params, cudaStream_t stream);
+
+/// range[t] = {first, one past last} list entry of tile t; {0, 0} where it has none.
+struct RangesParams {
+  FrameShape shape;
+  const std::uint32_t* tile;  // [list_bound], sorted
+  uint2* range;               // [tiles]
+};
+void launch_ranges(const RangesParams& params, cudaStream_t stream);
+
+}  // namespace catgs::cuda

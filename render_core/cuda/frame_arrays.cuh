@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+
+#include <cuda_fp16.h>
+
+#include "render_core/math/ellipse-inl.h"
+
+namespace catgs::cuda {
+
+/// What blending needs of one projected Gaussian: one 32-byte sector.
+/// Colour is half precision: its rounding alone leaves 77 dB.
+struct __align__(32) SplatRecord {
+  float2 centre_px;
+  math::Whitening<float> whitening;
+  float log2_opacity;
+  __half2 red_green;
+  __half blue;
+  __half unused;
+};
+static_assert(sizeof(SplatRecord) == 32);
+
+/// Counts of a frame. Written by the device, copied to mapped host memory at the frame's end; the
+/// host reads them only then.
+struct FrameCounts {
+  std::uint32_t visible = 0;             // Gaussians that passed culling
+  std::uint32_t list_entries = 0;        // sum of all tile lists, before any bound was applied
+  std::uint32_t list_max = 0;            // longest tile list
+  unsigned long long blended_pairs = 0;  // only when counted
+};
+
+/// Tiles of the image and the bounds of the frame's buffers.
+struct FrameShape {
+  int width_px = 0, height_px = 0;
+  int tiles_x = 0, tiles_y = 0;
+  std::uint32_t visible_bound = 0;  // room for visible Gaussians
+  std::uint32_t list_bound = 0;     // room for list entries
+
+  __host__ __device__ std::uint32_t tiles() const {
+    return static_cast<std::uint32_t>(tiles_x) * static_cast<std::uint32_t>(tiles_y);
+  }
+};
+
+constexpr int warp_size = 32;
+
+}  // namespace catgs::cuda

@@ -1,0 +1,105 @@
+#include <algorithm>
+#include <bit>
+
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/iterator/transform_iterator.h>
+
+#include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/sort.cuh"
+
+namespace catgs::cuda {
+namespace {
+
+constexpr int block_size = 256;
+constexpr std::uint32_t last_key = 0xffffffffu;
+
+std::uint32_t blocks_for(std::uint32_t count) { return (count + block_size - 1) / block_size; }
+
+__global__ void prepare_depth_sort(const FrameCounts* counts, std::uint32_t bound,
+                                   std::uint32_t* depth, std::uint32_t* order) {
+  const std::uint32_t k = blockIdx.x * block_size + threadIdx.x;
+  if (k >= bound) return;
+  order[k] = k;
+  if (k >= counts->visible) depth[k] = last_key;
+}
+
+/// Tile count of the k-th splat in depth order, 0 past the visible ones.
+struct CountInOrder {
+  const FrameCounts* counts;
+  const std::uint32_t* order;
+  const std::uint32_t* tile_count;
+  __device__ std::uint32_t operator()(std::uint32_t k) const {
+    return k < counts->visible ? tile_count[order[k]] : 0u;
+  }
+};
+
+auto counts_in_order(const FrameCounts* counts, const std::uint32_t* order,
+                     const std::uint32_t* tile_count) {
+  return thrust::make_transform_iterator(thrust::make_counting_iterator(0u),
+                                         CountInOrder{counts, order, tile_count});
+}
+
+__global__ void store_list_entries(FrameCounts* counts, CountInOrder count,
+                                   const std::uint32_t* first, std::uint32_t bound) {
+  counts->list_entries = first[bound - 1] + count(bound - 1);
+}
+
+int tile_bits(const FrameShape& shape) { return static_cast<int>(std::bit_width(shape.tiles())); }
+
+}  // namespace
+
+std::size_t sort_scratch_bytes(const FrameShape& shape) {
+  std::size_t depth = 0, scan = 0, tile = 0;
+  cub::DoubleBuffer<std::uint32_t> keys, values;
+  check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound),
+        "depth sort size");
+  check(cub::DeviceScan::ExclusiveSum(nullptr, scan, counts_in_order(nullptr, nullptr, nullptr),
+                                      static_cast<std::uint32_t*>(nullptr), shape.visible_bound),
+        "tile count scan size");
+  check(cub::DeviceRadixSort::SortPairs(nullptr, tile, keys, values, shape.list_bound, 0,
+                                        tile_bits(shape)),
+        "tile sort size");
+  return std::max({depth, scan, tile});
+}
+
+void sort_by_depth(const FrameShape& shape, const FrameCounts* counts,
+                   PingPong<std::uint32_t>& depth, PingPong<std::uint32_t>& order,
+                   SortScratch scratch, cudaStream_t stream) {
+  prepare_depth_sort<<<blocks_for(shape.visible_bound), block_size, 0, stream>>>(
+      counts, shape.visible_bound, depth.current, order.current);
+  check_launch("depth sort padding");
+  cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
+  cub::DoubleBuffer<std::uint32_t> values(order.current, order.other);
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
+                                        shape.visible_bound, 0, 32, stream),
+        "depth sort");
+  depth = {keys.Current(), keys.Alternate()};
+  order = {values.Current(), values.Alternate()};
+}
+
+void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::uint32_t* order,
+                      const std::uint32_t* tile_count, std::uint32_t* first, SortScratch scratch,
+                      cudaStream_t stream) {
+  check(cub::DeviceScan::ExclusiveSum(scratch.memory, scratch.bytes,
+                                      counts_in_order(counts, order, tile_count), first,
+                                      shape.visible_bound, stream),
+        "tile count scan");
+  store_list_entries<<<1, 1, 0, stream>>>(counts, CountInOrder{counts, order, tile_count}, first,
+                                          shape.visible_bound);
+  check_launch("tile count total");
+}
+
+void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
+                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream) {
+  cub::DoubleBuffer<std::uint32_t> keys(tile.current, tile.other);
+  cub::DoubleBuffer<std::uint32_t> values(slot.current, slot.other);
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
+                                        shape.list_bound, 0, tile_bits(shape), stream),
+        "tile sort");
+  tile = {keys.Current(), keys.Alternate()};
+  slot = {values.Current(), values.Alternate()};
+}
+
+}  // namespace catgs::cuda
