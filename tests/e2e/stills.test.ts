@@ -14,7 +14,7 @@ import {
   settled_picture,
   type Picture,
 } from './support/pictures';
-import { catgs_render, start_server } from './support/programs';
+import { catgs_render, start_server, stop_servers } from './support/programs';
 import { scratch_folder, write_patches, write_tum, type Patch } from './support/scenes';
 
 const { folder, remove } = scratch_folder();
@@ -29,6 +29,7 @@ beforeAll(async () => {
 
 afterAll(async () => {
   await browser.close();
+  await stop_servers();
   remove();
 });
 

@@ -13,7 +13,7 @@ import {
   type WatchedPage,
 } from './support/browser';
 import { psnr_db, settled_picture } from './support/pictures';
-import { catgs_render, start_server, type RunningServer } from './support/programs';
+import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
 import { scratch_folder } from './support/scenes';
 
 const { folder, remove } = scratch_folder();
@@ -36,6 +36,7 @@ afterEach(async () => {
 afterAll(async () => {
   await browser.close();
   await server.stop();
+  await stop_servers();
   remove();
 });
 

@@ -4,11 +4,12 @@ import { existsSync } from 'node:fs';
 import path from 'node:path';
 import { build_dir } from './paths';
 
-// A test that fails half-way, or runs out of time, leaves no server behind.
 const running = new Set<ChildProcess>();
-process.once('exit', () => {
-  for (const child of running) child.kill('SIGKILL');
-});
+
+/** For the end of a file: a test that failed half-way leaves no server behind. */
+export async function stop_servers(): Promise<void> {
+  await Promise.all([...running].map((child) => end(child, 'SIGKILL')));
+}
 
 function program(name: string): string {
   const file = path.join(build_dir, 'bin', name);
