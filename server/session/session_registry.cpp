@@ -117,6 +117,7 @@ std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Hello& hello)
 }
 
 void SessionRegistry::give_frames() {
+  if (stopped_) return;
   while (scheduler_.has_free_slot()) {
     candidates_.clear();
     candidate_clients_.clear();
@@ -142,6 +143,7 @@ void SessionRegistry::give_frames() {
 }
 
 void SessionRegistry::tick() {
+  if (stopped_) return;
   const TimePoint now = Clock::now();
   for (const auto& client : clients_) client->session().on_tick(now);
   give_frames();
@@ -197,6 +199,7 @@ void SessionRegistry::drain(std::chrono::milliseconds deadline) {
 }
 
 void SessionRegistry::stop_timers() {
+  stopped_ = true;  // cancel() does not take back a handler that is queued: that would re-arm
   pace_timer_.cancel();
   tick_timer_.cancel();
 }

@@ -72,6 +72,7 @@ class SessionRegistry {
   FrameScheduler scheduler_;
   boost::asio::steady_timer pace_timer_;
   boost::asio::steady_timer tick_timer_;
+  bool stopped_ = false;
   bool draining_ = false;
   std::uint32_t admitted_ = 0;
   std::vector<FrameCandidate> candidates_;  // scratch of give_frames()
