@@ -18,7 +18,8 @@ namespace {
 
 using Values = std::vector<std::string>;
 
-std::string quoted(std::string_view text) {
+// Not "quoted": for a std::string argument that name also finds std::quoted.
+std::string toml_string(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -58,7 +59,7 @@ Setting text(std::string name, std::string value_name, std::string help,
           std::move(value_name),
           std::move(help),
           [=](ServerConfig& c, const Values& v) { c.*member = single(v); },
-          [=](const ServerConfig& c) { return quoted(c.*member); }};
+          [=](const ServerConfig& c) { return toml_string(c.*member); }};
 }
 
 Setting list(std::string name, std::string value_name, std::string help,
@@ -70,7 +71,7 @@ Setting list(std::string name, std::string value_name, std::string help,
           [=](ServerConfig& c, const Values& v) { c.*member = v; },
           [=](const ServerConfig& c) {
             std::vector<std::string> items;
-            for (const auto& item : c.*member) items.push_back(quoted(item));
+            for (const auto& item : c.*member) items.push_back(toml_string(item));
             return fmt::format("[{}]", fmt::join(items, ", "));
           }};
 }
@@ -110,7 +111,7 @@ Setting choice(std::string name, std::string help, T ServerConfig::*member, Choi
           [=](const ServerConfig& config) {
             const auto it =
                 std::ranges::find(choices, config.*member, &std::pair<std::string, T>::second);
-            return quoted(it->first);
+            return toml_string(it->first);
           }};
 }
 

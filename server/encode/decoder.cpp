@@ -27,6 +27,15 @@ void copy_plane(const AVFrame& frame, int plane, glm::ivec2 size_px,
   }
 }
 
+// FFmpeg 6.1 (Ubuntu 24.04) made the field a flag and deprecated it.
+bool is_key_frame(const AVFrame& frame) {
+#ifdef AV_FRAME_FLAG_KEY
+  return (frame.flags & AV_FRAME_FLAG_KEY) != 0;
+#else
+  return frame.key_frame != 0;
+#endif
+}
+
 }  // namespace
 
 Decoder::Decoder(Codec codec) : state_(std::make_unique<State>()) {
@@ -64,7 +73,7 @@ EncodeStatus Decoder::decode(std::span<const std::byte> bytes, DecodedPicture& p
   }
   picture.size_px = {frame.width, frame.height};
   picture.full_range = frame.format == AV_PIX_FMT_YUVJ420P || frame.color_range == AVCOL_RANGE_JPEG;
-  picture.idr = frame.key_frame != 0;
+  picture.idr = is_key_frame(frame);
   const glm::ivec2 chroma_px = (picture.size_px + 1) / 2;
   copy_plane(frame, 0, picture.size_px, picture.planes[0]);
   copy_plane(frame, 1, chroma_px, picture.planes[1]);
