@@ -243,7 +243,7 @@ main() {
   ensure_packages "${build_packages[@]}"
   local -a cuda_options=("-DCATGS_CUDA=$cuda_choice")
   if [[ $cuda_choice == ON ]]; then
-    cuda_options+=(-DCMAKE_CUDA_ARCHITECTURES=native)
+    cuda_options+=("-DCMAKE_CUDA_COMPILER=$nvcc_path" -DCMAKE_CUDA_ARCHITECTURES=native)
   fi
   configure_build run "${cuda_options[@]}"
   build_all run "Build server, tools and client"
