@@ -35,10 +35,11 @@ say() { printf '%s  %s\n' "$(date +%T)" "$*"; }
 make_root() {
   local root=$1 cache=$2
   local -a options=(--variant=minbase "--cache-dir=$cache/debootstrap")
-  local -a target=(bookworm "$root" http://deb.debian.org/debian)
+  # No mirror is named: debootstrap knows each distribution's own.
+  local -a target=(bookworm "$root")
   if [[ $system == ubuntu ]]; then
     # Debian's debootstrap may not know the name noble; all Ubuntu suites share the script of gutsy.
-    target=(noble "$root" http://archive.ubuntu.com/ubuntu gutsy)
+    target=(noble "$root" "" gutsy)
     options+=("--components=main,universe")
     # Debian does not carry Ubuntu's keys; inside, apt checks signatures with the real ones.
     [[ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ]] || options+=(--no-check-gpg)
@@ -49,7 +50,8 @@ make_root() {
     return 1
   }
   if [[ $system == ubuntu ]]; then
-    echo "deb ${target[2]} noble-updates main universe" >>"$root/etc/apt/sources.list"
+    sed -n 's/ noble / noble-updates /p' "$root/etc/apt/sources.list" >"$root.updates"
+    cat "$root.updates" >>"$root/etc/apt/sources.list"
   fi
   cp /etc/resolv.conf "$root/etc/resolv.conf"
   git clone --quiet --no-local "$source_dir" "$root/root/catgs"
