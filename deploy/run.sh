@@ -78,8 +78,10 @@ listening_inode() {
   local hex
   hex=$(printf ':%04X' "$1")
   # State 0A is LISTEN; field 2 is address:port, field 10 the inode.
-  awk -v port="$hex" '$4 == "0A" && substr($2, length($2) - 4) == port { print $10; exit }' \
-    /proc/net/tcp /proc/net/tcp6 2>/dev/null
+  # Without IPv6 there is no tcp6, and that is no failure.
+  { cat /proc/net/tcp /proc/net/tcp6 2>/dev/null || true; } |
+    awk -v port="$hex" \
+      '!found && $4 == "0A" && substr($2, length($2) - 4) == port { print $10; found = 1 }'
 }
 
 check_port() {

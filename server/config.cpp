@@ -289,6 +289,10 @@ void validate(const ServerConfig& config) {
   if (!is_loopback(config.bind) && !guarded && !config.open)
     throw InputError("--bind " + config.bind, {}, "other machines could connect without a token",
                      "give --token-file or --token-key-file, or --open if everybody may");
+  if (config.admin_bind != "off" && !config.open &&
+      !is_loopback(parse_endpoint(config.admin_bind).address))
+    throw InputError("--admin-bind " + config.admin_bind, {}, "metrics have no token",
+                     "bind a loopback address, or give --open if everybody may read them");
 }
 
 std::string print_config(const ServerConfig& config, const ConfigSources& sources) {

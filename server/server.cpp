@@ -82,7 +82,7 @@ struct Server::State {
         client(find_client(config.client_dir)),
         net(net_options()),
         pool(std::make_shared<ThreadPool>(config.threads)),
-        stop_signals(io, SIGINT, SIGTERM),
+        stop_signals(io),
         drain_timer(io) {}
 
   NetOptions net_options();
@@ -99,11 +99,11 @@ struct Server::State {
   const StaticFiles client;
   std::atomic<bool> ready{false};
   NetServer net;
+  boost::asio::io_context io{1};  // outlives the pool, whose tasks post to it
   std::shared_ptr<ThreadPool> pool;
   std::string scene_list;
   std::vector<std::shared_ptr<const SceneEntry>> scenes;
   std::vector<EncoderChoice> encoders;
-  boost::asio::io_context io{1};
   boost::asio::signal_set stop_signals;
   boost::asio::steady_timer drain_timer;
   std::unique_ptr<SessionRegistry> registry;
@@ -159,10 +159,16 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
                                                  s.encoders, std::move(authorize), s.metrics);
 }
 
-Server::~Server() = default;
+Server::~Server() {
+  // The network thread hands connections to the registry, which ends before the network does.
+  if (state_) state_->net.stop();
+}
 
 void Server::run() {
   State& s = *state_;
+  // Not before: while scenes load, nobody would hear the signal, and its default ends the process.
+  s.stop_signals.add(SIGINT);
+  s.stop_signals.add(SIGTERM);
   s.wait_for_signal();
   s.net.start();
   s.ready = true;

@@ -40,6 +40,9 @@ const std::string& checked_length(std::string_view field, const std::string& tex
                                   std::size_t max_bytes) {
   if (text.size() > max_bytes)
     throw Invalid(fmt::format("{}: {} bytes, at most {}", field, text.size(), max_bytes));
+  // They would let a client write lines and colours into the log.
+  if (std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    throw Invalid(fmt::format("{}: control characters", field));
   return text;
 }
 

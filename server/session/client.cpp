@@ -85,6 +85,7 @@ void Client::on_close() {
 }
 
 std::variant<Admission, ErrorMessage> Client::admit(const Hello& hello) {
+  token_ = hello.token;
   auto result = registry_.admit(hello);
   if (const auto* admission = std::get_if<Admission>(&result)) {
     admitted_ = true;
@@ -99,14 +100,18 @@ std::variant<Admission, ErrorMessage> Client::admit(const Hello& hello) {
 
 std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> Client::find_scene(
     const std::string& scene_id) {
-  if (auto scene = registry_.find_scene(scene_id)) return scene;
+  auto scene = registry_.find_scene(scene_id);
+  if (const auto refusal = registry_.authorize_(token_, scene ? scene->facts.scene_id : scene_id))
+    return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
+  if (scene) return scene;
   return ErrorMessage{ErrorCode::unknown_scene, "there is no scene \"" + scene_id + "\" here",
                       false};
 }
 
 std::vector<std::string> Client::scene_ids() {
   std::vector<std::string> ids;
-  for (const auto& scene : registry_.scenes_) ids.push_back(scene->facts.scene_id);
+  for (const auto& scene : registry_.scenes_)
+    if (!registry_.authorize_(token_, scene->facts.scene_id)) ids.push_back(scene->facts.scene_id);
   return ids;
 }
 

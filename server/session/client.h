@@ -66,6 +66,7 @@ class Client final : public ConnectionListener,
   LatestSlot<ReceivedPose> latest_pose_;
 
   std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
+  std::string token_;  // of the hello; a link may open one scene only
   bool admitted_ = false;
   Session session_;
 };

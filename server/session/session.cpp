@@ -119,7 +119,9 @@ void Session::on(const SelectScene& select, TimePoint now) {
 }
 
 void Session::on(const RequestIdr&, TimePoint now) {
-  if (now - last_idr_request_ < min_idr_request_interval) return;
+  // A decoder that failed twice needs the second one as well, only later.
+  idr_request_waits_ = now - last_idr_request_ < min_idr_request_interval;
+  if (idr_request_waits_) return;
   last_idr_request_ = now;
   idr_due_ = true;
 }
@@ -288,6 +290,7 @@ void Session::on_tick(TimePoint now) {
   if (state_ == State::awaiting_hello && now - created_ >= policy_.hello_timeout)
     return fail(ErrorCode::bad_message, "no hello within the time limit");
   if (state_ == State::closed) return;
+  if (idr_request_waits_) on(RequestIdr{}, now);
   if (policy_.idle_timeout > 0ms) {
     const auto idle = now - last_activity_;
     if (idle >= policy_.idle_timeout)

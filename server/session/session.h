@@ -167,6 +167,7 @@ class Session {
   TimePoint last_said_{};
   TimePoint last_activity_;
   TimePoint last_idr_request_{};
+  bool idr_request_waits_ = false;
   bool idle_warned_ = false;
 
   // Since the last Stats message.

@@ -96,7 +96,7 @@ std::shared_ptr<const SceneEntry> SessionRegistry::find_scene(const std::string&
 
 std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Hello& hello) {
   const auto scene = find_scene(hello.scene_id);
-  // The token first: whoever has none does not learn which scenes exist.
+  // The token first: a refusal does not depend on what is here.
   const std::string& wanted_scene = scene ? scene->facts.scene_id : hello.scene_id;
   if (const auto refusal = authorize_(hello.token, wanted_scene))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, true};

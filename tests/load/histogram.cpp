@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace catgs::load {
 
@@ -38,6 +39,7 @@ void DurationHistogram::add(const DurationHistogram& other) {
 }
 
 double DurationHistogram::percentile_ms(double share) const {
+  if (count_ == 0) return std::numeric_limits<double>::quiet_NaN();
   const auto rank =
       static_cast<std::uint64_t>(std::max(1.0, std::ceil(share * static_cast<double>(count_))));
   std::uint64_t seen = 0;
@@ -49,7 +51,8 @@ double DurationHistogram::percentile_ms(double share) const {
 }
 
 double DurationHistogram::mean_ms() const {
-  return count_ == 0 ? 0.0 : 1e-3 * sum_us_ / static_cast<double>(count_);
+  return count_ == 0 ? std::numeric_limits<double>::quiet_NaN()
+                     : 1e-3 * sum_us_ / static_cast<double>(count_);
 }
 
 }  // namespace catgs::load

@@ -24,7 +24,8 @@ void SessionStats::age_until(std::int64_t now_us) {
         start_us_ + static_cast<std::int64_t>(static_cast<double>(ticks_) * tick_us_);
     if (tick_us >= now_us) return;
     ++ticks_;
-    if (shown_pose_us_ >= 0) pose_age.add(tick_us - shown_pose_us_);
+    // A picture that has not come yet is as old as the session.
+    pose_age.add(tick_us - (shown_pose_us_ >= 0 ? shown_pose_us_ : start_us_));
   }
 }
 
