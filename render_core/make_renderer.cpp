@@ -3,6 +3,7 @@
 
 #include "render_core/cpu/cpu_renderer.h"
 #include "render_core/cuda/cuda_renderer.h"
+#include "render_core/error.h"
 #include "render_core/reference/reference.h"
 #include "render_core/renderer.h"
 #include "render_core/thread_pool.h"
@@ -27,7 +28,11 @@ MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
   if (const std::string obstacle = cuda_obstacle(); !obstacle.empty()) {
     return {make_cpu_renderer(*cloud, pool(), options.simd), obstacle};
   }
-  return {make_cuda_renderer(*cloud), "a CUDA device is there"};
+  try {
+    return {make_cuda_renderer(*cloud), "a CUDA device is there"};
+  } catch (const InputError& error) {
+    return {make_cpu_renderer(*cloud, pool(), options.simd), error.what()};
+  }
 }
 
 }  // namespace catgs

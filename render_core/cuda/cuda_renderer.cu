@@ -96,7 +96,7 @@ class CudaView final : public View {
   }
 
   [[nodiscard]] std::uint64_t list_limit() const {
-    return std::min<std::uint64_t>(settings_.max_list_entries, std::uint32_t(-1) / 2);
+    return std::clamp<std::uint64_t>(settings_.max_list_entries, 1, list_entries_limit);
   }
 
   void enqueue(const FrameRequest& request);
@@ -192,7 +192,7 @@ void CudaView::fill(FrameView& frame) {
   }
   frame.stats = {};
   frame.stats.visible = counts.visible;
-  frame.stats.list_entries = counts.list_entries;
+  frame.stats.list_entries = std::min(counts.list_entries, shape_.list_bound);
   frame.stats.list_max = counts.list_max;
   frame.stats.blended_pairs = counts.blended_pairs;
   if (counts.list_entries > shape_.list_bound) {

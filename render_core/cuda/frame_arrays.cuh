@@ -43,4 +43,7 @@ struct FrameShape {
 
 constexpr int warp_size = 32;
 
+/// Sums of list entries saturate here, so that 32 bits hold them whatever a scene asks for.
+constexpr std::uint32_t list_entries_limit = std::uint32_t{1} << 31;
+
 }  // namespace catgs::cuda

@@ -54,7 +54,7 @@ __device__ Projected project_one(const ProjectParams& p, std::uint32_t i, const 
   const math::Vec3<double> mean_double{mean.x, mean.y, mean.z};
   out.depth = static_cast<float>(math::view_depth(p.camera_double, mean_double));
   out.log2_opacity = mean.w;
-  if (!(out.depth >= p.camera.near_z) || math::reach_of(mean.w) < 0.0f) return out;
+  if (!(out.depth > p.camera.near_z) || math::reach_of(mean.w) < 0.0f) return out;
 
   const float4 a = __ldg(&p.scene.factor_a[i]);
   const float2 b = __ldg(&p.scene.factor_b[i]);

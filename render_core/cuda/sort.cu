@@ -35,6 +35,13 @@ struct CountInOrder {
   }
 };
 
+struct SaturatingSum {
+  __host__ __device__ std::uint32_t operator()(std::uint32_t a, std::uint32_t b) const {
+    const std::uint64_t sum = std::uint64_t{a} + b;
+    return sum < list_entries_limit ? static_cast<std::uint32_t>(sum) : list_entries_limit;
+  }
+};
+
 auto counts_in_order(const FrameCounts* counts, const std::uint32_t* order,
                      const std::uint32_t* tile_count) {
   return thrust::make_transform_iterator(thrust::make_counting_iterator(0u),
@@ -43,7 +50,7 @@ auto counts_in_order(const FrameCounts* counts, const std::uint32_t* order,
 
 __global__ void store_list_entries(FrameCounts* counts, CountInOrder count,
                                    const std::uint32_t* first, std::uint32_t bound) {
-  counts->list_entries = first[bound - 1] + count(bound - 1);
+  counts->list_entries = SaturatingSum{}(first[bound - 1], count(bound - 1));
 }
 
 int tile_bits(const FrameShape& shape) { return static_cast<int>(std::bit_width(shape.tiles())); }
@@ -55,8 +62,9 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   cub::DoubleBuffer<std::uint32_t> keys, values;
   check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound),
         "depth sort size");
-  check(cub::DeviceScan::ExclusiveSum(nullptr, scan, counts_in_order(nullptr, nullptr, nullptr),
-                                      static_cast<std::uint32_t*>(nullptr), shape.visible_bound),
+  check(cub::DeviceScan::ExclusiveScan(nullptr, scan, counts_in_order(nullptr, nullptr, nullptr),
+                                       static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
+                                       shape.visible_bound),
         "tile count scan size");
   check(cub::DeviceRadixSort::SortPairs(nullptr, tile, keys, values, shape.list_bound, 0,
                                         tile_bits(shape)),
@@ -82,9 +90,9 @@ void sort_by_depth(const FrameShape& shape, const FrameCounts* counts,
 void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::uint32_t* order,
                       const std::uint32_t* tile_count, std::uint32_t* first, SortScratch scratch,
                       cudaStream_t stream) {
-  check(cub::DeviceScan::ExclusiveSum(scratch.memory, scratch.bytes,
-                                      counts_in_order(counts, order, tile_count), first,
-                                      shape.visible_bound, stream),
+  check(cub::DeviceScan::ExclusiveScan(scratch.memory, scratch.bytes,
+                                       counts_in_order(counts, order, tile_count), first,
+                                       SaturatingSum{}, 0u, shape.visible_bound, stream),
         "tile count scan");
   store_list_entries<<<1, 1, 0, stream>>>(counts, CountInOrder{counts, order, tile_count}, first,
                                           shape.visible_bound);

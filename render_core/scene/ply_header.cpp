@@ -200,6 +200,8 @@ void require_rows_in_file(const ByteSource& file, const PlyElement& element) {
     throw InputError(file.name(), where,
                      "cannot be located: an element before it has a list "
                      "property or is cut off");
+  if (element.has_list)
+    throw InputError(file.name(), where, "has a list property, so its rows have no fixed size");
   require_count(file, where, element.count);
   if (element.row_bytes > 0 &&
       element.count > (file.size() - element.data_offset) / element.row_bytes)

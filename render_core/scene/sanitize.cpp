@@ -62,12 +62,15 @@ bool repair_rotation(glm::quat& q, Repairs& repairs) {
   return true;
 }
 
+// A colour is 0…1. Sums of such coefficients stay within half precision, which cores blend with.
+constexpr float absurd_sh = 1e3f;
+
 bool repair_sh(GaussianCloud& cloud, std::size_t i, Repairs& repairs) {
   glm::vec3* sh = cloud.sh.data() + i * cloud.sh_count();
   bool bad = false;
   for (int k = 0; k < cloud.sh_count(); ++k)
     for (int channel = 0; channel < 3; ++channel)
-      if (!std::isfinite(sh[k][channel])) {
+      if (!(std::abs(sh[k][channel]) <= absurd_sh)) {
         sh[k][channel] = 0.0f;
         bad = true;
       }

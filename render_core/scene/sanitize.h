@@ -22,7 +22,7 @@ namespace catgs {
 ///  4. a zero quaternion becomes the identity, which is what the original renderer makes of it;
 ///  5. scales under 1e-10 (their squares would be denormal; on screen the low-pass filter hides
 ///     the difference) and opacities of 1 are clamped into the valid range;
-///  6. SH coefficients that are NaN or infinite become 0.
+///  6. SH coefficients that are NaN or beyond 1000 become 0.
 /// Quaternions are normalised; that is not counted as a repair.
 ///
 /// The order of the kept Gaussians stays, and so do the vectors' allocations.

@@ -50,7 +50,9 @@ std::string image_name(const JsonField& meta, const char* attribute, std::size_t
 }
 
 void parse_version_1(const JsonField& meta, SogMeta& sog) {
-  sog.count = meta.at("means").at("shape").elements().at(0).count();
+  const auto shape = meta.at("means").at("shape").elements();
+  if (shape.empty()) meta.at("means").at("shape").fail("is empty");
+  sog.count = shape.front().count();
   const auto min_scale = meta.at("scales").at("mins").vec3();
   const auto max_scale = meta.at("scales").at("maxs").vec3();
   const auto min_sh0 = meta.at("sh0").at("mins").numbers(4);

@@ -18,7 +18,8 @@ namespace catgs {
 namespace {
 
 constexpr std::uint64_t max_tree_bytes = 256 << 20;
-constexpr std::uint64_t max_levels = 64;
+constexpr std::uint64_t max_levels = 16;
+constexpr std::size_t max_nodes = std::size_t{1} << 20;
 constexpr int max_tree_depth = 64;
 
 LodPiece parse_piece(const JsonField& field, std::size_t file_count) {
@@ -160,7 +161,10 @@ LodTree read_lod_tree(const ByteSource& file) {
     const auto [node, depth] = std::move(pending.back());
     pending.pop_back();
     if (depth > max_tree_depth) node.fail(fmt::format("lies deeper than {}", max_tree_depth));
-    if (const auto lods = node.find("lods")) tree.nodes.push_back(parse_node(*lods, tree));
+    if (const auto lods = node.find("lods")) {
+      if (tree.nodes.size() == max_nodes) lods->fail(fmt::format("is node {}", max_nodes + 1));
+      tree.nodes.push_back(parse_node(*lods, tree));
+    }
     if (const auto children = node.find("children"))
       for (JsonField& child : children->elements())
         pending.emplace_back(std::move(child), depth + 1);

@@ -28,6 +28,10 @@ struct ConvertOptions {
 void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
   if (hints.source == "estimated") return;
   const auto sidecar = sidecar_of(out);
+  if (std::error_code error; std::filesystem::exists(sidecar, error)) {
+    fmt::print(stderr, "note: {} exists and was left as it is\n", sidecar.string());
+    return;
+  }
   write_sidecar(hints, sidecar);
   fmt::print("{}: first sight, from {}\n", sidecar.string(), hints.source);
 }

@@ -84,6 +84,8 @@ float focal_px_of(const RenderOptions& options, int height_px) {
 Scene load_with_progress(const RenderOptions& options, bool quiet) {
   Progress progress("loading", quiet);
   LoadOptions load;
+  load.lod = options.lod;
+  load.gaussian_budget = options.budget;
   load.threads = options.threads;
   load.progress = [&](double fraction) { progress.update(fraction); };
   return load_scene(options.scene, load);
@@ -93,6 +95,12 @@ Scene load_with_progress(const RenderOptions& options, bool quiet) {
 
 void add_render_options(CLI::App& command, RenderOptions& options) {
   command.add_option("scene", options.scene, "Scene file or folder")->required();
+  auto* lod = command.add_option("--lod", options.lod,
+                                 "Streamed SOG: this level of detail; 0 is the finest");
+  command
+      .add_option("--budget", options.budget,
+                  "Streamed SOG: the finest levels with at most so many Gaussians")
+      ->excludes(lod);
   auto* trace = command.add_option("--trace", options.trace, "Camera path: a TUM file");
   auto* script = command.add_option("--script", options.script.script,
                                     "Camera path: orbit, walk, head, drone, still or tour:FILE");

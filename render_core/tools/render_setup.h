@@ -16,6 +16,8 @@ namespace catgs {
 /// What `frames` and `bench` have in common: a scene, a camera path and a renderer.
 struct RenderOptions {
   std::string scene;
+  std::optional<int> lod;
+  std::optional<std::size_t> budget;
   std::string trace;
   bool anchor = false;
   ScriptOptions script;

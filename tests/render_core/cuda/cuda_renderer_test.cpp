@@ -1,5 +1,7 @@
 // Whole images of the CUDA core against the reference and the CPU core; needs a device.
 
+#include "render_core/cuda/cuda_renderer.h"
+
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -14,12 +16,8 @@ namespace {
 using test::TestScene;
 
 /// Skips the test where no device is, with the core's own reason.
-#define REQUIRE_DEVICE()                                                                         \
-  try {                                                                                          \
-    make_renderer(test::small_scenes().front().cloud, {.kind = RendererKind::cuda, .pool = {}}); \
-  } catch (const InputError& error) {                                                            \
-    GTEST_SKIP() << error.what();                                                                \
-  }
+#define REQUIRE_DEVICE() \
+  if (const std::string obstacle = cuda_obstacle(); !obstacle.empty()) GTEST_SKIP() << obstacle
 
 struct Rendered {
   std::vector<float> rgb;
