@@ -8,7 +8,7 @@ usage: tests/deploy/fresh_start.sh [debian | ubuntu] [test.sh options]
 
 Makes a minimal Debian 12 (or Ubuntu 24.04) root with debootstrap in a temporary folder, clones
 this repository's HEAD into it, and there, in namespaces of its own,
-  1. runs run.sh, fetches the page and /healthz, and stops it with Ctrl-C's signal,
+  1. runs run.sh, fetches the page and /healthz, and stops it,
   2. starts it again without any network,
   3. runs test.sh with the given options (default --quick).
 Nothing stays behind but the downloaded packages, in ${XDG_CACHE_HOME:-~/.cache}/catgs-debs.
@@ -89,16 +89,17 @@ mount_root() {
 # http_body PATH: the status line and body that the server answers, without any tool.
 http_body() {
   local reply
-  exec {reply}<>"/dev/tcp/127.0.0.1/$PORT"
+  exec {reply}<>"/dev/tcp/127.0.0.1/$PORT" || return 1
   printf 'GET %s HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n' "$1" >&"$reply"
   timeout 10 cat <&"$reply"
   exec {reply}>&-
 }
 
-# Starts run.sh, checks what it serves, and ends it the way Ctrl-C does.
+# Starts run.sh, checks what it serves, and ends it: Ctrl-C and TERM do the same there, but whoever
+# starts this script in the background makes it ignore the first.
 check_run() {
   local root=$1 title=$2 output=$1/root/run.out begin=$SECONDS
-  # A process group of its own, as in a terminal: a plain background job would ignore SIGINT.
+  # A process group of its own, as in a terminal.
   set -m
   enter "$root" "exec ./deploy/run.sh --port $PORT" >"$output" 2>&1 &
   local runner=$!
@@ -115,7 +116,7 @@ check_run() {
   cat "$output"
   http_body /healthz | head -n 1 | grep -q ' 200 ' || { say "$title: /healthz is not 200"; return 1; }
   http_body / | grep -qi '<!doctype html' || { say "$title: / is not the page"; return 1; }
-  kill -INT -- "-$runner"
+  kill -TERM -- "-$runner"
   wait "$runner"
   if http_body /healthz >/dev/null 2>&1; then
     say "$title: something still listens after the stop"
