@@ -74,7 +74,9 @@ write_environment() {
 
 # ---- inside: run by the namespaced copy of this script -----------------------------------------
 
-enter() { chroot "$1" /bin/bash -c "source /root/environment && cd /root/catgs && $2"; }
+inside_command() { printf 'source /root/environment && cd /root/catgs && %s' "$1"; }
+
+enter() { chroot "$1" /bin/bash -c "$(inside_command "$2")"; }
 
 mount_root() {
   local root=$1 cache=$2
@@ -95,15 +97,13 @@ http_body() {
   exec {reply}>&-
 }
 
-# Starts run.sh, checks what it serves, and ends it: Ctrl-C and TERM do the same there, but whoever
-# starts this script in the background makes it ignore the first.
+# Starts run.sh, checks what it serves, and ends it.
 check_run() {
-  local root=$1 title=$2 output=$1/root/run.out begin=$SECONDS
-  # A process group of its own, as in a terminal.
-  set -m
-  enter "$root" "exec ./deploy/run.sh --port $PORT" >"$output" 2>&1 &
+  local root=$1 title=$2 output=$1/root/run.out begin=$SECONDS reply
+  : >"$output"
+  chroot "$root" /bin/bash -c "$(inside_command "exec ./deploy/run.sh --port $PORT")" \
+    >"$output" 2>&1 &
   local runner=$!
-  set +m
   until grep -q 'stop *Ctrl-C' "$output"; do
     if ! kill -0 "$runner" 2>/dev/null; then
       cat "$output"
@@ -114,10 +114,12 @@ check_run() {
   done
   say "$title: serving after $((SECONDS - begin)) s"
   cat "$output"
-  http_body /healthz | head -n 1 | grep -q ' 200 ' || { say "$title: /healthz is not 200"; return 1; }
-  http_body / | grep -qi '<!doctype html' || { say "$title: / is not the page"; return 1; }
-  kill -TERM -- "-$runner"
-  wait "$runner"
+  reply=$(http_body /healthz)
+  [[ $reply == "HTTP/1.1 200 "* ]] || { say "$title: /healthz says $reply"; return 1; }
+  reply=$(http_body /)
+  [[ ${reply,,} == *"<!doctype html"* ]] || { say "$title: / is not the page"; return 1; }
+  kill -TERM "$runner"
+  wait "$runner" || { say "$title: run.sh did not end as asked"; return 1; }
   if http_body /healthz >/dev/null 2>&1; then
     say "$title: something still listens after the stop"
     return 1
