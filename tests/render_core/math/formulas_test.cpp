@@ -153,6 +153,18 @@ TEST_F(Formulas, NeedleKeepsItsWidthInSinglePrecision) {
                   math::whitened_square(wide, {along + across, along - across}), 3e-3);
 }
 
+TEST_F(Formulas, HarmonicsHaveTheOriginalsOrderAndSigns) {
+  // What no symmetric property shows: the original's table of constants, evaluated by hand in the
+  // direction (0.48, 0.6, 0.64).
+  const double expected[16] = {0.282094791774,  -0.293161507142, 0.312705607618,  -0.234529205713,
+                               0.314653948011,  -0.419538597347, 0.072161590130,  -0.335630877878,
+                               -0.070797138302, -0.117253462190, 0.532797501108,  -0.287390398703,
+                               -0.227368875921, -0.229912318963, -0.119879437749, 0.240624496321};
+  double basis[16];
+  math::sh_basis<double>({0.48, 0.6, 0.64}, 3, basis);
+  for (int i = 0; i < 16; ++i) EXPECT_NEAR(basis[i], expected[i], 1e-9) << i;
+}
+
 TEST_F(Formulas, HarmonicsAreOrthonormal) {
   // Integral over the sphere by a uniform grid in (z, azimuth), exact enough for degree 6 products.
   constexpr int rings = 800, steps = 64;
