@@ -100,7 +100,7 @@ FrameView CpuView::render_checked(const FrameRequest& request) {
                  static_cast<std::uint32_t>(first), shared_->kernels);
     });
     clock.end(Stage::project, stats);
-    lists_.finish(pool);
+    lists_.finish(splats_, visible_counts_, shared_->kernels, pool);
     clock.end(Stage::bin, stats);
     lists_.sort(splats_, pool);
     clock.end(Stage::sort, stats);

@@ -25,14 +25,18 @@ void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
 void TileLists::begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries) {
   grid_ = grid;
   max_entries_ = max_entries;
-  runs_ = 0;
-  const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
-  starts_.resize(tile_count + 1);
+  first_left_out_ = nothing_left_out;
+  starts_.resize(static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y) + 1);
   segments_.resize(segments);
+  clear_segments();
+}
+
+void TileLists::clear_segments() {
+  runs_ = 0;
   for (Segment& segment : segments_) {
     segment.runs.clear();
-    segment.positions.assign(tile_count, 0);
-    segment.dropped = 0;
+    segment.positions.assign(tiles(), 0);
+    segment.entries = 0;
   }
 }
 
@@ -41,66 +45,100 @@ void TileLists::add(std::size_t segment_index, std::span<const Splat> splats,
   Segment& segment = segments_[segment_index];
   const std::size_t known = segment.runs.size();
   kernels.list_tiles(splats, first_slot, segment.runs);
-  const std::span added = std::span(segment.runs).subspan(known);
-  if (runs_.fetch_add(added.size(), std::memory_order_relaxed) + added.size() > max_entries_) {
-    for (const TileRun& run : added) segment.dropped += run.end - run.begin;
-    segment.runs.resize(known);
-    return;
+  if (first_left_out_ != nothing_left_out) {
+    const auto left_out = [&](const TileRun& run) {
+      return depth_order(run.entry) >= first_left_out_;
+    };
+    segment.runs.erase(std::remove_if(segment.runs.begin() + static_cast<std::ptrdiff_t>(known),
+                                      segment.runs.end(), left_out),
+                       segment.runs.end());
   }
+  const std::span added = std::span(segment.runs).subspan(known);
   for (const TileRun& run : added) {
     std::uint32_t* const row = segment.positions.data() + run.row * grid_.x;
     for (int column = run.begin; column < run.end; ++column) ++row[column];
+    segment.entries += run.end - run.begin;
   }
+  // More runs than entries fit: finish() will list again, and these would only take memory.
+  if (runs_.fetch_add(added.size(), std::memory_order_relaxed) + added.size() > max_entries_)
+    segment.runs.resize(known);
 }
 
-void TileLists::finish(ThreadPool& pool) {
-  const std::uint64_t longest_kept = place_lists();
+void TileLists::finish(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
+                       const SimdKernels& kernels, ThreadPool& pool) {
+  std::uint64_t wanted = 0;
+  for (const Segment& segment : segments_) wanted += segment.entries;
+  if (wanted > max_entries_) list_nearest(splats, counts, kernels, pool);
+  place_lists();
+  overflowed_ = wanted - entries();
   if (entries_.size() < entries()) entries_.resize(entries());
 
   pool.parallel_for(segments_.size(), [&](std::size_t k) {
     Segment& segment = segments_[k];
     for (const TileRun& run : segment.runs) {
       const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(grid_.x);
-      for (std::size_t tile = row + run.begin; tile < row + run.end; ++tile) {
-        const std::uint32_t position = segment.positions[tile]++;
-        if (position < longest_kept) entries_[starts_[tile] + position] = run.entry;
-      }
+      for (std::size_t tile = row + run.begin; tile < row + run.end; ++tile)
+        entries_[starts_[tile] + segment.positions[tile]++] = run.entry;
     }
   });
 }
 
+/// Lists everything again without the farthest splats. Listing twice keeps the usual frame, in
+/// which all fits, free of what only this one needs: the number of entries of each splat.
+void TileLists::list_nearest(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
+                             const SimdKernels& kernels, ThreadPool& pool) {
+  const auto splats_of = [&](std::size_t rank) {
+    return splats.subspan(rank * cluster_size, counts[rank]);
+  };
+  const auto first_slot = [](std::size_t rank) {
+    return static_cast<std::uint32_t>(rank * cluster_size);
+  };
+  entries_of_slot_.assign(splats.size(), 0);
+  pool.parallel_for(counts.size(), [&](std::size_t rank) {
+    thread_local std::vector<TileRun> runs;
+    runs.clear();
+    kernels.list_tiles(splats_of(rank), first_slot(rank), runs);
+    for (const TileRun& run : runs) entries_of_slot_[run.entry.value] += run.end - run.begin;
+  });
+  first_left_out_ = find_first_left_out(splats, counts, pool);
+
+  clear_segments();
+  pool.parallel_for(segments_.size(), [&](std::size_t k) {
+    const std::size_t ranks = counts.size(), shares = segments_.size();
+    for (std::size_t rank = ranks * k / shares; rank < ranks * (k + 1) / shares; ++rank)
+      add(k, splats_of(rank), first_slot(rank), kernels);
+  });
+}
+
+/// The nearest splat that has to be left out, with all behind it, so that the entries of those
+/// before it (entries_of_slot_) stay within the bound.
+TileLists::DepthOrder TileLists::find_first_left_out(std::span<const Splat> splats,
+                                                     std::span<const std::uint32_t> counts,
+                                                     ThreadPool& pool) {
+  by_depth_.clear();
+  for (std::size_t rank = 0; rank < counts.size(); ++rank)
+    for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank]; ++slot)
+      by_depth_.push_back(
+          {std::bit_cast<std::uint32_t>(splats[slot].depth), static_cast<std::uint32_t>(slot)});
+  by_depth_scratch_.resize(by_depth_.size());
+  sorter_.sort(by_depth_, by_depth_scratch_, 32, pool);
+  std::uint64_t sum = 0;
+  for (const DepthSlot& splat : by_depth_) {
+    sum += entries_of_slot_[splat.value];
+    if (sum > max_entries_) return depth_order(splat);
+  }
+  return nothing_left_out;
+}
+
 /// Turns counts per segment and tile into each segment's first position in the tile's list, and
-/// sets starts_. Returns the length that lists are cut to.
-std::uint64_t TileLists::place_lists() {
-  const std::size_t tile_count = tiles();
-  std::uint64_t total = 0, longest_list = 0;
-  for (std::size_t tile = 0; tile < tile_count; ++tile) {
+/// sets starts_.
+void TileLists::place_lists() {
+  starts_[0] = 0;
+  for (std::size_t tile = 0; tile < tiles(); ++tile) {
     std::uint32_t length = 0;
     for (Segment& segment : segments_) length += std::exchange(segment.positions[tile], length);
-    starts_[tile + 1] = length;
-    total += length;
-    longest_list = std::max<std::uint64_t>(longest_list, length);
+    starts_[tile + 1] = starts_[tile] + length;
   }
-
-  std::uint64_t kept_length = longest_list;
-  if (total > max_entries_) {
-    const auto total_if_cut = [&](std::uint64_t length) {
-      std::uint64_t sum = 0;
-      for (std::size_t tile = 0; tile < tile_count; ++tile)
-        sum += std::min(starts_[tile + 1], length);
-      return sum;
-    };
-    std::uint64_t fits = 0;
-    for (std::uint64_t step = std::bit_floor(longest_list); step != 0; step /= 2)
-      if (total_if_cut(fits + step) <= max_entries_) fits += step;
-    kept_length = fits;
-  }
-  starts_[0] = 0;
-  for (std::size_t tile = 0; tile < tile_count; ++tile)
-    starts_[tile + 1] = starts_[tile] + std::min(starts_[tile + 1], kept_length);
-  overflowed_ = total - starts_[tile_count];
-  for (const Segment& segment : segments_) overflowed_ += segment.dropped;
-  return kept_length;
 }
 
 void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
@@ -123,34 +161,30 @@ void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
 void TileLists::build_by_keys(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
                               glm::ivec2 grid, std::uint64_t max_entries, ThreadPool& pool) {
   const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
-  const auto for_splats_of = [&](std::size_t rank, auto visit) {
-    const std::size_t first = rank * cluster_size;
-    for (std::size_t slot = first; slot < first + counts[rank]; ++slot) visit(slot, splats[slot]);
-  };
-  key_offsets_.resize(counts.size());
-  pool.parallel_for(counts.size(), [&](std::size_t rank) {
-    std::uint64_t touched = 0;
-    for_splats_of(rank, [&](std::size_t, const Splat& s) {
-      touched += static_cast<std::uint64_t>((s.tile_end_x - s.tile_x) * (s.tile_end_y - s.tile_y));
-    });
-    key_offsets_[rank] = touched;
-  });
-  std::uint64_t wanted = 0;
-  for (std::uint64_t& offset : key_offsets_) wanted += std::exchange(offset, wanted);
-  const std::uint64_t total = std::min(wanted, max_entries);
+  max_entries_ = max_entries;
+  first_left_out_ = nothing_left_out;
+  const std::uint64_t wanted = count_keys(splats, counts, pool);
+  std::uint64_t total = wanted;
+  if (wanted > max_entries) {
+    first_left_out_ = find_first_left_out(splats, counts, pool);
+    total = count_keys(splats, counts, pool);
+  }
   overflowed_ = wanted - total;
   keys_.resize(total);
   key_scratch_.resize(total);
 
   pool.parallel_for(counts.size(), [&](std::size_t rank) {
-    std::uint64_t at = key_offsets_[rank];
-    for_splats_of(rank, [&](std::size_t slot, const Splat& s) {
+    CodedIndex* key = keys_.data() + key_offsets_[rank];
+    for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank];
+         ++slot) {
+      if (entries_of_slot_[slot] == 0) continue;
+      const Splat& s = splats[slot];
       const std::uint64_t depth = std::bit_cast<std::uint32_t>(s.depth);
       for (int y = s.tile_y; y < s.tile_end_y; ++y)
-        for (int x = s.tile_x; x < s.tile_end_x && at < total; ++x, ++at)
-          keys_[at] = {static_cast<std::uint64_t>(y * grid.x + x) << 32 | depth,
-                       static_cast<std::uint32_t>(slot)};
-    });
+        for (int x = s.tile_x; x < s.tile_end_x; ++x)
+          *key++ = {static_cast<std::uint64_t>(y * grid.x + x) << 32 | depth,
+                    static_cast<std::uint32_t>(slot)};
+    }
   });
   sorter_.sort(keys_, key_scratch_, 32 + static_cast<int>(std::bit_width(tile_count - 1)), pool);
   order_ties(splats, std::span(keys_));
@@ -162,6 +196,30 @@ void TileLists::build_by_keys(std::span<const Splat> splats, std::span<const std
     ++starts_[(keys_[i].key >> 32) + 1];
   }
   std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+}
+
+/// Counts the keys of each splat that is not left out (entries_of_slot_) and where those of each
+/// cluster begin (key_offsets_); returns their sum.
+std::uint64_t TileLists::count_keys(std::span<const Splat> splats,
+                                    std::span<const std::uint32_t> counts, ThreadPool& pool) {
+  entries_of_slot_.resize(splats.size());
+  key_offsets_.resize(counts.size());
+  pool.parallel_for(counts.size(), [&](std::size_t rank) {
+    std::uint64_t sum = 0;
+    for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank];
+         ++slot) {
+      const Splat& s = splats[slot];
+      const DepthSlot entry{std::bit_cast<std::uint32_t>(s.depth),
+                            static_cast<std::uint32_t>(slot)};
+      const int area = (s.tile_end_x - s.tile_x) * (s.tile_end_y - s.tile_y);
+      const bool kept = depth_order(entry) < first_left_out_;
+      sum += entries_of_slot_[slot] = kept ? static_cast<std::uint32_t>(area) : 0;
+    }
+    key_offsets_[rank] = sum;
+  });
+  std::uint64_t total = 0;
+  for (std::uint64_t& offset : key_offsets_) total += std::exchange(offset, total);
+  return total;
 }
 
 std::span<const std::uint32_t> TileLists::tiles_by_length() {

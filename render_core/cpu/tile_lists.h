@@ -14,11 +14,14 @@
 namespace catgs {
 
 /// Which splats each tile blends. Listing decides membership, sorting the order. Memory is kept
-/// from frame to frame.
+/// from frame to frame and bounded: where more entries are wanted than `max_entries`, the farthest
+/// splats are left out of all lists, and what they wanted is counted.
+///
+/// Splats come as [cluster rank * cluster_size + i], i < counts[rank]; that index is their slot.
 class TileLists {
  public:
   /// Starts lists for a grid of tiles. Splats come in `segments` shares, each from one thread at a
-  /// time, in parallel with the others. At most `max_entries` entries are kept, and as many runs.
+  /// time, in parallel with the others.
   void begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries);
 
   /// Lists splats for the tiles whose rectangle of pixel centres meets their ellipse alpha >=
@@ -26,15 +29,15 @@ class TileLists {
   void add(std::size_t segment, std::span<const Splat> splats, std::uint32_t first_slot,
            const SimdKernels& kernels);
 
-  /// Builds the lists of what was added. Entries beyond the bound are left out of the longest lists
-  /// and counted.
-  void finish(ThreadPool& pool);
+  /// Builds the lists of what was added: `splats`, each once.
+  void finish(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
+              const SimdKernels& kernels, ThreadPool& pool);
 
   /// Brings each list into depth order; equal depths keep the order of the scene.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
 
   /// Both at once in the original's way: a (tile | depth) key per splat and tile of its box, one
-  /// sort of all keys. Keys beyond `max_entries` are not made, and counted.
+  /// sort of all keys.
   void build_by_keys(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
                      glm::ivec2 grid, std::uint64_t max_entries, ThreadPool& pool);
 
@@ -55,18 +58,36 @@ class TileLists {
   struct Segment {
     std::vector<TileRun> runs;
     std::vector<std::uint32_t> positions;  // [tile]: entries, then next position in its list
-    std::uint64_t dropped = 0;             // entries of runs beyond the bound
+    std::uint64_t entries = 0;
   };
-  std::uint64_t place_lists();
+  /// Orders splats from near to far: depth bits, then slot.
+  using DepthOrder = std::uint64_t;
+  static constexpr DepthOrder nothing_left_out = ~DepthOrder{0};
+  static DepthOrder depth_order(const DepthSlot& splat) {
+    return DepthOrder{splat.key} << 32 | splat.value;
+  }
+
+  void clear_segments();
+  void list_nearest(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
+                    const SimdKernels& kernels, ThreadPool& pool);
+  DepthOrder find_first_left_out(std::span<const Splat> splats,
+                                 std::span<const std::uint32_t> counts, ThreadPool& pool);
+  void place_lists();
+  std::uint64_t count_keys(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
+                           ThreadPool& pool);
 
   glm::ivec2 grid_{0};
   std::uint64_t max_entries_ = 0;
   std::vector<Segment> segments_;
   std::atomic<std::uint64_t> runs_{0};
+  DepthOrder first_left_out_ = nothing_left_out;
   std::vector<std::uint64_t> starts_ = {0};  // tiles + 1
   std::vector<DepthSlot> entries_;
   std::uint64_t overflowed_ = 0;
   std::vector<std::uint32_t> tiles_by_length_;
+  // What is left out when memory is short.
+  std::vector<std::uint32_t> entries_of_slot_;
+  std::vector<DepthSlot> by_depth_, by_depth_scratch_;
   // build_by_keys()
   std::vector<std::uint64_t> key_offsets_;  // [cluster rank]
   std::vector<CodedIndex> keys_, key_scratch_;

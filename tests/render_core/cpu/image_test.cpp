@@ -181,10 +181,12 @@ TEST(CpuView, CountsThePairsOfTheReference) {
 TEST(CpuView, ListMemoryIsBounded) {
   const TestScene scene = test::small_scenes().front();
   for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla}) {
-    const auto bounded = render(scene, {RendererKind::cpu, pool_of(2), "auto"},
-                                {.pipeline = pipeline, .max_list_entries = 1000});
+    const ViewSettings settings{.pipeline = pipeline, .max_list_entries = 1000};
+    const auto bounded = render(scene, {RendererKind::cpu, pool_of(1), "auto"}, settings);
     EXPECT_LE(bounded.stats.list_entries, 1000u);
     EXPECT_GT(bounded.stats.overflowed_entries, 0u);
+    const auto many = render(scene, {RendererKind::cpu, pool_of(5), "auto"}, settings);
+    EXPECT_EQ(bounded.rgb, many.rgb);
   }
 }
 

@@ -56,7 +56,7 @@ void fill(TileLists& lists, const Projected& projected, glm::ivec2 grid, std::ui
               std::span(projected.splats).subspan(first, projected.counts[rank]),
               static_cast<std::uint32_t>(first), kernels);
   }
-  lists.finish(pool);
+  lists.finish(projected.splats, projected.counts, kernels, pool);
 }
 
 math::Vec3<double> to_double(const glm::vec3& v) { return {v.x, v.y, v.z}; }
@@ -198,26 +198,50 @@ TEST_P(Kernels, ListsAreInDepthOrderWithTiesInSceneOrder) {
 INSTANTIATE_TEST_SUITE_P(, Kernels, testing::ValuesIn(test::small_scenes()),
                          [](const auto& test) { return test.param.name; });
 
-TEST(TileListsBound, OverflowIsCountedAndNeverWritten) {
+/// Depth order of a splat and how many entries it has in all lists.
+std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> entries_by_splat(
+    const TileLists& lists) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> entries;
+  for (std::size_t tile = 0; tile < lists.tiles(); ++tile)
+    for (const DepthSlot& entry : lists.list(tile)) ++entries[{entry.key, entry.value}];
+  return entries;
+}
+
+TEST(TileListsBound, LeavesOutTheFarthestAndCountsThem) {
   ThreadPool pool(2);
   const TestScene scene = test::small_scenes().front();
   const Camera& camera = scene.request.camera;
   const glm::ivec2 grid = (camera.size_px + 15) / 16;
   const SceneStore store(*scene.cloud, pool);
   const SimdKernels& kernels = simd_kernels().front();
-  const Projected projected = project_all(store, camera, kernels);
+  const Projected exact = project_all(store, camera, kernels);
+  const Projected boxes = project_all(store, camera, kernels, Pipeline::vanilla);
 
-  TileLists all, bounded;
-  fill(all, projected, grid, 1u << 30, kernels, pool);
-  for (const std::uint64_t bound : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{500},
-                                    all.entries() / 2, all.entries() - 1, all.entries()}) {
-    fill(bounded, projected, grid, bound, kernels, pool);
-    EXPECT_LE(bounded.entries(), bound);
-    EXPECT_EQ(bounded.entries() + bounded.overflowed_entries(), all.entries());
-
-    bounded.build_by_keys(projected.splats, projected.counts, grid, bound, pool);
-    EXPECT_LE(bounded.entries(), bound);
-  }
+  const auto check = [&](const auto& build) {
+    TileLists all, bounded;
+    build(all, std::uint64_t{1} << 30);
+    const auto wanted = entries_by_splat(all);
+    for (const std::uint64_t bound : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{500},
+                                      all.entries() / 2, all.entries() - 1, all.entries()}) {
+      SCOPED_TRACE(bound);
+      build(bounded, bound);
+      EXPECT_LE(bounded.entries(), bound);
+      EXPECT_EQ(bounded.entries() + bounded.overflowed_entries(), all.entries());
+      // The kept ones are the nearest, whole, and as many as fit.
+      const auto kept = entries_by_splat(bounded);
+      ASSERT_TRUE(std::equal(kept.begin(), kept.end(), wanted.begin()));
+      const auto next = std::next(wanted.begin(), static_cast<std::ptrdiff_t>(kept.size()));
+      if (next != wanted.end()) {
+        EXPECT_GT(bounded.entries() + next->second, bound);
+      }
+    }
+  };
+  check([&](TileLists& lists, std::uint64_t bound) {
+    fill(lists, exact, grid, bound, kernels, pool);
+  });
+  check([&](TileLists& lists, std::uint64_t bound) {
+    lists.build_by_keys(boxes.splats, boxes.counts, grid, bound, pool);
+  });
 }
 
 TEST(SortList, EqualsStableSortOnAnyDistribution) {
