@@ -5,7 +5,7 @@
 
 namespace catgs {
 
-SinCos portable_sincos(double angle_rad) {
+SinCos<double> portable_sincos(double angle_rad) {
   // angle = quarter * pi/2 + r with |r| <= pi/4. The high part of pi/2 has 33 bits, so that its
   // product with a quarter below 2^20 is exact (Cody and Waite's reduction).
   constexpr double half_pi_high = 0x1.921fb544p+0;
@@ -18,18 +18,7 @@ SinCos portable_sincos(double angle_rad) {
   for (int n = 17; n >= 3; n -= 2) sine = (1.0 + sine) * (-r2 / ((n - 1) * n));
   double cosine = 0.0;
   for (int n = 18; n >= 2; n -= 2) cosine = (1.0 + cosine) * (-r2 / ((n - 1) * n));
-  sine = r * (1.0 + sine);
-  cosine = 1.0 + cosine;
-  switch (static_cast<std::int64_t>(quarter) & 3) {
-    case 0:
-      return {sine, cosine};
-    case 1:
-      return {cosine, -sine};
-    case 2:
-      return {-sine, -cosine};
-    default:
-      return {-cosine, sine};
-  }
+  return add_quarters<double>({r * (1.0 + sine), 1.0 + cosine}, static_cast<std::int64_t>(quarter));
 }
 
 double value_noise(std::uint64_t seed, std::uint32_t channel, double x) {

@@ -2,24 +2,18 @@
 
 #include <cstdint>
 
+#include "render_core/portable.h"
+
 namespace catgs {
 
 // Building blocks of pose scripts that give the same bits on every machine: integer random numbers,
-// and double arithmetic of + - * / and sqrt only, which IEEE 754 rounds exactly. (sin and cos of
-// the C library differ by a last bit between its versions; the distributions of <random> between
-// standard libraries.)
+// and double arithmetic of + - * / and sqrt only, which IEEE 754 rounds exactly.
 
-/// SplitMix64 (Steele, Lea, Flood 2014): 64 bits of state, good enough to place waypoints.
-class PortableRng {
+/// Draws of doubles, good enough to place waypoints.
+class PortableRng : public SplitMix64 {
  public:
-  explicit PortableRng(std::uint64_t seed) : state_(seed) {}
+  using SplitMix64::SplitMix64;
 
-  std::uint64_t next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
   /// Uniform in [low, high).
   double uniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(next() >> 11) * 0x1p-53);
@@ -31,18 +25,10 @@ class PortableRng {
     return sum;
   }
   bool coin() { return (next() >> 63) != 0; }
-
- private:
-  std::uint64_t state_;
-};
-
-struct SinCos {
-  double sin;
-  double cos;
 };
 
 /// Error below 1e-15 for |angle_rad| <= 1e6.
-SinCos portable_sincos(double angle_rad);
+SinCos<double> portable_sincos(double angle_rad);
 
 /// Smooth noise: a random value in [-1, 1] at each integer of `x`, quintic between (twice
 /// differentiable). The channel picks one of independent noises.

@@ -84,9 +84,9 @@ SceneFrame::SceneFrame(const SceneHints& hints)
 }
 
 glm::dquat SceneFrame::turned(const glm::dvec3& yaw_pitch_roll_rad) const {
-  const SinCos yaw = portable_sincos(0.5 * yaw_pitch_roll_rad.x);
-  const SinCos pitch = portable_sincos(0.5 * yaw_pitch_roll_rad.y);
-  const SinCos roll = portable_sincos(0.5 * yaw_pitch_roll_rad.z);
+  const SinCos<double> yaw = portable_sincos(0.5 * yaw_pitch_roll_rad.x);
+  const SinCos<double> pitch = portable_sincos(0.5 * yaw_pitch_roll_rad.y);
+  const SinCos<double> roll = portable_sincos(0.5 * yaw_pitch_roll_rad.z);
   // glm's constructor order: w, x, y, z.
   return level_ * glm::dquat(yaw.cos, 0.0, yaw.sin, 0.0) * upright_ *
          glm::dquat(pitch.cos, pitch.sin, 0.0, 0.0) * glm::dquat(roll.cos, 0.0, 0.0, roll.sin);

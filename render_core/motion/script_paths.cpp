@@ -59,7 +59,7 @@ struct Wander {
 /// enough to look ahead along it.
 SmoothPath wander(const SceneFrame& frame, const Wander& how, PortableRng& rng, double duration_s) {
   constexpr double sharpest_turn = 45.0 * degree;  // per step
-  const SinCos turn = portable_sincos(sharpest_turn);
+  const SinCos<double> turn = portable_sincos(sharpest_turn);
   // A small scene is crossed more slowly, not with sharper turns.
   const double step = std::min(how.speed_m_s * how.step_s * frame.metre(), 0.08 * frame.extent());
   const auto random_place = [&] {  // far enough from the limits to turn before them
@@ -108,8 +108,8 @@ PoseAt walk_script(const SceneFrame& frame, std::uint64_t seed, double duration_
     // Glances to the side and down while the body follows the path.
     const double glance = 30.0 * degree * value_noise(noise_seed, 0, 0.5 * time_s);
     const double nod = (-5.0 + 8.0 * value_noise(noise_seed, 1, 0.4 * time_s)) * degree;
-    const SinCos turn = portable_sincos(glance);
-    const SinCos slope = portable_sincos(nod);
+    const SinCos<double> turn = portable_sincos(glance);
+    const SinCos<double> slope = portable_sincos(nod);
     const double speed = glm::length(sample.velocity);
     const glm::dvec3 view =
         slope.cos * (turn.cos * sample.velocity + turn.sin * side) + slope.sin * speed * frame.up();
@@ -123,7 +123,8 @@ PoseAt drone_script(const SceneFrame& frame, std::uint64_t seed, double duration
       wander(frame, {.speed_m_s = 3.0, .step_s = 0.8, .climb = 0.3}, rng, duration_s);
   return [=](double time_s) {
     constexpr double gravity_m_s2 = 9.81;
-    const SinCos dive = portable_sincos(-10.0 * degree);  // looks a little down on what it passes
+    const SinCos<double> dive =
+        portable_sincos(-10.0 * degree);  // looks a little down on what it passes
     const SmoothPath::Sample sample = path.at(time_s);
     const double speed = glm::length(sample.velocity);
     const glm::dvec3 view = dive.cos * sample.velocity + dive.sin * speed * frame.up();
@@ -143,7 +144,8 @@ PoseAt orbit_script(const SceneFrame& frame, std::uint64_t seed) {
   if (glm::length(radius) < 0.1 * frame.metre()) radius = -frame.metre() * frame.forward();
   const glm::dvec3 across = glm::cross(frame.up(), radius);
   return [=](double time_s) {
-    const SinCos angle = portable_sincos(direction * 2.0 * std::numbers::pi * time_s / period_s);
+    const SinCos<double> angle =
+        portable_sincos(direction * 2.0 * std::numbers::pi * time_s / period_s);
     const glm::dvec3 position =
         frame.inside(frame.focus() + rise + angle.cos * radius + angle.sin * across);
     return frame.look_along(position, frame.focus() - position, frame.up());

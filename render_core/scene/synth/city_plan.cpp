@@ -249,7 +249,7 @@ Block plan_block(std::uint64_t seed, int column, int row) {
   Block block{};
   block.column = column;
   block.row = row;
-  block.key = child(mix(seed), cell);
+  block.key = child(mix_bits(seed), cell);
   block.use = use_of(block.key, column, row);
   const float x0 = block_pitch_m * static_cast<float>(column);
   const float z0 = block_pitch_m * static_cast<float>(row);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include <glm/vec3.hpp>
+#include "render_core/portable.h"
 
 // Functions whose every bit is the same on every machine: they use only the operations that IEEE
 // 754 rounds exactly (+ - * / sqrt floor). The C library's sin, exp and pow differ in the last bit
@@ -12,10 +12,7 @@
 // -ffp-contract=off for the same reason.
 namespace catgs::synth {
 
-struct SinCos {
-  float sin;
-  float cos;
-};
+using SinCos = catgs::SinCos<float>;
 
 /// Sine and cosine of an angle in turns (1 = 360 degrees), error below 2e-6.
 inline SinCos sin_cos_turns(float turns) {
@@ -25,16 +22,7 @@ inline SinCos sin_cos_turns(float turns) {
   const float s = x * (1.0f + x2 * (-1.6666667e-1f + x2 * (8.3333310e-3f + x2 * -1.9839290e-4f)));
   const float c =
       1.0f + x2 * (-0.5f + x2 * (4.1666668e-2f + x2 * (-1.3888397e-3f + x2 * 2.4760495e-5f)));
-  switch (static_cast<std::int64_t>(quarters) & 3) {
-    case 0:
-      return {s, c};
-    case 1:
-      return {c, -s};
-    case 2:
-      return {-s, -c};
-    default:
-      return {-c, s};
-  }
+  return add_quarters<float>({s, c}, static_cast<std::int64_t>(quarters));
 }
 
 /// e^x for |x| < 80, relative error below 1e-6.

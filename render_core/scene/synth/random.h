@@ -6,16 +6,9 @@
 
 namespace catgs::synth {
 
-/// SplitMix64's finaliser (Steele, Lea, Flood 2014): a bijection that spreads every input bit.
-constexpr std::uint64_t mix(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
-
 /// Key of a part inside its whole: children of one key are independent of each other.
 constexpr std::uint64_t child(std::uint64_t key, std::uint64_t index) {
-  return mix(key ^ mix(index + 0x9e3779b97f4a7c15ull));
+  return mix_bits(key ^ mix_bits(index + golden_gamma));
 }
 
 /// Counter-based random numbers: draw n of a key is a pure function of (key, n), so that every part
@@ -24,9 +17,9 @@ constexpr std::uint64_t child(std::uint64_t key, std::uint64_t index) {
 /// inside braces.
 class Random {
  public:
-  explicit Random(std::uint64_t key) : state_(key) {}
+  explicit Random(std::uint64_t key) : bits_(key) {}
 
-  std::uint64_t bits() { return mix(state_ += 0x9e3779b97f4a7c15ull); }
+  std::uint64_t bits() { return bits_.next(); }
 
   /// In [0, 1), 24 bits.
   float uniform() { return static_cast<float>(bits() >> 40) * 0x1p-24f; }
@@ -49,7 +42,7 @@ class Random {
   float spread(float sigma) { return exp_exact(sigma * normal()); }
 
  private:
-  std::uint64_t state_;
+  SplitMix64 bits_;
 };
 
 /// Smooth noise in [0, 1] over the plane, one feature per unit.
@@ -59,7 +52,7 @@ inline float value_noise(std::uint64_t key, float x, float y) {
   const auto corner = [&](int dx, int dy) {
     const auto ix = static_cast<std::uint32_t>(static_cast<std::int32_t>(fx) + dx);
     const auto iy = static_cast<std::uint32_t>(static_cast<std::int32_t>(fy) + dy);
-    return static_cast<float>(mix(key ^ (std::uint64_t{ix} << 32 | iy)) >> 40) * 0x1p-24f;
+    return static_cast<float>(mix_bits(key ^ (std::uint64_t{ix} << 32 | iy)) >> 40) * 0x1p-24f;
   };
   const float tx = smooth_step(0.0f, 1.0f, x - fx);
   const float ty = smooth_step(0.0f, 1.0f, y - fy);
