@@ -13,6 +13,7 @@
 #include "render_core/math/ellipse-inl.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/math/spherical_harmonics-inl.h"
+#include "render_core/math/trail-inl.h"
 
 namespace catgs {
 namespace {
@@ -28,7 +29,7 @@ struct Sample {
   math::Vec2<T> pixel_px;
 };
 
-constexpr int result_count = 20;
+constexpr int result_count = 22;
 
 template <class T>
 struct Results {
@@ -47,6 +48,8 @@ CATGS_HD Results<T> evaluate(const Sample<T>& s) {
   const T rightmost = math::rightmost_y(w, reach);
   const auto ellipse = math::make_ellipse(w, reach, half.x, rightmost);
   const auto columns = math::columns_in_band(ellipse, T(-0.5) * half.y, T(0.5) * half.y);
+  const auto trail = math::make_trail(ellipse, {T(9) * s.pixel_px.y, T(-9) * s.pixel_px.x});
+  const auto swept = math::columns_in_band(trail, T(-0.5) * half.y, T(0.5) * half.y);
 
   T basis[16];
   math::sh_basis(math::view_direction(s.camera.position, s.mean), 3, basis);
@@ -67,7 +70,7 @@ CATGS_HD Results<T> evaluate(const Sample<T>& s) {
   return {depth,    p.centre_px.x, p.centre_px.y, w.xx,        w.xy,         w.yy,
           half.x,   half.y,        rightmost,     columns.low, columns.high, colour.x,
           colour.y, colour.z,      rgb.x,         rgb.y,       rgb.z,        math::luma_code(rgb),
-          chroma.x, chroma.y};
+          chroma.x, chroma.y,      swept.low,     swept.high};
 }
 
 __global__ void evaluate_all(const Sample<float>* samples, Results<float>* results, int count) {
