@@ -17,6 +17,8 @@ class HostImage {
   [[nodiscard]] glm::ivec2 size_px() const { return size_px_; }
   [[nodiscard]] const std::array<Plane, 3>& planes() const { return planes_; }
 
+  [[nodiscard]] std::size_t memory_bytes() const { return bytes_.capacity(); }
+
   /// rgb_f32: row `y`, 3 floats a pixel.
   [[nodiscard]] float* rgb_row(int y) const {
     return reinterpret_cast<float*>(planes_[0].data + planes_[0].stride_bytes * y);

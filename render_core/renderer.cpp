@@ -9,6 +9,13 @@ bool finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+std::string find_mistake(const Pose& pose, const std::string& name) {
+  if (!finite(pose.position)) return name + " position is not finite";
+  const float norm = glm::length(pose.orientation);
+  if (!(norm > 1e-6f && std::isfinite(norm))) return name + " orientation is not a rotation";
+  return {};
+}
+
 std::string find_mistake(const FrameRequest& request, PixelFormat format) {
   const Camera& camera = request.camera;
   const glm::ivec2 size = camera.size_px;
@@ -23,12 +30,12 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
   const glm::vec2 centre = camera.principal_point_px;
   if (!std::isfinite(centre.x) || !std::isfinite(centre.y)) return "principal point is not finite";
   if (!(camera.near_z > 0 && std::isfinite(camera.near_z))) return "near plane must be positive";
-  const Pose& pose = camera.world_from_camera;
-  if (!finite(pose.position)) return "camera position is not finite";
-  const float norm = glm::length(pose.orientation);
-  if (!(norm > 1e-6f && std::isfinite(norm))) return "camera orientation is not a rotation";
   if (!finite(request.background)) return "background is not finite";
-  return {};
+  std::string mistake = find_mistake(camera.world_from_camera, "camera");
+  if (mistake.empty() && request.forecast) {
+    mistake = find_mistake(request.forecast->world_from_camera, "forecast");
+  }
+  return mistake;
 }
 
 }  // namespace

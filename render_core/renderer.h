@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include "render_core/camera.h"
+#include "render_core/motion/frame_groups.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
@@ -25,6 +27,7 @@ class ThreadPool;
 enum class Pipeline {
   vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
   exact,    // exact ellipse/tile culling; the same image as the reference
+  catgs,    // the paper's: key frames (the image of `exact`) and sub-frames from their caches
 };
 
 enum class PixelFormat {
@@ -42,7 +45,11 @@ inline constexpr std::size_t stage_count = 5;
 inline constexpr std::array<std::string_view, stage_count> stage_names = {"project", "bin", "sort",
                                                                           "blend", "convert"};
 
-enum class FrameKind { key, sub };
+/// By which depths sub-frames blend. Caches fix which Gaussians a tile blends, not their order.
+enum class BlendOrder {
+  fresh,  // their own
+  key,    // those of their key frame, the paper's way: cheaper, but wrong once the view turned
+};
 
 struct FrameStats {
   FrameKind kind = FrameKind::key;
@@ -51,12 +58,18 @@ struct FrameStats {
   std::uint32_t list_max = 0;            // longest tile list
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
+  std::uint64_t tasks = 0;               // parts that the tiles were blended in
+  // Pipeline::catgs
+  int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
+  float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
+  float nearest_depth = 0;  // of visible Gaussians deeper than speculation_min_depth(); world units
   std::array<float, stage_count> stage_ms{};
 };
 
 struct FrameRequest {
   Camera camera;
   glm::vec3 background{0.0f};
+  std::optional<Forecast> forecast{};  // Pipeline::catgs; without one no sub-frame follows
 };
 
 struct Plane {
@@ -86,7 +99,10 @@ struct ViewSettings {
   PixelFormat format = PixelFormat::rgb_f32;
   MemorySpace space = MemorySpace::host;  // of rgb_f32; device: stay where the core made it
   std::uint64_t max_list_entries = std::uint64_t{64} << 20;  // bounds the memory of tile lists
-  bool count_pairs = false;  // fill FrameStats::blended_pairs; slower
+  bool count_pairs = false;              // fill FrameStats::blended_pairs; slower
+  SpeculationSettings speculation{};     // Pipeline::catgs
+  BlendOrder order = BlendOrder::fresh;  // Pipeline::catgs
+  bool split_tasks = true;               // CUDA core: long tiles are blended in several parts
 };
 
 /// What every core refuses before it renders: sizes, focal length, near plane or pose out of range.
@@ -102,6 +118,9 @@ class View {
   /// Renders one frame and waits for it. Any image size from 1x1 to max_image_side is accepted and
   /// may change from frame to frame (i420 needs even sides). On failure `frame` is untouched.
   virtual RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept = 0;
+
+  /// Memory of this View (caches, lists, image) where its core renders, without the scene.
+  [[nodiscard]] virtual std::size_t memory_bytes() const = 0;
 };
 
 inline constexpr int max_image_side_px = 8192;

@@ -58,6 +58,11 @@ class CpuView final : public View {
     return {};
   }
 
+  std::size_t memory_bytes() const override {
+    return image_.memory_bytes() + lists_.memory_bytes() + splats_.capacity() * sizeof(Splat) +
+           (visible_clusters_.capacity() + visible_counts_.capacity()) * sizeof(std::uint32_t);
+  }
+
  private:
   FrameView render_checked(const FrameRequest& request);
   void cull_clusters(const Camera& camera);
@@ -181,6 +186,10 @@ class CpuRenderer final : public Renderer {
   }
   std::size_t scene_bytes() const override { return shared_->store.bytes(); }
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
+    if (settings.pipeline == Pipeline::catgs) {
+      throw InputError("--pipeline catgs", "", "the CPU core has no sub-frames yet",
+                       "use --pipeline exact");
+    }
     return std::make_unique<CpuView>(shared_, settings);
   }
 

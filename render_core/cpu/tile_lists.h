@@ -53,6 +53,7 @@ class TileLists {
   [[nodiscard]] std::uint64_t entries() const { return starts_.back(); }
   [[nodiscard]] std::uint64_t overflowed_entries() const { return overflowed_; }
   [[nodiscard]] std::uint32_t longest() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   struct Segment {

@@ -66,6 +66,8 @@ class CudaView final : public View {
     }
   }
 
+  std::size_t memory_bytes() const override { return memory_.bytes(); }
+
  private:
   void set_shape(glm::ivec2 size_px) {
     shape_.width_px = size_px.x;
@@ -219,8 +221,8 @@ class CudaRenderer final : public Renderer {
   [[nodiscard]] std::size_t scene_bytes() const override { return scene_->bytes(); }
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     if (settings.pipeline != Pipeline::exact) {
-      throw InputError("--pipeline vanilla", "", "the CUDA core renders the exact pipeline only",
-                       "use --renderer cpu");
+      throw InputError("--pipeline", "", "the CUDA core renders the exact pipeline only",
+                       "use --pipeline exact, or --renderer cpu");
     }
     check(cudaSetDevice(device_), "device");
     return std::make_unique<CudaView>(scene_, device_, settings);

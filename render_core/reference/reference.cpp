@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include "render_core/error.h"
 #include "render_core/host_image.h"
 #include "render_core/math/blend-inl.h"
 #include "render_core/math/camera-inl.h"
@@ -147,6 +148,8 @@ class ReferenceView final : public View {
     }
   }
 
+  std::size_t memory_bytes() const override { return image_.memory_bytes(); }
+
  private:
   RenderStatus render_checked(const FrameRequest& request, FrameView& frame) {
     const glm::ivec2 size = request.camera.size_px;
@@ -184,6 +187,10 @@ class ReferenceRenderer final : public Renderer {
   }
   std::size_t scene_bytes() const override { return cloud_->bytes(); }
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
+    if (settings.pipeline == Pipeline::catgs) {
+      throw InputError("--pipeline catgs", "", "the reference keeps no caches",
+                       "use --pipeline exact");
+    }
     return std::make_unique<ReferenceView>(cloud_, pool_, settings);
   }
 

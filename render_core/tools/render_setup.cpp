@@ -39,8 +39,9 @@ RendererKind parse_renderer(std::string_view name) {
 }
 
 Pipeline parse_pipeline(std::string_view name) {
-  return parse_name<Pipeline>("--pipeline", name,
-                              {{"exact", Pipeline::exact}, {"vanilla", Pipeline::vanilla}});
+  return parse_name<Pipeline>(
+      "--pipeline", name,
+      {{"exact", Pipeline::exact}, {"vanilla", Pipeline::vanilla}, {"catgs", Pipeline::catgs}});
 }
 
 template <typename T>
@@ -123,7 +124,9 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
                      "Near plane, world units (default: the scene's hint)");
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
       ->capture_default_str();
-  command.add_option("--pipeline", options.pipeline, "exact or vanilla (the original 3DGS)")
+  command
+      .add_option("--pipeline", options.pipeline,
+                  "exact, vanilla (the original 3DGS) or catgs (key frames and sub-frames)")
       ->capture_default_str();
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();

@@ -1,0 +1,128 @@
+#include "render_core/motion/frame_groups.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+constexpr int grid_steps = 4;  // per axis of the image, its edges included
+
+/// Same image and same near plane, so that the cached lists mean the same.
+bool same_lens(const Camera& a, const Camera& b) {
+  return a.size_px == b.size_px && a.focal_px == b.focal_px &&
+         a.principal_point_px == b.principal_point_px && a.near_z == b.near_z;
+}
+
+Camera at_pose(const Camera& camera, const Pose& world_from_camera) {
+  Camera moved = camera;
+  moved.world_from_camera = world_from_camera;
+  return moved;
+}
+
+glm::dquat unit(const glm::quat& q) { return glm::normalize(glm::dquat(q)); }
+
+}  // namespace
+
+void check_speculation(const SpeculationSettings& settings) {
+  const auto require = [](bool good, std::string_view flag, std::string_view remedy) {
+    if (!good) throw InputError(flag, "", "is out of range", remedy);
+  };
+  require(settings.initial_window >= 0 && settings.initial_window <= max_initial_window, "--window",
+          "0 to " + std::to_string(max_initial_window) + " sub-frames");
+  require(settings.max_trail_px > 0.0f && std::isfinite(settings.max_trail_px), "--max-trail-px",
+          "a positive number of pixels");
+  require(settings.min_depth >= 0.0f && std::isfinite(settings.min_depth), "--min-depth",
+          "a depth in world units, 0 for twice the near plane");
+  require(settings.max_deviation_px >= 0.0f && std::isfinite(settings.max_deviation_px),
+          "--max-deviation-px", "a number of pixels");
+}
+
+float speculation_min_depth(const SpeculationSettings& settings, float near_z) {
+  return settings.min_depth > 0.0f ? settings.min_depth : 2.0f * near_z;
+}
+
+Pose uniform_motion(const Pose& from, const Pose& to, float share) {
+  return {glm::mix(from.position, to.position, share),
+          glm::quat(glm::normalize(glm::slerp(unit(from.orientation), unit(to.orientation),
+                                              static_cast<double>(share))))};
+}
+
+float max_displacement_px(const Camera& now, const Pose& end, float nearest_depth) {
+  const glm::dquat end_from_now =
+      glm::conjugate(unit(end.orientation)) * unit(now.world_from_camera.orientation);
+  const glm::dvec3 shift = glm::conjugate(unit(end.orientation)) *
+                           (glm::dvec3(now.world_from_camera.position) - glm::dvec3(end.position));
+  const glm::dvec2 focal(now.focal_px), centre(now.principal_point_px), size(now.size_px);
+  double largest = 0.0;
+  const auto move = [&](const glm::dvec2& pixel, const glm::dvec3& end_point, double end_min_z) {
+    if (!(end_point.z > end_min_z)) {
+      largest = std::numeric_limits<double>::infinity();
+      return;
+    }
+    const glm::dvec2 moved = centre + focal * glm::dvec2(end_point) / end_point.z;
+    largest = std::max(largest, glm::distance(pixel, moved));
+  };
+  for (int row = 0; row <= grid_steps; ++row) {
+    for (int column = 0; column <= grid_steps; ++column) {
+      const glm::dvec2 pixel = size * glm::dvec2(column, row) / static_cast<double>(grid_steps);
+      const glm::dvec3 turned = end_from_now * glm::dvec3((pixel - centre) / focal, 1.0);
+      move(pixel, turned, 0.0);
+      const auto depth = static_cast<double>(nearest_depth);
+      if (std::isfinite(depth)) move(pixel, turned * depth + shift, now.near_z);
+    }
+  }
+  return static_cast<float>(largest);
+}
+
+int speculation_window(int initial_window, float max_trail_px, float displacement_px) {
+  if (displacement_px <= max_trail_px) return initial_window;
+  return static_cast<int>(static_cast<double>(initial_window) * max_trail_px / displacement_px);
+}
+
+FrameGroups::FrameGroups(const SpeculationSettings& settings) : settings_(settings) {
+  check_speculation(settings);
+}
+
+FramePlan FrameGroups::plan(const Camera& now, const std::optional<Forecast>& forecast,
+                            float nearest_depth) {
+  const float min_depth = speculation_min_depth(settings_, now.near_z);
+  const float depth = nearest_depth > min_depth ? nearest_depth : min_depth;
+  if (continues(now, depth)) {
+    ++drawn_;
+    return {FrameKind::sub, window_, end_};
+  }
+  key_ = end_ = now;
+  window_ = drawn_ = 0;
+  if (forecast && forecast->frames > 0) {
+    const auto after = [&](int frames) {
+      return uniform_motion(now.world_from_camera, forecast->world_from_camera,
+                            static_cast<float>(frames) / static_cast<float>(forecast->frames));
+    };
+    // The forecast says nothing about what comes behind its last frame.
+    const int longest = std::min(settings_.initial_window, forecast->frames);
+    window_ = speculation_window(longest, settings_.max_trail_px,
+                                 max_displacement_px(now, after(longest), depth));
+    end_ = at_pose(now, after(window_));
+  }
+  return {FrameKind::key, window_, end_};
+}
+
+/// Whether the group's lists hold what the next frame shows. A displacement at infinity is one by
+/// rotation alone, so the bound in pixels bounds the angle too.
+bool FrameGroups::continues(const Camera& now, float nearest_depth) const {
+  if (drawn_ >= window_ || !same_lens(now, key_)) return false;
+  const float share = static_cast<float>(drawn_ + 1) / static_cast<float>(window_);
+  const Pose expected = uniform_motion(key_.world_from_camera, end_.world_from_camera, share);
+  return max_displacement_px(at_pose(now, expected), now.world_from_camera, nearest_depth) <=
+         settings_.max_deviation_px;
+}
+
+}  // namespace catgs

@@ -1,0 +1,237 @@
+#include "render_core/motion/frame_groups.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+Camera camera_at(const Pose& pose) { return make_camera(pose, {1920, 1080}, 1100.0f); }
+
+Pose moved(glm::vec3 position) { return {position, {1, 0, 0, 0}}; }
+
+Pose turned(float degrees, glm::vec3 axis, glm::vec3 position = glm::vec3(0)) {
+  return {position, glm::angleAxis(glm::radians(degrees), axis)};
+}
+
+TEST(UniformMotion, IsLinearInPositionAndAngle) {
+  const Pose from = turned(10, {0, 1, 0}, {1, 2, 3});
+  const Pose to = turned(50, {0, 1, 0}, {5, 2, 1});
+  const Pose quarter = uniform_motion(from, to, 0.25f);
+  EXPECT_NEAR(glm::distance(quarter.position, {2, 2, 2.5f}), 0.0f, 1e-6f);
+  const Pose expected = turned(20, {0, 1, 0});
+  EXPECT_NEAR(std::abs(glm::dot(quarter.orientation, expected.orientation)), 1.0f, 1e-6f);
+}
+
+TEST(UniformMotion, TakesTheShortWayAndNormalises) {
+  Pose to = turned(40, {1, 0, 0});
+  to.orientation = -2.0f * to.orientation;
+  const Pose half = uniform_motion({}, to, 0.5f);
+  EXPECT_NEAR(std::abs(glm::dot(half.orientation, turned(20, {1, 0, 0}).orientation)), 1.0f, 1e-6f);
+  const Pose end = uniform_motion({}, to, 1.0f);
+  EXPECT_NEAR(glm::length(end.orientation), 1.0f, 1e-6f);
+}
+
+TEST(MaxDisplacement, OfASidewaysStepIsThatOfTheNearestDepth) {
+  // u = f x / z: 0.1 units at depth 2 are 1100 * 0.1 / 2 = 55 px everywhere in the image.
+  EXPECT_NEAR(max_displacement_px(camera_at({}), moved({0.1f, 0, 0}), 2.0f), 55.0f, 1e-3f);
+  EXPECT_NEAR(max_displacement_px(camera_at({}), moved({0.1f, 0, 0}), infinity), 0.0f, 1e-3f);
+}
+
+TEST(MaxDisplacement, OfAStepForwardIsThatOfTheCorners) {
+  // A point at radius r and depth z moves by r dz / (z - dz).
+  const float corner = std::hypot(960.0f, 540.0f);
+  EXPECT_NEAR(max_displacement_px(camera_at({}), moved({0, 0, 0.5f}), 2.0f), corner / 3.0f, 1e-2f);
+}
+
+TEST(MaxDisplacement, OfARotationNeedsNoDepth) {
+  // Pan: at the left and right edge x = f tan(phi) goes to f tan(phi +- 1 deg).
+  const double edge = std::atan(960.0 / 1100.0);
+  const double expected = 1100.0 * std::tan(edge + glm::radians(1.0)) - 960.0;
+  const float at_infinity = max_displacement_px(camera_at({}), turned(1, {0, 1, 0}), infinity);
+  EXPECT_GE(at_infinity, static_cast<float>(expected));  // corners move in y too
+  EXPECT_LE(at_infinity, static_cast<float>(1.2 * expected));
+  EXPECT_FLOAT_EQ(max_displacement_px(camera_at({}), turned(1, {0, 1, 0}), 0.4f), at_infinity);
+  // Roll: a circle around the centre.
+  const float chord = 2.0f * std::hypot(960.0f, 540.0f) * std::sin(glm::radians(2.5f));
+  EXPECT_NEAR(max_displacement_px(camera_at({}), turned(5, {0, 0, 1}), 3.0f), chord, 1e-2f);
+}
+
+TEST(MaxDisplacement, FollowsTheWorldNotTheAxes) {
+  const glm::vec3 axis = glm::normalize(glm::vec3(1, -2, 0.5f));
+  const Pose start = turned(70, axis, {4, 5, 6});
+  const Pose step = {start.position + start.orientation * glm::vec3(0.1f, 0, 0), start.orientation};
+  EXPECT_NEAR(max_displacement_px(camera_at(start), step, 2.0f), 55.0f, 1e-3f);
+}
+
+TEST(MaxDisplacement, IsUnboundedThroughTheNearPlaneOrBehindTheCamera) {
+  EXPECT_EQ(max_displacement_px(camera_at({}), moved({0, 0, 0.3f}), 0.4f), infinity);
+  EXPECT_LT(max_displacement_px(camera_at({}), moved({0, 0, 0.1f}), 0.4f), infinity);
+  EXPECT_EQ(max_displacement_px(camera_at({}), turned(180, {0, 1, 0}), infinity), infinity);
+}
+
+TEST(SpeculationWindow, IsThePapersRule) {
+  EXPECT_EQ(speculation_window(4, 16.0f, 0.0f), 4);
+  EXPECT_EQ(speculation_window(4, 16.0f, 16.0f), 4);
+  EXPECT_EQ(speculation_window(4, 16.0f, 16.1f), 3);
+  EXPECT_EQ(speculation_window(4, 16.0f, 33.0f), 1);
+  EXPECT_EQ(speculation_window(4, 16.0f, 64.0f), 1);
+  EXPECT_EQ(speculation_window(4, 16.0f, 64.1f), 0);
+  EXPECT_EQ(speculation_window(4, 16.0f, infinity), 0);
+  EXPECT_EQ(speculation_window(0, 16.0f, 1.0f), 0);
+}
+
+TEST(Speculation, SettingsAreChecked) {
+  const auto error_of = [](const SpeculationSettings& settings) -> std::string {
+    try {
+      FrameGroups groups(settings);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(error_of({}), "");
+  EXPECT_THAT(error_of({.initial_window = -1}), ::testing::HasSubstr("--window"));
+  EXPECT_THAT(error_of({.initial_window = 65}), ::testing::HasSubstr("--window"));
+  EXPECT_THAT(error_of({.max_trail_px = 0}), ::testing::HasSubstr("--max-trail-px"));
+  EXPECT_THAT(error_of({.min_depth = std::nanf("")}), ::testing::HasSubstr("--min-depth"));
+  EXPECT_THAT(error_of({.max_deviation_px = infinity}), ::testing::HasSubstr("--max-deviation-px"));
+  EXPECT_FLOAT_EQ(speculation_min_depth({}, 0.3f), 0.6f);
+  EXPECT_FLOAT_EQ(speculation_min_depth({.min_depth = 0.4f}, 0.3f), 0.4f);
+}
+
+/// Sideways at `step` world units a frame, forecast right: kinds of the frames as a string.
+std::string kinds(FrameGroups& groups, int frames, float step, float depth, int horizon = 4) {
+  std::string kinds;
+  for (int i = 0; i < frames; ++i) {
+    const float x = static_cast<float>(i) * step;
+    const Forecast forecast{moved({x + step * static_cast<float>(horizon), 0, 0}), horizon};
+    const FramePlan plan = groups.plan(camera_at(moved({x, 0, 0})), forecast, depth);
+    kinds += plan.kind == FrameKind::key ? 'k' : 's';
+  }
+  return kinds;
+}
+
+TEST(FrameGroups, AKeyFrameAndWSubFrames) {
+  FrameGroups still{{}};
+  EXPECT_EQ(kinds(still, 11, 0.0f, 1.0f), "ksssskssssk");
+  FrameGroups off{{.initial_window = 0}};
+  EXPECT_EQ(kinds(off, 4, 0.0f, 1.0f), "kkkk");
+}
+
+TEST(FrameGroups, FastMotionShrinksTheWindow) {
+  // 1100 px * 0.01 / 1 = 11 px a frame, 44 px in four: W = floor(4 * 16 / 44) = 1.
+  FrameGroups fast{{}};
+  EXPECT_EQ(kinds(fast, 6, 0.01f, 1.0f), "ksksks");
+  FrameGroups farther{{}};
+  EXPECT_EQ(kinds(farther, 6, 0.01f, 3.0f), "kssssk");
+  FrameGroups nothing_near{{}};
+  EXPECT_EQ(kinds(nothing_near, 6, 0.01f, infinity), "kssssk");
+  FrameGroups faster{{}};
+  EXPECT_EQ(kinds(faster, 4, 0.02f, 1.0f), "kkkk");
+  FrameGroups longer_trails{{.max_trail_px = 32.0f}};
+  EXPECT_EQ(kinds(longer_trails, 6, 0.01f, 1.0f), "ksskss");
+}
+
+TEST(FrameGroups, UnknownOrTooSmallDepthsMeanTheDepthThreshold) {
+  // d = 2 x 0.2: 4 frames of 0.001 are 1100 * 0.004 / 0.4 = 11 px; of 0.002 22 px, so W = 2.
+  for (const float depth : {0.0f, 0.1f, std::nanf("")}) {
+    FrameGroups slow{{}};
+    EXPECT_EQ(kinds(slow, 6, 0.001f, depth), "kssssk");
+    FrameGroups quicker{{}};
+    EXPECT_EQ(kinds(quicker, 6, 0.002f, depth), "ksskss");
+  }
+}
+
+TEST(FrameGroups, PlansTheCameraAtTheEndOfTheWindow) {
+  FrameGroups groups{{}};
+  const Forecast forecast{turned(4, {0, 0, 1}, {0.08f, 0, 0}), 8};
+  const Camera now = camera_at({});
+  const FramePlan plan = groups.plan(now, forecast, 10.0f);  // 38 px by roll, 4.4 px by the step
+  EXPECT_EQ(plan.kind, FrameKind::key);
+  EXPECT_EQ(plan.window, 1);
+  EXPECT_NEAR(plan.window_end.world_from_camera.position.x, 0.01f, 1e-6f);
+  EXPECT_NEAR(glm::degrees(glm::angle(plan.window_end.world_from_camera.orientation)), 0.5f, 1e-3f);
+  EXPECT_EQ(plan.window_end.size_px, now.size_px);
+  const FramePlan sub = groups.plan(plan.window_end, std::nullopt, 10.0f);
+  EXPECT_EQ(sub.kind, FrameKind::sub);
+  EXPECT_EQ(sub.window, 1);
+}
+
+TEST(FrameGroups, WithoutForecastEveryFrameIsAKeyFrame) {
+  FrameGroups groups{{}};
+  for (int i = 0; i < 3; ++i) {
+    const FramePlan plan = groups.plan(camera_at({}), std::nullopt, 1.0f);
+    EXPECT_EQ(plan.kind, FrameKind::key);
+    EXPECT_EQ(plan.window, 0);
+  }
+}
+
+TEST(FrameGroups, NeverGoBeyondTheForecast) {
+  FrameGroups groups{{.initial_window = 8}};
+  EXPECT_EQ(kinds(groups, 6, 0.0f, 1.0f, 2), "ksskss");
+}
+
+/// A group whose forecast is 4 frames of 0.01 units to the right, at depth 20: 0.55 px a frame.
+class OpenGroup : public ::testing::Test {
+ protected:
+  OpenGroup() { groups_.plan(camera_at({}), Forecast{moved({0.04f, 0, 0}), 4}, depth); }
+  FrameKind next(const Camera& camera, float nearest = depth) {
+    return groups_.plan(camera, Forecast{camera.world_from_camera, 4}, nearest).kind;
+  }
+  static constexpr float depth = 20.0f;
+  FrameGroups groups_{{}};
+};
+
+TEST_F(OpenGroup, GoesOnWhereItWasForecast) {
+  EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::sub);
+  EXPECT_EQ(next(camera_at(moved({0.02f, 0, 0}))), FrameKind::sub);
+}
+
+TEST_F(OpenGroup, EndsWhereTheCameraLeavesThePath) {
+  // 2 px at depth 20 are 0.036 units.
+  EXPECT_EQ(next(camera_at(moved({0.01f, 0.03f, 0}))), FrameKind::sub);
+  EXPECT_EQ(next(camera_at(moved({0.02f, 0.04f, 0}))), FrameKind::key);
+}
+
+TEST_F(OpenGroup, EndsWhereTheViewTurnsAway) {
+  EXPECT_EQ(next(camera_at(turned(0.05f, {0, 1, 0}, {0.01f, 0, 0}))), FrameKind::sub);
+  EXPECT_EQ(next(camera_at(turned(0.2f, {0, 1, 0}, {0.02f, 0, 0}))), FrameKind::key);
+}
+
+TEST_F(OpenGroup, EndsWhenSomethingNearComesIntoView) {
+  EXPECT_EQ(next(camera_at(moved({0.01f, 0.01f, 0}))), FrameKind::sub);
+  EXPECT_EQ(next(camera_at(moved({0.02f, 0.01f, 0})), 0.5f), FrameKind::key);
+}
+
+TEST_F(OpenGroup, EndsWithAnotherLens) {
+  const Pose expected = moved({0.01f, 0, 0});
+  std::vector<Camera> others(4, camera_at(expected));
+  others[0].size_px.x += 16;
+  others[1].focal_px.y *= 1.01f;
+  others[2].principal_point_px.x += 1.0f;
+  others[3].near_z = 0.1f;
+  for (const Camera& other : others) {
+    FrameGroups groups{{}};
+    groups.plan(camera_at({}), Forecast{moved({0.04f, 0, 0}), 4}, depth);
+    EXPECT_EQ(groups.plan(other, std::nullopt, depth).kind, FrameKind::key);
+  }
+}
+
+TEST_F(OpenGroup, EndsWhenTheCachesAreGone) {
+  groups_.forget();
+  EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::key);
+  EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::sub);
+}
+
+}  // namespace
+}  // namespace catgs
