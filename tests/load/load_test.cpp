@@ -2,7 +2,6 @@
 // milliseconds: those belong to benchmarks.
 #include "tests/load/load.h"
 
-#include <filesystem>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -11,6 +10,7 @@
 
 #include "render_core/error.h"
 #include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
 
 namespace catgs::load {
@@ -70,8 +70,7 @@ TEST(Load, MjpegDecodesToo) {
 }
 
 TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
-  const auto folder = std::filesystem::temp_directory_path() / "catgs_load_tls";
-  std::filesystem::create_directories(folder);
+  const test::TemporaryFolder folder;
   test::write_self_signed(folder / "certificate.pem", folder / "key.pem");
   const RunningServer server([&](ServerConfig& config) {
     config.tls_cert = folder / "certificate.pem";
@@ -84,7 +83,6 @@ TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
   const SessionReports refused = run_load(options);
   EXPECT_FALSE(refused[0]->stats.connected);
   EXPECT_THAT(errors_of(refused), ::testing::HasSubstr("certificate verify failed"));
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {

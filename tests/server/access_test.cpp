@@ -1,12 +1,10 @@
 #include "server/access.h"
 
-#include <fstream>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "render_core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -18,18 +16,7 @@ constexpr std::string_view key = "0123456789abcdef0123456789abcdef";
 
 class AccessTest : public testing::Test {
  protected:
-  std::filesystem::path write(const std::string& name, const std::string& text) {
-    const auto path = folder / name;
-    std::ofstream(path) << text;
-    return path;
-  }
-  void SetUp() override {
-    folder = std::filesystem::path(testing::TempDir()) / ("access-" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder); }
-
-  std::filesystem::path folder;
+  const test::TemporaryFolder folder;
 };
 
 TEST_F(AccessTest, LinksCarryTheirGrant) {
@@ -58,7 +45,7 @@ TEST_F(AccessTest, AChangedLinkIsNoLink) {
 }
 
 TEST_F(AccessTest, LinksExpireAndBelongToAScene) {
-  AccessControl access({}, write("key", std::string(key) + "\n"));
+  AccessControl access({}, folder.write("key", std::string(key) + "\n"));
   const std::string token = make_link_token({"city", "viewer", 1000}, key);
   EXPECT_FALSE(access.refusal(token, "city", 999));
   EXPECT_THAT(access.refusal(token, "city", 1000), Optional(HasSubstr("expired")));
@@ -69,19 +56,19 @@ TEST_F(AccessTest, LinksExpireAndBelongToAScene) {
 }
 
 TEST_F(AccessTest, StaticTokensAreReadAgain) {
-  const auto path = write("tokens", "# first\nalpha-alpha\n");
+  const auto path = folder.write("tokens", "# first\nalpha-alpha\n");
   AccessControl access(path, {});
   EXPECT_FALSE(access.refusal("alpha-alpha", "city", 0));
   EXPECT_TRUE(access.refusal("alpha-alph", "city", 0));
   EXPECT_TRUE(access.refusal("# first", "city", 0));
 
   const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
-  write("tokens", "beta-beta\n");
+  folder.write("tokens", "beta-beta\n");
   std::filesystem::last_write_time(path, later);
   EXPECT_TRUE(access.refusal("alpha-alpha", "city", 0));
   EXPECT_FALSE(access.refusal("beta-beta", "city", 0));
 
-  write("tokens", "x\n");  // too short: the good ones stay
+  folder.write("tokens", "x\n");  // too short: the good ones stay
   std::filesystem::last_write_time(path, later + std::chrono::seconds(2));
   EXPECT_FALSE(access.refusal("beta-beta", "city", 0));
 }
@@ -92,8 +79,8 @@ TEST_F(AccessTest, WithoutFilesEverybodyMayEnter) {
 }
 
 TEST_F(AccessTest, NamesWhatIsWrong) {
-  EXPECT_THROW(read_key_file(write("short", "abc")), InputError);
-  EXPECT_THROW(AccessControl(write("empty", "# nothing\n"), {}), InputError);
+  EXPECT_THROW(read_key_file(folder.write("short", "abc")), InputError);
+  EXPECT_THROW(AccessControl(folder.write("empty", "# nothing\n"), {}), InputError);
   EXPECT_THROW(make_link_token({"city", "A B", 0}, key), InputError);
   for (const char* text : {"", "7", "d", "7x", "-1d", "0s", "7d ", "99999999d"})
     EXPECT_THROW(parse_duration(text), InputError) << text;

@@ -1,14 +1,12 @@
 #include "server/config.h"
 
-#include <filesystem>
-#include <fstream>
 #include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "render_core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -20,11 +18,8 @@ using testing::ThrowsMessage;
 
 class ConfigTest : public testing::Test {
  protected:
-  ConfigTest() : path(testing::TempDir() + "catgs-" + std::to_string(::getpid()) + ".toml") {}
-  ~ConfigTest() override { std::filesystem::remove(path); }
-
   void read_toml(const std::string& text) {
-    std::ofstream(path) << text;
+    folder.write("server.toml", text);
     apply_toml(path, config, sources);
   }
   void read_environment(const std::map<std::string, std::string>& variables) {
@@ -41,7 +36,8 @@ class ConfigTest : public testing::Test {
     apply_flag(*it, values, config, sources);
   }
 
-  std::string path;
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "server.toml";
   ServerConfig config;
   ConfigSources sources;
 };
@@ -69,7 +65,7 @@ TEST_F(ConfigTest, PrintedConfigReadsBackTheSame) {
   const std::string printed = print_config(config, sources);
   ServerConfig again;
   ConfigSources ignored;
-  std::ofstream(path) << printed;
+  folder.write("server.toml", printed);
   apply_toml(path, again, ignored);
   EXPECT_EQ(again.scenes, config.scenes);
   EXPECT_EQ(again.encoder, EncoderKind::jpeg);

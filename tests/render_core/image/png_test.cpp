@@ -9,6 +9,7 @@
 
 #include "render_core/error.h"
 #include "render_core/host_image.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -18,11 +19,8 @@ using ::testing::ThrowsMessage;
 
 class Png : public ::testing::Test {
  protected:
-  void TearDown() override { std::filesystem::remove(path_); }
-  std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() /
-      (std::string("catgs_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() +
-       ".png");
+  const test::TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_ / "picture.png";
 };
 
 Image ramp(int width, int height) {

@@ -12,6 +12,7 @@
 
 #include "render_core/error.h"
 #include "render_core/motion/portable.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -219,8 +220,8 @@ TEST(Script, DroneBanksIntoItsTurns) {
 
 class Tour : public ::testing::Test {
  protected:
-  void TearDown() override { std::filesystem::remove(path_); }
-  std::filesystem::path path_ = std::filesystem::temp_directory_path() / "catgs_script_tour.tum";
+  const test::TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_ / "tour.tum";
 };
 
 TEST_F(Tour, PassesItsKeyframesSmoothlyAndStaysAtTheLast) {

@@ -2,13 +2,13 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "render_core/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -19,15 +19,10 @@ using ::testing::ThrowsMessage;
 class TumFile : public ::testing::Test {
  protected:
   std::filesystem::path write(const std::string& text) const {
-    std::ofstream(path_, std::ios::binary) << text;
-    return path_;
+    return folder_.write("poses.tum", text);
   }
-  void TearDown() override { std::filesystem::remove(path_); }
 
-  std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() /
-      (std::string("catgs_") + ::testing::UnitTest::GetInstance()->current_test_info()->name() +
-       ".tum");
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(TumFile, ReadsCommentsBlankLinesAndAnyWhiteSpace) {
@@ -83,8 +78,9 @@ TEST_F(TumFile, RoundTripIsExact) {
     written.push_back(
         {i * 8'333, {glm::vec3(x, -x, x * x), glm::angleAxis(x, glm::vec3(0, 1, 0))}});
   }
-  write_tum(path_, written);
-  const Trajectory read = read_tum(path_);
+  const std::filesystem::path path = folder_ / "poses.tum";
+  write_tum(path, written);
+  const Trajectory read = read_tum(path);
   ASSERT_EQ(read.size(), written.size());
   for (std::size_t i = 0; i < read.size(); ++i) {
     EXPECT_EQ(read[i].time_us, written[i].time_us);

@@ -194,7 +194,7 @@ TEST(Sidecar, ErrorsNameTheField) {
               HasSubstr("start_pose.orientation"));
 }
 
-class Hints : public TemporaryFolder {
+class Hints : public FolderTest {
  protected:
   SceneHints find() {
     return find_hints(cloud_,

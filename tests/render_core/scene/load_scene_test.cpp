@@ -23,7 +23,7 @@ std::string ply_bytes(const GaussianCloud& cloud) {
   return out.str();
 }
 
-class LoadScene : public TemporaryFolder {};
+class LoadScene : public FolderTest {};
 
 TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {
   const GaussianCloud cloud = random_cloud(5000, 3);

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <random>
 #include <span>
@@ -16,6 +15,7 @@
 #include "render_core/scene/byte_source.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/load_context.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
 
@@ -118,26 +118,13 @@ inline void expect_near(const GaussianCloud& wanted, const GaussianCloud& read,
 /// to `error`: the component that is left out, at least 1/2, is then off by up to 3 times that.
 constexpr float smallest_three_angle(float error) { return 2.0f * 3.4641016f * error; }
 
-/// A folder of its own for each test case, removed afterwards.
-class TemporaryFolder : public ::testing::Test {
+/// Of a test case that reads and writes files.
+class FolderTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("catgs_") + info->test_suite_name() + "_" + info->name() + "_" +
-               std::to_string(std::random_device{}()));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   std::filesystem::path write(const std::string& name, const std::string& content) const {
-    const auto path = folder_ / name;
-    std::filesystem::create_directories(path.parent_path());
-    std::ofstream(path, std::ios::binary) << content;
-    return path;
+    return folder_.write(name, content);
   }
-
-  std::filesystem::path folder_;
+  const TemporaryFolder folder_;
 };
 
 }  // namespace catgs::test

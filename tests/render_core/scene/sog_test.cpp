@@ -58,12 +58,12 @@ INSTANTIATE_TEST_SUITE_P(Sog, SogVersions,
                          ::testing::Values(Case{1, 0}, Case{1, 1}, Case{1, 2}, Case{1, 3},
                                            Case{2, 0}, Case{2, 1}, Case{2, 2}, Case{2, 3}));
 
-class SogFolder : public TemporaryFolder {};
+class SogFolder : public FolderTest {};
 
 TEST_F(SogFolder, FilesAreFoundBesideTheMetaData) {
   const GaussianCloud cloud = random_cloud(100, 1);
   for (const auto& [name, content] : encode_sog(cloud, 2)) write("part/" + name, content);
-  const SogFile sog = read_sog(FolderFiles(folder_), "part/meta.json", two_threads());
+  const SogFile sog = read_sog(FolderFiles(folder_.path()), "part/meta.json", two_threads());
   expect_near(cloud, sog.cloud, steps(2));
 }
 
@@ -72,8 +72,9 @@ TEST_F(SogFolder, NamesCannotLeadOut) {
     meta["quats"]["files"][0] = "../quats.webp";
   });
   for (const auto& [name, content] : files) write(name, content);
-  EXPECT_THAT(input_error([&] { read_sog(FolderFiles(folder_), "meta.json", two_threads()); }),
-              HasSubstr("leads out of the folder"));
+  EXPECT_THAT(
+      input_error([&] { read_sog(FolderFiles(folder_.path()), "meta.json", two_threads()); }),
+      HasSubstr("leads out of the folder"));
 }
 
 TEST(Sog, RangesAreDecodedToTheirPlaces) {

@@ -19,10 +19,9 @@ Json piece(int file, int offset, int count) {
 
 /// Three nodes; level 0 has 100 + 200 + 300, level 1 has 40 + 50 (the third node lacks it), level 2
 /// 10 + 11 + 12 Gaussians.
-class StreamedSogTest : public TemporaryFolder {
+class StreamedSogTest : public FolderTest {
  protected:
   void SetUp() override {
-    TemporaryFolder::SetUp();
     write_sog("fine", 600, 2);
     write_sog("middle", 90, 1);
     write_sog("coarse", 33, 1);
@@ -47,7 +46,7 @@ class StreamedSogTest : public TemporaryFolder {
 
   StreamedSog load(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
     write("lod-meta.json", meta_.dump());
-    return read_streamed_sog(FolderFiles(folder_), level, budget, two_threads());
+    return read_streamed_sog(FolderFiles(folder_.path()), level, budget, two_threads());
   }
 
   Json meta_;

@@ -15,6 +15,7 @@
 #include "render_core/image/png.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/save_scene.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -61,17 +62,11 @@ GaussianCloud ball() {
 class CatgsRender : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("catgs_render_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
     save_scene(ball(), folder_ / "ball.ply");
     write_tum(path("path.tum"), {{0, {glm::vec3(0, 0, -4), {1, 0, 0, 0}}},
                                  {500'000, {glm::vec3(0.2f, 0, -4), {1, 0, 0, 0}}},
                                  {1'000'000, {glm::vec3(0.4f, 0, -4), {1, 0, 0, 0}}}});
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
   std::string scene() const { return path("ball.ply"); }
@@ -79,7 +74,7 @@ class CatgsRender : public ::testing::Test {
     return run(fmt::format("frames {} --size 64x48 {}", scene(), arguments));
   }
 
-  std::filesystem::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 TEST_F(CatgsRender, FramesOfATraceAreItsSamples) {

@@ -10,6 +10,7 @@
 #include "render_core/error.h"
 #include "render_core/host_image.h"
 #include "render_core/image/png.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -20,15 +21,6 @@ using ::testing::ThrowsMessage;
 
 class FrameSinkTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("catgs_sink_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   std::unique_ptr<FrameSink> sink(const std::string& name, glm::ivec2 size_px = {16, 8}) const {
     return make_frame_sink(
         {.path = folder_ / name, .size_px = size_px, .fps = 29.97, .first_frame = 7});
@@ -38,7 +30,7 @@ class FrameSinkTest : public ::testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
-  std::filesystem::path folder_;
+  const test::TemporaryFolder folder_;
 };
 
 FrameView grey_frame(HostImage& image, PixelFormat format, glm::ivec2 size_px) {
@@ -110,7 +102,7 @@ TEST_F(FrameSinkTest, RefusesWhatItCannotWrite) {
   EXPECT_THAT([&] { sink("a.gif"); },
               ThrowsMessage<InputError>(HasSubstr("unknown kind of output")));
   EXPECT_THROW(sink("no_such_folder/a.y4m"), InputError);
-  std::ofstream(folder_ / "file") << "in the way";
+  folder_.write("file", "in the way");
   EXPECT_THROW(sink("file/pictures"), InputError);
 }
 

@@ -1,14 +1,13 @@
 #include "server/net/http.h"
 
 #include <filesystem>
-#include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "render_core/error.h"
 #include "server/net/static_files.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -34,12 +33,10 @@ TEST(ContentSecurityPolicy, NamesWhoMayEmbed) {
 }
 
 TEST(StaticFiles, CompressesTextAndKeepsTypes) {
-  const auto folder =
-      std::filesystem::path(testing::TempDir()) / ("static-" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder / "assets");
-  std::ofstream(folder / "index.html") << std::string(5000, 'a');
-  std::ofstream(folder / "assets" / "x.mjs") << "export {}";
-  const StaticFiles files(folder);
+  const test::TemporaryFolder folder;
+  folder.write("index.html", std::string(5000, 'a'));
+  folder.write("assets/x.mjs", "export {}");
+  const StaticFiles files(folder.path());
   const auto plain = files.respond({"/", "", false});
   EXPECT_EQ(plain.body->size(), 5000u);
   EXPECT_FALSE(plain.gzip);
@@ -52,7 +49,6 @@ TEST(StaticFiles, CompressesTextAndKeepsTypes) {
               HasSubstr("text/javascript"));
   EXPECT_EQ(files.respond({"/assets/../index.html", "", true}).status, 404);
   EXPECT_EQ(files.respond({"/assets", "", true}).status, 404);
-  std::filesystem::remove_all(folder);
 }
 
 TEST(StaticFiles, NamesAFolderThatIsNoClient) {

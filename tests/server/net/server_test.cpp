@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 #include <boost/system/system_error.hpp>
@@ -16,6 +15,7 @@
 
 #include "render_core/error.h"
 #include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
 
 namespace catgs::test {
@@ -212,9 +212,8 @@ TEST(Server, RefusesForeignOriginsAndProtocols) {
 }
 
 TEST(Server, AdmitsByTokenAndNeverSaysIt) {
-  const auto folder = std::filesystem::path(testing::TempDir());
-  const auto token_file = folder / ("tokens-" + std::to_string(::getpid()));
-  std::ofstream(token_file) << "# museum\nopen-sesame-1\n";
+  const TemporaryFolder folder;
+  const auto token_file = folder.write("tokens", "# museum\nopen-sesame-1\n");
   RunningServer server([&](ServerConfig& config) { config.token_file = token_file.string(); });
   WireClient stranger(server.port());
   stranger.send(hello_message(64, 64, v1::CODEC_H264));
@@ -226,16 +225,13 @@ TEST(Server, AdmitsByTokenAndNeverSaysIt) {
   WireClient guest(server.port());
   guest.greet(64, 64, v1::CODEC_H264, "open-sesame-1");
   EXPECT_THAT(sessions_json(server), Not(HasSubstr("sesame")));
-  std::filesystem::remove(token_file);
 }
 
 TEST(Server, ServesPagesAndNothingElse) {
-  const auto folder =
-      std::filesystem::path(testing::TempDir()) / ("client-" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder / "web" / "assets");
-  std::ofstream(folder / "web" / "index.html") << "<!doctype html>";
-  std::ofstream(folder / "web" / "assets" / "a.wasm") << "wasm";
-  std::ofstream(folder / "secret.txt") << "secret";
+  const TemporaryFolder folder;
+  folder.write("web/index.html", "<!doctype html>");
+  folder.write("web/assets/a.wasm", "wasm");
+  folder.write("secret.txt", "secret");
   RunningServer server([&](ServerConfig& c) { c.client_dir = (folder / "web").string(); });
 
   const HttpReply page = http_get(server.port(), "/");
@@ -259,13 +255,12 @@ TEST(Server, ServesPagesAndNothingElse) {
   EXPECT_THAT(http_get(server.port(), "/api/scenes").body, HasSubstr("\"id\":\"city\""));
   EXPECT_EQ(http_get(server.port(), "/metrics").status, 404);
   EXPECT_THAT(http_get(server.admin_port(), "/metrics").body, HasSubstr("catgs_sessions 0"));
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Server, ServesTlsWithTheGivenCertificate) {
-  const auto folder = std::filesystem::path(testing::TempDir());
-  const auto certificate = folder / ("cert-" + std::to_string(::getpid()) + ".pem");
-  const auto key = folder / ("key-" + std::to_string(::getpid()) + ".pem");
+  const TemporaryFolder folder;
+  const auto certificate = folder / "certificate.pem";
+  const auto key = folder / "key.pem";
   write_self_signed(certificate, key);
   {
     RunningServer server([&](ServerConfig& config) {
@@ -289,7 +284,6 @@ TEST(Server, ServesTlsWithTheGivenCertificate) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("--tls-key"));
   }
-  std::filesystem::remove(certificate);
 }
 
 TEST(Server, NamesABusyPort) {
