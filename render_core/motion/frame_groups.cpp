@@ -29,6 +29,49 @@ Camera at_pose(const Camera& camera, const Pose& world_from_camera) {
 
 glm::dquat unit(const glm::quat& q) { return glm::normalize(glm::dquat(q)); }
 
+/// What a camera's image looks like from another pose.
+class RelativeView {
+ public:
+  RelativeView(const Camera& from, const Pose& to)
+      : to_from_(glm::conjugate(unit(to.orientation)) * unit(from.world_from_camera.orientation)),
+        shift_(glm::conjugate(unit(to.orientation)) *
+               (glm::dvec3(from.world_from_camera.position) - glm::dvec3(to.position))),
+        focal_(from.focal_px),
+        centre_(from.principal_point_px),
+        near_z_(from.near_z) {}
+
+  /// Where the point seen at `pixel` with view depth `depth` (world units; may be infinite) lies in
+  /// the image from the other pose; infinitely far away if it is not in front of the camera there.
+  [[nodiscard]] glm::dvec2 image_of(const glm::dvec2& pixel, double depth) const {
+    const glm::dvec3 ray = to_from_ * glm::dvec3((pixel - centre_) / focal_, 1.0);
+    const bool far = std::isinf(depth);
+    const glm::dvec3 point = far ? ray : ray * depth + shift_;
+    if (!(point.z > (far ? 0.0 : near_z_))) {
+      return glm::dvec2(std::numeric_limits<double>::infinity());
+    }
+    return centre_ + focal_ * glm::dvec2(point) / point.z;
+  }
+
+ private:
+  glm::dquat to_from_;
+  glm::dvec3 shift_;
+  glm::dvec2 focal_, centre_;
+  double near_z_;
+};
+
+/// Calls visit(pixel, depth) for a grid of image points, at `nearest_depth` and at infinity.
+template <class Visit>
+void for_each_point(const Camera& camera, float nearest_depth, const Visit& visit) {
+  for (int row = 0; row <= grid_steps; ++row) {
+    for (int column = 0; column <= grid_steps; ++column) {
+      const glm::dvec2 pixel =
+          glm::dvec2(camera.size_px) * glm::dvec2(column, row) / static_cast<double>(grid_steps);
+      visit(pixel, static_cast<double>(nearest_depth));
+      visit(pixel, std::numeric_limits<double>::infinity());
+    }
+  }
+}
+
 }  // namespace
 
 void check_speculation(const SpeculationSettings& settings) {
@@ -56,29 +99,29 @@ Pose uniform_motion(const Pose& from, const Pose& to, float share) {
 }
 
 float max_displacement_px(const Camera& now, const Pose& end, float nearest_depth) {
-  const glm::dquat end_from_now =
-      glm::conjugate(unit(end.orientation)) * unit(now.world_from_camera.orientation);
-  const glm::dvec3 shift = glm::conjugate(unit(end.orientation)) *
-                           (glm::dvec3(now.world_from_camera.position) - glm::dvec3(end.position));
-  const glm::dvec2 focal(now.focal_px), centre(now.principal_point_px), size(now.size_px);
+  const RelativeView view(now, end);
   double largest = 0.0;
-  const auto move = [&](const glm::dvec2& pixel, const glm::dvec3& end_point, double end_min_z) {
-    if (!(end_point.z > end_min_z)) {
+  for_each_point(now, nearest_depth, [&](const glm::dvec2& pixel, double depth) {
+    largest = std::max(largest, glm::distance(pixel, view.image_of(pixel, depth)));
+  });
+  return static_cast<float>(largest);
+}
+
+float max_deviation_px(const Camera& key, const Pose& end, const Pose& now, float nearest_depth) {
+  const RelativeView end_view(key, end), now_view(key, now);
+  double largest = 0.0;
+  for_each_point(key, nearest_depth, [&](const glm::dvec2& pixel, double depth) {
+    const glm::dvec2 trail = end_view.image_of(pixel, depth) - pixel;
+    const glm::dvec2 moved = now_view.image_of(pixel, depth) - pixel;
+    if (std::isinf(trail.x) || std::isinf(moved.x)) {
       largest = std::numeric_limits<double>::infinity();
       return;
     }
-    const glm::dvec2 moved = centre + focal * glm::dvec2(end_point) / end_point.z;
-    largest = std::max(largest, glm::distance(pixel, moved));
-  };
-  for (int row = 0; row <= grid_steps; ++row) {
-    for (int column = 0; column <= grid_steps; ++column) {
-      const glm::dvec2 pixel = size * glm::dvec2(column, row) / static_cast<double>(grid_steps);
-      const glm::dvec3 turned = end_from_now * glm::dvec3((pixel - centre) / focal, 1.0);
-      move(pixel, turned, 0.0);
-      const auto depth = static_cast<double>(nearest_depth);
-      if (std::isfinite(depth)) move(pixel, turned * depth + shift, now.near_z);
-    }
-  }
+    const double length2 = glm::dot(trail, trail);
+    const double share =
+        length2 > 0.0 ? std::clamp(glm::dot(moved, trail) / length2, 0.0, 1.0) : 0.0;
+    largest = std::max(largest, glm::distance(moved, share * trail));
+  });
   return static_cast<float>(largest);
 }
 
@@ -115,14 +158,12 @@ FramePlan FrameGroups::plan(const Camera& now, const std::optional<Forecast>& fo
   return {FrameKind::key, window_, end_};
 }
 
-/// Whether the group's lists hold what the next frame shows. A displacement at infinity is one by
+/// Whether the group's lists hold what the next frame shows. A deviation at infinity is one by
 /// rotation alone, so the bound in pixels bounds the angle too.
 bool FrameGroups::continues(const Camera& now, float nearest_depth) const {
-  if (drawn_ >= window_ || !same_lens(now, key_)) return false;
-  const float share = static_cast<float>(drawn_ + 1) / static_cast<float>(window_);
-  const Pose expected = uniform_motion(key_.world_from_camera, end_.world_from_camera, share);
-  return max_displacement_px(at_pose(now, expected), now.world_from_camera, nearest_depth) <=
-         settings_.max_deviation_px;
+  return drawn_ < window_ && same_lens(now, key_) &&
+         max_deviation_px(key_, end_.world_from_camera, now.world_from_camera, nearest_depth) <=
+             settings_.max_deviation_px;
 }
 
 }  // namespace catgs

@@ -27,8 +27,8 @@ struct SpeculationSettings {
   int initial_window = 4;      // W0: sub-frames behind a key frame while motion is small; 0: never
   float max_trail_px = 16.0f;  // l: the window shrinks when a Gaussian would move farther in it
   float min_depth = 0.0f;      // d, world units: nearer ones do not shrink it; 0: 2 x near plane
-  // A sub-frame is drawn only this close to the forecast path, by the largest displacement in the
-  // image; else the lists would miss Gaussians at the edges of tiles.
+  // A sub-frame is drawn only while its Gaussians lie this close to their trails; farther off, the
+  // lists miss some at the edges of tiles.
   float max_deviation_px = 2.0f;
 };
 
@@ -50,6 +50,11 @@ Pose uniform_motion(const Pose& from, const Pose& to, float share);
 /// the view axis) and at infinity. Depths between the two move less. Infinite when a point at
 /// nearest_depth ends up behind the near plane: no displacement bounds its trail.
 float max_displacement_px(const Camera& now, const Pose& end, float nearest_depth);
+
+/// How far from its trail the image of a point may lie, in pixels, when the camera should have gone
+/// from `key` to `end` but is at `now`; over the points of max_displacement_px(). The trail is what
+/// lists cover, so being early or late on the path is no deviation.
+float max_deviation_px(const Camera& key, const Pose& end, const Pose& now, float nearest_depth);
 
 /// The paper's rule, with M the displacement over `initial_window` frames: W0 if M <= l, else
 /// floor(W0 l / M).

@@ -79,6 +79,25 @@ TEST(MaxDisplacement, IsUnboundedThroughTheNearPlaneOrBehindTheCamera) {
   EXPECT_EQ(max_displacement_px(camera_at({}), turned(180, {0, 1, 0}), infinity), infinity);
 }
 
+TEST(MaxDeviation, IsTheDistanceFromTheTrail) {
+  const Camera key = camera_at({});
+  const Pose end = moved({0.1f, 0, 0});  // trails of 55 px to the left at depth 2
+  EXPECT_NEAR(max_deviation_px(key, end, moved({0, 0, 0}), 2.0f), 0.0f, 1e-3f);
+  EXPECT_NEAR(max_deviation_px(key, end, moved({0.07f, 0, 0}), 2.0f), 0.0f, 1e-3f);   // early
+  EXPECT_NEAR(max_deviation_px(key, end, moved({0.12f, 0, 0}), 2.0f), 11.0f, 1e-3f);  // beyond
+  EXPECT_NEAR(max_deviation_px(key, end, moved({-0.02f, 0, 0}), 2.0f), 11.0f, 1e-3f);
+  EXPECT_NEAR(max_deviation_px(key, end, moved({0.05f, 0.02f, 0}), 2.0f), 11.0f, 1e-3f);
+  EXPECT_EQ(max_deviation_px(key, end, moved({0, 0, 1.9f}), 2.0f), infinity);
+}
+
+TEST(MaxDeviation, OfATurnNeedsNoDepth) {
+  const Camera key = camera_at({});
+  const float turn = max_displacement_px(key, turned(1, {0, 1, 0}), infinity);
+  EXPECT_FLOAT_EQ(max_deviation_px(key, {}, turned(1, {0, 1, 0}), infinity), turn);
+  EXPECT_NEAR(max_deviation_px(key, turned(2, {0, 0, 1}), turned(1, {0, 0, 1}), infinity),
+              std::hypot(960.0f, 540.0f) * (1.0f - std::cos(glm::radians(1.0f))), 1e-2f);
+}
+
 TEST(SpeculationWindow, IsThePapersRule) {
   EXPECT_EQ(speculation_window(4, 16.0f, 0.0f), 4);
   EXPECT_EQ(speculation_window(4, 16.0f, 16.0f), 4);
@@ -206,6 +225,11 @@ TEST_F(OpenGroup, EndsWhereTheCameraLeavesThePath) {
 TEST_F(OpenGroup, EndsWhereTheViewTurnsAway) {
   EXPECT_EQ(next(camera_at(turned(0.05f, {0, 1, 0}, {0.01f, 0, 0}))), FrameKind::sub);
   EXPECT_EQ(next(camera_at(turned(0.2f, {0, 1, 0}, {0.02f, 0, 0}))), FrameKind::key);
+}
+
+TEST_F(OpenGroup, GoesOnWhenTheCameraStops) {
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(next(camera_at({})), FrameKind::sub);
+  EXPECT_EQ(next(camera_at({})), FrameKind::key);
 }
 
 TEST_F(OpenGroup, EndsWhenSomethingNearComesIntoView) {
