@@ -125,4 +125,24 @@ ImageQuality compare_images(const Image& a, const Image& b) {
   return quality;
 }
 
+double pop_excess(const Step& shown, const Step& truth) {
+  const std::size_t count = shown.after.rgb.size();
+  for (const Image* image : {&shown.before, &truth.before, &truth.after}) {
+    if (image->size_px != shown.after.size_px || count == 0) {
+      throw std::invalid_argument("pop_excess: needs four pictures of one size");
+    }
+  }
+  std::vector<double> excess(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto change = [i](const Step& step) {
+      return std::abs(static_cast<double>(step.after.rgb[i]) - step.before.rgb[i]);
+    };
+    excess[i] = change(shown) - change(truth);
+  }
+  const auto rank = static_cast<std::size_t>(std::ceil(0.999 * static_cast<double>(count))) - 1;
+  const auto place = excess.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::ranges::nth_element(excess, place);
+  return *place;
+}
+
 }  // namespace catgs

@@ -30,4 +30,15 @@ struct ImageQuality {
 /// averaged over the channels and the positions where the whole window fits.
 ImageQuality compare_images(const Image& a, const Image& b);
 
+/// Two pictures in time order.
+struct Step {
+  const Image& before;
+  const Image& after;
+};
+
+/// How much more a shown step changes than the true one: the value that 99.9 % of all channels of
+/// |shown change| - |true change| do not exceed. All pictures have one size
+/// (std::invalid_argument).
+double pop_excess(const Step& shown, const Step& truth);
+
 }  // namespace catgs

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "render_core/tools/frame_feed.h"
+
 namespace catgs {
 namespace {
 
@@ -12,58 +14,104 @@ double ms_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
 
+template <class Visit>
+void for_each_frame(const Measurement& measurement, Measurement::Kind kind, const Visit& visit) {
+  for (const Measurement::Frame& frame : measurement.frames) {
+    if (!kind || frame.stats.kind == *kind) visit(frame);
+  }
+}
+
 }  // namespace
 
 double Measurement::fps() const {
   return wall_ms > 0.0 ? 1000.0 * static_cast<double>(frames.size()) / wall_ms : 0.0;
 }
 
-std::vector<double> Measurement::frame_ms(FrameKind kind) const {
+std::vector<double> Measurement::frame_ms(Kind kind) const {
   std::vector<double> times;
-  for (const Frame& frame : frames) {
-    if (frame.stats.kind == kind) times.push_back(frame.ms);
-  }
+  for_each_frame(*this, kind, [&](const Frame& frame) { times.push_back(frame.ms); });
   return times;
 }
 
-std::vector<double> Measurement::frame_ms() const {
-  std::vector<double> times;
-  for (const Frame& frame : frames) times.push_back(frame.ms);
-  return times;
-}
-
-double Measurement::mean_stage_ms(Stage stage) const {
+double Measurement::mean_stage_ms(Stage stage, Kind kind) const {
   double sum = 0.0;
-  for (const Frame& frame : frames) sum += frame.stats.stage_ms[static_cast<std::size_t>(stage)];
-  return frames.empty() ? 0.0 : sum / static_cast<double>(frames.size());
+  std::size_t count = 0;
+  for_each_frame(*this, kind, [&](const Frame& frame) {
+    sum += frame.stats.stage_ms[static_cast<std::size_t>(stage)];
+    ++count;
+  });
+  return count == 0 ? 0.0 : sum / static_cast<double>(count);
 }
 
-Measurement measure(const RenderSetup& setup, std::size_t warmup, const ProgressReport& report) {
-  const auto view = setup.made.renderer->make_view(
-      {.pipeline = setup.pipeline, .format = PixelFormat::rgb_f32, .space = MemorySpace::device});
-  FrameView frame;
-  for (std::size_t i = 0; i < std::min(warmup, setup.poses.size()); ++i) {
-    render_or_throw(*view, setup.request(i), frame);
+ListLength Measurement::list_length(Kind kind) const {
+  ListLength length;
+  std::size_t count = 0;
+  for_each_frame(*this, kind, [&](const Frame& frame) {
+    length.mean += static_cast<double>(frame.stats.list_entries);
+    length.visible_mean += static_cast<double>(frame.stats.visible);
+    length.max = std::max(length.max, frame.stats.list_entries);
+    length.tile_max = std::max(length.tile_max, frame.stats.list_max);
+    length.overflowed += frame.stats.overflowed_entries;
+    ++count;
+  });
+  length.mean /= static_cast<double>(std::max<std::size_t>(count, 1));
+  length.visible_mean /= static_cast<double>(std::max<std::size_t>(count, 1));
+  return length;
+}
+
+std::map<int, std::size_t> Measurement::window_histogram() const {
+  std::map<int, std::size_t> histogram;
+  for_each_frame(*this, FrameKind::key,
+                 [&](const Frame& frame) { ++histogram[frame.stats.window]; });
+  return histogram;
+}
+
+std::size_t Measurement::windows_cut() const {
+  std::size_t cut = 0;
+  int missing = 0;  // sub-frames that the group still promised
+  for (const Frame& frame : frames) {
+    if (frame.stats.kind == FrameKind::key) {
+      cut += missing > 0 ? 1 : 0;
+      missing = frame.stats.window;
+    } else {
+      --missing;
+    }
   }
+  return cut;
+}
+
+Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t warmup,
+                    const ProgressReport& report) {
+  settings.format = PixelFormat::rgb_f32;
+  settings.space = MemorySpace::device;
+  const auto view = setup.made.renderer->make_view(settings);
+  FrameView frame;
+  FrameFeed warmup_feed(setup, settings);
+  for (std::size_t i = 0; i < std::min(warmup, setup.poses.size()); ++i) {
+    render_or_throw(*view, warmup_feed.next(), frame);
+  }
+  FrameFeed feed(setup, settings);
   Measurement measurement;
   measurement.frames.reserve(setup.poses.size());
   const auto start = Clock::now();
   auto last = start;
   for (std::size_t i = 0; i < setup.poses.size(); ++i) {
-    render_or_throw(*view, setup.request(i), frame);
+    render_or_throw(*view, feed.next(), frame);
     const auto now = Clock::now();
     measurement.frames.push_back({ms_between(last, now), frame.stats});
     last = now;
     report(static_cast<double>(i + 1) / static_cast<double>(setup.poses.size()));
   }
   measurement.wall_ms = ms_between(start, Clock::now());
+  measurement.view_bytes = view->memory_bytes();
   return measurement;
 }
 
-PairCost count_pairs(const RenderSetup& setup, const Measurement& measurement) {
+PairCost count_pairs(const RenderSetup& setup, ViewSettings settings,
+                     const Measurement& measurement) {
   constexpr std::size_t max_counted_frames = 8;
-  const auto view = setup.made.renderer->make_view(
-      {.pipeline = setup.pipeline, .format = PixelFormat::rgb_f32, .count_pairs = true});
+  settings.count_pairs = true;
+  const auto view = setup.made.renderer->make_view(settings);
   const std::size_t counted = std::min(max_counted_frames, setup.poses.size());
   double pairs = 0.0;
   double blend_ms = 0.0;

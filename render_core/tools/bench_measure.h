@@ -1,42 +1,63 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "render_core/tools/render_setup.h"
 
 namespace catgs {
 
-/// One pass over the path: frames back to back, nothing skipped.
+/// Lists of a set of frames.
+struct ListLength {
+  double mean = 0.0;             // list entries per frame
+  std::uint64_t max = 0;         // of a frame
+  std::uint32_t tile_max = 0;    // longest list of a tile
+  std::uint64_t overflowed = 0;  // entries that found no memory, all frames
+  double visible_mean = 0.0;
+};
+
+/// One pass over the path: frames back to back, nothing skipped. The queries below take all frames,
+/// or those of one kind.
 struct Measurement {
   struct Frame {
     double ms = 0.0;  // since the completion of the frame before
     FrameStats stats;
   };
   std::vector<Frame> frames;
-  double wall_ms = 0.0;  // of the whole pass, so that the mean rate hides no work between frames
+  double wall_ms = 0.0;        // of the whole pass, so that the mean rate hides no work in between
+  std::size_t view_bytes = 0;  // memory of the View at the end, which never shrinks
 
+  using Kind = std::optional<FrameKind>;
   [[nodiscard]] double fps() const;
-  /// Frame times of one kind.
-  [[nodiscard]] std::vector<double> frame_ms(FrameKind kind) const;
-  [[nodiscard]] std::vector<double> frame_ms() const;
-  [[nodiscard]] double mean_stage_ms(Stage stage) const;
+  [[nodiscard]] std::vector<double> frame_ms(Kind kind = std::nullopt) const;
+  [[nodiscard]] double mean_stage_ms(Stage stage, Kind kind = std::nullopt) const;
+  [[nodiscard]] ListLength list_length(Kind kind = std::nullopt) const;
+  /// Key frames by the window that they promised.
+  [[nodiscard]] std::map<int, std::size_t> window_histogram() const;
+  /// Groups that ended before their window, because the camera left its forecast.
+  [[nodiscard]] std::size_t windows_cut() const;
 };
 
 using ProgressReport = std::function<void(double fraction)>;
 
-/// Renders the first `warmup` frames of the path unmeasured, then the whole path. Throws as
-/// render_or_throw().
-Measurement measure(const RenderSetup& setup, std::size_t warmup, const ProgressReport& report);
+/// Renders the first `warmup` frames of the path unmeasured, then the whole path, with a View of
+/// these settings whose frames stay on the device. Throws as make_view() and render_or_throw().
+Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t warmup,
+                    const ProgressReport& report);
 
 /// Cost of the inner loop: blend time over (Gaussian, pixel) pairs blended, in nanoseconds of wall
 /// clock. Pairs are counted afterwards on a few frames spread over the path, because counting costs
-/// time; the time is that of the same frames in `measurement`.
+/// time; the time is that of the same frames in `measurement`. The frames of the catgs pipeline are
+/// counted as key frames: a sub-frame blends the same pairs but for a few.
 struct PairCost {
   double pairs_per_frame = 0.0;
   double ns_per_pair = 0.0;  // 0 when nothing was blended
 };
-PairCost count_pairs(const RenderSetup& setup, const Measurement& measurement);
+PairCost count_pairs(const RenderSetup& setup, ViewSettings settings,
+                     const Measurement& measurement);
 
 }  // namespace catgs

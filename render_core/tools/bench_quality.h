@@ -11,11 +11,13 @@ namespace catgs {
 /// Quality of a set of frames: PSNR of the mean squared error over them, and the worst of them.
 class QualityTally {
  public:
-  void add(const ImageQuality& quality);
+  /// `frame` is its number in the path.
+  void add(const ImageQuality& quality, std::size_t frame);
 
   [[nodiscard]] std::size_t frames() const { return frames_; }
   [[nodiscard]] double mean_psnr() const;
   [[nodiscard]] double min_psnr() const { return psnr_db(max_error_); }
+  [[nodiscard]] std::size_t worst_frame() const { return worst_frame_; }
   [[nodiscard]] double mean_ssim() const;
   [[nodiscard]] double min_ssim() const { return min_ssim_; }
   /// Worst 16x16 block of all frames; the 0.1 % block of the worst frame.
@@ -24,6 +26,7 @@ class QualityTally {
 
  private:
   std::size_t frames_ = 0;
+  std::size_t worst_frame_ = 0;
   double error_sum_ = 0.0;
   double max_error_ = 0.0;
   double ssim_sum_ = 0.0;
@@ -32,14 +35,33 @@ class QualityTally {
   double block_0_1_percent_psnr_ = psnr_db(0.0);
 };
 
-struct QualityReport {
-  std::string against;       // "exact pipeline, every 10th frame"
-  bool whole_images = true;  // else random pixels: no SSIM, no blocks
-  QualityTally key, sub;
+/// A number per frame: its mean and its largest value.
+struct Extent {
+  std::size_t count = 0;
+  double sum = 0.0, max = 0.0;
+
+  void add(double value);
+  [[nodiscard]] double mean() const { return count == 0 ? 0.0 : sum / static_cast<double>(count); }
 };
 
-/// Judges the measured pipeline at its own poses: `exact` by the reference at random pixels of a
-/// few frames, anything else by the exact pipeline on whole pictures of every `every`-th frame.
-QualityReport judge(const RenderSetup& setup, std::size_t every, const ProgressReport& report);
+struct QualityReport {
+  std::string against;       // "exact pipeline, every 10th frame"
+  bool whole_images = true;  // else random pixels: no SSIM, no blocks and nothing of what follows
+  QualityTally key, sub;
+  // Share of pixels that more than half of the background shows through: a view of nothing much
+  // flatters every PSNR.
+  Extent see_through;
+  // pop_excess() at the switches from a sub-frame to the next key frame.
+  Extent pop;
+};
+
+/// What a switch may add to the change that the exact pipeline shows there.
+inline constexpr double max_pop = 1.0 / 255.0;
+
+/// Judges a pipeline at its own poses: `exact` by the reference at random pixels of a few frames,
+/// anything else by the exact pipeline on whole pictures: every `every`-th frame, every `every`-th
+/// switch.
+QualityReport judge(const RenderSetup& setup, const ViewSettings& settings, std::size_t every,
+                    const ProgressReport& report);
 
 }  // namespace catgs

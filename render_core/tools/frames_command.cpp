@@ -7,6 +7,7 @@
 #include "render_core/error.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/frame_feed.h"
 #include "render_core/tools/frame_sink.h"
 #include "render_core/tools/progress.h"
 #include "render_core/tools/reference_check.h"
@@ -43,8 +44,10 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
 void render_frames(const FramesOptions& options, bool quiet) {
   const RenderSetup setup = prepare(options.render, quiet);
   const auto sink = make_sink(options, setup);
-  const auto view = setup.made.renderer->make_view(
-      {.pipeline = setup.pipeline, .format = sink ? sink->format() : PixelFormat::rgb_f32});
+  ViewSettings settings = setup.view;
+  settings.format = sink ? sink->format() : PixelFormat::rgb_f32;
+  const auto view = setup.made.renderer->make_view(settings);
+  FrameFeed feed(setup, settings);
   if (!quiet) {
     fmt::print(stderr, "{} ({})\n", setup.made.renderer->description(), setup.made.reason);
   }
@@ -53,7 +56,7 @@ void render_frames(const FramesOptions& options, bool quiet) {
     Progress progress("rendering", quiet);
     for (std::size_t i = 0; i < setup.poses.size(); ++i) {
       FrameView frame;
-      render_or_throw(*view, setup.request(i), frame);
+      render_or_throw(*view, feed.next(), frame);
       if (sink) sink->write(frame);
       if (options.checked_pixels > 0) {
         const double error = reference_error(setup, i, frame, options.checked_pixels);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <initializer_list>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
@@ -12,23 +11,13 @@
 
 #include "render_core/error.h"
 #include "render_core/motion/anchor.h"
+#include "render_core/tools/parse_name.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
 namespace {
 
 constexpr float default_fov_y_deg = 60.0f;
-
-template <typename Value>
-Value parse_name(std::string_view flag, std::string_view name,
-                 std::initializer_list<std::pair<std::string_view, Value>> known) {
-  std::string names;
-  for (const auto& [known_name, value] : known) {
-    if (name == known_name) return value;
-    names += fmt::format("{}{}", names.empty() ? "one of " : ", ", known_name);
-  }
-  throw InputError(flag, "", fmt::format("unknown \"{}\"", name), names);
-}
 
 RendererKind parse_renderer(std::string_view name) {
   return parse_name<RendererKind>("--renderer", name,
@@ -38,19 +27,14 @@ RendererKind parse_renderer(std::string_view name) {
                                    {"reference", RendererKind::reference}});
 }
 
-Pipeline parse_pipeline(std::string_view name) {
-  return parse_name<Pipeline>(
-      "--pipeline", name,
-      {{"exact", Pipeline::exact}, {"vanilla", Pipeline::vanilla}, {"catgs", Pipeline::catgs}});
-}
-
 template <typename T>
 bool parse_whole(std::string_view text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size();
 }
 
-Trajectory make_path(const RenderOptions& options, const SceneHints& hints) {
+/// The camera's recorded or scripted samples.
+Trajectory make_samples(const RenderOptions& options, const SceneHints& hints) {
   if (options.trace.empty() == options.script.script.empty()) {
     throw InputError("--trace, --script", "", "one of them is needed",
                      "--script orbit is a good start");
@@ -60,9 +44,8 @@ Trajectory make_path(const RenderOptions& options, const SceneHints& hints) {
     script.rate_hz = options.fps.value_or(script.rate_hz);
     return make_script(script, hints);
   }
-  Trajectory trace = read_tum(options.trace);
-  if (options.anchor) trace = anchored(trace, hints);
-  return options.fps ? resample(trace, *options.fps) : trace;
+  const Trajectory trace = read_tum(options.trace);
+  return options.anchor ? anchored(trace, hints) : trace;
 }
 
 double mean_rate_hz(const Trajectory& path) {
@@ -124,10 +107,7 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
                      "Near plane, world units (default: the scene's hint)");
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
       ->capture_default_str();
-  command
-      .add_option("--pipeline", options.pipeline,
-                  "exact, vanilla (the original 3DGS) or catgs (key frames and sub-frames)")
-      ->capture_default_str();
+  add_pipeline_options(command, options.pipeline);
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
   command.add_option("--threads", options.threads, "0: one per core")
@@ -147,10 +127,12 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
   const float focal_px = focal_px_of(options, size_px.y);
   const RendererKind kind = parse_renderer(options.renderer);
   RenderSetup setup;
-  setup.pipeline = parse_pipeline(options.pipeline);
+  setup.view = view_settings(options.pipeline);
   setup.scene = load_with_progress(options, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
-  const Trajectory path = make_path(options, setup.scene.hints);
+  setup.samples = make_samples(options, setup.scene.hints);
+  const bool resampled = options.fps && !options.trace.empty();
+  const Trajectory path = resampled ? resample(setup.samples, *options.fps) : setup.samples;
   const FrameRange range = parse_frame_range(options.frames, path.size());
   setup.first = range.begin;
   setup.poses.assign(path.begin() + static_cast<std::ptrdiff_t>(range.begin),

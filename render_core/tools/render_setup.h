@@ -10,6 +10,7 @@
 #include "render_core/renderer.h"
 #include "render_core/scene/scene.h"
 #include "render_core/thread_pool.h"
+#include "render_core/tools/pipeline_options.h"
 
 namespace catgs {
 
@@ -28,7 +29,7 @@ struct RenderOptions {
   std::optional<double> fps;
   std::string frames;
   std::string renderer = "auto";
-  std::string pipeline = "exact";
+  PipelineOptions pipeline;
   std::string simd = "auto";
   int threads = 0;
 };
@@ -42,12 +43,14 @@ struct RenderSetup {
   std::shared_ptr<const GaussianCloud> cloud;
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
-  Pipeline pipeline = Pipeline::exact;
+  ViewSettings view;      // pipeline and its parts; format and memory space are the user's choice
+  Trajectory samples;     // the camera as recorded
   Trajectory poses;       // one per frame
   std::size_t first = 0;  // number of the first of them in the whole path
   double fps = 0.0;       // of the path
   Camera camera;          // without the pose
 
+  /// Of a frame by itself, without a forecast; see FrameFeed.
   [[nodiscard]] FrameRequest request(std::size_t i) const;
 };
 

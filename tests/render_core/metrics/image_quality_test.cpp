@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -16,6 +17,22 @@ Image noise(int width, int height, unsigned seed) {
     image.rgb.push_back(static_cast<float>(rng() % 256) / 255.0f);
   }
   return image;
+}
+
+TEST(PopExcess, IsTheRareLargeChangeBeyondTheTrueOne) {
+  const Image truth_before = noise(100, 50, 1);
+  Image truth_after = truth_before;
+  for (float& value : truth_after.rgb) value += 0.1f;
+  const Step truth{truth_before, truth_after};
+  EXPECT_NEAR(pop_excess(truth, truth), 0.0, 1e-9);
+  Image shown = truth_after;
+  // 15000 channels: 14 faulty ones are fewer than 0.1 %, 16 are more.
+  for (std::size_t i = 0; i < 14; ++i) shown.rgb[i * 997] += 0.05f;
+  EXPECT_NEAR(pop_excess({truth_before, shown}, truth), 0.0, 1e-6);
+  for (std::size_t i = 14; i < 16; ++i) shown.rgb[i * 997] += 0.05f;
+  EXPECT_NEAR(pop_excess({truth_before, shown}, truth), 0.05, 1e-6);
+  EXPECT_NEAR(pop_excess({truth_before, truth_before}, truth), -0.1, 1e-6);  // a missed change
+  EXPECT_THROW(pop_excess({truth_before, noise(50, 100, 1)}, truth), std::invalid_argument);
 }
 
 /// SSIM straight from its definition: every window summed on its own.

@@ -152,7 +152,8 @@ TEST_F(CatgsRender, BenchReportsEveryFrame) {
   EXPECT_GE(json.at("quality").at("key").at("psnr_db").at("min").get<double>(), 60.0);
   for (const char* field :
        {"commit", "device", "flatness", "stage_ms", "list_length", "window_histogram",
-        "ns_per_gaussian", "ns_per_blended_pair", "device_bytes"}) {
+        "ns_per_gaussian", "ns_per_blended_pair", "device_bytes", "frame_ms_key", "frame_ms_sub",
+        "stage_ms_key", "list_length_key", "windows_cut", "view_bytes"}) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
 }
@@ -184,6 +185,8 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames(still + "--renderer gpu --out x"), "--renderer: unknown \"gpu\" (one of auto, cpu");
   expect(frames("--script still --out " + path("a.png")), "one picture for 1200 frames");
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
+  expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
+  expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
   expect(run("compare " + path("none.png") + " " + path("none.png")), path("none.png"));
 }
 

@@ -7,6 +7,7 @@
 #include "render_core/error.h"
 #include "render_core/tools/bench_measure.h"
 #include "render_core/tools/bench_quality.h"
+#include "render_core/tools/pipeline_options.h"
 #include "render_core/tools/render_setup.h"
 #include "render_core/tools/scene_hash.h"
 
@@ -42,6 +43,39 @@ TEST(ParseFrameRange, TakesOpenEndsAndClampsTheEnd) {
   for (const char* bad : {"3", "a:b", "5:5", "6:2", "10:", "-1:3", "1:2:3"}) {
     EXPECT_THROW(parse_frame_range(bad, 10), InputError) << bad;
   }
+}
+
+TEST(PipelineOptions, BecomeViewSettings) {
+  PipelineOptions options;
+  EXPECT_EQ(view_settings(options).pipeline, Pipeline::exact);
+  EXPECT_TRUE(view_settings(options).split_tasks);
+  options.pipeline = "catgs";
+  options.window = 8;
+  options.max_trail_px = 20.0f;
+  options.min_depth = 0.4f;
+  options.order = "key";
+  options.no_split = true;
+  const ViewSettings settings = view_settings(options);
+  EXPECT_EQ(settings.pipeline, Pipeline::catgs);
+  EXPECT_EQ(settings.speculation.initial_window, 8);
+  EXPECT_EQ(settings.speculation.max_trail_px, 20.0f);
+  EXPECT_EQ(settings.speculation.min_depth, 0.4f);
+  EXPECT_EQ(settings.speculation.max_deviation_px, SpeculationSettings{}.max_deviation_px);
+  EXPECT_EQ(settings.order, BlendOrder::key);
+  EXPECT_FALSE(settings.split_tasks);
+  EXPECT_EQ(view_settings({.pipeline = "catgs", .no_cache = true}).speculation.initial_window, 0);
+}
+
+TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
+  const auto refused = [](const PipelineOptions& options, const std::string& message) {
+    EXPECT_THAT([&] { view_settings(options); }, ThrowsMessage<InputError>(HasSubstr(message)));
+  };
+  refused({.pipeline = "fast"}, "--pipeline: unknown \"fast\" (one of exact, vanilla, catgs)");
+  refused({.pipeline = "catgs", .order = "old"}, "--order: unknown \"old\"");
+  refused({.pipeline = "catgs", .window = 65}, "--window: is out of range");
+  refused({.window = 4}, "--window: means nothing to the exact pipeline");
+  refused({.pipeline = "vanilla", .order = "key"}, "--order: means nothing to the vanilla");
+  refused({.no_cache = true}, "--no-cache: means nothing");
 }
 
 GaussianCloud small_cloud() {
@@ -85,9 +119,10 @@ TEST(QualityTally, MeanIsThePsnrOfTheMeanError) {
   bad.ssim = 0.91;
   bad.block_errors = {1e-4, 1e-3};
   QualityTally tally;
-  tally.add(good);
-  tally.add(bad);
+  tally.add(good, 3);
+  tally.add(bad, 7);
   EXPECT_EQ(tally.frames(), 2u);
+  EXPECT_EQ(tally.worst_frame(), 7u);
   EXPECT_NEAR(tally.mean_psnr(), -10.0 * std::log10(0.5 * (1e-6 + 3e-4)), 1e-9);
   EXPECT_NEAR(tally.min_psnr(), -10.0 * std::log10(3e-4), 1e-9);
   EXPECT_NEAR(tally.mean_ssim(), 0.95, 1e-12);

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+
+namespace catgs {
+
+/// The value of a name; `flag` names its source in the InputError that lists all names.
+template <typename Value>
+Value parse_name(std::string_view flag, std::string_view name,
+                 std::initializer_list<std::pair<std::string_view, Value>> known) {
+  std::string names;
+  for (const auto& [known_name, value] : known) {
+    if (name == known_name) return value;
+    names += fmt::format("{}{}", names.empty() ? "one of " : ", ", known_name);
+  }
+  throw InputError(flag, "", fmt::format("unknown \"{}\"", name), names);
+}
+
+}  // namespace catgs

@@ -1,0 +1,94 @@
+#include "render_core/tools/pipeline_options.h"
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+#include "render_core/tools/parse_name.h"
+
+namespace catgs {
+namespace {
+
+Pipeline parse_pipeline(std::string_view name) {
+  return parse_name<Pipeline>(
+      "--pipeline", name,
+      {{"exact", Pipeline::exact}, {"vanilla", Pipeline::vanilla}, {"catgs", Pipeline::catgs}});
+}
+
+BlendOrder parse_order(std::string_view name) {
+  return parse_name<BlendOrder>("--order", name,
+                                {{"fresh", BlendOrder::fresh}, {"key", BlendOrder::key}});
+}
+
+/// An option that changes nothing would spoil a comparison unnoticed.
+void refuse_without_caches(const PipelineOptions& options) {
+  const auto refuse = [&](bool given, std::string_view flag) {
+    if (!given) return;
+    throw InputError(flag, "", fmt::format("means nothing to the {} pipeline", options.pipeline),
+                     "use --pipeline catgs");
+  };
+  refuse(options.window.has_value(), "--window");
+  refuse(options.max_trail_px.has_value(), "--max-trail-px");
+  refuse(options.min_depth.has_value(), "--min-depth");
+  refuse(options.max_deviation_px.has_value(), "--max-deviation-px");
+  refuse(options.order.has_value(), "--order");
+  refuse(options.no_cache, "--no-cache");
+}
+
+}  // namespace
+
+void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
+  const SpeculationSettings defaults;
+  command
+      .add_option("--pipeline", options.pipeline,
+                  "exact, vanilla (the original 3DGS) or catgs (key frames and sub-frames)")
+      ->capture_default_str();
+  auto* window = command.add_option(
+      "--window", options.window,
+      fmt::format("catgs: sub-frames behind a key frame while motion is small; 0: none ({})",
+                  defaults.initial_window));
+  command.add_option(
+      "--max-trail-px", options.max_trail_px,
+      fmt::format("catgs: longest motion of a Gaussian in a window ({})", defaults.max_trail_px));
+  command.add_option("--min-depth", options.min_depth,
+                     "catgs: nearer Gaussians do not shorten the window (2 x near plane)");
+  command.add_option("--max-deviation-px", options.max_deviation_px,
+                     fmt::format("catgs: farther from the forecast a key frame is due ({})",
+                                 defaults.max_deviation_px));
+  command.add_option(
+      "--order", options.order,
+      "catgs: sub-frames blend by fresh depths or by those of the key frame (fresh)");
+  command
+      .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
+      ->excludes(window);
+  command.add_flag("--no-split", options.no_split, "CUDA: one block blends a tile, however long");
+}
+
+ViewSettings view_settings(const PipelineOptions& options) {
+  ViewSettings settings;
+  settings.pipeline = parse_pipeline(options.pipeline);
+  if (settings.pipeline != Pipeline::catgs) refuse_without_caches(options);
+  SpeculationSettings& speculation = settings.speculation;
+  speculation.initial_window =
+      options.no_cache ? 0 : options.window.value_or(speculation.initial_window);
+  speculation.max_trail_px = options.max_trail_px.value_or(speculation.max_trail_px);
+  speculation.min_depth = options.min_depth.value_or(speculation.min_depth);
+  speculation.max_deviation_px = options.max_deviation_px.value_or(speculation.max_deviation_px);
+  check_speculation(speculation);
+  if (options.order) settings.order = parse_order(*options.order);
+  settings.split_tasks = !options.no_split;
+  return settings;
+}
+
+std::string_view pipeline_name(Pipeline pipeline) {
+  switch (pipeline) {
+    case Pipeline::vanilla:
+      return "vanilla";
+    case Pipeline::exact:
+      return "exact";
+    case Pipeline::catgs:
+      break;
+  }
+  return "catgs";
+}
+
+}  // namespace catgs
