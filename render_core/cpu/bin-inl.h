@@ -12,6 +12,7 @@
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/lanes-inl.h"
 #include "render_core/math/ellipse-inl.h"
+#include "render_core/math/trail-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace catgs {
@@ -20,14 +21,15 @@ namespace HWY_NAMESPACE {
 /// Tile rows tested at once: few, because most splats touch two or three.
 using RowLanes = Lanes<hn::CappedTag<float, 4>>;
 
-/// Appends to `runs` the tiles that a splat's ellipse meets in RowLanes::count rows of tiles from
-/// `row` on; returns the new end.
-HWY_INLINE TileRun* list_rows(const Splat& s, const Ellipse<float>& ellipse, int row,
-                              std::uint32_t slot, TileRun* runs) {
+/// Appends to `runs` the tiles that a splat's ellipse or trail meets in RowLanes::count rows of
+/// tiles from `row` on; returns the new end.
+template <class Shape>
+HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, int row, std::uint32_t slot,
+                              TileRun* runs) {
   using L = RowLanes;
   constexpr auto side = static_cast<float>(tile_size_px);
   const L low_y = mul_add(L::iota(static_cast<float>(row)), L(side), L(0.5f - s.centre_y));
-  const Interval<L> columns = columns_in_band(convert<L>(ellipse), low_y, low_y + L(side - 1.0f));
+  const Interval<L> columns = columns_in_band(convert<L>(shape), low_y, low_y + L(side - 1.0f));
   // Pixel columns with centres inside, then tiles, both inside the splat's box of tiles.
   const L first =
       max(ceil(columns.low + L(s.centre_x - 0.5f - static_cast<float>(listing_slack_px))),
@@ -53,25 +55,33 @@ HWY_INLINE TileRun* list_rows(const Splat& s, const Ellipse<float>& ellipse, int
   return runs;
 }
 
-inline void list_tiles(std::span<const Splat> splats, std::uint32_t first_slot,
-                       std::vector<TileRun>& runs) {
+inline void list_tiles(const ListTask& task, std::vector<TileRun>& runs) {
   std::size_t most = 0;
-  for (const Splat& s : splats) most += s.tile_end_y - s.tile_y;
+  for (const Splat& s : task.splats) most += s.tile_end_y - s.tile_y;
   const std::size_t known = runs.size();
   runs.resize(known + most);
   TileRun* end = runs.data() + known;
-  std::uint32_t slot = first_slot;
-  for (const Splat& s : splats) {
+  std::uint32_t slot = task.first_slot;
+  const auto list = [&](const Splat& s, const auto& shape) HWY_ATTR {
+    for (int row = s.tile_y; row < s.tile_end_y; row += static_cast<int>(RowLanes::count))
+      end = list_rows(s, shape, row, slot, end);
+  };
+  for (std::size_t i = 0; i < task.splats.size(); ++i, ++slot) {
+    const Splat& s = task.splats[i];
     if (s.tile_end_x - s.tile_x == 1 && s.tile_end_y - s.tile_y == 1) {
       *end++ = {s.tile_y, s.tile_x, s.tile_end_x, {std::bit_cast<std::uint32_t>(s.depth), slot}};
-    } else {
-      const Whitening<float> w{s.whitening_xx, s.whitening_xy, s.whitening_yy};
-      const Ellipse<float> ellipse =
-          make_ellipse(w, reach_of(s.log2_opacity), s.half_extent_x, s.rightmost_y);
-      for (int row = s.tile_y; row < s.tile_end_y; row += static_cast<int>(RowLanes::count))
-        end = list_rows(s, ellipse, row, slot, end);
+      continue;
     }
-    ++slot;
+    const Whitening<float> w{s.whitening_xx, s.whitening_xy, s.whitening_yy};
+    if (task.paths == nullptr) {
+      list(s, make_ellipse(w, reach_of(s.log2_opacity), s.half_extent_x, s.rightmost_y));
+    } else {
+      const SplatPath& path = task.paths[i];
+      const Ellipse<float> ellipse =
+          make_ellipse(w, reach_of(path.log2_opacity) * path.growth * path.growth,
+                       s.half_extent_x * path.growth, s.rightmost_y * path.growth);
+      list(s, make_trail(ellipse, {path.dx, path.dy}));
+    }
   }
   runs.resize(static_cast<std::size_t>(end - runs.data()));
 }

@@ -43,9 +43,12 @@ struct Target {
   SimdKernels kernels;
 };
 
-#define CATGS_TARGET(name)                                                                       \
-  {                                                                                              \
-    HWY_##name, { #name, N_##name::project_cluster, N_##name::list_tiles, N_##name::blend_tile } \
+#define CATGS_TARGET(name)                                                               \
+  {                                                                                      \
+    HWY_##name, {                                                                        \
+#name, N_##name::project_cluster, N_##name::refresh_cluster, N_##name::list_tiles, \
+          N_##name::blend_tile                                                           \
+    }                                                                                    \
   }
 
 const Target compiled_targets[] = {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -30,20 +32,66 @@ struct alignas(64) Splat {
   float rightmost_y;  // px below the centre: where the ellipse alpha >= alpha_min is rightmost
 };
 
+/// log2_opacity of a splat that draws nothing now: it is behind the near plane, but not in all
+/// frames of its window.
+inline constexpr float hidden_log2_opacity = -128.0f;
+
+/// Where a splat goes until the end of its key frame's window.
+struct alignas(16) SplatPath {
+  float dx, dy;        // px
+  float growth;        // >= 1: on the way its ellipse stays inside that many times itself
+  float log2_opacity;  // of the Gaussian, also where the splat is hidden
+};
+
+/// Members of a cluster, a bit each.
+using ClusterMembers = std::array<std::uint32_t, cluster_size / 32>;
+
 /// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,
-/// which has room for the whole cluster; returns how many.
+/// which has room for the whole cluster.
 struct ProjectTask {
   const SceneStore* scene;
   const Camera* camera;
+  // What visible means, and the tiles of a splat's box: vanilla, the original's; exact, where its
+  // ellipse is; catgs, where its trail is until the camera is at `window_end`.
   Pipeline pipeline;
   std::size_t cluster;
   Splat* splats;
+  float min_depth;  // world units; nearer ones do not count in ClusterSummary
+  // catgs only.
+  const Camera* window_end = nullptr;
+  SplatPath* paths = nullptr;         // as splats
+  ClusterMembers* members = nullptr;  // which ones are visible
+};
+
+/// Projects and shades `members` of a cluster as project_cluster() does, but without culling: the
+/// n-th member is always splats[n].
+struct RefreshTask {
+  const SceneStore* scene;
+  const Camera* camera;
+  std::size_t cluster;
+  const ClusterMembers* members;
+  Splat* splats;          // without what only listing needs
+  std::uint32_t* depths;  // as splats: bits of depth
+  float min_depth;
+};
+
+struct ClusterSummary {
+  std::uint32_t visible = 0;                                     // splats written
+  float nearest_depth = std::numeric_limits<float>::infinity();  // of those deeper than min_depth
+  float longest_path_px = 0.0f;                                  // of the same
 };
 
 /// Neighbouring tiles of one row that list the same splat.
 struct TileRun {
   std::uint16_t row, begin, end;  // tiles; end exclusive
   DepthSlot entry;
+};
+
+/// Lists splats for the tiles that their ellipses alpha >= alpha_min meet, or their trails.
+struct ListTask {
+  std::span<const Splat> splats;
+  const SplatPath* paths;  // as splats; null: they do not move
+  std::uint32_t first_slot;
 };
 
 /// Blends one tile and writes its part of the image.
@@ -60,10 +108,9 @@ struct BlendTask {
 /// The stages that are compiled once per instruction set.
 struct SimdKernels {
   std::string_view name;
-  std::uint32_t (*project_cluster)(const ProjectTask& task);
-  // Appends the runs of tiles that the splats' ellipses meet; slots count up from first_slot.
-  void (*list_tiles)(std::span<const Splat> splats, std::uint32_t first_slot,
-                     std::vector<TileRun>& runs);
+  ClusterSummary (*project_cluster)(const ProjectTask& task);
+  ClusterSummary (*refresh_cluster)(const RefreshTask& task);
+  void (*list_tiles)(const ListTask& task, std::vector<TileRun>& runs);  // appends
   std::uint64_t (*blend_tile)(const BlendTask& task);  // (Gaussian, pixel) pairs blended
 };
 

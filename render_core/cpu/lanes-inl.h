@@ -75,6 +75,11 @@ CATGS_HD_INLINE LaneMask<D> operator&(const LaneMask<D>& a, const LaneMask<D>& b
 }
 
 template <class D>
+CATGS_HD_INLINE LaneMask<D> operator|(const LaneMask<D>& a, const LaneMask<D>& b) {
+  return {hn::Or(a.mask, b.mask)};
+}
+
+template <class D>
 CATGS_HD_INLINE bool none(const LaneMask<D>& m) {
   return hn::AllFalse(D(), m.mask);
 }
@@ -87,6 +92,14 @@ CATGS_HD_INLINE std::uint32_t bits(const LaneMask<D>& m) {
   std::uint32_t result = 0;
   __builtin_memcpy(&result, bytes, sizeof(result));
   return result & ((1u << Lanes<D>::count) - 1u);
+}
+
+/// The opposite of bits().
+template <class D>
+CATGS_HD_INLINE LaneMask<D> mask_of_bits(std::uint32_t bits) {
+  std::uint8_t bytes[8] = {};
+  __builtin_memcpy(bytes, &bits, sizeof(bits));
+  return {hn::LoadMaskBits(D(), bytes)};
 }
 
 template <class D>
@@ -147,6 +160,7 @@ CATGS_HD_INLINE Lanes<D> exp2_of_alpha(const Lanes<D>& x) {
 }
 
 using Floats = Lanes<hn::ScalableTag<float>>;
+using FloatMask = LaneMask<hn::ScalableTag<float>>;
 using Doubles = Lanes<hn::ScalableTag<double>>;
 
 }  // namespace HWY_NAMESPACE

@@ -82,6 +82,14 @@ class RadixSorter {
   std::vector<Histogram> histograms_;
 };
 
+/// Orders by key; `before` orders elements of equal keys.
+template <class Before>
+auto in_order_of(const Before& before) {
+  return [&before](const DepthSlot& a, const DepthSlot& b) {
+    return a.key != b.key ? a.key < b.key : before(a, b);
+  };
+}
+
 /// Sorts a list of up to some thousands of elements on the calling thread by key; `before` orders
 /// elements of equal keys. `scratch` has the size of `data`.
 ///
@@ -89,9 +97,7 @@ class RadixSorter {
 /// place; what shares those bits is sorted by comparison.
 template <class Before>
 void sort_list(std::span<DepthSlot> data, std::span<DepthSlot> scratch, const Before& before) {
-  const auto in_order = [&](const DepthSlot& a, const DepthSlot& b) {
-    return a.key != b.key ? a.key < b.key : before(a, b);
-  };
+  const auto in_order = in_order_of(before);
   constexpr std::size_t short_list = 24;  // where comparing beats clearing histograms
   if (data.size() <= short_list) return std::sort(data.begin(), data.end(), in_order);
 
@@ -121,6 +127,24 @@ void sort_list(std::span<DepthSlot> data, std::span<DepthSlot> scratch, const Be
     while (last != data.end() && leading(*last) == leading(*first)) ++last;
     if (last - first > 1) std::sort(first, last, in_order);
     first = last;
+  }
+}
+
+/// sort_list() for lists that are nearly in order: by insertion, as long as that moves less than
+/// sorting anew would.
+template <class Before>
+void sort_list_again(std::span<DepthSlot> data, std::span<DepthSlot> scratch,
+                     const Before& before) {
+  const auto in_order = in_order_of(before);
+  std::size_t moves = 0;
+  const std::size_t most_moves = 8 * data.size();
+  for (std::size_t i = 1; i < data.size(); ++i) {
+    const DepthSlot e = data[i];
+    std::size_t at = i;
+    for (; at > 0 && in_order(e, data[at - 1]); --at) data[at] = data[at - 1];
+    data[at] = e;
+    moves += i - at;
+    if (moves > most_moves) return sort_list(data, scratch, before);
   }
 }
 

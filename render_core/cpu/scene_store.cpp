@@ -162,14 +162,16 @@ ClusterCuller::ClusterCuller(const Camera& camera) {
   half_spaces_[4] = side(-down, f.y, size.y - c.y, slope_y);
 }
 
-bool ClusterCuller::outside(const Cluster& cluster) const {
-  for (const HalfSpace& h : half_spaces_) {
+unsigned ClusterCuller::beyond(const Cluster& cluster) const {
+  unsigned beyond = 0;
+  for (unsigned i = 0; i < std::size(half_spaces_); ++i) {
+    const HalfSpace& h = half_spaces_[i];
     const float centre = glm::dot(h.normal, cluster.centre) + h.offset;
     const float radius = glm::dot(glm::abs(h.normal), cluster.half_extent);
     const float rounding = 1e-5f * (std::abs(h.offset) + std::abs(centre));
-    if (centre + radius + h.reach_factor * cluster.reach + rounding < 0.0f) return true;
+    if (centre + radius + h.reach_factor * cluster.reach + rounding < 0.0f) beyond |= 1u << i;
   }
-  return false;
+  return beyond;
 }
 
 }  // namespace catgs

@@ -84,7 +84,12 @@ class SceneStore {
 class ClusterCuller {
  public:
   explicit ClusterCuller(const Camera& camera);
-  [[nodiscard]] bool outside(const Cluster& cluster) const;
+  [[nodiscard]] bool outside(const Cluster& cluster) const { return beyond(cluster) != 0; }
+
+  /// Half-spaces (a bit each, in the same order for all cameras) that the cluster lies outside of.
+  /// What is outside of the same one at both ends of a straight path through camera space is so all
+  /// the way.
+  [[nodiscard]] unsigned beyond(const Cluster& cluster) const;
 
  private:
   struct HalfSpace {

@@ -20,6 +20,14 @@ void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
   }
 }
 
+/// Orders splats of equal depth.
+struct SceneOrder {
+  std::span<const Splat> splats;
+  bool operator()(const DepthSlot& a, const DepthSlot& b) const {
+    return splats[a.value].original_index < splats[b.value].original_index;
+  }
+};
+
 }  // namespace
 
 void TileLists::begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries) {
@@ -40,11 +48,10 @@ void TileLists::clear_segments() {
   }
 }
 
-void TileLists::add(std::size_t segment_index, std::span<const Splat> splats,
-                    std::uint32_t first_slot, const SimdKernels& kernels) {
+void TileLists::add(std::size_t segment_index, const ListTask& task, const SimdKernels& kernels) {
   Segment& segment = segments_[segment_index];
   const std::size_t known = segment.runs.size();
-  kernels.list_tiles(splats, first_slot, segment.runs);
+  kernels.list_tiles(task, segment.runs);
   if (first_left_out_ != nothing_left_out) {
     const auto left_out = [&](const TileRun& run) {
       return depth_order(run.entry) >= first_left_out_;
@@ -64,11 +71,10 @@ void TileLists::add(std::size_t segment_index, std::span<const Splat> splats,
     segment.runs.resize(known);
 }
 
-void TileLists::finish(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                       const SimdKernels& kernels, ThreadPool& pool) {
+void TileLists::finish(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool) {
   std::uint64_t wanted = 0;
   for (const Segment& segment : segments_) wanted += segment.entries;
-  if (wanted > max_entries_) list_nearest(splats, counts, kernels, pool);
+  if (wanted > max_entries_) list_nearest(table, kernels, pool);
   place_lists();
   overflowed_ = wanted - entries();
   if (entries_.size() < entries()) entries_.resize(entries());
@@ -85,36 +91,29 @@ void TileLists::finish(std::span<const Splat> splats, std::span<const std::uint3
 
 /// Lists everything again without the farthest splats. Listing twice keeps the usual frame, in
 /// which all fits, free of what only this one needs: the number of entries of each splat.
-void TileLists::list_nearest(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                             const SimdKernels& kernels, ThreadPool& pool) {
-  const auto splats_of = [&](std::size_t rank) {
-    return splats.subspan(rank * cluster_size, counts[rank]);
-  };
-  const auto first_slot = [](std::size_t rank) {
-    return static_cast<std::uint32_t>(rank * cluster_size);
-  };
-  entries_of_slot_.assign(splats.size(), 0);
-  pool.parallel_for(counts.size(), [&](std::size_t rank) {
+void TileLists::list_nearest(const SplatTable& table, const SimdKernels& kernels,
+                             ThreadPool& pool) {
+  const std::size_t ranks = table.counts.size(), shares = segments_.size();
+  entries_of_slot_.assign(table.splats.size(), 0);
+  pool.parallel_for(ranks, [&](std::size_t rank) {
     thread_local std::vector<TileRun> runs;
     runs.clear();
-    kernels.list_tiles(splats_of(rank), first_slot(rank), runs);
+    kernels.list_tiles(table.of_cluster(rank), runs);
     for (const TileRun& run : runs) entries_of_slot_[run.entry.value] += run.end - run.begin;
   });
-  first_left_out_ = find_first_left_out(splats, counts, pool);
+  first_left_out_ = find_first_left_out(table, pool);
 
   clear_segments();
-  pool.parallel_for(segments_.size(), [&](std::size_t k) {
-    const std::size_t ranks = counts.size(), shares = segments_.size();
+  pool.parallel_for(shares, [&](std::size_t k) {
     for (std::size_t rank = ranks * k / shares; rank < ranks * (k + 1) / shares; ++rank)
-      add(k, splats_of(rank), first_slot(rank), kernels);
+      add(k, table.of_cluster(rank), kernels);
   });
 }
 
 /// The nearest splat that has to be left out, with all behind it, so that the entries of those
 /// before it (entries_of_slot_) stay within the bound.
-TileLists::DepthOrder TileLists::find_first_left_out(std::span<const Splat> splats,
-                                                     std::span<const std::uint32_t> counts,
-                                                     ThreadPool& pool) {
+TileLists::DepthOrder TileLists::find_first_left_out(const SplatTable& table, ThreadPool& pool) {
+  const auto& [splats, paths, counts] = table;
   by_depth_.clear();
   for (std::size_t rank = 0; rank < counts.size(); ++rank)
     for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank]; ++slot)
@@ -141,7 +140,9 @@ void TileLists::place_lists() {
   }
 }
 
-void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
+/// Calls visit(list, scratch) for all lists.
+template <class Visit>
+void TileLists::for_each_list(ThreadPool& pool, const Visit& visit) {
   constexpr std::size_t tiles_per_task = 16;
   pool.parallel_for((tiles() + tiles_per_task - 1) / tiles_per_task, [&](std::size_t task) {
     thread_local std::vector<DepthSlot> scratch;
@@ -150,24 +151,36 @@ void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
       const std::span<DepthSlot> list(entries_.data() + starts_[tile],
                                       entries_.data() + starts_[tile + 1]);
       if (scratch.size() < list.size()) scratch.resize(list.size());
-      sort_list(list, std::span(scratch).first(list.size()),
-                [&](const DepthSlot& a, const DepthSlot& b) {
-                  return splats[a.value].original_index < splats[b.value].original_index;
-                });
+      visit(list, std::span(scratch).first(list.size()));
     }
   });
 }
 
-void TileLists::build_by_keys(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                              glm::ivec2 grid, std::uint64_t max_entries, ThreadPool& pool) {
+void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
+  for_each_list(pool, [&](std::span<DepthSlot> list, std::span<DepthSlot> scratch) {
+    sort_list(list, scratch, SceneOrder{splats});
+  });
+}
+
+void TileLists::sort_again(std::span<const Splat> splats, std::span<const std::uint32_t> depths,
+                           ThreadPool& pool) {
+  for_each_list(pool, [&](std::span<DepthSlot> list, std::span<DepthSlot> scratch) {
+    for (DepthSlot& entry : list) entry.key = depths[entry.value];
+    sort_list_again(list, scratch, SceneOrder{splats});
+  });
+}
+
+void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
+                              ThreadPool& pool) {
+  const auto& [splats, paths, counts] = table;
   const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
-  const std::uint64_t wanted = count_keys(splats, counts, pool);
+  const std::uint64_t wanted = count_keys(table, pool);
   std::uint64_t total = wanted;
   if (wanted > max_entries) {
-    first_left_out_ = find_first_left_out(splats, counts, pool);
-    total = count_keys(splats, counts, pool);
+    first_left_out_ = find_first_left_out(table, pool);
+    total = count_keys(table, pool);
   }
   overflowed_ = wanted - total;
   keys_.resize(total);
@@ -200,8 +213,8 @@ void TileLists::build_by_keys(std::span<const Splat> splats, std::span<const std
 
 /// Counts the keys of each splat that is not left out (entries_of_slot_) and where those of each
 /// cluster begin (key_offsets_); returns their sum.
-std::uint64_t TileLists::count_keys(std::span<const Splat> splats,
-                                    std::span<const std::uint32_t> counts, ThreadPool& pool) {
+std::uint64_t TileLists::count_keys(const SplatTable& table, ThreadPool& pool) {
+  const auto& [splats, paths, counts] = table;
   entries_of_slot_.resize(splats.size());
   key_offsets_.resize(counts.size());
   pool.parallel_for(counts.size(), [&](std::size_t rank) {

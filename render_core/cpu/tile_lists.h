@@ -13,11 +13,23 @@
 
 namespace catgs {
 
+/// The splats of a frame: [cluster rank * cluster_size + i], i < counts[rank]; that index is their
+/// slot.
+struct SplatTable {
+  std::span<const Splat> splats;
+  const SplatPath* paths;  // [slot]; null: ellipses are listed, not trails
+  std::span<const std::uint32_t> counts;
+
+  [[nodiscard]] ListTask of_cluster(std::size_t rank) const {
+    const std::size_t first = rank * cluster_size;
+    return {splats.subspan(first, counts[rank]), paths == nullptr ? nullptr : paths + first,
+            static_cast<std::uint32_t>(first)};
+  }
+};
+
 /// Which splats each tile blends. Listing decides membership, sorting the order. Memory is kept
 /// from frame to frame and bounded: where more entries are wanted than `max_entries`, the farthest
 /// splats are left out of all lists, and what they wanted is counted.
-///
-/// Splats come as [cluster rank * cluster_size + i], i < counts[rank]; that index is their slot.
 class TileLists {
  public:
   /// Starts lists for a grid of tiles. Splats come in `segments` shares, each from one thread at a
@@ -25,21 +37,24 @@ class TileLists {
   void begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries);
 
   /// Lists splats for the tiles whose rectangle of pixel centres meets their ellipse alpha >=
-  /// alpha_min. Slots count up from `first_slot`.
-  void add(std::size_t segment, std::span<const Splat> splats, std::uint32_t first_slot,
-           const SimdKernels& kernels);
+  /// alpha_min, or their trail.
+  void add(std::size_t segment, const ListTask& task, const SimdKernels& kernels);
 
-  /// Builds the lists of what was added: `splats`, each once.
-  void finish(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-              const SimdKernels& kernels, ThreadPool& pool);
+  /// Builds the lists of what was added: all of `table`, each once.
+  void finish(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool);
 
   /// Brings each list into depth order; equal depths keep the order of the scene.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
 
+  /// The same for lists that were sorted before their splats moved a little: [slot] `depths` are
+  /// the bits of their depths now.
+  void sort_again(std::span<const Splat> splats, std::span<const std::uint32_t> depths,
+                  ThreadPool& pool);
+
   /// Both at once in the original's way: a (tile | depth) key per splat and tile of its box, one
   /// sort of all keys.
-  void build_by_keys(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                     glm::ivec2 grid, std::uint64_t max_entries, ThreadPool& pool);
+  void build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
+                     ThreadPool& pool);
 
   [[nodiscard]] std::size_t tiles() const { return starts_.size() - 1; }
   /// The splats of a tile (row-major index): depth bits and slot.
@@ -69,13 +84,12 @@ class TileLists {
   }
 
   void clear_segments();
-  void list_nearest(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                    const SimdKernels& kernels, ThreadPool& pool);
-  DepthOrder find_first_left_out(std::span<const Splat> splats,
-                                 std::span<const std::uint32_t> counts, ThreadPool& pool);
+  void list_nearest(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool);
+  DepthOrder find_first_left_out(const SplatTable& table, ThreadPool& pool);
   void place_lists();
-  std::uint64_t count_keys(std::span<const Splat> splats, std::span<const std::uint32_t> counts,
-                           ThreadPool& pool);
+  template <class Visit>
+  void for_each_list(ThreadPool& pool, const Visit& visit);
+  std::uint64_t count_keys(const SplatTable& table, ThreadPool& pool);
 
   glm::ivec2 grid_{0};
   std::uint64_t max_entries_ = 0;

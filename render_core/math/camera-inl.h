@@ -67,6 +67,21 @@ CATGS_HD_INLINE T view_depth(const CameraModel<T>& camera, const Vec3<T>& mean) 
   return dot(camera.forward, mean - camera.position);
 }
 
+/// A point of the world in camera space.
+template <class T>
+CATGS_HD_INLINE Vec3<T> camera_from_world(const CameraModel<T>& camera, const Vec3<T>& point) {
+  const Vec3<T> offset = point - camera.position;
+  return {dot(camera.right, offset), dot(camera.down, offset), dot(camera.forward, offset)};
+}
+
+/// Image of a point in camera space, z > 0.
+template <class T>
+CATGS_HD_INLINE Vec2<T> image_px(const CameraModel<T>& camera, const Vec3<T>& point) {
+  const T inverse_depth = T(1.0) / point.z;
+  return {mul_add(camera.focal_px.x, point.x * inverse_depth, camera.principal_point_px.x),
+          mul_add(camera.focal_px.y, point.y * inverse_depth, camera.principal_point_px.y)};
+}
+
 }  // namespace CATGS_MATH_NAMESPACE
 }  // namespace catgs
 CATGS_AFTER_MATH();

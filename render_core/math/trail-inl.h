@@ -12,6 +12,30 @@ CATGS_BEFORE_MATH();
 namespace catgs {
 namespace CATGS_MATH_NAMESPACE {
 
+/// Where a point that moves straight from `inside` (in front of the near plane) to `to`, both in
+/// camera space, leaves the view: `to` itself, or where it reaches the near plane before.
+template <class T>
+CATGS_HD_INLINE Vec3<T> cut_at_near(const Vec3<T>& inside, const Vec3<T>& to, T near_z) {
+  const auto leaves = to.z < near_z;
+  const T share = (near_z - inside.z) / select(leaves, to.z - inside.z, T(1.0));
+  return {select(leaves, mul_add(share, to.x - inside.x, inside.x), to.x),
+          select(leaves, mul_add(share, to.y - inside.y, inside.y), to.y), max(to.z, near_z)};
+}
+
+/// Least factor by which the ellipse of `from` has to grow to hold that of `to`, both around one
+/// centre: the largest singular value of from to^-1. The ratio of depths alone would not do: a
+/// flake seen from the edge grows across when the camera moves around it.
+template <class T>
+CATGS_HD_INLINE T growth_between(const Whitening<T>& from, const Whitening<T>& to) {
+  const T xx = from.xx / to.xx;
+  const T yy = from.yy / to.yy;
+  const T xy = (from.xy - xx * to.xy) / to.yy;
+  const T sum = mul_add(xx, xx, mul_add(xy, xy, yy * yy));
+  const T product = xx * yy;
+  const T rest = sum * sum - T(4.0) * product * product;
+  return sqrt(T(0.5) * (sum + sqrt(max(rest, T(0.0)))));
+}
+
 /// An ellipse swept along a straight path: the sum of the ellipse and the segment from 0 to
 /// `displacement`, prepared for being cut into bands of rows. Positions are relative to the
 /// ellipse's centre at the start of the path.

@@ -28,6 +28,7 @@ using test::TestScene;
 struct Projected {
   std::vector<Splat> splats;
   std::vector<std::uint32_t> counts;
+  [[nodiscard]] SplatTable table() const { return {splats, nullptr, counts}; }
   template <class Visit>
   void for_each(const Visit& visit) const {
     for (std::size_t rank = 0; rank < counts.size(); ++rank)
@@ -41,8 +42,10 @@ Projected project_all(const SceneStore& store, const Camera& camera, const SimdK
   Projected out;
   out.splats.resize(store.clusters().size() * cluster_size);
   for (std::size_t c = 0; c < store.clusters().size(); ++c)
-    out.counts.push_back(kernels.project_cluster(
-        {&store, &camera, pipeline, c, out.splats.data() + c * cluster_size}));
+    out.counts.push_back(kernels
+                             .project_cluster({&store, &camera, pipeline, c,
+                                               out.splats.data() + c * cluster_size, 0.0f})
+                             .visible);
   return out;
 }
 
@@ -51,12 +54,10 @@ void fill(TileLists& lists, const Projected& projected, glm::ivec2 grid, std::ui
   constexpr std::size_t segments = 3;
   lists.begin(grid, segments, max_entries);
   for (std::size_t rank = 0; rank < projected.counts.size(); ++rank) {
-    const std::size_t first = rank * cluster_size;
-    lists.add(rank * segments / projected.counts.size(),
-              std::span(projected.splats).subspan(first, projected.counts[rank]),
-              static_cast<std::uint32_t>(first), kernels);
+    lists.add(rank * segments / projected.counts.size(), projected.table().of_cluster(rank),
+              kernels);
   }
-  lists.finish(projected.splats, projected.counts, kernels, pool);
+  lists.finish(projected.table(), kernels, pool);
 }
 
 math::Vec3<double> to_double(const glm::vec3& v) { return {v.x, v.y, v.z}; }
@@ -181,7 +182,7 @@ TEST_P(Kernels, ListsAreInDepthOrderWithTiesInSceneOrder) {
   TileLists filled, keyed;
   fill(filled, projected, grid_, 1u << 30, simd_kernels().front(), pool_);
   filled.sort(projected.splats, pool_);
-  keyed.build_by_keys(projected.splats, projected.counts, grid_, 1u << 30, pool_);
+  keyed.build_by_keys(projected.table(), grid_, 1u << 30, pool_);
   for (const TileLists* lists : {&filled, &keyed}) {
     for (std::size_t tile = 0; tile < lists->tiles(); ++tile) {
       const auto list = lists->list(tile);
@@ -240,7 +241,7 @@ TEST(TileListsBound, LeavesOutTheFarthestAndCountsThem) {
     fill(lists, exact, grid, bound, kernels, pool);
   });
   check([&](TileLists& lists, std::uint64_t bound) {
-    lists.build_by_keys(boxes.splats, boxes.counts, grid, bound, pool);
+    lists.build_by_keys(boxes.table(), grid, bound, pool);
   });
 }
 
@@ -260,6 +261,28 @@ TEST(SortList, EqualsStableSortOnAnyDistribution) {
       std::ranges::stable_sort(expected, {}, &DepthSlot::key);
       sort_list(std::span(list), std::span(scratch),
                 [](const DepthSlot& a, const DepthSlot& b) { return a.value < b.value; });
+      for (std::size_t i = 0; i < size; ++i) {
+        ASSERT_EQ(list[i].key, expected[i].key);
+        ASSERT_EQ(list[i].value, expected[i].value);
+      }
+    }
+  }
+}
+
+TEST(SortListAgain, EqualsStableSortHoweverFarElementsMoved) {
+  std::uint64_t state = 3;
+  const auto random = [&state] {
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return static_cast<std::uint32_t>(state >> 33);
+  };
+  for (const std::size_t size : {0u, 1u, 2u, 25u, 300u, 5000u}) {
+    for (const std::uint32_t noise : {1u, 3u, 30u, 1000u, 0x3fffffffu}) {
+      std::vector<DepthSlot> list(size), scratch(size);
+      for (std::uint32_t i = 0; i < size; ++i) list[i] = {8 * i + random() % noise, i};
+      std::vector<DepthSlot> expected = list;
+      std::ranges::stable_sort(expected, {}, &DepthSlot::key);
+      sort_list_again(std::span(list), std::span(scratch),
+                      [](const DepthSlot& a, const DepthSlot& b) { return a.value < b.value; });
       for (std::size_t i = 0; i < size; ++i) {
         ASSERT_EQ(list[i].key, expected[i].key);
         ASSERT_EQ(list[i].value, expected[i].value);

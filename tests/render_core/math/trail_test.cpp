@@ -234,5 +234,36 @@ TEST(Trail, OfNoLengthIsItsEllipse) {
   }
 }
 
+TEST(Trail, GrowthHoldsTheOtherEllipseTightly) {
+  RandomCases random;
+  for (int n = 0; n < 2000; ++n) {
+    const Case a = random.next(), b = random.next();
+    const math::Whitening<double> from{a.w.xx, a.w.xy, a.w.yy}, to{b.w.xx, b.w.xy, b.w.yy};
+    const double growth = math::growth_between(from, to);
+    // Points on the rim of `to`, seen from `from`.
+    double largest = 0.0;
+    for (int step = 0; step < 4000; ++step) {
+      const double angle = step * M_PI / 4000;
+      const double y = std::sin(angle) / to.yy, x = (std::cos(angle) - to.xy * y) / to.xx;
+      largest = std::max(largest, std::sqrt(math::whitened_square(from, {x, y})));
+    }
+    EXPECT_LE(largest, growth * (1 + 1e-9)) << n;
+    EXPECT_GE(largest, growth * (1 - 1e-5)) << n;
+    const double in_float = math::growth_between(a.w, b.w);
+    EXPECT_NEAR(in_float, growth, 1e-3 * growth) << n;
+  }
+}
+
+TEST(Trail, PathsEndAtTheNearPlane) {
+  const math::Vec3<double> inside{1.0, 2.0, 4.0};
+  const auto stays = math::cut_at_near(inside, {3.0, 2.0, 1.5}, 1.0);
+  EXPECT_EQ(stays.x, 3.0);
+  EXPECT_EQ(stays.z, 1.5);
+  const auto cut = math::cut_at_near(inside, {5.0, -2.0, 0.0}, 1.0);  // three quarters of the way
+  EXPECT_DOUBLE_EQ(cut.x, 4.0);
+  EXPECT_DOUBLE_EQ(cut.y, -1.0);
+  EXPECT_DOUBLE_EQ(cut.z, 1.0);
+}
+
 }  // namespace
 }  // namespace catgs

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render_core/cpu/kernels.h"
+#include "render_core/cpu/scene_store.h"
+#include "render_core/cpu/tile_lists.h"
+#include "render_core/host_image.h"
+#include "render_core/motion/frame_groups.h"
+#include "render_core/renderer.h"
+#include "render_core/thread_pool.h"
+
+namespace catgs {
+
+/// What all Views of a renderer share; constant after construction.
+struct CpuScene {
+  SceneStore store;
+  std::shared_ptr<ThreadPool> pool;
+  SimdKernels kernels;
+};
+
+/// Buffers of a frame, kept for the next one. A key frame's are the caches of the sub-frames behind
+/// it: which Gaussians (the frustum cache) and which of them each tile blends (the sort cache).
+class CpuView final : public View {
+ public:
+  CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings);
+
+  RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override;
+  std::size_t memory_bytes() const override;
+
+ private:
+  FrameStats draw(const FrameRequest& request);
+  void draw_boxes(const Camera& camera, FrameStats& stats);
+  void draw_key_lists(const Camera& camera, const Camera* window_end, FrameStats& stats);
+  void draw_sub_lists(const Camera& camera, FrameStats& stats);
+  void cull_clusters(const Camera& camera, const Camera* window_end);
+  template <class Done>
+  void project(const Camera& camera, const Camera* window_end, const Done& done);
+  std::uint64_t blend(const FrameRequest& request);
+  [[nodiscard]] std::size_t segments() const;
+  [[nodiscard]] SplatTable table(bool with_paths) const;
+
+  std::shared_ptr<const CpuScene> scene_;
+  ViewSettings settings_;
+  FrameGroups groups_;
+  float nearest_depth_ = 0.0f;  // FrameStats of the last frame
+  glm::ivec2 grid_{0};          // tiles
+  HostImage image_;
+  std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
+  std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians
+  std::vector<ClusterSummary> summaries_;  // [rank]
+  std::vector<std::uint32_t> counts_;      // [rank]: visible Gaussians
+  std::vector<Splat> splats_;              // [slot], see SplatTable
+  std::vector<SplatPath> paths_;           // [slot]
+  std::vector<std::uint32_t> depths_;      // [slot]: bits, of a sub-frame
+  TileLists lists_;
+};
+
+}  // namespace catgs
