@@ -41,6 +41,15 @@ double soft_limit(double value, double low, double high) {
   return middle + std::copysign(free + room * excess / (room + excess), value - middle);
 }
 
+void check_sampling(double duration_s, double rate_hz) {
+  if (!(duration_s > 0.0 && duration_s <= max_duration_s)) {
+    throw InputError("--duration", "", "must be above 0 s and at most a day");
+  }
+  if (!(rate_hz > 0.0 && rate_hz <= max_rate_hz)) {
+    throw InputError("--fps", "", fmt::format("must be above 0 and at most {} Hz", max_rate_hz));
+  }
+}
+
 PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame) {
   constexpr std::string_view tour_prefix = "tour:";
   const std::string_view script = options.script;
@@ -103,19 +112,13 @@ Pose SceneFrame::look_along(const glm::dvec3& position, const glm::dvec3& view,
   return {inside(position), glm::quat(usable ? upright_view(view, up) : start_orientation_)};
 }
 
-Trajectory make_script(const ScriptOptions& options, const SceneHints& hints) {
-  if (!(options.duration_s > 0.0 && options.duration_s <= max_duration_s)) {
-    throw InputError("--duration", "", "must be above 0 s and at most a day");
-  }
-  if (!(options.rate_hz > 0.0 && options.rate_hz <= max_rate_hz)) {
-    throw InputError("--fps", "", fmt::format("must be above 0 and at most {} Hz", max_rate_hz));
-  }
-  const PoseAt pose_at = make_pose_at(options, SceneFrame(hints));
-  const auto count = static_cast<std::int64_t>(std::ceil(options.duration_s * options.rate_hz));
+Trajectory sample(const PoseAt& pose_at, double duration_s, double rate_hz) {
+  check_sampling(duration_s, rate_hz);
+  const auto count = static_cast<std::int64_t>(std::ceil(duration_s * rate_hz));
   Trajectory trajectory;
   trajectory.reserve(static_cast<std::size_t>(count));
   for (std::int64_t i = 0; i < count; ++i) {
-    const double time_s = static_cast<double>(i) / options.rate_hz;
+    const double time_s = static_cast<double>(i) / rate_hz;
     Pose pose = pose_at(time_s);
     // q and -q are the same rotation; neighbours of one sign keep the file easy to resample.
     if (!trajectory.empty() &&
@@ -125,6 +128,11 @@ Trajectory make_script(const ScriptOptions& options, const SceneHints& hints) {
     trajectory.push_back({static_cast<std::int64_t>(time_s * 1e6 + 0.5), pose});
   }
   return trajectory;
+}
+
+Trajectory make_script(const ScriptOptions& options, const SceneHints& hints) {
+  check_sampling(options.duration_s, options.rate_hz);  // a script plans its whole duration
+  return sample(make_pose_at(options, SceneFrame(hints)), options.duration_s, options.rate_hz);
 }
 
 }  // namespace catgs

@@ -56,13 +56,20 @@ class SceneFrame {
   double metre_ = 1.0;
 };
 
+/// Poses at `rate_hz` from time 0 over the duration. Throws InputError naming --duration or --fps.
+Trajectory sample(const PoseAt& pose_at, double duration_s, double rate_hz);
+
+/// A circle around the focus that begins at the start pose and always looks at the focus, turned by
+/// the angle of a time in radians (to the left as seen from above).
+PoseAt circle(const SceneFrame& frame, const std::function<double(double time_s)>& angle_rad);
+
 /// A person looking around: turns of the head with fixations between, leaning, stepping.
 PoseAt head_script(const SceneFrame& frame, std::uint64_t seed, double duration_s);
 /// A walk at the start pose's eye height through the limits.
 PoseAt walk_script(const SceneFrame& frame, std::uint64_t seed, double duration_s);
 /// A smooth, banked flight through the limits.
 PoseAt drone_script(const SceneFrame& frame, std::uint64_t seed, double duration_s);
-/// A circle around the focus that begins at the start pose and always looks at the focus.
+/// A circle() in about twenty seconds.
 PoseAt orbit_script(const SceneFrame& frame, std::uint64_t seed);
 /// Smooth flight through keyframes at their own times; stays at the last.
 PoseAt tour_script(const SceneFrame& frame, const Trajectory& keyframes);

@@ -134,22 +134,26 @@ PoseAt drone_script(const SceneFrame& frame, std::uint64_t seed, double duration
   };
 }
 
-PoseAt orbit_script(const SceneFrame& frame, std::uint64_t seed) {
-  PortableRng rng(seed);
-  const double direction = rng.coin() ? 1.0 : -1.0;
-  const double period_s = rng.uniform(16.0, 24.0);
+PoseAt circle(const SceneFrame& frame, const std::function<double(double time_s)>& angle_rad) {
   const glm::dvec3 arm = frame.start() - frame.focus();
   const glm::dvec3 rise = frame.up() * glm::dot(arm, frame.up());
   glm::dvec3 radius = arm - rise;
   if (glm::length(radius) < 0.1 * frame.metre()) radius = -frame.metre() * frame.forward();
   const glm::dvec3 across = glm::cross(frame.up(), radius);
   return [=](double time_s) {
-    const SinCos<double> angle =
-        portable_sincos(direction * 2.0 * std::numbers::pi * time_s / period_s);
+    const SinCos<double> angle = portable_sincos(angle_rad(time_s));
     const glm::dvec3 position =
         frame.inside(frame.focus() + rise + angle.cos * radius + angle.sin * across);
     return frame.look_along(position, frame.focus() - position, frame.up());
   };
+}
+
+PoseAt orbit_script(const SceneFrame& frame, std::uint64_t seed) {
+  PortableRng rng(seed);
+  const double direction = rng.coin() ? 1.0 : -1.0;
+  const double period_s = rng.uniform(16.0, 24.0);
+  return circle(
+      frame, [=](double time_s) { return direction * 2.0 * std::numbers::pi * time_s / period_s; });
 }
 
 }  // namespace catgs

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -12,12 +11,9 @@
 #include "render_core/error.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/tools/parse_name.h"
-#include "render_core/tools/progress.h"
 
 namespace catgs {
 namespace {
-
-constexpr float default_fov_y_deg = 60.0f;
 
 RendererKind parse_renderer(std::string_view name) {
   return parse_name<RendererKind>("--renderer", name,
@@ -54,37 +50,10 @@ double mean_rate_hz(const Trajectory& path) {
          static_cast<double>(path.back().time_us - path.front().time_us);
 }
 
-float focal_px_of(const RenderOptions& options, int height_px) {
-  const float focal_px = options.focal_px.value_or(focal_from_fov_y(
-      options.fov_y_deg.value_or(default_fov_y_deg) * std::numbers::pi_v<float> / 180.0f,
-      height_px));
-  if (!(std::isfinite(focal_px) && focal_px > 0.0f)) {
-    throw InputError("--focal-px, --fov-deg", "", "the focal length must be positive",
-                     "a field of view lies between 0 and 180 degrees");
-  }
-  return focal_px;
-}
-
-Scene load_with_progress(const RenderOptions& options, bool quiet) {
-  Progress progress("loading", quiet);
-  LoadOptions load;
-  load.lod = options.lod;
-  load.gaussian_budget = options.budget;
-  load.threads = options.threads;
-  load.progress = [&](double fraction) { progress.update(fraction); };
-  return load_scene(options.scene, load);
-}
-
 }  // namespace
 
 void add_render_options(CLI::App& command, RenderOptions& options) {
-  command.add_option("scene", options.scene, "Scene file or folder")->required();
-  auto* lod = command.add_option("--lod", options.lod,
-                                 "Streamed SOG: this level of detail; 0 is the finest");
-  command
-      .add_option("--budget", options.budget,
-                  "Streamed SOG: the finest levels with at most so many Gaussians")
-      ->excludes(lod);
+  add_scene_options(command, options.scene);
   auto* trace = command.add_option("--trace", options.trace, "Camera path: a TUM file");
   auto* script = command.add_option("--script", options.script.script,
                                     "Camera path: orbit, walk, head, drone, still or tour:FILE");
@@ -97,14 +66,7 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--fps", options.fps,
                      "Poses per second (default: a trace's own samples, 120 of a script)");
   command.add_option("--frames", options.frames, "A:B renders frames A to B - 1 of the path");
-  command.add_option("--size", options.size, "Width x height, pixels")->capture_default_str();
-  auto* focal = command.add_option("--focal-px", options.focal_px, "Focal length, pixels");
-  command
-      .add_option("--fov-deg", options.fov_y_deg,
-                  fmt::format("Vertical field of view (default: {})", default_fov_y_deg))
-      ->excludes(focal);
-  command.add_option("--near", options.near_z,
-                     "Near plane, world units (default: the scene's hint)");
+  add_lens_options(command, options.lens);
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
       ->capture_default_str();
   add_pipeline_options(command, options.pipeline);
@@ -123,12 +85,11 @@ FrameRequest RenderSetup::request(std::size_t i) const {
 }
 
 RenderSetup prepare(const RenderOptions& options, bool quiet) {
-  const glm::ivec2 size_px = parse_size("--size", options.size);
-  const float focal_px = focal_px_of(options, size_px.y);
+  (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
   const RendererKind kind = parse_renderer(options.renderer);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
-  setup.scene = load_with_progress(options, quiet);
+  setup.scene = load(options.scene, options.threads, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.samples = make_samples(options, setup.scene.hints);
   const bool resampled = options.fps && !options.trace.empty();
@@ -138,24 +99,10 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
   setup.poses.assign(path.begin() + static_cast<std::ptrdiff_t>(range.begin),
                      path.begin() + static_cast<std::ptrdiff_t>(range.end));
   setup.fps = options.fps.value_or(mean_rate_hz(path));
-  setup.camera =
-      make_camera({}, size_px, focal_px, options.near_z.value_or(setup.scene.hints.near_z));
+  setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   setup.made = make_renderer(setup.cloud, {.kind = kind, .pool = setup.pool, .simd = options.simd});
   return setup;
-}
-
-glm::ivec2 parse_size(std::string_view flag, std::string_view text) {
-  const std::size_t cross = std::min(text.find('x'), text.size());
-  glm::ivec2 size_px{0};
-  const bool whole = cross < text.size() && parse_whole(text.substr(0, cross), size_px.x) &&
-                     parse_whole(text.substr(cross + 1), size_px.y);
-  if (!whole || std::min(size_px.x, size_px.y) < 1 ||
-      std::max(size_px.x, size_px.y) > max_image_side_px) {
-    throw InputError(flag, "", fmt::format("\"{}\" is not a picture size", text),
-                     fmt::format("like 1280x720, sides of 1 to {}", max_image_side_px));
-  }
-  return size_px;
 }
 
 FrameRange parse_frame_range(std::string_view text, std::size_t count) {

@@ -11,21 +11,17 @@
 #include "render_core/scene/scene.h"
 #include "render_core/thread_pool.h"
 #include "render_core/tools/pipeline_options.h"
+#include "render_core/tools/scene_options.h"
 
 namespace catgs {
 
 /// What `frames` and `bench` have in common: a scene, a camera path and a renderer.
 struct RenderOptions {
-  std::string scene;
-  std::optional<int> lod;
-  std::optional<std::size_t> budget;
+  SceneOptions scene;
   std::string trace;
   bool anchor = false;
   ScriptOptions script;
-  std::string size = "1280x720";
-  std::optional<float> focal_px;
-  std::optional<float> fov_y_deg;
-  std::optional<float> near_z;
+  LensOptions lens;
   std::optional<double> fps;
   std::string frames;
   std::string renderer = "auto";
@@ -56,9 +52,6 @@ struct RenderSetup {
 
 /// Loads scene and path, makes the renderer. Throws InputError.
 RenderSetup prepare(const RenderOptions& options, bool quiet);
-
-/// "1920x1080" -> (1920, 1080); sides of 1…max_image_side_px. `flag` names the source in errors.
-glm::ivec2 parse_size(std::string_view flag, std::string_view text);
 
 /// "A:B" -> frames A to B - 1 of `count`; either may be left out; "" is all. Throws InputError when
 /// nothing is left.

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -164,6 +165,60 @@ TEST_F(CatgsRender, WritesAScriptedTrace) {
                       scene(), path("head.tum")));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
   EXPECT_EQ(read_tum(path("head.tum")).size(), 120u);
+}
+
+TEST_F(CatgsRender, MakesTracesOfOneMotion) {
+  ASSERT_EQ(run("synth city --gaussians 20000 " + path("city.ply")).exit_code, 0);
+  for (const char* motion : {"pan", "zoom", "rotate", "orbit"}) {
+    const Outcome outcome = run(fmt::format("trace {} {} --duration 1 --force --out {}", motion,
+                                            path("city.ply"), path("motion.tum")));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+    EXPECT_EQ(read_tum(path("motion.tum")).size(), 120u) << motion;
+  }
+}
+
+TEST_F(CatgsRender, TheFixedPathsOfTheCityAreFit) {
+  ASSERT_EQ(run("synth city --gaussians 50000 " + path("city.ply")).exit_code, 0);
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(CATGS_CITY_PATHS)) {
+    if (entry.path().extension() != ".tum") continue;
+    const Outcome outcome = run(fmt::format("trace check {} --focal-px 1100 --trace {}",
+                                            path("city.ply"), entry.path().string()));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+    ++files;
+  }
+  EXPECT_EQ(files, 6);
+}
+
+TEST_F(CatgsRender, AnUnfitTraceIsNotWritten) {
+  // The ball is seen from outside of its bounds, and the turning camera loses it.
+  const std::string rotate =
+      fmt::format("trace rotate {} --speed 90 --duration 4 --out {}", scene(), path("turn.tum"));
+  const Outcome refused = run(rotate);
+  EXPECT_EQ(refused.exit_code, 1) << refused.out;
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("turn.tum: not written: only"), HasSubstr("lie outside"),
+                                 HasSubstr("--force writes it")));
+  EXPECT_FALSE(std::filesystem::exists(path("turn.tum")));
+  const Outcome forced = run(rotate + " --force");
+  EXPECT_EQ(forced.exit_code, 0) << forced.out;
+  EXPECT_THAT(forced.out, HasSubstr("lie outside"));
+  EXPECT_EQ(read_tum(path("turn.tum")).size(), 480u);
+  const Outcome checked = run(fmt::format("trace check {} --trace {}", scene(), path("turn.tum")));
+  EXPECT_EQ(checked.exit_code, 1) << checked.out;
+}
+
+TEST_F(CatgsRender, AnchorsATrace) {
+  write_tum(path("far.tum"), {{0, {glm::vec3(500, 0, 0), {1, 0, 0, 0}}},
+                              {1'000'000, {glm::vec3(500, 0, 0.1f), {1, 0, 0, 0}}}});
+  const Outcome outcome = run(fmt::format("trace anchor {} --trace {} --fps 50 --force --out {}",
+                                          scene(), path("far.tum"), path("here.tum")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Trajectory moved = read_tum(path("here.tum"));
+  ASSERT_EQ(moved.size(), 51u);
+  EXPECT_LT(glm::length(moved[0].world_from_camera.position), 20.0f);
+  EXPECT_NEAR(
+      glm::distance(moved[0].world_from_camera.position, moved[50].world_from_camera.position),
+      0.1f, 1e-4f);
 }
 
 TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <glm/vec3.hpp>
+
+#include "render_core/motion/trajectory.h"
+#include "render_core/scene/scene.h"
+#include "render_core/thread_pool.h"
+
+namespace catgs {
+
+/// Whether a trace is fit to measure with: a camera that looks away from the scene, or has left it,
+/// renders fast and well.
+struct TraceCheck {
+  static constexpr double wanted_frames = 0.95;  // share of the frames that see enough
+  static constexpr double enough_in_view = 0.1;  // of the trace's largest in-view count
+
+  std::size_t frames = 0;
+  double seeing_frames = 0.0;  // share of the frames that see enough
+  std::size_t emptiest_frame = 0;
+  double emptiest_in_view = 0.0;   // of the largest in-view count
+  std::size_t outside_frames = 0;  // camera outside of the bounds
+  std::optional<std::size_t> first_outside;
+
+  [[nodiscard]] bool valid() const { return seeing_frames >= wanted_frames && outside_frames == 0; }
+  /// What is wrong, with both values; empty for a valid trace.
+  [[nodiscard]] std::string complaint() const;
+};
+
+/// `means` are the centres of the scene's Gaussians; in view are those deeper than the near plane
+/// that project into the image of `lens` (its pose is not used). Judged by an even sample of at
+/// most 2^17 of them. `bounds`: robust_bounds() of the scene.
+TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,
+                       const Bounds& bounds, const Camera& lens, ThreadPool& pool);
+
+}  // namespace catgs

@@ -1,0 +1,82 @@
+#include "render_core/tools/scene_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+#include "render_core/renderer.h"
+#include "render_core/tools/progress.h"
+
+namespace catgs {
+namespace {
+
+constexpr float default_fov_y_deg = 60.0f;
+
+bool parse_side(std::string_view text, int& side) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), side);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+void add_scene_options(CLI::App& command, SceneOptions& options) {
+  command.add_option("scene", options.path, "Scene file or folder")->required();
+  auto* lod = command.add_option("--lod", options.lod,
+                                 "Streamed SOG: this level of detail; 0 is the finest");
+  command
+      .add_option("--budget", options.budget,
+                  "Streamed SOG: the finest levels with at most so many Gaussians")
+      ->excludes(lod);
+}
+
+Scene load(const SceneOptions& options, int threads, bool quiet) {
+  Progress progress("loading", quiet);
+  LoadOptions load;
+  load.lod = options.lod;
+  load.gaussian_budget = options.budget;
+  load.threads = threads;
+  load.progress = [&](double fraction) { progress.update(fraction); };
+  return load_scene(options.path, load);
+}
+
+void add_lens_options(CLI::App& command, LensOptions& options) {
+  command.add_option("--size", options.size, "Width x height, pixels")->capture_default_str();
+  auto* focal = command.add_option("--focal-px", options.focal_px, "Focal length, pixels");
+  command
+      .add_option("--fov-deg", options.fov_y_deg,
+                  fmt::format("Vertical field of view (default: {})", default_fov_y_deg))
+      ->excludes(focal);
+  command.add_option("--near", options.near_z,
+                     "Near plane, world units (default: the scene's hint)");
+}
+
+Camera make_lens(const LensOptions& options, float hinted_near_z) {
+  const glm::ivec2 size_px = parse_size("--size", options.size);
+  const float fov_y_rad =
+      options.fov_y_deg.value_or(default_fov_y_deg) * std::numbers::pi_v<float> / 180.0f;
+  const float focal_px = options.focal_px.value_or(focal_from_fov_y(fov_y_rad, size_px.y));
+  if (!(std::isfinite(focal_px) && focal_px > 0.0f)) {
+    throw InputError("--focal-px, --fov-deg", "", "the focal length must be positive",
+                     "a field of view lies between 0 and 180 degrees");
+  }
+  return make_camera({}, size_px, focal_px, options.near_z.value_or(hinted_near_z));
+}
+
+glm::ivec2 parse_size(std::string_view flag, std::string_view text) {
+  const std::size_t cross = std::min(text.find('x'), text.size());
+  glm::ivec2 size_px{0};
+  const bool whole = cross < text.size() && parse_side(text.substr(0, cross), size_px.x) &&
+                     parse_side(text.substr(cross + 1), size_px.y);
+  if (!whole || std::min(size_px.x, size_px.y) < 1 ||
+      std::max(size_px.x, size_px.y) > max_image_side_px) {
+    throw InputError(flag, "", fmt::format("\"{}\" is not a picture size", text),
+                     fmt::format("like 1280x720, sides of 1 to {}", max_image_side_px));
+  }
+  return size_px;
+}
+
+}  // namespace catgs

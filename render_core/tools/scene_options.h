@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+
+#include "render_core/camera.h"
+#include "render_core/scene/scene.h"
+
+namespace catgs {
+
+/// A scene to load. The options belong to the caller and must outlive the command's callback.
+struct SceneOptions {
+  std::string path;
+  std::optional<int> lod;
+  std::optional<std::size_t> budget;
+};
+void add_scene_options(CLI::App& command, SceneOptions& options);
+
+/// Shows its progress on a terminal. Throws InputError.
+Scene load(const SceneOptions& options, int threads, bool quiet);
+
+/// A camera without a pose.
+struct LensOptions {
+  std::string size = "1280x720";
+  std::optional<float> focal_px;
+  std::optional<float> fov_y_deg;
+  std::optional<float> near_z;
+};
+void add_lens_options(CLI::App& command, LensOptions& options);
+
+/// Without --near the near plane is `hinted_near_z`. Throws InputError.
+Camera make_lens(const LensOptions& options, float hinted_near_z);
+
+/// "1920x1080" -> (1920, 1080); sides of 1…max_image_side_px. `flag` names the source in errors.
+glm::ivec2 parse_size(std::string_view flag, std::string_view text);
+
+}  // namespace catgs
