@@ -55,6 +55,13 @@ HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, int row, std::
   return runs;
 }
 
+/// Of a Splat or a SplatPath.
+template <class S>
+HWY_INLINE Ellipse<float> ellipse_of(const S& s) {
+  return make_ellipse<float>({s.whitening_xx, s.whitening_xy, s.whitening_yy},
+                             reach_of(s.log2_opacity), s.half_extent_x, s.rightmost_y);
+}
+
 inline void list_tiles(const ListTask& task, std::vector<TileRun>& runs) {
   std::size_t most = 0;
   for (const Splat& s : task.splats) most += s.tile_end_y - s.tile_y;
@@ -72,15 +79,11 @@ inline void list_tiles(const ListTask& task, std::vector<TileRun>& runs) {
       *end++ = {s.tile_y, s.tile_x, s.tile_end_x, {std::bit_cast<std::uint32_t>(s.depth), slot}};
       continue;
     }
-    const Whitening<float> w{s.whitening_xx, s.whitening_xy, s.whitening_yy};
     if (task.paths == nullptr) {
-      list(s, make_ellipse(w, reach_of(s.log2_opacity), s.half_extent_x, s.rightmost_y));
+      list(s, ellipse_of(s));
     } else {
       const SplatPath& path = task.paths[i];
-      const Ellipse<float> ellipse =
-          make_ellipse(w, reach_of(path.log2_opacity) * path.growth * path.growth,
-                       s.half_extent_x * path.growth, s.rightmost_y * path.growth);
-      list(s, make_trail(ellipse, {path.dx, path.dy}));
+      list(s, make_trail(ellipse_of(path), {path.dx, path.dy}));
     }
   }
   runs.resize(static_cast<std::size_t>(end - runs.data()));

@@ -36,11 +36,13 @@ struct alignas(64) Splat {
 /// frames of its window.
 inline constexpr float hidden_log2_opacity = -128.0f;
 
-/// Where a splat goes until the end of its key frame's window.
-struct alignas(16) SplatPath {
-  float dx, dy;        // px
-  float growth;        // >= 1: on the way its ellipse stays inside that many times itself
-  float log2_opacity;  // of the Gaussian, also where the splat is hidden
+/// Where a splat goes until the end of its key frame's window, and the ellipse that stays around it
+/// on the way.
+struct alignas(32) SplatPath {
+  float dx, dy;                                    // px
+  float whitening_xx, whitening_xy, whitening_yy;  // of that ellipse
+  float log2_opacity;                              // of the Gaussian, also where it is hidden
+  float half_extent_x, rightmost_y;                // of that ellipse, as in Splat
 };
 
 /// Members of a cluster, a bit each.

@@ -15,26 +15,24 @@ HWY_BEFORE_NAMESPACE();
 namespace catgs {
 namespace HWY_NAMESPACE {
 
-/// The tiles that splats may touch.
+/// The box of a splat, and the tiles that it may touch.
 template <Pipeline pipeline>
 HWY_INLINE SplatBox box_of(const ProjectionContext& context, const Sweep& s, const Floats& reach) {
-  const ProjectedGaussian<Floats>& g = s.shape;
-  const Vec2<Floats> half = half_extent(g, reach);
+  const Vec2<Floats>& centre = s.shape.centre_px;
   SplatBox box;
-  box.half_extent_px = half;
+  box.half_extent_px = half_extent(s.shape, reach);
   if constexpr (pipeline == Pipeline::vanilla) {
-    const Floats radius = three_sigma_radius(g);
-    box.columns = tiles_of_radius(g.centre_px.x, radius, context.last_pixel.x);
-    box.rows = tiles_of_radius(g.centre_px.y, radius, context.last_pixel.y);
+    const Floats radius = three_sigma_radius(s.shape);
+    box.columns = tiles_of_radius(centre.x, radius, context.last_pixel.x);
+    box.rows = tiles_of_radius(centre.y, radius, context.last_pixel.y);
   } else if constexpr (pipeline == Pipeline::catgs) {
+    const Vec2<Floats> half = half_extent(s.outline, reach);
     const Floats step_x = Floats(0.5) * s.displacement.x, step_y = Floats(0.5) * s.displacement.y;
-    box.columns = tiles_of_box(g.centre_px.x + step_x, mul_add(half.x, s.growth, abs(step_x)),
-                               context.last_pixel.x);
-    box.rows = tiles_of_box(g.centre_px.y + step_y, mul_add(half.y, s.growth, abs(step_y)),
-                            context.last_pixel.y);
+    box.columns = tiles_of_box(centre.x + step_x, half.x + abs(step_x), context.last_pixel.x);
+    box.rows = tiles_of_box(centre.y + step_y, half.y + abs(step_y), context.last_pixel.y);
   } else {
-    box.columns = tiles_of_box(g.centre_px.x, half.x, context.last_pixel.x);
-    box.rows = tiles_of_box(g.centre_px.y, half.y, context.last_pixel.y);
+    box.columns = tiles_of_box(centre.x, box.half_extent_px.x, context.last_pixel.x);
+    box.rows = tiles_of_box(centre.y, box.half_extent_px.y, context.last_pixel.y);
   }
   return box;
 }
@@ -91,7 +89,8 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     extremes.add_depths(counted, depth);
     if constexpr (sweeps) {
       extremes.add_paths(counted, s.displacement);
-      write_paths(s, log2_opacity, hits, task.paths + visible);
+      write_paths(s, log2_opacity, reach, half_extent(s.outline, reach).x, hits,
+                  task.paths + visible);
       (*task.members)[(i - begin) / 32] |= hits << ((i - begin) % 32);
       hide(look, in_front, context.near_z);
     }

@@ -20,7 +20,7 @@ struct Sweep {
   // Now; of those behind the near plane now, at the window's end.
   ProjectedGaussian<Floats> shape;
   Vec2<Floats> displacement;  // from there on, px
-  Floats growth;              // as in SplatPath
+  Whitening<Floats> outline;  // stays around it on the way
 };
 
 /// The sweep of Gaussians that are drawn at one end of the window only: from there to the near
@@ -29,9 +29,11 @@ HWY_INLINE Sweep sweep_to_near_plane(const CameraModel<Floats>& camera,
                                      const ProjectedGaussian<Floats>& shape,
                                      const Vec3<Floats>& drawn, const Vec3<Floats>& hidden) {
   const Vec2<Floats> cut = image_px(camera, cut_at_near(drawn, hidden, camera.near_z));
+  const Whitening<Floats> w = whitening(shape);
+  const Floats shrink = min(camera.near_z / drawn.z, Floats(1.0));
   return {shape,
           {cut.x - shape.centre_px.x, cut.y - shape.centre_px.y},
-          max(drawn.z / camera.near_z, Floats(1.0))};
+          {w.xx * shrink, w.xy * shrink, w.yy * shrink}};
 }
 
 HWY_INLINE Sweep select(const FloatMask& mask, const Sweep& a, const Sweep& b) {
@@ -44,7 +46,8 @@ HWY_INLINE Sweep select(const FloatMask& mask, const Sweep& a, const Sweep& b) {
            pick(a.shape.yy, b.shape.yy),
            pick(a.shape.determinant, b.shape.determinant)},
           {pick(a.displacement.x, b.displacement.x), pick(a.displacement.y, b.displacement.y)},
-          pick(a.growth, b.growth)};
+          {pick(a.outline.xx, b.outline.xx), pick(a.outline.xy, b.outline.xy),
+           pick(a.outline.yy, b.outline.yy)}};
 }
 
 /// Of Gaussians in front of the near plane now (their view_depth() is `depth`) or at the end.
@@ -56,7 +59,7 @@ HWY_INLINE Sweep sweep(const CameraModel<Floats>& now, const CameraModel<Floats>
   const auto last = project(end, mean, factor, max(at_end.z, now.near_z));
   const Sweep s{first,
                 {last.centre_px.x - first.centre_px.x, last.centre_px.y - first.centre_px.y},
-                max(growth_between(whitening(first), whitening(last)), Floats(1.0))};
+                whitening_of_both(whitening(first), whitening(last))};
   const auto comes = depth <= now.near_z, goes = at_end.z <= now.near_z;
   if (none(comes | goes)) return s;
   const Vec3<Floats> at_start = camera_from_world(now, mean);
@@ -65,15 +68,20 @@ HWY_INLINE Sweep sweep(const CameraModel<Floats>& now, const CameraModel<Floats>
   return select(comes, coming, select(goes, going, s));
 }
 
-/// Appends the path of each hit to `paths`.
-HWY_INLINE void write_paths(const Sweep& s, const Floats& log2_opacity, std::uint32_t hits,
-                            SplatPath* paths) {
+/// Writes the path of each hit, one after the other. `half_extent_x`: of the outline.
+HWY_INLINE void write_paths(const Sweep& s, const Floats& log2_opacity, const Floats& reach,
+                            const Floats& half_extent_x, std::uint32_t hits, SplatPath* out) {
   const hn::ScalableTag<float> d;
-  alignas(64) float quads[4 * Floats::count];
-  hn::StoreInterleaved4(s.displacement.x.v, s.displacement.y.v, s.growth.v, log2_opacity.v, d,
-                        quads);
-  for (; hits != 0; hits &= hits - 1)
-    std::memcpy(paths++, quads + std::countr_zero(hits) * 4, sizeof(SplatPath));
+  alignas(64) float quads[2][4 * Floats::count];
+  hn::StoreInterleaved4(s.displacement.x.v, s.displacement.y.v, s.outline.xx.v, s.outline.xy.v, d,
+                        quads[0]);
+  hn::StoreInterleaved4(s.outline.yy.v, log2_opacity.v, half_extent_x.v,
+                        rightmost_y(s.outline, reach).v, d, quads[1]);
+  for (; hits != 0; hits &= hits - 1, ++out) {
+    const int lane = std::countr_zero(hits);
+    std::memcpy(&out->dx, quads[0] + lane * 4, 16);
+    std::memcpy(&out->whitening_yy, quads[1] + lane * 4, 16);
+  }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -52,6 +52,13 @@ CATGS_HD_INLINE Vec2<T> half_extent(const ProjectedGaussian<T>& g, T reach) {
   return {sqrt(squared_sigmas * g.xx), sqrt(squared_sigmas * g.yy)};
 }
 
+/// The same from the whitening.
+template <class T>
+CATGS_HD_INLINE Vec2<T> half_extent(const Whitening<T>& w, T reach) {
+  const T half_height = sqrt(reach) / w.yy;
+  return {half_height * sqrt(mul_add(w.xy, w.xy, w.yy * w.yy)) / w.xx, half_height};
+}
+
 /// The original's bound: three standard deviations along the longest axis, whole pixels.
 template <class T>
 CATGS_HD_INLINE T three_sigma_radius(const ProjectedGaussian<T>& g) {

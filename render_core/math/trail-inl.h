@@ -22,18 +22,35 @@ CATGS_HD_INLINE Vec3<T> cut_at_near(const Vec3<T>& inside, const Vec3<T>& to, T 
           select(leaves, mul_add(share, to.y - inside.y, inside.y), to.y), max(to.z, near_z)};
 }
 
-/// Least factor by which the ellipse of `from` has to grow to hold that of `to`, both around one
-/// centre: the largest singular value of from to^-1. The ratio of depths alone would not do: a
-/// flake seen from the edge grows across when the camera moves around it.
+/// Whitening of the smallest ellipse that holds those of `a` and `b`, all around one centre: what a
+/// Gaussian needs that is seen from two places. In the plane whitened by `a` the covariance of `a`
+/// is I and that of `b` some S; the smallest one above both is I + (S - I)+, the positive part by
+/// eigenvalues. Sums of positive terms throughout: of two crossed needles S has a condition of 1e8.
 template <class T>
-CATGS_HD_INLINE T growth_between(const Whitening<T>& from, const Whitening<T>& to) {
-  const T xx = from.xx / to.xx;
-  const T yy = from.yy / to.yy;
-  const T xy = (from.xy - xx * to.xy) / to.yy;
-  const T sum = mul_add(xx, xx, mul_add(xy, xy, yy * yy));
-  const T product = xx * yy;
-  const T rest = sum * sum - T(4.0) * product * product;
-  return sqrt(T(0.5) * (sum + sqrt(max(rest, T(0.0)))));
+CATGS_HD_INLINE Whitening<T> whitening_of_both(const Whitening<T>& a, const Whitening<T>& b) {
+  const T zero = T(0.0), half = T(0.5), one = T(1.0), tiny = T(1e-30);
+  // S = N N^T with N = a b^-1, upper triangular as they are.
+  const T n_xx = a.xx / b.xx;
+  const T n_yy = a.yy / b.yy;
+  const T n_xy = (a.xy - n_xx * b.xy) / b.yy;
+  const T s_xx = mul_add(n_xx, n_xx, n_xy * n_xy);
+  const T s_xy = n_xy * n_yy;
+  const T s_yy = n_yy * n_yy;
+  // Eigenvalues, and the first one's projector: the larger entry on the diagonal, and the others.
+  const T skew = half * (s_xx - s_yy);
+  const T radius = max(sqrt(mul_add(skew, skew, s_xy * s_xy)), tiny);
+  const T first = half * (s_xx + s_yy) + radius;
+  const T root = n_xx * n_yy;
+  const T larger = max(first - one, zero), smaller = max(root * root / first - one, zero);
+  const T sum = radius + max(abs(skew), tiny);
+  const T major = half * sum / radius, mixed = half * s_xy / radius, minor = mixed * (s_xy / sum);
+  // I + (S - I)+, whitened as whitening() does it, on top of `a`.
+  const T yy = one + select(skew < zero, mul_add(larger, major, smaller * minor),
+                            mul_add(larger, minor, smaller * major));
+  const T xy = (larger - smaller) * mixed;
+  const T root_yy = sqrt(yy);
+  const T k = one / (root_yy * sqrt((one + larger) * (one + smaller)));
+  return {yy * k * a.xx, k * (yy * a.xy - xy * a.yy), a.yy / root_yy};
 }
 
 /// An ellipse swept along a straight path: the sum of the ellipse and the segment from 0 to

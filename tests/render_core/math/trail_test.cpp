@@ -234,23 +234,41 @@ TEST(Trail, OfNoLengthIsItsEllipse) {
   }
 }
 
-TEST(Trail, GrowthHoldsTheOtherEllipseTightly) {
+TEST(Trail, OutlineHoldsBothEllipsesTightly) {
   RandomCases random;
   for (int n = 0; n < 2000; ++n) {
     const Case a = random.next(), b = random.next();
-    const math::Whitening<double> from{a.w.xx, a.w.xy, a.w.yy}, to{b.w.xx, b.w.xy, b.w.yy};
-    const double growth = math::growth_between(from, to);
-    // Points on the rim of `to`, seen from `from`.
-    double largest = 0.0;
-    for (int step = 0; step < 4000; ++step) {
-      const double angle = step * M_PI / 4000;
-      const double y = std::sin(angle) / to.yy, x = (std::cos(angle) - to.xy * y) / to.xx;
-      largest = std::max(largest, std::sqrt(math::whitened_square(from, {x, y})));
-    }
-    EXPECT_LE(largest, growth * (1 + 1e-9)) << n;
-    EXPECT_GE(largest, growth * (1 - 1e-5)) << n;
-    const double in_float = math::growth_between(a.w, b.w);
-    EXPECT_NEAR(in_float, growth, 1e-3 * growth) << n;
+    const math::Whitening<double> first{a.w.xx, a.w.xy, a.w.yy}, second{b.w.xx, b.w.xy, b.w.yy};
+    const auto both = math::whitening_of_both(first, second);
+    const math::Whitening<float> rounded = math::whitening_of_both(a.w, b.w);
+    // The largest squared distance on a rim, in units of the outline's.
+    const auto farthest = [](const auto& rim, const math::Whitening<double>& outline) {
+      double largest = 0.0;
+      for (int step = 0; step < 4000; ++step) {
+        const double angle = step * M_PI / 4000;
+        const double y = std::sin(angle) / rim.yy, x = (std::cos(angle) - rim.xy * y) / rim.xx;
+        largest = std::max(largest, math::whitened_square(outline, {x, y}));
+      }
+      return largest;
+    };
+    // Both are inside and one touches; and nothing is smaller, or the order would matter.
+    EXPECT_LE(std::max(farthest(first, both), farthest(second, both)), 1.0 + 1e-9) << n;
+    EXPECT_GE(std::max(farthest(first, both), farthest(second, both)), 1.0 - 1e-4) << n;
+    const auto area = [](const auto& w) { return 1.0 / (w.xx * w.yy); };
+    EXPECT_NEAR(area(math::whitening_of_both(second, first)), area(both), 1e-6 * area(both)) << n;
+    EXPECT_NEAR(area(rounded), area(both), 1e-2 * area(both)) << n;
+    const math::Whitening<double> widened{rounded.xx, rounded.xy, rounded.yy};
+    EXPECT_LE(std::max(farthest(first, widened), farthest(second, widened)), 1.01) << n;
+  }
+}
+
+TEST(Trail, OutlineOfAnEllipseInsideTheOtherIsTheOther) {
+  const math::Whitening<double> large{0.1, 0.02, 0.05}, small{0.4, 0.02, 0.5};
+  for (const auto& both :
+       {math::whitening_of_both(large, small), math::whitening_of_both(small, large)}) {
+    EXPECT_NEAR(both.xx, large.xx, 1e-12);
+    EXPECT_NEAR(both.xy, large.xy, 1e-12);
+    EXPECT_NEAR(both.yy, large.yy, 1e-12);
   }
 }
 
