@@ -25,6 +25,22 @@ tcp::endpoint loopback(int port) {
   return {asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port)};
 }
 
+/// Runs the asynchronous operation that `start` begins with its handler, for as long as `patience`:
+/// Beast's time limits do not hold for blocking calls.
+template <typename Start>
+beast::error_code run(asio::io_context& io, beast::tcp_stream& stream, Start start) {
+  beast::error_code result;
+  stream.expires_after(patience);
+  start([&result](beast::error_code error, const auto&...) { result = error; });
+  io.restart();
+  io.run();
+  return result;
+}
+
+void require(beast::error_code error) {
+  if (error) throw beast::system_error(error);
+}
+
 ReceivedFrame parse_frame(const std::string& bytes) {
   std::size_t at = 1;
   std::size_t size = 0;
@@ -67,15 +83,14 @@ HttpReply http_get(int port, const std::string& target,
                    const std::map<std::string, std::string>& headers) {
   asio::io_context io;
   beast::tcp_stream stream(io);
-  stream.expires_after(patience);
-  stream.connect(loopback(port));
+  require(run(io, stream, [&](auto done) { stream.async_connect(loopback(port), done); }));
   http::request<http::empty_body> request(http::verb::get, target, 11);
   request.set(http::field::host, "127.0.0.1:" + std::to_string(port));
   for (const auto& [name, value] : headers) request.set(name, value);
-  http::write(stream, request);
+  require(run(io, stream, [&](auto done) { http::async_write(stream, request, done); }));
   beast::flat_buffer buffer;
   http::response<http::string_body> response;
-  http::read(stream, buffer, response);
+  require(run(io, stream, [&](auto done) { http::async_read(stream, buffer, response, done); }));
   HttpReply reply;
   reply.status = static_cast<int>(response.result_int());
   reply.body = response.body();
@@ -91,28 +106,24 @@ struct WireClient::State {
   asio::io_context io;
   websocket::stream<beast::tcp_stream> socket{io};
 
-  /// Runs one asynchronous operation to its end, with Beast's own time limit.
   template <typename Start>
   beast::error_code run(Start start) {
-    beast::error_code result;
-    beast::get_lowest_layer(socket).expires_after(patience);
-    start([&](beast::error_code error, std::size_t) { result = error; });
-    io.restart();
-    io.run();
-    return result;
+    return test::run(io, beast::get_lowest_layer(socket), std::move(start));
   }
 };
 
 WireClient::WireClient(int port, const Options& options) : state_(std::make_unique<State>()) {
   auto& socket = state_->socket;
-  beast::get_lowest_layer(socket).connect(loopback(port));
+  require(state_->run(
+      [&](auto done) { beast::get_lowest_layer(socket).async_connect(loopback(port), done); }));
   socket.read_message_max(64u << 20);
   socket.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
     if (!options.origin.empty()) request.set(http::field::origin, options.origin);
     if (!options.subprotocol.empty())
       request.set(http::field::sec_websocket_protocol, options.subprotocol);
   }));
-  socket.handshake("127.0.0.1:" + std::to_string(port), "/");
+  const std::string host = "127.0.0.1:" + std::to_string(port);
+  require(state_->run([&](auto done) { socket.async_handshake(host, "/", done); }));
 }
 
 WireClient::~WireClient() = default;
@@ -121,16 +132,14 @@ void WireClient::send(const v1::ClientMessage& message) { send_bytes(message.Ser
 
 void WireClient::send_bytes(std::string_view bytes, bool binary) {
   state_->socket.binary(binary);
-  const auto error = state_->run([&](auto done) {
-    state_->socket.async_write(asio::buffer(bytes.data(), bytes.size()), std::move(done));
-  });
-  if (error) throw beast::system_error(error);
+  require(state_->run([&](auto done) {
+    state_->socket.async_write(asio::buffer(bytes.data(), bytes.size()), done);
+  }));
 }
 
 Received WireClient::receive() {
   beast::flat_buffer buffer;
-  const auto error =
-      state_->run([&](auto done) { state_->socket.async_read(buffer, std::move(done)); });
+  const auto error = state_->run([&](auto done) { state_->socket.async_read(buffer, done); });
   Received received;
   if (error == beast::error::timeout) throw std::runtime_error("nothing was received");
   if (error) {
