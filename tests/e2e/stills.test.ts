@@ -5,7 +5,7 @@ import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, Page } from 'playwright-core';
 import type { Pose } from '#client/camera/camera_controller';
 import { axis_angle, multiply } from '#client/camera/vector';
-import { keep_screenshot, launch_browser, new_page } from './support/browser';
+import { choose_full_size, keep_screenshot, launch_browser, new_page } from './support/browser';
 import {
   coverage,
   mean_colour,
@@ -33,14 +33,12 @@ afterAll(async () => {
   remove();
 });
 
-/** A page of the streamed size with its automatic size switched off. */
+/** A page that shows pictures of its own size. */
 async function open(url: string): Promise<Page> {
   const { page } = await new_page(browser);
   await page.goto(url);
   await page.evaluate(() => window.catgs!.settled());
-  await page.getByRole('button', { name: 'Quality and view' }).click();
-  await page.getByLabel('Picture').selectOption('0');
-  await page.keyboard.press('Escape');
+  await choose_full_size(page);
   return page;
 }
 

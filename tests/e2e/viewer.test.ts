@@ -6,6 +6,7 @@ import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import type { Pose } from '#client/camera/camera_controller';
 import type { StatsSnapshot } from '#client/stats/metrics';
 import {
+  choose_full_size,
   insecure_host,
   keep_screenshot,
   launch_browser,
@@ -83,6 +84,7 @@ function turned(a: Pose, b: Pose): number {
 describe('a visit', () => {
   it('shows a moving picture, with video, without an error', async () => {
     const { page, errors } = await open_viewer();
+    await choose_full_size(page);
     const first = await settled_picture(page);
     expect([first.width, first.height]).toEqual([640, 360]);
     await page.keyboard.down('ArrowRight');
@@ -167,6 +169,7 @@ describe('a visit', () => {
 
   it('asks for the size that the view and the quality menu say', async () => {
     const { page } = await open_viewer();
+    await choose_full_size(page);
     await settle(page);
     await page.setViewportSize({ width: 800, height: 450 });
     await expect.poll(() => size_of(page), patience).toEqual([800, 450]);
@@ -181,10 +184,7 @@ describe('a visit', () => {
     const demo = await start_server('synth:city:300000');
     const { page } = await open_viewer(undefined, demo.url);
     await settle(page);
-    await page.getByRole('button', { name: 'Quality and view' }).click();
-    await page.getByLabel('Picture').selectOption('0');
-    await page.keyboard.press('Escape');
-    await page.locator('#view').focus();
+    await choose_full_size(page);
     await page.keyboard.down('ArrowRight');
     await more_frames(page, 120);
     const stats = await stats_of(page);
@@ -208,6 +208,7 @@ describe('trouble', () => {
   it('a server that crashed and came back is found again, without a reload, at the same place', async () => {
     const first = await start_server(scene);
     const { page } = await open_viewer(undefined, first.url);
+    await choose_full_size(page);
     await settle(page);
     await page.evaluate(() => {
       document.body.dataset['visit'] = 'first';
@@ -251,6 +252,7 @@ describe('trouble', () => {
   it('a page that is no secure context gets JPEG pictures and says how to get video', async () => {
     const { page } = await open_viewer(undefined, server.url.replace('127.0.0.1', insecure_host));
     await page.getByText('browsers offer their video decoder (WebCodecs) on https://').waitFor();
+    await choose_full_size(page);
     const picture = await settled_picture(page);
     expect([picture.width, picture.height]).toEqual([640, 360]);
     await page.getByRole('button', { name: 'Dismiss' }).click();

@@ -48,6 +48,17 @@ export async function new_page(
   return { page, errors };
 }
 
+/**
+ * Every pixel of the view, always: the automatic size follows how busy this machine is. Leaves the
+ * keyboard to the view.
+ */
+export async function choose_full_size(page: Page): Promise<void> {
+  await page.getByRole('button', { name: 'Quality and view' }).click();
+  await page.getByLabel('Picture').selectOption('0');
+  await page.keyboard.press('Escape');
+  await page.locator('#view').focus();
+}
+
 export async function keep_screenshot(page: Page, name: string): Promise<void> {
   mkdirSync(artefacts, { recursive: true });
   await page.screenshot({ path: path.join(artefacts, `${name}.png`) });
