@@ -9,12 +9,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include "render_core/build_info.h"
 #include "render_core/error.h"
 #include "server/commands.h"
 #include "server/config.h"
 #include "server/log.h"
 #include "server/server.h"
-#include "server/version.h"
 
 namespace catgs {
 namespace {
@@ -86,7 +86,7 @@ int serve(const CommandLine& line) {
 
 int run(int argc, char** argv) {
   CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
-  app.set_version_flag("--version", server_version);
+  app.set_version_flag("--version", build_version);
   app.footer(
       "Settings come from defaults, then --config FILE (TOML), then CATGS_<NAME> variables, then\n"
       "flags. Exit codes: 0 ended as asked, 1 failed, 2 bad usage, scene or configuration.\n"

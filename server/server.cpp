@@ -24,7 +24,6 @@
 #include "server/scene_catalog.h"
 #include "server/schedule/pool_executor.h"
 #include "server/session/session_registry.h"
-#include "server/version.h"
 
 namespace catgs {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "render_core/build_info.h"
 #include "server/net/wire.h"
 #include "server/session/frame_size.h"
-#include "server/version.h"
 
 namespace catgs {
 namespace {
@@ -184,7 +184,7 @@ void Session::say_config(TimePoint now) {
   welcome.scene = admission_.scene->facts;
   welcome.config = config_;
   welcome.renderer = admission_.scene->renderer_text;
-  welcome.server_version = server_version;
+  welcome.server_version = build_version;
   welcome.scene_ids = host_.scene_ids();
   say(welcome, now);
 }
