@@ -48,10 +48,21 @@ Scene load(const std::string& spec, int threads) {
   return load_scene(spec, options);
 }
 
+/// At most `max_bytes` of UTF-8, whole characters.
+std::string shortened(const std::string& text, std::size_t max_bytes) {
+  const auto continues_character = [&](std::size_t i) {
+    return (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;
+  };
+  if (text.size() <= max_bytes) return text;
+  while (max_bytes > 0 && continues_character(max_bytes)) --max_bytes;
+  return text.substr(0, max_bytes);
+}
+
 /// Scene ids are names that people can read in a link; a second scene of a name gets a number.
 std::string unique_id(const std::string& name,
                       const std::vector<std::shared_ptr<const SceneEntry>>& taken) {
-  std::string base = name.empty() ? "scene" : name.substr(0, 100);
+  constexpr std::size_t max_bytes = 100;  // with its number within the wire's 128
+  const std::string base = name.empty() ? "scene" : shortened(name, max_bytes);
   std::string id = base;
   for (int n = 2;
        std::ranges::any_of(taken, [&](const auto& entry) { return entry->facts.scene_id == id; });

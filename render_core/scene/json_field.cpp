@@ -18,6 +18,11 @@ nlohmann::json read_json(const ByteSource& file, std::uint64_t limit) {
   }
 }
 
+std::string to_utf8(const std::string& bytes) {
+  using nlohmann::json;
+  return json::parse(json(bytes).dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
 void JsonField::fail(std::string_view what, std::string_view remedy) const {
   throw InputError(file_, path_, what, remedy);
 }

@@ -17,6 +17,9 @@ namespace catgs {
 /// `limit` bytes are refused.
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit);
 
+/// `bytes` with U+FFFD for what is not UTF-8. File names may hold any bytes, JSON and the wire not.
+std::string to_utf8(const std::string& bytes);
+
 /// A value in a JSON document together with its place there, so that every complaint names file and
 /// field: "scene.json: limits.min[2]: is not a number". Borrows the document.
 class JsonField {

@@ -9,6 +9,7 @@
 #include "render_core/scene/byte_source.h"
 #include "render_core/scene/compressed_ply.h"
 #include "render_core/scene/file_set.h"
+#include "render_core/scene/json_field.h"
 #include "render_core/scene/load_context.h"
 #include "render_core/scene/locate_scene.h"
 #include "render_core/scene/ply.h"
@@ -79,7 +80,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
                      "levels and budgets are for streamed SOG folders");
 
   Scene scene;
-  scene.name = location.name;
+  scene.name = to_utf8(location.name);
   Decoded decoded = read_location(location, options, context.part(0.0, 0.9));
   scene.format = std::move(decoded.format);
   scene.cloud = std::move(decoded.cloud);

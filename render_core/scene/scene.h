@@ -47,7 +47,7 @@ struct SceneHints {
 
 /// A scene ready to be rendered.
 struct Scene {
-  std::string name;    // file or folder name without extension
+  std::string name;    // file or folder name without extension; UTF-8, other bytes read U+FFFD
   std::string format;  // "3DGS ply", "sog v2 (zip)", …
   GaussianCloud cloud;
   SceneHints hints;

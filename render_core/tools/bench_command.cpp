@@ -1,12 +1,11 @@
 // catgs-render bench: how fast a camera path renders, and how well.
-#include <fstream>
 #include <memory>
 
 #include <fmt/format.h>
 
-#include "render_core/error.h"
 #include "render_core/tools/bench_report.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/json_report.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
@@ -19,16 +18,6 @@ struct BenchOptions {
   std::size_t quality_every = 10;
   std::string json;
 };
-
-void write_json(const std::string& path, const nlohmann::ordered_json& json) {
-  if (path == "-") {
-    fmt::print("{}\n", json.dump(2));
-    return;
-  }
-  std::ofstream file(path);
-  file << json.dump(2) << std::endl;
-  if (!file) throw InputError(path, "", "cannot be written", "does the folder exist?");
-}
 
 void bench(const BenchOptions& options, bool quiet) {
   const RenderSetup setup = prepare(options.render, quiet);

@@ -10,6 +10,7 @@
 #include "render_core/image/png.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/json_report.h"
 
 namespace catgs {
 namespace {
@@ -28,7 +29,7 @@ void print_json(const ImageQuality& quality) {
       {"max_error", quality.max_error},
       {"worst_block_psnr_db", quality.worst_block_psnr()},
       {"block_0_1_percent_psnr_db", quality.block_0_1_percent_psnr()}};
-  fmt::print("{}\n", json.dump(2));
+  write_json("-", json);
 }
 
 void print_table(const ImageQuality& quality) {

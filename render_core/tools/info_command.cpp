@@ -13,6 +13,7 @@
 #include "render_core/scene/robust_bounds.h"
 #include "render_core/scene/scene.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/json_report.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
@@ -148,7 +149,7 @@ void info(const InfoOptions& options, bool quiet) {
       std::chrono::steady_clock::now() - start;
   const Json description = describe(scene, load_ms.count());
   if (options.json)
-    fmt::print("{}\n", description.dump(2));
+    write_json("-", description);
   else
     print_text(description);
 }

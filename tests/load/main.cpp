@@ -1,6 +1,5 @@
 // catgs-load: many headless clients of catgs-server, and what they got.
 #include <charconv>
-#include <fstream>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -9,6 +8,7 @@
 
 #include "render_core/build_info.h"
 #include "render_core/error.h"
+#include "render_core/tools/json_report.h"
 #include "tests/load/load.h"
 
 namespace catgs::load {
@@ -94,13 +94,7 @@ void write_report(const ProgramOptions& options, const SessionReports& reports,
                       {"ramp_s", options.load.ramp_s},    {"size", options.load.size},
                       {"fps", options.load.fps},          {"decode", options.load.decode}};
   json.update(to_json(reports, metrics));
-  if (options.json == "-") {
-    fmt::print("{}\n", json.dump(2));
-    return;
-  }
-  std::ofstream file(options.json);
-  file << json.dump(2) << std::endl;
-  if (!file) throw InputError(options.json, "", "cannot be written", "does the folder exist?");
+  write_json(options.json, json);
 }
 
 int run_checked(ProgramOptions& options) {

@@ -43,6 +43,13 @@ TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.ply.part"));
 }
 
+TEST_F(LoadScene, NamesAreUtf8WhateverTheFileIsCalled) {
+  save_scene(random_cloud(10, 0), folder_ / "caf\xe9\xff.ply");
+  EXPECT_EQ(load_scene(folder_ / "caf\xe9\xff.ply").name, "caf\ufffd\ufffd");
+  save_scene(random_cloud(10, 0), folder_ / "caf\u00e9 \"1\".ply");
+  EXPECT_EQ(load_scene(folder_ / "caf\u00e9 \"1\".ply").name, "caf\u00e9 \"1\"");
+}
+
 TEST_F(LoadScene, FilesAreToldApartByContent) {
   const GaussianCloud cloud = random_cloud(300, 1);
   const auto format_of = [&](const std::string& name, const std::string& content) {

@@ -268,6 +268,20 @@ TEST_F(CatgsRender, InfoDescribesTheScene) {
   EXPECT_THAT(failed.out, HasSubstr("absent.ply: does not exist"));
 }
 
+TEST_F(CatgsRender, ReportsAreJsonWhateverTheFilesAreCalled) {
+  const std::string odd = path("b\xe4ll.ply");
+  std::filesystem::copy_file(scene(), odd);
+  std::ofstream(path("b\xe4ll.json")) << R"({"near": 0.125})";
+  const auto info = nlohmann::json::parse(run(fmt::format("info --json '{}'", odd)).out);
+  EXPECT_EQ(info.at("name"), "b\ufffdll");
+  EXPECT_EQ(info.at("hints").at("source"), "sidecar b\ufffdll.json");
+  const Outcome bench =
+      run(fmt::format("bench '{}' --trace {} --size 64x48 --frames 0:2 --warmup 0 --json -", odd,
+                      path("path.tum")));
+  ASSERT_EQ(bench.exit_code, 0) << bench.out;
+  EXPECT_EQ(nlohmann::json::parse(bench.out).at("scene").at("name"), "b\ufffdll");
+}
+
 TEST_F(CatgsRender, ConvertPrunesAndKeepsTheHints) {
   std::ofstream(path("ball.json")) << R"({"near": 0.125})";
   const Outcome outcome =

@@ -9,11 +9,14 @@
 #include <boost/system/system_error.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "render_core/error.h"
+#include "render_core/scene/save_scene.h"
+#include "render_core/scene/synth.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
@@ -186,6 +189,30 @@ TEST(Server, RefusesAnUnknownSceneAndAFullHouse) {
   second.send(hello_message(64, 64, v1::CODEC_H264));
   EXPECT_EQ(second.receive_until_closed(&error).close_code, 1013);
   EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+}
+
+TEST(Server, ServesScenesWhateverTheirFilesAreCalled) {
+  const auto folder =
+      std::filesystem::path(testing::TempDir()) / ("scenes-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const Scene city = synthesize(SynthKind::city, 1000, 1);
+  std::string money;
+  for (int i = 0; i < 40; ++i) money += "\u20ac";  // 120 bytes: its id is cut between characters
+  std::vector<std::string> paths;
+  for (const std::string& name : {std::string("b\xe4r"), std::string("b\xf6r"), money}) {
+    paths.push_back((folder / (name + ".splat")).string());
+    save_scene(city.cloud, paths.back());
+  }
+  RunningServer server([&](ServerConfig& config) { config.scenes = paths; });
+  const auto listed = nlohmann::json::parse(http_get(server.port(), "/api/scenes").body);
+  const std::string cut = money.substr(0, 99);
+  EXPECT_EQ(listed.at("scenes")[0].at("id"), "b\ufffdr");
+  EXPECT_EQ(listed.at("scenes")[1].at("id"), "b\ufffdr-2");
+  EXPECT_EQ(listed.at("scenes")[2].at("id"), cut);
+  WireClient client(server.port());
+  EXPECT_THAT(client.greet().scene_ids(), testing::ElementsAre("b\ufffdr", "b\ufffdr-2", cut));
+  EXPECT_TRUE(nlohmann::json::accept(sessions_json(server)));
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Server, LimitsConnectionsOfOneAddress) {
