@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
+#include "server/required_file.h"
 
 namespace catgs {
 namespace {
@@ -85,11 +86,8 @@ bool is_role(std::string_view role) {
 }
 
 std::string read_text(const std::filesystem::path& path, std::string_view flag) {
-  std::ifstream in(path, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(in), {});
-  if (!in.good() && !in.eof())
-    throw InputError(fmt::format("{} {}", flag, path.string()), {}, "cannot be read");
-  return text;
+  std::ifstream in = open_required_file(flag, path);
+  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 }  // namespace
@@ -121,12 +119,12 @@ std::optional<LinkGrant> read_link_token(std::string_view token, std::string_vie
   return grant;
 }
 
-std::string read_key_file(const std::filesystem::path& path) {
-  std::string key = read_text(path, "--token-key-file");
+std::string read_key_file(std::string_view flag, const std::filesystem::path& path) {
+  std::string key = read_text(path, flag);
   while (!key.empty() && (key.back() == '\n' || key.back() == '\r')) key.pop_back();
   if (key.size() < min_key_bytes)
     throw InputError(
-        "--token-key-file " + path.string(), {},
+        fmt::format("{} {}", flag, path.string()), {},
         fmt::format("the key has {} bytes, at least {} are needed", key.size(), min_key_bytes),
         "make one: openssl rand -hex 32");
   return key;
@@ -147,9 +145,10 @@ std::chrono::seconds parse_duration(std::string_view text) {
 
 AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::path key_file)
     : token_file_(std::move(token_file)) {
-  if (!key_file.empty()) key_ = read_key_file(key_file);
+  if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
   if (!token_file_.empty()) {
-    token_file_time_ = std::filesystem::last_write_time(token_file_);
+    std::error_code missing;  // which read_token_file() reports
+    token_file_time_ = std::filesystem::last_write_time(token_file_, missing);
     read_token_file();
   }
 }

@@ -22,8 +22,9 @@ std::string make_link_token(const LinkGrant& grant, std::string_view key);
 /// The grant, if the token was made with `key`; says nothing about its expiry.
 std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key);
 
-/// Reads a key of at least 16 bytes; trailing line ends are not part of it. Throws InputError.
-std::string read_key_file(const std::filesystem::path& path);
+/// Reads a key of at least 16 bytes; trailing line ends are not part of it. Throws InputError that
+/// names the flag which gave the path.
+std::string read_key_file(std::string_view flag, const std::filesystem::path& path);
 
 /// "90s", "30m", "12h", "7d". Throws InputError.
 std::chrono::seconds parse_duration(std::string_view text);

@@ -38,7 +38,8 @@ void add_token_command(CLI::App& app, int& exit_code) {
     const auto now = std::chrono::system_clock::now() + parse_duration(options->expires);
     options->grant.expires_unix_s =
         std::chrono::duration_cast<std::chrono::seconds>(now.time_since_epoch()).count();
-    std::cout << make_link_token(options->grant, read_key_file(options->key_file)) << '\n';
+    std::cout << make_link_token(options->grant, read_key_file("--key-file", options->key_file))
+              << '\n';
     std::cerr << "append it to the page's address: https://HOST/#token=TOKEN\n";
     exit_code = 0;
   });

@@ -12,6 +12,8 @@
 #include <toml++/toml.h>
 
 #include "render_core/error.h"
+#include "server/net/http.h"
+#include "server/required_file.h"
 
 namespace catgs {
 namespace {
@@ -240,7 +242,8 @@ const std::vector<Setting>& settings() {
 void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& sources) {
   toml::table table;
   try {
-    table = toml::parse_file(path);
+    std::ifstream in = open_required_file("--config", path);
+    table = toml::parse(in, path);
   } catch (const toml::parse_error& error) {
     const auto line = error.source().begin.line;
     throw InputError(line ? fmt::format("{}:{}", path, line) : path, {}, error.description());

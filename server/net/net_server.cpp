@@ -3,7 +3,6 @@
 #include <atomic>
 #include <csignal>
 #include <exception>
-#include <fstream>
 #include <thread>
 #include <utility>
 
@@ -15,6 +14,7 @@
 #include "server/net/lws_http.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/wire.h"
+#include "server/required_file.h"
 
 namespace catgs {
 namespace {
@@ -171,11 +171,6 @@ const lws_protocols protocols[] = {
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
 
-void require_readable(const char* flag, const std::string& path) {
-  if (!std::ifstream(path))
-    throw InputError(fmt::format("{} {}", flag, path), {}, "cannot be read");
-}
-
 void forward_log(int level, const char* line) {
   std::string_view text(line);
   while (text.ends_with('\n')) text.remove_suffix(1);
@@ -238,8 +233,8 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   lws_set_log_level(LLL_ERR | LLL_WARN, forward_log);
   const bool tls = !options.tls_certificate.empty();
   if (tls) {
-    require_readable("--tls-cert", options.tls_certificate);
-    require_readable("--tls-key", options.tls_key);
+    open_required_file("--tls-cert", options.tls_certificate);
+    open_required_file("--tls-key", options.tls_key);
   }
   State& s = *state_;
   s.site = {std::move(options.http), std::move(options.accept), options.allowed_origins,

@@ -9,8 +9,10 @@
 namespace catgs {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Optional;
+using testing::ThrowsMessage;
 
 constexpr std::string_view key = "0123456789abcdef0123456789abcdef";
 
@@ -78,8 +80,23 @@ TEST_F(AccessTest, WithoutFilesEverybodyMayEnter) {
   EXPECT_FALSE(access.refusal("", "city", 0));
 }
 
+TEST_F(AccessTest, FilesThatCannotBeReadAreNamedWithTheirFlag) {
+  const auto says = [](const char* flag, const std::string& path, const char* why) {
+    return ThrowsMessage<InputError>(
+        AllOf(HasSubstr(flag), HasSubstr(path), HasSubstr(why), HasSubstr("check the path")));
+  };
+  const std::string absent = folder / "absent";
+  EXPECT_THAT([&] { AccessControl(absent, {}); },
+              says("--token-file", absent, "No such file or directory"));
+  EXPECT_THAT([&] { AccessControl({}, absent); },
+              says("--token-key-file", absent, "No such file or directory"));
+  EXPECT_THAT([&] { AccessControl(folder.path(), {}); },
+              says("--token-file", folder.path().string(), "it is a folder"));
+}
+
 TEST_F(AccessTest, NamesWhatIsWrong) {
-  EXPECT_THROW(read_key_file(folder.write("short", "abc")), InputError);
+  EXPECT_THAT([&] { read_key_file("--key-file", folder.write("short", "abc")); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--key-file"), HasSubstr("openssl rand"))));
   EXPECT_THROW(AccessControl(folder.write("empty", "# nothing\n"), {}), InputError);
   EXPECT_THROW(make_link_token({"city", "A B", 0}, key), InputError);
   for (const char* text : {"", "7", "d", "7x", "-1d", "0s", "7d ", "99999999d"})

@@ -89,7 +89,8 @@ TEST_F(ConfigTest, MistakesNameTheirPlace) {
   EXPECT_THAT([&] { read_flag("admin-bind", {"9090"}); },
               ThrowsMessage<InputError>(HasSubstr("ADDRESS:PORT")));
   EXPECT_THAT([&] { apply_toml("/nowhere.toml", config, sources); },
-              ThrowsMessage<InputError>(HasSubstr("/nowhere.toml")));
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--config /nowhere.toml"),
+                                              HasSubstr("No such file"), HasSubstr("check"))));
 }
 
 TEST_F(ConfigTest, RefusesAnOpenDoor) {
