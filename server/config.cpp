@@ -173,7 +173,9 @@ std::vector<Setting> make_settings() {
       text("tls-cert", "FILE", "Certificate chain, PEM: serve https and wss", &C::tls_cert),
       text("tls-key", "FILE", "Private key of the certificate, PEM", &C::tls_key),
       list("allow-origin", "ORIGIN",
-           "Other sites whose pages may connect, https://a.example; *: all", &C::allow_origins),
+           "Other sites whose pages may connect, or whose proxy forwards to a loopback address, "
+           "https://a.example; *: all",
+           &C::allow_origins),
       list("embed-origin", "ORIGIN", "Sites that may show the client in a frame",
            &C::embed_origins),
       choice<std::string>("log-format", "Form of the log on standard error", &C::log_format,
@@ -316,10 +318,6 @@ Endpoint parse_endpoint(std::string_view text_value) {
   if (address.starts_with('[') && address.ends_with(']'))
     address = address.substr(1, address.size() - 2);
   return {std::string(address), parse_int(text_value.substr(colon + 1), 0, 65535)};
-}
-
-bool is_loopback(std::string_view address) {
-  return address == "localhost" || address == "::1" || address.starts_with("127.");
 }
 
 }  // namespace catgs

@@ -77,7 +77,5 @@ std::string print_config(const ServerConfig& config, const ConfigSources& source
 
 /// "127.0.0.1:9090" or "[::1]:9090". Throws std::invalid_argument.
 Endpoint parse_endpoint(std::string_view text);
-/// 127.0.0.0/8, ::1, localhost.
-bool is_loopback(std::string_view address);
 
 }  // namespace catgs

@@ -2,15 +2,49 @@
 
 #include <algorithm>
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
 namespace catgs {
+namespace {
+
+/// "a.example:8080" or "[::1]:8080" without port and brackets.
+std::string_view host_name(std::string_view authority) {
+  if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
+  return authority.substr(0, authority.rfind(':'));
+}
+
+/// The host[:port] of "https://a.example:8443"; empty for what is no origin ("null", "*").
+std::string_view authority_of(std::string_view origin) {
+  const auto scheme_end = origin.find("://");
+  return scheme_end == std::string_view::npos ? "" : origin.substr(scheme_end + 3);
+}
+
+}  // namespace
 
 bool origin_allowed(std::string_view origin, std::string_view host,
                     const std::vector<std::string>& allowed) {
   if (origin.empty()) return true;
   if (std::ranges::any_of(allowed, [&](const auto& a) { return a == "*" || a == origin; }))
     return true;
-  const auto scheme_end = origin.find("://");
-  return scheme_end != std::string_view::npos && origin.substr(scheme_end + 3) == host;
+  const std::string_view authority = authority_of(origin);
+  return !authority.empty() && authority == host;
+}
+
+bool is_loopback(std::string_view address) {
+  if (address == "localhost") return true;
+  const std::string text(address);
+  in_addr v4{};
+  in6_addr v6{};
+  if (::inet_pton(AF_INET, text.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  return ::inet_pton(AF_INET6, text.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed) {
+  const std::string_view name = host_name(host);
+  return host.empty() || is_loopback(name) || std::ranges::any_of(allowed, [&](const auto& a) {
+           return a == "*" || host_name(authority_of(a)) == name;
+         });
 }
 
 std::string content_security_policy(const std::vector<std::string>& embed_origins) {

@@ -43,6 +43,15 @@ bool origin_allowed(std::string_view origin, std::string_view host,
                     const std::vector<std::string>& allowed);
 
 /// Security headers of every page. `embed_origins`: who may show it in a frame.
+/// 127.0.0.0/8, ::1, localhost.
+bool is_loopback(std::string_view address);
+
+/// Is a request with this Host header meant for a server that listens on a loopback address only? A
+/// foreign page may let its own name resolve to 127.0.0.1 (DNS rebinding); its requests then carry
+/// that name both in Origin and in Host, so comparing the two proves nothing. Yes for loopback
+/// names, for hosts of `allowed` origins (a proxy forwards them), and without a Host (no browser).
+bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed);
+
 std::string content_security_policy(const std::vector<std::string>& embed_origins);
 
 }  // namespace catgs

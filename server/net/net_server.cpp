@@ -30,6 +30,7 @@ struct Site {
   ConnectionAcceptor accept;  // null: no websockets
   std::vector<std::string> allowed_origins;
   std::string policy;
+  bool loopback = false;  // listens on a loopback address
 };
 
 /// Per-connection memory that libwebsockets owns, zeroed at its birth.
@@ -52,6 +53,19 @@ Service& service_of(lws* wsi) {
 
 const Site& site_of(lws* wsi) {
   return *static_cast<const Site*>(lws_get_vhost_user(lws_get_vhost(wsi)));
+}
+
+/// See loopback_host_allowed().
+bool host_allowed(const Site& site, const std::string& host) {
+  return !site.loopback || loopback_host_allowed(host, site.allowed_origins);
+}
+
+HttpResponse refuse_host(const std::string& host) {
+  spdlog::warn("request refused: this server is not known as {} (--allow-origin)", host);
+  return text_response(
+      403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
+                       "Open it as localhost, or start it with --allow-origin https://{0}\n",
+                       host));
 }
 
 void forget(HttpSlot& slot) { delete std::exchange(slot.exchange, nullptr); }
@@ -77,8 +91,12 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       const Site& site = site_of(wsi);
       forget(*slot);
       slot->exchange = new LwsHttpExchange;
+      const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+      const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(host); };
       bool finished = false;
-      if (slot->exchange->begin(wsi, site.http, site.policy, finished) != 0) return -1;
+      if (slot->exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse, site.policy,
+                                finished) != 0)
+        return -1;
       if (finished) return finish_request(wsi, *slot);
       lws_callback_on_writable(wsi);
       return 0;
@@ -112,10 +130,12 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
       const Site& site = site_of(wsi);
       const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
-      if (site.accept &&
-          origin_allowed(origin, request_header(wsi, WSI_TOKEN_HOST), site.allowed_origins))
+      const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+      if (site.accept && host_allowed(site, host) &&
+          origin_allowed(origin, host, site.allowed_origins))
         return 0;
-      spdlog::warn("websocket refused: origin {} is not allowed (--allow-origin)", origin);
+      spdlog::warn("websocket refused: origin {} is not allowed at {} (--allow-origin)", origin,
+                   host);
       lws_return_http_status(wsi, 403, "this origin is not allowed");
       return -1;
     }
@@ -238,8 +258,9 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   }
   State& s = *state_;
   s.site = {std::move(options.http), std::move(options.accept), options.allowed_origins,
-            content_security_policy(options.embed_origins)};
-  s.admin_site = {std::move(options.admin_http), nullptr, {}, content_security_policy({})};
+            content_security_policy(options.embed_origins), is_loopback(options.listen.address)};
+  s.admin_site = {std::move(options.admin_http), nullptr, options.allowed_origins,
+                  content_security_policy({}), is_loopback(options.admin_listen.address)};
   s.idle_policy.secs_since_valid_ping = ping_after_s;
   s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
 

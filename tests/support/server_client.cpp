@@ -122,7 +122,8 @@ WireClient::WireClient(int port, const Options& options) : state_(std::make_uniq
     if (!options.subprotocol.empty())
       request.set(http::field::sec_websocket_protocol, options.subprotocol);
   }));
-  const std::string host = "127.0.0.1:" + std::to_string(port);
+  const std::string own = "127.0.0.1:" + std::to_string(port);
+  const std::string& host = options.host.empty() ? own : options.host;
   require(state_->run([&](auto done) { socket.async_handshake(host, "/", done); }));
 }
 

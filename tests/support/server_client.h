@@ -62,6 +62,7 @@ class WireClient {
   struct Options {
     std::string origin;
     std::string subprotocol = "catgs.v1";
+    std::string host = {};  // empty: 127.0.0.1 and the port
   };
   /// Throws boost::system::system_error when the handshake is refused.
   explicit WireClient(int port) : WireClient(port, Options()) {}

@@ -26,6 +26,26 @@ TEST(Origin, OwnPagesAndListedOnesMayConnect) {
   EXPECT_TRUE(origin_allowed("null", "a.example", {"*"}));
 }
 
+TEST(LoopbackHost, ForeignNamesAreRefusedUnlessListed) {
+  for (const char* host :
+       {"localhost", "localhost:8080", "127.0.0.1", "127.9.8.7:1", "[::1]", "[::1]:8080", ""})
+    EXPECT_TRUE(loopback_host_allowed(host, {})) << host;
+  for (const char* host :
+       {"evil.example", "evil.example:8080", "127.evil.example", "localhost.evil",
+        "192.168.0.1:8080", "[2001:db8::1]:8080", "[::", ":8080"})
+    EXPECT_FALSE(loopback_host_allowed(host, {"https://a.example"})) << host;
+  EXPECT_TRUE(loopback_host_allowed("a.example", {"https://a.example"}));
+  EXPECT_TRUE(loopback_host_allowed("a.example:8443", {"https://a.example"}));
+  EXPECT_TRUE(loopback_host_allowed("b.example", {"https://a.example", "*"}));
+}
+
+TEST(LoopbackHost, LoopbackIsTheWholeNetwork127) {
+  for (const char* address : {"localhost", "127.0.0.1", "127.8.9.1", "::1"})
+    EXPECT_TRUE(is_loopback(address)) << address;
+  for (const char* address : {"::", "0.0.0.0", "127.a.example", "10.0.0.1", "127", ""})
+    EXPECT_FALSE(is_loopback(address)) << address;
+}
+
 TEST(ContentSecurityPolicy, NamesWhoMayEmbed) {
   EXPECT_THAT(content_security_policy({}), HasSubstr("frame-ancestors 'none'"));
   EXPECT_THAT(content_security_policy({"https://museum.example"}),
