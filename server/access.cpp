@@ -155,6 +155,7 @@ AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::
 
 std::optional<std::string> AccessControl::refusal(std::string_view token, std::string_view scene_id,
                                                   std::int64_t now_unix_s) {
+  const std::lock_guard lock(mutex_);
   if (token_file_.empty() && key_.empty()) return std::nullopt;
   if (token.empty()) return "this server needs an access token: open the link you were given";
   if (!token_file_.empty()) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,7 +30,7 @@ std::string read_key_file(std::string_view flag, const std::filesystem::path& pa
 /// "90s", "30m", "12h", "7d". Throws InputError.
 std::chrono::seconds parse_duration(std::string_view text);
 
-/// Who may open a session. Without a token file and a key file: everybody. Not thread-safe.
+/// Who may see which scene. Without a token file and a key file: everybody, all. Thread-safe.
 class AccessControl {
  public:
   /// Empty path: this kind of token is not used. Throws InputError when a file cannot be read.
@@ -45,7 +46,8 @@ class AccessControl {
   void read_token_file();
   [[nodiscard]] bool is_static_token(std::string_view token) const;
 
-  std::filesystem::path token_file_;
+  std::mutex mutex_;
+  const std::filesystem::path token_file_;
   std::filesystem::file_time_type token_file_time_{};
   std::vector<std::string> tokens_;
   std::string key_;

@@ -63,13 +63,10 @@ RegistryOptions registry_options(const ServerConfig& config) {
   return options;
 }
 
-std::string scenes_json(const std::vector<std::shared_ptr<const SceneEntry>>& scenes) {
-  auto list = nlohmann::json::array();
-  for (const auto& scene : scenes)
-    list.push_back({{"id", scene->facts.scene_id},
-                    {"title", scene->facts.title},
-                    {"gaussians", scene->facts.gaussians}});
-  return nlohmann::json{{"scenes", list}}.dump();
+/// The token of "Authorization: Bearer TOKEN"; empty: none.
+std::string bearer_token(std::string_view authorization) {
+  constexpr std::string_view scheme = "Bearer ";
+  return std::string(authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "");
 }
 
 }  // namespace
@@ -85,7 +82,8 @@ struct Server::State {
         drain_timer(io) {}
 
   NetOptions net_options();
-  HttpResponse respond(const HttpRequest& request) const;
+  HttpResponse respond(const HttpRequest& request);
+  HttpResponse list_scenes(const std::string& token);
   HttpResponse respond_admin(const HttpRequest& request) const;
   void print_banner() const;
   void wait_for_signal();
@@ -100,7 +98,6 @@ struct Server::State {
   NetServer net;
   boost::asio::io_context io{1};  // outlives the pool, whose tasks post to it
   std::shared_ptr<ThreadPool> pool;
-  std::string scene_list;
   std::vector<std::shared_ptr<const SceneEntry>> scenes;
   std::vector<EncoderChoice> encoders;
   boost::asio::signal_set stop_signals;
@@ -128,13 +125,30 @@ NetOptions Server::State::net_options() {
   return options;
 }
 
-HttpResponse Server::State::respond(const HttpRequest& request) const {
+HttpResponse Server::State::respond(const HttpRequest& request) {
   if (request.path == "/healthz") return text_response(200, "ok\n");
   if (request.path == "/readyz")
     return ready ? text_response(200, "ready\n") : text_response(503, "not ready\n");
-  if (request.path == "/api/scenes") return text_response(200, scene_list, "application/json");
+  if (request.path == "/api/scenes") return list_scenes(bearer_token(request.authorization));
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   return client.respond(request);
+}
+
+/// What the token may see. Like hello, this never tells a stranger what is here.
+HttpResponse Server::State::list_scenes(const std::string& token) {
+  auto list = nlohmann::json::array();
+  std::string refusal;
+  for (const auto& scene : scenes) {
+    const SceneFacts& facts = scene->facts;
+    if (const auto refused = access.refusal(token, facts.scene_id, unix_now_s()))
+      refusal = *refused;
+    else
+      list.push_back(
+          {{"id", facts.scene_id}, {"title", facts.title}, {"gaussians", facts.gaussians}});
+  }
+  if (list.empty())
+    return text_response(401, "401: " + refusal + "\nSend it as Authorization: Bearer TOKEN\n");
+  return text_response(200, nlohmann::json{{"scenes", list}}.dump(), "application/json");
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) const {
@@ -148,7 +162,6 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) const {
 Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(config)) {
   State& s = *state_;
   s.scenes = load_scenes(s.config, s.pool);
-  s.scene_list = scenes_json(s.scenes);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token, const std::string& scene_id) {
     return s.access.refusal(token, scene_id, unix_now_s());

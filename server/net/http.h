@@ -13,6 +13,7 @@ struct HttpRequest {
   std::string_view path;  // decoded, starts with '/', no query
   std::string_view if_none_match;
   bool accepts_gzip = false;
+  std::string_view authorization = {};  // the header, as it came
 };
 
 struct HttpResponse {
@@ -42,7 +43,6 @@ using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
 bool origin_allowed(std::string_view origin, std::string_view host,
                     const std::vector<std::string>& allowed);
 
-/// Security headers of every page. `embed_origins`: who may show it in a frame.
 /// 127.0.0.0/8, ::1, localhost.
 bool is_loopback(std::string_view address);
 
@@ -52,6 +52,7 @@ bool is_loopback(std::string_view address);
 /// names, for hosts of `allowed` origins (a proxy forwards them), and without a Host (no browser).
 bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed);
 
+/// Security headers of every page. `embed_origins`: who may show it in a frame.
 std::string content_security_policy(const std::vector<std::string>& embed_origins);
 
 }  // namespace catgs

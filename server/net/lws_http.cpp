@@ -55,7 +55,9 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
   const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
-  response_ = handler({path, if_none_match, encodings.find("gzip") != std::string::npos});
+  const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  response_ =
+      handler({path, if_none_match, encodings.find("gzip") != std::string::npos, authorization});
   finished = head_only_ || !response_.body || response_.body->empty();
   return write_headers(wsi, policy);
 }

@@ -17,6 +17,7 @@
 #include "render_core/error.h"
 #include "render_core/scene/save_scene.h"
 #include "render_core/scene/synth.h"
+#include "server/access.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
@@ -24,6 +25,7 @@
 namespace catgs::test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -192,9 +194,7 @@ TEST(Server, RefusesAnUnknownSceneAndAFullHouse) {
 }
 
 TEST(Server, ServesScenesWhateverTheirFilesAreCalled) {
-  const auto folder =
-      std::filesystem::path(testing::TempDir()) / ("scenes-" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
+  const TemporaryFolder folder;
   const Scene city = synthesize(SynthKind::city, 1000, 1);
   std::string money;
   for (int i = 0; i < 40; ++i) money += "\u20ac";  // 120 bytes: its id is cut between characters
@@ -212,7 +212,6 @@ TEST(Server, ServesScenesWhateverTheirFilesAreCalled) {
   WireClient client(server.port());
   EXPECT_THAT(client.greet().scene_ids(), testing::ElementsAre("b\ufffdr", "b\ufffdr-2", cut));
   EXPECT_TRUE(nlohmann::json::accept(sessions_json(server)));
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Server, LimitsConnectionsOfOneAddress) {
@@ -236,6 +235,53 @@ TEST(Server, RefusesForeignOriginsAndProtocols) {
                boost::system::system_error);
   EXPECT_THROW(WireClient(server.port(), {"", "catgs.v99"}), boost::system::system_error);
   EXPECT_THROW(WireClient(server.port(), {"", ""}), boost::system::system_error);
+}
+
+TEST(Server, AnswersNoForeignNameOnALoopbackAddress) {
+  // What a page of evil.example sends after its name was made to resolve to 127.0.0.1.
+  RunningServer server([](ServerConfig& config) { config.allow_origins = {"https://a.example"}; });
+  for (const int port : {server.port(), server.admin_port()}) {
+    const HttpReply refused = http_get(port, "/api/scenes", {{"host", "evil.example:8080"}});
+    EXPECT_EQ(refused.status, 403);
+    EXPECT_THAT(refused.body, HasSubstr("--allow-origin https://evil.example:8080"));
+  }
+  EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "a.example"}}).status, 200);
+  EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "localhost"}}).status, 200);
+  const WireClient::Options rebound{"http://evil.example:8080", "catgs.v1", "evil.example:8080"};
+  EXPECT_THROW(WireClient(server.port(), rebound), boost::system::system_error);
+}
+
+TEST(Server, LinksOpenTheirSceneOnly) {
+  const TemporaryFolder folder;
+  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
+  RunningServer server([&](ServerConfig& config) {
+    config.scenes = {"synth:city:2000", "synth:garden:2000"};
+    config.token_key_file = key_file.string();
+  });
+  const std::string link =
+      make_link_token({"city", "viewer", 1'000'000'000'000}, read_key_file("", key_file));
+  WireClient guest(server.port());
+  EXPECT_THAT(guest.greet(64, 64, v1::CODEC_H264, link).scene_ids(), testing::ElementsAre("city"));
+
+  v1::ClientMessage select;
+  select.mutable_select_scene()->set_scene_id("garden");
+  guest.send(select);
+  const auto error = guest.receive_message(v1::ServerMessage::kError).error();
+  EXPECT_EQ(error.code(), v1::Error::UNAUTHORIZED);
+  EXPECT_FALSE(error.fatal());
+  select.mutable_select_scene()->set_scene_id("city");
+  guest.send(select);
+  EXPECT_EQ(guest.receive_message(v1::ServerMessage::kWelcome).welcome().scene().scene_id(),
+            "city");
+
+  const auto scenes = [&](const std::string& token) {
+    return http_get(server.port(), "/api/scenes", {{"authorization", "Bearer " + token}});
+  };
+  EXPECT_THAT(scenes(link).body, AllOf(HasSubstr("\"city\""), Not(HasSubstr("garden"))));
+  EXPECT_EQ(scenes("guess").status, 401);
+  const HttpReply stranger = http_get(server.port(), "/api/scenes");
+  EXPECT_EQ(stranger.status, 401);
+  EXPECT_THAT(stranger.body, AllOf(HasSubstr("Bearer"), Not(HasSubstr("city"))));
 }
 
 TEST(Server, AdmitsByTokenAndNeverSaysIt) {
