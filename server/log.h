@@ -5,7 +5,8 @@
 namespace catgs {
 
 /// Sets up spdlog's default logger on standard error. `format`: "human" or "json" (one object a
-/// line: time, level, message); `level`: debug, info, warn, error. Nothing secret is ever logged.
+/// line: time, level, session where a line is about one, message); `level`: debug, info, warn,
+/// error. Nothing secret is ever logged.
 void set_up_log(std::string_view format, std::string_view level);
 
 }  // namespace catgs

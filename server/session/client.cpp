@@ -7,6 +7,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/net/wire.h"
+#include "server/session/log_session.h"
 #include "server/session/session_registry.h"
 
 namespace catgs {
@@ -91,9 +92,10 @@ std::variant<Admission, ErrorMessage> Client::admit(const Hello& hello) {
     admitted_ = true;
     ++registry_.admitted_;
     registry_.metrics_.sessions_admitted.Increment();
-    spdlog::info("session {}: {} looks at {}, {}x{}, {}", session_.id(),
-                 connection_->peer_address(), admission->scene->facts.scene_id, hello.viewport_px.x,
-                 hello.viewport_px.y, admission->encoder.text);
+    const LogSession about(session_.id());
+    spdlog::info("{} looks at {}, {}x{}, {}", connection_->peer_address(),
+                 admission->scene->facts.scene_id, hello.viewport_px.x, hello.viewport_px.y,
+                 admission->encoder.text);
   }
   return result;
 }
@@ -119,7 +121,8 @@ std::uint32_t Client::session_count() { return registry_.admitted_; }
 
 void Client::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message)) {
-    spdlog::warn("session {} ({}): {}", session_.id(), connection_->peer_address(), error->message);
+    const LogSession about(session_.id());
+    spdlog::warn("{}: {}", connection_->peer_address(), error->message);
     if (error->fatal) registry_.metrics_.sessions_refused.Increment();
   }
   connection_->send(wire::serialize(message));

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
+#include "server/session/log_session.h"
+
 namespace catgs {
 namespace {
 
@@ -81,8 +83,9 @@ void SessionRegistry::remove(const Client& client) {
   if (client.admitted()) {
     --admitted_;
     const Session& session = client.session();
-    spdlog::info("session {}: ended after {} frames, {} bytes, {} dropped", session.id(),
-                 session.frames_sent(), session.bytes_sent(), session.frames_dropped());
+    const LogSession about(session.id());
+    spdlog::info("ended after {} frames, {} bytes, {} dropped", session.frames_sent(),
+                 session.bytes_sent(), session.frames_dropped());
   }
   clients_.erase(it);
 }
