@@ -152,6 +152,11 @@ std::vector<Setting> make_settings() {
       text("simd", "TARGET", "SIMD target of the CPU core: auto, scalar, …", &C::simd),
       integer("threads", "N", "Threads that render and encode; 0: one per core", &C::threads, 0,
               1024),
+      integer("lod", "N", "Streamed SOG: this level of detail, 0 is the finest; -1: by --budget",
+              &C::lod, -1, 1000),
+      integer("budget", "N",
+              "Streamed SOG: the finest levels with at most so many Gaussians; 0: no bound",
+              &C::gaussian_budget, 0, 1'000'000'000),
       choice<EncoderKind>("encoder", "Video encoder", &C::encoder,
                           {{"auto", EncoderKind::automatic},
                            {"nvenc", EncoderKind::nvenc},
@@ -287,6 +292,8 @@ void validate(const ServerConfig& config) {
   if (config.scenes.empty())
     throw InputError("--scene", {}, "no scene is given",
                      "give a file, or try --scene synth:city:300000");
+  if (config.lod >= 0 && config.gaussian_budget > 0)
+    throw InputError("--lod, --budget", {}, "both are given", "give one of them");
   if (config.tls_cert.empty() != config.tls_key.empty())
     throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
                      "--tls-cert and --tls-key belong together");

@@ -22,7 +22,9 @@ struct ServerConfig {
   std::string client_dir;                     // empty: found beside the program
   RendererKind renderer = RendererKind::automatic;
   std::string simd = "auto";
-  int threads = 0;  // 0: one per core
+  int threads = 0;          // 0: one per core
+  int lod = -1;             // of streamed SOG scenes; -1: by gaussian_budget
+  int gaussian_budget = 0;  // of streamed SOG scenes; 0: no bound
   EncoderKind encoder = EncoderKind::automatic;
   int fps = 60;
   int bitrate_kbps = 8000;

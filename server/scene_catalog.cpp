@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
+#include "render_core/scene/locate_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/scene/synth.h"
 #include "render_core/thread_pool.h"
@@ -41,10 +44,27 @@ Scene synthesize(const std::string& spec) {
   return synthesize(parse_synth_kind(parts[1]), count, seed);
 }
 
-Scene load(const std::string& spec, int threads) {
-  if (spec.starts_with("synth:")) return synthesize(spec);
+bool is_synthetic(const std::string& spec) { return spec.starts_with("synth:"); }
+
+/// Only streamed SOG folders have levels of detail to choose from.
+bool has_levels(const std::string& spec) {
+  if (is_synthetic(spec)) return false;
+  std::error_code error;
+  if (!std::filesystem::exists(spec, error))
+    throw InputError("--scene " + spec, {}, "there is no such file or folder",
+                     "check the path, or try --scene synth:city:300000");
+  return locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
+}
+
+Scene load(const std::string& spec, const ServerConfig& config, int threads) {
+  if (is_synthetic(spec)) return synthesize(spec);
   LoadOptions options;
   options.threads = threads;
+  if (has_levels(spec)) {
+    if (config.lod >= 0) options.lod = config.lod;
+    if (config.gaussian_budget > 0)
+      options.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
+  }
   return load_scene(spec, options);
 }
 
@@ -89,10 +109,15 @@ SceneFacts facts_of(const Scene& scene, std::string id) {
 
 std::vector<std::shared_ptr<const SceneEntry>> load_scenes(
     const ServerConfig& config, const std::shared_ptr<ThreadPool>& pool) {
+  if ((config.lod >= 0 || config.gaussian_budget > 0) &&
+      std::ranges::none_of(config.scenes, has_levels))
+    throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
+                     "no scene has levels of detail to choose from",
+                     "levels and budgets are for streamed SOG folders");
   std::vector<std::shared_ptr<const SceneEntry>> entries;
   for (const auto& spec : config.scenes) {
     spdlog::info("loading {}", spec);
-    Scene scene = load(spec, pool->threads());
+    Scene scene = load(spec, config, pool->threads());
     auto entry = std::make_shared<SceneEntry>();
     entry->facts = facts_of(scene, unique_id(scene.name, entries));
     auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)),

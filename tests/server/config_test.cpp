@@ -105,6 +105,34 @@ TEST_F(ConfigTest, RefusesAnOpenDoor) {
   EXPECT_NO_THROW(validate(config));
 }
 
+TEST_F(ConfigTest, RefusesAnOpenAdminDoorEvenWithTokens) {
+  config.scenes = {"synth:city:1000"};
+  config.bind = "0.0.0.0";
+  config.token_file = "tokens";
+  config.admin_bind = "0.0.0.0:9090";
+  EXPECT_THAT([&] { validate(config); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--admin-bind 0.0.0.0:9090"),
+                                              HasSubstr("no token"), HasSubstr("--open"))));
+  for (const char* closed : {"off", "127.0.0.1:9090", "[::1]:9090", "localhost:9090"}) {
+    config.admin_bind = closed;
+    EXPECT_NO_THROW(validate(config)) << closed;
+  }
+  config.admin_bind = "[::]:9090";
+  EXPECT_THROW(validate(config), InputError);
+  config.open = true;
+  EXPECT_NO_THROW(validate(config));
+}
+
+TEST_F(ConfigTest, LevelAndBudgetExcludeEachOther) {
+  read_toml("scene = \"tour\"\nlod = 2\n");
+  EXPECT_NO_THROW(validate(config));
+  read_environment({{"CATGS_BUDGET", "1000000"}});
+  EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--lod, --budget")));
+  read_flag("lod", {"-1"});
+  EXPECT_NO_THROW(validate(config));
+  EXPECT_EQ(config.gaussian_budget, 1'000'000);
+}
+
 TEST_F(ConfigTest, RefusesHalfATlsPairAndNoScene) {
   EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--scene")));
   config.scenes = {"a.ply"};

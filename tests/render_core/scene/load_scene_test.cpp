@@ -17,12 +17,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-std::string ply_bytes(const GaussianCloud& cloud) {
-  std::ostringstream out;
-  write_ply(cloud, out);
-  return out.str();
-}
-
 class LoadScene : public FolderTest {};
 
 TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {

@@ -16,12 +16,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-std::string ply_bytes(const GaussianCloud& cloud) {
-  std::ostringstream out;
-  write_ply(cloud, out);
-  return out.str();
-}
-
 GaussianCloud parse(const std::string& bytes) {
   const MemorySource file("scene.ply", bytes_of(bytes));
   return read_ply(file, read_ply_header(file), two_threads());

@@ -15,6 +15,7 @@
 #include "render_core/scene/byte_source.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/load_context.h"
+#include "render_core/scene/ply.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
@@ -41,6 +42,12 @@ inline GaussianCloud random_cloud(std::size_t count, int sh_degree, unsigned see
       cloud.sh[i][k] = constant ? 3.0f * (uniform(random) - 0.5f) : 0.2f * normal(random);
   }
   return cloud;
+}
+
+inline std::string ply_bytes(const GaussianCloud& cloud) {
+  std::ostringstream out;
+  write_ply(cloud, out);
+  return out.str();
 }
 
 inline std::span<const std::byte> bytes_of(const std::string& text) {
