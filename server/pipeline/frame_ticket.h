@@ -23,6 +23,7 @@ struct FrameTicket {
 
   Codec codec = Codec::h264;
   bool idr = false;
+  bool refined = false;  // the picture of the frame before, encoded once more
   glm::ivec2 size_px{0};
   bool speculated = false;   // a sub-frame
   std::uint32_t window = 0;  // W of its key frame

@@ -36,11 +36,10 @@ struct StreamOpened {
 
 struct FrameJob {
   std::shared_ptr<Stream> stream;
-  FrameTicket ticket;
+  FrameTicket ticket;  // refined: nothing is rendered
   FrameRequest request;
   int real_fps = 1;  // what the session reaches: shares the bitrate out
   bool force_idr = false;
-  bool refine = false;  // encode the last picture once more instead of rendering
 };
 
 struct FrameResult {
@@ -48,7 +47,6 @@ struct FrameResult {
   std::string message;  // stage and cause of a failure
   OutgoingFrame frame;
   FrameStats stats;
-  bool refined = false;
 };
 
 /// A device that renders and encodes: the CPU's thread pool, or a GPU with its render thread and

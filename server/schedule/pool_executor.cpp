@@ -34,9 +34,8 @@ FrameResult run_now(FrameJob& job) {
   FrameTicket& ticket = result.frame.ticket;
   ticket = job.ticket;
   Stream& stream = *job.stream;
-  result.refined = job.refine;
   ticket.render_start = Clock::now();
-  if (!job.refine) {
+  if (!ticket.refined) {
     const RenderStatus rendered = stream.view->render(job.request, stream.picture);
     if (!rendered.ok()) {
       result.message = rendered.message;

@@ -76,6 +76,10 @@ void Client::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, 
   metrics.frames_sent.Increment();
   metrics.bytes_sent.Increment(static_cast<double>(packet_bytes));
   metrics.observe_frame(ticket, now);
+  // Not post(): nothing becomes due by it.
+  boost::asio::post(registry_.io_, [self = shared_from_this(), ticket, packet_bytes] {
+    self->session_.on_frame_sent(ticket, packet_bytes);
+  });
 }
 
 void Client::on_close() {
@@ -161,14 +165,15 @@ void Client::open_stream(StreamSettings settings) {
 
 void Client::start_frame(TimePoint now) {
   FrameOrder order = session_.start_frame(now);
-  FrameJob job{stream_, order.ticket, order.request, order.real_fps, order.force_idr, order.refine};
+  FrameJob job{stream_, order.ticket, order.request, order.real_fps, order.force_idr};
   registry_.scheduler_.frame_started();
   registry_.executor_->submit(
       std::move(job), on_session_thread<FrameResult>([](Client& client, FrameResult result) {
         client.registry_.scheduler_.frame_ended();
         Metrics& metrics = client.registry_.metrics_;
-        (result.ok ? (result.refined ? metrics.frames_refined : metrics.frames_rendered)
-                   : metrics.frames_failed)
+        (result.ok
+             ? (result.frame.ticket.refined ? metrics.frames_refined : metrics.frames_rendered)
+             : metrics.frames_failed)
             .Increment();
         metrics.list_entries_overflowed.Increment(
             static_cast<double>(result.stats.overflowed_entries));

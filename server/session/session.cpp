@@ -216,10 +216,10 @@ FrameOrder Session::start_frame(TimePoint now) {
   const int real_fps = measure_rate(now);
   rendering_ = true;
   FrameOrder order;
-  order.refine = !picture_is_stale();
+  order.ticket.refined = !picture_is_stale();
   order.force_idr = std::exchange(idr_due_, false);
   order.real_fps = real_fps;
-  if (order.refine)
+  if (order.ticket.refined)
     --refinements_left_;
   else
     refinements_left_ = config_.codec == Codec::h264 ? policy_.refine_frames : 0;
@@ -260,11 +260,8 @@ void Session::on_frame(FrameResult result, TimePoint now) {
     return;
   }
   failures_ = 0;
-  const std::uint64_t frame_id = result.frame.ticket.frame_id;
-  const std::size_t bytes = result.frame.bitstream.size();
-  count_sent(result, bytes);
   last_said_ = now;
-  credit_.sent(frame_id, now);
+  credit_.sent(result.frame.ticket.frame_id, now);
   const auto dropped = host_.send(std::move(result.frame));
   for (const std::uint64_t id : dropped) credit_.lost(id);
   if (dropped.empty()) return;
@@ -273,12 +270,12 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   stats_.dropped_packets += static_cast<std::uint32_t>(dropped.size());
 }
 
-void Session::count_sent(const FrameResult& result, std::size_t bytes) {
+void Session::on_frame_sent(const FrameTicket& ticket, std::size_t bytes) {
   ++frames_sent_;
   bytes_sent_ += bytes;
   ++second_frames_;
   second_bytes_ += bytes;
-  if (!result.refined) ++(result.frame.ticket.speculated ? stats_.sub_frames : stats_.key_frames);
+  if (!ticket.refined) ++(ticket.speculated ? stats_.sub_frames : stats_.key_frames);
 }
 
 void Session::say(const ServerMessage& message, TimePoint now) {

@@ -73,7 +73,6 @@ struct FrameOrder {
   FrameRequest request;
   int real_fps = 1;
   bool force_idr = false;
-  bool refine = false;
 };
 
 /// One client's life: hello -> admission -> welcome -> poses, frames, acks -> bye. It knows no
@@ -91,6 +90,8 @@ class Session {
   void on_bad_message(std::string_view what);
   void on_stream_opened(const StreamOpened& opened, TimePoint now);
   void on_frame(FrameResult result, TimePoint now);
+  /// A frame has left through the socket: only now it counts as sent.
+  void on_frame_sent(const FrameTicket& ticket, std::size_t bytes);
   /// At least four times a second: timeouts, statistics, heartbeat.
   void on_tick(TimePoint now);
   /// Tells the client why and closes; for reasons outside the session.
@@ -130,7 +131,6 @@ class Session {
   void request_stream();
   /// Notes that a frame starts; returns the rate that the session really reaches.
   int measure_rate(TimePoint now);
-  void count_sent(const FrameResult& result, std::size_t bytes);
   void send_statistics(TimePoint now);
   [[nodiscard]] bool picture_is_stale() const;
   [[nodiscard]] std::chrono::microseconds frame_interval() const;

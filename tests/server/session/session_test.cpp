@@ -86,10 +86,11 @@ class SessionTest : public testing::Test {
   void finish(const FrameOrder& order) {
     FrameResult result;
     result.ok = true;
-    result.refined = order.refine;
     result.frame.ticket = order.ticket;
     result.frame.bitstream.resize(100);
+    const bool dropped = std::ranges::count(host.drop_next, order.ticket.frame_id) > 0;
     session.on_frame(std::move(result), now);
+    if (!dropped) session.on_frame_sent(order.ticket, 100);
   }
   void ack(std::uint64_t id) {
     Ack message;
@@ -147,7 +148,7 @@ TEST_F(SessionTest, RendersOnDemandAndRefinesAStillPicture) {
   ASSERT_TRUE(frame_is_due());
   FrameOrder order = run_frame();
   EXPECT_TRUE(order.force_idr);
-  EXPECT_FALSE(order.refine);
+  EXPECT_FALSE(order.ticket.refined);
   EXPECT_EQ(order.ticket.pose_id, 1u);
   ack(order.ticket.frame_id);
 
@@ -159,7 +160,7 @@ TEST_F(SessionTest, RendersOnDemandAndRefinesAStillPicture) {
     now += 17ms;
     if (!frame_is_due()) continue;
     order = run_frame();
-    EXPECT_TRUE(order.refine);
+    EXPECT_TRUE(order.ticket.refined);
     EXPECT_FALSE(order.force_idr);
     ack(order.ticket.frame_id);
     ++refinements;
@@ -168,7 +169,7 @@ TEST_F(SessionTest, RendersOnDemandAndRefinesAStillPicture) {
 
   pose(3, 1.0f);
   ASSERT_TRUE(frame_is_due());
-  EXPECT_FALSE(run_frame().refine);
+  EXPECT_FALSE(run_frame().ticket.refined);
 }
 
 TEST_F(SessionTest, KeepsTheNominalRateAndUsesTheNewestPose) {
@@ -215,6 +216,47 @@ TEST_F(SessionTest, AsksForAnIdrAfterADrop) {
   ASSERT_TRUE(frame_is_due()) << "a dropped frame is not in flight";
   EXPECT_TRUE(run_frame().force_idr);
   EXPECT_EQ(session.frames_dropped(), 1u);
+  EXPECT_EQ(session.frames_sent(), 1u) << "what was dropped was not sent";
+  EXPECT_EQ(session.bytes_sent(), 100u);
+}
+
+TEST_F(SessionTest, CountsAFrameOnceItHasLeft) {
+  greet();
+  pose(1, 0.0f);
+  const FrameOrder order = session.start_frame(now);
+  FrameResult result;
+  result.ok = true;
+  result.frame.ticket = order.ticket;
+  session.on_frame(std::move(result), now);
+  EXPECT_EQ(session.frames_sent(), 0u) << "it waits for the socket";
+  session.on_frame_sent(order.ticket, 123);
+  EXPECT_EQ(session.frames_sent(), 1u);
+  EXPECT_EQ(session.bytes_sent(), 123u);
+}
+
+TEST_F(SessionTest, AnsweringIdrRequestsInQuickSuccessionTakesTurns) {
+  greet();
+  pose(1, 0.0f);
+  ack(run_frame().ticket.frame_id);
+  const auto next_is_idr = [&] {
+    now += 20ms;
+    pose(session.frames_sent() + 1, static_cast<float>(session.frames_sent()));
+    const FrameOrder order = run_frame();
+    ack(order.ticket.frame_id);
+    return order.force_idr;
+  };
+  EXPECT_FALSE(next_is_idr());
+  session.on_message(RequestIdr{}, now);
+  EXPECT_TRUE(next_is_idr());
+  session.on_message(RequestIdr{}, now);
+  session.on_tick(now);
+  EXPECT_FALSE(next_is_idr()) << "an IDR was sent a moment ago";
+  now += 250ms;
+  session.on_tick(now);
+  EXPECT_TRUE(next_is_idr()) << "but the request is not forgotten";
+  now += 250ms;
+  session.on_tick(now);
+  EXPECT_FALSE(next_is_idr()) << "and answered once";
 }
 
 TEST_F(SessionTest, PauseStopsFramesAndBeginsAnewWithAnIdr) {
