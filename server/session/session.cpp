@@ -66,8 +66,13 @@ void Session::fail(ErrorCode code, std::string_view message) {
   host_.close(later ? CloseCode::try_again_later : CloseCode::policy_violation, message);
 }
 
-void Session::on(const Hello& hello, TimePoint now) {
+void Session::note_activity(TimePoint now) {
   last_activity_ = now;
+  idle_warned_ = false;
+}
+
+void Session::on(const Hello& hello, TimePoint now) {
+  note_activity(now);
   if (hello.version < wire::version)
     return fail(ErrorCode::unsupported_version,
                 fmt::format("this server speaks catgs wire version {}, the client at most {}: "
@@ -88,9 +93,8 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   // Ids increase; an older sample has been overtaken.
   if (pose_ && sample.pose_id <= pose_->pose_id) return;
   if (!pose_ || !same_view(*pose_, sample, admission_.scene->facts.near_z)) {
-    last_activity_ = now;
+    note_activity(now);
     last_motion_ = now;
-    idle_warned_ = false;
   }
   pose_ = sample;
   pose_received_ = now;
@@ -102,13 +106,13 @@ void Session::on(const Ack& ack, TimePoint now) {
 }
 
 void Session::on(const Settings& settings, TimePoint now) {
-  last_activity_ = now;
+  note_activity(now);
   settings_ = settings;
   request_stream();
 }
 
 void Session::on(const SelectScene& select, TimePoint now) {
-  last_activity_ = now;
+  note_activity(now);
   auto found = host_.find_scene(select.scene_id);
   if (const auto* error = std::get_if<ErrorMessage>(&found)) return say(*error, now);
   admission_.scene = std::get<std::shared_ptr<const SceneEntry>>(std::move(found));
@@ -127,7 +131,7 @@ void Session::on(const RequestIdr&, TimePoint now) {
 }
 
 void Session::on(const Pause& pause, TimePoint now) {
-  last_activity_ = now;
+  note_activity(now);
   if (paused_ && !pause.paused) {
     // A hidden page presents nothing, so its frames in flight were never acknowledged.
     credit_.reset();
@@ -289,12 +293,15 @@ void Session::on_tick(TimePoint now) {
   if (state_ == State::closed) return;
   if (idr_request_waits_) on(RequestIdr{}, now);
   if (policy_.idle_timeout > 0ms) {
-    const auto idle = now - last_activity_;
-    if (idle >= policy_.idle_timeout)
-      return fail(ErrorCode::idle_timeout, "nothing moved for a long time: reload to continue");
-    if (!idle_warned_ && idle >= policy_.idle_timeout - policy_.idle_warning) {
+    const auto left = last_activity_ + policy_.idle_timeout - now;
+    if (left <= 0ms) return fail(ErrorCode::idle_timeout, "nothing has moved for a long time");
+    if (!idle_warned_ && left <= policy_.idle_warning) {
       idle_warned_ = true;
-      say(ErrorMessage{ErrorCode::idle_timeout, "nothing moves: this session will be closed soon",
+      const auto seconds = std::chrono::ceil<std::chrono::seconds>(left).count();
+      say(ErrorMessage{ErrorCode::idle_timeout,
+                       fmt::format("nothing moves: move the camera to keep this session, which "
+                                   "ends in {} s otherwise",
+                                   seconds),
                        false},
           now);
     }

@@ -118,7 +118,7 @@ class Session {
   void on(const UnknownMessage&, TimePoint) {}
   void on(const Hello& hello, TimePoint now);
   void on(const PoseSample& sample, TimePoint now);
-  void on(const PosePath&, TimePoint now) { last_activity_ = now; }
+  void on(const PosePath&, TimePoint now) { note_activity(now); }
   void on(const Ack& ack, TimePoint now);
   void on(const Settings& settings, TimePoint now);
   void on(const SelectScene& select, TimePoint now);
@@ -126,6 +126,8 @@ class Session {
   void on(const Pause& pause, TimePoint now);
   void on(const Bye&, TimePoint);
 
+  /// Somebody is there: the time to release starts anew, and so does its warning.
+  void note_activity(TimePoint now);
   void say(const ServerMessage& message, TimePoint now);
   void say_config(TimePoint now);
   void request_stream();

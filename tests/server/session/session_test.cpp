@@ -346,11 +346,33 @@ TEST_F(SessionTest, WarnsAndThenReleasesAnIdleSession) {
   session.on_tick(now);
   EXPECT_EQ(host.last_error().code, ErrorCode::idle_timeout);
   EXPECT_FALSE(host.last_error().fatal);
+  EXPECT_THAT(host.last_error().message, HasSubstr("30 s"));
   EXPECT_FALSE(host.closed);
   now += policy.idle_warning;
   session.on_tick(now);
   EXPECT_TRUE(host.last_error().fatal);
   EXPECT_TRUE(host.closed);
+}
+
+TEST_F(SessionTest, WarnsAnewAfterEverySignOfLife) {
+  greet();
+  const auto warnings = [&] { return host.count<ErrorMessage>(); };
+  const auto sign_of_life = [&](int i) {
+    if (i == 0) pose(1, 0.0f);
+    if (i == 1) session.on_message(Settings{}, now);
+    if (i == 2) session.on_message(Pause{true}, now);
+    if (i == 3) session.on_message(PosePath{}, now);
+  };
+  for (int i = 0; i < 4; ++i) {
+    sign_of_life(i);
+    now += policy.idle_timeout - policy.idle_warning;
+    session.on_tick(now);
+    session.on_tick(now + 1s);
+    EXPECT_EQ(warnings(), i + 1);
+    now += policy.idle_warning - 1ms;
+    session.on_tick(now);
+    EXPECT_FALSE(host.closed);
+  }
 }
 
 TEST_F(SessionTest, AFewFailedFramesEndItWithTheirCause) {

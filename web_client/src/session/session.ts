@@ -331,7 +331,10 @@ export class Session {
     this.send({ case: 'pose', value: this.last_pose_ });
   }
 
-  /** Tells the server (and every proxy between) that somebody still looks at a still picture. */
+  /**
+   * Keeps proxies from closing a connection on which nothing moves. The server does not take the
+   * repeated pose for a sign of life: it warns, and then gives the place to others.
+   */
   private keep_alive(): void {
     this.cancel_keep_alive_();
     this.cancel_keep_alive_ = this.env_.timers.after(keep_alive_ms, () => {

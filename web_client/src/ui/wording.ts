@@ -75,7 +75,7 @@ function failed_card(code: Error_Code, message: string): Card {
     case Error_Code.IDLE_TIMEOUT:
       return {
         title: 'Paused',
-        text: `${sentence(message)}Nothing moved for a while, so the server was given to others.`,
+        text: `${sentence(message)}Your place was given to others; continue where you were.`,
         action: { label: 'Continue', does: 'retry' },
       };
     case Error_Code.RENDER_FAILED:
