@@ -18,6 +18,7 @@ class FakeDecoder implements Decoder {
 
   decode(frame: EncodedFrame): void {
     this.frames.push(frame);
+    if (frame.header.frameId === fails_at) this.events.failed(new Error('broken'));
   }
 
   queue_length(): number {
@@ -36,6 +37,7 @@ let now_us: number;
 let decoders: FakeDecoder[];
 let failures_seen: number[];
 let has_decoder: boolean;
+let fails_at: bigint | undefined; // the frame on which decoders fail at once
 let refresh: (() => void)[];
 let drawn: FakePicture[];
 let pictures: FakePicture[];
@@ -50,6 +52,7 @@ beforeEach(() => {
   decoders = [];
   failures_seen = [];
   has_decoder = true;
+  fails_at = undefined;
   refresh = [];
   drawn = [];
   pictures = [];
@@ -214,6 +217,18 @@ describe('failures', () => {
     push(2n);
     push(3n, { idr: true });
     expect(decoder().frames.map(({ header }) => header.frameId)).toEqual([3n]);
+  });
+
+  it('on the first of several waiting frames leave none of them unacknowledged', async () => {
+    fails_at = 1n;
+    pipeline.configure(create(StreamConfigSchema, { codec: Codec.H264 }));
+    for (const id of [1n, 2n, 3n]) push(id);
+    await settle();
+    expect([...dropped].sort()).toEqual([1n, 2n, 3n]);
+    expect(acks).toHaveLength(3);
+    expect(decoders.map(({ closed }) => closed)).toEqual([true, false]);
+    expect(decoders.flatMap(({ frames }) => frames)).toEqual([]);
+    expect(key_frames_wanted).toBe(1);
   });
 
   it('close pictures that an old decoder still gives', async () => {

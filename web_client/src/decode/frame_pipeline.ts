@@ -117,7 +117,11 @@ export class FramePipeline {
       this.listener_.undecodable(`no decoder for ${codec}`);
     } else {
       this.decoder_ = decoder;
-      for (const frame of this.waiting_.splice(0)) decoder.decode(frame);
+      for (const frame of this.waiting_.splice(0)) {
+        // A frame on which it fails closes it; those behind need another key frame anyway.
+        if (generation === this.generation_) decoder.decode(frame);
+        else this.drop(frame);
+      }
     }
   }
 

@@ -70,6 +70,9 @@ export class WebCodecsDecoder implements Decoder {
         }),
       );
     } catch (error) {
+      // Not left for close(), which may have been called already.
+      this.inside_.delete(timestamp);
+      this.events_.skipped(frame);
       this.events_.failed(error instanceof Error ? error : new Error(String(error)));
     }
   }
