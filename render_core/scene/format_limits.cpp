@@ -16,9 +16,9 @@ void require_count(const ByteSource& file, std::string_view where, std::uint64_t
 }
 
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
-                             std::uint64_t compressed_bytes) {
+                             std::size_t plain_bytes, std::uint64_t compressed_bytes) {
   require_count(file, where, count);
-  if (count > (1 << 16) && count / 64 > compressed_bytes)
+  if (count > (1 << 16) && count * plain_bytes / max_compression > compressed_bytes)
     throw InputError(
         file.name(), where,
         fmt::format("{} Gaussians cannot be in {} compressed bytes", count, compressed_bytes),

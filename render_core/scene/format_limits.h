@@ -15,12 +15,15 @@ inline constexpr std::uint64_t max_gaussians = std::uint64_t{1} << 28;
 /// Throws InputError when a file announces no Gaussians or more than max_gaussians.
 void require_count(const ByteSource& file, std::string_view where, std::uint64_t count);
 
-/// The same for compressed files, where the count cannot be checked against the size: refuses more
-/// than 64 Gaussians per compressed byte (2^16 are always allowed). Deflate can reach that with its
-/// 1032:1 on Gaussians of 16 bytes, but no real scene comes near; it bounds the memory that a lying
-/// header can make us take.
+/// The same for compressed files, where the count cannot be checked against the size: refuses what
+/// would have to be compressed more than max_compression : 1 (2^16 Gaussians are always allowed),
+/// so that a lying header can make us take no more than about 2,500 times the file's size.
+/// `plain_bytes`: what the file stores of a Gaussian, decompressed.
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
-                             std::uint64_t compressed_bytes);
+                             std::size_t plain_bytes, std::uint64_t compressed_bytes);
+
+/// Far from what captures reach, and from what deflate can (1032).
+inline constexpr std::uint64_t max_compression = 256;
 
 /// SH degree with `coefficients` per channel beyond the constant one: 0, 3, 8, 15 or 24 (degree 4);
 /// -1 for any other number.

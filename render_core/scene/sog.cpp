@@ -99,7 +99,9 @@ void check_image_sizes(const FileSet& files, const SogMeta& sog, const std::stri
           file->name(), "size",
           fmt::format("{}x{} texels for {} Gaussians", size.width, size.height, sog.count));
   }
-  require_plausible_count(*files.open(meta_name), "count", sog.count, bytes);
+  constexpr std::size_t texel_bytes = 4;
+  require_plausible_count(*files.open(meta_name), "count", sog.count, texel_bytes * images.size(),
+                          bytes);
 }
 
 /// The palette's image is 64 entries wide; version 1 does not state the degree otherwise.

@@ -159,7 +159,9 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
     fail(file, "shDegree", fmt::format("{} is not in 0…4", header.sh_degree));
   if (header.fractional_bits > 23)
     fail(file, "fractionalBits", fmt::format("{} is not in 0…23", header.fractional_bits));
-  require_plausible_count(file, "numPoints", header.count, file.size());
+  std::size_t plain_bytes = 0;
+  for (const Attribute& attribute : attributes(header)) plain_bytes += attribute.bytes;
+  require_plausible_count(file, "numPoints", header.count, plain_bytes, file.size());
   return header;
 }
 

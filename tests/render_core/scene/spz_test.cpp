@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
+#include "render_core/scene/format_limits.h"
 #include "tests/render_core/scene/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
@@ -139,6 +141,16 @@ TEST(Spz, LyingHeadersAreRefusedBeforeMemoryIsTaken) {
   EXPECT_THAT(input_error([&] { parse(with(4, 0, "NGSX")); }), HasSubstr("magic"));
   EXPECT_THAT(input_error([&] { parse(with(4, 4, "\x09")); }), HasSubstr("version: 9"));
   EXPECT_THAT(input_error([&] { parse(with(4, 4, "\x03")); }), HasSubstr("version"));
+}
+
+TEST(Spz, HarmonicsCountInWhatAHeaderCanClaim) {
+  // 65 bytes each: a claim that 20 bytes each would still allow.
+  std::string spz = encode_spz(storable_cloud(2000, 3), {.version = 4});
+  const auto claimed = static_cast<std::uint32_t>(spz.size() * max_compression / 40);
+  ASSERT_GT(claimed, 1u << 16);
+  std::memcpy(spz.data() + 8, &claimed, sizeof claimed);
+  EXPECT_THAT(input_error([&] { parse(spz); }),
+              AllOf(HasSubstr("numPoints"), HasSubstr("compressed bytes")));
 }
 
 TEST(Spz, DamagedStreamsNameTheByte) {
