@@ -34,6 +34,20 @@ LoadOptions small_load(const std::string& url) {
   return options;
 }
 
+/// Returns once a session of the server has got a frame. Throws after twenty seconds: a bound
+/// against hanging, not a measurement.
+void wait_for_frames(const RunningServer& server) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (std::chrono::steady_clock::now() < deadline) {
+    const auto sessions =
+        nlohmann::json::parse(test::http_get(server.admin_port(), "/api/sessions").body);
+    for (const auto& session : sessions)
+      if (session.at("frames_sent").get<int>() > 0) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  throw std::runtime_error("no session got a frame");
+}
+
 /// What went wrong, for the test's log.
 std::string errors_of(const SessionReports& reports) {
   return to_json(reports, collect_metrics(reports, 30.0)).at("error_counts").dump(2);
@@ -92,8 +106,7 @@ TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
   options.decode = false;
   for (const auto& report : run_load(options)) {
     EXPECT_TRUE(report->stats.connected);
-    EXPECT_GE(report->stats.frames, 1u);
-    EXPECT_LE(report->stats.frames, 8u);
+    EXPECT_EQ(report->stats.frames, 1u) << "without a measured round trip one may be in flight";
     EXPECT_GT(report->stats.poses_sent, 30u);
   }
 }
@@ -143,7 +156,7 @@ TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
   options.sessions = 1;
   SessionReports reports;
   std::jthread load([&] { reports = run_load(options); });
-  std::this_thread::sleep_for(std::chrono::seconds(1));
+  wait_for_frames(*server);
   server.reset();
   load.join();
   EXPECT_TRUE(reports[0]->stats.connected);

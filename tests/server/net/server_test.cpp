@@ -98,7 +98,7 @@ TEST(Server, CreditBoundsWhatIsInFlight) {
   RunningServer server;
   WireClient client(server.port());
   client.greet();
-  // Never acknowledged: at most eight frames, however many poses come.
+  // Never acknowledged: no round trip is known, so one frame may be in flight, whatever poses come.
   std::set<std::uint64_t> frames;
   for (std::uint64_t id = 1; id <= 40; ++id) client.send_pose(id, 0.05f * static_cast<float>(id));
   for (int heartbeats = 0; heartbeats < 2;) {
@@ -107,8 +107,7 @@ TEST(Server, CreditBoundsWhatIsInFlight) {
     if (received.frame) frames.insert(received.frame->header.frame_id());
     if (received.message && received.message->has_heartbeat()) ++heartbeats;
   }
-  EXPECT_GE(frames.size(), 1u);
-  EXPECT_LE(frames.size(), 8u);
+  EXPECT_EQ(frames.size(), 1u);
   EXPECT_THAT(sessions_json(server), HasSubstr("\"frames_queued\":0"));
 }
 
