@@ -189,6 +189,21 @@ TEST(Ply, ErrorsNameTheMissingProperty) {
               HasSubstr("no element vertex"));
 }
 
+TEST(Ply, ListsAreRefusedWhereTheyHideTheGaussians) {
+  const auto with = [](const std::string& before, const std::string& line) {
+    std::string bytes = ply_bytes(random_cloud(3, 0));
+    return bytes.insert(bytes.find(before), line);
+  };
+  const std::string list = "property list uchar int indices\n";
+  EXPECT_THAT(input_error([&] { parse(with("end_header", list)); }),
+              AllOf(HasSubstr("element vertex"), HasSubstr("has a list property")));
+  EXPECT_THAT(input_error([&] { parse(with("element vertex", "element face 1\n" + list)); }),
+              AllOf(HasSubstr("element vertex"), HasSubstr("an element before it has a list")));
+  EXPECT_EQ(parse(with("end_header", "element face 0\n" + list)).size(), 3u);
+  EXPECT_THAT(input_error([&] { parse(with("end_header", "property list uchar quad a\n")); }),
+              HasSubstr("unknown type 'quad'"));
+}
+
 TEST(Ply, CutOffFilesAreRefusedAtEveryLength) {
   const std::string bytes = ply_bytes(random_cloud(4, 1));
   for (std::size_t length = 0; length < bytes.size(); ++length)

@@ -297,6 +297,16 @@ TEST_F(CatgsRender, ConvertPrunesAndKeepsTheHints) {
             2);
 }
 
+TEST_F(CatgsRender, ConvertLeavesASidecarThatIsThere) {
+  std::ofstream(path("ball.json")) << R"({"near": 0.125})";
+  std::ofstream(path("copy.json")) << R"({"near": 0.5})";
+  const Outcome outcome = run(fmt::format("convert {} {}", scene(), path("copy.ply")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, HasSubstr("copy.json exists and was left as it is"));
+  const auto json = nlohmann::json::parse(run("info --json " + path("copy.ply")).out);
+  EXPECT_EQ(json.at("hints").at("near"), 0.5);
+}
+
 TEST_F(CatgsRender, SynthesizedScenesKeepTheirStartPose) {
   const Outcome outcome = run("synth city --gaussians 1000 " + path("city.ply"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
