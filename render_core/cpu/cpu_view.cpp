@@ -83,6 +83,7 @@ FrameStats CpuView::draw(const FrameRequest& request) {
     stats.displacement_px = std::max(stats.displacement_px, summary.longest_path_px);
   }
   nearest_depth_ = stats.nearest_depth;
+  stats.tasks = lists_.tiles();  // each in one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();
   stats.overflowed_entries = lists_.overflowed_entries();
