@@ -37,7 +37,7 @@ HWY_INLINE SplatBox box_of(const ProjectionContext& context, const Sweep& s, con
   return box;
 }
 
-template <int degree, Pipeline pipeline>
+template <Pipeline pipeline>
 ClusterSummary project_cluster_of(const ProjectTask& task) {
   constexpr bool sweeps = pipeline == Pipeline::catgs;
   const SceneStore& scene = *task.scene;
@@ -81,7 +81,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     look.centre_px = s.shape.centre_px;
     look.w = whitening(s.shape);
     look.log2_opacity = log2_opacity;
-    look.colour = shade<degree>(scene, i, mean, context.camera.position);
+    look.colour = shade(scene, i, mean, context.camera.position);
     look.depth = depth;
     look.original_index = load_index(scene, i);
     box.rightmost_y = rightmost_y(look.w, reach);
@@ -101,20 +101,17 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
 }
 
 inline ClusterSummary project_cluster(const ProjectTask& task) {
-  return with_degree(task.scene->sh_degree(), [&](auto degree) {
-    switch (task.pipeline) {
-      case Pipeline::vanilla:
-        return project_cluster_of<degree(), Pipeline::vanilla>(task);
-      case Pipeline::exact:
-        return project_cluster_of<degree(), Pipeline::exact>(task);
-      default:
-        return project_cluster_of<degree(), Pipeline::catgs>(task);
-    }
-  });
+  switch (task.pipeline) {
+    case Pipeline::vanilla:
+      return project_cluster_of<Pipeline::vanilla>(task);
+    case Pipeline::exact:
+      return project_cluster_of<Pipeline::exact>(task);
+    default:
+      return project_cluster_of<Pipeline::catgs>(task);
+  }
 }
 
-template <int degree>
-ClusterSummary refresh_cluster_of(const RefreshTask& task) {
+inline ClusterSummary refresh_cluster(const RefreshTask& task) {
   const SceneStore& scene = *task.scene;
   const ProjectionContext context = make_context(*task.camera);
   const std::size_t begin = task.cluster * cluster_size;
@@ -134,7 +131,7 @@ ClusterSummary refresh_cluster_of(const RefreshTask& task) {
     look.centre_px = shape.centre_px;
     look.w = whitening(shape);
     look.log2_opacity = load(scene, SceneStore::log2_opacity, i);
-    look.colour = shade<degree>(scene, i, mean, context.camera.position);
+    look.colour = shade(scene, i, mean, context.camera.position);
     look.original_index = load_index(scene, i);
     extremes.add_depths(mask_of_bits<hn::ScalableTag<float>>(hits) & in_front &
                             (look.depth > Floats(task.min_depth)),
@@ -145,11 +142,6 @@ ClusterSummary refresh_cluster_of(const RefreshTask& task) {
       task.depths[written] = std::bit_cast<std::uint32_t>(task.splats[written].depth);
   }
   return extremes.summary(written);
-}
-
-inline ClusterSummary refresh_cluster(const RefreshTask& task) {
-  return with_degree(task.scene->sh_degree(),
-                     [&](auto degree) { return refresh_cluster_of<degree()>(task); });
 }
 
 }  // namespace HWY_NAMESPACE

@@ -80,10 +80,11 @@ HWY_INLINE Floats load_index(const SceneStore& scene, std::size_t i) {
   return Floats(hn::BitCast(d, hn::Load(du, scene.original_index() + i)));
 }
 
-/// Colour of the Gaussians at lanes `lane`… of a packet.
+/// Colour of the Gaussians from `i` on, which share a packet.
 template <int degree>
-HWY_INLINE Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3<Floats>& mean,
-                              const Vec3<Floats>& camera_position) {
+HWY_INLINE Vec3<Floats> shade_of_degree(const SceneStore& scene, std::size_t i,
+                                        const Vec3<Floats>& mean,
+                                        const Vec3<Floats>& camera_position) {
   Floats basis[16];
   sh_basis(view_direction(camera_position, mean), degree, basis);
   const float* sh = scene.sh_of_packet(i / packet_size) + i % packet_size;
@@ -94,6 +95,20 @@ HWY_INLINE Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3
     sum.z = mul_add(basis[k], Floats::load(sh + 2 * packet_size), sum.z);
   }
   return {colour_from_sh_sum(sum.x), colour_from_sh_sum(sum.y), colour_from_sh_sum(sum.z)};
+}
+
+inline Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3<Floats>& mean,
+                          const Vec3<Floats>& camera_position) {
+  switch (scene.sh_degree()) {
+    case 0:
+      return shade_of_degree<0>(scene, i, mean, camera_position);
+    case 1:
+      return shade_of_degree<1>(scene, i, mean, camera_position);
+    case 2:
+      return shade_of_degree<2>(scene, i, mean, camera_position);
+    default:
+      return shade_of_degree<3>(scene, i, mean, camera_position);
+  }
 }
 
 /// Tiles [low, end) that a splat's box touches, as floats holding integers.
@@ -181,21 +196,6 @@ HWY_INLINE void write_splats(const SplatLook& s, const SplatBox& box, std::uint3
              splats);
   for (; hits != 0; hits &= hits - 1)
     std::memcpy(out++, splats + std::countr_zero(hits) * 16, sizeof(Splat));
-}
-
-/// Calls call(std::integral_constant<int, degree>).
-template <class Call>
-ClusterSummary with_degree(int degree, const Call& call) {
-  switch (degree) {
-    case 0:
-      return call(std::integral_constant<int, 0>());
-    case 1:
-      return call(std::integral_constant<int, 1>());
-    case 2:
-      return call(std::integral_constant<int, 2>());
-    default:
-      return call(std::integral_constant<int, 3>());
-  }
 }
 
 /// Collects a ClusterSummary.
