@@ -159,6 +159,40 @@ TEST_F(CatgsRender, BenchReportsEveryFrame) {
   }
 }
 
+TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {
+  const auto bench = [&](const std::string& flags) {
+    const Outcome outcome =
+        run(fmt::format("bench {} --size 64x48 --script orbit --duration 0.5 --renderer cpu "
+                        "--pipeline catgs --warmup 1 {} --json {}",
+                        scene(), flags, path("bench.json")));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+    std::ifstream file(path("bench.json"));
+    return nlohmann::json::parse(file);
+  };
+  // 60 frames: one that knows no motion yet, then groups of five.
+  const auto json = bench("--quality --quality-every 1");
+  EXPECT_EQ(json.at("key_frames"), 13);
+  EXPECT_EQ(json.at("sub_frames"), 47);
+  EXPECT_EQ(json.at("window_histogram"), (nlohmann::json{{"0", 1}, {"4", 12}}));
+  EXPECT_EQ(json.at("windows_cut"), 0);
+  EXPECT_EQ(json.at("settings").at("order"), "fresh");
+  EXPECT_GT(json.at("frame_ms_sub").at("mean").get<double>(), 0.0);
+  EXPECT_EQ(json.at("quality").at("sub").at("frames"), 47);
+  const auto worst_psnr = [&](const char* kind) {  // null: all pictures are identical
+    const auto& value = json.at("quality").at(kind).at("psnr_db").at("min");
+    return value.is_null() ? 1000.0 : value.get<double>();
+  };
+  EXPECT_GE(worst_psnr("key"), 60.0);
+  EXPECT_GE(worst_psnr("sub"), 50.0);
+  EXPECT_EQ(json.at("quality").at("pop").at("switches"), 11);
+  EXPECT_LE(json.at("quality").at("pop").at("max").get<double>(), 1.0 / 255.0);
+  EXPECT_GT(json.at("quality").at("see_through").at("mean").get<double>(), 0.2);
+
+  const auto uncached = bench("--no-cache");
+  EXPECT_EQ(uncached.at("key_frames"), 60);
+  EXPECT_TRUE(uncached.at("frame_ms_sub").is_null());
+}
+
 TEST_F(CatgsRender, WritesAScriptedTrace) {
   const Outcome outcome =
       run(fmt::format("trace script {} --script head --seed 4 --duration 2 --fps 60 --out {}",
