@@ -7,9 +7,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 
 #include "render_core/cpu/splats-inl.h"
-#include "render_core/cpu/sweep-inl.h"
+#include "render_core/math/sweep-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace catgs {
@@ -17,7 +18,8 @@ namespace HWY_NAMESPACE {
 
 /// The box of a splat, and the tiles that it may touch.
 template <Pipeline pipeline>
-HWY_INLINE SplatBox box_of(const ProjectionContext& context, const Sweep& s, const Floats& reach) {
+HWY_INLINE SplatBox box_of(const ProjectionContext& context, const Sweep<Floats>& s,
+                           const Floats& reach) {
   const Vec2<Floats>& centre = s.shape.centre_px;
   SplatBox box;
   box.half_extent_px = half_extent(s.shape, reach);
@@ -35,6 +37,22 @@ HWY_INLINE SplatBox box_of(const ProjectionContext& context, const Sweep& s, con
     box.rows = tiles_of_box(centre.y, box.half_extent_px.y, context.last_pixel.y);
   }
   return box;
+}
+
+/// Writes the path of each hit, one after the other. `half_extent_x`: of the outline.
+HWY_INLINE void write_paths(const Sweep<Floats>& s, const Floats& log2_opacity, const Floats& reach,
+                            const Floats& half_extent_x, std::uint32_t hits, SplatPath* out) {
+  const hn::ScalableTag<float> d;
+  alignas(64) float quads[2][4 * Floats::count];
+  hn::StoreInterleaved4(s.displacement.x.v, s.displacement.y.v, s.outline.xx.v, s.outline.xy.v, d,
+                        quads[0]);
+  hn::StoreInterleaved4(s.outline.yy.v, log2_opacity.v, half_extent_x.v,
+                        rightmost_y(s.outline, reach).v, d, quads[1]);
+  for (; hits != 0; hits &= hits - 1, ++out) {
+    const int lane = std::countr_zero(hits);
+    std::memcpy(&out->dx, quads[0] + lane * 4, 16);
+    std::memcpy(&out->whitening_yy, quads[1] + lane * 4, 16);
+  }
 }
 
 template <Pipeline pipeline>
@@ -66,7 +84,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
 
     const Vec3<Floats> mean = load_mean(scene, i);
     const CovarianceFactor<Floats> factor = load_factor(scene, i);
-    Sweep s;
+    Sweep<Floats> s;
     if constexpr (sweeps) {
       s = sweep(context.camera, end_camera, mean, factor, depth);
     } else {

@@ -6,45 +6,65 @@ namespace catgs::cuda {
 namespace {
 
 constexpr int block_size = 256;
+constexpr int warps = block_size / warp_size;
 
-// A splat with more rows than this is written by its whole warp, a row a lane.
-constexpr int lone_rows = 4;
+/// List entries that a block of the emit kernel writes: blocks share the lists evenly, whatever a
+/// splat's size, and write them in order.
+constexpr std::uint32_t window_size = 2048;
 
-/// Writes a row's entries from `at` on, never past `end`, and returns where the next row's begin.
-__device__ std::uint32_t emit_row(const EmitParams& p, int row, int2 columns, std::uint32_t slot,
-                                  std::uint32_t at, std::uint32_t end) {
-  for (int column = columns.x; column <= columns.y; ++column, ++at) {
-    if (at >= end) continue;
-    p.tile[at] = static_cast<std::uint32_t>(row * p.shape.tiles_x + column);
-    p.slot[at] = slot;
+// Every splat of a window has an entry in it, but for the one that began before.
+constexpr std::uint32_t most_splats = window_size + 1;
+
+struct Window {
+  std::uint32_t begin, end;  // list entries
+  std::uint32_t tile[window_size];
+  std::uint32_t slot[window_size];
+
+  /// Writes a row's entries from `at` on, those before `last` and in the window, and returns where
+  /// the next row's begin.
+  __device__ std::uint32_t put_row(std::uint32_t first_tile, int2 columns, std::uint32_t splat,
+                                   std::uint32_t at, std::uint32_t last) {
+    const std::uint32_t stop = min(last, end);
+    for (int column = columns.x; column <= columns.y; ++column, ++at) {
+      if (at < begin || at >= stop) continue;
+      tile[at - begin] = first_tile + static_cast<std::uint32_t>(column);
+      slot[at - begin] = splat;
+    }
+    return at;
   }
-  return at;
-}
+};
 
-__device__ TileFootprint footprint_of(const EmitParams& p, std::uint32_t slot) {
-  const SplatRecord& r = p.records[slot];
-  return make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape);
+/// The first k in [0, count) whose entries begin after `at`, by one warp: 32 probes at a time.
+__device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t count,
+                                      std::uint32_t at) {
+  const std::uint32_t lane = threadIdx.x % warp_size;
+  std::uint32_t low = 0, high = count;  // the answer is in [low, high]
+  while (low < high) {
+    const std::uint32_t step = (high - low + warp_size - 1) / warp_size;
+    const std::uint32_t probe = low + step * (lane + 1) - 1;
+    const bool beyond = probe >= high || first[probe] > at;
+    const unsigned lanes = __ballot_sync(~0u, beyond);
+    const std::uint32_t hit = lanes == 0 ? warp_size : __ffs(static_cast<int>(lanes)) - 1;
+    const std::uint32_t new_low = low + step * hit;
+    high = hit == warp_size ? high : min(high, new_low + step - 1);
+    low = min(new_low, high);
+  }
+  return low;
 }
 
 /// Where a splat's entries end. Its tiles were counted by another kernel, and compilers may round
-/// the same formula differently there: entries counted but not written become padding.
+/// the same formula differently there: what is counted but not written stays padding.
 __device__ std::uint32_t entries_end(const EmitParams& p, std::uint32_t slot, std::uint32_t at) {
-  return min(at + p.tile_count[slot], p.shape.list_bound);
-}
-__device__ void pad_entry(const EmitParams& p, std::uint32_t at) {
-  p.tile[at] = p.shape.tiles();
-  p.slot[at] = 0;
-}
-__device__ void pad_rest(const EmitParams& p, std::uint32_t at, std::uint32_t end) {
-  for (; at < end; ++at) pad_entry(p, at);
+  return at + p.tile_count[slot];
 }
 
 /// All lanes write one splat; rows in order, so that the list is the same as a lone lane's.
-__device__ void emit_together(const EmitParams& p, std::uint32_t slot, std::uint32_t at) {
-  const std::uint32_t end = entries_end(p, slot, at);
+template <class Outline>
+__device__ void emit_together(const EmitParams& p, Window& window, const TileFootprint<Outline>& f,
+                              std::uint32_t slot, std::uint32_t at) {
+  const std::uint32_t last = entries_end(p, slot, at);
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  const TileFootprint f = footprint_of(p, slot);
-  for (int top = f.first_row; top <= f.last_row; top += warp_size) {
+  for (int top = f.first_row; top <= f.last_row && at < window.end; top += warp_size) {
     const int row = top + lane;
     const int2 columns = row <= f.last_row ? f.columns(row) : make_int2(0, -1);
     const std::uint32_t count = static_cast<std::uint32_t>(max(0, columns.y - columns.x + 1));
@@ -54,62 +74,116 @@ __device__ void emit_together(const EmitParams& p, std::uint32_t slot, std::uint
       const std::uint32_t other = __shfl_up_sync(~0u, before, step);
       if (lane >= step) before += other;
     }
-    emit_row(p, row, columns, slot, at + before - count, end);
+    window.put_row(static_cast<std::uint32_t>(row * p.shape.tiles_x), columns, slot,
+                   at + before - count, last);
     at += __shfl_sync(~0u, before, warp_size - 1);
   }
-  if (lane == 0) pad_rest(p, at, end);
+}
+
+__device__ void emit_large(const EmitParams& p, Window& window, std::uint32_t slot,
+                           std::uint32_t at) {
+  const SplatRecord& r = p.records[slot];
+  if (p.path != nullptr) {
+    emit_together(p, window, make_footprint(r.centre_px, p.path[slot], p.shape), slot, at);
+  } else {
+    emit_together(p, window, make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape),
+                  slot, at);
+  }
 }
 
 __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams p) {
-  const std::uint32_t k = blockIdx.x * block_size + threadIdx.x;
-  const bool live = k < min(p.counts->visible, p.shape.visible_bound);
-  std::uint32_t slot = 0, at = 0;
-  bool large = false;
-  if (live) {
-    slot = p.order[k];
-    at = p.first[k];
-    const TileFootprint f = footprint_of(p, slot);
-    large = f.last_row - f.first_row >= lone_rows;
-    if (!large) {
-      const std::uint32_t end = entries_end(p, slot, at);
-      for (int row = f.first_row; row <= f.last_row; ++row)
-        at = emit_row(p, row, f.columns(row), slot, at, end);
-      pad_rest(p, at, end);
-    }
+  __shared__ Window window;
+  __shared__ std::uint32_t splats[2];  // in depth order, those with entries in the window
+  __shared__ std::uint32_t large[most_splats];
+  __shared__ std::uint32_t large_count;
+  const std::uint32_t thread = threadIdx.x;
+  const std::uint32_t begin = blockIdx.x * window_size;
+  const std::uint32_t end = min(begin + window_size, p.shape.list_bound);
+  const std::uint32_t visible = min(p.counts->visible, p.shape.visible_bound);
+  const bool any = begin < p.counts->list_entries;
+  if (any && thread / warp_size < 2) {
+    // The last splat that begins at or before the window, to the last that begins in it.
+    const std::uint32_t beyond =
+        first_beyond(p.first, visible, thread < warp_size ? begin : end - 1);
+    if (thread % warp_size == 0)
+      splats[thread / warp_size] = thread < warp_size ? max(beyond, 1u) - 1 : beyond;
   }
-  for (unsigned left = __ballot_sync(~0u, large); left != 0; left &= left - 1) {
-    const int source = __ffs(static_cast<int>(left)) - 1;
-    emit_together(p, __shfl_sync(~0u, slot, source), __shfl_sync(~0u, at, source));
+  for (std::uint32_t j = thread; j < window_size; j += block_size) {
+    window.tile[j] = p.shape.tiles();  // padding, for what nobody writes
+    window.slot[j] = 0;
+  }
+  if (thread == 0) {
+    window.begin = begin;
+    window.end = end;
+    large_count = 0;
+  }
+  __syncthreads();
+  if (any) {
+    for (std::uint32_t k = splats[0] + thread; k < splats[1]; k += block_size) {
+      const std::uint32_t slot = p.order[k];
+      std::uint32_t at = p.first[k];
+      const TileSpans spans = p.spans[slot];
+      if (spans.rows() == TileSpans::not_small) {
+        if (p.tile_count[slot] > 0) large[atomicAdd(&large_count, 1u)] = k;
+        continue;
+      }
+      std::uint32_t first_tile =
+          spans.row() * static_cast<std::uint32_t>(p.shape.tiles_x) + spans.column();
+#pragma unroll
+      for (int j = 0; j < TileSpans::most_rows; ++j, first_tile += p.shape.tiles_x) {
+        if (j >= static_cast<int>(spans.rows())) break;
+        const int first = spans.first(j);
+        at =
+            window.put_row(first_tile, make_int2(first, first + spans.count(j) - 1), slot, at, end);
+      }
+    }
+    __syncthreads();
+    for (std::uint32_t j = thread / warp_size; j < large_count; j += warps) {
+      const std::uint32_t k = large[j];
+      emit_large(p, window, p.order[k], p.first[k]);
+    }
+    __syncthreads();
+  }
+  for (std::uint32_t at = begin + thread; at < end; at += block_size) {
+    p.tile[at] = window.tile[at - begin];
+    p.slot[at] = window.slot[at - begin];
   }
 }
 
-__global__ void __launch_bounds__(block_size) pad_kernel(const EmitParams p) {
-  const std::uint32_t at = p.counts->list_entries + blockIdx.x * block_size + threadIdx.x;
-  for (std::uint32_t i = at; i < p.shape.list_bound; i += gridDim.x * block_size) pad_entry(p, i);
-}
+/// Four entries a thread.
+constexpr std::uint32_t range_step = 4;
 
 __global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams p) {
-  const std::uint32_t i = blockIdx.x * block_size + threadIdx.x;
-  if (i >= p.shape.list_bound) return;
-  const std::uint32_t tile = p.tile[i];
-  if (tile >= p.shape.tiles()) return;  // padding
-  if (i == 0 || p.tile[i - 1] != tile) p.range[tile].x = i;
-  if (i + 1 == p.shape.list_bound || p.tile[i + 1] != tile) p.range[tile].y = i + 1;
+  const std::uint32_t first = (blockIdx.x * block_size + threadIdx.x) * range_step;
+  if (first >= p.shape.list_bound) return;
+  const std::uint32_t tiles = p.shape.tiles();  // padding, and what is beyond the ends
+  std::uint32_t before = first > 0 ? p.tile[first - 1] : tiles;
+#pragma unroll
+  for (std::uint32_t j = 0; j < range_step; ++j) {
+    const std::uint32_t i = first + j;
+    const std::uint32_t tile = i < p.shape.list_bound ? p.tile[i] : tiles;
+    if (tile != before) {
+      if (before < tiles) p.range[before].y = i;
+      if (tile < tiles) p.range[tile].x = i;
+    }
+    before = tile;
+  }
+  if (first + range_step >= p.shape.list_bound && before < tiles)
+    p.range[before].y = p.shape.list_bound;
 }
 
 }  // namespace
 
 void launch_emit(const EmitParams& params, cudaStream_t stream) {
-  const std::uint32_t blocks = (params.shape.visible_bound + block_size - 1) / block_size;
+  const std::uint32_t blocks = (params.shape.list_bound + window_size - 1) / window_size;
   emit_kernel<<<blocks, block_size, 0, stream>>>(params);
   check_launch("emit");
-  pad_kernel<<<512, block_size, 0, stream>>>(params);
-  check_launch("list padding");
 }
 
 void launch_ranges(const RangesParams& params, cudaStream_t stream) {
   check(cudaMemsetAsync(params.range, 0, params.shape.tiles() * sizeof(uint2), stream), "ranges");
-  const std::uint32_t blocks = (params.shape.list_bound + block_size - 1) / block_size;
+  constexpr std::uint32_t per_block = block_size * range_step;
+  const std::uint32_t blocks = (params.shape.list_bound + per_block - 1) / per_block;
   ranges_kernel<<<blocks, block_size, 0, stream>>>(params);
   check_launch("ranges");
 }

@@ -1,10 +1,11 @@
 #pragma once
 
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/tiles.cuh"
 
 namespace catgs::cuda {
 
-/// Writes the tile list entries of all visible splats in depth order, then pads up to the bound.
+/// Writes the tile list entries of all visible splats in depth order, and padding up to the bound.
 struct EmitParams {
   FrameShape shape;
   const FrameCounts* counts;
@@ -12,6 +13,8 @@ struct EmitParams {
   const std::uint32_t* order;       // [visible_bound], slots front to back
   const std::uint32_t* first;       // [visible_bound], where the k-th splat's entries begin
   const std::uint32_t* tile_count;  // [visible_bound], by slot
+  const TileSpans* spans;           // [visible_bound], by slot
+  const SplatPath* path;            // [visible_bound], by slot; null: splats stay where they are
   std::uint32_t* tile;              // [list_bound], tile index; shape.tiles() in the padding
   std::uint32_t* slot;              // [list_bound]
 };

@@ -4,17 +4,40 @@
 
 namespace catgs::cuda {
 
-/// Blends every tile's list front to back into the float image.
+/// A run of one tile's list that is blended on its own. A tile that is not split is one task.
+struct BlendTask {
+  std::uint32_t tile;
+  std::uint32_t first, last;  // list entries [first, last)
+  std::uint16_t slice;        // place of this run among the tile's
+  std::uint16_t slices;       // of the tile
+};
+static_assert(sizeof(BlendTask) == 16);
+
+/// A warp blends one of the 8x8 px parts of a tile: small enough that most splats of a tile miss
+/// most parts, large enough that two pixels a lane share what does not depend on the pixel.
+constexpr int part_size_px = 8;
+constexpr int parts_per_tile = (tile_size_px / part_size_px) * (tile_size_px / part_size_px);
+
+/// Blends all tasks front to back. Whole tiles go straight to the image, slices to slice_pixels.
 struct BlendParams {
   FrameShape shape;
   const SplatRecord* records;
-  const std::uint32_t* slot;  // [list_bound], sorted by tile, front to back within one
-  const uint2* range;         // [tiles]
+  const std::uint32_t* slot;   // [list_bound], sorted by tile, front to back within one
+  const BlendTask* tasks;      // [task_bound]
+  const std::uint32_t* queue;  // [queue_bound], tasks by class
   float3 background;
-  float* rgb;           // [height][width][3], display-referred, in [0, 1]
-  FrameCounts* counts;  // list_max is set, and blended_pairs when they are counted
-  bool count_pairs;     // slower
+  float* rgb;                  // [height][width][3], display-referred, in [0, 1]
+  float4* slice_pixels;        // [task_bound][tile_size_px^2], colour and transmittance of slices
+  std::uint32_t* consumed;     // [task_bound][parts_per_tile], one past the last entry looked at
+  float* slice_transmittance;  // [task_bound][parts_per_tile], 1, then what a slice leaves at most
+  std::uint32_t* reach;        // [tiles], zeroed; how much of its list a whole tile looked at
+  FrameCounts* counts;         // next_part is consumed; blended_pairs is set when counted
+  bool count_pairs;            // slower
+  int warps;                   // that the device holds at a time, by blend_warps()
 };
+
+/// Warps of the blend kernel that fit on the current device at a time.
+int blend_warps();
 void launch_blend(const BlendParams& params, cudaStream_t stream);
 
 }  // namespace catgs::cuda

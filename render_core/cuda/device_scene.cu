@@ -2,6 +2,8 @@
 #include <cmath>
 #include <vector>
 
+#include <cuda_fp16.h>
+
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/math/projection-inl.h"
 
@@ -50,9 +52,13 @@ DeviceScene::DeviceScene(const GaussianCloud& cloud) {
     *out = make_float2(l.zy, l.zz);
   });
   const int floats = 3 * cloud.sh_count();
-  const int stride = (floats + 3) / 4;
-  upload(sh_, n, static_cast<std::size_t>(stride),
-         [&](std::size_t i, float4* out) { std::copy_n(&cloud.sh_of(i)->x, floats, &out->x); });
+  constexpr int halfs_per_word = sizeof(uint4) / sizeof(__half);
+  const int stride = (floats + halfs_per_word - 1) / halfs_per_word;
+  upload(sh_, n, static_cast<std::size_t>(stride), [&](std::size_t i, uint4* out) {
+    const float* in = &cloud.sh_of(i)->x;
+    std::transform(in, in + floats, reinterpret_cast<__half*>(out),
+                   [](float value) { return __float2half_rn(value); });
+  });
   arrays_ = {static_cast<std::uint32_t>(n),
              cloud.sh_degree,
              stride,

@@ -20,13 +20,26 @@ struct __align__(32) SplatRecord {
 };
 static_assert(sizeof(SplatRecord) == 32);
 
+/// The blend draws its tasks in so many classes: by their place in the tile's list, the last taking
+/// all that are farther back.
+constexpr int queue_classes = 8;
+
 /// Counts of a frame. Written by the device, copied to mapped host memory at the frame's end; the
 /// host reads them only then.
 struct FrameCounts {
-  std::uint32_t visible = 0;             // Gaussians that passed culling
-  std::uint32_t list_entries = 0;        // sum of all tile lists, before any bound was applied
-  std::uint32_t list_max = 0;            // longest tile list
-  unsigned long long blended_pairs = 0;  // only when counted
+  // Of the key frame; sub-frames keep them.
+  std::uint32_t visible = 0;       // Gaussians in view
+  std::uint32_t list_entries = 0;  // sum of all tile lists, before any bound was applied
+  std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float
+  // Of the frame.
+  std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
+  std::uint32_t list_max = 0;  // longest tile list
+  std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
+  std::uint32_t runs = 0;                    // of the reorder stage
+  std::uint32_t allocated_tasks = 0;         // while they are being made
+  std::uint32_t next_part = 0;               // of a task, that no warp of the blend has taken yet
+  unsigned long long expected_entries = 0;   // list entries that tiles are expected to look at
+  unsigned long long blended_pairs = 0;      // only when counted
 };
 
 /// Tiles of the image and the bounds of the frame's buffers.

@@ -1,11 +1,23 @@
+#include <algorithm>
+
+#include "render_core/cuda/cull.cuh"
 #include "render_core/cuda/frame_memory.cuh"
 #include "render_core/cuda/sort.cuh"
+#include "render_core/cuda/split.cuh"
 
 namespace catgs::cuda {
 
-void FrameMemory::reserve(const FrameShape& shape, std::size_t scene_blocks,
+void FrameMemory::reserve(const FrameShape& shape, std::uint32_t gaussians,
                           const ViewSettings& settings) {
+  cull_mask.reserve(cull_words(gaussians));
+  cull_before.reserve(cull_words(gaussians));
+  visible.reserve(shape.visible_bound);
   records.reserve(shape.visible_bound);
+  spans.reserve(shape.visible_bound);
+  if (settings.pipeline == Pipeline::catgs) {
+    path.reserve(shape.visible_bound);
+    runs.reserve(run_bound(shape));
+  }
   tile_count.reserve(shape.visible_bound);
   first.reserve(shape.visible_bound);
   for (int i = 0; i < 2; ++i) {
@@ -15,10 +27,21 @@ void FrameMemory::reserve(const FrameShape& shape, std::size_t scene_blocks,
     slot[i].reserve(shape.list_bound);
   }
   range.reserve(shape.tiles());
-  block_state.reserve(scene_blocks + 1);
+  const std::size_t most_tasks = task_bound(shape);
+  tasks.reserve(most_tasks);
+  queue.reserve(queue_bound(shape));
+  tile_tasks.reserve(shape.tiles());
+  consumed.reserve(most_tasks * parts_per_tile);
+  slice_transmittance.reserve(most_tasks * parts_per_tile);
+  slice_pixels.reserve(most_tasks * tile_size_px * tile_size_px);
+  reach.reserve(shape.tiles());
+  scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(gaussians)));
+  reserve_image(shape, settings);
+}
+
+void FrameMemory::reserve_image(const FrameShape& shape, const ViewSettings& settings) {
   counts.reserve(1);
   host_counts.reserve(1);
-  scratch.reserve(sort_scratch_bytes(shape));
   const std::size_t pixels = static_cast<std::size_t>(shape.width_px) * shape.height_px;
   rgb.reserve(3 * pixels);
   if (settings.format == PixelFormat::i420) {
@@ -30,10 +53,13 @@ void FrameMemory::reserve(const FrameShape& shape, std::size_t scene_blocks,
 }
 
 std::size_t FrameMemory::bytes() const {
-  return records.bytes() + tile_count.bytes() + first.bytes() + depth[0].bytes() +
-         depth[1].bytes() + order[0].bytes() + order[1].bytes() + tile[0].bytes() +
-         tile[1].bytes() + slot[0].bytes() + slot[1].bytes() + range.bytes() + block_state.bytes() +
-         counts.bytes() + scratch.bytes() + rgb.bytes() + i420.bytes();
+  return cull_mask.bytes() + cull_before.bytes() + visible.bytes() + tasks.bytes() + queue.bytes() +
+         tile_tasks.bytes() + spans.bytes() + path.bytes() + runs.bytes() + consumed.bytes() +
+         slice_transmittance.bytes() + slice_pixels.bytes() + reach.bytes() + records.bytes() +
+         tile_count.bytes() + first.bytes() + depth[0].bytes() + depth[1].bytes() +
+         order[0].bytes() + order[1].bytes() + tile[0].bytes() + tile[1].bytes() + slot[0].bytes() +
+         slot[1].bytes() + range.bytes() + counts.bytes() + scratch.bytes() + rgb.bytes() +
+         i420.bytes();
 }
 
 }  // namespace catgs::cuda

@@ -1,19 +1,28 @@
 #pragma once
 
+#include "render_core/cuda/blend.cuh"
 #include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/tiles.cuh"
 #include "render_core/renderer.h"
 
 namespace catgs::cuda {
 
 /// All device memory of a View, sized by a FrameShape. Buffers only grow, between frames.
 struct FrameMemory {
+  DeviceBuffer<std::uint32_t> cull_mask, cull_before, visible;
   DeviceBuffer<SplatRecord> records;
+  DeviceBuffer<TileSpans> spans;
+  DeviceBuffer<SplatPath> path;
   DeviceBuffer<std::uint32_t> tile_count, first;
   DeviceBuffer<std::uint32_t> depth[2], order[2];
   DeviceBuffer<std::uint32_t> tile[2], slot[2];
   DeviceBuffer<uint2> range;
-  DeviceBuffer<std::uint64_t> block_state;
+  DeviceBuffer<BlendTask> tasks;
+  DeviceBuffer<std::uint32_t> queue, consumed, reach;
+  DeviceBuffer<uint2> tile_tasks, runs;
+  DeviceBuffer<float> slice_transmittance;
+  DeviceBuffer<float4> slice_pixels;
   DeviceBuffer<FrameCounts> counts;
   DeviceBuffer<std::byte> scratch;
   DeviceBuffer<float> rgb;
@@ -21,8 +30,10 @@ struct FrameMemory {
   PinnedBuffer<FrameCounts> host_counts;
   PinnedBuffer<std::byte> host_image;
 
-  /// Makes room; throws CudaError. `scene_blocks` words of look-back state.
-  void reserve(const FrameShape& shape, std::size_t scene_blocks, const ViewSettings& settings);
+  /// Makes room; throws CudaError.
+  void reserve(const FrameShape& shape, std::uint32_t gaussians, const ViewSettings& settings);
+  /// The same for the image and the counts alone.
+  void reserve_image(const FrameShape& shape, const ViewSettings& settings);
   [[nodiscard]] std::size_t bytes() const;
 };
 

@@ -1,26 +1,31 @@
 #pragma once
 
-#include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
-#include "render_core/math/camera-inl.h"
+#include "render_core/cuda/splat.cuh"
 
 namespace catgs::cuda {
 
-/// Cull, project and shade in one pass over the scene. Writes, for the v-th visible Gaussian in
-/// scene order (so that equal depths blend in scene order):
+/// Projects and shades the Gaussians in view: of a key frame as culling found them, of a sub-frame
+/// from the frustum cache. Slot v belongs to Gaussian visible[v].
 struct ProjectParams {
   SceneArrays scene;
-  math::CameraModel<float> camera;
-  math::CameraModel<double> camera_double;  // view depth is evaluated in double by every core
+  FrameCameras camera;
   FrameShape shape;
-  SplatRecord* records;        // [visible_bound]
-  std::uint32_t* depth_key;    // [visible_bound], order-preserving bits of the view depth
-  std::uint32_t* tile_count;   // [visible_bound], length of its part of the tile lists
-  std::uint64_t* block_state;  // [project_blocks(count) + 1], zeroed: ticket, then look-back words
-  FrameCounts* counts;         // zeroed; `visible` is set, which may exceed visible_bound
+  float min_depth;               // of splats that counts->displacement, ->nearness speak of
+  FrameCounts* counts;           // displacement and nearness are raised
+  const std::uint32_t* visible;  // [visible_bound], scene indices
+  SplatRecord* records;          // [visible_bound]
+  std::uint32_t* depth_key;      // [visible_bound], depth_key() of the view depth
+  std::uint32_t* tile_count;     // key frames: [visible_bound], its part of the tile lists
+  TileSpans* spans;              // key frames: [visible_bound]
+  SplatPath* path;               // key frames with a window: [visible_bound]
 };
 
-std::uint32_t project_blocks(std::uint32_t count);
-void launch_project(const ProjectParams& params, cudaStream_t stream);
+enum class Listing {
+  none,      // a sub-frame: its lists are there
+  ellipses,  // a key frame without a window
+  trails,    // a key frame with one
+};
+void launch_project(const ProjectParams& params, Listing listing, cudaStream_t stream);
 
 }  // namespace catgs::cuda

@@ -13,7 +13,8 @@ namespace catgs::cuda {
 namespace {
 
 constexpr int block_size = 256;
-constexpr std::uint32_t last_key = 0xffffffffu;
+constexpr std::uint32_t last_key = (1u << (depth_bits + depth_bits_below)) - 1u;
+constexpr int depth_end_bit = depth_bits_below + depth_bits;
 
 std::uint32_t blocks_for(std::uint32_t count) { return (count + block_size - 1) / block_size; }
 
@@ -60,7 +61,8 @@ int tile_bits(const FrameShape& shape) { return static_cast<int>(std::bit_width(
 std::size_t sort_scratch_bytes(const FrameShape& shape) {
   std::size_t depth = 0, scan = 0, tile = 0;
   cub::DoubleBuffer<std::uint32_t> keys, values;
-  check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound),
+  check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound,
+                                        depth_bits_below, depth_end_bit),
         "depth sort size");
   check(cub::DeviceScan::ExclusiveScan(nullptr, scan, counts_in_order(nullptr, nullptr, nullptr),
                                        static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
@@ -80,9 +82,10 @@ void sort_by_depth(const FrameShape& shape, const FrameCounts* counts,
   check_launch("depth sort padding");
   cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
   cub::DoubleBuffer<std::uint32_t> values(order.current, order.other);
-  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
-                                        shape.visible_bound, 0, 32, stream),
-        "depth sort");
+  check(
+      cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
+                                      shape.visible_bound, depth_bits_below, depth_end_bit, stream),
+      "depth sort");
   depth = {keys.Current(), keys.Alternate()};
   order = {values.Current(), values.Alternate()};
 }
@@ -107,6 +110,38 @@ void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
                                         shape.list_bound, 0, tile_bits(shape), stream),
         "tile sort");
   tile = {keys.Current(), keys.Alternate()};
+  slot = {values.Current(), values.Alternate()};
+}
+
+std::size_t key_sort_scratch_bytes(std::uint32_t count, const FrameShape& shape) {
+  std::size_t scan = 0, sort = 0;
+  cub::DoubleBuffer<std::uint64_t> keys;
+  cub::DoubleBuffer<std::uint32_t> values;
+  check(
+      cub::DeviceScan::InclusiveScan(nullptr, scan, static_cast<const std::uint32_t*>(nullptr),
+                                     static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, count),
+      "tile count sum size");
+  check(cub::DeviceRadixSort::SortPairs(nullptr, sort, keys, values, shape.list_bound, 0,
+                                        32 + tile_bits(shape)),
+        "key sort size");
+  return std::max(scan, sort);
+}
+
+void sum_tile_counts(std::uint32_t count, const std::uint32_t* tile_count, std::uint32_t* sums,
+                     SortScratch scratch, cudaStream_t stream) {
+  check(cub::DeviceScan::InclusiveScan(scratch.memory, scratch.bytes, tile_count, sums,
+                                       SaturatingSum{}, count, stream),
+        "tile count sum");
+}
+
+void sort_by_key(const FrameShape& shape, PingPong<std::uint64_t>& key,
+                 PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream) {
+  cub::DoubleBuffer<std::uint64_t> keys(key.current, key.other);
+  cub::DoubleBuffer<std::uint32_t> values(slot.current, slot.other);
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
+                                        shape.list_bound, 0, 32 + tile_bits(shape), stream),
+        "key sort");
+  key = {keys.Current(), keys.Alternate()};
   slot = {values.Current(), values.Alternate()};
 }
 

@@ -7,6 +7,18 @@ namespace catgs::cuda {
 /// Radix sorts by CUB. Counts stay on the device: the host passes bounds, and what lies between a
 /// count and its bound is padded with keys that sort last.
 
+// Positive floats sort like their bits. Counted from the near plane, 24 bits are enough: 32 octaves
+// of depth in steps of 2e-6. A quarter of the sort is saved.
+constexpr int depth_bits_below = 4;
+constexpr int depth_bits = 24;
+
+/// Key of a view depth; the lowest, where it is not beyond the near plane.
+__device__ inline std::uint32_t depth_key(float depth, float near_z) {
+  if (!(depth > near_z)) return 0;
+  return min(__float_as_uint(depth) - __float_as_uint(near_z),
+             (1u << (depth_bits + depth_bits_below)) - 2u);
+}
+
 /// Ping-pong buffers; CUB says which of the two holds the result.
 template <class T>
 struct PingPong {
@@ -38,5 +50,13 @@ void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::u
 /// the count must be shape.tiles() or more.
 void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
                   PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
+
+/// For the original's way: sums[i] = tile_count[0] + … + tile_count[i], and list entries by 64-bit
+/// (tile | depth) keys. Keys beyond the count must be all ones.
+std::size_t key_sort_scratch_bytes(std::uint32_t count, const FrameShape& shape);
+void sum_tile_counts(std::uint32_t count, const std::uint32_t* tile_count, std::uint32_t* sums,
+                     SortScratch scratch, cudaStream_t stream);
+void sort_by_key(const FrameShape& shape, PingPong<std::uint64_t>& key,
+                 PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
 
 }  // namespace catgs::cuda

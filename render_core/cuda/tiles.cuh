@@ -3,25 +3,37 @@
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/math/constants.h"
 #include "render_core/math/ellipse-inl.h"
+#include "render_core/math/trail-inl.h"
 
 namespace catgs::cuda {
 
-/// The tiles a splat reaches: rows first_row…last_row, and in each row columns by `columns`.
+/// The way of a splat through a key frame's window, by which it is listed: a math::Sweep.
+struct __align__(16) SplatPath {
+  float dx, dy;                      // px, from the record's centre
+  math::Whitening<float> whitening;  // of the outline
+  float log2_opacity;                // the record has none while the splat is behind the near plane
+  float unused[2];
+};
+static_assert(sizeof(SplatPath) == 32);
+
+/// The tiles that an outline (math::Ellipse or math::Trail) reaches: rows first_row…last_row, and
+/// in each row columns by `columns`.
+template <class Outline>
 struct TileFootprint {
-  math::Ellipse<float> ellipse;
+  Outline outline;
   float2 centre_px;
   int first_row, last_row;
   FrameShape shape;
 
   /// First and last column of one tile row; empty when first > last. A tile counts when the
-  /// rectangle of its pixel centres, as far as they lie in the image, meets the ellipse.
+  /// rectangle of its pixel centres, as far as they lie in the image, meets the outline.
   __device__ int2 columns(int row) const {
-    constexpr float tile = math_tile;
+    constexpr float tile = tile_size_px, slack = listing_slack_px;
     const float top = static_cast<float>(row) * tile + 0.5f;
     const float bottom = fminf(top + (tile - 1.0f), static_cast<float>(shape.height_px) - 0.5f);
-    const auto cut = math::columns_in_band(ellipse, top - centre_px.y, bottom - centre_px.y);
-    const float low = cut.low + centre_px.x;
-    const float high = cut.high + centre_px.x;
+    const auto cut = math::columns_in_band(outline, top - centre_px.y, bottom - centre_px.y);
+    const float low = cut.low + centre_px.x - slack;
+    const float high = cut.high + centre_px.x + slack;
     if (cut.low > cut.high || high < 0.5f || low > static_cast<float>(shape.width_px) - 0.5f) {
       return make_int2(0, -1);
     }
@@ -31,29 +43,100 @@ struct TileFootprint {
                      static_cast<int>(fminf(last, static_cast<float>(shape.tiles_x - 1))));
   }
 
-  static constexpr float math_tile = static_cast<float>(tile_size_px);
+  /// Sets the rows, for an outline that covers `top`…`bottom` (px).
+  __device__ void set_rows(float top, float bottom) {
+    constexpr float tile = tile_size_px, slack = listing_slack_px;
+    const float first = ceilf((top - slack - (tile - 0.5f)) * (1.0f / tile));
+    const float last = floorf((bottom + slack - 0.5f) * (1.0f / tile));
+    first_row = static_cast<int>(fmaxf(first, 0.0f));
+    last_row = static_cast<int>(fminf(last, static_cast<float>(shape.tiles_y - 1)));
+    if (!(first <= last)) last_row = first_row - 1;
+  }
 };
 
-/// Footprint of a splat with `half_extent` (px) around its centre; no rows when it reaches none.
-__device__ inline TileFootprint make_footprint(float2 centre_px, const math::Whitening<float>& w,
-                                               float log2_opacity, const FrameShape& shape) {
-  constexpr float tile = TileFootprint::math_tile;
+/// Footprint of a splat as it is now. It reaches nothing when `log2_opacity` is too low.
+__device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
+    float2 centre_px, const math::Whitening<float>& w, float log2_opacity,
+    const FrameShape& shape) {
   const float reach = math::reach_of(log2_opacity);
-  // Half extents of {|W d|^2 <= reach}: dy = root / yy, dx = root |W^-1 row| .
-  const float root = sqrtf(fmaxf(reach, 0.0f));
-  const float half_y = root / w.yy;
-  const float half_x = root * sqrtf(w.xy * w.xy + w.yy * w.yy) / (w.xx * w.yy);
-  TileFootprint f;
-  f.ellipse = math::make_ellipse(w, reach, half_x, math::rightmost_y(w, fmaxf(reach, 0.0f)));
+  const math::Vec2<float> half = math::half_extent(w, fmaxf(reach, 0.0f));
+  TileFootprint<math::Ellipse<float>> f;
+  f.outline = math::make_ellipse(w, reach, half.x, math::rightmost_y(w, fmaxf(reach, 0.0f)));
   f.centre_px = centre_px;
   f.shape = shape;
-  const float top = (centre_px.y - half_y - (tile - 0.5f)) * (1.0f / tile);
-  const float bottom = (centre_px.y + half_y - 0.5f) * (1.0f / tile);
-  f.first_row = max(0, static_cast<int>(ceilf(fmaxf(top, -1.0f))));
-  f.last_row = min(shape.tiles_y - 1,
-                   static_cast<int>(floorf(fminf(bottom, static_cast<float>(shape.tiles_y)))));
-  if (reach < 0.0f) f.last_row = -1;
+  f.set_rows(centre_px.y - half.y, centre_px.y + half.y);
+  if (reach < 0.0f) f.last_row = f.first_row - 1;
   return f;
+}
+
+/// Footprint of a splat on its way through a window.
+__device__ inline TileFootprint<math::Trail<float>> make_footprint(float2 centre_px,
+                                                                   const SplatPath& path,
+                                                                   const FrameShape& shape) {
+  const math::Whitening<float>& w = path.whitening;
+  const float reach = fmaxf(math::reach_of(path.log2_opacity), 0.0f);
+  const float half_x = math::half_extent(w, reach).x;
+  TileFootprint<math::Trail<float>> f;
+  f.outline = math::make_trail(math::make_ellipse(w, reach, half_x, math::rightmost_y(w, reach)),
+                               {path.dx, path.dy});
+  f.centre_px = centre_px;
+  f.shape = shape;
+  f.set_rows(centre_px.y + f.outline.top_y, centre_px.y + f.outline.bottom_y);
+  return f;
+}
+
+/// The tiles of a small splat, row by row: most splats are small, and their tiles are worth
+/// remembering between counting and listing.
+struct TileSpans {
+  static constexpr int most_rows = 4;
+  static constexpr unsigned not_small = 255;  // instead of rows: the tiles are found anew
+  // x: first row, leftmost column << 16; y: rows; z: first column of each row, from the leftmost,
+  // a byte a row; w: how many, likewise.
+  uint4 packed;
+
+  __device__ std::uint32_t row() const { return packed.x & 0xffffu; }
+  __device__ std::uint32_t column() const { return packed.x >> 16; }
+  __device__ std::uint32_t rows() const { return packed.y; }
+  __device__ int first(int j) const { return static_cast<int>(packed.z >> (8 * j) & 0xffu); }
+  __device__ int count(int j) const { return static_cast<int>(packed.w >> (8 * j) & 0xffu); }
+};
+
+/// Tiles of a footprint. Their number is the return value.
+template <class Outline>
+__device__ std::uint32_t find_tiles(const TileFootprint<Outline>& f, TileSpans& spans) {
+  const int rows = max(0, f.last_row - f.first_row + 1);
+  std::uint32_t tiles = 0;
+  spans.packed = make_uint4(0, TileSpans::not_small, 0, 0);
+  if (rows > TileSpans::most_rows) {
+    for (int row = f.first_row; row <= f.last_row; ++row) {
+      const int2 columns = f.columns(row);
+      tiles += static_cast<std::uint32_t>(max(0, columns.y - columns.x + 1));
+    }
+    return tiles;
+  }
+  int first[TileSpans::most_rows], count[TileSpans::most_rows];
+  int leftmost = 0xffff, rightmost = -1;
+#pragma unroll
+  for (int j = 0; j < TileSpans::most_rows; ++j) {
+    const int2 columns = j < rows ? f.columns(f.first_row + j) : make_int2(0, -1);
+    first[j] = columns.x;
+    count[j] = max(0, columns.y - columns.x + 1);
+    if (count[j] > 0) leftmost = min(leftmost, columns.x);
+    if (count[j] > 0) rightmost = max(rightmost, columns.y);
+    tiles += static_cast<std::uint32_t>(count[j]);
+  }
+  if (rightmost - leftmost > 250) return tiles;
+  uint4 packed = make_uint4(
+      static_cast<std::uint32_t>(f.first_row) | static_cast<std::uint32_t>(leftmost) << 16,
+      static_cast<std::uint32_t>(rows), 0, 0);
+#pragma unroll
+  for (int j = 0; j < TileSpans::most_rows; ++j) {
+    if (count[j] == 0) continue;
+    packed.z |= static_cast<std::uint32_t>(first[j] - leftmost) << (8 * j);
+    packed.w |= static_cast<std::uint32_t>(count[j]) << (8 * j);
+  }
+  spans.packed = packed;
+  return tiles;
 }
 
 }  // namespace catgs::cuda

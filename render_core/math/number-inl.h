@@ -20,9 +20,15 @@ template <class T>
 CATGS_HD_INLINE T select(bool condition, T if_true, T if_false) {
   return condition ? if_true : if_false;
 }
+CATGS_HD_INLINE bool none(bool condition) { return !condition; }
+#if defined(__CUDA_ARCH__)
+__device__ __forceinline__ float min(float a, float b) { return fminf(a, b); }  // one instruction
+__device__ __forceinline__ float max(float a, float b) { return fmaxf(a, b); }
+#else
 CATGS_HD_INLINE float min(float a, float b) { return a < b ? a : b; }
-CATGS_HD_INLINE double min(double a, double b) { return a < b ? a : b; }
 CATGS_HD_INLINE float max(float a, float b) { return a > b ? a : b; }
+#endif
+CATGS_HD_INLINE double min(double a, double b) { return a < b ? a : b; }
 CATGS_HD_INLINE double max(double a, double b) { return a > b ? a : b; }
 CATGS_HD_INLINE float sqrt(float a) { return std::sqrt(a); }
 CATGS_HD_INLINE double sqrt(double a) { return std::sqrt(a); }

@@ -15,12 +15,19 @@
 #include "render_core/renderer.h"
 #include "render_core/scene/synth.h"
 #include "render_core/thread_pool.h"
+#include "tests/support/camera_moves.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {
 namespace {
 
+using test::Move;
+using test::moved;
+using test::moves;
+using test::patient_settings;
+using test::request_on_path;
 using test::TestScene;
+using test::window;
 
 std::shared_ptr<ThreadPool> pool_of(int threads) { return std::make_shared<ThreadPool>(threads); }
 
@@ -34,49 +41,6 @@ Rendered render(View& view, const FrameRequest& request) {
   const RenderStatus status = view.render(request, frame);
   EXPECT_TRUE(status.ok()) << status.message;
   return {test::copy_rgb(frame), frame.stats};
-}
-
-/// A movement of the camera in its own axes.
-struct Move {
-  std::string name;
-  glm::vec3 shift;     // world units
-  glm::vec3 turn_rad;  // about x, y, z
-};
-
-Pose moved(const Pose& from, const Move& move) {
-  return {from.position + from.orientation * move.shift,
-          from.orientation * glm::quat(move.turn_rad)};
-}
-
-/// Long moves for a window of four frames: at 120 Hz, 3 m/s and 85 deg/s.
-std::vector<Move> moves() {
-  return {{"forward", {0, 0, 0.1f}, {0, 0, 0}},
-          {"back", {0, 0, -0.1f}, {0, 0, 0}},
-          {"sideways", {0.1f, 0.03f, 0}, {0, 0, 0}},
-          {"yaw", {0, 0, 0}, {0, 0.05f, 0}},
-          {"pitch", {0, 0, 0}, {-0.04f, 0, 0}},
-          {"roll", {0, 0, 0}, {0, 0, 0.05f}},
-          {"walk", {-0.05f, 0, 0.08f}, {0.02f, 0.03f, 0.01f}}};
-}
-
-constexpr int window = 4;
-
-/// Groups of `window` sub-frames whatever the motion, so that long trails are tested too.
-ViewSettings patient_settings() {
-  ViewSettings settings{.pipeline = Pipeline::catgs};
-  settings.speculation = {
-      .initial_window = window, .max_trail_px = 1e6f, .min_depth = 2.0f, .max_deviation_px = 0.5f};
-  return settings;
-}
-
-/// Frame `k` of a group on its way along `move`.
-FrameRequest request_on_path(const TestScene& scene, const Move& move, int k) {
-  FrameRequest request = scene.request;
-  const Pose start = scene.request.camera.world_from_camera, end = moved(start, move);
-  request.camera.world_from_camera =
-      uniform_motion(start, end, static_cast<float>(k) / static_cast<float>(window));
-  request.forecast = Forecast{end, std::max(1, window - k)};
-  return request;
 }
 
 class SubFrames : public testing::TestWithParam<TestScene> {

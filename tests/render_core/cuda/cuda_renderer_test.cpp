@@ -8,6 +8,7 @@
 
 #include "render_core/error.h"
 #include "render_core/renderer.h"
+#include "tests/support/camera_moves.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {
@@ -53,6 +54,77 @@ TEST_P(CudaSmallScenes, MatchesReferenceWithListsAsShortAsTheCpuCores) {
             2.0 + 1.05 * static_cast<double>(cpu.stats.list_entries));
 }
 
+Rendered render_in(View& view, const FrameRequest& request) {
+  FrameView frame;
+  const RenderStatus status = view.render(request, frame);
+  EXPECT_TRUE(status.ok()) << status.message;
+  return {test::copy_rgb(frame), frame.stats};
+}
+
+// Nothing may be missing as long as the camera keeps to the forecast, Gaussians that come through
+// the near plane or into the image among it.
+TEST_P(CudaSmallScenes, SubFramesOnTheForecastPathMissNothing) {
+  REQUIRE_DEVICE();
+  const TestScene& scene = GetParam();
+  const auto renderer = renderer_of(scene, RendererKind::cuda);
+  const auto exact = renderer->make_view({});
+  for (const test::Move& move : test::moves()) {
+    SCOPED_TRACE(move.name);
+    const auto view = renderer->make_view(test::patient_settings());
+    for (int k = 0; k <= test::window; ++k) {
+      const FrameRequest request = test::request_on_path(scene, move, k);
+      const Rendered drawn = render_in(*view, request);
+      EXPECT_EQ(drawn.stats.kind, k == 0 ? FrameKind::key : FrameKind::sub) << k;
+      EXPECT_EQ(drawn.stats.window, test::window);
+      EXPECT_GE(test::psnr_db(drawn.rgb, render_in(*exact, request).rgb), 60.0) << "frame " << k;
+    }
+    EXPECT_EQ(render_in(*view, test::request_on_path(scene, move, test::window)).stats.kind,
+              FrameKind::key);
+  }
+}
+
+TEST_P(CudaSmallScenes, KeyFramesListNoMoreThanTheCpuCores) {
+  REQUIRE_DEVICE();
+  const TestScene& scene = GetParam();
+  for (const test::Move& move : test::moves()) {
+    const FrameRequest request = test::request_on_path(scene, move, 0);
+    const auto cuda = renderer_of(scene, RendererKind::cuda)->make_view(test::patient_settings());
+    const auto cpu = renderer_of(scene, RendererKind::cpu)->make_view(test::patient_settings());
+    const FrameStats a = render_in(*cuda, request).stats, b = render_in(*cpu, request).stats;
+    EXPECT_LE(static_cast<double>(a.list_entries),
+              2.0 + 1.05 * static_cast<double>(b.list_entries));
+    // Which of the outermost Gaussians count is a matter of rounding.
+    EXPECT_NEAR(a.displacement_px, b.displacement_px, 0.01f + 0.02f * b.displacement_px);
+    EXPECT_FLOAT_EQ(1.0f / a.nearest_depth, 1.0f / b.nearest_depth);
+  }
+}
+
+// Slices are folded as the paper has it; the picture is the unsplit one's.
+TEST_P(CudaSmallScenes, SplittingChangesNothing) {
+  REQUIRE_DEVICE();
+  const TestScene& scene = GetParam();
+  const auto renderer = renderer_of(scene, RendererKind::cuda);
+  const auto split = renderer->make_view({}), whole = renderer->make_view({.split_tasks = false});
+  for (int frame = 0; frame < 3; ++frame) {  // later ones cut where earlier ones ended
+    const Rendered a = render_in(*split, scene.request), b = render_in(*whole, scene.request);
+    EXPECT_GE(test::psnr_db(a.rgb, b.rgb), 60.0);
+    EXPECT_GE(a.stats.tasks, b.stats.tasks);
+    for (std::size_t i = 0; i < a.rgb.size(); ++i) ASSERT_NEAR(a.rgb[i], b.rgb[i], 1.0f / 255.0f);
+  }
+}
+
+TEST_P(CudaSmallScenes, VanillaIsTheCpuCores) {
+  REQUIRE_DEVICE();
+  const TestScene& scene = GetParam();
+  const ViewSettings vanilla{.pipeline = Pipeline::vanilla};
+  const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request, vanilla);
+  const auto cpu = render(*renderer_of(scene, RendererKind::cpu), scene.request, vanilla);
+  EXPECT_GE(test::psnr_db(cuda.rgb, cpu.rgb), 55.0);
+  EXPECT_NEAR(static_cast<double>(cuda.stats.list_entries),
+              static_cast<double>(cpu.stats.list_entries),
+              2.0 + 1e-3 * static_cast<double>(cpu.stats.list_entries));
+}
+
 INSTANTIATE_TEST_SUITE_P(, CudaSmallScenes, testing::ValuesIn(test::small_scenes()),
                          [](const auto& test) { return test.param.name; });
 
@@ -94,7 +166,8 @@ TEST(CudaRenderer, OneViewFollowsSizesThatChange) {
     request.camera = make_camera(Pose{}, size, 0.6f * static_cast<float>(size.x));
     FrameView frame;
     ASSERT_TRUE(view->render(request, frame).ok());
-    EXPECT_EQ(test::copy_rgb(frame), render(*renderer, request).rgb);
+    // Not to the bit: where a view cuts long lists depends on what its last frame needed of them.
+    EXPECT_GE(test::psnr_db(test::copy_rgb(frame), render(*renderer, request).rgb), 60.0);
   }
 }
 
@@ -112,7 +185,8 @@ TEST(CudaRenderer, ShortMemoryIsCountedNeverOverrun) {
 TEST(CudaRenderer, CountsTheSamePairsAsTheCpuCore) {
   REQUIRE_DEVICE();
   const TestScene scene = random_scene(20'000);
-  const ViewSettings counting{.count_pairs = true};
+  // Slices of a tile blend what an unsplit tile hides.
+  const ViewSettings counting{.count_pairs = true, .split_tasks = false};
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request, counting);
   const auto cpu = render(*renderer_of(scene, RendererKind::cpu), scene.request, counting);
   const auto pairs = static_cast<double>(cpu.stats.blended_pairs);
@@ -145,11 +219,20 @@ TEST(CudaRenderer, VideoFormatIsTheCpuCores) {
   }
 }
 
-TEST(CudaRenderer, RefusesWhatItCannotRender) {
+TEST(CudaRenderer, LongTilesAreSplit) {
   REQUIRE_DEVICE();
-  const TestScene scene = random_scene(1'000);
+  TestScene scene = random_scene(200'000);
+  // The whole scene lies in a few of the tiles.
+  scene.request.camera = make_camera(Pose{}, {512, 512}, 40.0f);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
-  EXPECT_THROW(renderer->make_view({.pipeline = Pipeline::vanilla}), InputError);
+  const auto split = renderer->make_view({}), whole = renderer->make_view({.split_tasks = false});
+  const Rendered b = render_in(*whole, scene.request);
+  EXPECT_EQ(b.stats.tasks, 1024u);  // one a tile
+  for (int frame = 0; frame < 4; ++frame) {
+    const Rendered a = render_in(*split, scene.request);
+    EXPECT_GT(a.stats.tasks, b.stats.tasks);
+    EXPECT_GE(test::psnr_db(a.rgb, b.rgb), 60.0);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,321 @@
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "render_core/cuda/bin.cuh"
+#include "render_core/cuda/blend.cuh"
+#include "render_core/cuda/convert.cuh"
+#include "render_core/cuda/cuda_view.cuh"
+#include "render_core/cuda/cull.cuh"
+#include "render_core/cuda/project.cuh"
+#include "render_core/cuda/reorder.cuh"
+#include "render_core/cuda/sort.cuh"
+#include "render_core/cuda/split.cuh"
+
+namespace catgs::cuda {
+
+ListBounds::ListBounds(std::uint32_t gaussians, std::uint64_t list_limit)
+    : gaussians_(gaussians),
+      list_limit_(std::clamp<std::uint64_t>(list_limit, 1, list_entries_limit)),
+      visible_(gaussians / 4 + 1),
+      list_(
+          static_cast<std::uint32_t>(std::min<std::uint64_t>(gaussians + 65536ull, list_limit_))) {}
+
+void ListBounds::apply(FrameShape& shape) const {
+  shape.visible_bound = visible_;
+  shape.list_bound = list_;
+}
+
+bool ListBounds::outgrown_by(const FrameCounts& counts) {
+  constexpr std::uint32_t patience = 600;
+  const auto with_margin = [](std::uint32_t needed, std::uint64_t limit) {
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(std::uint64_t{needed} + needed / 8 + 4096, limit));
+  };
+  const auto grow = [&](std::uint32_t& bound, std::uint32_t needed, std::uint64_t limit) {
+    const std::uint32_t wanted = with_margin(needed, limit);
+    if (needed <= bound || wanted <= bound) return false;
+    bound = wanted;
+    return true;
+  };
+  const bool more_visible = grow(visible_, counts.visible, gaussians_);
+  const bool longer_lists = grow(list_, counts.list_entries, list_limit_);
+
+  most_visible_ = std::max(most_visible_, counts.visible);
+  most_list_ = std::max(most_list_, counts.list_entries);
+  if (most_visible_ > visible_ / 2 || most_list_ > list_ / 2) {
+    wide_frames_ = most_visible_ = most_list_ = 0;
+  } else if (++wide_frames_ >= patience) {
+    visible_ = with_margin(most_visible_, gaussians_);
+    list_ = with_margin(most_list_, list_limit_);
+    wide_frames_ = most_visible_ = most_list_ = 0;
+  }
+  return more_visible || longer_lists;
+}
+
+namespace {
+
+int processors_of(int device) {
+  int processors = 0;
+  check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device), "device");
+  return processors;
+}
+
+}  // namespace
+
+CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
+                   const ViewSettings& settings)
+    : scene_(std::move(scene)),
+      device_(device),
+      settings_(settings),
+      bounds_(scene_->arrays().count, settings.max_list_entries),
+      processors_(processors_of(device)),
+      blend_warps_(blend_warps()),
+      groups_(settings.speculation) {}
+
+RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noexcept {
+  if (RenderStatus bad = check_request(request, settings_.format); !bad.ok()) return bad;
+  try {
+    check(cudaSetDevice(device_), "device");
+    FramePlan plan;
+    if (settings_.pipeline == Pipeline::catgs)
+      plan = groups_.plan(request.camera, request.forecast, nearest_depth_);
+    if (settings_.pipeline == Pipeline::vanilla) {
+      draw_vanilla(request);
+    } else if (plan.kind == FrameKind::sub) {
+      draw_sub(request);
+    } else {
+      draw_key(request, plan);
+    }
+    frame = finished(plan);
+    return {};
+  } catch (const CudaError& error) {
+    // Buffers that could not grow are gone, and with them what frames shared.
+    groups_.forget();
+    bounds_ = ListBounds(scene_->arrays().count, settings_.max_list_entries);
+    reach_known_ = false;
+    return {error.status_code(), error.what()};
+  } catch (const std::exception& error) {
+    groups_.forget();
+    return {RenderStatus::Code::device_failed, error.what()};
+  }
+}
+
+void CudaView::set_shape(glm::ivec2 size_px) {
+  if (shape_.width_px != size_px.x || shape_.height_px != size_px.y) reach_known_ = false;
+  shape_.width_px = size_px.x;
+  shape_.height_px = size_px.y;
+  shape_.tiles_x = (size_px.x + tile_size_px - 1) / tile_size_px;
+  shape_.tiles_y = (size_px.y + tile_size_px - 1) / tile_size_px;
+  bounds_.apply(shape_);
+}
+
+void CudaView::mark(Stage stage) {
+  check(cudaEventRecord(after_[static_cast<std::size_t>(stage)].get(), stream_.get()), "event");
+}
+
+void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
+  const bool sweeps = plan.window > 0;
+  const CameraPair now = make_camera_pair(request.camera);
+  const FrameCameras cameras{now, sweeps ? make_camera_pair(plan.window_end).single : now.single};
+  const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
+  do {
+    set_shape(request.camera.size_px);
+    memory_.reserve(shape_, scene_->arrays().count, settings_);
+    const cudaStream_t stream = stream_.get();
+    check(cudaEventRecord(start_.get(), stream), "event");
+    check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
+    if (!reach_known_)
+      check(cudaMemsetAsync(memory_.reach.get(), 0xff, memory_.reach.bytes(), stream), "reach");
+    list_tiles(cameras, sweeps, min_depth);
+    split(nullptr);
+    mark(Stage::sort);
+    blend(request);
+    deliver();
+    reach_known_ = true;
+  } while (bounds_.outgrown_by(*memory_.host_counts.get()));
+}
+
+void CudaView::draw_sub(const FrameRequest& request) {
+  FrameMemory& m = memory_;
+  const cudaStream_t stream = stream_.get();
+  check(cudaEventRecord(start_.get(), stream), "event");
+  constexpr std::size_t kept = offsetof(FrameCounts, nearness);
+  check(cudaMemsetAsync(reinterpret_cast<std::byte*>(m.counts.get()) + kept, 0,
+                        sizeof(FrameCounts) - kept, stream),
+        "counts");
+  const CameraPair now = make_camera_pair(request.camera);
+  const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
+  launch_project({scene_->arrays(),
+                  {now, now.single},
+                  shape_,
+                  min_depth,
+                  m.counts.get(),
+                  m.visible.get(),
+                  m.records.get(),
+                  m.depth[0].get(),
+                  nullptr,
+                  nullptr,
+                  nullptr},
+                 Listing::none, stream);
+  mark(Stage::project);
+  mark(Stage::bin);
+  const bool reorders = settings_.order == BlendOrder::fresh;
+  odd_sub_frame_ = !odd_sub_frame_;
+  split(reorders ? m.runs.get() : nullptr);
+  if (reorders)
+    launch_reorder({m.runs.get(), m.counts.get(), m.depth[0].get(), lists_, processors_}, stream);
+  mark(Stage::sort);
+  blend(request);
+  deliver();
+}
+
+void CudaView::draw_vanilla(const FrameRequest& request) {
+  const glm::vec3& b = request.background;
+  do {
+    set_shape(request.camera.size_px);
+    memory_.reserve_image(shape_, settings_);
+    const cudaStream_t stream = stream_.get();
+    check(cudaEventRecord(start_.get(), stream), "event");
+    check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
+    vanilla_.draw(
+        {&scene_->arrays(), make_camera_pair(request.camera), shape_, make_float3(b.x, b.y, b.z),
+         memory_.rgb.get(), memory_.counts.get(), settings_.count_pairs},
+        [this](Stage stage) { mark(stage); }, stream);
+    deliver();
+  } while (bounds_.outgrown_by(*memory_.host_counts.get()));
+}
+
+/// Stages project, bin and most of sort of a key frame.
+void CudaView::list_tiles(const FrameCameras& cameras, bool sweeps, float min_depth) {
+  FrameMemory& m = memory_;
+  const cudaStream_t stream = stream_.get();
+  const SceneArrays& scene = scene_->arrays();
+  const SortScratch scratch{m.scratch.get(), m.scratch.bytes()};
+  SplatPath* path = sweeps ? m.path.get() : nullptr;
+  launch_cull({scene, cameras, sweeps, shape_, m.cull_mask.get(), m.cull_before.get(),
+               m.visible.get(), m.counts.get(), scratch},
+              stream);
+  launch_project({scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(),
+                  m.records.get(), m.depth[0].get(), m.tile_count.get(), m.spans.get(), path},
+                 sweeps ? Listing::trails : Listing::ellipses, stream);
+  mark(Stage::project);
+
+  PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
+  PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
+  sort_by_depth(shape_, m.counts.get(), depth, order, scratch, stream);
+  scan_tile_counts(shape_, m.counts.get(), order.current, m.tile_count.get(), m.first.get(),
+                   scratch, stream);
+  launch_emit({shape_, m.counts.get(), m.records.get(), order.current, m.first.get(),
+               m.tile_count.get(), m.spans.get(), path, m.tile[0].get(), m.slot[0].get()},
+              stream);
+  mark(Stage::bin);
+
+  PingPong<std::uint32_t> tile{m.tile[0].get(), m.tile[1].get()};
+  PingPong<std::uint32_t> slot{m.slot[0].get(), m.slot[1].get()};
+  sort_by_tile(shape_, tile, slot, scratch, stream);
+  launch_ranges({shape_, tile.current, m.range.get()}, stream);
+  lists_ = slot.current;
+}
+
+/// The paper's l, of the last frame.
+std::uint32_t CudaView::slice_length() const {
+  constexpr std::uint32_t first_guess = 512;
+  if (!reach_known_) return first_guess;
+  const std::uint64_t mean = memory_.host_counts.get()->expected_entries / shape_.tiles();
+  return std::max(shortest_slice, static_cast<std::uint32_t>(mean));
+}
+
+/// Cuts the tiles into tasks, and into runs where the reorder stage follows.
+void CudaView::split(uint2* runs) {
+  FrameMemory& m = memory_;
+  launch_split(
+      {shape_, m.range.get(), m.reach.get(), m.tasks.get(), m.tile_tasks.get(), m.queue.get(), runs,
+       odd_sub_frame_ ? reorder_run / 2 : 0, m.slice_transmittance.get(), m.counts.get(),
+       task_bound(shape_), slice_length(), settings_.split_tasks},
+      stream_.get());
+}
+
+void CudaView::blend(const FrameRequest& request) {
+  FrameMemory& m = memory_;
+  const cudaStream_t stream = stream_.get();
+  const float3 background =
+      make_float3(request.background.x, request.background.y, request.background.z);
+  launch_blend({shape_, m.records.get(), lists_, m.tasks.get(), m.queue.get(), background,
+                m.rgb.get(), m.slice_pixels.get(), m.consumed.get(), m.slice_transmittance.get(),
+                m.reach.get(), m.counts.get(), settings_.count_pairs, blend_warps_},
+               stream);
+  launch_composite({shape_, m.tasks.get(), m.tile_tasks.get(), m.slice_pixels.get(),
+                    m.consumed.get(), background, m.rgb.get(), m.reach.get()},
+                   stream);
+  mark(Stage::blend);
+}
+
+/// Brings the picture where the View's settings want it, and waits for the frame.
+void CudaView::deliver() {
+  FrameMemory& m = memory_;
+  const cudaStream_t stream = stream_.get();
+  const std::size_t pixels = static_cast<std::size_t>(shape_.width_px) * shape_.height_px;
+  if (settings_.format == PixelFormat::i420) {
+    launch_convert({shape_.width_px, shape_.height_px, m.rgb.get(), m.i420.get(),
+                    m.i420.get() + pixels, m.i420.get() + pixels + pixels / 4},
+                   stream);
+    check(cudaMemcpyAsync(m.host_image.get(), m.i420.get(), pixels + pixels / 2,
+                          cudaMemcpyDeviceToHost, stream),
+          "image copy");
+  } else if (settings_.space == MemorySpace::host) {
+    check(cudaMemcpyAsync(m.host_image.get(), m.rgb.get(), 3 * sizeof(float) * pixels,
+                          cudaMemcpyDeviceToHost, stream),
+          "image copy");
+  }
+  check(cudaMemcpyAsync(m.host_counts.get(), m.counts.get(), sizeof(FrameCounts),
+                        cudaMemcpyDeviceToHost, stream),
+        "counts");
+  mark(Stage::convert);
+  check(cudaStreamSynchronize(stream), "frame");
+}
+
+FrameView CudaView::finished(const FramePlan& plan) {
+  const FrameCounts& counts = *memory_.host_counts.get();
+  FrameView frame;
+  frame.format = settings_.format;
+  frame.size_px = {shape_.width_px, shape_.height_px};
+  const std::size_t width = static_cast<std::size_t>(shape_.width_px);
+  if (settings_.format == PixelFormat::i420) {
+    std::byte* luma = memory_.host_image.get();
+    std::byte* cb = luma + width * shape_.height_px;
+    std::byte* cr = cb + width * shape_.height_px / 4;
+    frame.space = MemorySpace::host;
+    frame.planes = {Plane{luma, width}, Plane{cb, width / 2}, Plane{cr, width / 2}};
+  } else {
+    frame.space = settings_.space;
+    std::byte* rgb = settings_.space == MemorySpace::host
+                         ? memory_.host_image.get()
+                         : reinterpret_cast<std::byte*>(memory_.rgb.get());
+    frame.planes = {Plane{rgb, 3 * sizeof(float) * width}, Plane{}, Plane{}};
+  }
+  FrameStats& stats = frame.stats;
+  stats.kind = plan.kind;
+  stats.window = plan.window;
+  stats.visible = counts.visible;
+  stats.list_entries = std::min(counts.list_entries, shape_.list_bound);
+  stats.overflowed_entries = counts.list_entries - stats.list_entries;
+  stats.list_max = counts.list_max;
+  for (const std::uint32_t queued : counts.queued) stats.tasks += queued;
+  stats.blended_pairs = counts.blended_pairs;
+  if (plan.kind == FrameKind::key)
+    stats.displacement_px = std::bit_cast<float>(counts.displacement);
+  stats.nearest_depth = counts.nearness == 0 ? std::numeric_limits<float>::infinity()
+                                             : std::bit_cast<float>(~counts.nearness);
+  nearest_depth_ = stats.nearest_depth;
+  cudaEvent_t before = start_.get();
+  for (std::size_t i = 0; i < stage_count; ++i) {
+    check(cudaEventElapsedTime(&stats.stage_ms[i], before, after_[i].get()), "stage time");
+    before = after_[i].get();
+  }
+  return frame;
+}
+
+}  // namespace catgs::cuda

@@ -1,0 +1,78 @@
+#pragma once
+
+#include "render_core/cuda/device_scene.cuh"
+#include "render_core/cuda/tiles.cuh"
+#include "render_core/math/sweep-inl.h"
+
+namespace catgs::cuda {
+
+/// A camera as kernels use it: view depth is evaluated in double by every core.
+struct CameraPair {
+  math::CameraModel<float> single;
+  math::CameraModel<double> precise;
+};
+
+inline CameraPair make_camera_pair(const Camera& camera) {
+  const auto precise = math::make_camera_model(camera);
+  return {math::convert<float>(precise), precise};
+}
+
+/// The camera of a frame, and where its window ends (the same, when it has none).
+struct FrameCameras {
+  CameraPair now;
+  math::CameraModel<float> end;
+};
+
+/// Logarithm of an opacity that reaches nothing.
+constexpr float never = -1e30f;
+
+/// A Gaussian in the image plane, before its colour.
+struct Splat {
+  float2 centre_px = {0.0f, 0.0f};
+  math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
+  float log2_opacity = never;
+  float depth = 0.0f;
+  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, {}};
+  bool in_view = false;  // its box, or that of its path, meets the image
+};
+
+/// With `sweeps`, splats that are in view at some time of the window; else those that are now.
+template <bool sweeps>
+__device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera,
+                            const FrameShape& shape, std::uint32_t i, const float4& mean_opacity) {
+  Splat out;
+  const math::CameraModel<float>& now = camera.now.single;
+  const math::Vec3<float> mean{mean_opacity.x, mean_opacity.y, mean_opacity.z};
+  out.depth = static_cast<float>(math::view_depth(camera.now.precise, math::convert<double>(mean)));
+  const float reach = math::reach_of(mean_opacity.w);
+  const bool in_front = out.depth > now.near_z;
+  const bool candidate = in_front || (sweeps && math::view_depth(camera.end, mean) > now.near_z);
+  if (!candidate || reach < 0.0f) return out;
+
+  const float4 a = __ldg(&scene.factor_a[i]);
+  const float2 b = __ldg(&scene.factor_b[i]);
+  const math::CovarianceFactor<float> factor{a.x, a.y, a.z, a.w, b.x, b.y};
+  math::Sweep<float> s{};
+  if (sweeps) {
+    s = math::sweep(now, camera.end, mean, factor, out.depth);
+  } else {
+    s.shape = math::project(now, mean, factor, out.depth);
+  }
+  const math::Vec2<float> half =
+      sweeps ? math::half_extent(s.outline, reach) : math::half_extent(s.shape, reach);
+  const float step_x = 0.5f * s.displacement.x, step_y = 0.5f * s.displacement.y;
+  const float x = s.shape.centre_px.x + step_x, y = s.shape.centre_px.y + step_y;
+  const float wide = half.x + fabsf(step_x), high = half.y + fabsf(step_y);
+  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.width_px) ||
+      y - high > static_cast<float>(shape.height_px)) {
+    return out;
+  }
+  out.in_view = true;
+  out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
+  out.whitening = math::whitening(s.shape);
+  if (in_front) out.log2_opacity = mean_opacity.w;
+  out.path = {s.displacement.x, s.displacement.y, s.outline, mean_opacity.w, {}};
+  return out;
+}
+
+}  // namespace catgs::cuda

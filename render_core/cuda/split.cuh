@@ -1,0 +1,64 @@
+#pragma once
+
+#include "render_core/cuda/blend.cuh"
+
+namespace catgs::cuda {
+
+/// Cuts long tile lists into slices of about the mean length (paper 3.4, Algorithm 1): with l the
+/// mean, a tile longer than 2 l becomes ceil(length / l) tasks of equal length.
+///
+/// Length is not that of the list but of the part of it that will be looked at: what the tile's
+/// pixels needed in the View's last frame, and a margin. Most entries lie behind opaque surfaces,
+/// and slices of those would be work that an unsplit tile never does. A long rest is cut too, in
+/// slices that are drawn last: most find then that nothing shines through what lies before them.
+/// For the same reason all first slices are queued before all second ones, and so on.
+/// The mean is the last frame's too, so that nothing waits for this one's.
+struct SplitParams {
+  FrameShape shape;
+  const uint2* range;          // [tiles]
+  std::uint32_t* reach;        // [tiles], of the last frame (all ones: not known); zeroed here
+  BlendTask* tasks;            // [task_bound]
+  uint2* tile_tasks;           // [tiles], first task and how many
+  std::uint32_t* queue;        // [queue_bound], see FrameCounts
+  uint2* runs;                 // [run_bound], for the reorder stage; null: it does not follow
+  std::uint32_t run_shift;     // how much shorter a tile's first run is
+  float* slice_transmittance;  // [task_bound][parts_per_tile], set to 1
+  FrameCounts* counts;         // queued, runs, expected_entries and list_max are set
+  std::uint32_t task_bound;    // task_bound(shape); tiles that find no room for slices get none
+  std::uint32_t slice_length;  // l
+  bool split;                  // else every tile is one task
+};
+void launch_split(const SplitParams& params, cudaStream_t stream);
+
+/// A slice shorter than this is not worth its own pixels.
+constexpr std::uint32_t shortest_slice = 4 * warp_size;
+
+/// Room for tasks: twice what the paper's rule can ask for, and one a tile.
+inline std::uint32_t task_bound(const FrameShape& shape) { return 5 * shape.tiles(); }
+
+/// Room for the queue: a place a tile in all classes but the last.
+inline std::uint32_t queue_bound(const FrameShape& shape) {
+  return (queue_classes - 1) * shape.tiles() + task_bound(shape);
+}
+
+/// List entries that one warp of the reorder stage takes; the last run of a tile may be shorter.
+constexpr std::uint32_t reorder_run = 512;
+inline std::uint32_t run_bound(const FrameShape& shape) {
+  return 2 * shape.tiles() + shape.list_bound / reorder_run;
+}
+
+/// Folds the slices of split tiles front to back:
+/// C = sum_i C_i prod_{m < i} T_m. Slices behind transmittance_min are not looked at.
+struct CompositeParams {
+  FrameShape shape;
+  const BlendTask* tasks;
+  const uint2* tile_tasks;
+  const float4* slice_pixels;
+  const std::uint32_t* consumed;
+  float3 background;
+  float* rgb;
+  std::uint32_t* reach;  // of split tiles is set
+};
+void launch_composite(const CompositeParams& params, cudaStream_t stream);
+
+}  // namespace catgs::cuda

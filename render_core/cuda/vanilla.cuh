@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+
+#include "render_core/cuda/device_buffer.h"
+#include "render_core/cuda/splat.cuh"
+#include "render_core/renderer.h"
+
+namespace catgs::cuda {
+
+/// The original 3DGS on the same records, as the baseline that speed-ups are measured against:
+/// every Gaussian is tested every frame, a box of three standard deviations decides its tiles, all
+/// (tile | depth) keys of 64 bits are sorted, and a block blends a tile, all splats by all pixels.
+class VanillaPipeline {
+ public:
+  struct Frame {
+    const SceneArrays* scene;
+    CameraPair camera;
+    FrameShape shape;
+    float3 background;
+    float* rgb;           // [height][width][3]
+    FrameCounts* counts;  // visible, list_entries and list_max are set; blended_pairs when counted
+    bool count_pairs;
+  };
+
+  /// Enqueues a frame; `mark` is called after each stage. Throws CudaError.
+  void draw(const Frame& frame, const std::function<void(Stage)>& mark, cudaStream_t stream);
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  // Slot = scene index.
+  DeviceBuffer<SplatRecord> records_;
+  DeviceBuffer<float> depth_;
+  DeviceBuffer<ushort4> box_;                      // tiles [x, z) x [y, w)
+  DeviceBuffer<std::uint32_t> tile_count_, last_;  // `last_`: inclusive sums
+  DeviceBuffer<std::uint64_t> key_[2];             // [list_bound]; all ones in the padding
+  DeviceBuffer<std::uint32_t> slot_[2];            // [list_bound]
+  DeviceBuffer<uint2> range_;                      // [tiles]
+  DeviceBuffer<std::byte> scratch_;
+};
+
+}  // namespace catgs::cuda
