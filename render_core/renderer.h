@@ -119,6 +119,10 @@ class View {
   /// may change from frame to frame (i420 needs even sides). On failure `frame` is untouched.
   virtual RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept = 0;
 
+  /// Entries in the list of each tile of the last frame, row by row; nothing where
+  /// the core does not tell. For analysis, not for every frame: it may wait for the device.
+  [[nodiscard]] virtual std::vector<std::uint32_t> tile_loads() const { return {}; }
+
   /// Memory of this View (caches, lists, image) where its core renders, without the scene.
   [[nodiscard]] virtual std::size_t memory_bytes() const = 0;
 };

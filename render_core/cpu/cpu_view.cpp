@@ -204,6 +204,14 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
   return pairs;
 }
 
+std::vector<std::uint32_t> CpuView::tile_loads() const {
+  std::vector<std::uint32_t> loads(lists_.tiles());
+  for (std::size_t tile = 0; tile < loads.size(); ++tile) {
+    loads[tile] = static_cast<std::uint32_t>(lists_.list(tile).size());
+  }
+  return loads;
+}
+
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   return image_.memory_bytes() + lists_.memory_bytes() + bytes(clusters_) + bytes(members_) +

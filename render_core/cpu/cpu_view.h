@@ -28,6 +28,7 @@ class CpuView final : public View {
   CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings);
 
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override;
+  std::vector<std::uint32_t> tile_loads() const override;
   std::size_t memory_bytes() const override;
 
  private:

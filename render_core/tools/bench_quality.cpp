@@ -149,6 +149,18 @@ void QualityTally::add(const ImageQuality& quality, std::size_t frame) {
   block_0_1_percent_psnr_ = std::min(block_0_1_percent_psnr_, quality.block_0_1_percent_psnr());
 }
 
+void QualityTally::add(const QualityTally& other) {
+  if (other.frames_ == 0) return;
+  if (frames_ == 0 || other.max_error_ > max_error_) worst_frame_ = other.worst_frame_;
+  frames_ += other.frames_;
+  error_sum_ += other.error_sum_;
+  max_error_ = std::max(max_error_, other.max_error_);
+  ssim_sum_ += other.ssim_sum_;
+  min_ssim_ = std::min(min_ssim_, other.min_ssim_);
+  worst_block_psnr_ = std::min(worst_block_psnr_, other.worst_block_psnr_);
+  block_0_1_percent_psnr_ = std::min(block_0_1_percent_psnr_, other.block_0_1_percent_psnr_);
+}
+
 double QualityTally::mean_psnr() const {
   return psnr_db(error_sum_ / static_cast<double>(std::max<std::size_t>(frames_, 1)));
 }

@@ -13,6 +13,8 @@ class QualityTally {
  public:
   /// `frame` is its number in the path.
   void add(const ImageQuality& quality, std::size_t frame);
+  /// All frames of another set; the worst frame keeps the number that it has there.
+  void add(const QualityTally& other);
 
   [[nodiscard]] std::size_t frames() const { return frames_; }
   [[nodiscard]] double mean_psnr() const;

@@ -35,6 +35,7 @@ void add_compare_command(CLI::App& app);
 void add_convert_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
 void add_info_command(CLI::App& app);
+void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 

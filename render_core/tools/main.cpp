@@ -29,6 +29,7 @@ int run(int argc, char** argv) {
   add_convert_command(app);
   add_frames_command(app);
   add_info_command(app);
+  add_paper_command(app);
   add_synth_command(app);
   add_trace_command(app);
 

@@ -37,12 +37,20 @@ void refuse_without_caches(const PipelineOptions& options) {
 }  // namespace
 
 void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
-  const SpeculationSettings defaults;
   command
       .add_option("--pipeline", options.pipeline,
                   "exact, vanilla (the original 3DGS) or catgs (key frames and sub-frames)")
       ->capture_default_str();
-  auto* window = command.add_option(
+  add_speculation_options(command, options);
+  command
+      .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
+      ->excludes(command.get_option("--window"));
+  command.add_flag("--no-split", options.no_split, "CUDA: one block blends a tile, however long");
+}
+
+void add_speculation_options(CLI::App& command, PipelineOptions& options) {
+  const SpeculationSettings defaults;
+  command.add_option(
       "--window", options.window,
       fmt::format("catgs: sub-frames behind a key frame while motion is small; 0: none ({})",
                   defaults.initial_window));
@@ -57,10 +65,6 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
   command.add_option(
       "--order", options.order,
       "catgs: sub-frames blend by fresh depths or by those of the key frame (fresh)");
-  command
-      .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
-      ->excludes(window);
-  command.add_flag("--no-split", options.no_split, "CUDA: one block blends a tile, however long");
 }
 
 ViewSettings view_settings(const PipelineOptions& options) {

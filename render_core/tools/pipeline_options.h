@@ -24,6 +24,8 @@ struct PipelineOptions {
 
 /// The options belong to the caller and must outlive the command's callback.
 void add_pipeline_options(CLI::App& command, PipelineOptions& options);
+/// Those of them that adjust the catgs pipeline without taking a part away.
+void add_speculation_options(CLI::App& command, PipelineOptions& options);
 
 /// Pipeline, speculation, order and task splitting of the options; the rest as by default. Throws
 /// InputError for an unknown name, a value out of range, an option that the pipeline has not.

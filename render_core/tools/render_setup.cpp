@@ -15,14 +15,6 @@
 namespace catgs {
 namespace {
 
-RendererKind parse_renderer(std::string_view name) {
-  return parse_name<RendererKind>("--renderer", name,
-                                  {{"auto", RendererKind::automatic},
-                                   {"cpu", RendererKind::cpu},
-                                   {"cuda", RendererKind::cuda},
-                                   {"reference", RendererKind::reference}});
-}
-
 template <typename T>
 bool parse_whole(std::string_view text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -60,6 +52,11 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   trace->excludes(script);
   command.add_flag("--anchor", options.anchor, "Move the trace to the scene's start pose")
       ->needs(trace);
+  add_frame_options(command, options);
+  add_pipeline_options(command, options.pipeline);
+}
+
+void add_frame_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--seed", options.script.seed, "Of the script")->capture_default_str();
   command.add_option("--duration", options.script.duration_s, "Of the script, seconds")
       ->capture_default_str();
@@ -69,7 +66,6 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   add_lens_options(command, options.lens);
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
       ->capture_default_str();
-  add_pipeline_options(command, options.pipeline);
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
   command.add_option("--threads", options.threads, "0: one per core")
@@ -85,12 +81,25 @@ FrameRequest RenderSetup::request(std::size_t i) const {
 }
 
 RenderSetup prepare(const RenderOptions& options, bool quiet) {
+  RenderSetup setup = prepare_scene(options, quiet);
+  set_path(setup, options);
+  return setup;
+}
+
+RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
   const RendererKind kind = parse_renderer(options.renderer);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
   setup.scene = load(options.scene, options.threads, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
+  setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
+  setup.pool = std::make_shared<ThreadPool>(options.threads);
+  setup.made = make_renderer(setup.cloud, {.kind = kind, .pool = setup.pool, .simd = options.simd});
+  return setup;
+}
+
+void set_path(RenderSetup& setup, const RenderOptions& options) {
   setup.samples = make_samples(options, setup.scene.hints);
   const bool resampled = options.fps && !options.trace.empty();
   const Trajectory path = resampled ? resample(setup.samples, *options.fps) : setup.samples;
@@ -99,10 +108,14 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
   setup.poses.assign(path.begin() + static_cast<std::ptrdiff_t>(range.begin),
                      path.begin() + static_cast<std::ptrdiff_t>(range.end));
   setup.fps = options.fps.value_or(mean_rate_hz(path));
-  setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
-  setup.pool = std::make_shared<ThreadPool>(options.threads);
-  setup.made = make_renderer(setup.cloud, {.kind = kind, .pool = setup.pool, .simd = options.simd});
-  return setup;
+}
+
+RendererKind parse_renderer(std::string_view name) {
+  return parse_name<RendererKind>("--renderer", name,
+                                  {{"auto", RendererKind::automatic},
+                                   {"cpu", RendererKind::cpu},
+                                   {"cuda", RendererKind::cuda},
+                                   {"reference", RendererKind::reference}});
 }
 
 FrameRange parse_frame_range(std::string_view text, std::size_t count) {

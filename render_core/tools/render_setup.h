@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
@@ -15,7 +16,7 @@
 
 namespace catgs {
 
-/// What `frames` and `bench` have in common: a scene, a camera path and a renderer.
+/// What `frames`, `bench` and `paper` have in common: a scene, a camera path and a renderer.
 struct RenderOptions {
   SceneOptions scene;
   std::string trace;
@@ -32,6 +33,8 @@ struct RenderOptions {
 
 /// The options belong to the caller and must outlive the command's callback.
 void add_render_options(CLI::App& command, RenderOptions& options);
+/// Those of them that name neither scene nor path nor pipeline.
+void add_frame_options(CLI::App& command, RenderOptions& options);
 
 /// The options, loaded and checked.
 struct RenderSetup {
@@ -52,6 +55,12 @@ struct RenderSetup {
 
 /// Loads scene and path, makes the renderer. Throws InputError.
 RenderSetup prepare(const RenderOptions& options, bool quiet);
+/// The same in two steps, for several paths through one scene.
+RenderSetup prepare_scene(const RenderOptions& options, bool quiet);
+void set_path(RenderSetup& setup, const RenderOptions& options);
+
+/// The value of --renderer. Throws InputError.
+RendererKind parse_renderer(std::string_view name);
 
 /// "A:B" -> frames A to B - 1 of `count`; either may be left out; "" is all. Throws InputError when
 /// nothing is left.

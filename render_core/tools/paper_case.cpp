@@ -1,0 +1,194 @@
+#include "render_core/tools/paper_case.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+#include "render_core/scene/prune.h"
+#include "render_core/tools/progress.h"
+
+namespace catgs {
+namespace {
+
+bool is_script(std::string_view trace) {
+  constexpr std::array<std::string_view, 5> scripts = {"orbit", "walk", "head", "drone", "still"};
+  return trace.starts_with("tour:") || std::ranges::find(scripts, trace) != scripts.end();
+}
+
+/// The render options of one trace of a case.
+RenderOptions with_trace(RenderOptions options, const std::string& trace) {
+  (is_script(trace) ? options.script.script : options.trace) = trace;
+  return options;
+}
+
+std::string stem(const std::string& file) {
+  const std::filesystem::path path(file);
+  return (path.has_filename() ? path : path.parent_path()).stem().string();
+}
+
+RenderSetup load_case(const PaperOptions& options, std::size_t index, bool quiet) {
+  RenderOptions render = options.render;
+  render.scene.path = options.cases[index].front();
+  render.pipeline.pipeline = pipeline_name(Pipeline::catgs);
+  return prepare_scene(render, quiet);
+}
+
+}  // namespace
+
+std::string_view variant_name(Variant variant) {
+  switch (variant) {
+    case Variant::vanilla:
+      return "3DGS";
+    case Variant::exact:
+      return "Exact";
+    case Variant::ours:
+      return "Ours";
+    case Variant::without_cache:
+      return "Ours-w/o cache";
+    case Variant::without_split:
+      break;
+  }
+  return "Ours-w/o split";
+}
+
+PaperCase::PaperCase(const PaperOptions& options, std::size_t index, std::string label, bool quiet)
+    : options_(&options),
+      index_(index),
+      label_(std::move(label)),
+      quiet_(quiet),
+      setup_(load_case(options, index, quiet)) {}
+
+PaperCase::PaperCase(const PaperCase& whole, RenderSetup setup)
+    : options_(whole.options_),
+      index_(whole.index_),
+      label_(whole.label_),
+      quiet_(whole.quiet_),
+      setup_(std::move(setup)) {}
+
+PaperCase PaperCase::pruned(double keep_fraction) const {
+  GaussianCloud cloud = *setup_.cloud;
+  keep_most_important(cloud, keep_fraction);
+  RenderSetup setup;
+  setup.scene = setup_.scene;  // the hints are those of the whole scene, so the paths stay
+  setup.cloud = std::make_shared<const GaussianCloud>(std::move(cloud));
+  setup.pool = setup_.pool;
+  setup.view = setup_.view;
+  setup.camera = setup_.camera;
+  setup.made = make_renderer(setup.cloud, {.kind = parse_renderer(options_->render.renderer),
+                                           .pool = setup.pool,
+                                           .simd = options_->render.simd});
+  return {*this, std::move(setup)};
+}
+
+std::string PaperCase::images() const {
+  return options_->images.empty() ? std::string() : options_->images[index_];
+}
+
+ViewSettings PaperCase::settings(Variant variant) const {
+  ViewSettings settings = setup_.view;
+  if (variant == Variant::vanilla) settings.pipeline = Pipeline::vanilla;
+  if (variant == Variant::exact) settings.pipeline = Pipeline::exact;
+  if (variant == Variant::without_cache) settings.speculation.initial_window = 0;
+  if (variant == Variant::without_split) settings.split_tasks = false;
+  return settings;
+}
+
+const std::vector<Measurement>& PaperCase::runs(Variant variant) {
+  auto known = runs_.find(variant);
+  if (known == runs_.end()) {
+    known = runs_.emplace(variant, runs(settings(variant), variant_name(variant))).first;
+  }
+  return known->second;
+}
+
+std::vector<Measurement> PaperCase::runs(const ViewSettings& settings, std::string_view name) {
+  std::vector<Measurement> runs;
+  try {
+    for_each_trace(name, [&](std::size_t, const ProgressReport& report) {
+      runs.push_back(measure(setup_, settings, options_->warmup, report));
+    });
+  } catch (const InputError& error) {
+    throw InputError(label_, fmt::format("{} ({})", name, pipeline_name(settings.pipeline)),
+                     error.what());
+  }
+  return runs;
+}
+
+void PaperCase::for_each_trace(std::string_view doing, const Visit& visit) {
+  const std::vector<std::string>& files = options_->cases[index_];
+  if (files.size() < 2) {
+    throw InputError("--case", label_, "has no trace", "name one or more behind the scene");
+  }
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    set_path(setup_, with_trace(options_->render, files[i]));
+    Progress progress(fmt::format("{}: {}, {}", label_, doing, stem(files[i])), quiet_);
+    visit(i - 1, [&](double fraction) { progress.update(fraction); });
+  }
+}
+
+void PaperCase::follow(Trajectory samples, Trajectory poses, double fps) {
+  setup_.samples = std::move(samples);
+  setup_.poses = std::move(poses);
+  setup_.first = 0;
+  setup_.fps = fps;
+}
+
+Measurement pooled(const std::vector<Measurement>& runs) {
+  Measurement all;
+  for (const Measurement& run : runs) {
+    all.frames.insert(all.frames.end(), run.frames.begin(), run.frames.end());
+    all.wall_ms += run.wall_ms;
+    all.view_bytes = std::max(all.view_bytes, run.view_bytes);
+  }
+  return all;
+}
+
+std::vector<std::string> case_labels(const std::vector<std::vector<std::string>>& cases) {
+  std::vector<std::string> scenes, labels;
+  for (const auto& files : cases) scenes.push_back(stem(files.front()));
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    std::string label = scenes[i];
+    if (std::ranges::count(scenes, label) > 1) {
+      for (std::size_t k = 1; k < cases[i].size(); ++k) label.append(" ").append(stem(cases[i][k]));
+    }
+    const std::string unnumbered = label;
+    for (int n = 2; std::ranges::find(labels, label) != labels.end(); ++n) {
+      label = fmt::format("{} ({})", unnumbered, n);
+    }
+    labels.push_back(std::move(label));
+  }
+  return labels;
+}
+
+void check(const PaperOptions& options) {
+  const auto require = [](const std::string& path) {
+    if (std::error_code error; !std::filesystem::exists(path, error)) {
+      throw InputError(path, "", "does not exist",
+                       "a scene, then its traces, then the next --case");
+    }
+  };
+  for (const auto& files : options.cases) {
+    for (const std::string& file : files) {
+      if (&file == &files.front() || !is_script(file)) require(file);
+    }
+  }
+  if (!options.images.empty() && options.images.size() != options.cases.size()) {
+    throw InputError(
+        "--images", "",
+        fmt::format("{} folders for {} scenes", options.images.size(), options.cases.size()),
+        "name one for each --case, in their order");
+  }
+  for (const std::string& folder : options.images) require(folder);
+  for (const double fraction : options.keep_fractions) {
+    if (!(fraction > 0.0 && fraction <= 1.0)) {
+      throw InputError("--keep-fraction", "", fmt::format("{} is not in (0, 1]", fraction));
+    }
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,183 @@
+// catgs-render paper: the tables and figures of the paper, for any scenes and traces.
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "render_core/build_info.h"
+#include "render_core/error.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/json_report.h"
+#include "render_core/tools/paper_tables.h"
+#include "render_core/tools/scene_hash.h"
+
+namespace catgs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct PaperCommand {
+  PaperOptions options;
+  std::vector<std::string> tables;
+  std::string baseline;
+  std::string json;
+};
+
+std::vector<PaperTable> side_by_side(std::vector<PaperTable> of_scenes) {
+  return {joined(of_scenes)};
+}
+
+std::vector<PaperTable> one_each(std::vector<PaperTable> of_scenes) { return of_scenes; }
+
+std::vector<PaperTable> mean_first(std::vector<PaperTable> of_scenes) {
+  if (of_scenes.size() > 1) of_scenes.insert(of_scenes.begin(), averaged(of_scenes));
+  return of_scenes;
+}
+
+std::vector<const PaperTableKind*> chosen_kinds(const std::vector<std::string>& names) {
+  std::vector<const PaperTableKind*> kinds;
+  for (const PaperTableKind& kind : paper_table_kinds()) {
+    const bool all = std::ranges::find(names, "all") != names.end();
+    if (all || std::ranges::find(names, kind.name) != names.end()) kinds.push_back(&kind);
+  }
+  return kinds;
+}
+
+Json read_baseline(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw InputError(path, "", "cannot be read");
+  try {
+    return Json::parse(file);
+  } catch (const Json::parse_error& error) {
+    throw InputError(path, fmt::format("byte {}", error.byte), "is not JSON");
+  }
+}
+
+Json case_json(const PaperCase& scene, const std::vector<std::string>& files) {
+  const RenderSetup& setup = scene.setup();
+  return {{"name", scene.label()},
+          {"scene", setup.scene.name},
+          {"gaussians", setup.cloud->size()},
+          {"sh_degree", setup.cloud->sh_degree},
+          {"hash", fmt::format("{:016x}", scene_hash(*setup.cloud))},
+          {"traces", std::vector<std::string>(files.begin() + 1, files.end())},
+          {"device", setup.made.renderer->description()},
+          {"near", setup.camera.near_z}};
+}
+
+Json settings_json(const PaperCase& scene) {
+  const RenderSetup& setup = scene.setup();
+  const SpeculationSettings& speculation = setup.view.speculation;
+  return {{"size_px", {setup.camera.size_px.x, setup.camera.size_px.y}},
+          {"focal_px", setup.camera.focal_px.x},
+          {"window", speculation.initial_window},
+          {"max_trail_px", speculation.max_trail_px},
+          {"min_depth", speculation.min_depth},
+          {"max_deviation_px", speculation.max_deviation_px},
+          {"order", setup.view.order == BlendOrder::fresh ? "fresh" : "key"},
+          {"warmup", scene.options().warmup},
+          {"every", scene.options().every}};
+}
+
+void paper(const PaperCommand& command, bool quiet) {
+  const PaperOptions& options = command.options;
+  check(options);
+  const auto kinds = chosen_kinds(command.tables);
+  const Json baseline = command.baseline.empty() ? Json() : read_baseline(command.baseline);
+  const std::vector<std::string> labels = case_labels(options.cases);
+  Json report = {{"version", build_version}, {"commit", build_commit}, {"cases", Json::array()}};
+  std::vector<std::vector<PaperTable>> parts(kinds.size());  // [kind][case]
+  for (std::size_t i = 0; i < options.cases.size(); ++i) {
+    PaperCase scene(options, i, labels[i], quiet);
+    if (!quiet) {
+      fmt::print(stderr, "{}: {} ({})\n", scene.label(), scene.setup().made.renderer->description(),
+                 scene.setup().made.reason);
+    }
+    report["cases"].push_back(case_json(scene, options.cases[i]));
+    report["settings"] = settings_json(scene);
+    for (std::size_t k = 0; k < kinds.size(); ++k) {
+      parts[k].push_back(kinds[k]->measure(scene));
+    }
+  }
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    const PaperTableKind& kind = *kinds[k];
+    std::vector<PaperTable> tables = kind.combine(std::move(parts[k]));
+    if (!baseline.is_null() && kind.name == "fps") {
+      add_rows(tables[0], fps_baseline_row, baseline, command.baseline);
+    }
+    if (command.json != "-") fmt::print("{}## {}\n\n", k == 0 ? "" : "\n", kind.about);
+    Json& json = report["tables"][std::string(kind.name)] = Json::array();
+    for (std::size_t t = 0; t < tables.size(); ++t) {
+      if (command.json != "-") fmt::print("{}{}", t == 0 ? "" : "\n", markdown(tables[t]));
+      json.push_back(to_json(tables[t]));
+    }
+  }
+  if (!command.json.empty()) write_json(command.json, report);
+}
+
+}  // namespace
+
+std::span<const PaperTableKind> paper_table_kinds() {
+  static constexpr std::array<PaperTableKind, 8> kinds = {
+      {{"fps", "Average frame rate", fps_table, side_by_side},
+       {"quality", "Render quality", quality_table, side_by_side},
+       {"ablation", "Impact of the major mechanisms", ablation_table, side_by_side},
+       {"stages", "Acceleration of the stages over 3DGS", stages_table, mean_first},
+       {"list", "Length of the tile lists", list_table, side_by_side},
+       {"window", "Impact of the window", window_table, one_each},
+       {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side},
+       {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side}}};
+  return kinds;
+}
+
+void add_paper_command(CLI::App& app) {
+  auto command = std::make_shared<PaperCommand>();
+  PaperOptions& options = command->options;
+  CLI::App* paper_app = app.add_subcommand(
+      "paper", "Prints the tables of the paper, as Markdown, for any scenes and traces");
+  std::vector<std::string> names;
+  for (const PaperTableKind& kind : paper_table_kinds()) names.emplace_back(kind.name);
+  names.emplace_back("all");
+  paper_app->add_option("--table", command->tables, "One or more, separated by commas")
+      ->required()
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(names));
+  paper_app
+      ->add_option("--case", options.cases,
+                   "A scene and behind it its traces: TUM files or scripts (orbit, walk, head, "
+                   "drone, still, tour:FILE). Repeated, it adds a column for each scene")
+      ->required()
+      ->type_name("SCENE TRACE...");
+  paper_app->add_option("--images", options.images,
+                        "quality: a COLMAP folder per case; compares with its photographs (PNG)");
+  paper_app
+      ->add_option("--image-rate", options.image_rate_hz,
+                   "Photographs per second of the video that they are from")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  paper_app->add_option("--baseline", command->baseline,
+                        "fps: rows measured elsewhere, JSON {\"FlashGS\": {\"city\": 120.5}}");
+  paper_app
+      ->add_option("--keep-fraction", options.keep_fractions,
+                   "pruned: shares of the Gaussians (1,0.5,0.25)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  paper_app->add_flag("--anchor", options.render.anchor,
+                      "Move the traces to the start pose of their scene");
+  add_frame_options(*paper_app, options.render);
+  add_speculation_options(*paper_app, options.render.pipeline);
+  paper_app->add_option("--warmup", options.warmup, "Frames rendered before measuring")
+      ->capture_default_str();
+  paper_app
+      ->add_option("--every", options.every, "quality, tiles: look at one frame in N of a trace")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  paper_app->add_option("--json", command->json,
+                        "Write the tables here too; - prints JSON instead");
+  paper_app->callback([command, paper_app] { paper(*command, is_quiet(*paper_app)); });
+}
+
+}  // namespace catgs
