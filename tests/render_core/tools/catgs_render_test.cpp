@@ -1,7 +1,6 @@
 // Runs the program itself: exit codes, messages, files.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -11,36 +10,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sys/wait.h>
 
 #include "render_core/image/png.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/save_scene.h"
+#include "tests/render_core/tools/run_catgs_render.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
 
+using test::Outcome;
+using test::run;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-struct Outcome {
-  int exit_code = -1;
-  std::string out;  // stdout and stderr together
-};
-
-Outcome run(const std::string& arguments) {
-  Outcome outcome;
-  FILE* pipe = popen(fmt::format("{} {} 2>&1", CATGS_RENDER, arguments).c_str(), "r");
-  if (pipe == nullptr) return outcome;
-  char buffer[4096];
-  for (std::size_t n = 0; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
-    outcome.out.append(buffer, n);
-  }
-  outcome.exit_code = WEXITSTATUS(pclose(pipe));
-  return outcome;
-}
 
 /// A ball of opaque Gaussians around the origin, seen from outside.
 GaussianCloud ball() {
