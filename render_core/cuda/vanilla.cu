@@ -181,6 +181,7 @@ void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mar
 
   if (count > 0) sum_tile_counts(count, tile_count_.get(), last_.get(), scratch, stream);
   check(cudaMemsetAsync(key_[0].get(), 0xff, bound * sizeof(std::uint64_t), stream), "padding");
+  check(cudaMemsetAsync(slot_[0].get(), 0, bound * sizeof(std::uint32_t), stream), "padding");
   emit_kernel<<<blocks, block_size, 0, stream>>>({count, f.shape, last_.get(), depth_.get(),
                                                   box_.get(), key_[0].get(), slot_[0].get(),
                                                   f.counts});

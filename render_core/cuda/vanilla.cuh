@@ -25,6 +25,8 @@ class VanillaPipeline {
 
   /// Enqueues a frame; `mark` is called after each stage. Throws CudaError.
   void draw(const Frame& frame, const std::function<void(Stage)>& mark, cudaStream_t stream);
+  /// [tiles], device memory: {first, one past last} list entry of each tile of the last frame.
+  [[nodiscard]] const uint2* ranges() const { return range_.get(); }
   [[nodiscard]] std::size_t bytes() const;
 
  private:
