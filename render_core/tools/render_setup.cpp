@@ -91,7 +91,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   const RendererKind kind = parse_renderer(options.renderer);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
-  setup.scene = load(options.scene, options.threads, quiet);
+  setup.scene = load_scene(options.scene, options.threads, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
   setup.pool = std::make_shared<ThreadPool>(options.threads);

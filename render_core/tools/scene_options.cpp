@@ -33,7 +33,7 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
       ->excludes(lod);
 }
 
-Scene load(const SceneOptions& options, int threads, bool quiet) {
+Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
   Progress progress("loading", quiet);
   LoadOptions load;
   load.lod = options.lod;

@@ -21,7 +21,7 @@ struct SceneOptions {
 void add_scene_options(CLI::App& command, SceneOptions& options);
 
 /// Shows its progress on a terminal. Throws InputError.
-Scene load(const SceneOptions& options, int threads, bool quiet);
+Scene load_scene(const SceneOptions& options, int threads, bool quiet);
 
 /// A camera without a pose.
 struct LensOptions {

@@ -40,7 +40,7 @@ struct LoadedScene {
 
 LoadedScene load_for_trace(const TraceOptions& options, bool quiet) {
   (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
-  LoadedScene loaded{load(options.scene, 0, quiet), {}};
+  LoadedScene loaded{load_scene(options.scene, 0, quiet), {}};
   loaded.bounds = robust_bounds(loaded.scene.cloud).value_or(Bounds{});
   return loaded;
 }
@@ -87,7 +87,7 @@ void add_script(CLI::App& trace) {
   command->add_option("--fps", options->script.rate_hz, "Poses per second")->capture_default_str();
   command->add_option("--out", options->out, "TUM file to write")->required();
   command->callback([options, command] {
-    const Scene scene = load(options->scene, 0, is_quiet(*command));
+    const Scene scene = load_scene(options->scene, 0, is_quiet(*command));
     write_tum(options->out, make_script(options->script, scene.hints));
   });
 }
