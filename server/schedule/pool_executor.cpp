@@ -11,7 +11,7 @@ StreamOpened open_now(Stream& stream, StreamSettings settings) {
   try {
     if (!stream.view || stream.settings.renderer != settings.renderer) {
       stream.view.reset();  // its memory first: two views of a large scene may not fit
-      stream.view = settings.renderer->make_view({Pipeline::exact, PixelFormat::i420});
+      stream.view = settings.renderer->make_view({Pipeline::catgs, PixelFormat::i420});
     }
     if (!stream.encoder || stream.settings.encoder != settings.encoder ||
         stream.settings.encoding != settings.encoding)

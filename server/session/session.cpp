@@ -98,6 +98,7 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   }
   pose_ = sample;
   pose_received_ = now;
+  predictor_.add({sample.client_time_us, sample.world_from_camera});
 }
 
 void Session::on(const Ack& ack, TimePoint now) {
@@ -119,6 +120,7 @@ void Session::on(const SelectScene& select, TimePoint now) {
   welcome_due_ = true;
   // A pose in the old scene means nothing in the new one.
   pose_.reset();
+  predictor_ = MotionPredictor();
   request_stream();
 }
 
@@ -240,6 +242,8 @@ FrameOrder Session::start_frame(TimePoint now) {
   order.request.camera =
       make_camera(pose, config_.size_px, focal_from_fov_y(pose_->fov_y_rad, config_.size_px.y),
                   admission_.scene->facts.near_z);
+  order.request.forecast =
+      predictor_.forecast(pose_->client_time_us, real_fps, SpeculationSettings{}.initial_window);
   return order;
 }
 

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "render_core/motion/predictor.h"
 #include "server/net/connection.h"
 #include "server/net/messages.h"
 #include "server/schedule/frame_executor.h"
@@ -154,6 +155,7 @@ class Session {
   CreditWindow credit_;
   std::optional<PoseSample> pose_;  // newest
   TimePoint pose_received_{};
+  MotionPredictor predictor_;  // on the client's clock
   TimePoint last_motion_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
   int refinements_left_ = 0;
