@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Packs the programs with the shared libraries that they need into one archive, for machines that
+# have neither these libraries nor a way to install them (a GPU node, say).
+#
+#   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
+#
+# DIR is a finished build (default: build/run, else build/release, else build/cuda). The archive
+# holds bin/ (start the programs from here), lib/ and, if it was built, web/. The other machine needs
+# the same processor family, a glibc at least as new, and libstdc++; for CUDA its own driver.
+set -euo pipefail
+# shellcheck source=deploy/lib.sh
+source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
+
+usage() { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "${BASH_SOURCE[0]}"; }
+
+build='' out=''
+while (($#)); do
+  case $1 in
+    --build | --out)
+      (($# >= 2)) || fail "$EXIT_USAGE" "$1 needs a value." "See deploy/bundle.sh --help."
+      if [[ $1 == --build ]]; then build=$2; else out=$2; fi
+      shift 2
+      ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    *) fail "$EXIT_USAGE" "Unknown argument: $1" "See deploy/bundle.sh --help." ;;
+  esac
+done
+
+if [[ -z $build ]]; then
+  for candidate in run release cuda; do
+    [[ -x $SOURCE_DIR/build/$candidate/bin/catgs-server ]] && build=$SOURCE_DIR/build/$candidate && break
+  done
+fi
+[[ -n $build && -x $build/bin/catgs-server ]] ||
+  fail "$EXIT_USAGE" "No finished build${build:+ in $build}." "Run deploy/run.sh first, or name a build folder with --build."
+: "${out:=$SOURCE_DIR/build/catgs-bundle.tar.xz}"
+
+stage=$(mktemp -d)
+trap 'rm -rf -- "$stage"' EXIT
+root=$stage/catgs
+mkdir -p "$root/bin" "$root/lib" "$root/libexec"
+
+for program in catgs-server catgs-render catgs-load; do
+  [[ -x $build/bin/$program ]] || continue
+  install -s "$build/bin/$program" "$root/libexec/$program"
+  # The C and C++ run-time libraries stay the other machine's: they belong to its loader and driver.
+  while read -r library; do
+    cp -Lu -- "$library" "$root/lib/"
+  done < <(ldd "$build/bin/$program" |
+    awk '$2 == "=>" && $3 ~ /^\// && $1 !~ /^(libc|libm|libdl|librt|libpthread|libstdc\+\+|libgcc_s)\.so/ {print $3}')
+  cat >"$root/bin/$program" <<'WRAPPER'
+#!/bin/sh
+home=$(dirname -- "$(dirname -- "$(readlink -f -- "$0")")")
+LD_LIBRARY_PATH=$home/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} exec "$home/libexec/$(basename -- "$0")" "$@"
+WRAPPER
+  chmod +x "$root/bin/$program"
+done
+if [[ -f $build/web_client/dist/index.html ]]; then cp -r -- "$build/web_client/dist" "$root/web"; fi
+
+XZ_OPT=${XZ_OPT:--T0} tar -C "$stage" -cJf "$out" catgs
+printf '%s: %s, %d libraries\n' "$out" "$(du -h -- "$out" | cut -f1)" "$(find "$root/lib" -type f | wc -l)"
+printf 'On the other machine: tar -xJf %s && catgs/bin/catgs-server --scene SCENE\n' "$(basename -- "$out")"
