@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -289,7 +290,9 @@ asio::awaitable<void> Connection::decode_one(EncodedMessage& message) {
     decoder_ = std::make_unique<Decoder>(message.codec);
     decoder_codec_ = message.codec;
   }
-  // On the pool, so that decoding one session delays no other session's time stamps.
+  // On the pool, so that decoding one session delays no other session's time stamps. The end of the
+  // run does not cancel it: co_spawn would send the cancellation to the pool's thread, where the
+  // picture may be finished and all that it refers to gone.
   const Result result = co_await asio::co_spawn(
       asio::make_strand(context_.decoders),
       [&decoder = *decoder_, &message]() -> asio::awaitable<Result> {
@@ -301,7 +304,7 @@ asio::awaitable<void> Connection::decode_one(EncodedMessage& message) {
         decoded.size_px = picture.size_px;
         co_return decoded;
       },
-      use_awaitable);
+      asio::bind_cancellation_slot(asio::cancellation_slot(), use_awaitable));
   v1::Ack ack = message.ack;
   if (!result.status.ok || result.size_px != message.size_px) {
     ++report_.stats.decode_errors;
