@@ -241,14 +241,18 @@ nvcc_path=""
 cuda_choice=OFF
 cuda_note=""
 
-# Decides whether the CUDA parts are built, and says why in `cuda_note`.
-choose_cuda() {
+find_gpu_and_nvcc() {
   gpu_name=$(nvidia-smi --query-gpu=name --format=csv,noheader 2>/dev/null | head -n 1 || true)
   nvcc_path=$(command -v nvcc || true)
   local toolkit_nvcc=${CUDA_HOME:-/usr/local/cuda}/bin/nvcc
   if [[ -z $nvcc_path && -x $toolkit_nvcc ]]; then
     nvcc_path=$toolkit_nvcc
   fi
+}
+
+# Decides whether the CUDA parts are built, and says why in `cuda_note`.
+choose_cuda() {
+  find_gpu_and_nvcc
   if [[ -z $gpu_name ]]; then
     cuda_note="no NVIDIA GPU"
     if grep -qsx 0x10de /sys/bus/pci/devices/*/vendor; then

@@ -59,7 +59,17 @@ main() {
   detect_distribution
   steps_begin 4 "$log"
   ensure_packages "${build_packages[@]}" "${test_packages[@]}"
-  configure_build release
+  # Where nvcc is, the CUDA core must compile: for the GPU that is there, else for one generation.
+  # Its tests are skipped without a GPU.
+  find_gpu_and_nvcc
+  local -a cuda_options=(-DCATGS_CUDA=OFF)
+  if [[ -n $nvcc_path ]]; then
+    local generation=90
+    [[ -z $gpu_name ]] || generation=native
+    cuda_options=(-DCATGS_CUDA=ON "-DCMAKE_CUDA_COMPILER=$nvcc_path"
+      "-DCMAKE_CUDA_ARCHITECTURES=$generation")
+  fi
+  configure_build release "${cuda_options[@]}"
   build_all release "Build with tests"
   rm -f "$build_dir/tests.xml"
   step "Test" run_tests

@@ -20,6 +20,13 @@ def skip_reason(output: str) -> str:
     return match.group(1).strip() if match else "no reason given"
 
 
+def group_by_reason(skipped: list) -> dict:
+    groups = {}
+    for name, reason in skipped:
+        groups.setdefault(reason, []).append(name)
+    return groups
+
+
 def main() -> int:
     results, log = pathlib.Path(sys.argv[1]), sys.argv[2]
     if not results.is_file():
@@ -40,7 +47,9 @@ def main() -> int:
         print("\n".join(f"    {line}" for line in lines))
     if skipped:
         print(f"\nSkipped, {len(skipped)}:")
-        print("\n".join(f"    {name}: {reason}" for name, reason in skipped))
+        for reason, names in group_by_reason(skipped).items():
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            print(f"    {', '.join(names[:3])}{more}: {reason}")
     total = int(suite.get("tests"))
     print(f"\n{total - len(failed) - len(skipped)} tests passed, {len(failed)} failed, "
           f"{len(skipped)} skipped of {total} in {float(suite.get('time')):.0f} s. Log: {log}")

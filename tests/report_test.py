@@ -31,6 +31,12 @@ class Report(unittest.TestCase):
         self.assertIn("skips: no such device", result.stdout)
         self.assertIn("1 tests passed, 0 failed, 1 skipped of 2", result.stdout)
 
+    def test_many_skips_for_one_reason_are_one_line(self):
+        tests = "".join(SKIPPED.replace("skips", f"skips{i}") for i in range(5))
+        result = self.report(PASSING + tests)
+        self.assertIn("skips0, skips1, skips2 and 2 more: no such device", result.stdout)
+        self.assertIn("5 skipped of 6", result.stdout)
+
     def test_failures_show_their_output(self):
         result = self.report(PASSING + FAILING)
         self.assertEqual(result.returncode, 1)
