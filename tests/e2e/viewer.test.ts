@@ -250,7 +250,9 @@ describe('trouble', () => {
   });
 
   it('a page that is no secure context gets JPEG pictures and says how to get video', async () => {
-    const { page } = await open_viewer(undefined, server.url.replace('127.0.0.1', insecure_host));
+    // By a name of its own the server answers only when it was told that name.
+    const plain = await start_server(scene, ['--allow-origin', `http://${insecure_host}`]);
+    const { page } = await open_viewer(undefined, plain.url.replace('127.0.0.1', insecure_host));
     await page.getByText('browsers offer their video decoder (WebCodecs) on https://').waitFor();
     await choose_full_size(page);
     const picture = await settled_picture(page);
@@ -258,6 +260,7 @@ describe('trouble', () => {
     await page.getByRole('button', { name: 'Dismiss' }).click();
     await page.keyboard.press('KeyI');
     await page.locator('#stats-panel').getByText(/jpeg/).waitFor();
+    await plain.stop();
   });
 
   it('an unknown scene is said', async () => {
