@@ -138,7 +138,7 @@ FramePlan FrameGroups::plan(const Camera& now, const std::optional<Forecast>& fo
                             float nearest_depth) {
   const float min_depth = speculation_min_depth(settings_, now.near_z);
   const float depth = nearest_depth > min_depth ? nearest_depth : min_depth;
-  if (continues(now, depth)) {
+  if (forecast && continues(now, depth)) {
     ++drawn_;
     return {FrameKind::sub, window_, end_};
   }

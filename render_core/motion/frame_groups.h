@@ -75,7 +75,8 @@ class FrameGroups {
 
   /// Key or sub-frame? Counts the frame as drawn. `nearest_depth`: of visible Gaussians deeper than
   /// speculation_min_depth() in the last frame that the view finished; anything less, or NaN, means
-  /// that depth itself. Without a forecast a key frame gets no window.
+  /// that depth itself. Without a forecast the frame is a key
+  /// frame and gets no window.
   FramePlan plan(const Camera& now, const std::optional<Forecast>& forecast, float nearest_depth);
 
   /// The caches are gone (a failed frame): the next frame is a key frame.

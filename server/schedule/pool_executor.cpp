@@ -42,6 +42,8 @@ FrameResult run_now(FrameJob& job) {
       return result;
     }
     result.stats = stream.picture.stats;
+    ticket.speculated = result.stats.kind == FrameKind::sub;
+    ticket.window = static_cast<std::uint32_t>(result.stats.window);
   }
   ticket.render_end = Clock::now();
   EncodedFrame encoded;

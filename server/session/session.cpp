@@ -209,7 +209,7 @@ std::optional<FrameCandidate> Session::next_frame() const {
     return std::nullopt;
   TimePoint ready = next_start_;
   if (!picture_is_stale()) {
-    if (refinements_left_ == 0) return std::nullopt;
+    if (refinements_left_ == 0 && !shown_is_sub_frame_) return std::nullopt;
     // Between two poses of a moving camera a refinement would only be in the next one's way.
     ready = std::max(ready, last_motion_ + policy_.still_after);
   }
@@ -222,7 +222,9 @@ FrameOrder Session::start_frame(TimePoint now) {
   const int real_fps = measure_rate(now);
   rendering_ = true;
   FrameOrder order;
-  order.ticket.refined = !picture_is_stale();
+  const bool still = !picture_is_stale();
+  // What stays is a key frame: a sub-frame may lack a little at the edges of tiles.
+  order.ticket.refined = still && !shown_is_sub_frame_;
   order.force_idr = std::exchange(idr_due_, false);
   order.real_fps = real_fps;
   if (order.ticket.refined)
@@ -269,6 +271,7 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   }
   failures_ = 0;
   last_said_ = now;
+  if (!result.frame.ticket.refined) shown_is_sub_frame_ = result.frame.ticket.speculated;
   credit_.sent(result.frame.ticket.frame_id, now);
   const auto dropped = host_.send(std::move(result.frame));
   for (const std::uint64_t id : dropped) credit_.lost(id);

@@ -158,6 +158,7 @@ class Session {
   MotionPredictor predictor_;  // on the client's clock
   TimePoint last_motion_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
+  bool shown_is_sub_frame_ = false;
   int refinements_left_ = 0;
   bool rendering_ = false;
   bool idr_due_ = false;

@@ -181,7 +181,7 @@ TEST(FrameGroups, PlansTheCameraAtTheEndOfTheWindow) {
   EXPECT_NEAR(plan.window_end.world_from_camera.position.x, 0.01f, 1e-6f);
   EXPECT_NEAR(glm::degrees(glm::angle(plan.window_end.world_from_camera.orientation)), 0.5f, 1e-3f);
   EXPECT_EQ(plan.window_end.size_px, now.size_px);
-  const FramePlan sub = groups.plan(plan.window_end, std::nullopt, 10.0f);
+  const FramePlan sub = groups.plan(plan.window_end, forecast, 10.0f);
   EXPECT_EQ(sub.kind, FrameKind::sub);
   EXPECT_EQ(sub.window, 1);
 }
@@ -193,6 +193,15 @@ TEST(FrameGroups, WithoutForecastEveryFrameIsAKeyFrame) {
     EXPECT_EQ(plan.kind, FrameKind::key);
     EXPECT_EQ(plan.window, 0);
   }
+}
+
+TEST(FrameGroups, AFrameWithoutForecastEndsTheWindow) {
+  FrameGroups groups{{}};
+  const Forecast still{camera_at({}).world_from_camera, 4};
+  EXPECT_EQ(groups.plan(camera_at({}), still, 1.0f).window, 4);
+  EXPECT_EQ(groups.plan(camera_at({}), still, 1.0f).kind, FrameKind::sub);
+  EXPECT_EQ(groups.plan(camera_at({}), std::nullopt, 1.0f).kind, FrameKind::key);
+  EXPECT_EQ(groups.plan(camera_at({}), still, 1.0f).kind, FrameKind::key);
 }
 
 TEST(FrameGroups, NeverGoBeyondTheForecast) {

@@ -140,6 +140,25 @@ TEST_F(SessionTest, ForecastsFromPastPosesAlone) {
   EXPECT_FALSE(run_frame().request.forecast);  // elsewhere
 }
 
+TEST_F(SessionTest, APictureThatStaysIsAKeyFrame) {
+  greet();
+  pose(1, 0.0f);
+  FrameOrder order = session.start_frame(now);
+  order.ticket.speculated = true;  // the core drew a sub-frame
+  finish(order);
+  ack(order.ticket.frame_id);
+  EXPECT_FALSE(frame_is_due());  // the camera may still move
+  now += policy.still_after + 17ms;
+  ASSERT_TRUE(frame_is_due());
+  const FrameOrder again = run_frame();
+  EXPECT_FALSE(again.ticket.refined);
+  EXPECT_FALSE(again.request.forecast);  // hence a key frame
+  ack(again.ticket.frame_id);
+  now += 17ms;
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_TRUE(run_frame().ticket.refined);
+}
+
 TEST_F(SessionTest, WelcomesAfterItsStreamIsOpen) {
   greet();
   ASSERT_EQ(host.opened.size(), 1u);
