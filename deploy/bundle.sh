@@ -5,8 +5,9 @@
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
 # DIR is a finished build (default: build/run, else build/release, else build/cuda). The archive
-# holds bin/ (start the programs from here), lib/ and, if it was built, web/. The other machine needs
-# the same processor family, a glibc at least as new, and libstdc++; for CUDA its own driver.
+# holds bin/ (start the programs from here), lib/ and the web client, if it was built. The other
+# machine needs the same processor family, a glibc at least as new, and libstdc++; for CUDA its own
+# driver.
 set -euo pipefail
 # shellcheck source=deploy/lib.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
@@ -46,6 +47,8 @@ mkdir -p "$root/bin" "$root/lib" "$root/libexec"
 for program in catgs-server catgs-render catgs-load; do
   [[ -x $build/bin/$program ]] || continue
   install -s "$build/bin/$program" "$root/libexec/$program"
+  absent=$(ldd "$build/bin/$program" | grep 'not found' || true)
+  [[ -z $absent ]] || fail "$EXIT_FAILED" "$program lacks libraries here already:" "$absent"
   # The C and C++ run-time libraries stay the other machine's: they belong to its loader and driver.
   while read -r library; do
     cp -Lu -- "$library" "$root/lib/"
@@ -58,7 +61,10 @@ LD_LIBRARY_PATH=$home/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} exec "$home/libex
 WRAPPER
   chmod +x "$root/bin/$program"
 done
-if [[ -f $build/web_client/dist/index.html ]]; then cp -r -- "$build/web_client/dist" "$root/web"; fi
+if [[ -f $build/web_client/dist/index.html ]]; then
+  mkdir -p "$root/share/catgs"  # where the server looks, seen from its program
+  cp -r -- "$build/web_client/dist" "$root/share/catgs/web"
+fi
 
 XZ_OPT=${XZ_OPT:--T0} tar -C "$stage" -cJf "$out" catgs
 printf '%s: %s, %d libraries\n' "$out" "$(du -h -- "$out" | cut -f1)" "$(find "$root/lib" -type f | wc -l)"

@@ -258,6 +258,8 @@ choose_cuda() {
     if grep -qsx 0x10de /sys/bus/pci/devices/*/vendor; then
       cuda_note="an NVIDIA device without a working driver (nvidia-smi fails)"
     fi
+  elif [[ $(nvidia-smi --query-gpu=compute_cap --format=csv,noheader | head -n 1) == [1-7].* ]]; then
+    cuda_note="$gpu_name, which is older than the CUDA core asks for (compute capability 8.0)"
   elif [[ -z $nvcc_path ]]; then
     cuda_note="$gpu_name, but no nvcc"
   else

@@ -131,6 +131,8 @@ class Scripts(unittest.TestCase):
         self.assertEqual(self.run_library(choose).stdout, "OFF: NVIDIA Test 9000, but no nvcc\n")
         self.stand_in("nvcc", "exit 0")
         self.assertEqual(self.run_library(choose).stdout, "ON: NVIDIA Test 9000\n")
+        self.stand_in("nvidia-smi", 'case $1 in *compute_cap*) echo 7.5 ;; *) echo NVIDIA Old ;; esac')
+        self.assertTrue(self.run_library(choose).stdout.startswith("OFF: NVIDIA Old, which is older"))
 
     def test_a_failing_step_shows_the_end_of_its_own_output_and_the_log(self):
         log = self.folder / "log"
