@@ -45,7 +45,8 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
   command
       .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
       ->excludes(command.get_option("--window"));
-  command.add_flag("--no-split", options.no_split, "CUDA: a tile's list is never cut, however long");
+  command.add_flag("--no-split", options.no_split,
+                   "CUDA: a tile's list is never cut, however long");
 }
 
 void add_speculation_options(CLI::App& command, PipelineOptions& options) {

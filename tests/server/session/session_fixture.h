@@ -1,0 +1,112 @@
+#pragma once
+
+// A Session with a fake clock and a fake server around it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/session/session.h"
+
+namespace catgs::test {
+
+using namespace std::chrono_literals;
+
+struct FakeHost final : SessionHost {
+  std::variant<Admission, ErrorMessage> admission = Admission{};
+  std::vector<ServerMessage> said;
+  std::vector<OutgoingFrame> frames;
+  std::vector<StreamSettings> opened;
+  std::vector<std::uint64_t> drop_next;
+  std::optional<CloseCode> closed;
+
+  std::variant<Admission, ErrorMessage> admit(const Hello&) override { return admission; }
+  std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
+      const std::string& id) override {
+    auto scene = std::make_shared<SceneEntry>();
+    scene->facts.scene_id = id;
+    return scene;
+  }
+  std::vector<std::string> scene_ids() override { return {"a"}; }
+  std::uint32_t session_count() override { return 1; }
+  void send(const ServerMessage& message) override { said.push_back(message); }
+  std::vector<std::uint64_t> send(OutgoingFrame frame) override {
+    frames.push_back(std::move(frame));
+    return std::exchange(drop_next, {});
+  }
+  void close(CloseCode code, std::string_view) override { closed = code; }
+  void open_stream(StreamSettings settings) override { opened.push_back(std::move(settings)); }
+
+  template <typename T>
+  int count() const {
+    return static_cast<int>(std::ranges::count_if(
+        said, [](const ServerMessage& m) { return std::holds_alternative<T>(m); }));
+  }
+  const ErrorMessage& last_error() const {
+    for (auto it = said.rbegin(); it != said.rend(); ++it)
+      if (const auto* error = std::get_if<ErrorMessage>(&*it)) return *error;
+    throw std::logic_error("no error was said");
+  }
+};
+
+class SessionTest : public testing::Test {
+ protected:
+  SessionTest() {
+    auto scene = std::make_shared<SceneEntry>();
+    scene->facts.scene_id =
+        std::string("a");  // GCC 12 warns of overlap when "a" itself is assigned
+    scene->facts.near_z = 0.2f;
+    host.admission = Admission{scene, {EncoderKind::x264, Codec::h264, "libx264"}};
+  }
+
+  void greet(Settings settings = {}) {
+    Hello hello;
+    hello.version = 1;
+    hello.viewport_px = {640, 361};
+    hello.decoders = {Codec::h264};
+    hello.settings = settings;
+    session.on_message(hello, now);
+    open_stream();
+  }
+  void open_stream() {
+    session.on_stream_opened({true, "", Codec::h264, "avc1.42C01F", "libx264"}, now);
+  }
+  void pose(std::uint64_t id, float x) {
+    PoseSample sample;
+    sample.pose_id = id;
+    sample.world_from_camera.position.x = x;
+    sample.fov_y_rad = 1.0f;
+    session.on_message(sample, now);
+  }
+  bool frame_is_due() const {
+    const auto candidate = session.next_frame();
+    return candidate && candidate->ready <= now;
+  }
+  /// Starts and ends one frame; returns its order.
+  FrameOrder run_frame() {
+    const FrameOrder order = session.start_frame(now);
+    finish(order);
+    return order;
+  }
+  void finish(const FrameOrder& order) {
+    FrameResult result;
+    result.ok = true;
+    result.frame.ticket = order.ticket;
+    result.frame.bitstream.resize(100);
+    const bool dropped = std::ranges::count(host.drop_next, order.ticket.frame_id) > 0;
+    session.on_frame(std::move(result), now);
+    if (!dropped) session.on_frame_sent(order.ticket, 100);
+  }
+  void ack(std::uint64_t id) {
+    Ack message;
+    message.frame_id = id;
+    message.presented_us = 1;
+    session.on_message(message, now);
+  }
+
+  TimePoint now = TimePoint{} + 1h;
+  SessionPolicy policy;
+  FakeHost host;
+  Session session{"test", policy, host, now};
+};
+
+}  // namespace catgs::test

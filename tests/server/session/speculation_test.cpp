@@ -1,0 +1,66 @@
+// What a Session asks of key frames and sub-frames.
+
+#include "tests/server/session/session_fixture.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+using test::SessionTest;
+
+// Samples of the client's clock, 1/60 s apart, 0.1 further along x each.
+TEST_F(SessionTest, ForecastsFromPastPosesAlone) {
+  greet();
+  const auto walk = [&](std::uint64_t id) {
+    PoseSample sample;
+    sample.pose_id = id;
+    sample.client_time_us = static_cast<std::int64_t>(id) * 16'667;
+    sample.world_from_camera.position.x = 0.1f * static_cast<float>(id);
+    sample.fov_y_rad = 1.0f;
+    session.on_message(sample, now);
+  };
+  walk(1);
+  EXPECT_FALSE(run_frame().request.forecast);  // nothing is known of the motion
+  FrameOrder order;
+  for (std::uint64_t id = 2; id <= 30; ++id) {
+    now += 17ms;
+    ack(id - 1);
+    walk(id);
+    order = run_frame();
+  }
+  ASSERT_TRUE(order.request.forecast);
+  const Forecast& forecast = *order.request.forecast;
+  EXPECT_EQ(forecast.frames, SpeculationSettings{}.initial_window);
+  // As far in so many frames of the rate that the session reaches as it came in as many samples.
+  const float step =
+      (forecast.world_from_camera.position.x - order.request.camera.world_from_camera.position.x) /
+      static_cast<float>(forecast.frames);
+  EXPECT_NEAR(step * static_cast<float>(order.real_fps), 0.1f * 60.0f, 0.1f);
+
+  session.on_message(SelectScene{"another"}, now);
+  open_stream();
+  walk(31);
+  EXPECT_FALSE(run_frame().request.forecast);  // elsewhere
+}
+
+TEST_F(SessionTest, APictureThatStaysIsAKeyFrame) {
+  greet();
+  pose(1, 0.0f);
+  FrameOrder order = session.start_frame(now);
+  order.ticket.speculated = true;  // the core drew a sub-frame
+  finish(order);
+  ack(order.ticket.frame_id);
+  EXPECT_FALSE(frame_is_due());  // the camera may still move
+  now += policy.still_after + 17ms;
+  ASSERT_TRUE(frame_is_due());
+  const FrameOrder again = run_frame();
+  EXPECT_FALSE(again.ticket.refined);
+  EXPECT_FALSE(again.request.forecast);  // hence a key frame
+  ack(again.ticket.frame_id);
+  now += 17ms;
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_TRUE(run_frame().ticket.refined);
+}
+
+}  // namespace
+}  // namespace catgs
