@@ -166,7 +166,8 @@ __global__ void __launch_bounds__(composite_block) composite_kernel(const Compos
     pixel.colour.z += pixel.transmittance * slice.z;
     pixel.transmittance *= slice.w;
     looked_at = p.consumed[task * parts_per_tile + part];
-    // A slice stops within itself at transmittance_min: what is left is less than that.
+    // Unlike an unsplit tile's, a pixel that finished within a slice goes on: it kept what it let
+    // through then (1e-2 at most), and that much of the later slices shows.
     if (pixel.transmittance < static_cast<float>(transmittance_min)) break;
   }
   looked_at =

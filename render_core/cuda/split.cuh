@@ -33,7 +33,8 @@ void launch_split(const SplitParams& params, cudaStream_t stream);
 /// A slice shorter than this is not worth its own pixels.
 constexpr std::uint32_t shortest_slice = 4 * warp_size;
 
-/// Room for tasks: twice what the paper's rule can ask for, and one a tile.
+/// Room for tasks: twice what the paper's rule can ask for, which the slices of long rests share,
+/// and one a tile for blocks of tiles that find none.
 inline std::uint32_t task_bound(const FrameShape& shape) { return 5 * shape.tiles(); }
 
 /// Room for the queue: a place a tile in all classes but the last.
