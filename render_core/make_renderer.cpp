@@ -3,15 +3,36 @@
 
 #include "render_core/cpu/cpu_renderer.h"
 #include "render_core/cuda/cuda_renderer.h"
+#include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "render_core/reference/reference.h"
 #include "render_core/renderer.h"
 #include "render_core/thread_pool.h"
 
 namespace catgs {
+namespace {
+
+MadeRenderer make_on_devices(const GaussianCloud& cloud, const RendererOptions& options,
+                             std::string reason) {
+  MadeRenderer made =
+      make_cuda_renderer(cloud, options.devices ? options.devices : std::make_shared<DeviceSet>());
+  made.reason = reason.append(made.reason.empty() ? "" : "; ").append(made.reason);
+  return made;
+}
+
+}  // namespace
+
+void check(const RendererOptions& options) {
+  const bool on_host = options.kind == RendererKind::cpu || options.kind == RendererKind::reference;
+  if (on_host && options.devices && !options.devices->all()) {
+    throw InputError("--device", "", "chooses among CUDA devices, and --renderer asks for none",
+                     "leave one of them out");
+  }
+}
 
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
                            const RendererOptions& options) {
+  check(options);
   const auto pool = [&options] {
     return options.pool ? options.pool : std::make_shared<ThreadPool>();
   };
@@ -21,7 +42,7 @@ MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
     case RendererKind::cpu:
       return {make_cpu_renderer(*cloud, pool(), options.simd), "asked for"};
     case RendererKind::cuda:
-      return {make_cuda_renderer(*cloud), "asked for"};
+      return make_on_devices(*cloud, options, "asked for");
     case RendererKind::automatic:
       break;
   }
@@ -29,8 +50,8 @@ MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
     return {make_cpu_renderer(*cloud, pool(), options.simd), obstacle};
   }
   try {
-    return {make_cuda_renderer(*cloud), "a CUDA device is there"};
-  } catch (const InputError& error) {
+    return make_on_devices(*cloud, options, "a CUDA device is there");
+  } catch (const DevicesUnusable& error) {
     return {make_cpu_renderer(*cloud, pool(), options.simd), error.what()};
   }
 }

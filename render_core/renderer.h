@@ -18,11 +18,12 @@
 
 namespace catgs {
 
+class DeviceSet;
 class ThreadPool;
 
-// One interface for every core. A Renderer owns one scene on one device; a View is one client's
-// share of it (its caches and its output image). Views of a Renderer may render at the same time
-// from different threads; one View renders one frame at a time.
+// One interface for every core. A Renderer owns one scene, with a copy on each of its devices; a
+// View is one client's share of one of them (its caches and its output image). Views of a Renderer
+// may render at the same time from different threads; one View renders one frame at a time.
 
 enum class Pipeline {
   vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
@@ -125,6 +126,9 @@ class View {
 
   /// Memory of this View (caches, lists, image) where its core renders, without the scene.
   [[nodiscard]] virtual std::size_t memory_bytes() const = 0;
+
+  /// The CUDA device that the View lives on; nothing on other cores.
+  [[nodiscard]] virtual std::optional<int> device() const { return std::nullopt; }
 };
 
 inline constexpr int max_image_side_px = 8192;
@@ -136,10 +140,11 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  /// For people: "CPU, AVX3_DL, 2 threads".
+  /// For people: "CPU, AVX3_DL, 2 threads", "CUDA, 2 x NVIDIA H200".
   [[nodiscard]] virtual std::string description() const = 0;
-  /// Scene bytes resident on the device.
+  /// Bytes of the scene's copy, of which each device holds one.
   [[nodiscard]] virtual std::size_t scene_bytes() const = 0;
+  /// Any thread. Throws where the device has no room left for it.
   [[nodiscard]] virtual std::unique_ptr<View> make_view(const ViewSettings& settings) = 0;
 };
 
@@ -147,9 +152,14 @@ enum class RendererKind { automatic, cpu, cuda, reference };
 
 struct RendererOptions {
   RendererKind kind = RendererKind::automatic;
-  std::shared_ptr<ThreadPool> pool;  // CPU core; null: the Renderer makes its own
-  std::string simd = "auto";         // CPU core: auto or a name of simd_targets()
+  std::shared_ptr<ThreadPool> pool;      // CPU core; null: the Renderer makes its own
+  std::string simd = "auto";             // CPU core: auto or a name of simd_targets()
+  std::shared_ptr<DeviceSet> devices{};  // CUDA core; null: device 0
 };
+
+/// Refuses options that contradict each other, as make_renderer() does: before a large scene is
+/// read. Throws InputError.
+void check(const RendererOptions& options);
 
 struct MadeRenderer {
   std::unique_ptr<Renderer> renderer;
@@ -160,7 +170,8 @@ struct MadeRenderer {
 /// uses one lane.
 std::vector<std::string_view> simd_targets();
 
-/// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run.
+/// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run, and
+/// where a wanted device does not exist.
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
                            const RendererOptions& options = {});
 

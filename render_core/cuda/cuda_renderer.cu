@@ -1,55 +1,204 @@
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <future>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <cuda_runtime_api.h>
 
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/cuda/cuda_view.cuh"
-#include "render_core/error.h"
 
 namespace catgs {
 namespace cuda {
 namespace {
 
-class CudaRenderer final : public Renderer {
+constexpr int oldest_major = 8;  // compute capability
+
+/// A kernel to look for: code that the build lacks for a device is missing for this one too.
+__global__ void probe() {}
+
+/// A device with its copy of the scene.
+struct Device {
+  int index = 0;
+  std::string name;
+  std::shared_ptr<const DeviceScene> scene;
+};
+
+/// A View and its place on a device.
+class PlacedView final : public View {
  public:
-  CudaRenderer(const GaussianCloud& cloud, int device) : device_(device) {
-    check(cudaSetDevice(device), "device");
-    cudaDeviceProp properties{};
-    check(cudaGetDeviceProperties(&properties, device), "device properties");
-    name_ = properties.name;
-    scene_ = std::make_shared<const DeviceScene>(cloud);
+  PlacedView(const Device& device, DeviceSet::Place place, const ViewSettings& settings)
+      : place_(std::move(place)), view_(std::in_place, device.scene, device.index, settings) {}
+  ~PlacedView() override {
+    // Freeing makes a context on the current device, which may be one that nobody asked for.
+    (void)cudaSetDevice(place_.device());
+    view_.reset();
   }
 
-  [[nodiscard]] std::string description() const override { return "CUDA, " + name_; }
-  [[nodiscard]] std::size_t scene_bytes() const override { return scene_->bytes(); }
+  RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
+    return view_->render(request, frame);
+  }
+  [[nodiscard]] std::vector<std::uint32_t> tile_loads() const override {
+    return view_->tile_loads();
+  }
+  [[nodiscard]] std::size_t memory_bytes() const override { return view_->memory_bytes(); }
+  [[nodiscard]] std::optional<int> device() const override { return place_.device(); }
+
+ private:
+  DeviceSet::Place place_;
+  std::optional<CudaView> view_;
+};
+
+class CudaRenderer final : public Renderer {
+ public:
+  CudaRenderer(std::vector<Device> devices, std::shared_ptr<DeviceSet> set)
+      : devices_(std::move(devices)), set_(std::move(set)) {
+    for (const Device& device : devices_) set_->add(device.index);
+  }
+
+  [[nodiscard]] std::string description() const override {
+    std::vector<std::pair<std::string, int>> models;
+    for (const Device& device : devices_) {
+      const auto same = [&](const auto& model) { return model.first == device.name; };
+      const auto known = std::find_if(models.begin(), models.end(), same);
+      if (known == models.end()) {
+        models.emplace_back(device.name, 1);
+      } else {
+        ++known->second;
+      }
+    }
+    std::string text = "CUDA";
+    for (const auto& [name, count] : models) {
+      text += ", " + (count > 1 ? std::to_string(count) + " x " : std::string()) + name;
+    }
+    return text;
+  }
+
+  [[nodiscard]] std::size_t scene_bytes() const override { return devices_.front().scene->bytes(); }
+
+  /// On the least loaded device that can take it: one that has failed loses its Views and would
+  /// look like the best place for the next.
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
-    check(cudaSetDevice(device_), "device");
-    return std::make_unique<CudaView>(scene_, device_, settings);
+    std::vector<int> candidates;
+    for (const Device& device : devices_) candidates.push_back(device.index);
+    for (;;) {
+      DeviceSet::Place place = set_->take(candidates);
+      const int index = place.device();
+      try {
+        return make_view_at(std::move(place), settings);
+      } catch (const CudaError&) {
+        std::erase(candidates, index);
+        if (candidates.empty()) throw;
+      }
+    }
   }
 
  private:
-  int device_;
-  std::string name_;
-  std::shared_ptr<const DeviceScene> scene_;
+  [[nodiscard]] std::unique_ptr<View> make_view_at(DeviceSet::Place place,
+                                                   const ViewSettings& settings) const {
+    const auto device =
+        std::find_if(devices_.begin(), devices_.end(),
+                     [&](const Device& candidate) { return candidate.index == place.device(); });
+    check(cudaSetDevice(device->index), "device");
+    return std::make_unique<PlacedView>(*device, std::move(place), settings);
+  }
+
+  std::vector<Device> devices_;
+  std::shared_ptr<DeviceSet> set_;
 };
+
+/// Throws DevicesUnusable with what to do about it.
+void require_usable(const std::string& flag, const cudaDeviceProp& properties) {
+  const auto version = [&](const char* separator) {
+    return std::to_string(properties.major) + separator + std::to_string(properties.minor);
+  };
+  if (properties.major < oldest_major) {
+    throw DevicesUnusable(flag, properties.name,
+                          "has compute capability " + version(".") + ", the CUDA core needs " +
+                              std::to_string(oldest_major) + ".0",
+                          "choose another device, or --renderer cpu");
+  }
+  cudaFuncAttributes attributes{};
+  if (const cudaError_t code = cudaFuncGetAttributes(&attributes, probe); code != cudaSuccess) {
+    (void)cudaGetLastError();
+    throw DevicesUnusable(
+        flag, properties.name, cudaGetErrorString(code),
+        "is this program built for it, with -DCMAKE_CUDA_ARCHITECTURES=" + version("") + "?");
+  }
+}
+
+std::string free_memory() {
+  std::size_t free = 0, total = 0;
+  if (cudaMemGetInfo(&free, &total) != cudaSuccess) return "";
+  char text[64];
+  std::snprintf(text, sizeof(text), ", %.1f of %.1f GB are free", 1e-9 * static_cast<double>(free),
+                1e-9 * static_cast<double>(total));
+  return text;
+}
+
+/// Copies the scene to a device and leaves that the calling thread's current one. Throws
+/// DevicesUnusable.
+Device open_device(const GaussianCloud& cloud, int index) {
+  const std::string flag = "--device " + std::to_string(index);
+  cudaDeviceProp properties{};
+  try {
+    check(cudaGetDeviceProperties(&properties, index), "device properties");
+    check(cudaSetDevice(index), "device");
+    require_usable(flag, properties);
+    const auto free_there = [index](const DeviceScene* scene) {
+      (void)cudaSetDevice(index);  // see ~PlacedView()
+      delete scene;
+    };
+    return {index, properties.name, {new DeviceScene(cloud), free_there}};
+  } catch (const CudaError& error) {
+    const bool full = error.status_code() == RenderStatus::Code::out_of_memory;
+    throw DevicesUnusable(
+        flag, properties.name, error.what() + (full ? free_memory() : std::string()),
+        full ? "choose another device or a smaller scene, or --renderer cpu"
+             : "does nvidia-smi say why? Choose another device, or --renderer cpu");
+  }
+}
+
+int device_count() {
+  int count = 0;
+  check(cudaGetDeviceCount(&count), "devices");
+  return count;
+}
 
 }  // namespace
 }  // namespace cuda
 
 std::string cuda_obstacle() {
-  int devices = 0;
-  if (const cudaError_t code = cudaGetDeviceCount(&devices); code != cudaSuccess) {
-    return cudaGetErrorString(code);
+  try {
+    return cuda::device_count() > 0 ? "" : "no CUDA device";
+  } catch (const cuda::CudaError& error) {
+    return error.what();
   }
-  return devices > 0 ? "" : "no CUDA device";
 }
 
-std::unique_ptr<Renderer> make_cuda_renderer(const GaussianCloud& cloud, int device) {
-  try {
-    return std::make_unique<cuda::CudaRenderer>(cloud, device);
-  } catch (const cuda::CudaError& error) {
-    throw InputError("--renderer cuda", "", error.what(), "use --renderer cpu");
+MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices) {
+  if (const std::string obstacle = cuda_obstacle(); !obstacle.empty())
+    throw DevicesUnusable("--renderer cuda", "", obstacle, "use --renderer cpu");
+  std::vector<std::future<cuda::Device>> uploads;
+  for (const int index : devices->among(cuda::device_count())) {
+    uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(cloud), index));
   }
+  std::vector<cuda::Device> opened;
+  std::string left_out;
+  for (auto& upload : uploads) {
+    try {
+      opened.push_back(upload.get());
+    } catch (const DevicesUnusable& error) {
+      if (!devices->all()) throw;
+      left_out.append(left_out.empty() ? "without " : "; ").append(error.what());
+    }
+  }
+  if (opened.empty()) throw DevicesUnusable("--device all", "", left_out);
+  return {std::make_unique<cuda::CudaRenderer>(std::move(opened), std::move(devices)), left_out};
 }
 
 }  // namespace catgs

@@ -3,13 +3,22 @@
 #include <memory>
 #include <string>
 
+#include "render_core/device_set.h"
+#include "render_core/error.h"
 #include "render_core/renderer.h"
 
 namespace catgs {
 
-/// The CUDA core on device `device`. Throws InputError when the device cannot be used or the scene
-/// does not fit.
-std::unique_ptr<Renderer> make_cuda_renderer(const GaussianCloud& cloud, int device = 0);
+/// The wanted CUDA devices are there, but cannot be used: too old, full, not built for.
+class DevicesUnusable : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+/// The CUDA core, with a copy of the scene on each of `devices`. The reason says which of all
+/// devices were left out. Throws InputError when a wanted device does not exist, DevicesUnusable
+/// when one cannot be used; where all are wanted, when none can.
+MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices);
 
 /// Why no CUDA device can be used ("no NVIDIA driver", …); empty when one can.
 std::string cuda_obstacle();

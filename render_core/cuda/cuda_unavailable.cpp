@@ -1,13 +1,13 @@
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/error.h"
 
 // Stands in for the CUDA core in builds without nvcc.
 namespace catgs {
 
 std::string cuda_obstacle() { return "this build has no CUDA core"; }
 
-std::unique_ptr<Renderer> make_cuda_renderer(const GaussianCloud& /*cloud*/, int /*device*/) {
-  throw InputError("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
+MadeRenderer make_cuda_renderer(const GaussianCloud& /*cloud*/,
+                                std::shared_ptr<DeviceSet> /*devices*/) {
+  throw DevicesUnusable("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
 }
 
 }  // namespace catgs

@@ -79,9 +79,9 @@ PaperCase PaperCase::pruned(double keep_fraction) const {
   setup.pool = setup_.pool;
   setup.view = setup_.view;
   setup.camera = setup_.camera;
-  setup.made = make_renderer(setup.cloud, {.kind = parse_renderer(options_->render.renderer),
-                                           .pool = setup.pool,
-                                           .simd = options_->render.simd});
+  RendererOptions core = renderer_options(options_->render);
+  core.pool = setup.pool;
+  setup.made = make_renderer(setup.cloud, core);
   return {*this, std::move(setup)};
 }
 

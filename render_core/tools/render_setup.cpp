@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/tools/parse_name.h"
@@ -66,6 +67,8 @@ void add_frame_options(CLI::App& command, RenderOptions& options) {
   add_lens_options(command, options.lens);
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
       ->capture_default_str();
+  command.add_option("--device", options.device,
+                     "CUDA core: all, or devices as CUDA numbers them, like 0 or 0,1 [0]");
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
   command.add_option("--threads", options.threads, "0: one per core")
@@ -88,14 +91,15 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
 
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
-  const RendererKind kind = parse_renderer(options.renderer);
+  RendererOptions core = renderer_options(options);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
   setup.scene = load_scene(options.scene, options.threads, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
   setup.pool = std::make_shared<ThreadPool>(options.threads);
-  setup.made = make_renderer(setup.cloud, {.kind = kind, .pool = setup.pool, .simd = options.simd});
+  core.pool = setup.pool;
+  setup.made = make_renderer(setup.cloud, core);
   return setup;
 }
 
@@ -110,12 +114,23 @@ void set_path(RenderSetup& setup, const RenderOptions& options) {
   setup.fps = options.fps.value_or(mean_rate_hz(path));
 }
 
-RendererKind parse_renderer(std::string_view name) {
-  return parse_name<RendererKind>("--renderer", name,
-                                  {{"auto", RendererKind::automatic},
-                                   {"cpu", RendererKind::cpu},
-                                   {"cuda", RendererKind::cuda},
-                                   {"reference", RendererKind::reference}});
+RendererOptions renderer_options(const RenderOptions& options) {
+  RendererOptions core;
+  core.kind = parse_name<RendererKind>("--renderer", options.renderer,
+                                       {{"auto", RendererKind::automatic},
+                                        {"cpu", RendererKind::cpu},
+                                        {"cuda", RendererKind::cuda},
+                                        {"reference", RendererKind::reference}});
+  core.simd = options.simd;
+  if (!options.device.empty()) {
+    try {
+      core.devices = std::make_shared<DeviceSet>(parse_devices(options.device));
+    } catch (const std::invalid_argument& error) {
+      throw InputError("--device", "", error.what());
+    }
+  }
+  check(core);
+  return core;
 }
 
 FrameRange parse_frame_range(std::string_view text, std::size_t count) {

@@ -26,6 +26,7 @@ struct RenderOptions {
   std::optional<double> fps;
   std::string frames;
   std::string renderer = "auto";
+  std::string device;  // empty: the first, if CUDA renders
   PipelineOptions pipeline;
   std::string simd = "auto";
   int threads = 0;
@@ -59,8 +60,8 @@ RenderSetup prepare(const RenderOptions& options, bool quiet);
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet);
 void set_path(RenderSetup& setup, const RenderOptions& options);
 
-/// The value of --renderer. Throws InputError.
-RendererKind parse_renderer(std::string_view name);
+/// The choice of core, checked; without a thread pool. Throws InputError.
+RendererOptions renderer_options(const RenderOptions& options);
 
 /// "A:B" -> frames A to B - 1 of `count`; either may be left out; "" is all. Throws InputError when
 /// nothing is left.
