@@ -14,6 +14,7 @@ namespace {
 struct BenchOptions {
   RenderOptions render;
   std::size_t warmup = 10;
+  std::size_t views = 1;
   bool quality = false;
   std::size_t quality_every = 10;
   std::string json;
@@ -24,10 +25,12 @@ void bench(const BenchOptions& options, bool quiet) {
   BenchResult result;
   result.settings = setup.view;
   result.warmup = options.warmup;
+  result.views = options.views;
   {
     Progress progress("measuring", quiet);
-    result.measurement = measure(setup, setup.view, options.warmup,
-                                 [&](double fraction) { progress.update(fraction); });
+    result.measurement = measure(
+        setup, setup.view, options.warmup, [&](double fraction) { progress.update(fraction); },
+        options.views);
   }
   result.pair_cost = count_pairs(setup, setup.view, result.measurement);
   if (options.quality) {
@@ -46,6 +49,11 @@ void add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("bench", "Measures how fast a camera path renders");
   add_render_options(*command, options->render);
   command->add_option("--warmup", options->warmup, "Frames rendered before measuring")
+      ->capture_default_str();
+  command
+      ->add_option("--views", options->views,
+                   "Views that render the path at the same time; the rate is that of all")
+      ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command->add_flag("--quality", options->quality,
                     "Compare with the exact pipeline, or that with the reference");

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <future>
+#include <memory>
 
 #include "render_core/tools/frame_feed.h"
 
@@ -12,6 +14,36 @@ using Clock = std::chrono::steady_clock;
 
 double ms_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
+}
+
+/// One pass over the path, with a View that is warm.
+std::vector<Measurement::Frame> time_path(const RenderSetup& setup, const ViewSettings& settings,
+                                          View& view, const ProgressReport& report) {
+  FrameFeed feed(setup, settings);
+  std::vector<Measurement::Frame> frames;
+  frames.reserve(setup.poses.size());
+  auto last = Clock::now();
+  for (std::size_t i = 0; i < setup.poses.size(); ++i) {
+    FrameView frame;
+    render_or_throw(view, feed.next(), frame);
+    const auto now = Clock::now();
+    frames.push_back({ms_between(last, now), frame.stats, i == 0});
+    last = now;
+    report(static_cast<double>(i + 1) / static_cast<double>(setup.poses.size()));
+  }
+  return frames;
+}
+
+/// Calls body(i) for every i in [0, count): the first on this thread, each other on its own. Throws
+/// what one of them threw, when all have ended.
+template <class Body>
+void side_by_side(std::size_t count, const Body& body) {
+  std::vector<std::future<void>> others;
+  for (std::size_t i = 1; i < count; ++i) {
+    others.push_back(std::async(std::launch::async, [&body, i] { body(i); }));
+  }
+  body(0);
+  for (std::future<void>& other : others) other.get();
 }
 
 template <class Visit>
@@ -71,7 +103,7 @@ std::size_t Measurement::windows_cut() const {
   int missing = 0;  // sub-frames that the group still promised
   for (const Frame& frame : frames) {
     if (frame.stats.kind == FrameKind::key) {
-      cut += missing > 0 ? 1 : 0;
+      cut += missing > 0 && !frame.first ? 1 : 0;
       missing = frame.stats.window;
     } else {
       --missing;
@@ -81,29 +113,31 @@ std::size_t Measurement::windows_cut() const {
 }
 
 Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t warmup,
-                    const ProgressReport& report) {
+                    const ProgressReport& report, std::size_t views) {
   settings.format = PixelFormat::rgb_f32;
   settings.space = MemorySpace::device;
-  const auto view = setup.made.renderer->make_view(settings);
-  FrameView frame;
-  FrameFeed warmup_feed(setup, settings);
-  for (std::size_t i = 0; i < std::min(warmup, setup.poses.size()); ++i) {
-    render_or_throw(*view, warmup_feed.next(), frame);
-  }
-  FrameFeed feed(setup, settings);
-  Measurement measurement;
-  measurement.frames.reserve(setup.poses.size());
+  std::vector<std::unique_ptr<View>> warm(views);
+  side_by_side(views, [&](std::size_t v) {
+    warm[v] = setup.made.renderer->make_view(settings);
+    FrameView frame;
+    FrameFeed feed(setup, settings);
+    for (std::size_t i = 0; i < std::min(warmup, setup.poses.size()); ++i) {
+      render_or_throw(*warm[v], feed.next(), frame);
+    }
+  });
+
+  std::vector<std::vector<Measurement::Frame>> passes(views);
   const auto start = Clock::now();
-  auto last = start;
-  for (std::size_t i = 0; i < setup.poses.size(); ++i) {
-    render_or_throw(*view, feed.next(), frame);
-    const auto now = Clock::now();
-    measurement.frames.push_back({ms_between(last, now), frame.stats});
-    last = now;
-    report(static_cast<double>(i + 1) / static_cast<double>(setup.poses.size()));
-  }
+  side_by_side(views, [&](std::size_t v) {
+    passes[v] = time_path(
+        setup, settings, *warm[v], v == 0 ? report : [](double) {});
+  });
+  Measurement measurement;
   measurement.wall_ms = ms_between(start, Clock::now());
-  measurement.view_bytes = view->memory_bytes();
+  for (std::size_t v = 0; v < views; ++v) {
+    measurement.frames.insert(measurement.frames.end(), passes[v].begin(), passes[v].end());
+    measurement.view_bytes = std::max(measurement.view_bytes, warm[v]->memory_bytes());
+  }
   return measurement;
 }
 

@@ -20,16 +20,17 @@ struct ListLength {
   double visible_mean = 0.0;
 };
 
-/// One pass over the path: frames back to back, nothing skipped. The queries below take all frames,
-/// or those of one kind.
+/// One pass over the path, or several: frames back to back, nothing skipped. The queries below take
+/// all frames, or those of one kind.
 struct Measurement {
   struct Frame {
     double ms = 0.0;  // since the completion of the frame before
     FrameStats stats;
+    bool first = false;  // of a pass
   };
-  std::vector<Frame> frames;
+  std::vector<Frame> frames;   // pass by pass
   double wall_ms = 0.0;        // of the whole pass, so that the mean rate hides no work in between
-  std::size_t view_bytes = 0;  // memory of the View at the end, which never shrinks
+  std::size_t view_bytes = 0;  // memory of a View at the end, which never shrinks
 
   using Kind = std::optional<FrameKind>;
   [[nodiscard]] double fps() const;
@@ -45,9 +46,10 @@ struct Measurement {
 using ProgressReport = std::function<void(double fraction)>;
 
 /// Renders the first `warmup` frames of the path unmeasured, then the whole path, with a View of
-/// these settings whose frames stay on the device. Throws as make_view() and render_or_throw().
+/// these settings whose frames stay on the device; or with several at the same time, each on a
+/// thread of its own, and the wall clock of all. Throws as make_view() and render_or_throw().
 Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t warmup,
-                    const ProgressReport& report);
+                    const ProgressReport& report, std::size_t views = 1);
 
 /// Cost of the inner loop: blend time over (Gaussian, pixel) pairs blended, in nanoseconds of wall
 /// clock. Pairs are counted afterwards on a few frames spread over the path, because counting costs

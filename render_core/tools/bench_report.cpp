@@ -105,6 +105,7 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
   json["simd"] = options.simd;
   json["threads"] = setup.pool->threads();
   json["warmup"] = result.warmup;
+  json["views"] = result.views;
   return json;
 }
 
@@ -210,8 +211,9 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
              setup.cloud->sh_degree, setup.camera.size_px.x, setup.camera.size_px.y,
              pipeline_name(result.settings.pipeline));
   fmt::print("{} ({})\n", setup.made.renderer->description(), setup.made.reason);
-  fmt::print("{:<14}{:.1f} fps over {} frames; flatness {:.2f}\n", "speed", measurement.fps(),
-             measurement.frames.size(), flatness(measurement.frame_ms()));
+  const std::string of_views = result.views > 1 ? fmt::format(" of {} views", result.views) : "";
+  fmt::print("{:<14}{:.1f} fps over {} frames{}; flatness {:.2f}\n", "speed", measurement.fps(),
+             measurement.frames.size(), of_views, flatness(measurement.frame_ms()));
   print_times("frame ms", measurement, std::nullopt);
   if (groups) {
     print_times("key frame ms", measurement, FrameKind::key);

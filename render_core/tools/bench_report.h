@@ -13,6 +13,7 @@ namespace catgs {
 struct BenchResult {
   ViewSettings settings;
   std::size_t warmup = 0;
+  std::size_t views = 1;
   Measurement measurement;
   PairCost pair_cost;
   std::optional<QualityReport> quality;

@@ -172,6 +172,13 @@ TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {
   EXPECT_LE(json.at("quality").at("pop").at("max").get<double>(), 1.0 / 255.0);
   EXPECT_GT(json.at("quality").at("see_through").at("mean").get<double>(), 0.2);
 
+  // Each view starts anew; that cuts no group.
+  const auto together = bench("--views 3");
+  EXPECT_EQ(together.at("settings").at("views"), 3);
+  EXPECT_EQ(together.at("key_frames"), 3 * 13);
+  EXPECT_EQ(together.at("sub_frames"), 3 * 47);
+  EXPECT_EQ(together.at("windows_cut"), 0);
+
   const auto uncached = bench("--no-cache");
   EXPECT_EQ(uncached.at("key_frames"), 60);
   EXPECT_TRUE(uncached.at("frame_ms_sub").is_null());
@@ -256,6 +263,9 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(run("frames x.ply --size 64 --out x"), "--size: \"64\" is not a picture size");
   expect(frames(still + "--fov-deg 180 --out x"), "the focal length must be positive");
   expect(frames(still + "--renderer gpu --out x"), "--renderer: unknown \"gpu\" (one of auto, cpu");
+  expect(frames(still + "--device gpu --out x"), "--device: \"gpu\" is neither all nor a list");
+  expect(frames(still + "--renderer cpu --device 1 --out x"),
+         "--device: chooses among CUDA devices");
   expect(frames("--script still --out " + path("a.png")), "one picture for 1200 frames");
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
   expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
