@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
+#include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "server/net/http.h"
 #include "server/required_file.h"
@@ -123,6 +124,16 @@ Choices<std::string> words(std::initializer_list<const char*> list_of_words) {
   return choices;
 }
 
+Setting device() {
+  return {"device", Setting::Kind::text, "all|N[,N...]",
+          "CUDA devices that render, as CUDA numbers them; each holds the scenes",
+          // A TOML array comes as several values.
+          [](ServerConfig& c, const Values& v) {
+            c.devices = parse_devices(fmt::format("{}", fmt::join(v, ",")));
+          },
+          [](const ServerConfig& c) { return toml_string(devices_text(c.devices)); }};
+}
+
 Setting admin_bind() {
   Setting setting =
       text("admin-bind", "ADDRESS:PORT", "Address of /metrics and /api/sessions, or off",
@@ -149,6 +160,7 @@ std::vector<Setting> make_settings() {
                             {"cpu", RendererKind::cpu},
                             {"cuda", RendererKind::cuda},
                             {"reference", RendererKind::reference}}),
+      device(),
       text("simd", "TARGET", "SIMD target of the CPU core: auto, scalar, …", &C::simd),
       integer("threads", "N", "Threads that render and encode; 0: one per core", &C::threads, 0,
               1024),
@@ -292,6 +304,9 @@ void validate(const ServerConfig& config) {
   if (config.scenes.empty())
     throw InputError("--scene", {}, "no scene is given",
                      "give a file, or try --scene synth:city:300000");
+  check({.kind = config.renderer,
+         .pool = {},
+         .devices = std::make_shared<DeviceSet>(config.devices)});
   if (config.lod >= 0 && config.gaussian_budget > 0)
     throw InputError("--lod, --budget", {}, "both are given", "give one of them");
   if (config.tls_cert.empty() != config.tls_key.empty())

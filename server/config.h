@@ -21,6 +21,7 @@ struct ServerConfig {
   std::string admin_bind = "127.0.0.1:9090";  // address:port or "off"
   std::string client_dir;                     // empty: found beside the program
   RendererKind renderer = RendererKind::automatic;
+  std::vector<int> devices;  // of the CUDA core; empty: all
   std::string simd = "auto";
   int threads = 0;          // 0: one per core
   int lod = -1;             // of streamed SOG scenes; -1: by gaussian_budget

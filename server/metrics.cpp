@@ -40,7 +40,11 @@ double seconds(TimePoint from, TimePoint to) {
 }  // namespace
 
 Metrics::Metrics()
-    : connections(gauge(registry_, "catgs_connections", "Open websockets")),
+    : views_(prometheus::BuildGauge()
+                 .Name("catgs_device_views")
+                 .Help("Streams that render on a CUDA device")
+                 .Register(registry_)),
+      connections(gauge(registry_, "catgs_connections", "Open websockets")),
       sessions(gauge(registry_, "catgs_sessions", "Admitted sessions")),
       frames_running(gauge(registry_, "catgs_frames_running", "Frames being rendered or encoded")),
       frames_queued(
@@ -82,6 +86,10 @@ Metrics::Metrics()
 
 std::string Metrics::scrape() const {
   return prometheus::TextSerializer().Serialize(registry_.Collect());
+}
+
+void Metrics::set_views(int device, int views) {
+  views_.Add({{"device", std::to_string(device)}}).Set(views);  // the gauge that is there already
 }
 
 void Metrics::observe_frame(const FrameTicket& ticket, TimePoint now) {

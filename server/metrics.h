@@ -5,6 +5,7 @@
 #include <string>
 
 #include <prometheus/counter.h>
+#include <prometheus/family.h>
 #include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
@@ -22,11 +23,15 @@ class Metrics {
   /// The text format of a scrape.
   [[nodiscard]] std::string scrape() const;
 
+  /// Views that live on a CUDA device, as of now.
+  void set_views(int device, int views);
+
   /// Stage durations of a frame that was handed to the socket at `now`.
   void observe_frame(const FrameTicket& ticket, TimePoint now);
 
  private:
   prometheus::Registry registry_;
+  prometheus::Family<prometheus::Gauge>& views_;
 
  public:
   prometheus::Gauge& connections;

@@ -107,8 +107,8 @@ SceneFacts facts_of(const Scene& scene, std::string id) {
 
 }  // namespace
 
-std::vector<std::shared_ptr<const SceneEntry>> load_scenes(
-    const ServerConfig& config, const std::shared_ptr<ThreadPool>& pool) {
+std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& config,
+                                                           const RendererOptions& core) {
   if ((config.lod >= 0 || config.gaussian_budget > 0) &&
       std::ranges::none_of(config.scenes, has_levels))
     throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
@@ -117,16 +117,18 @@ std::vector<std::shared_ptr<const SceneEntry>> load_scenes(
   std::vector<std::shared_ptr<const SceneEntry>> entries;
   for (const auto& spec : config.scenes) {
     spdlog::info("loading {}", spec);
-    Scene scene = load(spec, config, pool->threads());
+    Scene scene = load(spec, config, core.pool->threads());
     auto entry = std::make_shared<SceneEntry>();
     entry->facts = facts_of(scene, unique_id(scene.name, entries));
-    auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)),
-                              {config.renderer, pool, config.simd});
+    auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
     entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
     entry->renderer = std::move(made.renderer);
-    spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB on the device, view from {}",
+    spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}",
                  entry->facts.scene_id, entry->facts.gaussians, scene.format,
                  static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
+    // The banner tells that of the first.
+    if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)
+      spdlog::info("scene {}: renderer {}", entry->facts.scene_id, entry->renderer_text);
     entries.push_back(std::move(entry));
   }
   return entries;

@@ -15,6 +15,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "render_core/thread_pool.h"
 #include "server/access.h"
@@ -78,13 +79,14 @@ struct Server::State {
         client(find_client(config.client_dir)),
         net(net_options()),
         pool(std::make_shared<ThreadPool>(config.threads)),
+        devices(std::make_shared<DeviceSet>(config.devices)),
         stop_signals(io),
         drain_timer(io) {}
 
   NetOptions net_options();
   HttpResponse respond(const HttpRequest& request);
   HttpResponse list_scenes(const std::string& token);
-  HttpResponse respond_admin(const HttpRequest& request) const;
+  HttpResponse respond_admin(const HttpRequest& request);
   void print_banner() const;
   void wait_for_signal();
   void begin_stop();
@@ -98,6 +100,7 @@ struct Server::State {
   NetServer net;
   boost::asio::io_context io{1};  // outlives the pool, whose tasks post to it
   std::shared_ptr<ThreadPool> pool;
+  std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
   std::vector<std::shared_ptr<const SceneEntry>> scenes;
   std::vector<EncoderChoice> encoders;
   boost::asio::signal_set stop_signals;
@@ -151,7 +154,8 @@ HttpResponse Server::State::list_scenes(const std::string& token) {
   return text_response(200, nlohmann::json{{"scenes", list}}.dump(), "application/json");
 }
 
-HttpResponse Server::State::respond_admin(const HttpRequest& request) const {
+HttpResponse Server::State::respond_admin(const HttpRequest& request) {
+  for (const auto& [device, views] : devices->views()) metrics.set_views(device, views);
   if (request.path == "/metrics")
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
   if (request.path == "/api/sessions")
@@ -161,7 +165,7 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) const {
 
 Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(config)) {
   State& s = *state_;
-  s.scenes = load_scenes(s.config, s.pool);
+  s.scenes = load_scenes(s.config, {s.config.renderer, s.pool, s.config.simd, s.devices});
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token, const std::string& scene_id) {
     return s.access.refusal(token, scene_id, unix_now_s());

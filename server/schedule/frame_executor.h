@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "render_core/renderer.h"
@@ -32,6 +33,7 @@ struct StreamOpened {
   Codec codec = Codec::h264;
   std::string codec_string;
   std::string encoder_name;
+  std::optional<int> device{};  // see View::device()
 };
 
 struct FrameJob {

@@ -26,6 +26,7 @@ StreamOpened open_now(Stream& stream, StreamSettings settings) {
   opened.codec = stream.encoder->codec();
   opened.codec_string = stream.encoder->codec_string();
   opened.encoder_name = stream.encoder->name();
+  opened.device = stream.view->device();
   return opened;
 }
 

@@ -177,6 +177,7 @@ void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   config_.codec = opened.codec;
   config_.codec_string = opened.codec_string;
   config_.encoder = admission_.encoder.text;
+  device_ = opened.device;
   credit_.set_frame_interval(frame_interval());
   state_ = State::live;
   idr_due_ = true;

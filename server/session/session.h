@@ -110,6 +110,7 @@ class Session {
   [[nodiscard]] const CreditWindow& credit() const { return credit_; }
   [[nodiscard]] const StreamConfig& config() const { return config_; }
   [[nodiscard]] const SceneEntry* scene() const { return admission_.scene.get(); }
+  [[nodiscard]] std::optional<int> device() const { return device_; }
   [[nodiscard]] std::uint64_t frames_sent() const { return frames_sent_; }
   [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
@@ -148,6 +149,7 @@ class Session {
   glm::ivec2 viewport_px_{0};
   Settings settings_;
   StreamConfig config_;
+  std::optional<int> device_;  // that its stream renders on, where a device has a number
   bool opening_stream_ = false;
   bool stream_outdated_ = false;  // settings changed while the stream was busy
   bool welcome_due_ = false;      // the scene is new to the client

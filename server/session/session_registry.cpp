@@ -172,6 +172,7 @@ void SessionRegistry::publish() {
         {"scene", session.scene() ? session.scene()->facts.scene_id : ""},
         {"width_px", session.config().size_px.x},
         {"height_px", session.config().size_px.y},
+        {"device", session.device() ? nlohmann::json(*session.device()) : nlohmann::json()},
         {"encoder", session.config().encoder},
         {"frames_sent", session.frames_sent()},
         {"frames_dropped", session.frames_dropped()},

@@ -133,6 +133,27 @@ TEST_F(ConfigTest, LevelAndBudgetExcludeEachOther) {
   EXPECT_EQ(config.gaussian_budget, 1'000'000);
 }
 
+TEST_F(ConfigTest, DevicesAreAListInEveryLayer) {
+  EXPECT_THAT(print_config(config, sources), HasSubstr("device = \"all\"  # default\n"));
+  read_toml("device = [1, 0]\nscene = \"a.ply\"\n");
+  EXPECT_THAT(config.devices, ElementsAre(1, 0));
+  EXPECT_THAT(print_config(config, sources), HasSubstr("device = \"1,0\"  # " + path + ":1\n"));
+  read_toml("device = 3\n");
+  EXPECT_THAT(config.devices, ElementsAre(3));
+  read_environment({{"CATGS_DEVICE", "0,1"}});
+  EXPECT_THAT(config.devices, ElementsAre(0, 1));
+  EXPECT_THAT([&] { read_toml("\ndevice = [0, 0]\n"); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr(path + ":2: device"), HasSubstr("twice"))));
+  EXPECT_THAT([&] { read_flag("device", {"gpu"}); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--device"), HasSubstr("like 0 or 0,1"))));
+  EXPECT_NO_THROW(validate(config));
+  config.renderer = RendererKind::cpu;
+  EXPECT_THAT([&] { validate(config); },
+              ThrowsMessage<InputError>(HasSubstr("leave one of them out")));
+  read_flag("device", {"all"});
+  EXPECT_NO_THROW(validate(config));
+}
+
 TEST_F(ConfigTest, RefusesHalfATlsPairAndNoScene) {
   EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--scene")));
   config.scenes = {"a.ply"};

@@ -35,7 +35,9 @@ class SceneCatalog : public FolderTest {
     config_.scenes = {folder_ / "streamed", folder_ / "plain.splat"};
   }
   std::uint64_t gaussians(std::size_t scene) {
-    return load_scenes(config_, std::make_shared<ThreadPool>(2)).at(scene)->facts.gaussians;
+    return load_scenes(config_, {.pool = std::make_shared<ThreadPool>(2)})
+        .at(scene)
+        ->facts.gaussians;
   }
 
   ServerConfig config_;
