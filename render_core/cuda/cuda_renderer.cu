@@ -163,28 +163,24 @@ Device open_device(const GaussianCloud& cloud, int index) {
   }
 }
 
-int device_count() {
-  int count = 0;
-  check(cudaGetDeviceCount(&count), "devices");
-  return count;
-}
-
 }  // namespace
 }  // namespace cuda
 
 std::string cuda_obstacle() {
-  try {
-    return cuda::device_count() > 0 ? "" : "no CUDA device";
-  } catch (const cuda::CudaError& error) {
-    return error.what();
+  int devices = 0;
+  if (const cudaError_t code = cudaGetDeviceCount(&devices); code != cudaSuccess) {
+    return cudaGetErrorString(code);
   }
+  return devices > 0 ? "" : "no CUDA device";
 }
 
 MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices) {
   if (const std::string obstacle = cuda_obstacle(); !obstacle.empty())
     throw DevicesUnusable("--renderer cuda", "", obstacle, "use --renderer cpu");
+  int count = 0;
+  (void)cudaGetDeviceCount(&count);
   std::vector<std::future<cuda::Device>> uploads;
-  for (const int index : devices->among(cuda::device_count())) {
+  for (const int index : devices->among(count)) {
     uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(cloud), index));
   }
   std::vector<cuda::Device> opened;
