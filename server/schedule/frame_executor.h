@@ -67,6 +67,9 @@ class FrameExecutor {
   virtual void open(std::shared_ptr<Stream> stream, StreamSettings settings,
                     std::function<void(StreamOpened)> done) = 0;
   virtual void submit(FrameJob job, std::function<void(FrameResult)> done) = 0;
+  /// Ends the stream on a thread of the executor: freeing device memory waits for the device, and
+  /// the caller has other sessions to serve. Not while a job holds it.
+  virtual void close(std::shared_ptr<Stream> stream) = 0;
 };
 
 }  // namespace catgs

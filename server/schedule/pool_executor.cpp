@@ -65,7 +65,13 @@ FrameResult run_now(FrameJob& job) {
 }  // namespace
 
 // A worker lets go of the stream before it reports: the stream may hold the last reference to this
-// very pool, which none of its own threads can join.
+// very pool, which none of its own threads can join. For the same reason the executor, which holds
+// the pool, outlasts the streams that are closing.
+
+PoolExecutor::~PoolExecutor() {
+  std::unique_lock lock(mutex_);
+  closed_.wait(lock, [this] { return closing_ == 0; });
+}
 
 void PoolExecutor::open(std::shared_ptr<Stream> stream, StreamSettings settings,
                         std::function<void(StreamOpened)> done) {
@@ -74,6 +80,19 @@ void PoolExecutor::open(std::shared_ptr<Stream> stream, StreamSettings settings,
     StreamOpened opened = open_now(*stream, std::move(settings));
     stream.reset();
     done(std::move(opened));
+  });
+}
+
+void PoolExecutor::close(std::shared_ptr<Stream> stream) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++closing_;
+  }
+  pool_->submit([this, stream = std::move(stream)]() mutable {
+    stream.reset();
+    const std::lock_guard lock(mutex_);
+    --closing_;
+    closed_.notify_all();  // under the lock: the executor may end right after it
   });
 }
 

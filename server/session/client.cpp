@@ -24,7 +24,10 @@ Client::Client(SessionRegistry& registry, std::shared_ptr<Connection> connection
     : registry_(registry),
       connection_(std::move(connection)),
       rate_(messages_per_second, message_burst, Clock::now()),
+      executor_(registry.executor_),
       session_(std::move(session_id), registry.options_.policy, *this, Clock::now()) {}
+
+Client::~Client() { executor_->close(std::move(stream_)); }
 
 template <typename Handle>
 void Client::post(Handle handle) {
@@ -156,18 +159,17 @@ std::function<void(Result)> Client::on_session_thread(Handle handle) {
 }
 
 void Client::open_stream(StreamSettings settings) {
-  registry_.executor_->open(
-      stream_, std::move(settings),
-      on_session_thread<StreamOpened>([](Client& client, const StreamOpened& opened) {
-        client.session_.on_stream_opened(opened, Clock::now());
-      }));
+  executor_->open(stream_, std::move(settings),
+                  on_session_thread<StreamOpened>([](Client& client, const StreamOpened& opened) {
+                    client.session_.on_stream_opened(opened, Clock::now());
+                  }));
 }
 
 void Client::start_frame(TimePoint now) {
   FrameOrder order = session_.start_frame(now);
   FrameJob job{stream_, order.ticket, order.request, order.real_fps, order.force_idr};
   registry_.scheduler_.frame_started();
-  registry_.executor_->submit(
+  executor_->submit(
       std::move(job), on_session_thread<FrameResult>([](Client& client, FrameResult result) {
         client.registry_.scheduler_.frame_ended();
         Metrics& metrics = client.registry_.metrics_;

@@ -21,6 +21,7 @@ class Client final : public ConnectionListener,
                      public std::enable_shared_from_this<Client> {
  public:
   Client(SessionRegistry& registry, std::shared_ptr<Connection> connection, std::string session_id);
+  ~Client() override;  // any thread but the executor's, even after the registry's end
 
   // Network thread.
   void on_message(std::span<const std::byte> bytes) override;
@@ -65,6 +66,7 @@ class Client final : public ConnectionListener,
   bool refused_ = false;  // network thread: nothing more is read
   LatestSlot<ReceivedPose> latest_pose_;
 
+  const std::shared_ptr<FrameExecutor> executor_;
   std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
   std::string token_;  // of the hello; a link may open one scene only
   bool admitted_ = false;
