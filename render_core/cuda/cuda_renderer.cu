@@ -111,8 +111,9 @@ class CudaRenderer final : public Renderer {
   std::shared_ptr<DeviceSet> set_;
 };
 
-/// Throws DevicesUnusable with what to do about it.
-void require_usable(const std::string& flag, const cudaDeviceProp& properties) {
+/// Makes the device the calling thread's current one, if the core can use it. Else throws
+/// DevicesUnusable with what to do about it.
+void use_device(const std::string& flag, int index, const cudaDeviceProp& properties) {
   const auto version = [&](const char* separator) {
     return std::to_string(properties.major) + separator + std::to_string(properties.minor);
   };
@@ -122,6 +123,7 @@ void require_usable(const std::string& flag, const cudaDeviceProp& properties) {
                               std::to_string(oldest_major) + ".0",
                           "choose another device, or --renderer cpu");
   }
+  check(cudaSetDevice(index), "device");
   cudaFuncAttributes attributes{};
   if (const cudaError_t code = cudaFuncGetAttributes(&attributes, probe); code != cudaSuccess) {
     (void)cudaGetLastError();
@@ -147,8 +149,7 @@ Device open_device(const GaussianCloud& cloud, int index) {
   cudaDeviceProp properties{};
   try {
     check(cudaGetDeviceProperties(&properties, index), "device properties");
-    check(cudaSetDevice(index), "device");
-    require_usable(flag, properties);
+    use_device(flag, index, properties);
     const auto free_there = [index](const DeviceScene* scene) {
       (void)cudaSetDevice(index);  // see ~PlacedView()
       delete scene;
