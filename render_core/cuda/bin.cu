@@ -52,8 +52,12 @@ __device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t 
   return low;
 }
 
-/// Where a splat's entries end. Its tiles were counted by another kernel, and compilers may round
-/// the same formula differently there: what is counted but not written stays padding.
+// The tiles of large splats were counted by another kernel, where compilers may round the same
+// formula differently. With half the slack here every tile that is found was counted; what was
+// counted but is not found stays padding.
+constexpr float emit_slack_px = 0.5f * static_cast<float>(listing_slack_px);
+
+/// Where a splat's entries end.
 __device__ std::uint32_t entries_end(const EmitParams& p, std::uint32_t slot, std::uint32_t at) {
   return at + p.tile_count[slot];
 }
@@ -84,9 +88,11 @@ __device__ void emit_large(const EmitParams& p, Window& window, std::uint32_t sl
                            std::uint32_t at) {
   const SplatRecord& r = p.records[slot];
   if (p.path != nullptr) {
-    emit_together(p, window, make_footprint(r.centre_px, p.path[slot], p.shape), slot, at);
+    emit_together(p, window, make_footprint(r.centre_px, p.path[slot], p.shape, emit_slack_px),
+                  slot, at);
   } else {
-    emit_together(p, window, make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape),
+    emit_together(p, window,
+                  make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape, emit_slack_px),
                   slot, at);
   }
 }
@@ -175,16 +181,14 @@ __global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams p
 }  // namespace
 
 void launch_emit(const EmitParams& params, cudaStream_t stream) {
-  const std::uint32_t blocks = (params.shape.list_bound + window_size - 1) / window_size;
-  emit_kernel<<<blocks, block_size, 0, stream>>>(params);
+  emit_kernel<<<blocks_for(params.shape.list_bound, window_size), block_size, 0, stream>>>(params);
   check_launch("emit");
 }
 
 void launch_ranges(const RangesParams& params, cudaStream_t stream) {
   check(cudaMemsetAsync(params.range, 0, params.shape.tiles() * sizeof(uint2), stream), "ranges");
   constexpr std::uint32_t per_block = block_size * range_step;
-  const std::uint32_t blocks = (params.shape.list_bound + per_block - 1) / per_block;
-  ranges_kernel<<<blocks, block_size, 0, stream>>>(params);
+  ranges_kernel<<<blocks_for(params.shape.list_bound, per_block), block_size, 0, stream>>>(params);
   check_launch("ranges");
 }
 

@@ -1,7 +1,7 @@
 #include "render_core/cuda/blend.cuh"
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/splat.cuh"
-#include "render_core/math/blend-inl.h"
 #include "render_core/math/constants.h"
 
 namespace catgs::cuda {
@@ -94,13 +94,13 @@ __device__ int stage(StagedSplats& staged, const Loaded& splat) {
 
 /// The largest transmittance that earlier slices of the task's tile leave in this part, as far as
 /// they are known to have finished.
-__device__ float transmittance_before(const BlendParams& p, std::uint32_t task, int slice,
+__device__ float transmittance_before(const BlendParams& p, std::uint32_t slice, int place,
                                       int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   float product = 1.0f;
-  for (int back = 1 + lane; back <= slice; back += warp_size) {
+  for (int back = 1 + lane; back <= place; back += warp_size) {
     const volatile float* known = p.slice_transmittance;
-    product *= known[(task - back) * parts_per_tile + part];
+    product *= known[(slice - back) * parts_per_tile + part];
   }
 #pragma unroll
   for (int step = warp_size / 2; step > 0; step /= 2)
@@ -117,7 +117,7 @@ __device__ int row_in_part(int lane) {
 /// Part of a task: the pixels of this lane and where they are.
 struct Part {
   BlendTask task;
-  std::uint32_t task_index;
+  std::uint32_t slice;  // where the slice's pixels are kept, if it is one
   int part;
   int in_tile_x, in_tile_y;  // of the lane's first pixel
   int x_px, y_px;
@@ -126,9 +126,9 @@ struct Part {
 __device__ Part make_part(const BlendParams& p, std::uint32_t task, int part_of_tile) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   Part part;
-  part.task_index = task;
+  part.slice = task - p.shape.tiles();
   part.part = part_of_tile;
-  const uint4 words = __ldg(reinterpret_cast<const uint4*>(&p.tasks[part.task_index]));
+  const uint4 words = __ldg(reinterpret_cast<const uint4*>(&p.tasks[task]));
   part.task = {words.x, words.y, words.z, static_cast<std::uint16_t>(words.w & 0xffffu),
                static_cast<std::uint16_t>(words.w >> 16)};
   part.in_tile_x = part.part % parts_across * part_size_px + column_in_part(lane);
@@ -146,19 +146,14 @@ __device__ void store(const BlendParams& p, const Part& part, const Pixels& pixe
   for (int i = 0; i < pixels_per_lane; ++i) {
     const int y = part.y_px + i * rows_per_pass;
     if (part.task.slices > 1) {
-      const std::size_t at = (static_cast<std::size_t>(part.task_index) * tile_size_px +
-                              part.in_tile_y + i * rows_per_pass) *
+      const std::size_t at = (static_cast<std::size_t>(part.slice) * tile_size_px + part.in_tile_y +
+                              i * rows_per_pass) *
                                  tile_size_px +
                              part.in_tile_x;
       const math::Vec3<float>& c = pixels[i].colour;
-      p.slice_pixels[at] = make_float4(c.x, c.y, c.z, fabsf(pixels[i].transmittance));
-    } else if (part.x_px < p.shape.width_px && y < p.shape.height_px) {
-      const auto shown =
-          math::resolve<float>(pixels[i], {p.background.x, p.background.y, p.background.z});
-      float* out = p.rgb + 3 * (static_cast<std::size_t>(y) * p.shape.width_px + part.x_px);
-      out[0] = shown.x;
-      out[1] = shown.y;
-      out[2] = shown.z;
+      p.slice_pixels[at] = make_float4(c.x, c.y, c.z, pixels[i].transmittance);
+    } else {
+      show_pixel(p.rgb, p.shape, part.x_px, y, pixels[i], p.background);
     }
   }
 }
@@ -209,15 +204,14 @@ __device__ void blend_part(const BlendParams& p, StagedSplats& staged, const Par
   const std::uint32_t last = part.task.last;
   std::uint32_t first = part.task.first;
   unsigned long long pairs = 0;
+  const auto behind_finished = [&] {
+    // Half of it, so that rounding cannot make the composite want what was not blended.
+    return part.task.slice > 0 && transmittance_before(p, part.slice, part.task.slice, part.part) <
+                                      0.5f * static_cast<float>(transmittance_min);
+  };
+  if (behind_finished()) return;  // nobody will ask for this part of the slice
   // Two loads are in flight while a group is blended: the next group's records, and the slots of
   // the one after it.
-  const auto hidden = [&] {
-    // Half of it, so that rounding cannot make the composite want what was not blended.
-    return part.task.slice > 0 &&
-           transmittance_before(p, part.task_index, part.task.slice, part.part) <
-               0.5f * static_cast<float>(transmittance_min);
-  };
-  live = live && !hidden();
   const Loaded nothing{make_float4(0.0f, 0.0f, 1.0f, 0.0f), make_float4(1.0f, never, 0.0f, 0.0f)};
   Loaded next = nothing;
   if (first + lane < last) next = load(p.records, p.slot[first + lane]);
@@ -237,20 +231,19 @@ __device__ void blend_part(const BlendParams& p, StagedSplats& staged, const Par
 #pragma unroll
     for (int i = 0; i < pixels_per_lane; ++i) lane_live |= pixels[i].transmittance > 0.0f;
     live = __any_sync(~0u, lane_live);
-    if (group % 4 == 3) live = live && !hidden();
+    if (group % 4 == 3 && behind_finished()) break;
   }
   if (count_pairs) atomicAdd(&p.counts->blended_pairs, pairs);
   store(p, part, pixels);
 
   const std::uint32_t consumed = min(first, last);
-  float largest = 0.0f;
+  float largest = 0.0f;  // of pixels that are not finished: nothing behind shows in those that are
 #pragma unroll
-  for (int i = 0; i < pixels_per_lane; ++i)
-    largest = fmaxf(largest, fabsf(pixels[i].transmittance));
+  for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, pixels[i].transmittance);
   largest = __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(largest)));
   if (lane != 0) return;
   if (part.task.slices > 1) {
-    const std::uint32_t at = part.task_index * parts_per_tile + part.part;
+    const std::uint32_t at = part.slice * parts_per_tile + part.part;
     p.consumed[at] = consumed;
     volatile float* known = p.slice_transmittance;
     known[at] = largest;

@@ -4,7 +4,8 @@
 
 namespace catgs::cuda {
 
-/// A run of one tile's list that is blended on its own. A tile that is not split is one task.
+/// A run of one tile's list that is blended on its own: task t is the whole of tile t where that is
+/// not split, task shape.tiles() + s is slice s of those that are.
 struct BlendTask {
   std::uint32_t tile;
   std::uint32_t first, last;  // list entries [first, last)
@@ -23,17 +24,20 @@ struct BlendParams {
   FrameShape shape;
   const SplatRecord* records;
   const std::uint32_t* slot;   // [list_bound], sorted by tile, front to back within one
-  const BlendTask* tasks;      // [task_bound]
-  const std::uint32_t* queue;  // [queue_bound], tasks by class
+  const BlendTask* tasks;      // [task_bound(shape)]
+  const std::uint32_t* queue;  // [queue_bound(shape)], tasks by class
   float3 background;
-  float* rgb;                  // [height][width][3], display-referred, in [0, 1]
-  float4* slice_pixels;        // [task_bound][tile_size_px^2], colour and transmittance of slices
-  std::uint32_t* consumed;     // [task_bound][parts_per_tile], one past the last entry looked at
-  float* slice_transmittance;  // [task_bound][parts_per_tile], 1, then what a slice leaves at most
-  std::uint32_t* reach;        // [tiles], zeroed; how much of its list a whole tile looked at
-  FrameCounts* counts;         // next_part is consumed; blended_pairs is set when counted
-  bool count_pairs;            // slower
-  int warps;                   // that the device holds at a time, by blend_warps()
+  float* rgb;  // [height][width][3], display-referred, in [0, 1]
+  // Of slices: their pixels [slice_bound][tile_size_px^2], colour and transmittance as in
+  // math::PixelState; and [slice_bound][parts_per_tile], one past the last entry looked at, and 1,
+  // then the largest transmittance that a slice leaves to what lies behind.
+  float4* slice_pixels;
+  std::uint32_t* consumed;
+  float* slice_transmittance;
+  std::uint32_t* reach;  // [tiles], zeroed; how much of its list a whole tile looked at
+  FrameCounts* counts;   // next_part is consumed; blended_pairs is set when counted
+  bool count_pairs;      // slower
+  int warps;             // that the device holds at a time, by blend_warps()
 };
 
 /// Warps of the blend kernel that fit on the current device at a time.

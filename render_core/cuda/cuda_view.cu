@@ -16,43 +16,56 @@
 
 namespace catgs::cuda {
 
-ListBounds::ListBounds(std::uint32_t gaussians, std::uint64_t list_limit)
-    : gaussians_(gaussians),
-      list_limit_(std::clamp<std::uint64_t>(list_limit, 1, list_entries_limit)),
-      visible_(gaussians / 4 + 1),
-      list_(
-          static_cast<std::uint32_t>(std::min<std::uint64_t>(gaussians + 65536ull, list_limit_))) {}
+Room::Room(std::uint64_t first_guess, std::uint64_t limit)
+    : limit_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(limit, 1, list_entries_limit))),
+      size_(static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guess, limit_))) {}
 
-void ListBounds::apply(FrameShape& shape) const {
-  shape.visible_bound = visible_;
-  shape.list_bound = list_;
+std::uint32_t Room::with_margin(std::uint32_t needed) const {
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(std::uint64_t{needed} + needed / 8 + 4096, limit_));
 }
 
-bool ListBounds::outgrown_by(const FrameCounts& counts) {
+bool Room::outgrown_by(std::uint32_t needed) {
   constexpr std::uint32_t patience = 600;
-  const auto with_margin = [](std::uint32_t needed, std::uint64_t limit) {
-    return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(std::uint64_t{needed} + needed / 8 + 4096, limit));
-  };
-  const auto grow = [&](std::uint32_t& bound, std::uint32_t needed, std::uint64_t limit) {
-    const std::uint32_t wanted = with_margin(needed, limit);
-    if (needed <= bound || wanted <= bound) return false;
-    bound = wanted;
-    return true;
-  };
-  const bool more_visible = grow(visible_, counts.visible, gaussians_);
-  const bool longer_lists = grow(list_, counts.list_entries, list_limit_);
-
-  most_visible_ = std::max(most_visible_, counts.visible);
-  most_list_ = std::max(most_list_, counts.list_entries);
-  if (most_visible_ > visible_ / 2 || most_list_ > list_ / 2) {
-    wide_frames_ = most_visible_ = most_list_ = 0;
+  const bool grows = needed > size_ && size_ < limit_;
+  if (grows) size_ = with_margin(needed);
+  most_ = std::max(most_, needed);
+  if (most_ > size_ / 2) {
+    wide_frames_ = most_ = 0;
   } else if (++wide_frames_ >= patience) {
-    visible_ = with_margin(most_visible_, gaussians_);
-    list_ = with_margin(most_list_, list_limit_);
-    wide_frames_ = most_visible_ = most_list_ = 0;
+    size_ = with_margin(most_);
+    wide_frames_ = most_ = 0;
   }
+  return grows;
+}
+
+void Room::limit_to(double part) {
+  size_ = limit_ = std::max(1u, static_cast<std::uint32_t>(part * size_));
+}
+
+FrameRoom::FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits)
+    : visible_(gaussians / 4 + 1, gaussians),
+      lists_(gaussians + 65536ull, list_limit),
+      slices_(splits ? 4096 : 0, splits ? list_entries_limit : 0) {}
+
+void FrameRoom::apply(FrameShape& shape) const {
+  shape.visible_bound = visible_.size();
+  shape.list_bound = lists_.size();
+  shape.slice_bound = std::min(slices_.size(), most_slices(shape));
+}
+
+bool FrameRoom::outgrown_by(const FrameCounts& counts) {
+  slices_.outgrown_by(counts.wanted_slices);  // without them a frame is slower, not wrong
+  const bool more_visible = visible_.outgrown_by(counts.visible);
+  const bool longer_lists = lists_.outgrown_by(counts.list_entries);
   return more_visible || longer_lists;
+}
+
+bool FrameRoom::retreat() {
+  constexpr std::uint32_t little = 1u << 16;
+  if (lists_.size() <= little) return false;
+  for (Room* room : {&visible_, &lists_, &slices_}) room->limit_to(0.75);
+  return true;
 }
 
 namespace {
@@ -70,7 +83,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
     : scene_(std::move(scene)),
       device_(device),
       settings_(settings),
-      bounds_(scene_->arrays().count, settings.max_list_entries),
+      room_(first_room()),
       processors_(processors_of(device)),
       blend_warps_(blend_warps()),
       groups_(settings.speculation) {}
@@ -92,15 +105,24 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
     frame = finished(plan);
     return {};
   } catch (const CudaError& error) {
-    // Buffers that could not grow are gone, and with them what frames shared.
-    groups_.forget();
-    bounds_ = ListBounds(scene_->arrays().count, settings_.max_list_entries);
-    reach_known_ = false;
+    forget_frames();
     return {error.status_code(), error.what()};
   } catch (const std::exception& error) {
-    groups_.forget();
+    forget_frames();
     return {RenderStatus::Code::device_failed, error.what()};
   }
+}
+
+/// After a failure: buffers that could not grow are gone, and with them what frames shared.
+void CudaView::forget_frames() {
+  groups_.forget();
+  room_ = first_room();
+  shape_ = {};
+  reach_known_ = false;
+}
+
+FrameRoom CudaView::first_room() const {
+  return {scene_->arrays().count, settings_.max_list_entries, settings_.split_tasks};
 }
 
 void CudaView::set_shape(glm::ivec2 size_px) {
@@ -109,7 +131,23 @@ void CudaView::set_shape(glm::ivec2 size_px) {
   shape_.height_px = size_px.y;
   shape_.tiles_x = (size_px.x + tile_size_px - 1) / tile_size_px;
   shape_.tiles_y = (size_px.y + tile_size_px - 1) / tile_size_px;
-  bounds_.apply(shape_);
+  room_.apply(shape_);
+}
+
+/// Sets the frame's shape and makes room for it; where the device has too little memory, for a part
+/// of its lists, the nearest.
+void CudaView::make_room(glm::ivec2 size_px) {
+  for (;;) {
+    set_shape(size_px);
+    try {
+      return memory_.reserve(shape_, scene_->arrays().count, settings_);
+    } catch (const CudaError& error) {
+      const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
+      if (!short_of_memory || !room_.retreat()) throw;
+      memory_ = {};
+      reach_known_ = false;
+    }
+  }
 }
 
 void CudaView::mark(Stage stage) {
@@ -122,8 +160,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   const FrameCameras cameras{now, sweeps ? make_camera_pair(plan.window_end).single : now.single};
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
   do {
-    set_shape(request.camera.size_px);
-    memory_.reserve(shape_, scene_->arrays().count, settings_);
+    make_room(request.camera.size_px);
     const cudaStream_t stream = stream_.get();
     check(cudaEventRecord(start_.get(), stream), "event");
     check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
@@ -135,7 +172,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
     blend(request);
     deliver();
     reach_known_ = true;
-  } while (bounds_.outgrown_by(*memory_.host_counts.get()));
+  } while (room_.outgrown_by(*memory_.host_counts.get()));
 }
 
 void CudaView::draw_sub(const FrameRequest& request) {
@@ -174,18 +211,18 @@ void CudaView::draw_sub(const FrameRequest& request) {
 
 void CudaView::draw_vanilla(const FrameRequest& request) {
   const glm::vec3& b = request.background;
-  do {
-    set_shape(request.camera.size_px);
-    memory_.reserve_image(shape_, settings_);
-    const cudaStream_t stream = stream_.get();
-    check(cudaEventRecord(start_.get(), stream), "event");
-    check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
-    vanilla_.draw(
-        {&scene_->arrays(), make_camera_pair(request.camera), shape_, make_float3(b.x, b.y, b.z),
-         memory_.rgb.get(), memory_.counts.get(), settings_.count_pairs},
-        [this](Stage stage) { mark(stage); }, stream);
-    deliver();
-  } while (bounds_.outgrown_by(*memory_.host_counts.get()));
+  set_shape(request.camera.size_px);
+  shape_.list_bound = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
+  memory_.reserve_image(shape_, settings_);
+  const cudaStream_t stream = stream_.get();
+  check(cudaEventRecord(start_.get(), stream), "event");
+  check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
+  vanilla_.draw(
+      {&scene_->arrays(), make_camera_pair(request.camera), shape_, make_float3(b.x, b.y, b.z),
+       memory_.rgb.get(), memory_.counts.get(), settings_.count_pairs},
+      [this](Stage stage) { mark(stage); }, stream);
+  deliver();
 }
 
 /// Stages project, bin and most of sort of a key frame.
@@ -206,6 +243,7 @@ void CudaView::list_tiles(const FrameCameras& cameras, bool sweeps, float min_de
   PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
   PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
   sort_by_depth(shape_, m.counts.get(), depth, order, scratch, stream);
+  check(cudaEventRecord(depth_sorted_.get(), stream), "event");
   scan_tile_counts(shape_, m.counts.get(), order.current, m.tile_count.get(), m.first.get(),
                    scratch, stream);
   launch_emit({shape_, m.counts.get(), m.records.get(), order.current, m.first.get(),
@@ -220,10 +258,9 @@ void CudaView::list_tiles(const FrameCameras& cameras, bool sweeps, float min_de
   lists_ = slot.current;
 }
 
-/// The paper's l, of the last frame.
+/// The paper's l, of the last frame; 0: not known.
 std::uint32_t CudaView::slice_length() const {
-  constexpr std::uint32_t first_guess = 512;
-  if (!reach_known_) return first_guess;
+  if (!reach_known_) return 0;
   const std::uint64_t mean = memory_.host_counts.get()->expected_entries / shape_.tiles();
   return std::max(shortest_slice, static_cast<std::uint32_t>(mean));
 }
@@ -231,11 +268,10 @@ std::uint32_t CudaView::slice_length() const {
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
 void CudaView::split(uint2* runs) {
   FrameMemory& m = memory_;
-  launch_split(
-      {shape_, m.range.get(), m.reach.get(), m.tasks.get(), m.tile_tasks.get(), m.queue.get(), runs,
-       odd_sub_frame_ ? reorder_run / 2 : 0, m.slice_transmittance.get(), m.counts.get(),
-       task_bound(shape_), slice_length(), settings_.split_tasks},
-      stream_.get());
+  launch_split({shape_, m.range.get(), m.reach.get(), m.tasks.get(), m.tile_slices.get(),
+                m.queue.get(), runs, odd_sub_frame_ ? reorder_run / 2 : 0,
+                m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
+               stream_.get());
 }
 
 void CudaView::blend(const FrameRequest& request) {
@@ -247,7 +283,7 @@ void CudaView::blend(const FrameRequest& request) {
                 m.rgb.get(), m.slice_pixels.get(), m.consumed.get(), m.slice_transmittance.get(),
                 m.reach.get(), m.counts.get(), settings_.count_pairs, blend_warps_},
                stream);
-  launch_composite({shape_, m.tasks.get(), m.tile_tasks.get(), m.slice_pixels.get(),
+  launch_composite({shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(),
                     m.consumed.get(), background, m.rgb.get(), m.reach.get()},
                    stream);
   mark(Stage::blend);
@@ -315,6 +351,8 @@ FrameView CudaView::finished(const FramePlan& plan) {
   stats.visible = counts.visible;
   stats.list_entries = std::min(counts.list_entries, shape_.list_bound);
   stats.overflowed_entries = counts.list_entries - stats.list_entries;
+  if (settings_.pipeline != Pipeline::vanilla)
+    stats.overflowed_entries += counts.visible - std::min(counts.visible, shape_.visible_bound);
   stats.list_max = counts.list_max;
   for (const std::uint32_t queued : counts.queued) stats.tasks += queued;
   stats.blended_pairs = counts.blended_pairs;
@@ -327,6 +365,16 @@ FrameView CudaView::finished(const FramePlan& plan) {
   for (std::size_t i = 0; i < stage_count; ++i) {
     check(cudaEventElapsedTime(&stats.stage_ms[i], before, after_[i].get()), "stage time");
     before = after_[i].get();
+  }
+  if (settings_.pipeline != Pipeline::vanilla && plan.kind == FrameKind::key) {
+    // Tiles are binned in depth order, so that a part of sorting comes first.
+    float depth_sort_ms = 0.0f;
+    check(
+        cudaEventElapsedTime(&depth_sort_ms, after_[static_cast<std::size_t>(Stage::project)].get(),
+                             depth_sorted_.get()),
+        "stage time");
+    stats.stage_ms[static_cast<std::size_t>(Stage::bin)] -= depth_sort_ms;
+    stats.stage_ms[static_cast<std::size_t>(Stage::sort)] += depth_sort_ms;
   }
   return frame;
 }

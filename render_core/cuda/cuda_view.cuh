@@ -12,25 +12,42 @@
 
 namespace catgs::cuda {
 
-/// How much room lists get. The host does not wait for counts within a frame: it allots by what
-/// frames needed before, with a margin since the padding up to a bound is sorted too, and draws a
-/// frame again that needed more.
-class ListBounds {
+/// Room for one kind of things, whose need is known only after a frame: what frames needed before,
+/// and a margin. Room that is far too wide for long comes down.
+class Room {
  public:
-  /// `list_limit`: most entries of all tile lists.
-  ListBounds(std::uint32_t gaussians, std::uint64_t list_limit);
+  Room(std::uint64_t first_guess, std::uint64_t limit);
 
-  void apply(FrameShape& shape) const;
-  /// After a key frame: whether it needed more room than it had and can have; then the bounds have
-  /// grown. Bounds that are far too wide for long come down.
-  bool outgrown_by(const FrameCounts& counts);
+  [[nodiscard]] std::uint32_t size() const { return size_; }
+  /// After a key frame: whether it needed more than there is and can be; then the room has grown.
+  bool outgrown_by(std::uint32_t needed);
+  /// Never more than now, or a part of it.
+  void limit_to(double part);
 
  private:
-  std::uint32_t gaussians_;
-  std::uint64_t list_limit_;
-  std::uint32_t visible_, list_;
-  std::uint32_t wide_frames_ = 0;  // key frames since less than half of it was needed
-  std::uint32_t most_visible_ = 0, most_list_ = 0;  // in these
+  [[nodiscard]] std::uint32_t with_margin(std::uint32_t needed) const;
+
+  std::uint32_t limit_, size_;
+  std::uint32_t wide_frames_ = 0;  // key frames since half of it was needed
+  std::uint32_t most_ = 0;         // needed in these
+};
+
+/// How much room the frames of a View get. The host does not wait for counts within a frame: it
+/// allots by what frames needed before (not more, since the padding up to a bound is sorted too),
+/// and draws a frame again that needed more.
+class FrameRoom {
+ public:
+  /// `list_limit`: most entries of all tile lists.
+  FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits);
+
+  void apply(FrameShape& shape) const;
+  /// After a key frame: whether it lacked room and should be drawn again.
+  bool outgrown_by(const FrameCounts& counts);
+  /// The device has no memory for this much: less from now on. False when it is little already.
+  bool retreat();
+
+ private:
+  Room visible_, lists_, slices_;
 };
 
 class CudaView final : public View {
@@ -44,7 +61,10 @@ class CudaView final : public View {
   }
 
  private:
+  [[nodiscard]] FrameRoom first_room() const;
   void set_shape(glm::ivec2 size_px);
+  void make_room(glm::ivec2 size_px);
+  void forget_frames();
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   void draw_sub(const FrameRequest& request);
   void draw_vanilla(const FrameRequest& request);
@@ -62,8 +82,9 @@ class CudaView final : public View {
   Stream stream_;
   Event start_;
   Event after_[stage_count];
+  Event depth_sorted_;
   FrameShape shape_;
-  ListBounds bounds_;
+  FrameRoom room_;
   FrameMemory memory_;
   VanillaPipeline vanilla_;
   int processors_;

@@ -47,8 +47,7 @@ auto bits_of(const std::uint32_t* mask) { return thrust::make_transform_iterator
 }  // namespace
 
 std::uint32_t cull_words(std::uint32_t count) {
-  const std::uint32_t blocks = (count + block_size - 1) / block_size;
-  return blocks * (block_size / warp_size);
+  return blocks_for(count, block_size) * (block_size / warp_size);
 }
 
 std::size_t cull_scratch_bytes(std::uint32_t count) {

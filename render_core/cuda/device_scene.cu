@@ -59,6 +59,9 @@ DeviceScene::DeviceScene(const GaussianCloud& cloud) {
     std::transform(in, in + floats, reinterpret_cast<__half*>(out),
                    [](float value) { return __float2half_rn(value); });
   });
+  // Copies from pageable memory may return before they end, and Views' streams do not wait for
+  // them.
+  check(cudaStreamSynchronize(cudaStreamLegacy), "scene upload");
   arrays_ = {static_cast<std::uint32_t>(n),
              cloud.sh_degree,
              stride,

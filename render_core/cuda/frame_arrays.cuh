@@ -36,10 +36,11 @@ struct FrameCounts {
   std::uint32_t list_max = 0;  // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
   std::uint32_t runs = 0;                    // of the reorder stage
-  std::uint32_t allocated_tasks = 0;         // while they are being made
-  std::uint32_t next_part = 0;               // of a task, that no warp of the blend has taken yet
-  unsigned long long expected_entries = 0;   // list entries that tiles are expected to look at
-  unsigned long long blended_pairs = 0;      // only when counted
+  std::uint32_t wanted_slices = 0;           // of long tiles; allocated_slices found room
+  std::uint32_t allocated_slices = 0;
+  std::uint32_t next_part = 0;              // of a task, that no warp of the blend has taken yet
+  unsigned long long expected_entries = 0;  // list entries that tiles are expected to look at
+  unsigned long long blended_pairs = 0;     // only when counted
 };
 
 /// Tiles of the image and the bounds of the frame's buffers.
@@ -48,6 +49,7 @@ struct FrameShape {
   int tiles_x = 0, tiles_y = 0;
   std::uint32_t visible_bound = 0;  // room for visible Gaussians
   std::uint32_t list_bound = 0;     // room for list entries
+  std::uint32_t slice_bound = 0;    // room for slices of long tiles
 
   __host__ __device__ std::uint32_t tiles() const {
     return static_cast<std::uint32_t>(tiles_x) * static_cast<std::uint32_t>(tiles_y);
@@ -55,6 +57,10 @@ struct FrameShape {
 };
 
 constexpr int warp_size = 32;
+
+constexpr std::uint32_t blocks_for(std::uint32_t threads, std::uint32_t block_size) {
+  return (threads + block_size - 1) / block_size;
+}
 
 /// Sums of list entries saturate here, so that 32 bits hold them whatever a scene asks for.
 constexpr std::uint32_t list_entries_limit = std::uint32_t{1} << 31;

@@ -16,7 +16,7 @@ void FrameMemory::reserve(const FrameShape& shape, std::uint32_t gaussians,
   spans.reserve(shape.visible_bound);
   if (settings.pipeline == Pipeline::catgs) {
     path.reserve(shape.visible_bound);
-    runs.reserve(run_bound(shape));
+    if (settings.order == BlendOrder::fresh) runs.reserve(run_bound(shape));
   }
   tile_count.reserve(shape.visible_bound);
   first.reserve(shape.visible_bound);
@@ -27,13 +27,13 @@ void FrameMemory::reserve(const FrameShape& shape, std::uint32_t gaussians,
     slot[i].reserve(shape.list_bound);
   }
   range.reserve(shape.tiles());
-  const std::size_t most_tasks = task_bound(shape);
-  tasks.reserve(most_tasks);
+  tasks.reserve(task_bound(shape));
   queue.reserve(queue_bound(shape));
-  tile_tasks.reserve(shape.tiles());
-  consumed.reserve(most_tasks * parts_per_tile);
-  slice_transmittance.reserve(most_tasks * parts_per_tile);
-  slice_pixels.reserve(most_tasks * tile_size_px * tile_size_px);
+  tile_slices.reserve(shape.tiles());
+  const std::size_t slices = shape.slice_bound;
+  consumed.reserve(slices * parts_per_tile);
+  slice_transmittance.reserve(slices * parts_per_tile);
+  slice_pixels.reserve(slices * tile_size_px * tile_size_px);
   reach.reserve(shape.tiles());
   scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(gaussians)));
   reserve_image(shape, settings);
@@ -54,7 +54,7 @@ void FrameMemory::reserve_image(const FrameShape& shape, const ViewSettings& set
 
 std::size_t FrameMemory::bytes() const {
   return cull_mask.bytes() + cull_before.bytes() + visible.bytes() + tasks.bytes() + queue.bytes() +
-         tile_tasks.bytes() + spans.bytes() + path.bytes() + runs.bytes() + consumed.bytes() +
+         tile_slices.bytes() + spans.bytes() + path.bytes() + runs.bytes() + consumed.bytes() +
          slice_transmittance.bytes() + slice_pixels.bytes() + reach.bytes() + records.bytes() +
          tile_count.bytes() + first.bytes() + depth[0].bytes() + depth[1].bytes() +
          order[0].bytes() + order[1].bytes() + tile[0].bytes() + tile[1].bytes() + slot[0].bytes() +

@@ -20,7 +20,7 @@ struct FrameMemory {
   DeviceBuffer<uint2> range;
   DeviceBuffer<BlendTask> tasks;
   DeviceBuffer<std::uint32_t> queue, consumed, reach;
-  DeviceBuffer<uint2> tile_tasks, runs;
+  DeviceBuffer<uint2> tile_slices, runs;
   DeviceBuffer<float> slice_transmittance;
   DeviceBuffer<float4> slice_pixels;
   DeviceBuffer<FrameCounts> counts;

@@ -51,7 +51,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
 }  // namespace
 
 void launch_project(const ProjectParams& params, Listing listing, cudaStream_t stream) {
-  const std::uint32_t blocks = (params.shape.visible_bound + block_size - 1) / block_size;
+  const std::uint32_t blocks = blocks_for(params.shape.visible_bound, block_size);
   const auto kernel = listing == Listing::none       ? project_kernel<Listing::none>
                       : listing == Listing::ellipses ? project_kernel<Listing::ellipses>
                                                      : project_kernel<Listing::trails>;

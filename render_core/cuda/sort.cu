@@ -16,8 +16,6 @@ constexpr int block_size = 256;
 constexpr std::uint32_t last_key = (1u << (depth_bits + depth_bits_below)) - 1u;
 constexpr int depth_end_bit = depth_bits_below + depth_bits;
 
-std::uint32_t blocks_for(std::uint32_t count) { return (count + block_size - 1) / block_size; }
-
 __global__ void prepare_depth_sort(const FrameCounts* counts, std::uint32_t bound,
                                    std::uint32_t* depth, std::uint32_t* order) {
   const std::uint32_t k = blockIdx.x * block_size + threadIdx.x;
@@ -77,7 +75,7 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
 void sort_by_depth(const FrameShape& shape, const FrameCounts* counts,
                    PingPong<std::uint32_t>& depth, PingPong<std::uint32_t>& order,
                    SortScratch scratch, cudaStream_t stream) {
-  prepare_depth_sort<<<blocks_for(shape.visible_bound), block_size, 0, stream>>>(
+  prepare_depth_sort<<<blocks_for(shape.visible_bound, block_size), block_size, 0, stream>>>(
       counts, shape.visible_bound, depth.current, order.current);
   check_launch("depth sort padding");
   cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
@@ -113,18 +111,23 @@ void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
   slot = {values.Current(), values.Alternate()};
 }
 
-std::size_t key_sort_scratch_bytes(std::uint32_t count, const FrameShape& shape) {
-  std::size_t scan = 0, sort = 0;
-  cub::DoubleBuffer<std::uint64_t> keys;
-  cub::DoubleBuffer<std::uint32_t> values;
+std::size_t sum_scratch_bytes(std::uint32_t count) {
+  std::size_t bytes = 0;
   check(
-      cub::DeviceScan::InclusiveScan(nullptr, scan, static_cast<const std::uint32_t*>(nullptr),
+      cub::DeviceScan::InclusiveScan(nullptr, bytes, static_cast<const std::uint32_t*>(nullptr),
                                      static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, count),
       "tile count sum size");
-  check(cub::DeviceRadixSort::SortPairs(nullptr, sort, keys, values, shape.list_bound, 0,
+  return bytes;
+}
+
+std::size_t key_sort_scratch_bytes(std::uint32_t entries, const FrameShape& shape) {
+  std::size_t bytes = 0;
+  cub::DoubleBuffer<std::uint64_t> keys;
+  cub::DoubleBuffer<std::uint32_t> values;
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, entries, 0,
                                         32 + tile_bits(shape)),
         "key sort size");
-  return std::max(scan, sort);
+  return bytes;
 }
 
 void sum_tile_counts(std::uint32_t count, const std::uint32_t* tile_count, std::uint32_t* sums,
@@ -134,12 +137,12 @@ void sum_tile_counts(std::uint32_t count, const std::uint32_t* tile_count, std::
         "tile count sum");
 }
 
-void sort_by_key(const FrameShape& shape, PingPong<std::uint64_t>& key,
+void sort_by_key(std::uint32_t entries, const FrameShape& shape, PingPong<std::uint64_t>& key,
                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<std::uint64_t> keys(key.current, key.other);
   cub::DoubleBuffer<std::uint32_t> values(slot.current, slot.other);
-  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
-                                        shape.list_bound, 0, 32 + tile_bits(shape), stream),
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, entries, 0,
+                                        32 + tile_bits(shape), stream),
         "key sort");
   key = {keys.Current(), keys.Alternate()};
   slot = {values.Current(), values.Alternate()};

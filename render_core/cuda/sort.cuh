@@ -52,11 +52,12 @@ void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
                   PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
 
 /// For the original's way: sums[i] = tile_count[0] + … + tile_count[i], and list entries by 64-bit
-/// (tile | depth) keys. Keys beyond the count must be all ones.
-std::size_t key_sort_scratch_bytes(std::uint32_t count, const FrameShape& shape);
+/// (tile | depth) keys.
+std::size_t sum_scratch_bytes(std::uint32_t count);
+std::size_t key_sort_scratch_bytes(std::uint32_t entries, const FrameShape& shape);
 void sum_tile_counts(std::uint32_t count, const std::uint32_t* tile_count, std::uint32_t* sums,
                      SortScratch scratch, cudaStream_t stream);
-void sort_by_key(const FrameShape& shape, PingPong<std::uint64_t>& key,
+void sort_by_key(std::uint32_t entries, const FrameShape& shape, PingPong<std::uint64_t>& key,
                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
 
 }  // namespace catgs::cuda

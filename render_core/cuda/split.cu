@@ -2,14 +2,14 @@
 #include <cub/block/block_scan.cuh>
 
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/split.cuh"
-#include "render_core/math/blend-inl.h"
 
 namespace catgs::cuda {
 namespace {
 
 constexpr int split_block = 256;
-constexpr std::uint32_t most_slices = 1024;
+constexpr std::uint32_t most_slices_per_tile = 1024;
 
 /// How a tile is cut.
 struct Cut {
@@ -17,33 +17,55 @@ struct Cut {
   std::uint32_t expected;  // list entries that it will look at
   std::uint32_t slices;    // of these
   std::uint32_t reserve;   // slices of what lies behind them
+
+  __device__ std::uint32_t listed() const { return range.y - range.x; }
+  /// Slices that need room: a whole tile needs none.
+  __device__ std::uint32_t stored() const { return slices + reserve > 1 ? slices + reserve : 0; }
+  __device__ Cut without_reserve() const { return {range, expected, slices, 0}; }
+  __device__ Cut whole() const { return {range, listed(), 1, 0}; }
 };
 
 __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
-  const uint2 range = p.range[t];
-  const std::uint32_t listed = range.y - range.x;
-  Cut cut{range, listed, 1, 0};
+  Cut cut{p.range[t], 0, 1, 0};
+  cut = cut.whole();
   if (!p.split) return cut;
+  const std::uint32_t length =
+      p.slice_length > 0
+          ? p.slice_length
+          : max(shortest_slice, min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles());
   const std::uint32_t reach = p.reach[t];
-  if (reach < listed) cut.expected = min(listed, reach + reach / 4 + 2 * warp_size);
-  if (cut.expected > 2 * p.slice_length)
-    cut.slices = min((cut.expected + p.slice_length - 1) / p.slice_length, most_slices);
-  const std::uint32_t rest = listed - cut.expected;
-  if (rest > 4 * p.slice_length)
-    cut.reserve = min((rest + 2 * p.slice_length - 1) / (2 * p.slice_length), most_slices);
+  if (reach < cut.listed()) cut.expected = min(cut.listed(), reach + reach / 4 + 2 * warp_size);
+  if (cut.expected > 2 * length)
+    cut.slices = min((cut.expected + length - 1) / length, most_slices_per_tile);
+  const std::uint32_t rest = cut.listed() - cut.expected;
+  if (rest > 4 * length)
+    cut.reserve = min((rest + 2 * length - 1) / (2 * length), most_slices_per_tile);
   return cut;
 }
 
 /// What the block's earlier threads, or all of them, take up.
 struct Places {
-  std::uint32_t tasks, runs;
+  std::uint32_t slices, slices_without_reserve, runs;
 };
 
 struct AddPlaces {
   __device__ Places operator()(const Places& a, const Places& b) const {
-    return {a.tasks + b.tasks, a.runs + b.runs};
+    return {a.slices + b.slices, a.slices_without_reserve + b.slices_without_reserve,
+            a.runs + b.runs};
   }
 };
+
+/// Room for `count` slices, or false.
+__device__ bool allocate(const SplitParams& p, std::uint32_t count, std::uint32_t& first) {
+  std::uint32_t* allocated = &p.counts->allocated_slices;
+  std::uint32_t seen = *const_cast<const volatile std::uint32_t*>(allocated);
+  while (count <= p.shape.slice_bound - seen) {
+    first = seen;
+    seen = atomicCAS(allocated, seen, seen + count);
+    if (seen == first) return true;
+  }
+  return false;
+}
 
 /// Slices of a tile that stand in one class of the queue.
 __device__ std::uint32_t queued_in(int queue_class, const Cut& cut) {
@@ -56,7 +78,7 @@ __device__ void write_runs(const SplitParams& p, const Cut& cut, std::uint32_t a
   if (p.runs == nullptr) return;
   for (std::uint32_t begin = 0; begin < cut.expected; ++at) {
     const std::uint32_t end =
-        min(begin + reorder_run - (begin == 0 ? p.run_shift : 0), cut.range.y - cut.range.x);
+        min(begin + reorder_run - (begin == 0 ? p.run_shift : 0), cut.listed());
     p.runs[at] = make_uint2(cut.range.x + begin, cut.range.x + end);
     begin = end;
   }
@@ -68,10 +90,12 @@ __device__ std::uint32_t runs_of(const SplitParams& p, const Cut& cut) {
              : (cut.expected + p.run_shift + reorder_run - 1) / reorder_run;
 }
 
+/// `first`: the tile's first slice, if it has any; `place`: its first in each class of the queue.
 __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cut,
                             std::uint32_t first, const std::uint32_t (&place)[queue_classes]) {
   const std::uint32_t slices = cut.slices + cut.reserve;
-  const std::uint32_t rest = cut.range.y - cut.range.x - cut.expected;
+  const std::uint32_t rest = cut.listed() - cut.expected;
+  const std::uint32_t first_task = slices > 1 ? p.shape.tiles() + first : t;
   const auto begin_of = [&](std::uint32_t s) {
     const bool expected = s < cut.slices || cut.reserve == 0;
     const std::uint64_t length = expected ? cut.expected : rest;
@@ -81,50 +105,59 @@ __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cu
            static_cast<std::uint32_t>(length * k / of);
   };
   for (std::uint32_t s = 0; s < slices; ++s) {
-    p.tasks[first + s] = {t, begin_of(s), s + 1 == slices ? cut.range.y : begin_of(s + 1),
-                          static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(slices)};
+    p.tasks[first_task + s] = {t, begin_of(s), s + 1 == slices ? cut.range.y : begin_of(s + 1),
+                               static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(slices)};
     for (int part = 0; part < parts_per_tile && slices > 1; ++part)
       p.slice_transmittance[(first + s) * parts_per_tile + part] = 1.0f;
     const bool in_last = s >= cut.slices || s + 1 >= queue_classes;
     const std::uint32_t c = in_last ? queue_classes - 1 : s;
     const std::uint32_t earlier = in_last ? s - min(cut.slices, queue_classes - 1u) : 0;
-    p.queue[c * p.shape.tiles() + place[c] + earlier] = first + s;
+    p.queue[c * p.shape.tiles() + place[c] + earlier] = first_task + s;
   }
+}
+
+/// Finds room for the slices of the block's tiles: of all, of those that will be looked at, or of
+/// none; `cut` is what remains of this thread's tile. Returns its first slice.
+__device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places& before,
+                                   const Places& all) {
+  enum class Room { all, without_reserve, none };
+  __shared__ Room room;
+  __shared__ std::uint32_t first_in_block;
+  if (threadIdx.x == 0) {
+    atomicAdd(&p.counts->wanted_slices, all.slices);
+    room = allocate(p, all.slices, first_in_block)                   ? Room::all
+           : allocate(p, all.slices_without_reserve, first_in_block) ? Room::without_reserve
+                                                                     : Room::none;
+  }
+  __syncthreads();
+  if (room == Room::all) return first_in_block + before.slices;
+  cut = room == Room::none ? cut.whole() : cut.without_reserve();
+  return first_in_block + before.slices_without_reserve;
 }
 
 __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p) {
   using Scan = cub::BlockScan<Places, split_block>;
   __shared__ Scan::TempStorage scratch;
   __shared__ std::uint32_t queued[queue_classes];  // by the block, then before the block
-  __shared__ Places first_in_block;
-  __shared__ bool fits;
+  __shared__ std::uint32_t first_run;
   const std::uint32_t tiles = p.shape.tiles();
   const std::uint32_t t = blockIdx.x * split_block + threadIdx.x;
   const bool present = t < tiles;
   Cut cut = present ? cut_of(p, t) : Cut{};
   Places before{}, all{};
-  Scan(scratch).ExclusiveScan({cut.slices + cut.reserve, runs_of(p, cut)}, before, Places{},
-                              AddPlaces{}, all);
+  Scan(scratch).ExclusiveScan({cut.stored(), cut.without_reserve().stored(), runs_of(p, cut)},
+                              before, Places{}, AddPlaces{}, all);
   if (threadIdx.x < queue_classes) queued[threadIdx.x] = 0;
-  if (threadIdx.x == 0) {
-    // The last `tiles` places are kept for blocks whose slices find no room: each tile has one.
-    first_in_block = {atomicAdd(&p.counts->allocated_tasks, all.tasks),
-                      atomicAdd(&p.counts->runs, all.runs)};
-    fits = first_in_block.tasks + all.tasks <= p.task_bound - tiles;
-  }
+  if (threadIdx.x == 0) first_run = atomicAdd(&p.counts->runs, all.runs);
   const unsigned long long expected = __reduce_add_sync(~0u, cut.expected);
-  const std::uint32_t longest = __reduce_max_sync(~0u, cut.range.y - cut.range.x);
+  const std::uint32_t longest = __reduce_max_sync(~0u, cut.listed());
   if (threadIdx.x % warp_size == 0) {
     atomicAdd(&p.counts->expected_entries, expected);
     atomicMax(&p.counts->list_max, longest);
   }
   __syncthreads();
-  if (present) write_runs(p, cut, first_in_block.runs + before.runs);
-  std::uint32_t first = first_in_block.tasks + before.tasks;
-  if (present && !fits) {
-    cut = {cut.range, cut.range.y - cut.range.x, 1, 0};
-    first = p.task_bound - tiles + t;
-  }
+  if (present) write_runs(p, cut, first_run + before.runs);
+  const std::uint32_t first = make_room(p, cut, before, all);
   std::uint32_t place[queue_classes];
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) {
@@ -139,7 +172,7 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) place[c] += queued[c];
   p.reach[t] = 0;
-  p.tile_tasks[t] = make_uint2(first, cut.slices + cut.reserve);
+  p.tile_slices[t] = make_uint2(first, cut.stored());
   write_tasks(p, t, cut, first, place);
 }
 
@@ -149,46 +182,37 @@ __global__ void __launch_bounds__(composite_block) composite_kernel(const Compos
   using Reduce = cub::BlockReduce<std::uint32_t, composite_block>;
   __shared__ Reduce::TempStorage scratch;
   const std::uint32_t tile = blockIdx.x;
-  const uint2 tasks = p.tile_tasks[tile];
-  if (tasks.y <= 1) return;
-  const std::uint32_t first = tasks.x, slices = tasks.y;
+  const uint2 slices = p.tile_slices[tile];
+  if (slices.y == 0) return;
   const int in_tile_x = static_cast<int>(threadIdx.x) % tile_size_px;
   const int in_tile_y = static_cast<int>(threadIdx.x) / tile_size_px;
   const int part =
       in_tile_y / part_size_px * (tile_size_px / part_size_px) + in_tile_x / part_size_px;
   math::PixelState<float> pixel = math::empty_pixel<float>();
   std::uint32_t looked_at = 0;
-  for (std::uint32_t task = first; task < first + slices; ++task) {
+  for (std::uint32_t s = slices.x; s < slices.x + slices.y; ++s) {
     const float4 slice =
-        p.slice_pixels[static_cast<std::size_t>(task) * composite_block + threadIdx.x];
+        p.slice_pixels[static_cast<std::size_t>(s) * composite_block + threadIdx.x];
     pixel.colour.x += pixel.transmittance * slice.x;
     pixel.colour.y += pixel.transmittance * slice.y;
     pixel.colour.z += pixel.transmittance * slice.z;
-    pixel.transmittance *= slice.w;
-    looked_at = p.consumed[task * parts_per_tile + part];
-    // Unlike an unsplit tile's, a pixel that finished within a slice goes on: it kept what it let
-    // through then (1e-2 at most), and that much of the later slices shows.
-    if (pixel.transmittance < static_cast<float>(transmittance_min)) break;
+    pixel.transmittance *= fabsf(slice.w);
+    looked_at = p.consumed[s * parts_per_tile + part];
+    const bool finished = signbit(slice.w);
+    if (finished || pixel.transmittance < static_cast<float>(transmittance_min)) break;
   }
   looked_at =
       Reduce(scratch).Reduce(looked_at, [](std::uint32_t a, std::uint32_t b) { return max(a, b); });
-  if (threadIdx.x == 0) p.reach[tile] = looked_at - p.tasks[first].first;
-
-  const int x = static_cast<int>(tile) % p.shape.tiles_x * tile_size_px + in_tile_x;
-  const int y = static_cast<int>(tile) / p.shape.tiles_x * tile_size_px + in_tile_y;
-  if (x >= p.shape.width_px || y >= p.shape.height_px) return;
-  const auto shown = math::resolve<float>(pixel, {p.background.x, p.background.y, p.background.z});
-  float* out = p.rgb + 3 * (static_cast<std::size_t>(y) * p.shape.width_px + x);
-  out[0] = shown.x;
-  out[1] = shown.y;
-  out[2] = shown.z;
+  if (threadIdx.x == 0) p.reach[tile] = looked_at - p.tasks[p.shape.tiles() + slices.x].first;
+  show_pixel(p.rgb, p.shape, static_cast<int>(tile) % p.shape.tiles_x * tile_size_px + in_tile_x,
+             static_cast<int>(tile) / p.shape.tiles_x * tile_size_px + in_tile_y, pixel,
+             p.background);
 }
 
 }  // namespace
 
 void launch_split(const SplitParams& params, cudaStream_t stream) {
-  const std::uint32_t blocks = (params.shape.tiles() + split_block - 1) / split_block;
-  split_kernel<<<blocks, split_block, 0, stream>>>(params);
+  split_kernel<<<blocks_for(params.shape.tiles(), split_block), split_block, 0, stream>>>(params);
   check_launch("split");
 }
 

@@ -12,20 +12,20 @@ namespace catgs::cuda {
 /// and slices of those would be work that an unsplit tile never does. A long rest is cut too, in
 /// slices that are drawn last: most find then that nothing shines through what lies before them.
 /// For the same reason all first slices are queued before all second ones, and so on.
-/// The mean is the last frame's too, so that nothing waits for this one's.
+/// The mean is the last frame's too, so that nothing waits for this one's. Where slices find no
+/// room, tiles go without, first without those of the rest.
 struct SplitParams {
   FrameShape shape;
   const uint2* range;          // [tiles]
   std::uint32_t* reach;        // [tiles], of the last frame (all ones: not known); zeroed here
-  BlendTask* tasks;            // [task_bound]
-  uint2* tile_tasks;           // [tiles], first task and how many
-  std::uint32_t* queue;        // [queue_bound], see FrameCounts
+  BlendTask* tasks;            // [task_bound(shape)]
+  uint2* tile_slices;          // [tiles], first slice and how many; none: one task
+  std::uint32_t* queue;        // [queue_bound(shape)], see FrameCounts
   uint2* runs;                 // [run_bound], for the reorder stage; null: it does not follow
   std::uint32_t run_shift;     // how much shorter a tile's first run is
-  float* slice_transmittance;  // [task_bound][parts_per_tile], set to 1
-  FrameCounts* counts;         // queued, runs, expected_entries and list_max are set
-  std::uint32_t task_bound;    // task_bound(shape); tiles that find no room for slices get none
-  std::uint32_t slice_length;  // l
+  float* slice_transmittance;  // [slice_bound][parts_per_tile], set to 1
+  FrameCounts* counts;         // what split makes is set, and list_max
+  std::uint32_t slice_length;  // l; 0: not known, the mean list is taken
   bool split;                  // else every tile is one task
 };
 void launch_split(const SplitParams& params, cudaStream_t stream);
@@ -33,14 +33,17 @@ void launch_split(const SplitParams& params, cudaStream_t stream);
 /// A slice shorter than this is not worth its own pixels.
 constexpr std::uint32_t shortest_slice = 4 * warp_size;
 
-/// Room for tasks: twice what the paper's rule can ask for, which the slices of long rests share,
-/// and one a tile for blocks of tiles that find none.
-inline std::uint32_t task_bound(const FrameShape& shape) { return 5 * shape.tiles(); }
+inline std::uint32_t task_bound(const FrameShape& shape) {
+  return shape.tiles() + shape.slice_bound;
+}
 
 /// Room for the queue: a place a tile in all classes but the last.
 inline std::uint32_t queue_bound(const FrameShape& shape) {
-  return (queue_classes - 1) * shape.tiles() + task_bound(shape);
+  return (queue_classes - 1) * shape.tiles() + shape.slice_bound;
 }
+
+/// Slices that are worth their pixels: what the paper's rule can ask for, and as much again.
+inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tiles(); }
 
 /// List entries that one warp of the reorder stage takes; the last run of a tile may be shorter.
 constexpr std::uint32_t reorder_run = 512;
@@ -49,11 +52,11 @@ inline std::uint32_t run_bound(const FrameShape& shape) {
 }
 
 /// Folds the slices of split tiles front to back:
-/// C = sum_i C_i prod_{m < i} T_m. Slices behind transmittance_min are not looked at.
+/// C = sum_i C_i prod_{m < i} T_m. Slices behind a finished pixel are not looked at.
 struct CompositeParams {
   FrameShape shape;
   const BlendTask* tasks;
-  const uint2* tile_tasks;
+  const uint2* tile_slices;
   const float4* slice_pixels;
   const std::uint32_t* consumed;
   float3 background;

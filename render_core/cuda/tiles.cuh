@@ -22,18 +22,19 @@ template <class Outline>
 struct TileFootprint {
   Outline outline;
   float2 centre_px;
+  float slack_px;  // that boxes are moved outwards by
   int first_row, last_row;
   FrameShape shape;
 
   /// First and last column of one tile row; empty when first > last. A tile counts when the
   /// rectangle of its pixel centres, as far as they lie in the image, meets the outline.
   __device__ int2 columns(int row) const {
-    constexpr float tile = tile_size_px, slack = listing_slack_px;
+    constexpr float tile = tile_size_px;
     const float top = static_cast<float>(row) * tile + 0.5f;
     const float bottom = fminf(top + (tile - 1.0f), static_cast<float>(shape.height_px) - 0.5f);
     const auto cut = math::columns_in_band(outline, top - centre_px.y, bottom - centre_px.y);
-    const float low = cut.low + centre_px.x - slack;
-    const float high = cut.high + centre_px.x + slack;
+    const float low = cut.low + centre_px.x - slack_px;
+    const float high = cut.high + centre_px.x + slack_px;
     if (cut.low > cut.high || high < 0.5f || low > static_cast<float>(shape.width_px) - 0.5f) {
       return make_int2(0, -1);
     }
@@ -45,9 +46,9 @@ struct TileFootprint {
 
   /// Sets the rows, for an outline that covers `top`…`bottom` (px).
   __device__ void set_rows(float top, float bottom) {
-    constexpr float tile = tile_size_px, slack = listing_slack_px;
-    const float first = ceilf((top - slack - (tile - 0.5f)) * (1.0f / tile));
-    const float last = floorf((bottom + slack - 0.5f) * (1.0f / tile));
+    constexpr float tile = tile_size_px;
+    const float first = ceilf((top - slack_px - (tile - 0.5f)) * (1.0f / tile));
+    const float last = floorf((bottom + slack_px - 0.5f) * (1.0f / tile));
     first_row = static_cast<int>(fmaxf(first, 0.0f));
     last_row = static_cast<int>(fminf(last, static_cast<float>(shape.tiles_y - 1)));
     if (!(first <= last)) last_row = first_row - 1;
@@ -56,13 +57,14 @@ struct TileFootprint {
 
 /// Footprint of a splat as it is now. It reaches nothing when `log2_opacity` is too low.
 __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
-    float2 centre_px, const math::Whitening<float>& w, float log2_opacity,
-    const FrameShape& shape) {
+    float2 centre_px, const math::Whitening<float>& w, float log2_opacity, const FrameShape& shape,
+    float slack_px = listing_slack_px) {
   const float reach = math::reach_of(log2_opacity);
   const math::Vec2<float> half = math::half_extent(w, fmaxf(reach, 0.0f));
   TileFootprint<math::Ellipse<float>> f;
   f.outline = math::make_ellipse(w, reach, half.x, math::rightmost_y(w, fmaxf(reach, 0.0f)));
   f.centre_px = centre_px;
+  f.slack_px = slack_px;
   f.shape = shape;
   f.set_rows(centre_px.y - half.y, centre_px.y + half.y);
   if (reach < 0.0f) f.last_row = f.first_row - 1;
@@ -70,9 +72,9 @@ __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
 }
 
 /// Footprint of a splat on its way through a window.
-__device__ inline TileFootprint<math::Trail<float>> make_footprint(float2 centre_px,
-                                                                   const SplatPath& path,
-                                                                   const FrameShape& shape) {
+__device__ inline TileFootprint<math::Trail<float>> make_footprint(
+    float2 centre_px, const SplatPath& path, const FrameShape& shape,
+    float slack_px = listing_slack_px) {
   const math::Whitening<float>& w = path.whitening;
   const float reach = fmaxf(math::reach_of(path.log2_opacity), 0.0f);
   const float half_x = math::half_extent(w, reach).x;
@@ -80,6 +82,7 @@ __device__ inline TileFootprint<math::Trail<float>> make_footprint(float2 centre
   f.outline = math::make_trail(math::make_ellipse(w, reach, half_x, math::rightmost_y(w, reach)),
                                {path.dx, path.dy});
   f.centre_px = centre_px;
+  f.slack_px = slack_px;
   f.shape = shape;
   f.set_rows(centre_px.y + f.outline.top_y, centre_px.y + f.outline.bottom_y);
   return f;

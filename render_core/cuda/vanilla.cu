@@ -1,10 +1,10 @@
 #include <algorithm>
 
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/shade.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/vanilla.cuh"
-#include "render_core/math/blend-inl.h"
 
 namespace catgs::cuda {
 namespace {
@@ -27,16 +27,16 @@ struct EmitParams {
   const std::uint32_t* last;  // [count]
   const float* depth;
   const ushort4* box;
-  std::uint64_t* key;   // [list_bound]
-  std::uint32_t* slot;  // [list_bound]
+  std::uint64_t* key;   // by list entry
+  std::uint32_t* slot;  // likewise
   FrameCounts* counts;  // list_entries is set
 };
 
 struct BlendParams {
   FrameShape shape;
   const SplatRecord* records;
-  const std::uint64_t* key;   // [list_bound], sorted
-  const std::uint32_t* slot;  // [list_bound], likewise
+  const std::uint64_t* key;   // by list entry, sorted
+  const std::uint32_t* slot;  // likewise
   uint2* range;               // [tiles]
   float3 background;
   float* rgb;
@@ -45,8 +45,6 @@ struct BlendParams {
 };
 
 constexpr int block_size = 256;
-
-std::uint32_t blocks_for(std::uint32_t count) { return (count + block_size - 1) / block_size; }
 
 /// The tiles that a box of whole pixels around the centre overlaps, as the original rounds them.
 __device__ ushort4 box_of(float2 centre_px, float radius, const FrameShape& shape) {
@@ -146,42 +144,43 @@ __global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) 
     }
   }
   if (p.count_pairs) atomicAdd(&p.counts->blended_pairs, pairs);
-  if (!inside) return;
-  const auto shown = math::resolve<float>(pixel, {p.background.x, p.background.y, p.background.z});
-  float* out = p.rgb + 3 * (static_cast<std::size_t>(py) * p.shape.width_px + px);
-  out[0] = shown.x;
-  out[1] = shown.y;
-  out[2] = shown.z;
+  show_pixel(p.rgb, p.shape, px, py, pixel, p.background);
 }
 
 }  // namespace
 
 void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mark,
                            cudaStream_t stream) {
-  const std::uint32_t count = f.scene->count, bound = f.shape.list_bound;
+  const std::uint32_t count = f.scene->count;
   records_.reserve(count);
   depth_.reserve(count);
   box_.reserve(count);
   tile_count_.reserve(count);
   last_.reserve(count);
+  entries_.reserve(1);
   range_.reserve(f.shape.tiles());
-  for (int i = 0; i < 2; ++i) {
-    key_[i].reserve(bound);
-    slot_[i].reserve(bound);
-  }
-  scratch_.reserve(key_sort_scratch_bytes(count, f.shape));
-  const SortScratch scratch{scratch_.get(), scratch_.bytes()};
-
-  const std::uint32_t blocks = std::max(blocks_for(count), 1u);  // an empty scene has a background
+  scratch_.reserve(sum_scratch_bytes(count));
+  const std::uint32_t blocks = std::max(blocks_for(count, block_size), 1u);  // none in empty scenes
   project_kernel<<<blocks, block_size, 0, stream>>>({*f.scene, f.camera, f.shape, records_.get(),
                                                      depth_.get(), box_.get(), tile_count_.get(),
                                                      f.counts});
   check_launch("vanilla project");
   mark(Stage::project);
 
-  if (count > 0) sum_tile_counts(count, tile_count_.get(), last_.get(), scratch, stream);
-  check(cudaMemsetAsync(key_[0].get(), 0xff, bound * sizeof(std::uint64_t), stream), "padding");
-  check(cudaMemsetAsync(slot_[0].get(), 0, bound * sizeof(std::uint32_t), stream), "padding");
+  *entries_.get() = 0;
+  if (count > 0) {
+    sum_tile_counts(count, tile_count_.get(), last_.get(), {scratch_.get(), scratch_.bytes()},
+                    stream);
+    check(cudaMemcpyAsync(entries_.get(), last_.get() + (count - 1), sizeof(std::uint32_t),
+                          cudaMemcpyDeviceToHost, stream),
+          "list entries");
+    check(cudaStreamSynchronize(stream), "vanilla project");
+  }
+  const std::uint32_t entries = std::min(*entries_.get(), f.shape.list_bound);
+  for (int i = 0; i < 2; ++i) {
+    key_[i].reserve(entries);
+    slot_[i].reserve(entries);
+  }
   emit_kernel<<<blocks, block_size, 0, stream>>>({count, f.shape, last_.get(), depth_.get(),
                                                   box_.get(), key_[0].get(), slot_[0].get(),
                                                   f.counts});
@@ -190,11 +189,12 @@ void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mar
 
   PingPong<std::uint64_t> key{key_[0].get(), key_[1].get()};
   PingPong<std::uint32_t> slot{slot_[0].get(), slot_[1].get()};
-  sort_by_key(f.shape, key, slot, scratch, stream);
+  scratch_.reserve(key_sort_scratch_bytes(entries, f.shape));
+  sort_by_key(entries, f.shape, key, slot, {scratch_.get(), scratch_.bytes()}, stream);
   const BlendParams blend{f.shape,      records_.get(), key.current, slot.current, range_.get(),
                           f.background, f.rgb,          f.counts,    f.count_pairs};
   check(cudaMemsetAsync(range_.get(), 0, f.shape.tiles() * sizeof(uint2), stream), "ranges");
-  ranges_kernel<<<blocks_for(bound), block_size, 0, stream>>>(blend);
+  ranges_kernel<<<std::max(blocks_for(entries, block_size), 1u), block_size, 0, stream>>>(blend);
   check_launch("vanilla ranges");
   mark(Stage::sort);
 

@@ -16,14 +16,15 @@ class VanillaPipeline {
   struct Frame {
     const SceneArrays* scene;
     CameraPair camera;
-    FrameShape shape;
+    FrameShape shape;  // list_bound: entries beyond it are not drawn
     float3 background;
     float* rgb;           // [height][width][3]
     FrameCounts* counts;  // visible, list_entries and list_max are set; blended_pairs when counted
     bool count_pairs;
   };
 
-  /// Enqueues a frame; `mark` is called after each stage. Throws CudaError.
+  /// Enqueues a frame; `mark` is called after each stage. Waits for the number of list entries, as
+  /// the original does, to sort as many. Throws CudaError.
   void draw(const Frame& frame, const std::function<void(Stage)>& mark, cudaStream_t stream);
   /// [tiles], device memory: {first, one past last} list entry of each tile of the last frame.
   [[nodiscard]] const uint2* ranges() const { return range_.get(); }
@@ -35,8 +36,9 @@ class VanillaPipeline {
   DeviceBuffer<float> depth_;
   DeviceBuffer<ushort4> box_;                      // tiles [x, z) x [y, w)
   DeviceBuffer<std::uint32_t> tile_count_, last_;  // `last_`: inclusive sums
-  DeviceBuffer<std::uint64_t> key_[2];             // [list_bound]; all ones in the padding
-  DeviceBuffer<std::uint32_t> slot_[2];            // [list_bound]
+  PinnedBuffer<std::uint32_t> entries_;            // one: the last of `last_`
+  DeviceBuffer<std::uint64_t> key_[2];             // by list entry
+  DeviceBuffer<std::uint32_t> slot_[2];            // likewise
   DeviceBuffer<uint2> range_;                      // [tiles]
   DeviceBuffer<std::byte> scratch_;
 };

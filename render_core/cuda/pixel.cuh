@@ -1,0 +1,20 @@
+#pragma once
+
+#include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/math/blend-inl.h"
+
+namespace catgs::cuda {
+
+/// Shows a blended pixel over its background. `rgb`: [height][width][3], display-referred, in
+/// [0, 1]. Pixels of edge tiles that lie outside the image go nowhere.
+__device__ inline void show_pixel(float* rgb, const FrameShape& shape, int x_px, int y_px,
+                                  const math::PixelState<float>& pixel, float3 background) {
+  if (x_px >= shape.width_px || y_px >= shape.height_px) return;
+  const auto shown = math::resolve<float>(pixel, {background.x, background.y, background.z});
+  float* out = rgb + 3 * (static_cast<std::size_t>(y_px) * shape.width_px + x_px);
+  out[0] = shown.x;
+  out[1] = shown.y;
+  out[2] = shown.z;
+}
+
+}  // namespace catgs::cuda
