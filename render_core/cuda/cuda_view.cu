@@ -195,6 +195,7 @@ void CudaView::draw_sub(const FrameRequest& request) {
                   m.depth[0].get(),
                   nullptr,
                   nullptr,
+                  nullptr,
                   nullptr},
                  Listing::none, stream);
   mark(Stage::project);
@@ -235,14 +236,15 @@ void CudaView::list_tiles(const FrameCameras& cameras, bool sweeps, float min_de
   launch_cull({scene, cameras, sweeps, shape_, m.cull_mask.get(), m.cull_before.get(),
                m.visible.get(), m.counts.get(), scratch},
               stream);
-  launch_project({scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(),
-                  m.records.get(), m.depth[0].get(), m.tile_count.get(), m.spans.get(), path},
-                 sweeps ? Listing::trails : Listing::ellipses, stream);
+  launch_project(
+      {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), m.records.get(),
+       m.depth[0].get(), m.tile_count.get(), m.spans.get(), path, m.order[0].get()},
+      sweeps ? Listing::trails : Listing::ellipses, stream);
   mark(Stage::project);
 
   PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
   PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
-  sort_by_depth(shape_, m.counts.get(), depth, order, scratch, stream);
+  sort_by_depth(shape_, depth, order, scratch, stream);
   check(cudaEventRecord(depth_sorted_.get(), stream), "event");
   scan_tile_counts(shape_, m.counts.get(), order.current, m.tile_count.get(), m.first.get(),
                    scratch, stream);

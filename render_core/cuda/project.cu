@@ -18,7 +18,12 @@ __device__ void raise(std::uint32_t* target, std::uint32_t value) {
 template <Listing listing>
 __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams p) {
   const std::uint32_t v = blockIdx.x * block_size + threadIdx.x;
-  if (v >= min(p.counts->visible, p.shape.visible_bound)) return;
+  if (v >= p.shape.visible_bound) return;
+  if constexpr (listing != Listing::none) p.order[v] = v;
+  if (v >= p.counts->visible) {
+    p.depth_key[v] = no_depth_key;
+    return;
+  }
   const std::uint32_t i = p.visible[v];
   const float4 mean = __ldg(&p.scene.mean_opacity[i]);
   const ShCoefficients sh = load_sh(p.scene, i);

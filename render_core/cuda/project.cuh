@@ -15,10 +15,11 @@ struct ProjectParams {
   FrameCounts* counts;           // displacement and nearness are raised
   const std::uint32_t* visible;  // [visible_bound], scene indices
   SplatRecord* records;          // [visible_bound]
-  std::uint32_t* depth_key;      // [visible_bound], depth_key() of the view depth
-  std::uint32_t* tile_count;     // key frames: [visible_bound], its part of the tile lists
-  TileSpans* spans;              // key frames: [visible_bound]
-  SplatPath* path;               // key frames with a window: [visible_bound]
+  std::uint32_t* depth_key;   // [visible_bound], depth_key() of the view depth; no_depth_key beyond
+  std::uint32_t* tile_count;  // key frames: [visible_bound], its part of the tile lists
+  TileSpans* spans;           // key frames: [visible_bound]
+  SplatPath* path;            // key frames with a window: [visible_bound]
+  std::uint32_t* order;       // key frames: [visible_bound], as sort_by_depth() wants it
 };
 
 enum class Listing {

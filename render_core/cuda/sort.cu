@@ -12,17 +12,7 @@
 namespace catgs::cuda {
 namespace {
 
-constexpr int block_size = 256;
-constexpr std::uint32_t last_key = (1u << (depth_bits + depth_bits_below)) - 1u;
 constexpr int depth_end_bit = depth_bits_below + depth_bits;
-
-__global__ void prepare_depth_sort(const FrameCounts* counts, std::uint32_t bound,
-                                   std::uint32_t* depth, std::uint32_t* order) {
-  const std::uint32_t k = blockIdx.x * block_size + threadIdx.x;
-  if (k >= bound) return;
-  order[k] = k;
-  if (k >= counts->visible) depth[k] = last_key;
-}
 
 /// Tile count of the k-th splat in depth order, 0 past the visible ones.
 struct CountInOrder {
@@ -72,12 +62,8 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   return std::max({depth, scan, tile});
 }
 
-void sort_by_depth(const FrameShape& shape, const FrameCounts* counts,
-                   PingPong<std::uint32_t>& depth, PingPong<std::uint32_t>& order,
-                   SortScratch scratch, cudaStream_t stream) {
-  prepare_depth_sort<<<blocks_for(shape.visible_bound, block_size), block_size, 0, stream>>>(
-      counts, shape.visible_bound, depth.current, order.current);
-  check_launch("depth sort padding");
+void sort_by_depth(const FrameShape& shape, PingPong<std::uint32_t>& depth,
+                   PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
   cub::DoubleBuffer<std::uint32_t> values(order.current, order.other);
   check(

@@ -12,11 +12,13 @@ namespace catgs::cuda {
 constexpr int depth_bits_below = 4;
 constexpr int depth_bits = 24;
 
+/// Key of what is not there, behind all that is.
+constexpr std::uint32_t no_depth_key = (1u << (depth_bits + depth_bits_below)) - 1u;
+
 /// Key of a view depth; the lowest, where it is not beyond the near plane.
 __device__ inline std::uint32_t depth_key(float depth, float near_z) {
   if (!(depth > near_z)) return 0;
-  return min(__float_as_uint(depth) - __float_as_uint(near_z),
-             (1u << (depth_bits + depth_bits_below)) - 2u);
+  return min(__float_as_uint(depth) - __float_as_uint(near_z), no_depth_key - 1u);
 }
 
 /// Ping-pong buffers; CUB says which of the two holds the result.
@@ -35,10 +37,10 @@ struct SortScratch {
 std::size_t sort_scratch_bytes(const FrameShape& shape);
 
 /// Sorts visible splats front to back, stable: on return order.current[k] is the slot of the k-th
-/// nearest. `depth` holds `counts->visible` keys; both arrays have shape.visible_bound entries.
-void sort_by_depth(const FrameShape& shape, const FrameCounts* counts,
-                   PingPong<std::uint32_t>& depth, PingPong<std::uint32_t>& order,
-                   SortScratch scratch, cudaStream_t stream);
+/// nearest. Both arrays have shape.visible_bound entries; `order` holds their numbers, `depth` keys
+/// and, beyond the visible ones, no_depth_key.
+void sort_by_depth(const FrameShape& shape, PingPong<std::uint32_t>& depth,
+                   PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream);
 
 /// first[k] = sum of tile_count[order[j]] over j < k: where the k-th splat writes its list entries.
 /// Sets counts->list_entries.
