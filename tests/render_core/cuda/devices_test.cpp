@@ -7,16 +7,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/cuda/cuda_renderer.h"
 #include "render_core/device_set.h"
 #include "render_core/error.h"
-#include "render_core/renderer.h"
+#include "tests/render_core/cuda/device.h"
 #include "tests/support/camera_moves.h"
-#include "tests/support/test_scenes.h"
 
 namespace catgs {
 namespace {
 
+using test::render_in;
+using test::Rendered;
 using test::TestScene;
 using testing::Each;
 using testing::ElementsAre;
@@ -24,47 +24,26 @@ using testing::HasSubstr;
 using testing::Pair;
 using testing::ThrowsMessage;
 
-TestScene random_scene() {
-  TestScene scene;
-  scene.cloud = std::make_shared<const GaussianCloud>(test::random_cloud(50'000, 2, 7));
-  scene.request.camera = make_camera(Pose{}, {640, 360}, 400.0f);
-  return scene;
-}
-
-struct Drawn {
-  std::vector<float> rgb;
-  FrameStats stats;
-};
-
-Drawn draw(View& view, const FrameRequest& request) {
-  FrameView frame;
-  const RenderStatus status = view.render(request, frame);
-  EXPECT_TRUE(status.ok()) << status.message;
-  return {status.ok() ? test::copy_rgb(frame) : std::vector<float>(), frame.stats};
-}
-
 /// Some groups of key frame and sub-frames along `move`.
-std::vector<Drawn> draw_path(View& view, const TestScene& scene, const test::Move& move) {
-  std::vector<Drawn> frames;
+std::vector<Rendered> draw_path(View& view, const TestScene& scene, const test::Move& move) {
+  std::vector<Rendered> frames;
   for (int group = 0; group < 5; ++group) {
     for (int k = 0; k <= test::window; ++k)
-      frames.push_back(draw(view, test::request_on_path(scene, move, k)));
+      frames.push_back(render_in(view, test::request_on_path(scene, move, k)));
   }
   return frames;
 }
 
 class Devices : public testing::Test {
  protected:
-  void SetUp() override {
-    if (const std::string obstacle = cuda_obstacle(); !obstacle.empty()) GTEST_SKIP() << obstacle;
-  }
+  void SetUp() override { REQUIRE_DEVICE(); }
 
   std::unique_ptr<Renderer> make(std::shared_ptr<DeviceSet> set) {
     return make_renderer(scene_.cloud, {.kind = RendererKind::cuda, .pool = {}, .devices = set})
         .renderer;
   }
 
-  const TestScene scene_ = random_scene();
+  const TestScene scene_ = test::random_scene(50'000);
 };
 
 /// Every device of the machine, and a renderer on all of them.
@@ -88,14 +67,14 @@ TEST_F(Devices, ViewsOfOneDeviceDrawInThreadsWhatTheyDrawAlone) {
   const auto set = std::make_shared<DeviceSet>();
   const auto renderer = make(set);
   const std::vector<test::Move> moves = test::moves();
-  std::vector<std::vector<Drawn>> alone;
+  std::vector<std::vector<Rendered>> alone;
   for (const test::Move& move : moves)
     alone.push_back(draw_path(*renderer->make_view(test::patient_settings()), scene_, move));
   std::vector<std::jthread> threads;
   for (std::size_t i = 0; i < moves.size(); ++i) {
     threads.emplace_back([&, i] {
       const auto view = renderer->make_view(test::patient_settings());
-      const std::vector<Drawn> frames = draw_path(*view, scene_, moves[i]);
+      const std::vector<Rendered> frames = draw_path(*view, scene_, moves[i]);
       for (std::size_t k = 0; k < frames.size(); ++k) {
         EXPECT_EQ(frames[k].stats.kind, alone[i][k].stats.kind) << moves[i].name << " " << k;
         EXPECT_GE(test::psnr_db(frames[k].rgb, alone[i][k].rgb), 60.0) << moves[i].name << " " << k;
@@ -110,15 +89,15 @@ TEST_F(Devices, ViewsComeAndGoWhileAnotherRenders) {
   const auto set = std::make_shared<DeviceSet>();
   const auto renderer = make(set);
   const auto lasting = renderer->make_view({});
-  const Drawn first = draw(*lasting, scene_.request);
+  const Rendered first = render_in(*lasting, scene_.request);
   {
     const std::jthread visitors([&] {
       for (int i = 0; i < 20; ++i)
-        EXPECT_GE(test::psnr_db(draw(*renderer->make_view({}), scene_.request).rgb, first.rgb),
+        EXPECT_GE(test::psnr_db(render_in(*renderer->make_view({}), scene_.request).rgb, first.rgb),
                   60.0);
     });
     for (int i = 0; i < 100; ++i)
-      EXPECT_GE(test::psnr_db(draw(*lasting, scene_.request).rgb, first.rgb), 60.0);
+      EXPECT_GE(test::psnr_db(render_in(*lasting, scene_.request).rgb, first.rgb), 60.0);
   }
   EXPECT_THAT(set->views(), ElementsAre(Pair(0, 1)));
 }
@@ -135,7 +114,7 @@ TEST_F(Devices, AMissingDeviceIsAMistakeForAutoToo) {
 TEST_F(AllDevices, ShareTheViewsAndDrawTheSame) {
   const auto one = make(std::make_shared<DeviceSet>());
   EXPECT_EQ(renderer_->scene_bytes(), one->scene_bytes());
-  const Drawn alone = draw(*one->make_view({}), scene_.request);
+  const Rendered alone = render_in(*one->make_view({}), scene_.request);
 
   std::vector<std::unique_ptr<View>> views(2 * count_);
   for (auto& view : views) view = renderer_->make_view({});
@@ -144,7 +123,7 @@ TEST_F(AllDevices, ShareTheViewsAndDrawTheSame) {
   for (const auto& view : views) {
     threads.emplace_back([&] {
       for (int i = 0; i < 10; ++i)
-        EXPECT_GE(test::psnr_db(draw(*view, scene_.request).rgb, alone.rgb), 60.0)
+        EXPECT_GE(test::psnr_db(render_in(*view, scene_.request).rgb, alone.rgb), 60.0)
             << "device " << *view->device();
     });
   }
@@ -176,7 +155,8 @@ TEST_F(AllDevices, OneThatIsNotTheFirstRendersAlone) {
   EXPECT_EQ(view->device(), 1);
   const test::Move move = test::moves().front();
   const auto first = make(std::make_shared<DeviceSet>())->make_view(test::patient_settings());
-  const std::vector<Drawn> a = draw_path(*view, scene_, move), b = draw_path(*first, scene_, move);
+  const std::vector<Rendered> a = draw_path(*view, scene_, move),
+                              b = draw_path(*first, scene_, move);
   for (std::size_t k = 0; k < a.size(); ++k)
     EXPECT_GE(test::psnr_db(a[k].rgb, b[k].rgb), 60.0) << k;
 }
