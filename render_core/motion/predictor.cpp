@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
+
+#include "render_core/motion/rotation.h"
 
 namespace catgs {
 namespace {
@@ -12,6 +13,24 @@ namespace {
 constexpr std::int64_t memory_us = 1'000'000;
 // Closer stamps are jitter: dividing a step by them would make a jump of it.
 constexpr std::int64_t min_step_us = 4'000;
+// How late a sample may come without cutting a forecast of the whole horizon.
+constexpr std::int64_t max_age_us = 50'000;
+
+// Confidence. Of recorded head motion, foreseen from samples that come up to 20 ms late, these
+// make the smallest errors at 8…100 ms; twice or half of each costs less than 2 % of them.
+constexpr std::int64_t check_us = 33'000;
+constexpr double fading_s = 0.3;
+constexpr double damping_s = 0.12;
+constexpr double first_doubt = 0.4;         // the usual one of these recordings
+constexpr double first_doubt_moved = 1e-4;  // weighs as much as so much motion, rad
+
+// Horizons that shrink to nothing leave recorded heads with 2 to 5 % less frames per key frame, and
+// the trails in its lists hardly shorter: far motion ends a window anyway.
+constexpr double least_trust = 0.5;
+
+constexpr std::int64_t still_us = 100'000;
+constexpr double still_rad = 0.5e-3;  // half a pixel at a focal length of 1000 px
+constexpr double jump_rad = 5e-3;     // what is less than a few pixels needs no new motion
 
 bool usable(const Pose& pose) {
   const glm::vec3& p = pose.position;
@@ -20,121 +39,183 @@ bool usable(const Pose& pose) {
          norm > 1e-6f;
 }
 
-/// Axis times angle of the rotation from `from` to `to`, in the axes of `from`.
-glm::dvec3 rotation_between(const glm::quat& from, const glm::quat& to) {
-  glm::dquat turn = glm::conjugate(glm::dquat(from)) * glm::dquat(to);
-  if (turn.w < 0.0) turn = -turn;  // the short way
-  const glm::dvec3 axis(turn.x, turn.y, turn.z);
-  const double sine = glm::length(axis);
-  return sine > 0.0 ? axis * (2.0 * std::atan2(sine, turn.w) / sine) : glm::dvec3(0.0);
-}
-
-glm::dquat rotation_by(const glm::dvec3& axis_angle) {
-  const double angle = glm::length(axis_angle);
-  return angle > 0.0 ? glm::angleAxis(angle, axis_angle / angle) : glm::dquat(1, 0, 0, 0);
-}
-
-struct Speed {
-  double linear = 0.0, angular = 0.0;  // units / s, rad / s
+struct Step {
+  glm::dvec3 shift{0.0};  // world axes, units
+  glm::dvec3 turn{0.0};   // rotation vector in the axes of where it begins, rad
 };
 
-Speed speed_between(const TimedPose& a, const TimedPose& b) {
-  const double seconds = 1e-6 * static_cast<double>(std::max(b.time_us - a.time_us, min_step_us));
-  const Pose& from = a.world_from_camera;
-  const Pose& to = b.world_from_camera;
-  return {glm::distance(glm::dvec3(from.position), glm::dvec3(to.position)) / seconds,
-          glm::length(rotation_between(from.orientation, to.orientation)) / seconds};
+Step step_between(const Pose& from, const Pose& to) {
+  return {glm::dvec3(to.position) - glm::dvec3(from.position),
+          rotation_between(from.orientation, to.orientation)};
+}
+
+/// How far the step moves a picture, rad.
+double extent(const Step& step) {
+  return glm::length(step.turn) + glm::length(step.shift) / MotionPredictor::lever;
+}
+
+double seconds_between(std::int64_t from_us, std::int64_t to_us) {
+  return 1e-6 * static_cast<double>(to_us - from_us);
+}
+
+/// How far a unit velocity goes that decays at `rate_hz`.
+double decaying_reach_s(double seconds, double rate_hz) {
+  return rate_hz > 0.0 ? -std::expm1(-rate_hz * seconds) / rate_hz : seconds;
 }
 
 }  // namespace
 
-void MotionPredictor::add(const TimedPose& sample) {
-  if (!usable(sample.world_from_camera)) return;
-  TimedPose unit = sample;
-  unit.world_from_camera.orientation = glm::normalize(sample.world_from_camera.orientation);
-  if (samples_.empty()) return start_at(unit);
-  const std::int64_t newest_us = samples_.back().time_us;
-  if (std::abs(unit.time_us - newest_us) > settings_.gap_us) return start_at(unit);
-
-  const auto place = std::ranges::lower_bound(samples_, unit.time_us, {}, &TimedPose::time_us);
-  if (place != samples_.end() && place->time_us == unit.time_us) {
-    *place = unit;
-  } else if (place != samples_.end()) {
-    if (place != samples_.begin()) samples_.insert(place, unit);
-  } else if (is_jump(unit)) {
-    start_at(unit);
-  } else {
-    samples_.push_back(unit);
+void MotionPredictor::add(const TimedPose& timed) {
+  if (!usable(timed.world_from_camera)) return;
+  Sample sample{.time_us = timed.time_us, .pose = timed.world_from_camera, .motion = {}};
+  sample.pose.orientation = glm::normalize(sample.pose.orientation);
+  if (samples_.empty() || std::abs(sample.time_us - samples_.back().time_us) > settings_.gap_us) {
+    return start_at(sample);
   }
-  const auto expired = std::ranges::lower_bound(samples_, samples_.back().time_us - memory_us, {},
-                                                &TimedPose::time_us);
-  const auto surplus = samples_.end() - std::min<std::ptrdiff_t>(samples_.size(), max_samples);
-  samples_.erase(samples_.begin(), std::max(expired, surplus));
+  const auto place = std::ranges::lower_bound(samples_, sample.time_us, {}, &Sample::time_us);
+  if (place == samples_.end()) {
+    append(sample);
+  } else {
+    insert(place, sample);
+  }
+  const auto kept =
+      std::ranges::lower_bound(samples_, samples_.back().time_us - memory_us, {}, &Sample::time_us);
+  samples_.erase(samples_.begin(), kept);
+}
+
+void MotionPredictor::append(const Sample& sample) {
+  const std::size_t count = samples_.size();
+  if (count >= 2 && samples_[count - 1].time_us - samples_[count - 2].time_us < min_step_us) {
+    samples_.pop_back();
+  }
+  samples_.push_back(sample);
+  follow(samples_.size() - 1);
+  drop_a_jump_at_the_start();
+  if (newest_is_a_jump()) return start_at(sample);
+  check_forecast();
+}
+
+void MotionPredictor::insert(Samples::iterator place, const Sample& sample) {
+  if (place->time_us == sample.time_us) {
+    place->pose = sample.pose;
+  } else if (place == samples_.begin() ||
+             sample.time_us - std::prev(place)->time_us < min_step_us ||
+             place->time_us - sample.time_us < min_step_us) {
+    return;
+  } else {
+    place = samples_.insert(place, sample);
+  }
+  for (auto i = static_cast<std::size_t>(place - samples_.begin()); i < samples_.size(); ++i) {
+    follow(i);
+  }
+}
+
+void MotionPredictor::start_at(const Sample& sample) {
+  samples_.assign(1, sample);
+  samples_.front().motion = {};
+  error_ = moved_ = 0.0;
+}
+
+/// Sets the motion of a sample, from that of the sample before and the step in between: exponential
+/// smoothing, for irregular intervals.
+void MotionPredictor::follow(std::size_t index) {
+  if (index == 0) return;
+  Sample& sample = samples_[index];
+  const bool burst = index >= 2 && sample.time_us - samples_[index - 1].time_us < min_step_us;
+  const Sample& before = samples_[index - (burst ? 2 : 1)];
+  const Step step = step_between(before.pose, sample.pose);
+  const double seconds =
+      seconds_between(before.time_us, std::max(sample.time_us, before.time_us + min_step_us));
+  sample.speed = glm::length(step.shift) / seconds;
+  sample.angular_speed = glm::length(step.turn) / seconds;
+  const double smoothing_s = 1e-6 * static_cast<double>(settings_.smoothing_us);
+  const double share = before.motion.known ? seconds / (seconds + smoothing_s) : 1.0;
+  sample.motion = {true, glm::mix(before.motion.velocity, step.shift / seconds, share),
+                   glm::mix(before.motion.angular_rate, step.turn / seconds, share)};
+}
+
+/// The first step of a motion has none to be compared with, but the second tells.
+void MotionPredictor::drop_a_jump_at_the_start() {
+  if (samples_.size() != 3) return;
+  const Sample &first = samples_[1], &second = samples_[2];
+  const bool slows_down = first.speed > jump_ratio * second.speed ||
+                          first.angular_speed > jump_ratio * second.angular_speed;
+  if (!slows_down || extent(step_between(samples_[0].pose, first.pose)) < jump_rad) return;
+  samples_.erase(samples_.begin());
+  samples_[0].motion = {};
+  follow(1);
+}
+
+bool MotionPredictor::newest_is_a_jump() const {
+  if (samples_.size() < 3) return false;  // no speed to compare with
+  double speed = 0.0, angular_speed = 0.0;
+  for (std::size_t i = 1; i + 1 < samples_.size(); ++i) {
+    speed = std::max(speed, samples_[i].speed);
+    angular_speed = std::max(angular_speed, samples_[i].angular_speed);
+  }
+  const Sample& newest = samples_.back();
+  return (newest.speed > jump_ratio * speed || newest.angular_speed > jump_ratio * angular_speed) &&
+         extent(step_between(samples_[samples_.size() - 2].pose, newest.pose)) >= jump_rad;
+}
+
+/// Compares the newest sample with what the one check_us ago let expect, undamped: whether the
+/// camera keeps its velocity is the question.
+void MotionPredictor::check_forecast() {
+  const Sample& newest = samples_.back();
+  const double fading =
+      std::exp(-seconds_between(samples_[samples_.size() - 2].time_us, newest.time_us) / fading_s);
+  error_ *= fading;
+  moved_ *= fading;
+  const auto later =
+      std::ranges::upper_bound(samples_, newest.time_us - check_us, {}, &Sample::time_us);
+  if (later == samples_.begin() || !std::prev(later)->motion.known) return;
+  const Sample& then = *std::prev(later);
+  const double seconds = seconds_between(then.time_us, newest.time_us);
+  const Step step = step_between(then.pose, newest.pose);
+  error_ += extent({step.shift - seconds * then.motion.velocity,
+                    step.turn - seconds * then.motion.angular_rate});
+  moved_ += extent(step);
+}
+
+double MotionPredictor::confidence() const {
+  const double doubt = (error_ + first_doubt * first_doubt_moved) / (moved_ + first_doubt_moved);
+  return std::clamp(1.0 - doubt, settings_.min_confidence, 1.0);
+}
+
+bool MotionPredictor::still() const {
+  if (samples_.empty()) return false;
+  const Sample& newest = samples_.back();
+  const auto later =
+      std::ranges::upper_bound(samples_, newest.time_us - still_us, {}, &Sample::time_us);
+  if (later == samples_.begin()) return false;  // not known for so long
+  return std::all_of(std::prev(later), samples_.end(), [&](const Sample& sample) {
+    return extent(step_between(sample.pose, newest.pose)) <= still_rad;
+  });
 }
 
 std::optional<Pose> MotionPredictor::at(std::int64_t time_us) const {
   if (samples_.empty()) return std::nullopt;
-  const TimedPose& newest = samples_.back();
-  const double seconds = 1e-6 * static_cast<double>(std::clamp<std::int64_t>(
-                                    time_us - newest.time_us, 0, settings_.horizon_us));
-  const Motion motion = fit();
-  const Pose& from = newest.world_from_camera;
-  return Pose{glm::vec3(glm::dvec3(from.position) + motion.velocity * seconds),
-              glm::quat(glm::normalize(glm::dquat(from.orientation) *
-                                       rotation_by(motion.angular_rate * seconds)))};
+  const Sample& newest = samples_.back();
+  if (samples_.size() < 3 || still()) return newest.pose;
+  const std::int64_t end_us = newest.time_us + settings_.horizon_us + max_age_us;
+  const double seconds =
+      seconds_between(newest.time_us, std::clamp(time_us, newest.time_us, end_us));
+  const double reach_s = decaying_reach_s(seconds, (1.0 - confidence()) / damping_s);
+  return Pose{glm::vec3(glm::dvec3(newest.pose.position) + reach_s * newest.motion.velocity),
+              rotated(newest.pose.orientation, reach_s * newest.motion.angular_rate)};
 }
 
 std::optional<Forecast> MotionPredictor::forecast(std::int64_t now_us, double rate_hz,
                                                   int frames) const {
-  if (samples_.size() < 2 || now_us - samples_.back().time_us > settings_.gap_us) {
-    return std::nullopt;
-  }
-  const std::int64_t ahead_us = std::llround(1e6 * static_cast<double>(frames) / rate_hz);
-  return Forecast{*at(now_us + ahead_us), frames};
+  if (samples_.size() < 3) return std::nullopt;
+  const std::int64_t age_us = now_us - samples_.back().time_us;
+  if (age_us > settings_.gap_us) return std::nullopt;
+  const double trust = still() ? 1.0 : std::clamp(2.0 * confidence(), least_trust, 1.0);
+  const double held_us = std::min(trust * static_cast<double>(settings_.horizon_us),
+                                  static_cast<double>(settings_.horizon_us + max_age_us - age_us));
+  constexpr double rounding = 1e-6;
+  const int held = std::clamp(static_cast<int>(1e-6 * held_us * rate_hz + rounding), 0, frames);
+  return Forecast{*at(now_us + std::llround(1e6 * held / rate_hz)), held};
 }
-
-bool MotionPredictor::is_jump(const TimedPose& sample) const {
-  if (samples_.size() < 2) return false;  // no speed to compare with
-  Speed fastest;
-  for (std::size_t i = 1; i < samples_.size(); ++i) {
-    const Speed speed = speed_between(samples_[i - 1], samples_[i]);
-    fastest.linear = std::max(fastest.linear, speed.linear);
-    fastest.angular = std::max(fastest.angular, speed.angular);
-  }
-  const Speed speed = speed_between(samples_.back(), sample);
-  return speed.linear > jump_ratio * fastest.linear || speed.angular > jump_ratio * fastest.angular;
-}
-
-/// Slopes of the lines through positions and rotation vectors over time. The newest sample itself
-/// is where the motion goes on from: it is what the camera shows now.
-MotionPredictor::Motion MotionPredictor::fit() const {
-  const TimedPose& newest = samples_.back();
-  auto first = std::ranges::lower_bound(samples_, newest.time_us - settings_.fit_us, {},
-                                        &TimedPose::time_us);
-  // Slow streams: two samples make a velocity, however far they are apart.
-  first = std::min(first, samples_.end() - std::min<std::ptrdiff_t>(samples_.size(), 2));
-  const auto count = static_cast<double>(samples_.end() - first);
-  double time_sum = 0.0, time_square_sum = 0.0;
-  Motion sum, product_sum;
-  for (auto sample = first; sample != samples_.end(); ++sample) {
-    const double time = 1e-6 * static_cast<double>(sample->time_us - newest.time_us);
-    const glm::dvec3 shift = glm::dvec3(sample->world_from_camera.position) -
-                             glm::dvec3(newest.world_from_camera.position);
-    const glm::dvec3 turn = rotation_between(newest.world_from_camera.orientation,
-                                             sample->world_from_camera.orientation);
-    time_sum += time;
-    time_square_sum += time * time;
-    sum.velocity += shift;
-    sum.angular_rate += turn;
-    product_sum.velocity += time * shift;
-    product_sum.angular_rate += time * turn;
-  }
-  const double spread = count * time_square_sum - time_sum * time_sum;
-  if (!(spread > 0.0)) return {};  // a single sample
-  return {(count * product_sum.velocity - time_sum * sum.velocity) / spread,
-          (count * product_sum.angular_rate - time_sum * sum.angular_rate) / spread};
-}
-
-void MotionPredictor::start_at(const TimedPose& sample) { samples_.assign(1, sample); }
 
 }  // namespace catgs

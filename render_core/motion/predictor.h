@@ -1,9 +1,10 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
+
+#include <glm/vec3.hpp>
 
 #include "render_core/motion/frame_groups.h"
 #include "render_core/motion/trajectory.h"
@@ -11,24 +12,34 @@
 namespace catgs {
 
 struct PredictorSettings {
-  // Velocities are fitted to the samples of this last while. Of 20…100 ms, 40 foresees recorded
-  // head motion best at 8…66 ms: less follows the jitter of tracking, more lags behind turns.
-  std::int64_t fit_us = 40'000;
-  std::int64_t horizon_us = 100'000;  // the motion is not continued further than this
+  std::int64_t smoothing_us = 6'000;  // time constant of the velocities
+  std::int64_t horizon_us = 100'000;  // no forecast reaches further
   std::int64_t gap_us = 250'000;      // a longer silence ends a motion
+  // Forecasts are trusted this much, whatever came of earlier ones (0…1). With 1 the camera goes on
+  // at constant velocity, over the whole horizon.
+  double min_confidence = 0.0;
 };
 
-/// Where a camera is going, judged by where it has been: constant velocity and constant angular
-/// rate, by least squares over its last samples. One per camera; not for several threads at once.
+/// Where a camera is going, judged by where it has been: its smoothed velocity and angular rate,
+/// damped by how wrong its own forecasts were. One per camera; not for several threads at once.
+///
+/// Confidence is the share of the motion that forecasts made 33 ms ahead got right lately: 1 - the
+/// sum of their errors over the sum of the motions, a sample weighing exp(-age / 0.3 s). A turn
+/// counts by its angle, a shift by the angle under which it appears `lever` away. In doubt, which
+/// is 1 - confidence, velocity decays as exp(-t doubt / 120 ms); under a confidence of one half the
+/// horizon shrinks too, to its half at one quarter.
+/// `catgs-render trace forecast` compares this with other ways to predict.
 ///
 /// Stamps lie within +-2^62 us. Samples may come irregularly and late:
 ///  - one with a known stamp replaces that sample;
-///  - one out of order is put where it belongs, or ignored if older than all that is kept;
+///  - one out of order is put where it belongs, or ignored if it is older than all that is kept or
+///    tells nothing new;
 ///  - one later than the newest by more than gap_us, or earlier by as much (the clock was set),
 ///    begins a new motion;
-///  - so does a jump: a step that is jump_ratio times faster than any of the last second, in
-///    position or in orientation. Nothing before a teleport says where the camera goes after it,
-///    and the same holds for a start from rest. No unit of length is needed for this;
+///  - so does a teleport: a step that is jump_ratio times faster than any of the last second, in
+///    position or in orientation. Nothing before it says where the camera goes after it, and the
+///    same holds for a sudden start from rest. Two steps that agree make a motion; before them
+///    nothing is forecast;
 ///  - one that is not finite, or whose orientation is not a rotation, is ignored.
 class MotionPredictor {
  public:
@@ -36,30 +47,51 @@ class MotionPredictor {
 
   void add(const TimedPose& sample);
 
-  /// The expected pose at a time after the newest sample; nothing before the first sample. It stays
-  /// where it is after a single sample, and stops horizon_us after the newest one.
+  /// The expected pose at a time after the newest sample; nothing before the first sample. A camera
+  /// that is still, or whose motion is unknown, stays where it is.
   [[nodiscard]] std::optional<Pose> at(std::int64_t time_us) const;
 
-  /// For a frame shown at `now_us`, the camera `frames` frames later; nothing while the motion is
-  /// unknown (less than two samples of it, or none in the last gap_us).
+  /// For a frame shown at `now_us`, the camera as many frames later as the horizon holds, `frames`
+  /// at most; nothing while the motion is unknown. A still camera stays over the whole horizon.
   [[nodiscard]] std::optional<Forecast> forecast(std::int64_t now_us, double rate_hz,
                                                  int frames) const;
 
+  /// 0…1; a first guess until forecasts have been checked.
+  [[nodiscard]] double confidence() const;
+
+  /// Whether the camera has not moved for 100 ms, but for the tremor of tracking.
+  [[nodiscard]] bool still() const;
+
   static constexpr double jump_ratio = 10.0;
-  static constexpr std::size_t max_samples = 256;  // a second at 120 Hz, with room for bursts
+  // World units; the distance at which shifts count like turns. Forecasts of recorded head motion
+  // hardly depend on it, from 0.5 to 10 m.
+  static constexpr double lever = 3.0;
 
  private:
-  /// Velocities in the frame of the newest sample.
   struct Motion {
+    bool known = false;
     glm::dvec3 velocity{0.0};      // world axes, units / s
-    glm::dvec3 angular_rate{0.0};  // camera axes of the newest sample, rad / s
+    glm::dvec3 angular_rate{0.0};  // camera axes, rad / s
   };
-  [[nodiscard]] bool is_jump(const TimedPose& sample) const;
-  [[nodiscard]] Motion fit() const;
-  void start_at(const TimedPose& sample);
+  struct Sample {
+    std::int64_t time_us = 0;
+    Pose pose;
+    Motion motion;
+    double speed = 0.0, angular_speed = 0.0;  // of the step that led here; units / s, rad / s
+  };
+  using Samples = std::vector<Sample>;
+
+  void append(const Sample& sample);
+  void insert(Samples::iterator place, const Sample& sample);
+  void start_at(const Sample& sample);
+  void follow(std::size_t index);
+  void drop_a_jump_at_the_start();
+  void check_forecast();
+  [[nodiscard]] bool newest_is_a_jump() const;
 
   PredictorSettings settings_;
-  std::vector<TimedPose> samples_;  // increasing times, of one motion
+  Samples samples_;  // of one motion; increasing times, min_step_us apart but for the newest
+  double error_ = 0.0, moved_ = 0.0;  // of forecasts, faded sums; rad
 };
 
 }  // namespace catgs

@@ -5,7 +5,8 @@ namespace catgs {
 FrameFeed::FrameFeed(const RenderSetup& setup, const ViewSettings& settings)
     : setup_(setup),
       forecast_frames_(settings.pipeline == Pipeline::catgs ? settings.speculation.initial_window
-                                                            : 0) {}
+                                                            : 0),
+      predictor_(setup.predictor) {}
 
 FrameRequest FrameFeed::next() {
   FrameRequest request = setup_.request(next_frame_);

@@ -78,6 +78,7 @@ PaperCase PaperCase::pruned(double keep_fraction) const {
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(cloud));
   setup.pool = setup_.pool;
   setup.view = setup_.view;
+  setup.predictor = setup_.predictor;
   setup.camera = setup_.camera;
   RendererOptions core = renderer_options(options_->render);
   core.pool = setup.pool;

@@ -32,6 +32,7 @@ void refuse_without_caches(const PipelineOptions& options) {
   refuse(options.max_deviation_px.has_value(), "--max-deviation-px");
   refuse(options.order.has_value(), "--order");
   refuse(options.no_cache, "--no-cache");
+  refuse(options.constant_velocity, "--constant-velocity");
 }
 
 }  // namespace
@@ -45,6 +46,8 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
   command
       .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
       ->excludes(command.get_option("--window"));
+  command.add_flag("--constant-velocity", options.constant_velocity,
+                   "catgs: forecasts go on undamped, however wrong earlier ones were");
   command.add_flag("--no-split", options.no_split,
                    "CUDA: a tile's list is never cut, however long");
 }
@@ -82,6 +85,10 @@ ViewSettings view_settings(const PipelineOptions& options) {
   if (options.order) settings.order = parse_order(*options.order);
   settings.split_tasks = !options.no_split;
   return settings;
+}
+
+PredictorSettings predictor_settings(const PipelineOptions& options) {
+  return {.min_confidence = options.constant_velocity ? 1.0 : 0.0};
 }
 
 std::string_view pipeline_name(Pipeline pipeline) {

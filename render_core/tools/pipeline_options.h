@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "render_core/motion/predictor.h"
 #include "render_core/renderer.h"
 
 namespace catgs {
@@ -19,6 +20,7 @@ struct PipelineOptions {
   std::optional<float> max_deviation_px{};
   std::optional<std::string> order{};
   bool no_cache = false;
+  bool constant_velocity = false;
   bool no_split = false;
 };
 
@@ -30,6 +32,9 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options);
 /// Pipeline, speculation, order and task splitting of the options; the rest as by default. Throws
 /// InputError for an unknown name, a value out of range, an option that the pipeline has not.
 ViewSettings view_settings(const PipelineOptions& options);
+
+/// How the catgs pipeline's forecasts are made.
+PredictorSettings predictor_settings(const PipelineOptions& options);
 
 std::string_view pipeline_name(Pipeline pipeline);
 

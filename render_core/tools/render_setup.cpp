@@ -94,6 +94,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   RendererOptions core = renderer_options(options);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
+  setup.predictor = predictor_settings(options.pipeline);
   setup.scene = load_scene(options.scene, options.threads, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.camera = make_lens(options.lens, setup.scene.hints.near_z);

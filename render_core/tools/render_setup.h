@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/scene.h"
@@ -43,12 +44,13 @@ struct RenderSetup {
   std::shared_ptr<const GaussianCloud> cloud;
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
-  ViewSettings view;      // pipeline and its parts; format and memory space are the user's choice
-  Trajectory samples;     // the camera as recorded
-  Trajectory poses;       // one per frame
-  std::size_t first = 0;  // number of the first of them in the whole path
-  double fps = 0.0;       // of the path
-  Camera camera;          // without the pose
+  ViewSettings view;  // pipeline and its parts; format and memory space are the user's choice
+  PredictorSettings predictor;  // of the catgs pipeline's forecasts
+  Trajectory samples;           // the camera as recorded
+  Trajectory poses;             // one per frame
+  std::size_t first = 0;        // number of the first of them in the whole path
+  double fps = 0.0;             // of the path
+  Camera camera;                // without the pose
 
   /// Of a frame by itself, without a forecast; see FrameFeed.
   [[nodiscard]] FrameRequest request(std::size_t i) const;

@@ -153,15 +153,15 @@ TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {
     std::ifstream file(path("bench.json"));
     return nlohmann::json::parse(file);
   };
-  // 60 frames: one that knows no motion yet, then groups of five.
+  // 60 frames: two that know no motion yet, then groups of five.
   const auto json = bench("--quality --quality-every 1");
-  EXPECT_EQ(json.at("key_frames"), 13);
-  EXPECT_EQ(json.at("sub_frames"), 47);
-  EXPECT_EQ(json.at("window_histogram"), (nlohmann::json{{"0", 1}, {"4", 12}}));
+  EXPECT_EQ(json.at("key_frames"), 14);
+  EXPECT_EQ(json.at("sub_frames"), 46);
+  EXPECT_EQ(json.at("window_histogram"), (nlohmann::json{{"0", 2}, {"4", 12}}));
   EXPECT_EQ(json.at("windows_cut"), 0);
   EXPECT_EQ(json.at("settings").at("order"), "fresh");
   EXPECT_GT(json.at("frame_ms_sub").at("mean").get<double>(), 0.0);
-  EXPECT_EQ(json.at("quality").at("sub").at("frames"), 47);
+  EXPECT_EQ(json.at("quality").at("sub").at("frames"), 46);
   const auto worst_psnr = [&](const char* kind) {  // null: all pictures are identical
     const auto& value = json.at("quality").at(kind).at("psnr_db").at("min");
     return value.is_null() ? 1000.0 : value.get<double>();
@@ -175,8 +175,8 @@ TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {
   // Each view starts anew; that cuts no group.
   const auto together = bench("--views 3");
   EXPECT_EQ(together.at("settings").at("views"), 3);
-  EXPECT_EQ(together.at("key_frames"), 3 * 13);
-  EXPECT_EQ(together.at("sub_frames"), 3 * 47);
+  EXPECT_EQ(together.at("key_frames"), 3 * 14);
+  EXPECT_EQ(together.at("sub_frames"), 3 * 46);
   EXPECT_EQ(together.at("windows_cut"), 0);
 
   const auto uncached = bench("--no-cache");
