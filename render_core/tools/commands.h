@@ -38,5 +38,7 @@ void add_info_command(CLI::App& app);
 void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
+/// Of `trace`, which adds it.
+void add_trace_forecast_command(CLI::App& trace);
 
 }  // namespace catgs
