@@ -56,8 +56,9 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
   const SpeculationSettings defaults;
   command.add_option(
       "--window", options.window,
-      fmt::format("catgs: sub-frames behind a key frame while motion is small; 0: none ({})",
-                  defaults.initial_window));
+      fmt::format(
+          "catgs: sub-frames behind a key frame while motion is small, within 100 ms; 0: none ({})",
+          defaults.initial_window));
   command.add_option(
       "--max-trail-px", options.max_trail_px,
       fmt::format("catgs: longest motion of a Gaussian in a window ({})", defaults.max_trail_px));

@@ -163,6 +163,23 @@ TEST_F(BenchParts, ForecastsKnowOnlyThePast) {
   EXPECT_NE(straight[60]->world_from_camera.position, turning[60]->world_from_camera.position);
 }
 
+TEST_F(BenchParts, ForecastsAreMadeAsTheSetupSays) {
+  // To and fro with every frame: no forecast comes true, and its horizon is halved.
+  for (std::size_t i = 0; i < setup_.samples.size(); ++i) {
+    setup_.samples[i].world_from_camera.position.x = i % 2 == 0 ? 0.01f : 0.0f;
+  }
+  catgs_.speculation.initial_window = 16;
+  const auto last_frames = [&] {
+    FrameFeed feed(setup_, catgs_);
+    std::optional<Forecast> last;
+    for (std::size_t i = 0; i < setup_.poses.size(); ++i) last = feed.next().forecast;
+    return last ? last->frames : -1;
+  };
+  EXPECT_EQ(last_frames(), 5);
+  setup_.predictor = {.horizon_us = 160'000, .min_confidence = 1.0};
+  EXPECT_EQ(last_frames(), 16);
+}
+
 TEST_F(BenchParts, OtherPipelinesGetNoForecast) {
   FrameFeed feed(setup_, {});
   for (std::size_t i = 0; i < setup_.poses.size(); ++i) EXPECT_FALSE(feed.next().forecast);

@@ -160,6 +160,7 @@ TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {
   EXPECT_EQ(json.at("window_histogram"), (nlohmann::json{{"0", 2}, {"4", 12}}));
   EXPECT_EQ(json.at("windows_cut"), 0);
   EXPECT_EQ(json.at("settings").at("order"), "fresh");
+  EXPECT_EQ(json.at("settings").at("constant_velocity"), false);
   EXPECT_GT(json.at("frame_ms_sub").at("mean").get<double>(), 0.0);
   EXPECT_EQ(json.at("quality").at("sub").at("frames"), 46);
   const auto worst_psnr = [&](const char* kind) {  // null: all pictures are identical

@@ -64,6 +64,8 @@ TEST(PipelineOptions, BecomeViewSettings) {
   EXPECT_EQ(settings.order, BlendOrder::key);
   EXPECT_FALSE(settings.split_tasks);
   EXPECT_EQ(view_settings({.pipeline = "catgs", .no_cache = true}).speculation.initial_window, 0);
+  EXPECT_EQ(predictor_settings({}).min_confidence, 0.0);
+  EXPECT_EQ(predictor_settings({.constant_velocity = true}).min_confidence, 1.0);
 }
 
 TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
@@ -76,6 +78,7 @@ TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
   refused({.window = 4}, "--window: means nothing to the exact pipeline");
   refused({.pipeline = "vanilla", .order = "key"}, "--order: means nothing to the vanilla");
   refused({.no_cache = true}, "--no-cache: means nothing");
+  refused({.constant_velocity = true}, "--constant-velocity: means nothing");
 }
 
 GaussianCloud small_cloud() {
