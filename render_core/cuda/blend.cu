@@ -146,10 +146,8 @@ __device__ void store(const BlendParams& p, const Part& part, const Pixels& pixe
   for (int i = 0; i < pixels_per_lane; ++i) {
     const int y = part.y_px + i * rows_per_pass;
     if (part.task.slices > 1) {
-      const std::size_t at = (static_cast<std::size_t>(part.slice) * tile_size_px + part.in_tile_y +
-                              i * rows_per_pass) *
-                                 tile_size_px +
-                             part.in_tile_x;
+      const std::size_t at =
+          slice_pixel(part.slice, part.in_tile_x, part.in_tile_y + i * rows_per_pass);
       const math::Vec3<float>& c = pixels[i].colour;
       p.slice_pixels[at] = make_float4(c.x, c.y, c.z, pixels[i].transmittance);
     } else {
@@ -286,10 +284,8 @@ __global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) 
 
 }  // namespace
 
-int blend_warps() {
-  int device = 0, blocks = 0, processors = 0;
-  check(cudaGetDevice(&device), "device");
-  check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device), "device");
+int blend_warps(int processors) {
+  int blocks = 0;
   check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, blend_kernel<false>, block_size, 0),
         "occupancy");
   return processors * blocks * warps_per_block;

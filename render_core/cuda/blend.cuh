@@ -19,6 +19,16 @@ static_assert(sizeof(BlendTask) == 16);
 constexpr int part_size_px = 8;
 constexpr int parts_per_tile = (tile_size_px / part_size_px) * (tile_size_px / part_size_px);
 
+/// Part of a pixel of a tile.
+__device__ inline int part_of(int in_tile_x, int in_tile_y) {
+  return in_tile_y / part_size_px * (tile_size_px / part_size_px) + in_tile_x / part_size_px;
+}
+
+/// Where a slice keeps a pixel of its tile.
+__device__ inline std::size_t slice_pixel(std::uint32_t slice, int in_tile_x, int in_tile_y) {
+  return (static_cast<std::size_t>(slice) * tile_size_px + in_tile_y) * tile_size_px + in_tile_x;
+}
+
 /// Blends all tasks front to back. Whole tiles go straight to the image, slices to slice_pixels.
 struct BlendParams {
   FrameShape shape;
@@ -40,8 +50,8 @@ struct BlendParams {
   int warps;             // that the device holds at a time, by blend_warps()
 };
 
-/// Warps of the blend kernel that fit on the current device at a time.
-int blend_warps();
+/// Warps of the blend kernel that `processors` of the current device hold at a time.
+int blend_warps(int processors);
 void launch_blend(const BlendParams& params, cudaStream_t stream);
 
 }  // namespace catgs::cuda

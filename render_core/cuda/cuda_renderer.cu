@@ -172,7 +172,14 @@ std::string cuda_obstacle() {
   if (const cudaError_t code = cudaGetDeviceCount(&devices); code != cudaSuccess) {
     return cudaGetErrorString(code);
   }
-  return devices > 0 ? "" : "no CUDA device";
+  for (int device = 0; device < devices; ++device) {
+    int major = 0;
+    (void)cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device);
+    if (major >= cuda::oldest_major) return "";
+  }
+  if (devices == 0) return "no CUDA device";
+  return "no CUDA device of compute capability " + std::to_string(cuda::oldest_major) +
+         ".0 or more";
 }
 
 MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices) {

@@ -20,7 +20,7 @@ class DevicesUnusable : public InputError {
 /// when one cannot be used; where all are wanted, when none can.
 MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices);
 
-/// Why no CUDA device can be used ("no NVIDIA driver", …); empty when one can.
+/// Why no CUDA device can be used ("no CUDA device", …); empty when one can.
 std::string cuda_obstacle();
 
 }  // namespace catgs

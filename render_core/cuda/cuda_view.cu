@@ -16,58 +16,6 @@
 
 namespace catgs::cuda {
 
-Room::Room(std::uint64_t first_guess, std::uint64_t limit)
-    : limit_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(limit, 1, list_entries_limit))),
-      size_(static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guess, limit_))) {}
-
-std::uint32_t Room::with_margin(std::uint32_t needed) const {
-  return static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(std::uint64_t{needed} + needed / 8 + 4096, limit_));
-}
-
-bool Room::outgrown_by(std::uint32_t needed) {
-  constexpr std::uint32_t patience = 600;
-  const bool grows = needed > size_ && size_ < limit_;
-  if (grows) size_ = with_margin(needed);
-  most_ = std::max(most_, needed);
-  if (most_ > size_ / 2) {
-    wide_frames_ = most_ = 0;
-  } else if (++wide_frames_ >= patience) {
-    size_ = with_margin(most_);
-    wide_frames_ = most_ = 0;
-  }
-  return grows;
-}
-
-void Room::limit_to(double part) {
-  size_ = limit_ = std::max(1u, static_cast<std::uint32_t>(part * size_));
-}
-
-FrameRoom::FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits)
-    : visible_(gaussians / 4 + 1, gaussians),
-      lists_(gaussians + 65536ull, list_limit),
-      slices_(splits ? 4096 : 0, splits ? list_entries_limit : 0) {}
-
-void FrameRoom::apply(FrameShape& shape) const {
-  shape.visible_bound = visible_.size();
-  shape.list_bound = lists_.size();
-  shape.slice_bound = std::min(slices_.size(), most_slices(shape));
-}
-
-bool FrameRoom::outgrown_by(const FrameCounts& counts) {
-  slices_.outgrown_by(counts.wanted_slices);  // without them a frame is slower, not wrong
-  const bool more_visible = visible_.outgrown_by(counts.visible);
-  const bool longer_lists = lists_.outgrown_by(counts.list_entries);
-  return more_visible || longer_lists;
-}
-
-bool FrameRoom::retreat() {
-  constexpr std::uint32_t little = 1u << 16;
-  if (lists_.size() <= little) return false;
-  for (Room* room : {&visible_, &lists_, &slices_}) room->limit_to(0.75);
-  return true;
-}
-
 namespace {
 
 int processors_of(int device) {
@@ -83,10 +31,17 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
     : scene_(std::move(scene)),
       device_(device),
       settings_(settings),
-      room_(first_room()),
+      room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
       processors_(processors_of(device)),
-      blend_warps_(blend_warps()),
-      groups_(settings.speculation) {}
+      blend_warps_(blend_warps(processors_)),
+      groups_(settings.speculation) {
+  // What does not depend on the image is most of a View: a device that cannot hold it should say so
+  // while there is a choice of devices, not in the first frame.
+  if (settings.pipeline == Pipeline::vanilla) return;
+  set_shape({tile_size_px, tile_size_px});
+  memory_.reserve(shape_, scene_->arrays().count, settings_);
+  shape_ = {};
+}
 
 RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noexcept {
   if (RenderStatus bad = check_request(request, settings_.format); !bad.ok()) return bad;
@@ -116,13 +71,8 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
 /// After a failure: buffers that could not grow are gone, and with them what frames shared.
 void CudaView::forget_frames() {
   groups_.forget();
-  room_ = first_room();
   shape_ = {};
   reach_known_ = false;
-}
-
-FrameRoom CudaView::first_room() const {
-  return {scene_->arrays().count, settings_.max_list_entries, settings_.split_tasks};
 }
 
 void CudaView::set_shape(glm::ivec2 size_px) {
@@ -131,23 +81,36 @@ void CudaView::set_shape(glm::ivec2 size_px) {
   shape_.height_px = size_px.y;
   shape_.tiles_x = (size_px.x + tile_size_px - 1) / tile_size_px;
   shape_.tiles_y = (size_px.y + tile_size_px - 1) / tile_size_px;
-  room_.apply(shape_);
+  const FrameSizes room = room_.sizes();
+  shape_.visible_bound = room.visible;
+  shape_.list_bound = room.list_entries;
+  shape_.slice_bound = std::min(room.slices, most_slices(shape_));
 }
 
-/// Sets the frame's shape and makes room for it; where the device has too little memory, for a part
-/// of its lists, the nearest.
+/// Sets the frame's shape and makes room for it; where the device has too little memory, without
+/// slices, and for the nearest part of the lists.
 void CudaView::make_room(glm::ivec2 size_px) {
+  const FrameRoom wanted = room_;
   for (;;) {
     set_shape(size_px);
     try {
       return memory_.reserve(shape_, scene_->arrays().count, settings_);
     } catch (const CudaError& error) {
-      const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
-      if (!short_of_memory || !room_.retreat()) throw;
       memory_ = {};
       reach_known_ = false;
+      const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
+      if (short_of_memory && room_.retreat()) continue;
+      room_ = wanted;
+      throw;
     }
   }
+}
+
+/// After a key frame: whether it lacked room, and has more now.
+bool CudaView::needs_more_room() {
+  const FrameCounts& counts = *memory_.host_counts.get();
+  return room_.outgrown_by(
+      {counts.visible, counts.list_entries, std::min(counts.wanted_slices, most_slices(shape_))});
 }
 
 void CudaView::mark(Stage stage) {
@@ -172,7 +135,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
     blend(request);
     deliver();
     reach_known_ = true;
-  } while (room_.outgrown_by(*memory_.host_counts.get()));
+  } while (needs_more_room());
 }
 
 void CudaView::draw_sub(const FrameRequest& request) {
@@ -353,8 +316,6 @@ FrameView CudaView::finished(const FramePlan& plan) {
   stats.visible = counts.visible;
   stats.list_entries = std::min(counts.list_entries, shape_.list_bound);
   stats.overflowed_entries = counts.list_entries - stats.list_entries;
-  if (settings_.pipeline != Pipeline::vanilla)
-    stats.overflowed_entries += counts.visible - std::min(counts.visible, shape_.visible_bound);
   stats.list_max = counts.list_max;
   for (const std::uint32_t queued : counts.queued) stats.tasks += queued;
   stats.blended_pairs = counts.blended_pairs;

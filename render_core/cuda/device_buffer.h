@@ -9,13 +9,12 @@
 
 namespace catgs::cuda {
 
-/// Owns `size()` elements of device memory (or, with `Pinned`, of page-locked host memory that the
-/// device can address). Grows by `reserve`, never shrinks, never keeps its contents when growing.
+/// Owns `size()` elements of device memory (or, when `pinned`, of page-locked host memory). Grows
+/// by `reserve`, never shrinks, never keeps its contents when growing.
 template <class T, bool pinned = false>
 class Buffer {
  public:
   Buffer() = default;
-  explicit Buffer(std::size_t count) { reserve(count); }
   ~Buffer() { release(); }
   Buffer(Buffer&& other) noexcept
       : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
@@ -31,7 +30,7 @@ class Buffer {
     release();
     void* memory = nullptr;
     if constexpr (pinned) {
-      check(cudaHostAlloc(&memory, count * sizeof(T), cudaHostAllocMapped), "pinned memory");
+      check(cudaHostAlloc(&memory, count * sizeof(T), cudaHostAllocDefault), "pinned memory");
     } else {
       check(cudaMalloc(&memory, count * sizeof(T)), "device memory");
     }

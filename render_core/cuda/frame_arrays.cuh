@@ -24,8 +24,8 @@ static_assert(sizeof(SplatRecord) == 32);
 /// all that are farther back.
 constexpr int queue_classes = 8;
 
-/// Counts of a frame. Written by the device, copied to mapped host memory at the frame's end; the
-/// host reads them only then.
+/// Counts of a frame. Written by the device, copied to page-locked host memory at the frame's end;
+/// the host reads them only then.
 struct FrameCounts {
   // Of the key frame; sub-frames keep them.
   std::uint32_t visible = 0;       // Gaussians in view

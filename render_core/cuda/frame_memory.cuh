@@ -8,7 +8,7 @@
 
 namespace catgs::cuda {
 
-/// All device memory of a View, sized by a FrameShape. Buffers only grow, between frames.
+/// All device memory of a View, sized by a FrameShape. Buffers grow between frames.
 struct FrameMemory {
   DeviceBuffer<std::uint32_t> cull_mask, cull_before, visible;
   DeviceBuffer<SplatRecord> records;

@@ -18,7 +18,8 @@ constexpr std::uint32_t no_depth_key = (1u << (depth_bits + depth_bits_below)) -
 /// Key of a view depth; the lowest, where it is not beyond the near plane.
 __device__ inline std::uint32_t depth_key(float depth, float near_z) {
   if (!(depth > near_z)) return 0;
-  return min(__float_as_uint(depth) - __float_as_uint(near_z), no_depth_key - 1u);
+  return min(__float_as_uint(depth) - __float_as_uint(near_z),
+             no_depth_key - (1u << depth_bits_below));  // before it in the bits that are sorted
 }
 
 /// Ping-pong buffers; CUB says which of the two holds the result.
@@ -33,7 +34,8 @@ struct SortScratch {
   std::size_t bytes = 0;
 };
 
-/// Scratch that every call below needs at most for these bounds.
+/// Scratch that sort_by_depth(), scan_tile_counts() and sort_by_tile() need at most for these
+/// bounds.
 std::size_t sort_scratch_bytes(const FrameShape& shape);
 
 /// Sorts visible splats front to back, stable: on return order.current[k] is the slot of the k-th

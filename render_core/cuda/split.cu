@@ -186,13 +186,11 @@ __global__ void __launch_bounds__(composite_block) composite_kernel(const Compos
   if (slices.y == 0) return;
   const int in_tile_x = static_cast<int>(threadIdx.x) % tile_size_px;
   const int in_tile_y = static_cast<int>(threadIdx.x) / tile_size_px;
-  const int part =
-      in_tile_y / part_size_px * (tile_size_px / part_size_px) + in_tile_x / part_size_px;
+  const int part = part_of(in_tile_x, in_tile_y);
   math::PixelState<float> pixel = math::empty_pixel<float>();
   std::uint32_t looked_at = 0;
   for (std::uint32_t s = slices.x; s < slices.x + slices.y; ++s) {
-    const float4 slice =
-        p.slice_pixels[static_cast<std::size_t>(s) * composite_block + threadIdx.x];
+    const float4 slice = p.slice_pixels[slice_pixel(s, in_tile_x, in_tile_y)];
     pixel.colour.x += pixel.transmittance * slice.x;
     pixel.colour.y += pixel.transmittance * slice.y;
     pixel.colour.z += pixel.transmittance * slice.z;

@@ -13,7 +13,7 @@ namespace catgs::cuda {
 /// slices that are drawn last: most find then that nothing shines through what lies before them.
 /// For the same reason all first slices are queued before all second ones, and so on.
 /// The mean is the last frame's too, so that nothing waits for this one's. Where slices find no
-/// room, tiles go without, first without those of the rest.
+/// room, blocks of tiles go without, first without those of the rest.
 struct SplitParams {
   FrameShape shape;
   const uint2* range;          // [tiles]

@@ -1,7 +1,5 @@
 // Key frames and sub-frames of the CPU core against its exact pipeline at the same poses.
 
-#include <algorithm>
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -10,12 +8,11 @@
 
 #include "render_core/cpu/scene_store.h"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/motion/predictor.h"
-#include "render_core/motion/script.h"
 #include "render_core/renderer.h"
-#include "render_core/scene/synth.h"
 #include "render_core/thread_pool.h"
 #include "tests/support/camera_moves.h"
+#include "tests/support/catgs_view_tests.h"
+#include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {
@@ -25,23 +22,13 @@ using test::Move;
 using test::moved;
 using test::moves;
 using test::patient_settings;
+using test::render_in;
+using test::Rendered;
 using test::request_on_path;
 using test::TestScene;
 using test::window;
 
 std::shared_ptr<ThreadPool> pool_of(int threads) { return std::make_shared<ThreadPool>(threads); }
-
-struct Rendered {
-  std::vector<float> rgb;
-  FrameStats stats;
-};
-
-Rendered render(View& view, const FrameRequest& request) {
-  FrameView frame;
-  const RenderStatus status = view.render(request, frame);
-  EXPECT_TRUE(status.ok()) << status.message;
-  return {test::copy_rgb(frame), frame.stats};
-}
 
 class SubFrames : public testing::TestWithParam<TestScene> {
  protected:
@@ -64,13 +51,13 @@ TEST_P(SubFrames, OnTheForecastPathNothingIsMissing) {
       const auto view = core->make_view(patient_settings());
       for (int k = 0; k <= window; ++k) {
         const FrameRequest request = request_on_path(scene, move, k);
-        const Rendered drawn = render(*view, request), expected = render(*exact, request);
+        const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
         EXPECT_EQ(drawn.stats.kind, k == 0 ? FrameKind::key : FrameKind::sub) << k;
         EXPECT_EQ(drawn.stats.window, window);
         EXPECT_EQ(drawn.stats.overflowed_entries, 0u);
         EXPECT_GE(test::psnr_db(drawn.rgb, expected.rgb), k == 0 ? 120.0 : 90.0) << "frame " << k;
       }
-      EXPECT_EQ(render(*view, request_on_path(scene, move, window)).stats.kind, FrameKind::key);
+      EXPECT_EQ(render_in(*view, request_on_path(scene, move, window)).stats.kind, FrameKind::key);
     }
   }
 }
@@ -82,7 +69,7 @@ TEST_P(SubFrames, ThreadsDoNotChangeTheImage) {
   const auto many_view = many->make_view(patient_settings());
   for (int k = 0; k <= window; ++k) {
     const FrameRequest request = request_on_path(GetParam(), move, k);
-    EXPECT_EQ(render(*one_view, request).rgb, render(*many_view, request).rgb);
+    EXPECT_EQ(render_in(*one_view, request).rgb, render_in(*many_view, request).rgb);
   }
 }
 
@@ -93,7 +80,8 @@ TEST_P(SubFrames, AStillCameraNeedsNoFreshOrder) {
   const auto view = core->make_view(settings), exact = core->make_view({});
   for (int k = 0; k <= window; ++k) {
     const FrameRequest request = request_on_path(GetParam(), {}, k);
-    EXPECT_GE(test::psnr_db(render(*view, request).rgb, render(*exact, request).rgb), 120.0) << k;
+    EXPECT_GE(test::psnr_db(render_in(*view, request).rgb, render_in(*exact, request).rgb), 120.0)
+        << k;
   }
 }
 
@@ -102,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(, SubFrames, testing::ValuesIn(test::small_scenes()),
 
 // Gaussians are culled in clusters of neighbours. Here one cluster fills the view and another comes
 // in whole, from the side or through the near plane.
-TEST(CatgsView, ClustersThatComeIntoViewAreKept) {
+TEST(CpuSubFrames, ClustersThatComeIntoViewAreKept) {
   struct Entrance {
     glm::vec3 centre;  // of the cluster that comes in
     Move move;
@@ -126,7 +114,7 @@ TEST(CatgsView, ClustersThatComeIntoViewAreKept) {
     std::uint32_t visible_first = 0, visible_last = 0;
     for (int k = 0; k <= window; ++k) {
       const FrameRequest request = request_on_path(scene, entrance.move, k);
-      const Rendered drawn = render(*view, request), expected = render(*exact, request);
+      const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
       EXPECT_GE(test::psnr_db(drawn.rgb, expected.rgb), 80.0) << "frame " << k;
       (k == 0 ? visible_first : visible_last) = expected.stats.visible;
     }
@@ -135,134 +123,11 @@ TEST(CatgsView, ClustersThatComeIntoViewAreKept) {
   }
 }
 
-/// PSNR of mean squared errors, dB.
-class MeanPsnr {
- public:
-  void add(double psnr_db) {
-    sum_ += std::pow(10.0, -0.1 * psnr_db);
-    ++count_;
-    worst_ = std::min(worst_, psnr_db);
-  }
-  [[nodiscard]] int count() const { return count_; }
-  [[nodiscard]] double mean() const { return -10.0 * std::log10(sum_ / count_); }
-  [[nodiscard]] double worst() const { return worst_; }
-
- private:
-  double sum_ = 0.0, worst_ = INFINITY;
-  int count_ = 0;
-};
-
-// Forecasts from past samples are never quite right; the lists then miss rims of Gaussians at the
-// edges of tiles. Measured over `head`, which is the worst: 88 dB, 77 dB the worst frame.
-TEST(CatgsView, KeepsItsQualityOnScriptedMotion) {
-  const auto pool = pool_of(2);
-  const Scene scene = synthesize(SynthKind::city, 20'000, 1, *pool);
-  const auto cloud = std::make_shared<const GaussianCloud>(scene.cloud);
-  const auto renderer = make_renderer(cloud, {RendererKind::cpu, pool, "auto"}).renderer;
-  for (const std::string script : {"walk", "head", "drone"}) {
-    const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
-    const auto exact = renderer->make_view({});
-    MotionPredictor predictor;
-    MeanPsnr keys, subs;
-    for (const TimedPose& sample :
-         make_script({.script = script, .duration_s = 0.6}, scene.hints)) {
-      predictor.add(sample);
-      FrameRequest request;
-      request.camera = make_camera(sample.world_from_camera, {320, 192}, 183.0f);
-      request.forecast = predictor.forecast(sample.time_us, 120.0, window);
-      const Rendered drawn = render(*view, request), expected = render(*exact, request);
-      (drawn.stats.kind == FrameKind::key ? keys : subs)
-          .add(test::psnr_db(drawn.rgb, expected.rgb));
-    }
-    SCOPED_TRACE(script);
-    EXPECT_GE(subs.count(), 40);
-    // A Gaussian that is at 1/255 in a pixel is drawn there or not by a last bit: 106 dB measured;
-    // without such a pixel 147 dB.
-    EXPECT_GE(keys.worst(), 100.0);
-    EXPECT_GE(subs.mean(), 75.0);
-    EXPECT_GE(subs.worst(), 60.0);
-  }
-}
-
-TEST(CatgsView, KeyOrderIsWrongOnceTheViewTurned) {
-  const TestScene scene = test::small_scenes().front();
-  const auto renderer =
-      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
-  ViewSettings settings = patient_settings();
-  settings.order = BlendOrder::key;
-  const auto view = renderer->make_view(settings), exact = renderer->make_view({});
-  const Move yaw{"yaw", {0, 0, 0}, {0, 0.05f, 0}};
-  double psnr = 0.0;
-  for (int k = 0; k <= window; ++k) {
-    const FrameRequest request = request_on_path(scene, yaw, k);
-    psnr = test::psnr_db(render(*view, request).rgb, render(*exact, request).rgb);
-  }
-  // 2.9 degrees; 46.5 dB measured.
-  EXPECT_GT(psnr, 42.0);
-  EXPECT_LT(psnr, 60.0);
-}
-
-TEST(CatgsView, WithoutForecastIsTheExactPipeline) {
-  const TestScene scene = test::small_scenes().front();
-  const auto renderer =
-      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
-  const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
-  const auto exact = renderer->make_view({});
-  for (int k = 0; k < 3; ++k) {
-    const Rendered drawn = render(*view, scene.request), expected = render(*exact, scene.request);
-    EXPECT_EQ(drawn.rgb, expected.rgb);
-    EXPECT_EQ(drawn.stats.kind, FrameKind::key);
-    EXPECT_EQ(drawn.stats.window, 0);
-    EXPECT_EQ(drawn.stats.list_entries, expected.stats.list_entries);
-  }
-}
-
-TEST(CatgsView, ANewImageSizeIsANewGroup) {
-  const TestScene scene = test::small_scenes().front();
-  const auto renderer =
-      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
-  const auto view = renderer->make_view(patient_settings());
-  const auto exact = renderer->make_view({});
-  FrameRequest request = request_on_path(scene, moves().front(), 0);
-  render(*view, request);
-  for (const glm::ivec2 size : {glm::ivec2(200, 150), glm::ivec2(17, 300), glm::ivec2(64, 64)}) {
-    request.camera = make_camera(request.camera.world_from_camera, size, 140.0f);
-    const Rendered key = render(*view, request), sub = render(*view, request);
-    EXPECT_EQ(key.stats.kind, FrameKind::key);
-    EXPECT_EQ(sub.stats.kind, FrameKind::sub);
-    EXPECT_GE(test::psnr_db(sub.rgb, render(*exact, request).rgb), 120.0);
-  }
-}
-
-TEST(CatgsView, ListMemoryIsBoundedInKeyAndSubFrames) {
-  const TestScene scene = test::small_scenes().front();
-  const auto renderer =
-      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
-  ViewSettings settings = patient_settings();
-  settings.max_list_entries = 1000;
-  const auto view = renderer->make_view(settings);
-  for (int k = 0; k <= window; ++k) {
-    const FrameStats stats = render(*view, request_on_path(scene, moves().back(), k)).stats;
-    EXPECT_LE(stats.list_entries, 1000u);
-    EXPECT_GT(stats.overflowed_entries, 0u);
-  }
-}
-
-TEST(CatgsView, CountsWhatItMeasures) {
-  const TestScene scene = test::small_scenes().front();
-  const auto renderer =
-      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
-  const auto view = renderer->make_view(patient_settings());
-  const Move sideways{"sideways", {0.1f, 0, 0}, {0, 0, 0}};
-  const FrameStats key = render(*view, request_on_path(scene, sideways, 0)).stats;
-  // A sideways step moves a point by f step / z; the nearest the most.
-  EXPECT_GT(key.nearest_depth, 2.0f);
-  EXPECT_NEAR(key.displacement_px, 150.0f * 0.1f / key.nearest_depth, 1e-3f);
-  const FrameStats sub = render(*view, request_on_path(scene, sideways, 1)).stats;
-  EXPECT_FLOAT_EQ(sub.nearest_depth, key.nearest_depth);
-  EXPECT_EQ(sub.list_entries, key.list_entries);
-  EXPECT_GT(view->memory_bytes(), 160u * 120 * 12);
-}
-
 }  // namespace
+
+namespace test {
+
+INSTANTIATE_TEST_SUITE_P(Cpu, CatgsView, testing::Values(Core{RendererKind::cpu, 120.0, INFINITY}));
+
+}  // namespace test
 }  // namespace catgs

@@ -2,14 +2,17 @@
 
 // What tests of the CUDA core share.
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <cuda_runtime_api.h>
 #include <gtest/gtest.h>
 
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/renderer.h"
+#include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 
 /// Skips the test where no device is, with the core's own reason.
@@ -17,18 +20,6 @@
   if (const std::string obstacle = cuda_obstacle(); !obstacle.empty()) GTEST_SKIP() << obstacle
 
 namespace catgs::test {
-
-struct Rendered {
-  std::vector<float> rgb;
-  FrameStats stats;
-};
-
-inline Rendered render_in(View& view, const FrameRequest& request) {
-  FrameView frame;
-  const RenderStatus status = view.render(request, frame);
-  EXPECT_TRUE(status.ok()) << status.message;
-  return {status.ok() ? copy_rgb(frame) : std::vector<float>(), frame.stats};
-}
 
 inline Rendered render(Renderer& renderer, const FrameRequest& request,
                        const ViewSettings& settings = {}) {
@@ -46,5 +37,22 @@ inline TestScene random_scene(std::size_t count) {
   scene.request.camera = make_camera(Pose{}, {640, 360}, 400.0f);
   return scene;
 }
+
+/// Takes all memory of the current device but about `left` bytes.
+class Hog {
+ public:
+  explicit Hog(std::size_t left) {
+    std::size_t free = 0, total = 0;
+    EXPECT_EQ(cudaMemGetInfo(&free, &total), cudaSuccess);
+    EXPECT_GT(free, left);
+    EXPECT_EQ(cudaMalloc(&memory_, free - left), cudaSuccess);
+  }
+  ~Hog() { (void)cudaFree(memory_); }
+  Hog(const Hog&) = delete;
+  Hog& operator=(const Hog&) = delete;
+
+ private:
+  void* memory_ = nullptr;
+};
 
 }  // namespace catgs::test

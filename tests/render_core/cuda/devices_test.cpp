@@ -4,6 +4,7 @@
 #include <thread>
 #include <vector>
 
+#include <cuda_runtime_api.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -130,6 +131,12 @@ TEST_F(AllDevices, ShareTheViewsAndDrawTheSame) {
   threads.clear();
   views.clear();
   EXPECT_THAT(set_->views(), Each(Pair(testing::_, 0)));
+}
+
+TEST_F(AllDevices, AViewGoesWhereMemoryIs) {
+  (void)cudaSetDevice(0);
+  const test::Hog hog(std::size_t{2} << 20);
+  for (int i = 0; i < 3; ++i) EXPECT_NE(renderer_->make_view({})->device(), 0);
 }
 
 TEST_F(AllDevices, ANewViewTakesThePlaceOfOneThatEnded) {

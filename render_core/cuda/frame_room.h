@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+
+namespace catgs::cuda {
+
+/// Room for one kind of things, whose need is known only after a frame: what frames needed before,
+/// and a margin. Room that is far too wide for long comes down.
+class Room {
+ public:
+  Room(std::uint64_t first_guess, std::uint64_t limit);
+
+  [[nodiscard]] std::uint32_t size() const { return size_; }
+  /// After a key frame: whether it needed more than there is and can be; then the room has grown.
+  bool outgrown_by(std::uint32_t needed);
+  /// A part of what there is now, and for some hundred key frames no more than that.
+  void shrink_to(double part);
+
+ private:
+  [[nodiscard]] std::uint32_t with_margin(std::uint32_t needed) const;
+
+  std::uint32_t ceiling_, limit_, size_;
+  std::uint32_t frames_ = 0;  // key frames since the room was last looked over
+  std::uint32_t most_ = 0;    // needed in these
+};
+
+/// Numbers of things that a frame needs, or has room for.
+struct FrameSizes {
+  std::uint32_t visible = 0;       // Gaussians in view
+  std::uint32_t list_entries = 0;  // of all tile lists
+  std::uint32_t slices = 0;        // of long tiles
+};
+
+/// How much room the frames of a View get. The host does not wait for counts within a frame: it
+/// allots by what frames needed before (not much more, since the padding up to a bound is sorted
+/// too), and draws a frame again that needed more.
+class FrameRoom {
+ public:
+  /// `list_limit`: most entries of all tile lists. `splits`: long tiles are cut into slices.
+  FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits);
+
+  [[nodiscard]] FrameSizes sizes() const;
+  /// After a key frame: whether it lacked room and should be drawn again.
+  bool outgrown_by(const FrameSizes& needed);
+  /// The device has no memory for this much: gives up slices, which only make frames faster, then a
+  /// part of the lists, whose ends are the farthest splats. False when little is left of them.
+  bool retreat();
+
+ private:
+  Room visible_, lists_, slices_;
+};
+
+}  // namespace catgs::cuda

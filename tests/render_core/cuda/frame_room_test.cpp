@@ -1,0 +1,102 @@
+#include "render_core/cuda/frame_room.h"
+
+#include <gtest/gtest.h>
+
+namespace catgs::cuda {
+namespace {
+
+constexpr int patience = 600;
+
+void draw(Room& room, int frames, std::uint32_t needed) {
+  for (int i = 0; i < frames; ++i) room.outgrown_by(needed);
+}
+
+TEST(Room, GrowsOnceWithAMarginThatTheNextNeedFits) {
+  Room room(1000, 1'000'000);
+  EXPECT_FALSE(room.outgrown_by(1000));
+  EXPECT_TRUE(room.outgrown_by(10'000));
+  EXPECT_GT(room.size(), 11'000u);
+  EXPECT_LT(room.size(), 20'000u);
+  EXPECT_FALSE(room.outgrown_by(11'000));
+}
+
+TEST(Room, StopsAtItsLimit) {
+  Room room(1000, 5000);
+  EXPECT_TRUE(room.outgrown_by(4'000'000'000u));
+  EXPECT_EQ(room.size(), 5000u);
+  EXPECT_FALSE(room.outgrown_by(4'000'000'000u));
+  EXPECT_EQ(Room(1000, 10).size(), 10u);
+}
+
+TEST(Room, ComesDownWhenHalfOfItWasNotNeededForLong) {
+  Room room(1'000'000, 2'000'000);
+  draw(room, patience - 1, 100'000);
+  EXPECT_EQ(room.size(), 1'000'000u);
+  draw(room, 1, 100'000);
+  EXPECT_LT(room.size(), 200'000u);
+  EXPECT_GE(room.size(), 100'000u);
+  draw(room, 3 * patience, 100'000);
+  EXPECT_GE(room.size(), 100'000u);
+}
+
+TEST(Room, StaysWhileNowAndThenMoreIsNeeded) {
+  Room room(1'000'000, 2'000'000);
+  for (int i = 0; i < 10; ++i) {
+    draw(room, patience / 2, 10);
+    draw(room, 1, 600'000);
+  }
+  EXPECT_EQ(room.size(), 1'000'000u);
+}
+
+TEST(Room, NeverGrowsByComingDown) {
+  for (const std::uint32_t size : {0u, 1u, 4096u, 9000u}) {
+    Room room(size, 1'000'000);
+    draw(room, 2 * patience, size / 3);
+    EXPECT_LE(room.size(), size);
+  }
+}
+
+TEST(Room, ForgetsAfterAWhileThatItWasTold) {
+  Room room(1'000'000, 2'000'000);
+  room.shrink_to(0.75);
+  EXPECT_EQ(room.size(), 750'000u);
+  EXPECT_FALSE(room.outgrown_by(1'500'000));
+  draw(room, patience - 1, 1'500'000);
+  EXPECT_TRUE(room.outgrown_by(1'500'000));
+  EXPECT_GE(room.size(), 1'500'000u);
+}
+
+TEST(FrameRoom, GivesUpSlicesThenListsNeverGaussians) {
+  FrameRoom room(4'000'000, 1u << 26, true);
+  room.outgrown_by({2'000'000, 8'000'000, 10'000});
+  const FrameSizes before = room.sizes();
+  EXPECT_GE(before.slices, 10'000u);
+  ASSERT_TRUE(room.retreat());
+  EXPECT_EQ(room.sizes().slices, 0u);
+  EXPECT_EQ(room.sizes().list_entries, before.list_entries);
+  ASSERT_TRUE(room.retreat());
+  EXPECT_EQ(room.sizes().list_entries, before.list_entries / 4 * 3);
+  int retreats = 0;
+  while (room.retreat()) ASSERT_LT(++retreats, 100);
+  EXPECT_GT(room.sizes().list_entries, 0u);
+  EXPECT_EQ(room.sizes().visible, before.visible);
+}
+
+TEST(FrameRoom, IsOutgrownByWhatWouldBeMissing) {
+  FrameRoom room(100'000, 1u << 20, true);
+  EXPECT_FALSE(room.outgrown_by({1000, 1000, 1'000'000}));  // slices only make frames faster
+  EXPECT_TRUE(room.outgrown_by({90'000, 1000, 0}));
+  EXPECT_TRUE(room.outgrown_by({90'000, 500'000, 0}));
+  EXPECT_FALSE(room.outgrown_by({90'000, 500'000, 0}));
+}
+
+TEST(FrameRoom, OfAnEmptySceneOrWithoutSlices) {
+  FrameRoom empty(0, 0, false);
+  for (int i = 0; i < 3 * patience; ++i) ASSERT_FALSE(empty.outgrown_by({}));
+  EXPECT_GE(empty.sizes().visible, 1u);
+  EXPECT_GE(empty.sizes().list_entries, 1u);
+  EXPECT_EQ(empty.sizes().slices, 0u);
+}
+
+}  // namespace
+}  // namespace catgs::cuda
