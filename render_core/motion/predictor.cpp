@@ -39,19 +39,14 @@ bool usable(const Pose& pose) {
          norm > 1e-6f;
 }
 
-struct Step {
-  glm::dvec3 shift{0.0};  // world axes, units
-  glm::dvec3 turn{0.0};   // rotation vector in the axes of where it begins, rad
-};
-
-Step step_between(const Pose& from, const Pose& to) {
-  return {glm::dvec3(to.position) - glm::dvec3(from.position),
-          rotation_between(from.orientation, to.orientation)};
+/// World axes, units.
+glm::dvec3 shift_between(const Pose& from, const Pose& to) {
+  return glm::dvec3(to.position) - glm::dvec3(from.position);
 }
 
-/// How far the step moves a picture, rad.
-double extent(const Step& step) {
-  return glm::length(step.turn) + glm::length(step.shift) / MotionPredictor::lever;
+/// Rotation vector in the axes of `from`, rad.
+glm::dvec3 turn_between(const Pose& from, const Pose& to) {
+  return rotation_between(from.orientation, to.orientation);
 }
 
 double seconds_between(std::int64_t from_us, std::int64_t to_us) {
@@ -123,15 +118,16 @@ void MotionPredictor::follow(std::size_t index) {
   Sample& sample = samples_[index];
   const bool burst = index >= 2 && sample.time_us - samples_[index - 1].time_us < min_step_us;
   const Sample& before = samples_[index - (burst ? 2 : 1)];
-  const Step step = step_between(before.pose, sample.pose);
+  const glm::dvec3 shift = shift_between(before.pose, sample.pose);
+  const glm::dvec3 turn = turn_between(before.pose, sample.pose);
   const double seconds =
       seconds_between(before.time_us, std::max(sample.time_us, before.time_us + min_step_us));
-  sample.speed = glm::length(step.shift) / seconds;
-  sample.angular_speed = glm::length(step.turn) / seconds;
+  sample.speed = glm::length(shift) / seconds;
+  sample.angular_speed = glm::length(turn) / seconds;
   const double smoothing_s = 1e-6 * static_cast<double>(settings_.smoothing_us);
   const double share = before.motion.known ? seconds / (seconds + smoothing_s) : 1.0;
-  sample.motion = {true, glm::mix(before.motion.velocity, step.shift / seconds, share),
-                   glm::mix(before.motion.angular_rate, step.turn / seconds, share)};
+  sample.motion = {true, glm::mix(before.motion.velocity, shift / seconds, share),
+                   glm::mix(before.motion.angular_rate, turn / seconds, share)};
 }
 
 /// The first step of a motion has none to be compared with, but the second tells.
@@ -140,7 +136,7 @@ void MotionPredictor::drop_a_jump_at_the_start() {
   const Sample &first = samples_[1], &second = samples_[2];
   const bool slows_down = first.speed > jump_ratio * second.speed ||
                           first.angular_speed > jump_ratio * second.angular_speed;
-  if (!slows_down || extent(step_between(samples_[0].pose, first.pose)) < jump_rad) return;
+  if (!slows_down || extent_between(samples_[0], first) < jump_rad) return;
   samples_.erase(samples_.begin());
   samples_[0].motion = {};
   follow(1);
@@ -155,7 +151,7 @@ bool MotionPredictor::newest_is_a_jump() const {
   }
   const Sample& newest = samples_.back();
   return (newest.speed > jump_ratio * speed || newest.angular_speed > jump_ratio * angular_speed) &&
-         extent(step_between(samples_[samples_.size() - 2].pose, newest.pose)) >= jump_rad;
+         extent_between(samples_[samples_.size() - 2], newest) >= jump_rad;
 }
 
 /// Compares the newest sample with what the one check_us ago let expect, undamped: whether the
@@ -171,10 +167,20 @@ void MotionPredictor::check_forecast() {
   if (later == samples_.begin() || !std::prev(later)->motion.known) return;
   const Sample& then = *std::prev(later);
   const double seconds = seconds_between(then.time_us, newest.time_us);
-  const Step step = step_between(then.pose, newest.pose);
-  error_ += extent({step.shift - seconds * then.motion.velocity,
-                    step.turn - seconds * then.motion.angular_rate});
-  moved_ += extent(step);
+  const glm::dvec3 shift = shift_between(then.pose, newest.pose);
+  const glm::dvec3 turn = turn_between(then.pose, newest.pose);
+  error_ +=
+      extent(shift - seconds * then.motion.velocity, turn - seconds * then.motion.angular_rate);
+  moved_ += extent(shift, turn);
+}
+
+/// By what angle a step moves a picture.
+double MotionPredictor::extent(const glm::dvec3& shift, const glm::dvec3& turn) const {
+  return glm::length(turn) + glm::length(shift) / settings_.lever;
+}
+
+double MotionPredictor::extent_between(const Sample& from, const Sample& to) const {
+  return extent(shift_between(from.pose, to.pose), turn_between(from.pose, to.pose));
 }
 
 double MotionPredictor::confidence() const {
@@ -189,7 +195,7 @@ bool MotionPredictor::still() const {
       std::ranges::upper_bound(samples_, newest.time_us - still_us, {}, &Sample::time_us);
   if (later == samples_.begin()) return false;  // not known for so long
   return std::all_of(std::prev(later), samples_.end(), [&](const Sample& sample) {
-    return extent(step_between(sample.pose, newest.pose)) <= still_rad;
+    return extent_between(sample, newest) <= still_rad;
   });
 }
 

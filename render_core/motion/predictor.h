@@ -18,14 +18,23 @@ struct PredictorSettings {
   // Forecasts are trusted this much, whatever came of earlier ones (0…1). With 1 the camera goes on
   // at constant velocity, over the whole horizon.
   double min_confidence = 0.0;
+  // World units; the distance at which shifts count like turns. Forecasts of recorded head motion
+  // hardly depend on it, from 0.5 to 10 m; what is tremor and what a motion does.
+  double lever = 3.0;
 };
+
+/// The lever for a scene by its near plane, in its units: 3 for the usual 0.2, less where people
+/// come nearer to smaller things.
+constexpr double forecast_lever(float near_z) {
+  return near_z > 0.0f ? 15.0 * static_cast<double>(near_z) : PredictorSettings{}.lever;
+}
 
 /// Where a camera is going, judged by where it has been: its smoothed velocity and angular rate,
 /// damped by how wrong its own forecasts were. One per camera; not for several threads at once.
 ///
 /// Confidence is the share of the motion that forecasts made 33 ms ahead got right lately: 1 - the
 /// sum of their errors over the sum of the motions, a sample weighing exp(-age / 0.3 s). A turn
-/// counts by its angle, a shift by the angle under which it appears `lever` away. In doubt, which
+/// counts by its angle, a shift by the angle under which it appears from a lever away. In doubt, which
 /// is 1 - confidence, velocity decays as exp(-t doubt / 120 ms); under a confidence of one half the
 /// horizon shrinks too, to its half at one quarter.
 /// `catgs-render trace forecast` compares this with other ways to predict.
@@ -63,9 +72,6 @@ class MotionPredictor {
   [[nodiscard]] bool still() const;
 
   static constexpr double jump_ratio = 10.0;
-  // World units; the distance at which shifts count like turns. Forecasts of recorded head motion
-  // hardly depend on it, from 0.5 to 10 m.
-  static constexpr double lever = 3.0;
 
  private:
   struct Motion {
@@ -88,6 +94,8 @@ class MotionPredictor {
   void drop_a_jump_at_the_start();
   void check_forecast();
   [[nodiscard]] bool newest_is_a_jump() const;
+  [[nodiscard]] double extent(const glm::dvec3& shift, const glm::dvec3& turn) const;
+  [[nodiscard]] double extent_between(const Sample& from, const Sample& to) const;
 
   PredictorSettings settings_;
   Samples samples_;  // of one motion; increasing times, min_step_us apart but for the newest

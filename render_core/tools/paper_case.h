@@ -5,7 +5,6 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "render_core/tools/bench_measure.h"
@@ -62,10 +61,8 @@ class PaperCase {
   using Visit = std::function<void(std::size_t trace, const ProgressReport& report)>;
   void for_each_trace(std::string_view doing, const Visit& visit);
 
-  /// How forecasts are made in what is measured from now on; returns how they were made before.
-  PredictorSettings predict_by(const PredictorSettings& settings) {
-    return std::exchange(setup_.predictor, settings);
-  }
+  /// How forecasts are made in what is measured from now on.
+  void predict_by(const PredictorSettings& settings) { setup_.predictor = settings; }
 
   /// Puts setup() on a path of the caller's.
   void follow(Trajectory samples, Trajectory poses, double fps);

@@ -17,7 +17,7 @@ namespace {
 /// (through the near plane) still gets no window.
 constexpr float any_trail_px = 1e9f;
 /// Nor does a forecast end them, which would be 100 ms away at most.
-constexpr PredictorSettings any_motion{.horizon_us = 1'000'000, .min_confidence = 1.0};
+constexpr std::int64_t any_horizon_us = 1'000'000;
 
 constexpr std::size_t max_trail_frames = 32;
 constexpr std::size_t max_trail_gaussians = 50'000;
@@ -132,7 +132,11 @@ PaperTable window_table(PaperCase& scene) {
   const std::vector<Measurement>& exact = scene.runs(Variant::exact);
   add("Exact", without_window(exact, exact));
   add("None", without_window(scene.runs(Variant::without_cache), exact));
-  const PredictorSettings usual = scene.predict_by(any_motion);
+  const PredictorSettings usual = scene.setup().predictor;
+  PredictorSettings patient = usual;
+  patient.horizon_us = any_horizon_us;
+  patient.min_confidence = 1.0;
+  scene.predict_by(patient);
   for (const int window : {1, 2, 4, 8, 16}) {
     add(fmt::format("W-{}", window), with_window(scene, window, exact));
   }

@@ -98,6 +98,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   setup.scene = load_scene(options.scene, options.threads, quiet);
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
+  setup.predictor.lever = forecast_lever(setup.camera.near_z);
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   core.pool = setup.pool;
   setup.made = make_renderer(setup.cloud, core);

@@ -34,6 +34,11 @@ bool same_view(const PoseSample& a, const PoseSample& b, float near_z) {
          glm::length(p.position - q.position) <= tolerance * near_z;
 }
 
+/// Knows nothing yet of the motion through the scene.
+MotionPredictor predictor_for(const SceneEntry& scene) {
+  return MotionPredictor({.lever = forecast_lever(scene.facts.near_z)});
+}
+
 }  // namespace
 
 Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host, TimePoint now)
@@ -82,6 +87,7 @@ void Session::on(const Hello& hello, TimePoint now) {
   if (const auto* error = std::get_if<ErrorMessage>(&admitted))
     return fail(error->code, error->message);
   admission_ = std::get<Admission>(std::move(admitted));
+  predictor_ = predictor_for(*admission_.scene);
   viewport_px_ = hello.viewport_px;
   settings_ = hello.settings;
   welcome_due_ = true;
@@ -120,7 +126,7 @@ void Session::on(const SelectScene& select, TimePoint now) {
   welcome_due_ = true;
   // A pose in the old scene means nothing in the new one.
   pose_.reset();
-  predictor_ = MotionPredictor();
+  predictor_ = predictor_for(*admission_.scene);
   request_stream();
 }
 

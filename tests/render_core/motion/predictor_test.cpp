@@ -277,6 +277,18 @@ TEST(Predictor, TremorIsNoMotion) {
   }
 }
 
+TEST(Predictor, WhatIsTremorDependsOnTheScene) {
+  EXPECT_DOUBLE_EQ(forecast_lever(0.2f), 15.0 * static_cast<double>(0.2f));
+  EXPECT_EQ(forecast_lever(0.0f), PredictorSettings{}.lever);
+  for (const float near_z : {0.2f, 0.002f}) {
+    MotionPredictor predictor({.lever = forecast_lever(near_z)});
+    for (int i = 0; i < 60; ++i) {  // 5 mm a second in metres, 50 cm in a hundredth of that
+      predictor.add({i * 10'000, {{5e-5f * static_cast<float>(i), 0, 0}, {1, 0, 0, 0}}});
+    }
+    EXPECT_EQ(predictor.still(), near_z == 0.2f);
+  }
+}
+
 TEST(Predictor, ASlowMotionIsNotStill) {
   MotionPredictor predictor;  // 1 unit / minute
   const auto creeping = [](std::int64_t time_us) {
