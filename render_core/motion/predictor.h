@@ -34,7 +34,7 @@ constexpr double forecast_lever(float near_z) {
 ///
 /// Confidence is the share of the motion that forecasts made 33 ms ahead got right lately: 1 - the
 /// sum of their errors over the sum of the motions, a sample weighing exp(-age / 0.3 s). A turn
-/// counts by its angle, a shift by the angle under which it appears from a lever away. In doubt, which
+/// counts by its angle, a shift by the angle under which it appears a lever away. In doubt, which
 /// is 1 - confidence, velocity decays as exp(-t doubt / 120 ms); under a confidence of one half the
 /// horizon shrinks too, to its half at one quarter.
 /// `catgs-render trace forecast` compares this with other ways to predict.
