@@ -35,7 +35,7 @@ void VoxelGrid::add_gaussian(const GaussianCloud& cloud, std::size_t i, float we
   const glm::vec3 u = rotation[axes[0]] * scale[axes[0]], v = rotation[axes[1]] * scale[axes[1]];
   const float area = cloud.opacity[i] * two_pi * scale[axes[0]] * scale[axes[1]] * weight;
   const auto points = [&](float s) {
-    return std::clamp(static_cast<int>(std::ceil(2.0f * s / cell_size_)), 1, 8);
+    return static_cast<int>(std::clamp(std::ceil(2.0f * s / cell_size_), 1.0f, 8.0f));
   };
   const int rows = points(scale[axes[0]]), columns = points(scale[axes[1]]);
   const auto place = [](int k, int n) {  // -1.5…1.5 standard deviations, evenly

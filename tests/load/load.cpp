@@ -66,6 +66,11 @@ void check(const LoadOptions& options) {
   if (!(options.duration_s > 0.0 && options.ramp_s >= 0.0 && options.ramp_s < options.duration_s)) {
     throw InputError("--duration, --ramp", "", "the run must last longer than its ramp");
   }
+  // The clock counts nanoseconds in 64 bits: an end that overflows it would lie in the past.
+  constexpr double longest_run_s = 7 * 24 * 3600.0;
+  if (options.duration_s > longest_run_s) {
+    throw InputError("--duration", "", "the run may last a week at most");
+  }
   if (!(options.fov_y_deg > 6.0f && options.fov_y_deg < 160.0f)) {
     throw InputError("--fov-deg", "", "must lie between 6 and 160 degrees");
   }

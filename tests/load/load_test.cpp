@@ -2,6 +2,7 @@
 // milliseconds: those belong to benchmarks.
 #include "tests/load/load.h"
 
+#include <limits>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/error.h"
+#include "render_core/motion/trajectory.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
@@ -176,6 +178,16 @@ TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {
   refused([](LoadOptions& options) { options.script.script = ""; });
   refused([](LoadOptions& options) { options.traces = {"/nonexistent.tum"}; });
   refused([](LoadOptions& options) { options.duration_s = 0.0; });
+  const test::TemporaryFolder folder;
+  const std::filesystem::path trace = folder / "still.tum";
+  write_tum(trace, {{0, Pose()}, {1'000'000, Pose()}});
+  for (const double endless_s : {1e30, std::numeric_limits<double>::infinity()}) {
+    refused([&](LoadOptions& options) {
+      options.script.script = "";
+      options.traces = {trace.string()};
+      options.duration_s = endless_s;
+    });
+  }
   refused([](LoadOptions& options) { options.ramp_s = 3.0; });
   refused([](LoadOptions& options) { options.fov_y_deg = 0.0f; });
 }
