@@ -1,7 +1,6 @@
 // catgs-render convert: a scene in, another format out.
 #include <filesystem>
 #include <memory>
-#include <optional>
 
 #include <fmt/format.h>
 
@@ -11,15 +10,14 @@
 #include "render_core/scene/save_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/tools/commands.h"
-#include "render_core/tools/progress.h"
+#include "render_core/tools/scene_options.h"
 
 namespace catgs {
 namespace {
 
 struct ConvertOptions {
-  std::string in, out;
-  std::optional<int> lod;
-  std::optional<std::size_t> budget;
+  SceneOptions in;
+  std::string out;
   double keep_fraction = 1.0;
   int threads = 0;
 };
@@ -40,16 +38,7 @@ void convert(const ConvertOptions& options, bool quiet) {
   if (!(options.keep_fraction > 0.0 && options.keep_fraction <= 1.0))
     throw InputError("--keep-fraction", "",
                      fmt::format("{} is not in (0, 1]", options.keep_fraction));
-  LoadOptions load;
-  load.lod = options.lod;
-  load.gaussian_budget = options.budget;
-  load.threads = options.threads;
-  Scene scene;
-  {
-    Progress progress("Reading " + options.in, quiet);
-    load.progress = [&](double fraction) { progress.update(fraction); };
-    scene = load_scene(options.in, load);
-  }
+  Scene scene = load_scene(options.in, options.threads, quiet);
   const std::size_t loaded = scene.cloud.size();
   keep_most_important(scene.cloud, options.keep_fraction);
   save_scene(scene.cloud, options.out);
@@ -70,14 +59,8 @@ void convert(const ConvertOptions& options, bool quiet) {
 void add_convert_command(CLI::App& app) {
   auto options = std::make_shared<ConvertOptions>();
   CLI::App* command = app.add_subcommand("convert", "Converts a scene to .ply, .splat or .spz");
-  command->add_option("in", options->in, "Any scene that can be rendered")->required();
+  add_scene_options(*command, options->in, "in");
   command->add_option("out", options->out, "File to write: .ply, .splat or .spz")->required();
-  auto* lod = command->add_option("--lod", options->lod,
-                                  "Streamed SOG: this level of detail; 0 is the finest");
-  command
-      ->add_option("--budget", options->budget,
-                   "Streamed SOG: the finest levels with at most so many Gaussians")
-      ->excludes(lod);
   command
       ->add_option("--keep-fraction", options->keep_fraction,
                    "Keep this share of the Gaussians, by opacity times mean projected area")

@@ -3,7 +3,6 @@
 #include <array>
 #include <chrono>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,7 +13,7 @@
 #include "render_core/scene/scene.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
-#include "render_core/tools/progress.h"
+#include "render_core/tools/scene_options.h"
 
 namespace catgs {
 namespace {
@@ -22,9 +21,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct InfoOptions {
-  std::string scene;
-  std::optional<int> lod;
-  std::optional<std::size_t> budget;
+  SceneOptions scene;
   int threads = 0;
   bool json = false;
 };
@@ -137,14 +134,8 @@ void print_text(const Json& info) {
 }
 
 void info(const InfoOptions& options, bool quiet) {
-  LoadOptions load;
-  load.lod = options.lod;
-  load.gaussian_budget = options.budget;
-  load.threads = options.threads;
-  Progress progress("Reading " + options.scene, quiet);
-  load.progress = [&](double fraction) { progress.update(fraction); };
   const auto start = std::chrono::steady_clock::now();
-  const Scene scene = load_scene(options.scene, load);
+  const Scene scene = load_scene(options.scene, options.threads, quiet);
   const std::chrono::duration<double, std::milli> load_ms =
       std::chrono::steady_clock::now() - start;
   const Json description = describe(scene, load_ms.count());
@@ -160,13 +151,7 @@ void add_info_command(CLI::App& app) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command =
       app.add_subcommand("info", "Describes a scene: content, defects, first sight");
-  command->add_option("scene", options->scene, "Scene file or folder")->required();
-  auto* lod = command->add_option("--lod", options->lod,
-                                  "Streamed SOG: this level of detail; 0 is the finest");
-  command
-      ->add_option("--budget", options->budget,
-                   "Streamed SOG: the finest levels with at most so many Gaussians")
-      ->excludes(lod);
+  add_scene_options(*command, options->scene);
   command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
   command->add_flag("--json", options->json, "As JSON, lengths in world units");
   command->callback([options, command] { info(*options, is_quiet(*command)); });

@@ -23,8 +23,8 @@ bool parse_side(std::string_view text, int& side) {
 
 }  // namespace
 
-void add_scene_options(CLI::App& command, SceneOptions& options) {
-  command.add_option("scene", options.path, "Scene file or folder")->required();
+void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name) {
+  command.add_option(name, options.path, "Scene file or folder")->required();
   auto* lod = command.add_option("--lod", options.lod,
                                  "Streamed SOG: this level of detail; 0 is the finest");
   command

@@ -18,7 +18,8 @@ struct SceneOptions {
   std::optional<int> lod;
   std::optional<std::size_t> budget;
 };
-void add_scene_options(CLI::App& command, SceneOptions& options);
+/// The path is the command's next positional argument.
+void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name = "scene");
 
 /// Shows its progress on a terminal. Throws InputError.
 Scene load_scene(const SceneOptions& options, int threads, bool quiet);
