@@ -19,7 +19,9 @@ namespace catgs {
 
 namespace {
 
-constexpr float invisible_opacity = static_cast<float>(alpha_min);
+constexpr float least_opacity = static_cast<float>(alpha_min);
+// A file that keeps the logit gives back a little less than was written.
+constexpr float invisible_opacity = least_opacity * (1.0f - 1e-5f);
 constexpr float absurd_value = 1e9f;
 constexpr float absurd_diagonals = 1e4f;
 constexpr float min_scale = 1e-10f;
@@ -86,6 +88,7 @@ Verdict judge(GaussianCloud& cloud, std::size_t i, const Reach& reach, Repairs& 
       !finite({q.x, q.y, q.z}) || !std::isfinite(q.w))
     return Verdict::not_finite;
   if (opacity < invisible_opacity) return Verdict::invisible;
+  opacity = std::max(opacity, least_opacity);
   if (!reach.contains(cloud.mean[i], std::max({scale.x, scale.y, scale.z}))) return Verdict::absurd;
 
   bool repaired = repair_rotation(q, repairs);

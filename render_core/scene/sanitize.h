@@ -12,8 +12,8 @@ namespace catgs {
 /// Dropped:
 ///  1. mean, scale, rotation or opacity is NaN or infinite;
 ///  2. peak alpha under 1/255: every pipeline skips such contributions (math/constants.h:
-///  alpha_min),
-///     so no pixel changes, and the memory and the culling time are saved;
+///     alpha_min), so no pixel changes, and the memory and the culling time are saved; less than
+///     1e-5 of it under counts as rounding;
 ///  3. absurd: a coordinate or scale over 1e9 (its fourth power, a 2D covariance's determinant,
 ///     would overflow), or farther from the middle of the robust bounds, or larger, than 1e4 times
 ///     their diagonal. What lies that far out is a float that escaped in training, and one such

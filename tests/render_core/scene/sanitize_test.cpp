@@ -48,6 +48,15 @@ TEST(Sanitize, DropsWhatCannotBeDrawnAndKeepsTheOrder) {
   EXPECT_EQ(cloud.mean[8992], before.mean[9001]);
 }
 
+TEST(Sanitize, KeepsTheFaintestAfterItsLogitWasWritten) {
+  GaussianCloud cloud = test::random_cloud(2, 0, 1);
+  const float faintest = 1.0f / 255.0f;
+  cloud.opacity = {faintest * (1.0f - 3e-6f), 0.999f * faintest};
+  EXPECT_EQ(sanitize(cloud, two_threads()).invisible, 1u);
+  ASSERT_EQ(cloud.size(), 1u);
+  EXPECT_EQ(cloud.opacity[0], faintest);
+}
+
 TEST(Sanitize, RepairsWhatHasAnObviousMeaning) {
   GaussianCloud cloud = random_cloud(1000, 1);
   cloud.rotation[1] = glm::quat(0.0f, 0.0f, 0.0f, 0.0f);
