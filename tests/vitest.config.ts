@@ -2,6 +2,8 @@ import { fileURLToPath } from 'node:url';
 import { defineConfig } from 'vitest/config';
 
 export default defineConfig({
+  // A minimal system knows no name "localhost".
+  server: { host: '127.0.0.1' },
   resolve: { alias: { '#client': fileURLToPath(new URL('../web_client/src', import.meta.url)) } },
   test: {
     projects: [
