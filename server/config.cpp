@@ -316,10 +316,16 @@ void validate(const ServerConfig& config) {
   if (!is_loopback(config.bind) && !guarded && !config.open)
     throw InputError("--bind " + config.bind, {}, "other machines could connect without a token",
                      "give --token-file or --token-key-file, or --open if everybody may");
-  if (config.admin_bind != "off" && !config.open &&
-      !is_loopback(parse_endpoint(config.admin_bind).address))
+  if (config.admin_bind == "off") return;
+  const Endpoint admin = parse_endpoint(config.admin_bind);
+  if (!config.open && !is_loopback(admin.address))
     throw InputError("--admin-bind " + config.admin_bind, {}, "metrics have no token",
                      "bind a loopback address, or give --open if everybody may read them");
+  // One listener would take both, whatever the addresses, and answer metrics with the page's 404.
+  if (admin.port == config.port && config.port != 0)
+    throw InputError(fmt::format("--port {}, --admin-bind {}", config.port, config.admin_bind), {},
+                     "page and metrics cannot share a port",
+                     "change one of them, or give --admin-bind off");
 }
 
 std::string print_config(const ServerConfig& config, const ConfigSources& sources) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 #include "render_core/build_info.h"
 #include "render_core/error.h"
@@ -36,7 +37,7 @@ void add_options(CLI::App& app, CommandLine& line) {
       ->envname("CATGS_CONFIG")
       ->option_text("FILE");
   app.add_flag("--print-config", line.print_config,
-               "Print the settings in force and where each comes from, then exit");
+               "Print the settings in force and where each comes from, check them, then exit");
   const ServerConfig defaults;
   for (const auto& setting : settings()) {
     const std::string name = "--" + setting.name;
@@ -73,11 +74,9 @@ ServerConfig effective_config(const CommandLine& line, ConfigSources& sources) {
 int serve(const CommandLine& line) {
   ConfigSources sources;
   const ServerConfig config = effective_config(line, sources);
-  if (line.print_config) {
-    std::cout << print_config(config, sources);
-    return exit_ok;
-  }
+  if (line.print_config) std::cout << print_config(config, sources);
   validate(config);
+  if (line.print_config) return exit_ok;
   set_up_log(config.log_format, config.log_level);
   Server server(config);
   server.run();
@@ -87,6 +86,9 @@ int serve(const CommandLine& line) {
 int run(int argc, char** argv) {
   CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
   app.set_version_flag("--version", build_version);
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return fmt::format("catgs-server: {} (see catgs-server --help)\n", error.what());
+  });
   app.footer(
       "Settings come from defaults, then --config FILE (TOML), then CATGS_<NAME> variables, then\n"
       "flags. Exit codes: 0 ended as asked, 1 failed, 2 bad usage, scene or configuration.\n"

@@ -123,6 +123,22 @@ TEST_F(ConfigTest, RefusesAnOpenAdminDoorEvenWithTokens) {
   EXPECT_NO_THROW(validate(config));
 }
 
+TEST_F(ConfigTest, PageAndMetricsNeedPortsOfTheirOwn) {
+  config.scenes = {"synth:city:1000"};
+  config.port = 9090;
+  for (const char* same : {"127.0.0.1:9090", "[::1]:9090"}) {
+    config.admin_bind = same;
+    EXPECT_THAT([&] { validate(config); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr("--port 9090"), HasSubstr(same),
+                                                HasSubstr("--admin-bind off"))));
+  }
+  config.admin_bind = "off";
+  EXPECT_NO_THROW(validate(config));
+  config.port = 0;  // the system chooses two
+  config.admin_bind = "127.0.0.1:0";
+  EXPECT_NO_THROW(validate(config));
+}
+
 TEST_F(ConfigTest, LevelAndBudgetExcludeEachOther) {
   read_toml("scene = \"tour\"\nlod = 2\n");
   EXPECT_NO_THROW(validate(config));
