@@ -114,7 +114,7 @@ step() {
   unset 'groups[-1]'
   if ((status != 0)); then
     printf '[%d/%d] %s: FAILED (status %d)\n' "$step_number" "$step_count" "$title" "$status" >&2
-    tac "$step_log" | sed '/^==== /q' | head -n 20 | tac | cut -c1-160 | sed 's/^/    /' >&2
+    tac "$step_log" | sed '/^==== /q' | head -n 20 | tac | sed 's/^/    /' >&2
     fail "$EXIT_FAILED" "The whole log: $step_log"
   fi
   print_step "$title" "$(format_duration $(($(now_us) - begin_us)))"

@@ -19,8 +19,9 @@ SCENE is a .ply, .splat, .spz or .sog file, a streamed SOG folder or a training 
   --log FILE   the build's full log (default build/run/run.log)
   -h, --help   this text
 
-Everything from the first other option on goes to catgs-server as it is, for example
-  deploy/run.sh garden.ply --port 9000 --encoder jpeg
+Every other option goes to catgs-server, with the word behind it as its value:
+  deploy/run.sh --encoder jpeg garden.ply --fps 30
+build/run/bin/catgs-server --help lists them. A list is given by repeating its option.
 
 Exit status: 0 stopped with Ctrl-C, 1 a step failed, 2 wrong usage, 3 packages are missing and
 installing them needs root, 4 not Debian 12 or Ubuntu 24.04, 5 the port is in use.
@@ -53,9 +54,13 @@ parse_arguments() {
         usage
         exit 0
         ;;
+      --open | -*=*) server_options+=("$1") ;;  # --open is the server's only one without a value
       -*)
-        server_options=("$@")
-        break
+        server_options+=("$1")
+        if (($# > 1)) && [[ $2 != -* || $2 == -[0-9]* ]]; then
+          server_options+=("$2")
+          shift
+        fi
         ;;
       *)
         [[ -e $1 ]] || fail "$EXIT_USAGE" "No such scene: $1"
@@ -92,7 +97,7 @@ check_port() {
   if [[ -n $fd ]]; then
     pid=${fd#/proc/}
     pid=${pid%%/*}
-    owner="$(tr '\0' ' ' <"/proc/$pid/cmdline" | cut -c1-80) (process $pid)"
+    owner="$(<"/proc/$pid/comm") (process $pid)"
   fi
   fail "$EXIT_PORT_BUSY" "Port $port is in use by: $owner" \
     "Stop that program, or choose another port: ./deploy/run.sh --port $((port % 65535 + 1))"
@@ -115,7 +120,6 @@ ensure_scene() {
     step_done "Scene: ${scenes[*]##*/}"
     return
   fi
-  scenes=("$demo_scene")
   # Like make: a newer generator may draw another city.
   if [[ $demo_scene -nt $bin_dir/catgs-render ]]; then
     step_done "Demo scene: city, 300,000 Gaussians, already made"
@@ -160,39 +164,78 @@ make_lan_credentials() {
 
 # ---- serving ----------------------------------------------------------------------------------
 
-readonly server_log=$build_dir/server.log
 readonly admin_port=9090  # the server's default, and Prometheus' own
+server_command=()
+server_log=""
+metrics_note=""
 
-start_server() {
-  local -a options=(--scene "${scenes[@]}" --port "$port" --log-level info)
+compose_server_command() {
+  server_log=$build_dir/server-$port.log  # one each: several may serve from here
+  server_command=("$bin_dir/catgs-server" --scene "${scenes[@]:-$demo_scene}" --port "$port"
+    --log-level info)
   if ((lan)); then
-    options+=(--bind 0.0.0.0 --token-file "$lan_dir/token"
+    server_command+=(--bind 0.0.0.0 --token-file "$lan_dir/token"
       --tls-cert "$lan_dir/cert.pem" --tls-key "$lan_dir/key.pem")
   fi
-  # Metrics are an extra here: a busy admin port must not keep the pictures away.
-  if [[ -n $(listening_inode "$admin_port") && " ${server_options[*]} " != *" --admin-bind"* ]]; then
-    options+=(--admin-bind off)
+  # Metrics are an extra here: a taken admin port must not keep the pictures away.
+  if [[ " ${server_options[*]}" != *" --admin-bind"* ]]; then
+    if ((port == admin_port)); then
+      metrics_note="off: port $admin_port serves the page (--admin-bind ADDRESS:PORT moves them)"
+    elif [[ -n $(listening_inode "$admin_port") ]]; then
+      metrics_note="off: port $admin_port is busy (--admin-bind ADDRESS:PORT moves them)"
+    fi
+    [[ -z $metrics_note ]] || server_command+=(--admin-bind off)
   fi
+  server_command+=("${server_options[@]}")
+}
+
+# A mistyped option is told before scenes are made and loaded.
+check_server_options() {
+  local message status=0
+  message=$("${server_command[@]}" --print-config 2>&1 >/dev/null) || status=$?
+  ((status == 0)) || fail "$status" "$message" "All options: $bin_dir/catgs-server --help"
+}
+
+start_server() {
   : >"$server_log"
-  start_group "$server_log" "$bin_dir/catgs-server" "${options[@]}" "${server_options[@]}"
+  start_group "$server_log" "${server_command[@]}"
 }
 
 # The server's last words before it serves, in either log format, whatever address and TLS it was given.
 readonly serving_pattern='s#.*open \(https\{0,1\}://[^ ]*\) in a browser.*#\1#p'
 
 wait_until_serving() {
-  local server=$1
+  local server=$1 ended=0
   until [[ -n $(sed -n "$serving_pattern" "$server_log") ]]; do
-    if ! kill -0 "$server" 2>/dev/null; then
-      cat "$server_log"
+    if ((ended)); then
+      # Its error and not the progress before it; a crash leaves only that.
+      grep '^catgs-server: ' "$server_log" || cat "$server_log"
       return 1
     fi
+    # Its last words may have come since the log was read: one more look.
+    kill -0 "$server" 2>/dev/null || ended=1
     sleep 0.1
   done
 }
 
 # server_says KEY: what the server's log gives as "KEY: text", the last time it did.
 server_says() { sed -n "s/.*$1: \([^\"]*\).*/\1/p" "$server_log" | tail -n 1; }
+
+# The ids of the scenes, as the server's log tells in either format, ready for an address.
+scene_ids() {
+  sed -n 's/.*\( info \|"message":"\)scene \(.*\): [0-9]* Gaussians, .*/\2/p' "$server_log" |
+    sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/&/%26/g; s/+/%2B/g'
+}
+
+# row NAME TEXT...: one line of the welcome for each text, named once.
+row() {
+  local name=$1 text
+  shift
+  for text in "$@"; do
+    printf '  %-9s %s\n' "$name" "$text"
+    name=""
+  done
+}
 
 print_welcome() {
   local url
@@ -202,18 +245,26 @@ print_welcome() {
     qrencode -t ANSIUTF8 -m 2 "$url"
     echo "Your phone warns once about the certificate, which this machine made for itself."
   fi
-  cat <<WELCOME
-
-  open      $url
-  renderer  $(server_says renderer)
-  encoder   $(server_says encoder)
-  log       $server_log
-  stop      Ctrl-C
-
-  Try       drag to turn, wheel or pinch to zoom, M to fly with W A S D
-            ./deploy/run.sh your_scene.ply      serve a scene of your own
-            ./deploy/run.sh --lan               open it on your phone
-WELCOME
+  local -a ids scene_urls=() hints=("drag to turn, wheel or pinch to zoom, M to fly with W A S D")
+  mapfile -t ids < <(scene_ids)
+  local id page=${url%%#*}
+  for id in "${ids[@]}"; do
+    scene_urls+=("$page?scene=$id${url#"$page"}")
+  done
+  local metrics
+  metrics=${metrics_note:-$(server_says metrics)}
+  ((${#scenes[@]} > 0)) || hints+=("./deploy/run.sh your_scene.ply      serve a scene of your own")
+  ((lan)) || hints+=("./deploy/run.sh --lan               open it on your phone")
+  echo
+  row open "$url"
+  ((${#scene_urls[@]} < 2)) || row scenes "${scene_urls[@]}"
+  row renderer "$(server_says renderer)"
+  row encoder "$(server_says encoder)"
+  row metrics "${metrics:-off}"
+  row log "$server_log"
+  row stop "Ctrl-C"
+  echo
+  row Try "${hints[@]}"
   if [[ -n $gpu_name && $cuda_choice == OFF ]] && ((allow_cuda)); then
     echo "  Your $gpu_name waits for nvcc: install the CUDA toolkit"
     echo "  (https://developer.nvidia.com/cuda-downloads) and start again."
@@ -249,6 +300,8 @@ main() {
   fi
   configure_build run "${cuda_options[@]}"
   build_all run "Build server, tools and client"
+  compose_server_command
+  check_server_options
   ensure_scene
   if ((lan)); then
     choose_lan_address

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What run.sh and test.sh say and return when the machine is not as they need it.
+"""What run.sh and test.sh say and return, whatever machine and options they are given.
 
 The system is played by stand-ins in front of PATH, so nothing is installed, built or served.
 """
@@ -7,6 +7,7 @@ The system is played by stand-ins in front of PATH, so nothing is installed, bui
 import os
 import pathlib
 import re
+import shutil
 import socket
 import subprocess
 import tempfile
@@ -17,9 +18,27 @@ RUN = str(SOURCE_DIR / "deploy/run.sh")
 TEST = str(SOURCE_DIR / "deploy/test.sh")
 LIBRARY = str(SOURCE_DIR / "deploy/lib.sh")
 DEBIAN = 'ID=debian\nVERSION_ID="12"\n'
+# Plays catgs-server: refuses --speed as a check of its options, an empty scene when started,
+# and otherwise says what the real one says, and ends.
+SERVER = """
+if [[ "$*" == *--speed* ]]; then echo "catgs-server: no such option: --speed" >&2; exit 2; fi
+[[ "$*" != *--print-config* ]] || exit 0
+for scene in "$@"; do
+  [[ $scene == *.ply ]] || continue
+  echo "12:00:00.000 info loading $scene"
+  [[ $scene != *empty* ]] || { echo "catgs-server: --scene $scene: is empty" >&2; exit 2; }
+  name=$(basename "$scene" .ply)
+  echo "12:00:00.000 info scene $name: 10 Gaussians, 3DGS .ply, 0.1 MB per device, view from all"
+done
+echo "12:00:00.000 info renderer: CPU"
+[[ "$*" == *--admin-bind* ]] || echo "12:00:00.000 info metrics: http://127.0.0.1:9090/metrics"
+echo "12:00:00.000 info open http://127.0.0.1:7/ in a browser; Ctrl-C stops the server"
+"""
 
 
-class Scripts(unittest.TestCase):
+class Machine(unittest.TestCase):
+    """A Debian without a GPU."""
+
     def setUp(self):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
@@ -60,6 +79,8 @@ class Scripts(unittest.TestCase):
     def options(self):
         return ["--port", self.free_port(), "--log", str(self.folder / "log")]
 
+
+class Scripts(Machine):
     def test_other_distributions_are_shown_the_container(self):
         self.os_release('ID=fedora\nVERSION_ID=40\n')
         for script in (RUN, TEST):
@@ -105,7 +126,8 @@ class Scripts(unittest.TestCase):
             result = self.run_script(RUN, "--port", str(port))
         self.assertEqual(result.returncode, 5, result.stdout + result.stderr)
         self.assertIn(f"Port {port} is in use by", result.stderr)
-        self.assertIn(f"process {os.getpid()}", result.stderr)
+        name = pathlib.Path("/proc/self/comm").read_text().strip()
+        self.assertIn(f": {name} (process {os.getpid()})\n", result.stderr)
         self.assertIn("--port", result.stderr.splitlines()[-1])
 
     def test_wrong_usage(self):
@@ -137,13 +159,112 @@ class Scripts(unittest.TestCase):
     def test_a_failing_step_shows_the_end_of_its_own_output_and_the_log(self):
         log = self.folder / "log"
         result = self.run_library(f'steps_begin 2 "{log}"; step One echo early; '
-                                  'step Two bash -c "echo the reason; exit 7"; echo never')
+                                  'step Two bash -c "echo the reason' + 40 * " is long" +
+                                  ' to the end; exit 7"; echo never')
         self.assertEqual(result.returncode, 1)
         self.assertTrue(re.match(r"\[1/2\] One +0\.\d s\n$", result.stdout), result.stdout)
         self.assertIn("[2/2] Two: FAILED (status 7)", result.stderr)
-        self.assertIn("the reason", result.stderr)
+        self.assertIn("the reason" + 40 * " is long" + " to the end\n", result.stderr)
         self.assertNotIn("early", result.stderr)
         self.assertIn(str(log), result.stderr)
+
+
+class Serving(Machine):
+    """run.sh to its end: a checkout whose build makes stand-ins for the programs."""
+
+    def setUp(self):
+        super().setUp()
+        self.checkout = self.folder / "checkout"
+        shutil.copytree(SOURCE_DIR / "deploy", self.checkout / "deploy",
+                        ignore=shutil.ignore_patterns("media"))
+        self.bin = self.checkout / "build/run/bin"
+        self.bin.mkdir(parents=True)
+        for name, script in (("catgs-server", SERVER), ("catgs-render", 'touch "${@: -1}"')):
+            self.stand_in(name, script)
+            (self.folder / "bin" / name).rename(self.bin / name)
+        self.stand_in("dpkg-query", 'shift 2; for p; do echo "installed $p"; done')
+        for name in ("cmake", "ninja"):
+            self.stand_in(name, "exit 0")
+
+    def scene(self, name):
+        path = self.folder / name
+        path.touch()
+        return str(path)
+
+    def serve(self, *arguments):
+        return self.run_script(str(self.checkout / "deploy/run.sh"), *arguments)
+
+    def server_calls(self):
+        return [c for c in self.calls().splitlines() if c.startswith("catgs-server ")]
+
+    def test_its_own_options_and_scenes_stand_anywhere(self):
+        port, scene, log = self.free_port(), self.scene("a.ply"), str(self.folder / "log")
+        groups = (["--encoder", "jpeg"], ["--port", port], ["--fps=30"], [scene], ["--lod", "-1"],
+                  ["--no-cuda"], ["--open"], ["--log", log])
+        for order in (groups, groups[::-1]):
+            (self.folder / "calls").unlink(missing_ok=True)
+            result = self.serve(*sum(order, []))
+            self.assertIn("stop      Ctrl-C", result.stdout, result.stderr)
+            call = self.server_calls()[-1]
+            self.assertIn(f" --scene {scene} --port {port} ", call)
+            for option in ("--encoder jpeg", "--fps=30", "--lod -1", "--open"):
+                self.assertIn(option, call)
+            for own in ("--no-cuda", "--log " + log):
+                self.assertNotIn(own, call)
+            self.assertTrue(pathlib.Path(log).exists())
+
+    def test_a_wrong_server_option_ends_with_its_status_before_a_scene_is_made(self):
+        result = self.serve("--speed", "9", *self.options())
+        self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+        self.assertIn("catgs-server: no such option: --speed\n", result.stderr)
+        self.assertIn("build/run/bin/catgs-server --help", result.stderr)
+        self.assertNotIn("catgs-render", self.calls())
+        self.assertEqual(len(self.server_calls()), 1)
+
+    def test_a_scene_that_fails_shows_the_error_and_not_the_progress(self):
+        result = self.serve(self.scene("empty.ply"), *self.options())
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("empty.ply: is empty\n", result.stderr)
+        self.assertNotIn("loading", result.stderr)
+
+    def test_each_of_several_scenes_gets_its_address(self):
+        scenes = [self.scene("a.ply"), self.scene("my room #2.ply")]
+        output = self.serve(*scenes, *self.options()).stdout
+        self.assertRegex(output, r"  scenes +http://127\.0\.0\.1:7/\?scene=a\n"
+                                 r" +http://127\.0\.0\.1:7/\?scene=my%20room%20%232\n")
+        self.assertNotIn("?scene=", self.serve(scenes[0], *self.options()).stdout)
+
+    def test_hints_are_for_what_was_not_done(self):
+        output = self.serve(*self.options()).stdout
+        self.assertIn("your_scene.ply", output)
+        self.assertIn("--lan", output)
+        output = self.serve(self.scene("a.ply"), *self.options()).stdout
+        self.assertNotIn("your_scene.ply", output)
+        self.assertIn("--lan", output)
+
+    def test_metrics_move_out_of_the_way_of_the_page(self):
+        script = self.checkout / "deploy/run.sh"
+        port = self.free_port()
+        script.write_text(script.read_text().replace("admin_port=9090", f"admin_port={port}"))
+        output = self.serve(*self.options()).stdout
+        self.assertIn("  metrics   http://127.0.0.1:9090/metrics\n", output)
+        output = self.serve("--port", port).stdout
+        self.assertIn(f"  metrics   off: port {port} serves the page", output)
+        self.assertIn("--admin-bind off", self.server_calls()[-1])
+        with socket.create_server(("127.0.0.1", int(port))):
+            output = self.serve(*self.options()).stdout
+            self.assertIn(f"  metrics   off: port {port} is busy", output)
+            self.assertIn("--admin-bind off", self.server_calls()[-1])
+            self.serve("--admin-bind", "127.0.0.1:9", *self.options())
+            self.assertNotIn("--admin-bind off", self.server_calls()[-1])
+
+    def test_each_port_has_a_log_of_its_own(self):
+        ports = [self.free_port(), self.free_port()]
+        for port in ports:
+            self.serve("--port", port)
+        for port in ports:
+            log = self.checkout / f"build/run/server-{port}.log"
+            self.assertIn("in a browser", log.read_text())
 
 
 if __name__ == "__main__":
