@@ -5,7 +5,8 @@
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
 # DIR is a finished build (default: build/run, else build/release, else build/cuda). The archive
-# holds bin/ (start the programs from here), lib/ and the web client, if it was built. The other
+# holds bin/ (start the programs from here), lib/ and the web client, if it was built. Most of lib/
+# comes with libavcodec, which is linked against every codec that the distribution has. The other
 # machine needs the same processor family, a glibc at least as new, and libstdc++; for CUDA its own
 # driver.
 set -euo pipefail
@@ -40,7 +41,7 @@ fi
 : "${out:=$SOURCE_DIR/build/catgs-bundle.tar.xz}"
 
 stage=$(mktemp -d)
-trap 'rm -rf -- "$stage"' EXIT
+trap 'rm -rf -- "$stage" "$out.part"' EXIT
 root=$stage/catgs
 mkdir -p "$root/bin" "$root/lib" "$root/libexec"
 
@@ -66,6 +67,10 @@ if [[ -f $build/web_client/dist/index.html ]]; then
   cp -r -- "$build/web_client/dist" "$root/share/catgs/web"
 fi
 
-XZ_OPT=${XZ_OPT:--T0} tar -C "$stage" -cJf "$out" catgs
-printf '%s: %s, %d libraries\n' "$out" "$(du -h -- "$out" | cut -f1)" "$(find "$root/lib" -type f | wc -l)"
+printf 'Packing %s with its %d libraries, %s in all: a minute or two\n' "$build" \
+  "$(find "$root/lib" -type f | wc -l)" "$(du -sh -- "$root" | cut -f1)"
+# Level 2: 57 MB of 175, and a third less processor time than level 3 takes for 56.
+XZ_OPT=${XZ_OPT:--T0 -2} tar -C "$stage" -cJf "$out.part" catgs
+mv -- "$out.part" "$out"
+printf '%s: %s\n' "$out" "$(du -h -- "$out" | cut -f1)"
 printf 'On the other machine: tar -xJf %s && catgs/bin/catgs-server --scene SCENE\n' "$(basename -- "$out")"
