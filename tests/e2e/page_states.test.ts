@@ -169,4 +169,19 @@ describe('page', () => {
     await page.getByRole('button', { name: 'Connect' }).click();
     await page.evaluate(() => window.catgs!.settled());
   });
+
+  it('frames the view for who came by Tab, not for who clicked and flies', async () => {
+    server = await start_fake_server(stream);
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.evaluate(() => window.catgs!.settled());
+    const framed = (): Promise<boolean> =>
+      page.evaluate(() => getComputedStyle(document.querySelector('#view')!, '::after').content !== 'none');
+    await page.mouse.click(200, 200);
+    await page.keyboard.press('KeyW');
+    expect(await framed()).toBe(false);
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('Shift+Tab');
+    expect(await framed()).toBe(true);
+  });
 });

@@ -12,6 +12,7 @@ export function bind_view_input(view: HTMLElement, listener: ViewInputListener):
   const keys = new HeldKeys();
   bind_pointers(view, listener);
   bind_keys(keys, listener);
+  bind_focus(view);
   return keys;
 }
 
@@ -50,6 +51,26 @@ function bind_keys(keys: HeldKeys, listener: ViewInputListener): void {
   });
   window.addEventListener('keyup', (event) => keys.up(event.code, event.shiftKey));
   window.addEventListener('blur', () => keys.release_all());
+}
+
+/**
+ * Marks focus that came by Tab. (`:focus-visible` also frames the picture for whoever clicked on it
+ * and then flies by keys.)
+ */
+function bind_focus(view: HTMLElement): void {
+  let by_tab = false;
+  const mark = (): void => void view.classList.toggle('focus-by-tab', by_tab);
+  const listen = { capture: true };
+  window.addEventListener('keydown', (event) => (by_tab = event.key === 'Tab'), listen);
+  window.addEventListener(
+    'pointerdown',
+    () => {
+      by_tab = false;
+      mark();
+    },
+    listen,
+  );
+  view.addEventListener('focus', mark);
 }
 
 /** Whether a key belongs to a control of the page and not to the camera. */
