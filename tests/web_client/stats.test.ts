@@ -4,6 +4,7 @@ import type { Frame } from '#client/decode/picture';
 import { Metrics } from '#client/stats/metrics';
 import { PoseAge } from '#client/stats/pose_age';
 import { percentile, TimeWindow } from '#client/stats/window';
+import { slowest_stage, stats_rows } from '#client/ui/stats_panel';
 import { FrameHeaderSchema } from '#client/wire/wire';
 
 const ms = 1000;
@@ -109,5 +110,46 @@ describe('metrics', () => {
     expect(stats.fps_shown).toBe(0);
     expect(stats.motion_to_photon_ms.p50).toBeNaN();
     expect(stats.stages_ms.render).toBeNaN();
+  });
+});
+
+describe('statistics panel', () => {
+  const frame: Frame = {
+    header: create(FrameHeaderSchema, {
+      poseId: 1n,
+      widthPx: 640,
+      heightPx: 360,
+      waitUs: 29_000,
+      renderUs: 133_000,
+      encodeUs: 36_000,
+      sendWaitUs: 5000,
+    }),
+    bytes: 1000,
+    received_us: 210 * ms,
+    decoded_us: 212 * ms,
+  };
+  const texts = (metrics: Metrics): Record<string, string> => {
+    const stats = metrics.snapshot(220 * ms);
+    return Object.fromEntries(stats_rows.map((row) => [row.label, row.text(stats)]));
+  };
+
+  it('gives each part of a frame a row, and knows the slowest', () => {
+    const metrics = new Metrics();
+    metrics.presented(frame, 220 * ms);
+    expect(texts(metrics)).toMatchObject({
+      Wait: '29.0 ms',
+      Render: '133.0 ms',
+      Encode: '36.0 ms',
+      Send: '5.0 ms',
+      Decode: '2.0 ms',
+      Display: '8.0 ms',
+      Picture: '640 × 360',
+    });
+    expect(slowest_stage(metrics.snapshot(220 * ms).stages_ms)).toBe('render');
+  });
+
+  it('shows one dash for what was not measured', () => {
+    expect(new Set(Object.values(texts(new Metrics())))).toEqual(new Set(['–']));
+    expect(slowest_stage(new Metrics().snapshot(0).stages_ms)).toBeUndefined();
   });
 });

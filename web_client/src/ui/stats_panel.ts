@@ -11,54 +11,77 @@ export interface Facts {
 
 const history_length = 72;
 
+type Stage = keyof StatsSnapshot['stages_ms'];
+
 interface Row {
   readonly label: string;
   readonly title?: string;
   readonly text: (stats: StatsSnapshot) => string;
   readonly plot?: (stats: StatsSnapshot) => number;
+  readonly stage?: Stage;
 }
 
-const number = (v: number, digits = 0): string => (Number.isFinite(v) ? v.toFixed(digits) : '–');
+const nothing = '–';
 
-const rows: readonly Row[] = [
+/** `digits` behind the point, and one dash for all values when one was not measured. */
+function measured(values: readonly number[], digits: number, unit: string): string {
+  if (!values.every(Number.isFinite)) return nothing;
+  return `${values.map((v) => v.toFixed(digits)).join(' / ')} ${unit}`;
+}
+
+const stage_row = (stage: Stage, label: string, title: string): Row => ({
+  label,
+  title: `Mean time per frame: ${title}`,
+  text: ({ stages_ms }) => measured([stages_ms[stage]], 1, 'ms'),
+  stage,
+});
+
+/** Where most of a frame's time goes; undefined before anything was measured. */
+export function slowest_stage(stages_ms: StatsSnapshot['stages_ms']): Stage | undefined {
+  const stages = Object.keys(stages_ms) as Stage[];
+  return stages
+    .filter((stage) => stages_ms[stage] > 0)
+    .sort((a, b) => stages_ms[b] - stages_ms[a])[0];
+}
+
+export const stats_rows: readonly Row[] = [
   {
     label: 'Shown',
-    text: (s) => `${number(s.fps_shown, 1)} fps`,
+    text: (s) => (s.frames_shown > 0 ? measured([s.fps_shown], 1, 'fps') : nothing),
     plot: (s) => s.fps_shown,
   },
   {
     label: 'Motion to photon',
     title: 'From a camera sample to its picture on the canvas: median / 95th percentile',
-    text: (s) => `${number(s.motion_to_photon_ms.p50)} / ${number(s.motion_to_photon_ms.p95)} ms`,
+    text: ({ motion_to_photon_ms: t }) => measured([t.p50, t.p95], 0, 'ms'),
     plot: (s) => s.motion_to_photon_ms.p50,
   },
   {
     label: 'Pose age',
     title: 'How old the camera behind the picture is while moving: median / 95th percentile',
-    text: (s) => `${number(s.pose_age_ms.p50)} / ${number(s.pose_age_ms.p95)} ms`,
+    text: ({ pose_age_ms: t }) => measured([t.p50, t.p95], 0, 'ms'),
     plot: (s) => s.pose_age_ms.p95,
   },
   {
     label: 'Bitrate',
-    text: (s) => `${number(s.bitrate_kbps / 1000, 2)} Mb/s`,
+    text: (s) => (s.frames_shown > 0 ? measured([s.bitrate_kbps / 1000], 2, 'Mb/s') : nothing),
     plot: (s) => s.bitrate_kbps,
   },
+  stage_row('wait', 'Wait', 'the server has the camera and no turn yet'),
+  stage_row('render', 'Render', 'the server draws the picture'),
+  stage_row('encode', 'Encode', 'the server compresses it'),
+  stage_row('send', 'Send', 'the server waits for the network'),
+  stage_row('decode', 'Decode', 'this browser decompresses it'),
+  stage_row('present', 'Display', 'from decoded to drawn on the canvas'),
   {
-    label: 'Server',
-    title: 'Mean time per frame: waiting + rendering + encoding + sending',
-    text: ({ stages_ms: t }) =>
-      [t.wait, t.render, t.encode, t.send].map((v) => number(v)).join(' + ') + ' ms',
+    label: 'Picture',
+    text: (s) => (s.frames_shown > 0 ? `${s.width_px} × ${s.height_px}` : nothing),
   },
-  {
-    label: 'Client',
-    title: 'Mean time per frame: decoding + waiting for the display',
-    text: ({ stages_ms: t }) => `${number(t.decode, 1)} + ${number(t.present, 1)} ms`,
-  },
-  { label: 'Picture', text: (s) => `${s.width_px} × ${s.height_px}` },
   {
     label: 'Drops',
     title: 'Frames that arrived and were never shown; packets that the server never sent',
-    text: (s) => `${s.frames_dropped} here, ${s.packets_dropped} at the server`,
+    text: (s) =>
+      s.frames_shown > 0 ? `${s.frames_dropped} here, ${s.packets_dropped} at the server` : nothing,
   },
 ];
 
@@ -70,7 +93,7 @@ export class StatsPanel {
 
   constructor() {
     const list = document.createElement('dl');
-    for (const row of rows) {
+    for (const row of stats_rows) {
       const value = document.createElement('span');
       const cell = add_row(list, row.label, row.title);
       if (row.plot) {
@@ -105,8 +128,11 @@ export class StatsPanel {
   }
 
   show(stats: StatsSnapshot): void {
-    rows.forEach((row, i) => {
-      this.values_[i]!.textContent = row.text(stats);
+    const slowest = slowest_stage(stats.stages_ms);
+    stats_rows.forEach((row, i) => {
+      const value = this.values_[i]!;
+      value.textContent = row.text(stats);
+      value.classList.toggle('slowest', row.stage !== undefined && row.stage === slowest);
       const plot = this.plots_.get(row);
       if (!plot || !row.plot) return;
       plot.history.push(row.plot(stats));
