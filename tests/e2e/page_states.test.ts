@@ -184,4 +184,29 @@ describe('page', () => {
     await page.keyboard.press('Shift+Tab');
     expect(await framed()).toBe(true);
   });
+
+  it.each([
+    { width: 360, height: 740 },
+    { width: 740, height: 360 },
+  ])('shows one panel at a time on a phone of %o, and how to reach its end', async (viewport) => {
+    server = await start_fake_server(stream);
+    const { page } = await new_page(browser, { viewport, hasTouch: true, isMobile: true });
+    await page.goto(server.url);
+    await page.evaluate(() => window.catgs!.settled());
+    const open = (): Promise<string[]> =>
+      page.evaluate(() =>
+        [...document.querySelectorAll('.panel:not([hidden])')].map((panel) => panel.id),
+      );
+    await page.getByRole('button', { name: 'Statistics' }).tap();
+    await page.getByRole('button', { name: 'Controls' }).tap();
+    expect(await open()).toEqual(['help-panel']);
+    expect(await page.getByText('Keys').isHidden()).toBe(true);
+    await page.getByRole('button', { name: 'Statistics' }).tap();
+    expect(await open()).toEqual(['stats-panel']);
+    const panel = page.locator('#stats-panel');
+    const goes_on = (): Promise<boolean> => panel.evaluate((e) => e.classList.contains('more-below'));
+    await expect.poll(goes_on).toBe(viewport.height < 500);
+    await panel.evaluate((e) => e.scrollTo(0, e.scrollHeight));
+    await expect.poll(goes_on).toBe(false);
+  });
 });

@@ -15,10 +15,14 @@ export interface ToolbarListener {
 const panels = ['quality', 'stats', 'help'] as const;
 type Panel = (typeof panels)[number];
 
+// Here one panel leaves little of the picture to see.
+const small_screen = '(max-width: 800px), (max-height: 500px)';
+
 /** Buttons, their panels and their keys. */
 export class Toolbar {
   private readonly fov_ = by_id('view-fov', HTMLInputElement);
   private readonly fov_value_ = by_id('view-fov-value', HTMLElement);
+  private readonly small_screen_ = matchMedia(small_screen);
 
   constructor(private readonly listener_: ToolbarListener) {
     const click = (id: string, action: () => void): void =>
@@ -27,7 +31,14 @@ export class Toolbar {
     click('button-reset', () => listener_.reset());
     click('button-full', toggle_full_screen);
     click('view-flip', () => listener_.flip_up());
-    for (const panel of panels) click(`button-${panel}`, () => this.toggle(panel));
+    for (const panel of panels) {
+      click(`button-${panel}`, () => this.toggle(panel));
+      hint_at_more(element_of(panel));
+    }
+    window.addEventListener('resize', () => {
+      const open = panels.find((panel) => this.is_open(panel));
+      if (open) this.close_beside(open);
+    });
     by_id('button-full', HTMLButtonElement).hidden = !document.fullscreenEnabled;
     this.bind_quality();
     this.bind_keys();
@@ -68,9 +79,7 @@ export class Toolbar {
       KeyF: toggle_full_screen,
       KeyI: () => this.toggle('stats'),
       KeyH: () => this.toggle('help'),
-      Escape: () => {
-        for (const panel of panels) this.show(panel, false);
-      },
+      Escape: () => this.close_all(),
     };
     window.addEventListener('keydown', (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
@@ -79,20 +88,50 @@ export class Toolbar {
   }
 
   private toggle(panel: Panel): void {
-    const open = by_id(`${panel}-panel`, HTMLElement).hidden;
-    // Menus share a corner; statistics have their own.
-    if (open && panel !== 'stats') {
-      this.show('quality', false);
-      this.show('help', false);
-    }
+    const open = !this.is_open(panel);
     this.show(panel, open);
+    if (open) this.close_beside(panel);
+  }
+
+  /** Closes what would lie under this panel, and on a small screen all else. */
+  private close_beside(panel: Panel): void {
+    const rect = element_of(panel).getBoundingClientRect();
+    for (const other of panels) {
+      if (other === panel || !this.is_open(other)) continue;
+      const beside = element_of(other).getBoundingClientRect();
+      if (this.small_screen_.matches || overlap(rect, beside)) this.show(other, false);
+    }
+  }
+
+  private is_open(panel: Panel): boolean {
+    return !element_of(panel).hidden;
+  }
+
+  private close_all(): void {
+    for (const panel of panels) this.show(panel, false);
   }
 
   private show(panel: Panel, shown: boolean): void {
-    by_id(`${panel}-panel`, HTMLElement).hidden = !shown;
+    element_of(panel).hidden = !shown;
     by_id(`button-${panel}`, HTMLButtonElement).setAttribute('aria-expanded', String(shown));
     if (panel === 'stats') this.listener_.stats_shown(shown);
   }
+}
+
+const element_of = (panel: Panel): HTMLElement => by_id(`${panel}-panel`, HTMLElement);
+
+function overlap(a: DOMRect, b: DOMRect): boolean {
+  return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+}
+
+/** Lets panels.css show that a panel goes on below: phones show no scroll bars. */
+function hint_at_more(panel: HTMLElement): void {
+  const look = (): void => {
+    const below_px = panel.scrollHeight - panel.clientHeight - panel.scrollTop;
+    panel.classList.toggle('more-below', below_px > 1);
+  };
+  panel.addEventListener('scroll', look, { passive: true });
+  new ResizeObserver(look).observe(panel);
 }
 
 function toggle_full_screen(): void {
