@@ -164,10 +164,47 @@ describe('page', () => {
     await page.goto(`${server.url}#token=wrong`);
     await page.getByText('Access token needed').waitFor();
     await keep_screenshot(page, 'fake-token');
+    // Nothing to control yet: neither the buttons nor their keys.
+    await page.keyboard.press('KeyH');
+    expect(await page.locator('#help-panel').isHidden()).toBe(true);
+    expect(await page.locator('#toolbar').getAttribute('inert')).not.toBeNull();
     expect(page.url()).not.toContain('token');
     await page.getByLabel('Access token').fill('right');
     await page.getByRole('button', { name: 'Connect' }).click();
     await page.evaluate(() => window.catgs!.settled());
+    expect(await page.locator('#toolbar').getAttribute('inert')).toBeNull();
+  });
+
+  it('leads from a scene that does not exist to those that do', async () => {
+    server = await start_fake_server((peer, body) => {
+      if (body.case === 'hello' && body.value.sceneId === 'nope') {
+        refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here')(peer, body);
+      } else {
+        stream(peer, body);
+      }
+    });
+    const { page } = await new_page(browser);
+    await page.goto(`${server.url}?scene=nope`);
+    await page.getByText('No such scene').waitFor();
+    await page.getByRole('link', { name: 'garden' }).click();
+    await page.evaluate(() => window.catgs!.settled());
+    expect(page.url()).toBe(`${server.url}?scene=garden`);
+  });
+
+  it('goes to another scene by the keyboard', async () => {
+    server = await start_fake_server(stream);
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.evaluate(() => window.catgs!.settled());
+    await page.getByLabel('Choose a scene').focus();
+    await page.keyboard.press('Enter');
+    await page.getByRole('link', { name: 'garden' }).waitFor();
+    await page.keyboard.press('Escape');
+    expect(await page.getByRole('link', { name: 'garden' }).isHidden()).toBe(true);
+    await page.keyboard.press('Enter');
+    await page.getByRole('link', { name: 'garden' }).focus();
+    await page.keyboard.press('Enter');
+    await page.waitForURL(`${server.url}?scene=garden`);
   });
 
   it('frames the view for who came by Tab, not for who clicked and flies', async () => {

@@ -263,8 +263,10 @@ describe('trouble', () => {
     await plain.stop();
   });
 
-  it('an unknown scene is said', async () => {
+  it('an unknown scene is said, and the ones there are', async () => {
     const { page } = await open_viewer(undefined, `${server.url}?scene=atlantis`);
     await page.getByText('No such scene').waitFor();
+    await page.getByRole('link', { name: 'city' }).click();
+    await settle(page);
   });
 });

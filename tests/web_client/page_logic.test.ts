@@ -2,6 +2,7 @@
 import { describe, expect, it } from 'vitest';
 import { Settling } from '#client/automation';
 import { AutoHeight } from '#client/session/auto_height';
+import { scene_address } from '#client/session/scenes';
 import { take_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
@@ -48,6 +49,14 @@ describe('endpoint', () => {
     ['https://host/tour/index.html?x#y', 'wss://host/tour/'],
   ])('of %s is %s', (page, endpoint) => {
     expect(endpoint_of(page)).toBe(endpoint);
+  });
+});
+
+describe('scene address', () => {
+  it('is the page with another scene, and nothing else changed', () => {
+    const page = 'http://host/tour/?scene=nope&lang=en';
+    expect(scene_address(page, 'a b&c')).toBe('http://host/tour/?scene=a+b%26c&lang=en');
+    expect(scene_address('http://host/', 'city')).toBe('http://host/?scene=city');
   });
 });
 
@@ -154,6 +163,23 @@ describe('wording', () => {
       text: 'Trying again in 3 s.',
       action: { does: 'retry' },
     });
+  });
+
+  it('offers the scenes that there are, and without any says where the name is', () => {
+    const state = { phase: 'failed', code: Error_Code.UNKNOWN_SCENE, message: 'no' } as const;
+    expect(card_for(state, false, ['city'])).toMatchObject({
+      text: 'No. Open one of these:',
+      scene_ids: ['city'],
+    });
+    expect(card_for(state, false)?.text).toContain('?scene=');
+  });
+
+  it('leaves a refused token to the words of the server', () => {
+    const message = 'this server needs an access token: open the link you were given';
+    const state = { phase: 'failed', code: Error_Code.UNAUTHORIZED, message } as const;
+    expect(card_for(state, false)?.text).toBe(
+      'This server needs an access token: open the link you were given.',
+    );
   });
 
   it('explains JPEG by what is missing', () => {

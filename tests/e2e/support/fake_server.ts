@@ -21,6 +21,8 @@ const policy =
   "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; " +
   "img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; frame-ancestors 'none'";
 
+const scene_ids = ['city', 'garden'];
+
 const content_types: Readonly<Record<string, string>> = {
   '.html': 'text/html; charset=utf-8',
   '.js': 'text/javascript',
@@ -53,6 +55,10 @@ export async function start_fake_server(
 ): Promise<FakeServer> {
   const http = createServer((request, response) => {
     const name = new URL(request.url ?? '/', 'http://localhost').pathname;
+    if (name === '/api/scenes') {
+      response.end(JSON.stringify({ scenes: scene_ids.map((id) => ({ id })) }));
+      return;
+    }
     const file = path.join(web_dist, name === '/' ? 'index.html' : name);
     readFile(file).then(
       (body) => {
@@ -145,7 +151,7 @@ export function welcome(): ServerBody {
       },
       renderer: 'CPU, AVX2, 2 threads (no CUDA device)',
       serverVersion: '0.1.0',
-      sceneIds: ['city'],
+      sceneIds: scene_ids,
     },
   };
 }

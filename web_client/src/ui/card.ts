@@ -1,4 +1,5 @@
 import { by_id } from './dom';
+import { show_scene_links } from './scene_links';
 import type { Card } from './wording';
 
 export interface CardListener {
@@ -36,6 +37,7 @@ export class CardView {
     this.card_.classList.toggle('settled', card.busy !== true);
     this.title_.textContent = card.title;
     this.text_.textContent = card.text;
+    show_scene_links('card-scenes', card.scene_ids ?? []);
     this.form_.hidden = card.asks_token !== true;
     this.action_.hidden = card.action === undefined;
     this.action_.textContent = card.action?.label ?? '';

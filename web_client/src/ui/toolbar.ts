@@ -22,6 +22,7 @@ const small_screen = '(max-width: 800px), (max-height: 500px)';
 export class Toolbar {
   private readonly fov_ = by_id('view-fov', HTMLInputElement);
   private readonly fov_value_ = by_id('view-fov-value', HTMLElement);
+  private readonly bar_ = by_id('toolbar', HTMLElement);
   private readonly small_screen_ = matchMedia(small_screen);
 
   constructor(private readonly listener_: ToolbarListener) {
@@ -42,6 +43,12 @@ export class Toolbar {
     by_id('button-full', HTMLButtonElement).hidden = !document.fullscreenEnabled;
     this.bind_quality();
     this.bind_keys();
+  }
+
+  /** Off while there is nothing to control: a card then says why. */
+  set_active(active: boolean): void {
+    this.bar_.inert = !active;
+    if (!active) this.close_all();
   }
 
   show_mode(mode: CameraMode): void {
@@ -83,7 +90,7 @@ export class Toolbar {
     };
     window.addEventListener('keydown', (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-      if (!is_typing(event.target)) actions[event.code]?.();
+      if (!this.bar_.inert && !is_typing(event.target)) actions[event.code]?.();
     });
   }
 

@@ -10,11 +10,13 @@ import { WorkerClient } from '../session/client';
 import { browser_timers, clock_from } from '../session/clock';
 import type { FromWorker, Quality, View } from '../session/messages';
 import type { SessionState } from '../session/state';
+import { list_scenes } from '../session/scenes';
 import { remember_token, session_storage, take_token } from '../session/token';
-import type { SceneFacts, StreamConfig, Welcome } from '../wire/wire';
+import { Error_Code, type SceneFacts, type StreamConfig, type Welcome } from '../wire/wire';
 import type { CardView } from './card';
 import { by_id } from './dom';
 import { Notice } from './notice';
+import { SceneTitle } from './scene_title';
 import { StatsPanel, type Facts } from './stats_panel';
 import { Toolbar } from './toolbar';
 import { broken_card, card_for, jpeg_reason } from './wording';
@@ -33,13 +35,16 @@ export class Viewer {
   private readonly worker_: WorkerClient;
   private readonly settling_: Settling;
   private readonly notice_ = new Notice();
+  private readonly title_ = new SceneTitle();
   private readonly stats_panel_ = new StatsPanel();
   private readonly toolbar_: Toolbar;
   private readonly view_ = by_id('view', HTMLElement);
   private readonly auto_height_ = new AutoHeight();
   private state_: SessionState = { phase: 'connecting', attempt: 0 };
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
+  private scene_ids_: readonly string[] = [];
   private broken_ = false;
+  private token_ = take_token(location, history, session_storage());
   private near_z_ = 0;
   private scene_id_: string | undefined;
   private shown_: Extract<FromWorker, { kind: 'presented' }> | undefined;
@@ -80,6 +85,7 @@ export class Viewer {
   }
 
   use_token(token: string): void {
+    this.token_ = token;
     remember_token(token, session_storage());
     this.worker_.post({ kind: 'token', token });
   }
@@ -89,6 +95,7 @@ export class Viewer {
     this.broken_ = true;
     clearInterval(this.stats_timer_);
     this.worker_.post({ kind: 'stop' });
+    this.toolbar_.set_active(false);
     this.card_.show(broken_card(message));
   }
 
@@ -100,7 +107,7 @@ export class Viewer {
         canvas,
         url: location.href,
         page_origin_ms: performance.timeOrigin,
-        token: take_token(location, history, session_storage()),
+        token: this.token_,
         scene_id: new URLSearchParams(location.search).get('scene') ?? '',
         view: this.view(),
         quality: this.quality(),
@@ -173,6 +180,9 @@ export class Viewer {
       case 'state':
         this.state_ = message.state;
         if (message.state.phase !== 'connecting' || message.state.attempt > 0) this.show_state();
+        if (message.state.phase === 'failed' && message.state.code === Error_Code.UNKNOWN_SCENE) {
+          void this.offer_scenes();
+        }
         break;
       case 'welcome':
         this.welcome(message.welcome);
@@ -203,8 +213,15 @@ export class Viewer {
   private show_state(): void {
     if (this.broken_) return;
     const has_picture = this.shown_ !== undefined;
-    this.card_.show(card_for(this.state_, has_picture));
+    this.card_.show(card_for(this.state_, has_picture, this.scene_ids_));
+    this.toolbar_.set_active(this.state_.phase !== 'failed');
     document.body.classList.toggle('stale', has_picture && this.state_.phase !== 'live');
+  }
+
+  /** Without a welcome nobody has said which scenes there are. */
+  private async offer_scenes(): Promise<void> {
+    this.scene_ids_ = await list_scenes(location.href, this.token_);
+    this.show_state();
   }
 
   private welcome(welcome: Welcome): void {
@@ -214,7 +231,7 @@ export class Viewer {
     if (!scene || scene.sceneId === this.scene_id_) return;
     this.scene_id_ = scene.sceneId;
     this.near_z_ = scene.nearZ;
-    this.show_title(scene);
+    this.title_.show(scene, welcome.sceneIds);
     this.camera_.load(scene_setup(scene));
     this.loop_.enable();
   }
@@ -247,16 +264,6 @@ export class Viewer {
   private show_facts(facts: Partial<Facts>): void {
     this.facts_ = { ...this.facts_, ...facts };
     this.stats_panel_.show_facts(this.facts_);
-  }
-
-  private show_title(scene: SceneFacts): void {
-    const title = by_id('scene-title', HTMLElement);
-    const count = document.createElement('small');
-    count.textContent = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
-    const name = scene.title || scene.sceneId;
-    title.replaceChildren(name, count);
-    title.hidden = false;
-    document.title = `${name} – CaT-GS`;
   }
 
   private async look_at_height(): Promise<void> {

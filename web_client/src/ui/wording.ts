@@ -8,10 +8,18 @@ export interface Card {
   readonly busy?: boolean; // something goes on by itself
   readonly action?: { readonly label: string; readonly does: 'retry' | 'reload' };
   readonly asks_token?: boolean;
+  readonly scene_ids?: readonly string[]; // to choose from
 }
 
-/** Undefined when the picture speaks for itself. `has_picture`: one is on the canvas. */
-export function card_for(state: SessionState, has_picture: boolean): Card | undefined {
+/**
+ * Undefined when the picture speaks for itself. `has_picture`: one is on the canvas. `scene_ids`:
+ * what this visitor may see, as far as known.
+ */
+export function card_for(
+  state: SessionState,
+  has_picture: boolean,
+  scene_ids: readonly string[] = [],
+): Card | undefined {
   switch (state.phase) {
     case 'live':
       return has_picture
@@ -33,7 +41,7 @@ export function card_for(state: SessionState, has_picture: boolean): Card | unde
         action: { label: 'Try now', does: 'retry' },
       };
     case 'failed':
-      return failed_card(state.code, state.message);
+      return failed_card(state.code, state.message, scene_ids);
   }
 }
 
@@ -44,20 +52,25 @@ const waiting_title = {
   refused: 'The server is busy',
 } as const;
 
-function failed_card(code: Error_Code, message: string): Card {
+function failed_card(code: Error_Code, message: string, scene_ids: readonly string[]): Card {
   const retry = { label: 'Try again', does: 'retry' } as const;
   const reload = { label: 'Reload', does: 'reload' } as const;
   switch (code) {
     case Error_Code.UNAUTHORIZED:
       return {
         title: 'Access token needed',
-        text: `${sentence(message)}Open the link you were given (it ends in #token=…), or enter the token here.`,
+        text: sentence(message).trim(),
         asks_token: true,
       };
     case Error_Code.UNKNOWN_SCENE:
       return {
         title: 'No such scene',
-        text: `${sentence(message)}Check the scene's name in the address (?scene=…).`,
+        text:
+          sentence(message) +
+          (scene_ids.length > 0
+            ? 'Open one of these:'
+            : "Check the scene's name in the address (?scene=…)."),
+        scene_ids,
         action: retry,
       };
     case Error_Code.UNSUPPORTED_VERSION:

@@ -1,0 +1,20 @@
+/** Ids of the scenes that the token may see; none when the server does not tell. */
+export async function list_scenes(page_url: string, token: string): Promise<readonly string[]> {
+  try {
+    const headers: HeadersInit = token ? { authorization: `Bearer ${token}` } : {};
+    const response = await fetch(new URL('./api/scenes', page_url), { headers });
+    if (!response.ok) return [];
+    const { scenes } = (await response.json()) as { scenes: readonly { id: string }[] };
+    return scenes.map(({ id }) => id);
+  } catch (error) {
+    console.warn('the list of scenes could not be read', error);
+    return [];
+  }
+}
+
+/** The page's address with another scene. */
+export function scene_address(page_url: string, scene_id: string): string {
+  const url = new URL(page_url);
+  url.searchParams.set('scene', scene_id);
+  return url.href;
+}

@@ -1,0 +1,19 @@
+import { scene_address } from '../session/scenes';
+import { by_id } from './dom';
+
+/** Shows the scenes as links in the list with this id, and the list only when there are any. */
+export function show_scene_links(list_id: string, ids: readonly string[], current?: string): void {
+  const list = by_id(list_id, HTMLUListElement);
+  list.hidden = ids.length === 0;
+  list.replaceChildren(
+    ...ids.map((id) => {
+      const link = document.createElement('a');
+      link.href = scene_address(location.href, id);
+      link.textContent = id;
+      if (id === current) link.setAttribute('aria-current', 'page');
+      const item = document.createElement('li');
+      item.append(link);
+      return item;
+    }),
+  );
+}

@@ -1,0 +1,33 @@
+import type { SceneFacts } from '../wire/wire';
+import { by_id } from './dom';
+import { show_scene_links } from './scene_links';
+
+/** The chip with the scene's name; where there are several scenes, it opens their list. */
+export class SceneTitle {
+  private readonly chooser_ = by_id('scene-chooser', HTMLDetailsElement);
+
+  constructor() {
+    const close = (): void => {
+      this.chooser_.open = false;
+    };
+    this.chooser_.addEventListener('keydown', (event) => {
+      if (event.key === 'Escape') close();
+    });
+    // Where a click focuses no link (Safari), it focuses the list, whose tabindex is for that.
+    this.chooser_.addEventListener('focusout', ({ relatedTarget }) => {
+      if (!(relatedTarget instanceof Node && this.chooser_.contains(relatedTarget))) close();
+    });
+  }
+
+  /** `scene_ids`: what this visitor may see. */
+  show(scene: SceneFacts, scene_ids: readonly string[]): void {
+    const name = scene.title || scene.sceneId;
+    const count = document.createElement('small');
+    count.textContent = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
+    by_id('scene-name', HTMLElement).replaceChildren(name, count);
+    show_scene_links('scene-list', scene_ids, scene.sceneId);
+    this.chooser_.hidden = scene_ids.length < 2;
+    by_id('scene-title', HTMLElement).hidden = false;
+    document.title = `${name} – CaT-GS`;
+  }
+}
