@@ -15,8 +15,7 @@ __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
   const std::uint32_t i = blockIdx.x * block_size + threadIdx.x;
   bool visible = false;
   if (i < p.scene.count) {
-    const float4 mean = __ldg(&p.scene.mean_opacity[i]);
-    visible = make_splat<sweeps>(p.scene, p.camera, p.shape, i, mean).in_view;
+    visible = make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i)).in_view;
   }
   const unsigned word = __ballot_sync(~0u, visible);
   if (threadIdx.x % warp_size == 0) p.mask[i / warp_size] = word;

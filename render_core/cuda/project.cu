@@ -25,12 +25,12 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
     return;
   }
   const std::uint32_t i = p.visible[v];
-  const float4 mean = __ldg(&p.scene.mean_opacity[i]);
+  const Centre centre = load_centre(p.scene, i);
   const ShCoefficients sh = load_sh(p.scene, i);
-  const Splat splat = make_splat<listing == Listing::trails>(p.scene, p.camera, p.shape, i, mean);
+  const Splat splat = make_splat<listing == Listing::trails>(p.scene, p.camera, p.shape, i, centre);
   const math::CameraModel<float>& now = p.camera.now.single;
-  const auto colour = shade(sh, p.scene.sh_degree,
-                            math::view_direction<float>(now.position, {mean.x, mean.y, mean.z}));
+  const auto colour =
+      shade(sh, p.scene.sh_degree, math::view_direction<float>(now.position, centre.mean));
   p.records[v] = make_record(splat.centre_px, splat.whitening, splat.log2_opacity, colour);
   p.depth_key[v] = depth_key(splat.depth, now.near_z);
   const bool counted = splat.in_view && splat.depth > p.min_depth;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "render_core/cuda/device_scene.cuh"
+#include "render_core/cuda/gaussian.cuh"
 #include "render_core/cuda/tiles.cuh"
 #include "render_core/math/sweep-inl.h"
 
@@ -39,19 +39,17 @@ struct Splat {
 /// With `sweeps`, splats that are in view at some time of the window; else those that are now.
 template <bool sweeps>
 __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera,
-                            const FrameShape& shape, std::uint32_t i, const float4& mean_opacity) {
+                            const FrameShape& shape, std::uint32_t i, const Centre& centre) {
   Splat out;
   const math::CameraModel<float>& now = camera.now.single;
-  const math::Vec3<float> mean{mean_opacity.x, mean_opacity.y, mean_opacity.z};
+  const math::Vec3<float>& mean = centre.mean;
   out.depth = static_cast<float>(math::view_depth(camera.now.precise, math::convert<double>(mean)));
-  const float reach = math::reach_of(mean_opacity.w);
+  const float reach = math::reach_of(centre.log2_opacity);
   const bool in_front = out.depth > now.near_z;
   const bool candidate = in_front || (sweeps && math::view_depth(camera.end, mean) > now.near_z);
   if (!candidate || reach < 0.0f) return out;
 
-  const float4 a = __ldg(&scene.factor_a[i]);
-  const float2 b = __ldg(&scene.factor_b[i]);
-  const math::CovarianceFactor<float> factor{a.x, a.y, a.z, a.w, b.x, b.y};
+  const math::CovarianceFactor<float> factor = load_factor(scene, i);
   math::Sweep<float> s{};
   if (sweeps) {
     s = math::sweep(now, camera.end, mean, factor, out.depth);
@@ -70,8 +68,8 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   out.in_view = true;
   out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
   out.whitening = math::whitening(s.shape);
-  if (in_front) out.log2_opacity = mean_opacity.w;
-  out.path = {s.displacement.x, s.displacement.y, s.outline, mean_opacity.w, {}};
+  if (in_front) out.log2_opacity = centre.log2_opacity;
+  out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, {}};
   return out;
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/gaussian.cuh"
 #include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/shade.cuh"
 #include "render_core/cuda/sort.cuh"
@@ -63,22 +64,19 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const std::uint32_t i = blockIdx.x * block_size + threadIdx.x;
   if (i >= p.scene.count) return;
   p.tile_count[i] = 0;
-  const float4 mean_opacity = __ldg(&p.scene.mean_opacity[i]);
-  const math::Vec3<float> mean{mean_opacity.x, mean_opacity.y, mean_opacity.z};
+  const auto [mean, log2_opacity] = load_centre(p.scene, i);
   const math::CameraModel<float>& camera = p.camera.single;
   const float depth =
       static_cast<float>(math::view_depth(p.camera.precise, math::convert<double>(mean)));
-  if (!(depth > camera.near_z) || math::reach_of(mean_opacity.w) < 0.0f) return;
-  const float4 a = __ldg(&p.scene.factor_a[i]);
-  const float2 b = __ldg(&p.scene.factor_b[i]);
-  const auto g = math::project<float>(camera, mean, {a.x, a.y, a.z, a.w, b.x, b.y}, depth);
+  if (!(depth > camera.near_z) || math::reach_of(log2_opacity) < 0.0f) return;
+  const auto g = math::project<float>(camera, mean, load_factor(p.scene, i), depth);
   const float2 centre = make_float2(g.centre_px.x, g.centre_px.y);
   const ushort4 box = box_of(centre, math::three_sigma_radius(g), p.shape);
   const std::uint32_t tiles = static_cast<std::uint32_t>(box.z - box.x) * (box.w - box.y);
   if (tiles == 0) return;
   const auto colour = shade(load_sh(p.scene, i), p.scene.sh_degree,
                             math::view_direction<float>(camera.position, mean));
-  p.records[i] = make_record(centre, math::whitening(g), mean_opacity.w, colour);
+  p.records[i] = make_record(centre, math::whitening(g), log2_opacity, colour);
   p.depth[i] = depth;
   p.box[i] = box;
   p.tile_count[i] = tiles;
