@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "render_core/error.h"
 #include "render_core/tools/bench_report.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
@@ -17,10 +18,15 @@ struct BenchOptions {
   std::size_t views = 1;
   bool quality = false;
   std::size_t quality_every = 10;
+  std::string worst;
   std::string json;
 };
 
 void bench(const BenchOptions& options, bool quiet) {
+  if (!options.worst.empty() && options.render.pipeline.pipeline == "exact") {
+    throw InputError("--worst", "", "has no whole pictures of the exact pipeline to compare with",
+                     "use --pipeline catgs or vanilla");
+  }
   const RenderSetup setup = prepare(options.render, quiet);
   BenchResult result;
   result.settings = setup.view;
@@ -37,6 +43,7 @@ void bench(const BenchOptions& options, bool quiet) {
     Progress progress("judging", quiet);
     result.quality = judge(setup, setup.view, options.quality_every,
                            [&](double fraction) { progress.update(fraction); });
+    if (!options.worst.empty()) write_worst_frames(options.worst, *result.quality);
   }
   if (options.json != "-") print_report(setup, result);
   if (!options.json.empty()) write_json(options.json, report_json(options.render, setup, result));
@@ -55,13 +62,17 @@ void add_bench_command(CLI::App& app) {
                    "Views that render the path at the same time; the rate is that of all")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  command->add_flag("--quality", options->quality,
-                    "Compare with the exact pipeline, or that with the reference");
+  auto* quality = command->add_flag("--quality", options->quality,
+                                    "Compare with the exact pipeline, or that with the reference");
   command
       ->add_option("--quality-every", options->quality_every,
                    "Judge one frame in N and one key switch in N")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command
+      ->add_option("--worst", options->worst,
+                   "Write the worst key and sub-frames here as PNG, beside what exact draws")
+      ->needs(quality);
   command->add_option("--json", options->json, "Write the report here; - prints it instead");
   command->callback([options, command] { bench(*options, is_quiet(*command)); });
 }

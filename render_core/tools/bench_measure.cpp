@@ -98,6 +98,19 @@ std::map<int, std::size_t> Measurement::window_histogram() const {
   return histogram;
 }
 
+double Measurement::frames_per_key() const {
+  const std::size_t keys = frame_ms(FrameKind::key).size();
+  return keys == 0 ? 0.0 : static_cast<double>(frames.size()) / static_cast<double>(keys);
+}
+
+double Measurement::keys_without_window() const {
+  const std::map<int, std::size_t> windows = window_histogram();
+  const auto none = windows.find(0);
+  const std::size_t keys = frame_ms(FrameKind::key).size();
+  return none == windows.end() ? 0.0
+                               : static_cast<double>(none->second) / static_cast<double>(keys);
+}
+
 std::size_t Measurement::windows_cut() const {
   std::size_t cut = 0;
   int missing = 0;  // sub-frames that the group still promised

@@ -39,6 +39,9 @@ struct Measurement {
   [[nodiscard]] ListLength list_length(Kind kind = std::nullopt) const;
   /// Key frames by the window that they promised.
   [[nodiscard]] std::map<int, std::size_t> window_histogram() const;
+  [[nodiscard]] double frames_per_key() const;
+  /// Share of the key frames that promised no sub-frames.
+  [[nodiscard]] double keys_without_window() const;
   /// Groups that ended before their window, because the camera left its forecast.
   [[nodiscard]] std::size_t windows_cut() const;
 };

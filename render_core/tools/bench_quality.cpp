@@ -1,11 +1,13 @@
 #include "render_core/tools/bench_quality.h"
 
 #include <algorithm>
-#include <array>
+#include <cmath>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "render_core/error.h"
 #include "render_core/image/png.h"
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/reference_check.h"
@@ -55,7 +57,10 @@ class Judge {
 
   /// `before` and `after`: frames i - 1 and i of the judged pipeline.
   void compare_switch(std::size_t i, const Image& before, const Image& after) {
-    quality_.pop.add(pop_excess({before, after}, {exact_image(i - 1, 0.0f), exact_image(i, 0.0f)}));
+    const double excess =
+        pop_excess({before, after}, {exact_image(i - 1, 0.0f), exact_image(i, 0.0f)});
+    quality_.pop.add(excess);
+    quality_.pops += excess > max_pop ? 1 : 0;
   }
 
   void finish() {
@@ -63,7 +68,13 @@ class Judge {
       pairs_[i].quality = compare_images(pairs_[i].judged, pairs_[i].truth);
     });
     for (const Pair& pair : pairs_) {
-      (pair.kind == FrameKind::key ? quality_.key : quality_.sub).add(pair.quality, pair.frame);
+      const bool key = pair.kind == FrameKind::key;
+      QualityTally& tally = key ? quality_.key : quality_.sub;
+      WorstFrames& worst = key ? quality_.worst_key : quality_.worst_sub;
+      tally.add(pair.quality, pair.frame);
+      const JudgedFrame frame{pair.frame, pair.judged, pair.truth};
+      if (tally.worst_frame() == pair.frame) worst.frame = frame;
+      if (tally.worst_block_frame() == pair.frame) worst.block = frame;
     }
     pairs_.clear();
   }
@@ -135,6 +146,17 @@ QualityReport judge_by_exact(const RenderSetup& setup, const ViewSettings& setti
   return quality;
 }
 
+Image difference(const JudgedFrame& frame) {
+  constexpr float gain = 16.0f;
+  Image image{frame.judged.size_px, {}};
+  image.rgb.reserve(frame.judged.rgb.size());
+  for (std::size_t i = 0; i < frame.judged.rgb.size(); ++i) {
+    const float off = std::abs(frame.judged.rgb[i] - frame.truth.rgb[i]);
+    image.rgb.push_back(std::min(1.0f, gain * off));
+  }
+  return image;
+}
+
 }  // namespace
 
 void QualityTally::add(const ImageQuality& quality, std::size_t frame) {
@@ -145,6 +167,7 @@ void QualityTally::add(const ImageQuality& quality, std::size_t frame) {
   ssim_sum_ += quality.ssim;
   min_ssim_ = std::min(min_ssim_, quality.ssim);
   if (quality.block_errors.empty()) return;
+  if (frames_ == 1 || quality.worst_block_psnr() < worst_block_psnr_) worst_block_frame_ = frame;
   worst_block_psnr_ = std::min(worst_block_psnr_, quality.worst_block_psnr());
   block_0_1_percent_psnr_ = std::min(block_0_1_percent_psnr_, quality.block_0_1_percent_psnr());
 }
@@ -152,6 +175,9 @@ void QualityTally::add(const ImageQuality& quality, std::size_t frame) {
 void QualityTally::add(const QualityTally& other) {
   if (other.frames_ == 0) return;
   if (frames_ == 0 || other.max_error_ > max_error_) worst_frame_ = other.worst_frame_;
+  if (frames_ == 0 || other.worst_block_psnr_ < worst_block_psnr_) {
+    worst_block_frame_ = other.worst_block_frame_;
+  }
   frames_ += other.frames_;
   error_sum_ += other.error_sum_;
   max_error_ = std::max(max_error_, other.max_error_);
@@ -173,6 +199,23 @@ void Extent::add(double value) {
   max = count == 0 ? value : std::max(max, value);
   sum += value;
   ++count;
+}
+
+void write_worst_frames(const std::filesystem::path& folder, const QualityReport& report) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError(folder.string(), "", "cannot be made", error.message());
+  const auto write = [&](std::string_view what, const JudgedFrame& frame) {
+    if (frame.judged.rgb.empty()) return;
+    const std::string name = fmt::format("{}_{:06}", what, frame.number);
+    write_png(folder / (name + ".png"), frame.judged);
+    write_png(folder / (name + "_exact.png"), frame.truth);
+    write_png(folder / (name + "_difference.png"), difference(frame));
+  };
+  write("key_worst_frame", report.worst_key.frame);
+  write("key_worst_block", report.worst_key.block);
+  write("sub_worst_frame", report.worst_sub.frame);
+  write("sub_worst_block", report.worst_sub.block);
 }
 
 QualityReport judge(const RenderSetup& setup, const ViewSettings& settings, std::size_t every,

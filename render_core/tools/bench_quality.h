@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <string>
 
+#include "render_core/image/image.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/tools/bench_measure.h"
 
@@ -24,11 +26,12 @@ class QualityTally {
   [[nodiscard]] double min_ssim() const { return min_ssim_; }
   /// Worst 16x16 block of all frames; the 0.1 % block of the worst frame.
   [[nodiscard]] double worst_block_psnr() const { return worst_block_psnr_; }
+  [[nodiscard]] std::size_t worst_block_frame() const { return worst_block_frame_; }
   [[nodiscard]] double block_0_1_percent_psnr() const { return block_0_1_percent_psnr_; }
 
  private:
   std::size_t frames_ = 0;
-  std::size_t worst_frame_ = 0;
+  std::size_t worst_frame_ = 0, worst_block_frame_ = 0;
   double error_sum_ = 0.0;
   double max_error_ = 0.0;
   double ssim_sum_ = 0.0;
@@ -46,19 +49,37 @@ struct Extent {
   [[nodiscard]] double mean() const { return count == 0 ? 0.0 : sum / static_cast<double>(count); }
 };
 
+/// A frame and what it should have been, for people to look at.
+struct JudgedFrame {
+  std::size_t number = 0;
+  Image judged, truth;
+};
+
+/// The frame with the largest mean error, and the one with the worst block.
+struct WorstFrames {
+  JudgedFrame frame, block;
+};
+
 struct QualityReport {
   std::string against;       // "exact pipeline, every 10th frame"
   bool whole_images = true;  // else random pixels: no SSIM, no blocks and nothing of what follows
   QualityTally key, sub;
+  WorstFrames worst_key, worst_sub;
   // Share of pixels that more than half of the background shows through: a view of nothing much
   // flatters every PSNR.
   Extent see_through;
   // pop_excess() at the switches from a sub-frame to the next key frame.
   Extent pop;
+  std::size_t pops = 0;  // switches over max_pop
 };
 
 /// What a switch may add to the change that the exact pipeline shows there.
 inline constexpr double max_pop = 1.0 / 255.0;
+
+/// Writes the worst frames of a report on whole images into a folder, which is made:
+/// sub_worst_frame_000123.png and …_exact.png, with …_difference.png, 16 times too bright. Throws
+/// InputError.
+void write_worst_frames(const std::filesystem::path& folder, const QualityReport& report);
 
 /// Judges a pipeline at its own poses: `exact` by the reference at random pixels of a few frames,
 /// anything else by the exact pipeline on whole pictures: every `every`-th frame, every `every`-th

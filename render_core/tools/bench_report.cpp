@@ -31,6 +31,7 @@ Json to_json(const QualityTally& tally, bool whole_images) {
   if (whole_images) {
     json["ssim"] = {{"mean", tally.mean_ssim()}, {"min", tally.min_ssim()}};
     json["worst_block_psnr_db"] = tally.worst_block_psnr();
+    json["worst_block_frame"] = tally.worst_block_frame();
     json["block_0_1_percent_psnr_db"] = tally.block_0_1_percent_psnr();
   }
   return json;
@@ -49,7 +50,8 @@ Json to_json(const QualityReport& quality) {
     json["pop"] = {{"switches", quality.pop.count},
                    {"mean", quality.pop.mean()},
                    {"max", quality.pop.max},
-                   {"allowed", max_pop}};
+                   {"allowed", max_pop},
+                   {"over", quality.pops}};
   }
   return json;
 }
@@ -124,7 +126,11 @@ void print_times(std::string_view name, const Measurement& measurement, Measurem
 void print_groups(const Measurement& measurement) {
   const std::size_t keys = measurement.frame_ms(FrameKind::key).size();
   const std::size_t subs = measurement.frame_ms(FrameKind::sub).size();
-  fmt::print("{:<14}{} key frames, {} sub-frames; windows", "groups", keys, subs);
+  fmt::print(
+      "{:<14}{} key frames, {} sub-frames: {:.2f} frames per key frame, {:.0f} % of the keys "
+      "without a window; windows",
+      "groups", keys, subs, measurement.frames_per_key(),
+      100.0 * measurement.keys_without_window());
   for (const auto& [window, count] : measurement.window_histogram()) {
     fmt::print(" {}: {}", window, count);
   }
@@ -136,8 +142,10 @@ void print_quality(std::string_view kind, const QualityReport& report, const Qua
   fmt::print("{:<14}{:.2f} dB mean, {:.2f} dB worst frame ({})", fmt::format("{} frames", kind),
              tally.mean_psnr(), tally.min_psnr(), tally.worst_frame());
   if (report.whole_images) {
-    fmt::print(", {:.2f} dB worst block; SSIM {:.5f} mean, {:.5f} worst", tally.worst_block_psnr(),
-               tally.mean_ssim(), tally.min_ssim());
+    fmt::print(
+        ", {:.2f} dB worst block ({}), {:.2f} dB 0.1 % block; SSIM {:.5f} mean, {:.5f} worst",
+        tally.worst_block_psnr(), tally.worst_block_frame(), tally.block_0_1_percent_psnr(),
+        tally.mean_ssim(), tally.min_ssim());
   }
   fmt::print("\n");
 }
@@ -151,8 +159,9 @@ void print_quality(const QualityReport& quality) {
                100.0 * quality.see_through.mean(), 100.0 * quality.see_through.max);
   }
   if (quality.pop.count > 0) {
-    fmt::print("{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} key switches (1/255 is allowed)\n",
-               "pop", 255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count);
+    fmt::print("{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} key switches, {} over 1/255\n", "pop",
+               255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
+               quality.pops);
   }
 }
 
@@ -192,6 +201,8 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
   json["overflowed_entries"] = lists.overflowed;
   json["key_frames"] = measurement.frame_ms(FrameKind::key).size();
   json["sub_frames"] = measurement.frame_ms(FrameKind::sub).size();
+  json["frames_per_key"] = measurement.frames_per_key();
+  json["keys_without_window"] = measurement.keys_without_window();
   json["window_histogram"] = windows;
   json["windows_cut"] = measurement.windows_cut();
   json["ns_per_gaussian"] = result.ns_per_gaussian(setup);

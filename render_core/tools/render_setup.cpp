@@ -61,8 +61,10 @@ void add_frame_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--seed", options.script.seed, "Of the script")->capture_default_str();
   command.add_option("--duration", options.script.duration_s, "Of the script, seconds")
       ->capture_default_str();
-  command.add_option("--fps", options.fps,
-                     "Poses per second (default: a trace's own samples, 120 of a script)");
+  command.add_option(
+      "--fps", options.fps,
+      "Frames per second (default: a trace's own samples, 120 of a script). A trace is "
+      "resampled, but forecasts know its own samples alone, and none of the future");
   command.add_option("--frames", options.frames, "A:B renders frames A to B - 1 of the path");
   add_lens_options(command, options.lens);
   command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")

@@ -3,12 +3,15 @@
 #include <memory>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "render_core/host_image.h"
+#include "render_core/image/png.h"
 #include "render_core/tools/bench_measure.h"
 #include "render_core/tools/bench_quality.h"
 #include "render_core/tools/frame_feed.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -99,6 +102,8 @@ TEST_F(BenchParts, MeasureTellsKeyAndSubFramesApart) {
   EXPECT_EQ(measurement.frame_ms(FrameKind::sub).size(), 16u);
   EXPECT_EQ(measurement.window_histogram(), (std::map<int, std::size_t>{{0, 2}, {4, 5}}));
   EXPECT_EQ(measurement.windows_cut(), 0u);
+  EXPECT_DOUBLE_EQ(measurement.frames_per_key(), 23.0 / 7.0);
+  EXPECT_DOUBLE_EQ(measurement.keys_without_window(), 2.0 / 7.0);
   EXPECT_DOUBLE_EQ(measurement.mean_stage_ms(Stage::sort, FrameKind::key), 3.0);
   EXPECT_DOUBLE_EQ(measurement.mean_stage_ms(Stage::sort, FrameKind::sub), 1.0);
   EXPECT_DOUBLE_EQ(measurement.list_length(FrameKind::key).mean, 100.0);
@@ -127,6 +132,27 @@ TEST_F(BenchParts, JudgeFindsTheKnownErrors) {
   // At a switch the picture falls by 0.009 on top of the true step of 0.001 upwards.
   EXPECT_EQ(quality.pop.count, 4u);
   EXPECT_NEAR(quality.pop.max, sub_error - key_error - 2 * 0.001, 1e-5);
+  EXPECT_EQ(quality.pops, 4u);
+}
+
+TEST_F(BenchParts, TheWorstFramesAreKeptAndWritten) {
+  catgs_.speculation.initial_window = 2;
+  const QualityReport quality = judge(setup_, catgs_, 1, no_report);
+  EXPECT_EQ(quality.worst_sub.frame.number, quality.sub.worst_frame());
+  EXPECT_EQ(quality.worst_sub.block.number, quality.sub.worst_block_frame());
+  EXPECT_NEAR(quality.worst_sub.frame.judged.rgb[5] - quality.worst_sub.frame.truth.rgb[5],
+              sub_error, 1e-6f);
+  EXPECT_NEAR(quality.worst_key.block.judged.rgb[5] - quality.worst_key.block.truth.rgb[5],
+              key_error, 1e-6f);
+
+  const test::TemporaryFolder folder;
+  write_worst_frames(folder / "new/worst", quality);
+  const auto name = fmt::format("new/worst/sub_worst_frame_{:06}", quality.sub.worst_frame());
+  EXPECT_EQ(read_png(folder / (name + ".png")).size_px, size_px);
+  EXPECT_NEAR(read_png(folder / (name + "_exact.png")).rgb[0], quality.worst_sub.frame.truth.rgb[0],
+              0.5f / 255.0f);
+  EXPECT_NEAR(read_png(folder / (name + "_difference.png")).rgb[0], 16.0f * sub_error,
+              0.5f / 255.0f);
 }
 
 TEST_F(BenchParts, JudgeTakesEveryNthFrameAndSwitch) {

@@ -131,6 +131,15 @@ TEST(QualityTally, MeanIsThePsnrOfTheMeanError) {
   EXPECT_NEAR(tally.mean_ssim(), 0.95, 1e-12);
   EXPECT_NEAR(tally.min_ssim(), 0.91, 1e-12);
   EXPECT_NEAR(tally.worst_block_psnr(), 30.0, 1e-9);
+  EXPECT_EQ(tally.worst_block_frame(), 7u);
+  QualityTally all;
+  all.add(tally);
+  good.block_errors = {1e-7, 2e-3};  // one bad block in a good picture
+  QualityTally speck;
+  speck.add(good, 9);
+  all.add(speck);
+  EXPECT_EQ(all.worst_frame(), 7u);
+  EXPECT_EQ(all.worst_block_frame(), 9u);
 }
 
 TEST(Measurement, SplitsByKindAndCountsTheWholePass) {
