@@ -140,8 +140,7 @@ void CpuView::cull_clusters(const Camera& camera, const Camera* window_end) {
   const bool cull = settings_.pipeline != Pipeline::vanilla;
   clusters_.clear();
   for (std::size_t c = 0; c < clusters.size(); ++c) {
-    const unsigned beyond = cull ? now.beyond(clusters[c]) : 0;
-    if (beyond == 0 || (window_end != nullptr && (beyond & end.beyond(clusters[c])) == 0))
+    if (!cull || !outside_on_the_way(now, end, clusters[c]))
       clusters_.push_back(static_cast<std::uint32_t>(c));
   }
 }

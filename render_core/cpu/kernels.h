@@ -11,7 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "render_core/camera.h"
-#include "render_core/cpu/radix_sort.h"
+#include "render_core/cpu/list_sort.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/host_image.h"
 #include "render_core/renderer.h"

@@ -4,28 +4,16 @@
 #include <span>
 #include <vector>
 
-#include <glm/vec3.hpp>
 #include <hwy/aligned_allocator.h>
 
-#include "render_core/camera.h"
+#include "render_core/scene/clusters.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/thread_pool.h"
 
 namespace catgs {
 
-/// Gaussians that are culled together: neighbours along a Morton curve.
-inline constexpr std::size_t cluster_size = 256;
-
 /// Lanes of the widest SIMD target; the storage is padded and interleaved for it.
 inline constexpr std::size_t packet_size = 16;
-
-/// Bounds of a cluster for culling.
-struct Cluster {
-  glm::vec3 centre;       // of the box around the means, world
-  glm::vec3 half_extent;  // of that box
-  // Largest distance from a mean, world units, at which one of its Gaussians reaches alpha_min.
-  float reach;
-};
 
 /// A GaussianCloud laid out for the CPU core: Morton order, structure of arrays, covariances
 /// factored. N = size() rounded up to whole packets; the padding has opacity 0 and is never
@@ -78,26 +66,6 @@ class SceneStore {
   hwy::AlignedFreeUniquePtr<std::uint32_t[]> original_index_;
   hwy::AlignedFreeUniquePtr<float[]> sh_;
   std::vector<Cluster> clusters_;
-};
-
-/// Half-spaces in the world: a cluster lies outside when none of its Gaussians can reach a pixel.
-class ClusterCuller {
- public:
-  explicit ClusterCuller(const Camera& camera);
-  [[nodiscard]] bool outside(const Cluster& cluster) const { return beyond(cluster) != 0; }
-
-  /// Half-spaces (a bit each, in the same order for all cameras) that the cluster lies outside of.
-  /// What is outside of the same one at both ends of a straight path through camera space is so all
-  /// the way.
-  [[nodiscard]] unsigned beyond(const Cluster& cluster) const;
-
- private:
-  struct HalfSpace {
-    glm::vec3 normal;  // towards the image
-    float offset;
-    float reach_factor;  // how far a Gaussian's reach, in world units, carries it inwards
-  };
-  HalfSpace half_spaces_[5];
 };
 
 }  // namespace catgs

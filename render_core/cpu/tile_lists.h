@@ -8,7 +8,8 @@
 #include <glm/vec2.hpp>
 
 #include "render_core/cpu/kernels.h"
-#include "render_core/cpu/radix_sort.h"
+#include "render_core/cpu/list_sort.h"
+#include "render_core/radix_sort.h"
 #include "render_core/thread_pool.h"
 
 namespace catgs {

@@ -1,0 +1,105 @@
+#include "render_core/scene/clusters.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render_core/math/camera-inl.h"
+#include "render_core/math/constants.h"
+#include "render_core/math/ellipse-inl.h"
+#include "render_core/radix_sort.h"
+
+namespace catgs {
+namespace {
+
+/// Spreads the low 21 bits of `v` to every third bit.
+std::uint64_t spread_bits(std::uint64_t v) {
+  v &= 0x1fffff;
+  v = (v | v << 32) & 0x1f00000000ffff;
+  v = (v | v << 16) & 0x1f0000ff0000ff;
+  v = (v | v << 8) & 0x100f00f00f00f00f;
+  v = (v | v << 4) & 0x10c30c30c30c30c3;
+  v = (v | v << 2) & 0x1249249249249249;
+  return v;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> morton_order(const GaussianCloud& cloud, ThreadPool& pool) {
+  glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
+  for (const glm::vec3& mean : cloud.mean) {
+    low = glm::min(low, mean);
+    high = glm::max(high, mean);
+  }
+  constexpr double cells = 1 << 21;
+  const glm::dvec3 scale = (cells - 1.0) / glm::max(glm::dvec3(high) - glm::dvec3(low), 1e-30);
+
+  std::vector<CodedIndex> codes(cloud.size()), scratch(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const glm::dvec3 cell = (glm::dvec3(cloud.mean[i]) - glm::dvec3(low)) * scale;
+    codes[i] = {spread_bits(static_cast<std::uint64_t>(cell.x)) |
+                    spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
+                    spread_bits(static_cast<std::uint64_t>(cell.z)) << 2,
+                static_cast<std::uint32_t>(i)};
+  }
+  RadixSorter sorter;
+  sorter.sort(codes, scratch, 63, pool);
+  std::vector<std::uint32_t> order(cloud.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = codes[i].value;
+  return order;
+}
+
+void ClusterBounds::add(const glm::vec3& mean, double sigma, float log2_opacity) {
+  low_ = glm::min(low_, mean);
+  high_ = glm::max(high_, mean);
+  const double squared_sigmas =
+      math::reach_of(static_cast<double>(log2_opacity)) / (exponent_scale * exponent_scale);
+  reach_ = std::max(reach_, std::sqrt(std::max(0.0, squared_sigmas)) * sigma);
+}
+
+Cluster ClusterBounds::cluster() const {
+  const glm::vec3 centre = 0.5f * (low_ + high_);
+  // Rounded outwards.
+  const glm::vec3 half = glm::max(high_ - centre, centre - low_) * (1.0f + 1e-6f);
+  return {centre, half, static_cast<float>(reach_) * (1.0f + 1e-6f)};
+}
+
+// A Gaussian at view coordinates (x, y, z), z > near, covers columns up to
+//   f x / z + c + k sqrt(low_pass + (f / z)^2 (1 + s^2) sigma^2),
+// with k its extent in standard deviations, sigma its largest one and s the clamped slope. Since
+// sqrt(a + b) <= sqrt(a) + sqrt(b), it stays left of the first pixel centre when
+//   f x + (c + k_max sqrt(low_pass) - 0.5) z + f sqrt(1 + s_max^2) k sigma < 0:
+// a half-space moved by the Gaussian's reach k sigma. Likewise for the other sides.
+ClusterCuller::ClusterCuller(const Camera& camera) {
+  const auto model = math::make_camera_model(camera);
+  const auto vec3 = [](const math::Vec3<double>& v) { return glm::dvec3(v.x, v.y, v.z); };
+  const glm::dvec3 right = vec3(model.right), down = vec3(model.down),
+                   forward = vec3(model.forward);
+  const double blur = std::sqrt(-2.0 * std::log(alpha_min)) * std::sqrt(low_pass_px2);
+  const double slack = blur - 0.5 + 0.01;  // px; the last term covers rounding
+  const glm::dvec2 size(camera.size_px);
+
+  const auto half_space = [&](const glm::dvec3& normal, double reach_factor, double offset) {
+    return HalfSpace{glm::vec3(normal),
+                     static_cast<float>(offset - glm::dot(normal, vec3(model.position))),
+                     static_cast<float>(reach_factor)};
+  };
+  const auto side = [&](const glm::dvec3& axis, double focal, double from_edge, double slope) {
+    const glm::dvec3 normal = (axis * focal + forward * (from_edge + slack)) / focal;
+    return half_space(normal, std::sqrt(1.0 + slope * slope), 0.0);
+  };
+  const auto steepest = [](double a, double b) { return std::max(std::abs(a), std::abs(b)); };
+  const double slope_x = steepest(model.slope_min.x, model.slope_max.x);
+  const double slope_y = steepest(model.slope_min.y, model.slope_max.y);
+  const auto& f = model.focal_px;
+  const auto& c = model.principal_point_px;
+  half_spaces_[0] = half_space(forward, 0.0, -static_cast<double>(camera.near_z));
+  half_spaces_[1] = side(right, f.x, c.x, slope_x);
+  half_spaces_[2] = side(-right, f.x, size.x - c.x, slope_x);
+  half_spaces_[3] = side(down, f.y, c.y, slope_y);
+  half_spaces_[4] = side(-down, f.y, size.y - c.y, slope_y);
+}
+
+}  // namespace catgs

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "render_core/camera.h"
+#include "render_core/host_device.h"
+#include "render_core/scene/gaussian_cloud.h"
+#include "render_core/thread_pool.h"
+
+namespace catgs {
+
+/// Gaussians that are culled together: neighbours along a Morton curve.
+inline constexpr std::size_t cluster_size = 256;
+
+constexpr std::size_t clusters_of(std::size_t gaussians) {
+  return (gaussians + cluster_size - 1) / cluster_size;
+}
+
+/// Indices of the cloud's Gaussians along a Morton curve; equal codes keep their order. Cluster c
+/// is a run of them, from c * cluster_size on.
+std::vector<std::uint32_t> morton_order(const GaussianCloud& cloud, ThreadPool& pool);
+
+/// Bounds of a cluster for culling.
+struct Cluster {
+  glm::vec3 centre;       // of the box around the means, world
+  glm::vec3 half_extent;  // of that box
+  // Largest distance from a mean, world units, at which one of its Gaussians reaches alpha_min.
+  float reach;
+};
+
+/// Collects the bounds of a cluster. They hold for the values that are added: those that a core
+/// draws, as it has rounded them.
+class ClusterBounds {
+ public:
+  /// `sigma`: no less than the Gaussian's largest standard deviation, world units.
+  void add(const glm::vec3& mean, double sigma, float log2_opacity);
+  /// At least one Gaussian was added.
+  [[nodiscard]] Cluster cluster() const;
+
+ private:
+  glm::vec3 low_{std::numeric_limits<float>::max()}, high_{std::numeric_limits<float>::lowest()};
+  double reach_ = 0.0;
+};
+
+/// Half-spaces in the world: a cluster lies outside when none of its Gaussians can reach a pixel.
+class ClusterCuller {
+ public:
+  explicit ClusterCuller(const Camera& camera);
+  [[nodiscard]] CATGS_HD bool outside(const Cluster& cluster) const { return beyond(cluster) != 0; }
+
+  /// Half-spaces (a bit each, in the same order for all cameras) that the cluster lies outside of.
+  [[nodiscard]] CATGS_HD unsigned beyond(const Cluster& cluster) const {
+    unsigned beyond = 0;
+    for (int i = 0; i < count; ++i) {
+      const HalfSpace& h = half_spaces_[i];
+      const float centre = h.normal.x * cluster.centre.x + h.normal.y * cluster.centre.y +
+                           h.normal.z * cluster.centre.z + h.offset;
+      const float radius = fabsf(h.normal.x) * cluster.half_extent.x +
+                           fabsf(h.normal.y) * cluster.half_extent.y +
+                           fabsf(h.normal.z) * cluster.half_extent.z;
+      const float rounding = 1e-5f * (fabsf(h.offset) + fabsf(centre));
+      if (centre + radius + h.reach_factor * cluster.reach + rounding < 0.0f) beyond |= 1u << i;
+    }
+    return beyond;
+  }
+
+ private:
+  static constexpr int count = 5;
+  struct HalfSpace {
+    glm::vec3 normal;  // towards the image
+    float offset;
+    float reach_factor;  // how far a Gaussian's reach, in world units, carries it inwards
+  };
+  HalfSpace half_spaces_[count];
+};
+
+/// Whether a cluster is outside all the way from one camera to another: what is outside of the same
+/// half-space at both ends of a straight path through camera space is so on it.
+CATGS_HD inline bool outside_on_the_way(const ClusterCuller& now, const ClusterCuller& end,
+                                        const Cluster& cluster) {
+  const unsigned beyond = now.beyond(cluster);
+  return beyond != 0 && (beyond & end.beyond(cluster)) != 0;
+}
+
+}  // namespace catgs
