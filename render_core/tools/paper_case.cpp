@@ -26,8 +26,25 @@ RenderOptions with_trace(RenderOptions options, const std::string& trace) {
   return options;
 }
 
+/// The options of catgs with these flags too, written as on a command line.
+PipelineOptions with_flags(PipelineOptions options, const std::string& flags) {
+  options.pipeline = pipeline_name(Pipeline::catgs);
+  CLI::App parser;
+  add_pipeline_options(parser, options);
+  try {
+    parser.parse(flags);
+  } catch (const CLI::ParseError& error) {
+    throw InputError("--variant", flags, error.what(), "catgs-render bench --help lists the flags");
+  }
+  return options;
+}
+
 std::string stem(const std::string& file) {
-  const std::filesystem::path path(file);
+  std::filesystem::path path(file);
+  // A scene of many files is called by its folder.
+  if (path.filename() == "lod-meta.json" || path.filename() == "meta.json") {
+    path = path.parent_path();
+  }
   return (path.has_filename() ? path : path.parent_path()).stem().string();
 }
 
@@ -40,20 +57,17 @@ RenderSetup load_case(const PaperOptions& options, std::size_t index, bool quiet
 
 }  // namespace
 
-std::string_view variant_name(Variant variant) {
-  switch (variant) {
-    case Variant::vanilla:
-      return "3DGS";
-    case Variant::exact:
-      return "Exact";
-    case Variant::ours:
-      return "Ours";
-    case Variant::without_cache:
-      return "Ours-w/o cache";
-    case Variant::without_split:
-      break;
+std::vector<Variant> ablations(const PaperOptions& options) {
+  std::vector<Variant> all = {
+      variants::without_cache,
+      {"Ours-w/o split", Pipeline::catgs, "--no-split"},
+      {"Ours-w/o fresh order", Pipeline::catgs, "--order key"},
+      {"Ours-w/o doubt", Pipeline::catgs, "--constant-velocity"},
+  };
+  for (const std::string& flags : options.variants) {
+    all.push_back({"Ours " + flags, Pipeline::catgs, flags});
   }
-  return "Ours-w/o split";
+  return all;
 }
 
 PaperCase::PaperCase(const PaperOptions& options, std::size_t index, std::string label, bool quiet)
@@ -90,19 +104,23 @@ std::string PaperCase::images() const {
   return options_->images.empty() ? std::string() : options_->images[index_];
 }
 
-ViewSettings PaperCase::settings(Variant variant) const {
-  ViewSettings settings = setup_.view;
-  if (variant == Variant::vanilla) settings.pipeline = Pipeline::vanilla;
-  if (variant == Variant::exact) settings.pipeline = Pipeline::exact;
-  if (variant == Variant::without_cache) settings.speculation.initial_window = 0;
-  if (variant == Variant::without_split) settings.split_tasks = false;
+PipelineOptions PaperCase::pipeline_options(const Variant& variant) const {
+  return with_flags(options_->render.pipeline, variant.flags);
+}
+
+ViewSettings PaperCase::settings(const Variant& variant) const {
+  ViewSettings settings = view_settings(pipeline_options(variant));
+  settings.pipeline = variant.pipeline;
   return settings;
 }
 
-const std::vector<Measurement>& PaperCase::runs(Variant variant) {
-  auto known = runs_.find(variant);
+const std::vector<Measurement>& PaperCase::runs(const Variant& variant) {
+  auto known = runs_.find(variant.name);
   if (known == runs_.end()) {
-    known = runs_.emplace(variant, runs(settings(variant), variant_name(variant))).first;
+    const PredictorSettings usual = setup_.predictor;
+    setup_.predictor.min_confidence = predictor_settings(pipeline_options(variant)).min_confidence;
+    known = runs_.emplace(variant.name, runs(settings(variant), variant.name)).first;
+    setup_.predictor = usual;
   }
   return known->second;
 }
@@ -185,6 +203,13 @@ void check(const PaperOptions& options) {
         "name one for each --case, in their order");
   }
   for (const std::string& folder : options.images) require(folder);
+  for (const std::string& flags : options.variants) {
+    const PipelineOptions variant = with_flags(options.render.pipeline, flags);
+    if (variant.pipeline != pipeline_name(Pipeline::catgs)) {
+      throw InputError("--variant", flags, "is not of the catgs pipeline", "leave --pipeline out");
+    }
+    (void)view_settings(variant);
+  }
   for (const double fraction : options.keep_fractions) {
     if (!(fraction > 0.0 && fraction <= 1.0)) {
       throw InputError("--keep-fraction", "", fmt::format("{} is not in (0, 1]", fraction));

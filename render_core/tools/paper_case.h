@@ -20,17 +20,27 @@ struct PaperOptions {
   std::size_t warmup = 10;
   std::size_t every = 10;  // quality and tiles look at one frame in so many
   std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
+  std::vector<std::string> variants;  // flags of more rows of ablation
 };
 
-/// The renderers that the tables compare.
-enum class Variant {
-  vanilla,        // "3DGS"
-  exact,          // "Exact": precise culling alone
-  ours,           // "Ours"
-  without_cache,  // "Ours-w/o": every frame is a key frame
-  without_split,  // a tile is blended by one block, however long its list is
+/// A renderer that the tables compare: a pipeline, and the flags by which `bench` would be told to
+/// do without a part of it.
+struct Variant {
+  std::string name;
+  Pipeline pipeline = Pipeline::catgs;
+  std::string flags{};
 };
-std::string_view variant_name(Variant variant);
+
+namespace variants {
+inline const Variant vanilla{"3DGS", Pipeline::vanilla};
+inline const Variant exact{"Exact", Pipeline::exact};  // precise culling alone
+inline const Variant ours{"Ours"};
+inline const Variant without_cache{"Ours-w/o cache", Pipeline::catgs, "--no-cache"};
+}  // namespace variants
+
+/// Ours with one part at a time taken away, and with the flags of `--variant`. A new part is a line
+/// here.
+std::vector<Variant> ablations(const PaperOptions& options);
 
 /// A scene and its traces, loaded, and what was measured on it so far: several tables use the same
 /// runs.
@@ -49,11 +59,11 @@ class PaperCase {
   /// COLMAP folder; "" without one.
   [[nodiscard]] std::string images() const;
 
-  [[nodiscard]] ViewSettings settings(Variant variant) const;
+  [[nodiscard]] ViewSettings settings(const Variant& variant) const;
 
   /// One measurement per trace; of a variant, measured when first asked for. An InputError says
   /// which one the core does not render.
-  const std::vector<Measurement>& runs(Variant variant);
+  const std::vector<Measurement>& runs(const Variant& variant);
   std::vector<Measurement> runs(const ViewSettings& settings, std::string_view name);
 
   /// Calls visit(index of the trace, progress) with setup() on each trace in turn; `doing` is what
@@ -71,13 +81,14 @@ class PaperCase {
 
  private:
   PaperCase(const PaperCase& whole, RenderSetup setup);
+  [[nodiscard]] PipelineOptions pipeline_options(const Variant& variant) const;
 
   const PaperOptions* options_;
   std::size_t index_;
   std::string label_;
   bool quiet_;
   RenderSetup setup_;
-  std::map<Variant, std::vector<Measurement>> runs_;
+  std::map<std::string, std::vector<Measurement>> runs_;  // by the variant's name
 };
 
 /// All traces as one: the same queries, over all frames.

@@ -3,6 +3,7 @@
 #include <array>
 #include <fstream>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -33,6 +34,19 @@ std::vector<PaperTable> one_each(std::vector<PaperTable> of_scenes) { return of_
 
 std::vector<PaperTable> mean_first(std::vector<PaperTable> of_scenes) {
   if (of_scenes.size() > 1) of_scenes.insert(of_scenes.begin(), averaged(of_scenes));
+  return of_scenes;
+}
+
+/// The first column of all scenes side by side, which the first note explains; then all of each.
+std::vector<PaperTable> first_column_first(std::vector<PaperTable> of_scenes) {
+  std::vector<PaperTable> first = of_scenes;
+  for (PaperTable& table : first) {
+    table.corner = table.columns.front();
+    table.columns = {std::exchange(table.title, {})};
+    table.notes.resize(1);
+    for (PaperTable::Row& row : table.rows) row.numbers.resize(1);
+  }
+  of_scenes.insert(of_scenes.begin(), joined(first));
   return of_scenes;
 }
 
@@ -123,7 +137,7 @@ std::span<const PaperTableKind> paper_table_kinds() {
   static constexpr std::array<PaperTableKind, 8> kinds = {
       {{"fps", "Average frame rate", fps_table, side_by_side},
        {"quality", "Render quality", quality_table, side_by_side},
-       {"ablation", "Impact of the major mechanisms", ablation_table, side_by_side},
+       {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first},
        {"stages", "Acceleration of the stages over 3DGS", stages_table, mean_first},
        {"list", "Length of the tile lists", list_table, side_by_side},
        {"window", "Impact of the window", window_table, one_each},
@@ -164,6 +178,10 @@ void add_paper_command(CLI::App& app) {
       ->add_option("--keep-fraction", options.keep_fractions,
                    "pruned: shares of the Gaussians (1,0.5,0.25)")
       ->delimiter(',')
+      ->allow_extra_args(false);
+  paper_app
+      ->add_option("--variant", options.variants,
+                   "ablation: a row more, of ours with these flags of bench, like \"--window 8\"")
       ->allow_extra_args(false);
   paper_app->add_flag("--anchor", options.render.anchor,
                       "Move the traces to the start pose of their scene");

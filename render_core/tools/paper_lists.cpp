@@ -53,11 +53,11 @@ class TileLoads {
 };
 
 /// Adds the column of a variant.
-void add_tiles(PaperTable& table, PaperCase& scene, Variant variant) {
+void add_tiles(PaperTable& table, PaperCase& scene, const Variant& variant) {
   TileLoads loads;
   double tasks = 0.0;
   std::size_t frames = 0;
-  scene.for_each_trace(variant_name(variant), [&](std::size_t, const ProgressReport& report) {
+  scene.for_each_trace(variant.name, [&](std::size_t, const ProgressReport& report) {
     const RenderSetup& setup = scene.setup();
     const auto view = setup.made.renderer->make_view(scene.settings(variant));
     for (std::size_t i = 0; i < setup.poses.size(); i += scene.options().every) {
@@ -77,7 +77,7 @@ void add_tiles(PaperTable& table, PaperCase& scene, Variant variant) {
     }
   });
   loads.finish();
-  table.columns.push_back(fmt::format("{} {}", scene.label(), variant_name(variant)));
+  table.columns.push_back(fmt::format("{} {}", scene.label(), variant.name));
   const double slices = tasks > 0.0 ? tasks / static_cast<double>(frames) : Number::nothing;
   const std::array<Number, 9> column = {Number{loads.tiles(), 0},
                                         Number{loads.mean(), 1},
@@ -112,10 +112,10 @@ PaperTable list_table(PaperCase& scene) {
     const bool none = run.frame_ms(kind).empty();
     return Number{none ? Number::nothing : thousand * run.list_length(kind).mean};
   };
-  const Measurement ours = pooled(scene.runs(Variant::ours));
-  const Measurement vanilla = pooled(scene.runs(Variant::vanilla));
-  const Measurement exact = pooled(scene.runs(Variant::exact));
-  const double growth = key_list_growth(scene.runs(Variant::ours), scene.runs(Variant::exact),
+  const Measurement ours = pooled(scene.runs(variants::ours));
+  const Measurement vanilla = pooled(scene.runs(variants::vanilla));
+  const Measurement exact = pooled(scene.runs(variants::exact));
+  const double growth = key_list_growth(scene.runs(variants::ours), scene.runs(variants::exact),
                                         [](const FrameStats&) { return true; });
   PaperTable table{.title = {},
                    .corner = "List length (10³)",
@@ -154,8 +154,8 @@ PaperTable tiles_table(PaperCase& scene) {
       .notes = {fmt::format("List entries per 16x16 tile, one frame in {}. Slices: parts in which "
                             "a frame's tiles are blended.",
                             scene.options().every)}};
-  add_tiles(table, scene, Variant::vanilla);
-  add_tiles(table, scene, Variant::exact);
+  add_tiles(table, scene, variants::vanilla);
+  add_tiles(table, scene, variants::exact);
   return table;
 }
 

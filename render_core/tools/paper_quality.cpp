@@ -83,7 +83,7 @@ class PhotoJudge {
 
   void run() {
     const int steps = follow_path();
-    FrameFeed feed(scene_.setup(), scene_.settings(Variant::ours));
+    FrameFeed feed(scene_.setup(), scene_.settings(variants::ours));
     Progress progress(scene_.label() + ": photographs", scene_.quiet());
     for (std::size_t k = 0; k < images_.size(); ++k) {
       const bool judged = k % scene_.options().every == 0;
@@ -153,24 +153,23 @@ class PhotoJudge {
   std::filesystem::path folder_;
   std::vector<ColmapImage> images_;
   ThreadPool& pool_;
-  std::array<Row, 4> rows_ = {{{"3DGS", Variant::vanilla},
-                               {"Exact", Variant::exact},
-                               {"Ours-key", Variant::ours},
-                               {"Ours-sub", Variant::ours}}};
+  std::array<Row, 4> rows_ = {{{"3DGS", variants::vanilla},
+                               {"Exact", variants::exact},
+                               {"Ours-key", variants::ours},
+                               {"Ours-sub", variants::ours}}};
   Row& sub_ = rows_.back();
 };
 
 PaperTable quality_by_exact(PaperCase& scene) {
   QualityTally vanilla, key, sub;
-  const auto judge_variant = [&](Variant variant, const auto& take) {
+  const auto judge_variant = [&](const Variant& variant, const auto& take) {
     scene.for_each_trace(
-        fmt::format("quality of {}", variant_name(variant)),
-        [&](std::size_t, const ProgressReport& report) {
+        fmt::format("quality of {}", variant.name), [&](std::size_t, const ProgressReport& report) {
           take(judge(scene.setup(), scene.settings(variant), scene.options().every, report));
         });
   };
-  judge_variant(Variant::vanilla, [&](const QualityReport& report) { vanilla.add(report.key); });
-  judge_variant(Variant::ours, [&](const QualityReport& report) {
+  judge_variant(variants::vanilla, [&](const QualityReport& report) { vanilla.add(report.key); });
+  judge_variant(variants::ours, [&](const QualityReport& report) {
     key.add(report.key);
     sub.add(report.sub);
   });

@@ -1,15 +1,18 @@
 // Tables of the paper about time: fps, ablation, stages, pruned.
+#include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "render_core/metrics/summary.h"
 #include "render_core/tools/paper_tables.h"
 
 namespace catgs {
 namespace {
 
-Number fps(PaperCase& scene, Variant variant) { return {pooled(scene.runs(variant)).fps()}; }
+Number fps(PaperCase& scene, const Variant& variant) { return {pooled(scene.runs(variant)).fps()}; }
 
 std::uint64_t tasks(const std::vector<Measurement>& runs) {
   std::uint64_t sum = 0;
@@ -59,14 +62,14 @@ PaperTable::Row speedups(std::string name, const Measurement& run, const Measure
 }  // namespace
 
 PaperTable fps_table(PaperCase& scene) {
-  const Number vanilla = fps(scene, Variant::vanilla), ours = fps(scene, Variant::ours);
+  const Number vanilla = fps(scene, variants::vanilla), ours = fps(scene, variants::ours);
   return {.title = {},
           .corner = "Average FPS",
           .columns = {scene.label()},
           .rows = {{"Model size", {{static_cast<double>(scene.setup().cloud->size()), 0}}},
                    {"3DGS", {vanilla}},
-                   {"Exact", {fps(scene, Variant::exact)}},
-                   {"Ours-w/o", {fps(scene, Variant::without_cache)}},
+                   {"Exact", {fps(scene, variants::exact)}},
+                   {"Ours-w/o", {fps(scene, variants::without_cache)}},
                    {"Ours", {ours}},
                    {"Ours over 3DGS", {{ours.value / vanilla.value, 2, "×"}}}},
           .notes = {std::string(fps_note),
@@ -75,23 +78,53 @@ PaperTable fps_table(PaperCase& scene) {
 }
 
 PaperTable ablation_table(PaperCase& scene) {
-  PaperTable table{.title = {},
-                   .corner = "Average FPS",
-                   .columns = {scene.label()},
-                   .rows = {{"Ours-Full", {fps(scene, Variant::ours)}},
-                            {"Ours-w/o cache", {fps(scene, Variant::without_cache)}},
-                            {"Ours-w/o split", {fps(scene, Variant::without_split)}}},
+  PaperTable table{.title = scene.label(),
+                   .corner = {},
+                   .columns = {"Average FPS", "of Full", "Flatness", "p99 ms", "Key frame ms",
+                               "Sub-frame ms", "Frames per key", "Keys without window"},
+                   .rows = {},
                    .notes = {std::string(fps_note)}};
-  if (tasks(scene.runs(Variant::ours)) == tasks(scene.runs(Variant::without_split))) {
-    table.notes.push_back(scene.label() + ": no tile was split.");
+  const double full_fps = pooled(scene.runs(variants::ours)).fps();
+  const auto add = [&](std::string name, const Variant& variant) {
+    const std::vector<Measurement>& runs = scene.runs(variant);
+    const Measurement all = pooled(runs);
+    double flat = 0.0;
+    for (const Measurement& run : runs) flat = std::max(flat, flatness(run.frame_ms()));
+    const auto mean_ms = [&](FrameKind kind) {
+      const Summary times = summarize(all.frame_ms(kind));
+      return times.count > 0 ? times.mean : Number::nothing;
+    };
+    table.rows.push_back({std::move(name),
+                          {{all.fps()},
+                           {all.fps() / full_fps, 2, "×"},
+                           {flat, 2},
+                           {summarize(all.frame_ms()).p99, 2},
+                           {mean_ms(FrameKind::key), 3},
+                           {mean_ms(FrameKind::sub), 3},
+                           {all.frames_per_key(), 2},
+                           {100.0 * all.keys_without_window(), 0, " %"}}});
+  };
+  add("Ours-Full", variants::ours);
+  std::string flags;
+  for (const Variant& variant : ablations(scene.options())) {
+    add(variant.name, variant);
+    flags += fmt::format("{}{}: {}", flags.empty() ? "" : ", ", variant.name, variant.flags);
+    if (variant.flags == "--no-split" &&
+        tasks(scene.runs(variants::ours)) == tasks(scene.runs(variant))) {
+      table.notes.push_back(scene.label() + ": no tile was split.");
+    }
   }
+  table.notes.push_back("As `bench` is told: " + flags + ".");
+  table.notes.emplace_back(
+      "Flatness: p99 over frames of their time over the median of the 121 around, "
+      "of the worst trace.");
   return table;
 }
 
 PaperTable stages_table(PaperCase& scene) {
-  const Measurement vanilla = pooled(scene.runs(Variant::vanilla));
-  const Measurement exact = pooled(scene.runs(Variant::exact));
-  const Measurement ours = pooled(scene.runs(Variant::ours));
+  const Measurement vanilla = pooled(scene.runs(variants::vanilla));
+  const Measurement exact = pooled(scene.runs(variants::exact));
+  const Measurement ours = pooled(scene.runs(variants::ours));
   PaperTable table{
       .title = scene.label(),
       .corner = "Speed-up",
@@ -120,8 +153,8 @@ PaperTable pruned_table(PaperCase& scene) {
   const auto add = [&table](PaperCase& kept, double fraction) {
     table.columns.push_back(fmt::format("{} {:g} %", kept.label(), 100.0 * fraction));
     const double thousands = 1e-3 * static_cast<double>(kept.setup().cloud->size());
-    const std::array<Number, 4> column = {Number{thousands}, fps(kept, Variant::vanilla),
-                                          fps(kept, Variant::exact), fps(kept, Variant::ours)};
+    const std::array<Number, 4> column = {Number{thousands}, fps(kept, variants::vanilla),
+                                          fps(kept, variants::exact), fps(kept, variants::ours)};
     for (std::size_t i = 0; i < column.size(); ++i) table.rows[i].numbers.push_back(column[i]);
   };
   for (const double fraction : scene.options().keep_fractions) {

@@ -79,7 +79,7 @@ WindowColumn without_window(const std::vector<Measurement>& runs,
 }
 
 WindowColumn with_window(PaperCase& scene, int window, const std::vector<Measurement>& exact) {
-  ViewSettings settings = scene.settings(Variant::ours);
+  ViewSettings settings = scene.settings(variants::ours);
   settings.speculation.initial_window = window;
   settings.speculation.max_trail_px = any_trail_px;
   const std::vector<Measurement> runs = scene.runs(settings, fmt::format("W-{}", window));
@@ -129,9 +129,9 @@ PaperTable window_table(PaperCase& scene) {
                                           c.held, c.p99_ms, c.max_ms};
     for (std::size_t i = 0; i < column.size(); ++i) table.rows[i].numbers.push_back(column[i]);
   };
-  const std::vector<Measurement>& exact = scene.runs(Variant::exact);
+  const std::vector<Measurement>& exact = scene.runs(variants::exact);
   add("Exact", without_window(exact, exact));
-  add("None", without_window(scene.runs(Variant::without_cache), exact));
+  add("None", without_window(scene.runs(variants::without_cache), exact));
   const PredictorSettings usual = scene.setup().predictor;
   PredictorSettings patient = usual;
   patient.horizon_us = any_horizon_us;

@@ -102,8 +102,29 @@ TEST_F(Paper, PrintsMarkdownAndWritesJson) {
   EXPECT_THAT(names(json.at("tables")), ElementsAre("ablation", "list"));
   EXPECT_EQ(json.at("cases").at(0).at("gaussians"), 2000);
   EXPECT_EQ(json.at("settings").at("size_px"), (Json{96, 64}));
-  EXPECT_THAT(names(json.at("tables").at("ablation").at(0).at("rows")),
-              ElementsAre("Ours-Full", "Ours-w/o cache", "Ours-w/o split"));
+}
+
+TEST_F(Paper, AblationTakesOnePartAwayAtATime) {
+  const Json ablation =
+      tables("ablation", "--window 6 --variant '--window 2' --variant '--order key --no-split'");
+  ASSERT_EQ(ablation.size(), 3u);  // both scenes, then each
+  const Json& fps = ablation.at(0).at("rows");
+  EXPECT_THAT(names(fps),
+              ElementsAre("Ours-Full", "Ours-w/o cache", "Ours-w/o split", "Ours-w/o fresh order",
+                          "Ours-w/o doubt", "Ours --window 2", "Ours --order key --no-split"));
+  EXPECT_THAT(names(fps.at("Ours-Full")), ElementsAre("cloud", "mist"));
+  const Json& rows = ablation.at(1).at("rows");
+  EXPECT_EQ(ablation.at(1).at("title"), "cloud");
+  EXPECT_EQ(rows.at("Ours-Full").at("Average FPS"), fps.at("Ours-Full").at("cloud"));
+  EXPECT_EQ(rows.at("Ours-Full").at("of Full"), 1.0);
+  EXPECT_EQ(rows.at("Ours-w/o cache").at("Frames per key"), 1.0);
+  EXPECT_EQ(rows.at("Ours-w/o cache").at("Keys without window"), 100.0);
+  EXPECT_TRUE(rows.at("Ours-w/o cache").at("Sub-frame ms").is_null());
+  // Of 40 frames two know no motion yet; then come groups of 7, or of 3.
+  EXPECT_DOUBLE_EQ(rows.at("Ours-Full").at("Frames per key").get<double>(), 40.0 / 8);
+  EXPECT_DOUBLE_EQ(rows.at("Ours --window 2").at("Frames per key").get<double>(), 40.0 / 15);
+  EXPECT_EQ(rows.at("Ours --order key --no-split").at("Frames per key"),
+            rows.at("Ours-Full").at("Frames per key"));
 }
 
 TEST_F(Paper, ListsGrowFromExactToTheBoxes) {
@@ -259,6 +280,12 @@ TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {
          "has no COLMAP reconstruction");
   expect(paper(fmt::format("--table pruned --keep-fraction 0 {}", cloud_case())),
          "--keep-fraction: 0 is not in (0, 1]");
+  expect(paper(fmt::format("--table ablation {} --variant '--windows 2'", cloud_case())),
+         "--variant: --windows 2: ");
+  expect(paper(fmt::format("--table ablation {} --variant '--pipeline exact'", cloud_case())),
+         "is not of the catgs pipeline");
+  expect(paper(fmt::format("--table ablation {} --variant '--window 99'", cloud_case())),
+         "--window: is out of range");
   std::ofstream(path("bad.json")) << R"({"FlashGS": {"clod": 1}})";
   expect(paper(fmt::format("--table fps {} --baseline {}", cloud_case(), path("bad.json"))),
          "FlashGS: has none of the columns (they are called cloud)");

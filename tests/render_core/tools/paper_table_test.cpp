@@ -102,6 +102,8 @@ TEST(PaperCases, AreCalledAsTheirScenes) {
               ElementsAre("city", "room"));
   EXPECT_THAT(case_labels({{"city.ply", "t/walk.tum"}, {"city.ply", "t/pan.tum", "head"}}),
               ElementsAre("city walk", "city pan head"));
+  EXPECT_THAT(case_labels({{"a/room/lod-meta.json"}, {"b/hall/meta.json"}}),
+              ElementsAre("room", "hall"));
   EXPECT_THAT(case_labels({{"city.ply", "walk"}, {"b/city.ply", "walk"}}),
               ElementsAre("city walk", "city walk (2)"));
 }
