@@ -50,11 +50,27 @@ std::vector<PaperTable> first_column_first(std::vector<PaperTable> of_scenes) {
   return of_scenes;
 }
 
+/// Side by side, and behind them what grows over the first scene.
+std::vector<PaperTable> growing(std::vector<PaperTable> of_scenes) {
+  PaperTable all = joined(of_scenes);
+  const std::vector<PaperTable::Row> rows = all.rows;
+  for (const PaperTable::Row& row : rows) {
+    if (!row.name.starts_with("In view") && !row.name.ends_with("frame ms")) continue;
+    PaperTable::Row& growth = all.rows.emplace_back(
+        PaperTable::Row{row.name.substr(0, row.name.rfind(' ')) + " over the first", {}});
+    for (const Number& number : row.numbers) {
+      growth.numbers.push_back({number.value / row.numbers.front().value, 3, "×"});
+    }
+  }
+  return {std::move(all)};
+}
+
 std::vector<const PaperTableKind*> chosen_kinds(const std::vector<std::string>& names) {
   std::vector<const PaperTableKind*> kinds;
   for (const PaperTableKind& kind : paper_table_kinds()) {
     const bool all = std::ranges::find(names, "all") != names.end();
-    if (all || std::ranges::find(names, kind.name) != names.end()) kinds.push_back(&kind);
+    if ((all && kind.of_the_paper) || std::ranges::find(names, kind.name) != names.end())
+      kinds.push_back(&kind);
   }
   return kinds;
 }
@@ -134,15 +150,16 @@ void paper(const PaperCommand& command, bool quiet) {
 }  // namespace
 
 std::span<const PaperTableKind> paper_table_kinds() {
-  static constexpr std::array<PaperTableKind, 8> kinds = {
-      {{"fps", "Average frame rate", fps_table, side_by_side},
-       {"quality", "Render quality", quality_table, side_by_side},
-       {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first},
-       {"stages", "Acceleration of the stages over 3DGS", stages_table, mean_first},
-       {"list", "Length of the tile lists", list_table, side_by_side},
-       {"window", "Impact of the window", window_table, one_each},
-       {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side},
-       {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side}}};
+  static constexpr std::array<PaperTableKind, 9> kinds = {
+      {{"fps", "Average frame rate", fps_table, side_by_side, true},
+       {"quality", "Render quality", quality_table, side_by_side, true},
+       {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first, true},
+       {"stages", "Acceleration of the stages over 3DGS", stages_table, mean_first, true},
+       {"list", "Length of the tile lists", list_table, side_by_side, true},
+       {"window", "Impact of the window", window_table, one_each, true},
+       {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side, true},
+       {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side, true},
+       {"scaling", "One view of scenes of several sizes", scaling_table, growing, false}}};
   return kinds;
 }
 
@@ -154,7 +171,9 @@ void add_paper_command(CLI::App& app) {
   std::vector<std::string> names;
   for (const PaperTableKind& kind : paper_table_kinds()) names.emplace_back(kind.name);
   names.emplace_back("all");
-  paper_app->add_option("--table", command->tables, "One or more, separated by commas")
+  paper_app
+      ->add_option("--table", command->tables,
+                   "One or more, separated by commas; all: those of the paper")
       ->required()
       ->delimiter(',')
       ->allow_extra_args(false)

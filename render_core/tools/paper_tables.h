@@ -23,12 +23,16 @@ PaperTable window_table(PaperCase& scene);    // appendix: window size
 PaperTable tiles_table(PaperCase& scene);     // Fig. 3: load of the tiles
 PaperTable pruned_table(PaperCase& scene);    // appendix: pruned scenes
 
+// Not in the paper.
+PaperTable scaling_table(PaperCase& scene);  // one view of scenes of several sizes
+
 /// Which are told by --table, and how the tables of several scenes become one.
 struct PaperTableKind {
   std::string_view name;
   std::string_view about;
   PaperTable (*measure)(PaperCase& scene);
   std::vector<PaperTable> (*combine)(std::vector<PaperTable> of_scenes);
+  bool of_the_paper;  // so that `all` prints it
 };
 std::span<const PaperTableKind> paper_table_kinds();
 

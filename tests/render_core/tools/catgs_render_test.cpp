@@ -213,7 +213,7 @@ TEST_F(CatgsRender, TheFixedPathsOfTheCityAreFit) {
     EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
     ++files;
   }
-  EXPECT_EQ(files, 6);
+  EXPECT_EQ(files, 8);
 }
 
 TEST_F(CatgsRender, AnUnfitTraceIsNotWritten) {

@@ -159,6 +159,28 @@ TEST_F(Paper, LongerWindowsHaveLongerTrailsAndLists) {
   }
 }
 
+TEST_F(Paper, ScalingComparesWithTheFirstScene) {
+  const Json tables_of = tables("scaling");
+  ASSERT_EQ(tables_of.size(), 1u);
+  const Json& rows = tables_of.at(0).at("rows");
+  const auto value = [&](const char* row, const char* scene) {
+    return rows.at(row).at(scene).get<double>();
+  };
+  EXPECT_EQ(value("Gaussians (10³)", "cloud"), 2.0);
+  EXPECT_EQ(value("Gaussians (10³)", "mist"), 0.5);
+  EXPECT_EQ(value("In view over the first", "cloud"), 1.0);
+  EXPECT_NEAR(value("In view over the first", "mist"),
+              value("In view (10³)", "mist") / value("In view (10³)", "cloud"), 1e-9);
+  for (const char* row : {"Key frame", "Sub-frame"}) {
+    EXPECT_NEAR(value(fmt::format("{} over the first", row).c_str(), "mist"),
+                value(fmt::format("{} ms", row).c_str(), "mist") /
+                    value(fmt::format("{} ms", row).c_str(), "cloud"),
+                1e-9);
+  }
+  EXPECT_NEAR(value("Scene bytes per Gaussian", "cloud") * 2e-3, value("Scene MB", "cloud"), 1e-9);
+  EXPECT_GT(value("View MB", "mist"), 0.0);
+}
+
 TEST_F(Paper, QualityAgainstExactIsBestForKeyFrames) {
   const Json rows = tables("quality", "--every 2").at(0).at("rows");
   EXPECT_THAT(names(rows), ElementsAre("3DGS", "Ours-key", "Ours-sub"));
