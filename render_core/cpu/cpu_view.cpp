@@ -57,6 +57,7 @@ FrameStats CpuView::draw(const FrameRequest& request) {
   const Camera& camera = request.camera;
   grid_ = (camera.size_px + (tile_size_px - 1)) / tile_size_px;
   image_.resize(settings_.format, camera.size_px);
+  blocks_.place(camera.size_px);
   FrameStats stats;
   if (settings_.pipeline == Pipeline::vanilla) {
     draw_boxes(camera, stats);
@@ -189,15 +190,9 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
   const std::span<const std::uint32_t> tiles = lists_.tiles_by_length();
   scene_->pool->parallel_for(tiles.size(), [&](std::size_t i) {
     const std::uint32_t tile = tiles[i];
-    const auto index = static_cast<int>(tile);
-    const std::uint64_t blended =
-        scene_->kernels.blend_tile({splats_.data(),
-                                    lists_.list(tile),
-                                    {index % grid_.x, index / grid_.x},
-                                    request.background,
-                                    settings_.pipeline != Pipeline::vanilla,
-                                    settings_.count_pairs,
-                                    &image_});
+    const std::uint64_t blended = scene_->kernels.blend_blocks(
+        {splats_.data(), lists_.list(tile), blocks_.of_tile(tile), request.background,
+         settings_.pipeline != Pipeline::vanilla, settings_.count_pairs, &image_});
     if (settings_.count_pairs) pairs += blended;
   });
   return pairs;
@@ -213,8 +208,9 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  return image_.memory_bytes() + lists_.memory_bytes() + bytes(clusters_) + bytes(members_) +
-         bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_) + bytes(depths_);
+  return image_.memory_bytes() + lists_.memory_bytes() + blocks_.memory_bytes() + bytes(clusters_) +
+         bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_) +
+         bytes(depths_);
 }
 
 }  // namespace catgs

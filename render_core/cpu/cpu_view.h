@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "render_core/cpu/kernels.h"
+#include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
 #include "render_core/host_image.h"
@@ -57,6 +58,7 @@ class CpuView final : public View {
   std::vector<SplatPath> paths_;           // [slot]
   std::vector<std::uint32_t> depths_;      // [slot]: bits, of a sub-frame
   TileLists lists_;
+  PixelBlocks blocks_;
 };
 
 }  // namespace catgs

@@ -47,7 +47,7 @@ struct Target {
   {                                                                                      \
     HWY_##name, {                                                                        \
 #name, N_##name::project_cluster, N_##name::refresh_cluster, N_##name::list_tiles, \
-          N_##name::blend_tile                                                           \
+          N_##name::blend_blocks                                                         \
     }                                                                                    \
   }
 

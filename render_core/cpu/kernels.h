@@ -96,13 +96,26 @@ struct ListTask {
   std::uint32_t first_slot;
 };
 
-/// Blends one tile and writes its part of the image.
+/// Pixels are blended in blocks of 4x4, which are culled as one: a register where that is wide
+/// enough. Squares are met by fewer splats than rows of as many pixels are.
+inline constexpr int block_side_px = 4;
+inline constexpr int block_px = block_side_px * block_side_px;
+
+/// First pixel of a block, inside of the image; the others may lie outside.
+struct PixelBlock {
+  std::uint16_t x, y;
+};
+
+/// Most blocks that one task blends; a tile has half as many.
+inline constexpr int max_task_blocks = 32;
+
+/// Blends a tile's list in some blocks and writes them to the image.
 struct BlendTask {
   const Splat* splats;
   std::span<const DepthSlot> list;  // front to back
-  glm::ivec2 tile;
+  std::span<const PixelBlock> blocks;
   glm::vec3 background;
-  bool cull_blocks;  // skip parts of rows that a splat's ellipse does not meet; same image
+  bool cull_blocks;  // skip blocks that a splat's ellipse does not meet; same image
   bool count_pairs;  // else the result is 0
   const HostImage* image;
 };
@@ -113,7 +126,7 @@ struct SimdKernels {
   ClusterSummary (*project_cluster)(const ProjectTask& task);
   ClusterSummary (*refresh_cluster)(const RefreshTask& task);
   void (*list_tiles)(const ListTask& task, std::vector<TileRun>& runs);  // appends
-  std::uint64_t (*blend_tile)(const BlendTask& task);  // (Gaussian, pixel) pairs blended
+  std::uint64_t (*blend_blocks)(const BlendTask& task);  // (Gaussian, pixel) pairs blended
 };
 
 /// Kernels for instruction sets that this processor has, best first; the last is "SCALAR".

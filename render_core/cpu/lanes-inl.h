@@ -143,6 +143,11 @@ CATGS_HD_INLINE Lanes<D> mul_add(const Lanes<D>& a, const Lanes<D>& b, const Lan
   return Lanes<D>(hn::MulAdd(a.v, b.v, c.v));
 }
 
+template <class D>
+CATGS_HD_INLINE Lanes<D> neg_mul_add(const Lanes<D>& a, const Lanes<D>& b, const Lanes<D>& c) {
+  return Lanes<D>(hn::NegMulAdd(a.v, b.v, c.v));
+}
+
 /// 2^x for x in [-8, 0] with a relative error below 2.1e-5 (an alpha is off by less than a
 /// hundredth of an 8-bit step): the minimax polynomial of 2^(x/8), raised to the 8th power. Cheaper
 /// than splitting off the integer part, which the short range does not need.

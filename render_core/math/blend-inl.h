@@ -30,12 +30,18 @@ CATGS_HD_INLINE auto contributes(T exponent) {
   return exponent >= T(log2_alpha_min);
 }
 
-/// Blends one Gaussian with alpha = min(alpha_max, 2^exponent) over what lies behind, where it
-/// contributes and the pixel is not finished. A pixel that it would take below transmittance_min is
-/// finished without it. Returns which pixels are not finished.
+/// min(alpha_max, 2^exponent), or 0 where that does not contribute.
+template <class T>
+CATGS_HD_INLINE T alpha_of(T exponent) {
+  return select(contributes(exponent), min(T(alpha_max), exp2_of_alpha(exponent)), T(0.0));
+}
+
+/// Blends one Gaussian with alpha_of(exponent) over what lies behind, where the pixel is not
+/// finished. A pixel that it would take below transmittance_min is finished without it. Returns
+/// which pixels are not finished.
 template <class T>
 CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colour) {
-  const T alpha = select(contributes(exponent), min(T(alpha_max), exp2_of_alpha(exponent)), T(0.0));
+  const T alpha = alpha_of(exponent);
   const T weight = alpha * pixel.transmittance;
   const T behind = pixel.transmittance - weight;
   // Negative, hence false, for pixels finished before; true for live ones that it does not reach.
@@ -45,6 +51,41 @@ CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colo
   pixel.colour.y = mul_add(used, colour.y, pixel.colour.y);
   pixel.colour.z = mul_add(used, colour.z, pixel.colour.z);
   pixel.transmittance = select(live, behind, -abs(pixel.transmittance));
+  return live;
+}
+
+/// A pixel for a run of Gaussians in registers. Its transmittance goes on falling behind the
+/// Gaussian that finishes it: one multiply-add is all that the next Gaussian has to wait for.
+template <class T>
+struct RunningPixel {
+  Vec3<T> colour;
+  T running;        // below transmittance_min: the pixel is finished
+  T transmittance;  // of the pixel, not negative
+};
+
+template <class T>
+CATGS_HD_INLINE RunningPixel<T> begin_run(const PixelState<T>& pixel) {
+  return {pixel.colour, pixel.transmittance, abs(pixel.transmittance)};
+}
+
+template <class T>
+CATGS_HD_INLINE PixelState<T> end_run(const RunningPixel<T>& pixel) {
+  return {pixel.colour,
+          select(pixel.running >= T(transmittance_min), pixel.transmittance, -pixel.transmittance)};
+}
+
+/// As for a PixelState.
+template <class T>
+CATGS_HD_INLINE auto blend(RunningPixel<T>& pixel, T exponent, const Vec3<T>& colour) {
+  const T alpha = alpha_of(exponent);
+  const T weight = alpha * pixel.running;
+  pixel.running = neg_mul_add(alpha, pixel.running, pixel.running);
+  const auto live = pixel.running >= T(transmittance_min);
+  const T used = select(live, weight, T(0.0));
+  pixel.colour.x = mul_add(used, colour.x, pixel.colour.x);
+  pixel.colour.y = mul_add(used, colour.y, pixel.colour.y);
+  pixel.colour.z = mul_add(used, colour.z, pixel.colour.z);
+  pixel.transmittance = select(live, pixel.running, pixel.transmittance);
   return live;
 }
 

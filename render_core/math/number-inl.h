@@ -40,6 +40,9 @@ CATGS_HD_INLINE double ceil(double a) { return std::ceil(a); }
 /// a * b + c, with one rounding where the machine has it for free.
 CATGS_HD_INLINE float mul_add(float a, float b, float c) { return a * b + c; }
 CATGS_HD_INLINE double mul_add(double a, double b, double c) { return a * b + c; }
+/// c - a * b, likewise.
+CATGS_HD_INLINE float neg_mul_add(float a, float b, float c) { return c - a * b; }
+CATGS_HD_INLINE double neg_mul_add(double a, double b, double c) { return c - a * b; }
 
 /// 2^x for the exponent of a visible contribution, x in [-8, 0].
 CATGS_HD_INLINE float exp2_of_alpha(float x) { return exp2f(x); }
