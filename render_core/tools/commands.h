@@ -38,7 +38,8 @@ void add_info_command(CLI::App& app);
 void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
-/// Of `trace`, which adds it.
+// Of `trace`, which adds them.
 void add_trace_forecast_command(CLI::App& trace);
+void add_trace_windows_command(CLI::App& trace);
 
 }  // namespace catgs

@@ -26,19 +26,6 @@ RenderOptions with_trace(RenderOptions options, const std::string& trace) {
   return options;
 }
 
-/// The options of catgs with these flags too, written as on a command line.
-PipelineOptions with_flags(PipelineOptions options, const std::string& flags) {
-  options.pipeline = pipeline_name(Pipeline::catgs);
-  CLI::App parser;
-  add_pipeline_options(parser, options);
-  try {
-    parser.parse(flags);
-  } catch (const CLI::ParseError& error) {
-    throw InputError("--variant", flags, error.what(), "catgs-render bench --help lists the flags");
-  }
-  return options;
-}
-
 std::string stem(const std::string& file) {
   std::filesystem::path path(file);
   // A scene of many files is called by its folder.
@@ -204,11 +191,7 @@ void check(const PaperOptions& options) {
   }
   for (const std::string& folder : options.images) require(folder);
   for (const std::string& flags : options.variants) {
-    const PipelineOptions variant = with_flags(options.render.pipeline, flags);
-    if (variant.pipeline != pipeline_name(Pipeline::catgs)) {
-      throw InputError("--variant", flags, "is not of the catgs pipeline", "leave --pipeline out");
-    }
-    (void)view_settings(variant);
+    (void)with_flags(options.render.pipeline, flags);
   }
   for (const double fraction : options.keep_fractions) {
     if (!(fraction > 0.0 && fraction <= 1.0)) {

@@ -88,6 +88,23 @@ ViewSettings view_settings(const PipelineOptions& options) {
   return settings;
 }
 
+PipelineOptions with_flags(PipelineOptions options, const std::string& flags) {
+  const std::string_view catgs = pipeline_name(Pipeline::catgs);
+  options.pipeline = catgs;
+  CLI::App parser;
+  add_pipeline_options(parser, options);
+  try {
+    parser.parse(flags);
+  } catch (const CLI::ParseError& error) {
+    throw InputError("--variant", flags, error.what(), "catgs-render bench --help lists the flags");
+  }
+  if (options.pipeline != catgs) {
+    throw InputError("--variant", flags, "is not of the catgs pipeline", "leave --pipeline out");
+  }
+  (void)view_settings(options);
+  return options;
+}
+
 PredictorSettings predictor_settings(const PipelineOptions& options) {
   return {.min_confidence = options.constant_velocity ? 1.0 : 0.0};
 }

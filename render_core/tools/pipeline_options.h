@@ -33,6 +33,10 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options);
 /// InputError for an unknown name, a value out of range, an option that the pipeline has not.
 ViewSettings view_settings(const PipelineOptions& options);
 
+/// The options of the catgs pipeline with these flags too, written as on a command line. InputError
+/// for what that refuses; it names --variant, where users give such flags.
+PipelineOptions with_flags(PipelineOptions options, const std::string& flags);
+
 /// How the catgs pipeline's forecasts are made.
 PredictorSettings predictor_settings(const PipelineOptions& options);
 

@@ -184,6 +184,7 @@ void add_trace_command(CLI::App& app) {
   add_script(*trace);
   add_check(*trace);
   add_trace_forecast_command(*trace);
+  add_trace_windows_command(*trace);
 }
 
 }  // namespace catgs
