@@ -103,6 +103,7 @@ struct ViewSettings {
   bool count_pairs = false;              // fill FrameStats::blended_pairs; slower
   SpeculationSettings speculation{};     // Pipeline::catgs
   BlendOrder order = BlendOrder::fresh;  // Pipeline::catgs
+  bool colour_cache = true;              // Pipeline::catgs: colours are kept while they hold
   bool split_tasks = true;               // CUDA core: long tiles are blended in several parts
 };
 

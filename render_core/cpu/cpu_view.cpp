@@ -37,7 +37,10 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 }  // namespace
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
-    : scene_(std::move(scene)), settings_(settings), groups_(settings.speculation) {}
+    : scene_(std::move(scene)), settings_(settings), groups_(settings.speculation) {
+  if (settings.pipeline == Pipeline::catgs && settings.colour_cache)
+    colours_.emplace(scene_->store.clusters().size());
+}
 
 RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noexcept {
   RenderStatus status = check_request(request, settings_.format);
@@ -125,9 +128,9 @@ void CpuView::draw_sub_lists(const Camera& camera, FrameStats& stats) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;
       if (counts_[rank] == 0) continue;
-      summaries_[rank] = scene_->kernels.refresh_cluster({&scene_->store, &camera, clusters_[rank],
-                                                          &members_[rank], splats_.data() + first,
-                                                          depths_.data() + first, min_depth});
+      summaries_[rank] = scene_->kernels.refresh_cluster(
+          {&scene_->store, &camera, clusters_[rank], &members_[rank], splats_.data() + first,
+           depths_.data() + first, min_depth, colours_of(clusters_[rank], camera)});
     }
   });
   clock.end(Stage::project);
@@ -157,6 +160,12 @@ SplatTable CpuView::table(bool with_paths) const {
   return {splats_, with_paths ? paths_.data() : nullptr, counts_};
 }
 
+ClusterColours CpuView::colours_of(std::uint32_t cluster, const Camera& camera) {
+  if (!colours_) return {nullptr, nullptr};
+  return colours_->of_cluster(cluster, scene_->store.clusters()[cluster],
+                              camera.world_from_camera.position);
+}
+
 /// Projects the visible clusters and calls done(share, rank) after each.
 template <class Done>
 void CpuView::project(const Camera& camera, const Camera* window_end, const Done& done) {
@@ -177,8 +186,8 @@ void CpuView::project(const Camera& camera, const Camera* window_end, const Done
       const std::size_t first = rank * cluster_size;
       summaries_[rank] = scene_->kernels.project_cluster(
           {&scene_->store, &camera, culling, clusters_[rank], splats_.data() + first, min_depth,
-           window_end, sweeps ? paths_.data() + first : nullptr,
-           sweeps ? &members_[rank] : nullptr});
+           colours_of(clusters_[rank], camera), window_end,
+           sweeps ? paths_.data() + first : nullptr, sweeps ? &members_[rank] : nullptr});
       counts_[rank] = summaries_[rank].visible;
       done(share, rank);
     }
@@ -208,9 +217,9 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  return image_.memory_bytes() + lists_.memory_bytes() + blocks_.memory_bytes() + bytes(clusters_) +
-         bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_) +
-         bytes(depths_);
+  return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
+         blocks_.memory_bytes() + bytes(clusters_) + bytes(members_) + bytes(summaries_) +
+         bytes(counts_) + bytes(splats_) + bytes(paths_) + bytes(depths_);
 }
 
 }  // namespace catgs

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "render_core/cpu/colour_cache.h"
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
@@ -43,6 +45,7 @@ class CpuView final : public View {
   std::uint64_t blend(const FrameRequest& request);
   [[nodiscard]] std::size_t segments() const;
   [[nodiscard]] SplatTable table(bool with_paths) const;
+  ClusterColours colours_of(std::uint32_t cluster, const Camera& camera);
 
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
@@ -57,6 +60,7 @@ class CpuView final : public View {
   std::vector<Splat> splats_;              // [slot], see SplatTable
   std::vector<SplatPath> paths_;           // [slot]
   std::vector<std::uint32_t> depths_;      // [slot]: bits, of a sub-frame
+  std::optional<ColourCache> colours_;
   TileLists lists_;
   PixelBlocks blocks_;
 };

@@ -48,6 +48,12 @@ struct alignas(32) SplatPath {
 /// Members of a cluster, a bit each.
 using ClusterMembers = std::array<std::uint32_t, cluster_size / 32>;
 
+/// The colours of a cluster that need no shading, and room for those that do.
+struct ClusterColours {
+  float* rgb;              // [channel][Gaussian of the cluster]; null: none are kept
+  ClusterMembers* shaded;  // which ones hold
+};
+
 /// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,
 /// which has room for the whole cluster.
 struct ProjectTask {
@@ -59,6 +65,7 @@ struct ProjectTask {
   std::size_t cluster;
   Splat* splats;
   float min_depth;  // world units; nearer ones do not count in ClusterSummary
+  ClusterColours colours{nullptr, nullptr};
   // catgs only.
   const Camera* window_end = nullptr;
   SplatPath* paths = nullptr;         // as splats
@@ -75,6 +82,7 @@ struct RefreshTask {
   Splat* splats;          // without what only listing needs
   std::uint32_t* depths;  // as splats: bits of depth
   float min_depth;
+  ClusterColours colours;
 };
 
 struct ClusterSummary {

@@ -99,7 +99,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     look.centre_px = s.shape.centre_px;
     look.w = whitening(s.shape);
     look.log2_opacity = log2_opacity;
-    look.colour = shade(scene, i, mean, context.camera.position);
+    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
     look.depth = depth;
     look.original_index = load_index(scene, i);
     box.rightmost_y = rightmost_y(look.w, reach);
@@ -149,7 +149,7 @@ inline ClusterSummary refresh_cluster(const RefreshTask& task) {
     look.centre_px = shape.centre_px;
     look.w = whitening(shape);
     look.log2_opacity = load(scene, SceneStore::log2_opacity, i);
-    look.colour = shade(scene, i, mean, context.camera.position);
+    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
     look.original_index = load_index(scene, i);
     extremes.add_depths(mask_of_bits<hn::ScalableTag<float>>(hits) & in_front &
                             (look.depth > Floats(task.min_depth)),

@@ -111,6 +111,27 @@ inline Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3<Flo
   }
 }
 
+/// Colour of the Gaussians from `i` on, from the `at`-th one of their cluster: as they were kept,
+/// or shaded, and then kept if there is room.
+HWY_INLINE Vec3<Floats> colour_of(const ClusterColours& colours, const SceneStore& scene,
+                                  std::size_t i, std::size_t at, const Vec3<Floats>& mean,
+                                  const Vec3<Floats>& camera_position) {
+  if (colours.rgb == nullptr) return shade(scene, i, mean, camera_position);
+  constexpr std::uint32_t all_lanes = (1u << Floats::count) - 1u;
+  std::uint32_t& shaded = (*colours.shaded)[at / 32];
+  float* const rgb = colours.rgb + at;
+  if ((shaded >> (at % 32) & 1u) == 0) {
+    const Vec3<Floats> colour = shade(scene, i, mean, camera_position);
+    colour.x.store(rgb);
+    colour.y.store(rgb + cluster_size);
+    colour.z.store(rgb + 2 * cluster_size);
+    shaded |= all_lanes << (at % 32);
+    return colour;
+  }
+  return {Floats::load(rgb), Floats::load(rgb + cluster_size),
+          Floats::load(rgb + 2 * cluster_size)};
+}
+
 /// Tiles [low, end) that a splat's box touches, as floats holding integers.
 struct TileRange {
   Floats low, end;

@@ -102,6 +102,7 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
     json["min_depth"] = speculation_min_depth(speculation, setup.camera.near_z);
     json["max_deviation_px"] = speculation.max_deviation_px;
     json["order"] = settings.order == BlendOrder::fresh ? "fresh" : "key";
+    json["colour_cache"] = settings.colour_cache;
     json["constant_velocity"] = options.pipeline.constant_velocity;
   }
   json["split_tasks"] = settings.split_tasks;

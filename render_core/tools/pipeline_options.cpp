@@ -32,6 +32,7 @@ void refuse_without_caches(const PipelineOptions& options) {
   refuse(options.max_deviation_px.has_value(), "--max-deviation-px");
   refuse(options.order.has_value(), "--order");
   refuse(options.no_cache, "--no-cache");
+  refuse(options.no_colour_cache, "--no-colour-cache");
   refuse(options.constant_velocity, "--constant-velocity");
 }
 
@@ -46,6 +47,8 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
   command
       .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
       ->excludes(command.get_option("--window"));
+  command.add_flag("--no-colour-cache", options.no_colour_cache,
+                   "catgs: every Gaussian in view is shaded in every frame");
   command.add_flag("--constant-velocity", options.constant_velocity,
                    "catgs: forecasts go on undamped, however wrong earlier ones were");
   command.add_flag("--no-split", options.no_split,
@@ -84,6 +87,7 @@ ViewSettings view_settings(const PipelineOptions& options) {
   speculation.max_deviation_px = options.max_deviation_px.value_or(speculation.max_deviation_px);
   check_speculation(speculation);
   if (options.order) settings.order = parse_order(*options.order);
+  settings.colour_cache = !options.no_colour_cache;
   settings.split_tasks = !options.no_split;
   return settings;
 }

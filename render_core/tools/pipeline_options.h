@@ -20,6 +20,7 @@ struct PipelineOptions {
   std::optional<float> max_deviation_px{};
   std::optional<std::string> order{};
   bool no_cache = false;
+  bool no_colour_cache = false;
   bool constant_velocity = false;
   bool no_split = false;
 };

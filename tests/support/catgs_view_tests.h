@@ -66,7 +66,7 @@ TEST_P(CatgsView, KeepsItsQualityOnScriptedMotion) {
   const Scene scene = synthesize(SynthKind::city, 20'000, 1, pool);
   const auto renderer = renderer_of(std::make_shared<const GaussianCloud>(scene.cloud));
   for (const std::string script : {"walk", "head", "drone"}) {
-    const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
+    const auto view = renderer->make_view({.pipeline = Pipeline::catgs, .colour_cache = false});
     const auto exact = renderer->make_view({});
     MotionPredictor predictor;
     MeanPsnr keys, subs;

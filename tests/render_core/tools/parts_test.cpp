@@ -49,12 +49,14 @@ TEST(PipelineOptions, BecomeViewSettings) {
   PipelineOptions options;
   EXPECT_EQ(view_settings(options).pipeline, Pipeline::exact);
   EXPECT_TRUE(view_settings(options).split_tasks);
+  EXPECT_TRUE(view_settings(options).colour_cache);
   options.pipeline = "catgs";
   options.window = 8;
   options.max_trail_px = 20.0f;
   options.min_depth = 0.4f;
   options.order = "key";
   options.no_split = true;
+  options.no_colour_cache = true;
   const ViewSettings settings = view_settings(options);
   EXPECT_EQ(settings.pipeline, Pipeline::catgs);
   EXPECT_EQ(settings.speculation.initial_window, 8);
@@ -63,6 +65,7 @@ TEST(PipelineOptions, BecomeViewSettings) {
   EXPECT_EQ(settings.speculation.max_deviation_px, SpeculationSettings{}.max_deviation_px);
   EXPECT_EQ(settings.order, BlendOrder::key);
   EXPECT_FALSE(settings.split_tasks);
+  EXPECT_FALSE(settings.colour_cache);
   EXPECT_EQ(view_settings({.pipeline = "catgs", .no_cache = true}).speculation.initial_window, 0);
   EXPECT_EQ(predictor_settings({}).min_confidence, 0.0);
   EXPECT_EQ(predictor_settings({.constant_velocity = true}).min_confidence, 1.0);
