@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render_core/tools/bench_measure.h"
+#include "render_core/tools/floor_model.h"
 #include "render_core/tools/render_setup.h"
 
 namespace catgs {
@@ -21,6 +22,7 @@ struct PaperOptions {
   std::size_t every = 10;  // quality and tiles look at one frame in so many
   std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
   std::vector<std::string> variants;  // flags of more rows of ablation
+  DeviceRates rates;                  // of floor
 };
 
 /// A renderer that the tables compare: a pipeline, and the flags by which `bench` would be told to

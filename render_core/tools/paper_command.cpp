@@ -147,10 +147,21 @@ void paper(const PaperCommand& command, bool quiet) {
   if (!command.json.empty()) write_json(command.json, report);
 }
 
+void add_device_rates(CLI::App& command, DeviceRates& rates) {
+  const auto add = [&](const char* name, double& rate, const char* what) {
+    command.add_option(name, rate, what)->check(CLI::PositiveNumber)->capture_default_str();
+  };
+  add("--dram-bytes-per-s", rates.dram_bytes_per_s, "floor: what the device's memory moves (H200)");
+  add("--warp-instructions-per-s", rates.warp_instructions_per_s,
+      "floor: what its processors issue (H200)");
+  add("--instructions-per-evaluation", rates.instructions_per_evaluation,
+      "floor: for a list entry on a warp's pixels");
+}
+
 }  // namespace
 
 std::span<const PaperTableKind> paper_table_kinds() {
-  static constexpr std::array<PaperTableKind, 9> kinds = {
+  static constexpr std::array<PaperTableKind, 10> kinds = {
       {{"fps", "Average frame rate", fps_table, side_by_side, true},
        {"quality", "Render quality", quality_table, side_by_side, true},
        {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first, true},
@@ -159,7 +170,9 @@ std::span<const PaperTableKind> paper_table_kinds() {
        {"window", "Impact of the window", window_table, one_each, true},
        {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side, true},
        {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side, true},
-       {"scaling", "One view of scenes of several sizes", scaling_table, growing, false}}};
+       {"scaling", "One view of scenes of several sizes", scaling_table, growing, false},
+       {"floor", "Stages beside what their bytes and evaluations allow", floor_table, one_each,
+        false}}};
   return kinds;
 }
 
@@ -202,6 +215,7 @@ void add_paper_command(CLI::App& app) {
       ->add_option("--variant", options.variants,
                    "ablation: a row more, of ours with these flags of bench, like \"--window 8\"")
       ->allow_extra_args(false);
+  add_device_rates(*paper_app, options.rates);
   paper_app->add_flag("--anchor", options.render.anchor,
                       "Move the traces to the start pose of their scene");
   add_frame_options(*paper_app, options.render);

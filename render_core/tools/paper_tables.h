@@ -25,6 +25,7 @@ PaperTable pruned_table(PaperCase& scene);    // appendix: pruned scenes
 
 // Not in the paper.
 PaperTable scaling_table(PaperCase& scene);  // one view of scenes of several sizes
+PaperTable floor_table(PaperCase& scene);    // stages beside what bytes and evaluations allow
 
 /// Which are told by --table, and how the tables of several scenes become one.
 struct PaperTableKind {
