@@ -110,8 +110,9 @@ TEST_F(Paper, AblationTakesOnePartAwayAtATime) {
   ASSERT_EQ(ablation.size(), 3u);  // both scenes, then each
   const Json& fps = ablation.at(0).at("rows");
   EXPECT_THAT(names(fps),
-              ElementsAre("Ours-Full", "Ours-w/o cache", "Ours-w/o split", "Ours-w/o fresh order",
-                          "Ours-w/o doubt", "Ours --window 2", "Ours --order key --no-split"));
+              ElementsAre("Ours-Full", "Ours-w/o cache", "Ours-w/o split", "Ours-w/o colour cache",
+                          "Ours-w/o fresh order", "Ours-w/o doubt", "Ours --window 2",
+                          "Ours --order key --no-split"));
   EXPECT_THAT(names(fps.at("Ours-Full")), ElementsAre("cloud", "mist"));
   const Json& rows = ablation.at(1).at("rows");
   EXPECT_EQ(ablation.at(1).at("title"), "cloud");
@@ -212,7 +213,7 @@ TEST_F(Paper, QualityAgainstExactIsBestForKeyFrames) {
     const Json& value = rows.at(row).at("cloud PSNR");
     return value.is_null() ? 1e3 : value.get<double>();
   };
-  EXPECT_GE(psnr("Ours-key"), 100.0);
+  EXPECT_GE(psnr("Ours-key"), 75.0);  // colours are kept while they hold
   EXPECT_GE(psnr("Ours-sub"), 50.0);
   EXPECT_LT(psnr("3DGS"), psnr("Ours-key"));
 }
