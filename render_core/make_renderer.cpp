@@ -13,9 +13,9 @@ namespace catgs {
 namespace {
 
 MadeRenderer make_on_devices(const GaussianCloud& cloud, const RendererOptions& options,
-                             std::string reason) {
-  MadeRenderer made =
-      make_cuda_renderer(cloud, options.devices ? options.devices : std::make_shared<DeviceSet>());
+                             ThreadPool& pool, std::string reason) {
+  MadeRenderer made = make_cuda_renderer(
+      cloud, options.devices ? options.devices : std::make_shared<DeviceSet>(), pool);
   made.reason = reason.append(made.reason.empty() ? "" : "; ").append(made.reason);
   return made;
 }
@@ -42,7 +42,7 @@ MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
     case RendererKind::cpu:
       return {make_cpu_renderer(*cloud, pool(), options.simd), "asked for"};
     case RendererKind::cuda:
-      return make_on_devices(*cloud, options, "asked for");
+      return make_on_devices(*cloud, options, *pool(), "asked for");
     case RendererKind::automatic:
       break;
   }
@@ -50,7 +50,7 @@ MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
     return {make_cpu_renderer(*cloud, pool(), options.simd), obstacle};
   }
   try {
-    return make_on_devices(*cloud, options, "a CUDA device is there");
+    return make_on_devices(*cloud, options, *pool(), "a CUDA device is there");
   } catch (const DevicesUnusable& error) {
     return {make_cpu_renderer(*cloud, pool(), options.simd), error.what()};
   }

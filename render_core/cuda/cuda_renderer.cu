@@ -144,7 +144,7 @@ std::string free_memory() {
 
 /// Copies the scene to a device and leaves that the calling thread's current one. Throws
 /// DevicesUnusable.
-Device open_device(const GaussianCloud& cloud, int index) {
+Device open_device(const SceneSource& source, int index) {
   const std::string flag = "--device " + std::to_string(index);
   cudaDeviceProp properties{};
   try {
@@ -154,7 +154,7 @@ Device open_device(const GaussianCloud& cloud, int index) {
       (void)cudaSetDevice(index);  // see ~PlacedView()
       delete scene;
     };
-    return {index, properties.name, {new DeviceScene(cloud), free_there}};
+    return {index, properties.name, {new DeviceScene(source), free_there}};
   } catch (const CudaError& error) {
     const bool full = error.status_code() == RenderStatus::Code::out_of_memory;
     throw DevicesUnusable(
@@ -182,14 +182,16 @@ std::string cuda_obstacle() {
          ".0 or more";
 }
 
-MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices) {
+MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
+                                ThreadPool& pool) {
   if (const std::string obstacle = cuda_obstacle(); !obstacle.empty())
     throw DevicesUnusable("--renderer cuda", "", obstacle, "use --renderer cpu");
   int count = 0;
   (void)cudaGetDeviceCount(&count);
+  const cuda::SceneSource source{cloud, morton_order(cloud, pool), pool};
   std::vector<std::future<cuda::Device>> uploads;
   for (const int index : devices->among(count)) {
-    uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(cloud), index));
+    uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(source), index));
   }
   std::vector<cuda::Device> opened;
   std::string left_out;

@@ -6,6 +6,7 @@
 #include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "render_core/renderer.h"
+#include "render_core/thread_pool.h"
 
 namespace catgs {
 
@@ -17,8 +18,9 @@ class DevicesUnusable : public InputError {
 
 /// The CUDA core, with a copy of the scene on each of `devices`. The reason says which of all
 /// devices were left out. Throws InputError when a wanted device does not exist, DevicesUnusable
-/// when one cannot be used; where all are wanted, when none can.
-MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices);
+/// when one cannot be used; where all are wanted, when none can. `pool` packs the scene.
+MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
+                                ThreadPool& pool);
 
 /// Why no CUDA device can be used ("no CUDA device", …); empty when one can.
 std::string cuda_obstacle();

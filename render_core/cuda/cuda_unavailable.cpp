@@ -6,7 +6,7 @@ namespace catgs {
 std::string cuda_obstacle() { return "this build has no CUDA core"; }
 
 MadeRenderer make_cuda_renderer(const GaussianCloud& /*cloud*/,
-                                std::shared_ptr<DeviceSet> /*devices*/) {
+                                std::shared_ptr<DeviceSet> /*devices*/, ThreadPool& /*pool*/) {
   throw DevicesUnusable("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
 }
 

@@ -1,74 +1,59 @@
 #include <algorithm>
-#include <cmath>
+#include <span>
 #include <vector>
 
-#include <cuda_fp16.h>
-
 #include "render_core/cuda/device_scene.cuh"
-#include "render_core/math/projection-inl.h"
 
 namespace catgs::cuda {
 namespace {
 
-// Host to device in pieces, so that set-up needs little memory beside the cloud.
-constexpr std::size_t upload_chunk = std::size_t{1} << 18;
+// Host to device in pieces of some megabytes, so that set-up needs little memory beside the cloud.
+constexpr std::size_t clusters_per_upload = 1024;
 
-template <class T, class Make>
-void upload(DeviceBuffer<T>& target, std::size_t count, std::size_t per_item, Make&& make) {
-  target.reserve(std::max<std::size_t>(count * per_item, 1));
-  std::vector<T> staging;
-  for (std::size_t first = 0; first < count; first += upload_chunk) {
-    const std::size_t last = std::min(count, first + upload_chunk);
-    staging.assign((last - first) * per_item, T{});
-    for (std::size_t i = first; i < last; ++i) make(i, &staging[(i - first) * per_item]);
-    check(cudaMemcpy(target.get() + first * per_item, staging.data(), staging.size() * sizeof(T),
-                     cudaMemcpyHostToDevice),
-          "scene upload");
-  }
-}
-
-math::CovarianceFactor<float> factor_of(const GaussianCloud& cloud, std::size_t i) {
-  const glm::quat& q = cloud.rotation[i];
-  const glm::vec3& s = cloud.scale[i];
-  const double rotation[4] = {q.x, q.y, q.z, q.w};
-  const auto l = math::covariance_factor<double>(rotation, {s.x, s.y, s.z});
-  return {float(l.xx), float(l.yx), float(l.yy), float(l.zx), float(l.zy), float(l.zz)};
+template <class T>
+void upload(T* target, const std::vector<T>& source, std::size_t count) {
+  check(cudaMemcpy(target, source.data(), count * sizeof(T), cudaMemcpyHostToDevice),
+        "scene upload");
 }
 
 }  // namespace
 
-DeviceScene::DeviceScene(const GaussianCloud& cloud) {
-  const std::size_t n = cloud.size();
-  upload(mean_opacity_, n, 1, [&](std::size_t i, float4* out) {
-    const glm::vec3& m = cloud.mean[i];
-    *out = make_float4(m.x, m.y, m.z, std::log2(cloud.opacity[i]));
-  });
-  upload(factor_a_, n, 1, [&](std::size_t i, float4* out) {
-    const auto l = factor_of(cloud, i);
-    *out = make_float4(l.xx, l.yx, l.yy, l.zx);
-  });
-  upload(factor_b_, n, 1, [&](std::size_t i, float2* out) {
-    const auto l = factor_of(cloud, i);
-    *out = make_float2(l.zy, l.zz);
-  });
-  const int floats = 3 * cloud.sh_count();
-  constexpr int halfs_per_word = sizeof(uint4) / sizeof(__half);
-  const int stride = (floats + halfs_per_word - 1) / halfs_per_word;
-  upload(sh_, n, static_cast<std::size_t>(stride), [&](std::size_t i, uint4* out) {
-    const float* in = &cloud.sh_of(i)->x;
-    std::transform(in, in + floats, reinterpret_cast<__half*>(out),
-                   [](float value) { return __float2half_rn(value); });
-  });
+DeviceScene::DeviceScene(const SceneSource& source) {
+  const GaussianCloud& cloud = source.cloud;
+  const std::span<const std::uint32_t> order = source.order;
+  const std::size_t clusters = clusters_of(order.size());
+  const std::size_t block_bytes = packed_block_bytes(cloud.sh_degree);
+  blocks_.reserve(clusters * block_bytes);
+  units_.reserve(clusters);
+  clusters_.reserve(clusters);
+
+  std::vector<PackedUnits> units(clusters);
+  std::vector<Cluster> bounds(clusters);
+  std::vector<std::byte> blocks(std::min(clusters, clusters_per_upload) * block_bytes);
+  for (std::size_t first = 0; first < clusters; first += clusters_per_upload) {
+    const std::size_t count = std::min(clusters - first, clusters_per_upload);
+    std::ranges::fill(blocks, std::byte{});  // places that the last cluster leaves empty
+    source.pool.parallel_for(count, [&](std::size_t c) {
+      const std::size_t begin = (first + c) * cluster_size;
+      const PackedCluster packed =
+          pack_cluster(cloud, order.subspan(begin, std::min(cluster_size, order.size() - begin)),
+                       std::span(blocks).subspan(c * block_bytes, block_bytes));
+      units[first + c] = packed.units;
+      bounds[first + c] = packed.bounds;
+    });
+    upload(blocks_.get() + first * block_bytes, blocks, count * block_bytes);
+  }
+  upload(units_.get(), units, clusters);
+  upload(clusters_.get(), bounds, clusters);
   // Copies from pageable memory may return before they end, and Views' streams do not wait for
   // them.
   check(cudaStreamSynchronize(cudaStreamLegacy), "scene upload");
-  arrays_ = {static_cast<std::uint32_t>(n),
+  arrays_ = {static_cast<std::uint32_t>(order.size()),
+             static_cast<std::uint32_t>(clusters),
              cloud.sh_degree,
-             stride,
-             mean_opacity_.get(),
-             factor_a_.get(),
-             factor_b_.get(),
-             sh_.get()};
+             blocks_.get(),
+             units_.get(),
+             clusters_.get()};
 }
 
 }  // namespace catgs::cuda

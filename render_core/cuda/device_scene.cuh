@@ -1,39 +1,48 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "render_core/cuda/device_buffer.h"
+#include "render_core/cuda/packed_gaussian.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/thread_pool.h"
 
 namespace catgs::cuda {
 
-/// What kernels see of a scene; N = count. Pointers are device memory. Harmonics are half
-/// precision: they are most of a scene's bytes, and their rounding alone leaves 75 dB.
+/// What kernels see of a scene. Pointers are device memory. Gaussians are in the order of their
+/// clusters: Gaussian i is number i % cluster_size of cluster i / cluster_size.
 struct SceneArrays {
   std::uint32_t count = 0;
+  std::uint32_t cluster_count = 0;
   int sh_degree = 0;
-  int sh_stride = 0;                     // uint4 per Gaussian in `sh`
-  const float4* mean_opacity = nullptr;  // mean (world), log2 of the opacity
-  const float4* factor_a = nullptr;      // covariance factor xx, yx, yy, zx
-  const float2* factor_b = nullptr;      // covariance factor zy, zz
-  const uint4* sh = nullptr;             // 3 K halfs, coefficient-major RGB, padded with zeros
+  const std::byte* blocks = nullptr;   // [cluster_count][packed_block_bytes(sh_degree)]
+  const PackedUnits* units = nullptr;  // [cluster_count]
+  const Cluster* clusters = nullptr;   // [cluster_count]
+};
+
+/// What the copies on all devices are made from.
+struct SceneSource {
+  const GaussianCloud& cloud;
+  std::vector<std::uint32_t> order;  // morton_order()
+  ThreadPool& pool;
 };
 
 /// One scene on one device, shared by all Views.
 class DeviceScene {
  public:
-  explicit DeviceScene(const GaussianCloud& cloud);
+  /// On the current device. Throws CudaError.
+  explicit DeviceScene(const SceneSource& source);
 
   [[nodiscard]] const SceneArrays& arrays() const { return arrays_; }
   [[nodiscard]] std::size_t bytes() const {
-    return mean_opacity_.bytes() + factor_a_.bytes() + factor_b_.bytes() + sh_.bytes();
+    return blocks_.bytes() + units_.bytes() + clusters_.bytes();
   }
 
  private:
-  DeviceBuffer<float4> mean_opacity_;
-  DeviceBuffer<float4> factor_a_;
-  DeviceBuffer<float2> factor_b_;
-  DeviceBuffer<uint4> sh_;
+  DeviceBuffer<std::byte> blocks_;
+  DeviceBuffer<PackedUnits> units_;
+  DeviceBuffer<Cluster> clusters_;
   SceneArrays arrays_;
 };
 

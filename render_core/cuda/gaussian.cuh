@@ -9,6 +9,23 @@ namespace catgs::cuda {
 
 // How kernels read a scene: nobody else knows its layout.
 
+__device__ inline const std::byte* block_of(const SceneArrays& scene, std::uint32_t i) {
+  return scene.blocks + i / cluster_size * packed_block_bytes(scene.sh_degree);
+}
+
+/// Word `at` of the record of Gaussian i; at = 0 or 16, parts of its PackedGeometry.
+__device__ inline uint4 load_geometry(const SceneArrays& scene, std::uint32_t i, int at) {
+  const std::byte* word = block_of(scene, i) + packed_offset(at, sizeof(uint4), i % cluster_size);
+  return __ldg(reinterpret_cast<const uint4*>(word));
+}
+
+__device__ inline float low_half(std::uint32_t word) {
+  return from_half(static_cast<std::uint16_t>(word & 0xffffu));
+}
+__device__ inline float high_half(std::uint32_t word) {
+  return from_half(static_cast<std::uint16_t>(word >> 16));
+}
+
 /// What already rules out most Gaussians that nobody sees.
 struct Centre {
   math::Vec3<float> mean;  // world
@@ -16,15 +33,16 @@ struct Centre {
 };
 
 __device__ inline Centre load_centre(const SceneArrays& scene, std::uint32_t i) {
-  const float4 word = __ldg(&scene.mean_opacity[i]);
-  return {{word.x, word.y, word.z}, word.w};
+  const uint4 word = load_geometry(scene, i, 0);
+  return {{__uint_as_float(word.x), __uint_as_float(word.y), __uint_as_float(word.z)},
+          unpack_log2_opacity(word.w & 0xffffu)};
 }
 
 __device__ inline math::CovarianceFactor<float> load_factor(const SceneArrays& scene,
                                                             std::uint32_t i) {
-  const float4 a = __ldg(&scene.factor_a[i]);
-  const float2 b = __ldg(&scene.factor_b[i]);
-  return {a.x, a.y, a.z, a.w, b.x, b.y};
+  const float unit = __ldg(&scene.units[i / cluster_size].factor);
+  const uint4 word = load_geometry(scene, i, 16);
+  return unpack_factor({word.x, word.y, word.z}, unit);
 }
 
 }  // namespace catgs::cuda

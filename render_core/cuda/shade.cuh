@@ -1,26 +1,63 @@
 #pragma once
 
-#include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/gaussian.cuh"
 #include "render_core/math/spherical_harmonics-inl.h"
 
 namespace catgs::cuda {
 
-/// Half coefficients in one 16-byte load.
-constexpr int sh_per_word = 8;
-constexpr int sh_words = 48 / sh_per_word;
-
 struct ShCoefficients {
-  uint4 words[sh_words];
+  float base[3];  // RGB
+  static constexpr int words = (packed_sh_bytes(max_sh_degree) + 3) / 4;
+  std::uint32_t higher[words];  // four harmonics each, coefficient-major RGB
+  float unit[max_sh_degree];    // PackedUnits::sh
 };
+
+/// Loads the planes of a record from byte `at` on.
+template <int degree, int at>
+__device__ void load_planes(const SceneArrays& scene, std::uint32_t i,
+                            std::uint32_t (&words)[ShCoefficients::words]) {
+  if constexpr (at < packed_record_bytes(degree)) {
+    constexpr int width = packed_plane_width(degree, at);
+    static_assert(width != 2, "no degree leaves two bytes");
+    constexpr int w = (at - static_cast<int>(sizeof(PackedGeometry))) / 4;
+    const std::byte* from = block_of(scene, i) + packed_offset(at, width, i % cluster_size);
+    if constexpr (width == 16) {
+      const uint4 four = __ldg(reinterpret_cast<const uint4*>(from));
+      words[w] = four.x, words[w + 1] = four.y, words[w + 2] = four.z, words[w + 3] = four.w;
+    } else if constexpr (width == 8) {
+      const uint2 two = __ldg(reinterpret_cast<const uint2*>(from));
+      words[w] = two.x, words[w + 1] = two.y;
+    } else if constexpr (width == 4) {
+      words[w] = __ldg(reinterpret_cast<const std::uint32_t*>(from));
+    } else {
+      words[w] = __ldg(reinterpret_cast<const std::uint8_t*>(from));
+    }
+    load_planes<degree, at + width>(scene, i, words);
+  }
+}
 
 /// All loads are issued before the first is used.
 __device__ inline ShCoefficients load_sh(const SceneArrays& scene, std::uint32_t i) {
+  constexpr int first = sizeof(PackedGeometry);
   ShCoefficients sh{};
-  const uint4* words = scene.sh + static_cast<std::size_t>(i) * scene.sh_stride;
-#pragma unroll
-  for (int q = 0; q < sh_words; ++q)
-    if (q < scene.sh_stride) sh.words[q] = __ldg(&words[q]);
+  const uint4 a = load_geometry(scene, i, 0), b = load_geometry(scene, i, 16);
+  sh.base[0] = high_half(a.w), sh.base[1] = low_half(b.w), sh.base[2] = high_half(b.w);
+  switch (scene.sh_degree) {
+    case 1:
+      load_planes<1, first>(scene, i, sh.higher);
+      break;
+    case 2:
+      load_planes<2, first>(scene, i, sh.higher);
+      break;
+    case 3:
+      load_planes<3, first>(scene, i, sh.higher);
+      break;
+    default:
+      break;
+  }
+  const float4 units = __ldg(reinterpret_cast<const float4*>(&scene.units[i / cluster_size]));
+  sh.unit[0] = units.y, sh.unit[1] = units.z, sh.unit[2] = units.w;
   return sh;
 }
 
@@ -28,16 +65,14 @@ __device__ inline math::Vec3<float> shade(const ShCoefficients& sh, int degree,
                                           const math::Vec3<float>& direction) {
   float basis[16] = {};  // all set: zeros meet the coefficients that the degree leaves out
   math::sh_basis(direction, degree, basis);
-  float sum[3] = {0.0f, 0.0f, 0.0f};
+  float sum[3] = {basis[0] * sh.base[0], basis[0] * sh.base[1], basis[0] * sh.base[2]};
 #pragma unroll
-  for (int q = 0; q < sh_words; ++q) {
-    const __half2* pairs = reinterpret_cast<const __half2*>(&sh.words[q]);
+  for (int k = 1; k < 16; ++k) {
+    const float weight = basis[k] * sh.unit[sh_degree_of(k) - 1];
 #pragma unroll
-    for (int j = 0; j < sh_per_word / 2; ++j) {
-      const float2 pair = __half22float2(pairs[j]);
-      const int at = sh_per_word * q + 2 * j;
-      sum[at % 3] += basis[at / 3] * pair.x;
-      sum[(at + 1) % 3] += basis[(at + 1) / 3] * pair.y;
+    for (int channel = 0; channel < 3; ++channel) {
+      const int at = 3 * (k - 1) + channel;
+      sum[channel] += weight * packed_sh(sh.higher[at / 4], at % 4);
     }
   }
   return {math::colour_from_sh_sum(sum[0]), math::colour_from_sh_sum(sum[1]),

@@ -11,6 +11,8 @@ namespace catgs {
 /// Spherical-harmonics coefficients per colour channel for a degree in 0…3: (degree + 1)^2.
 constexpr int sh_coefficient_count(int degree) { return (degree + 1) * (degree + 1); }
 inline constexpr int max_sh_degree = 3;
+/// Degree of coefficient k.
+constexpr int sh_degree_of(int k) { return k < 1 ? 0 : k < 4 ? 1 : k < 9 ? 2 : 3; }
 
 /// A 3D Gaussian Splatting scene as a structure of arrays, normalised once by the readers:
 /// whatever the file stored (logarithms, logits, quantised values), here it is plain values.

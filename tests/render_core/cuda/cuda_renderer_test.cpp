@@ -26,9 +26,9 @@ class CudaSmallScenes : public testing::TestWithParam<TestScene> {};
 
 TEST_P(CudaSmallScenes, MatchesReferenceWithListsAsShortAsTheCpuCores) {
   REQUIRE_DEVICE();
-  const TestScene& scene = GetParam();
-  const auto reference = render(*renderer_of(scene, RendererKind::reference), scene.request);
-  const auto cpu = render(*renderer_of(scene, RendererKind::cpu), scene.request);
+  const TestScene &scene = GetParam(), ordered = test::in_cluster_order(scene);
+  const auto reference = render(*renderer_of(ordered, RendererKind::reference), scene.request);
+  const auto cpu = render(*renderer_of(ordered, RendererKind::cpu), scene.request);
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request);
   EXPECT_GE(test::psnr_db(cuda.rgb, reference.rgb), 60.0);
   EXPECT_EQ(cuda.stats.overflowed_entries, 0u);
@@ -95,10 +95,10 @@ TEST_P(CudaSmallScenes, SplittingChangesNothing) {
 
 TEST_P(CudaSmallScenes, VanillaIsTheCpuCores) {
   REQUIRE_DEVICE();
-  const TestScene& scene = GetParam();
+  const TestScene &scene = GetParam(), ordered = test::in_cluster_order(scene);
   const ViewSettings vanilla{.pipeline = Pipeline::vanilla};
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request, vanilla);
-  const auto cpu = render(*renderer_of(scene, RendererKind::cpu), scene.request, vanilla);
+  const auto cpu = render(*renderer_of(ordered, RendererKind::cpu), scene.request, vanilla);
   EXPECT_GE(test::psnr_db(cuda.rgb, cpu.rgb), 55.0);
   EXPECT_NEAR(static_cast<double>(cuda.stats.list_entries),
               static_cast<double>(cpu.stats.list_entries),
@@ -107,6 +107,30 @@ TEST_P(CudaSmallScenes, VanillaIsTheCpuCores) {
 
 INSTANTIATE_TEST_SUITE_P(, CudaSmallScenes, testing::ValuesIn(test::small_scenes()),
                          [](const auto& test) { return test.param.name; });
+
+TEST(CudaRenderer, AGaussianTakesAtMost80BytesOfTheDevice) {
+  REQUIRE_DEVICE();
+  const TestScene scene = random_scene(50'000);
+  EXPECT_LE(renderer_of(scene, RendererKind::cuda)->scene_bytes(), 80u * 50'000u);
+}
+
+// Clusters out of sight, or in sight at one end of the window only, cost no Gaussian that is seen.
+TEST(CudaRenderer, FindsWhatIsVisibleFromAnywhereInTheScene) {
+  REQUIRE_DEVICE();
+  const TestScene scene = random_scene(100'000);
+  const auto cuda = renderer_of(scene, RendererKind::cuda);
+  const auto cpu = renderer_of(scene, RendererKind::cpu);
+  for (const glm::vec3 target : {glm::vec3(5, 0, 5), glm::vec3(-5, 1, 4), glm::vec3(0, 5, 5.1f)}) {
+    FrameRequest request = scene.request;
+    request.camera =
+        make_camera(test::look_at({0, 0, 5}, target, {0, 0.6f, -0.8f}), {320, 200}, 300);
+    const auto a = render(*cuda, request), b = render(*cpu, request);
+    EXPECT_GE(test::psnr_db(a.rgb, b.rgb), 60.0);
+    EXPECT_NEAR(a.stats.visible, b.stats.visible, 2.0 + 1e-3 * b.stats.visible);
+    EXPECT_GT(a.stats.visible, 1000u);
+    EXPECT_LT(a.stats.visible, 50'000u);
+  }
+}
 
 TEST(CudaRenderer, RepeatsItselfToTheBit) {
   REQUIRE_DEVICE();

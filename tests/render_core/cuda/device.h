@@ -2,9 +2,12 @@
 
 // What tests of the CUDA core share.
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <cuda_runtime_api.h>
@@ -12,6 +15,8 @@
 
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/renderer.h"
+#include "render_core/scene/clusters.h"
+#include "render_core/thread_pool.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 
@@ -35,6 +40,25 @@ inline TestScene random_scene(std::size_t count) {
   scene.name = "random";
   scene.cloud = std::make_shared<const GaussianCloud>(random_cloud(count, 3, 7));
   scene.request.camera = make_camera(Pose{}, {640, 360}, 400.0f);
+  return scene;
+}
+
+/// The scene in the order of its clusters, in which the CUDA core blends equal depths.
+inline TestScene in_cluster_order(TestScene scene) {
+  ThreadPool pool(2);
+  const GaussianCloud& from = *scene.cloud;
+  GaussianCloud to;
+  to.resize(from.size(), from.sh_degree);
+  std::size_t i = 0;
+  for (const std::uint32_t original : morton_order(from, pool)) {
+    to.mean[i] = from.mean[original];
+    to.rotation[i] = from.rotation[original];
+    to.scale[i] = from.scale[original];
+    to.opacity[i] = from.opacity[original];
+    std::copy_n(from.sh_of(original), from.sh_count(), &to.sh[i * from.sh_count()]);
+    ++i;
+  }
+  scene.cloud = std::make_shared<const GaussianCloud>(std::move(to));
   return scene;
 }
 

@@ -1,0 +1,131 @@
+#include "render_core/cuda/packed_gaussian.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace catgs::cuda {
+namespace {
+
+constexpr float sh_levels = 127.0f;  // on either side of zero
+constexpr float sh_unit_scale = 0x1p15f;
+constexpr int factor_bits = 14;  // of an entry, beside the sign
+constexpr int most_octaves = 63;
+
+using Factor = math::CovarianceFactor<double>;
+
+Factor factor_of(const GaussianCloud& cloud, std::uint32_t i) {
+  const glm::dquat q = glm::normalize(glm::dquat(cloud.rotation[i]));
+  const glm::dvec3 scale(cloud.scale[i]);
+  const double rotation[4] = {q.x, q.y, q.z, q.w};
+  return math::covariance_factor<double>(rotation, {scale.x, scale.y, scale.z});
+}
+
+/// Binary exponent of the unit in which the largest entry has factor_bits.
+int unit_exponent(const Factor& l) {
+  int exponent = 0;
+  std::frexp(std::max({l.xx, std::abs(l.yx), l.yy, std::abs(l.zx), std::abs(l.zy), l.zz}),
+             &exponent);
+  constexpr int least = -126 + most_octaves;  // steps are normal floats
+  return std::max(exponent - factor_bits, least);
+}
+
+void pack_factor(const Factor& l, int cluster_exponent, std::uint32_t (&words)[3]) {
+  const int octaves = std::min(cluster_exponent - unit_exponent(l), most_octaves);
+  const double steps = std::ldexp(1.0, octaves - cluster_exponent);
+  const auto word = [&](int j, double beside, double on) {
+    constexpr double most = (1 << factor_bits) - 1;
+    const auto signed_bits =
+        static_cast<std::int32_t>(std::round(std::clamp(beside * steps, -most, most)));
+    const auto bits =
+        static_cast<std::uint32_t>(std::round(std::min(on * 2.0 * steps, 2.0 * most + 1.0)));
+    words[j] = (static_cast<std::uint32_t>(signed_bits) & 0x7fffu) | bits << 15 |
+               (static_cast<std::uint32_t>(octaves) >> 2 * j & 3u) << 30;
+  };
+  word(0, l.yx, l.xx);
+  word(1, l.zx, l.yy);
+  word(2, l.zy, l.zz);
+}
+
+std::uint8_t pack_sh(float value, float unit) {
+  const float steps = unit > 0.0f ? value / unit * sh_unit_scale : 0.0f;
+  return static_cast<std::uint8_t>(128.0f + std::clamp(std::round(steps), -sh_levels, sh_levels));
+}
+
+PackedUnits units_for(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
+                      std::span<const Factor> factors) {
+  int exponent = std::numeric_limits<int>::min();
+  for (const Factor& factor : factors) exponent = std::max(exponent, unit_exponent(factor));
+  float largest_sh[max_sh_degree + 1] = {};
+  for (const std::uint32_t i : members) {
+    const glm::vec3* sh = cloud.sh_of(i);
+    for (int k = 1; k < cloud.sh_count(); ++k)
+      for (int channel = 0; channel < 3; ++channel)
+        largest_sh[sh_degree_of(k)] =
+            std::max(largest_sh[sh_degree_of(k)], std::abs(sh[k][channel]));
+  }
+  PackedUnits units{power_of_two(exponent), {}};
+  for (int degree = 1; degree <= max_sh_degree; ++degree)
+    units.sh[degree - 1] = largest_sh[degree] / sh_levels * sh_unit_scale;
+  return units;
+}
+
+std::uint16_t pack_log2_opacity(float log2_opacity) {
+  const float part = std::clamp(log2_opacity / log2_opacity_min, 0.0f, 1.0f);
+  return static_cast<std::uint16_t>(std::round(part * 65535.0f));
+}
+
+PackedGeometry pack_geometry(const GaussianCloud& cloud, std::uint32_t i, const Factor& factor,
+                             float unit) {
+  const glm::vec3 &mean = cloud.mean[i], &base = *cloud.sh_of(i);
+  PackedGeometry g{{mean.x, mean.y, mean.z},  pack_log2_opacity(std::log2(cloud.opacity[i])),
+                   glm::packHalf1x16(base.r), {},
+                   glm::packHalf1x16(base.g), glm::packHalf1x16(base.b)};
+  pack_factor(factor, std::ilogb(unit), g.factor);
+  return g;
+}
+
+void add_to(ClusterBounds& bounds, const PackedGeometry& g, float unit) {
+  const auto l = unpack_factor(g.factor, unit);
+  // The Frobenius norm of the factor bounds the largest standard deviation.
+  double variance = 0.0;
+  for (const float entry : {l.xx, l.yx, l.yy, l.zx, l.zy, l.zz})
+    variance += std::pow(static_cast<double>(entry), 2);
+  bounds.add({g.mean[0], g.mean[1], g.mean[2]}, std::sqrt(variance),
+             unpack_log2_opacity(g.log2_opacity));
+}
+
+}  // namespace
+
+PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
+                           std::span<std::byte> block) {
+  std::array<Factor, cluster_size> factors;
+  for (std::size_t j = 0; j < members.size(); ++j) factors[j] = factor_of(cloud, members[j]);
+  const PackedUnits units = units_for(cloud, members, std::span(factors).first(members.size()));
+
+  const int degree = cloud.sh_degree, record_bytes = packed_record_bytes(degree);
+  std::array<std::byte, packed_record_bytes(max_sh_degree)> record;
+  ClusterBounds bounds;
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    const PackedGeometry geometry = pack_geometry(cloud, members[j], factors[j], units.factor);
+    std::memcpy(record.data(), &geometry, sizeof(geometry));
+    const glm::vec3* sh = cloud.sh_of(members[j]);
+    for (int b = 0; b < packed_sh_bytes(degree); ++b) {
+      const int k = 1 + b / 3;
+      record[sizeof(geometry) + b] =
+          std::byte{pack_sh(sh[k][b % 3], units.sh[sh_degree_of(k) - 1])};
+    }
+    for (int at = 0; at < record_bytes;) {
+      const int width = packed_plane_width(degree, at);
+      std::memcpy(&block[packed_offset(at, width, static_cast<std::uint32_t>(j))], &record[at],
+                  static_cast<std::size_t>(width));
+      at += width;
+    }
+    add_to(bounds, geometry, units.factor);
+  }
+  return {units, bounds.cluster()};
+}
+
+}  // namespace catgs::cuda

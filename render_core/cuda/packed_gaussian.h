@@ -1,0 +1,128 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#if defined(__CUDACC__)
+#include <cuda_fp16.h>
+#else
+#include <glm/gtc/packing.hpp>
+#endif
+
+#include "render_core/host_device.h"
+#include "render_core/math/projection-inl.h"
+#include "render_core/scene/clusters.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs::cuda {
+
+// How the CUDA core stores Gaussians: 77 bytes each with harmonics of degree 3, where plain floats
+// take 236.
+//
+// A Gaussian is a record: what geometry and base colour need, then a byte for every higher
+// harmonic. A block holds the records of a cluster plane by plane: the first 16 bytes of all, the
+// next 16 of all, and so on, and what is left of a record in planes of 8, 4, 2 and 1 bytes. So
+// every load is a whole word, neighbours' loads are one access, and no byte is padding.
+
+/// The first part of a record. Halves are IEEE binary16, as bits.
+struct PackedGeometry {
+  float mean[3];               // world; as it is: view depth decides the order of blending
+  std::uint16_t log2_opacity;  // see unpack_log2_opacity()
+  std::uint16_t base_red;      // halves: the first harmonic
+  std::uint32_t factor[3];     // see unpack_factor()
+  std::uint16_t base_green, base_blue;
+};
+static_assert(sizeof(PackedGeometry) == 32);
+
+/// What the numbers of a cluster's records count in.
+struct alignas(16) PackedUnits {
+  float factor;  // of the cluster's largest Gaussian, a power of two
+  float sh[3];   // of the harmonics of degree 1, 2 and 3; the largest in the cluster is 127 / 2^15
+};
+
+constexpr int packed_sh_bytes(int sh_degree) { return 3 * (sh_coefficient_count(sh_degree) - 1); }
+constexpr int packed_record_bytes(int sh_degree) {
+  return static_cast<int>(sizeof(PackedGeometry)) + packed_sh_bytes(sh_degree);
+}
+constexpr std::size_t packed_block_bytes(int sh_degree) {
+  return cluster_size * static_cast<std::size_t>(packed_record_bytes(sh_degree));
+}
+
+/// Bytes of each record in the plane that begins at byte `at`.
+constexpr int packed_plane_width(int sh_degree, int at) {
+  int width = 16;
+  while (width > packed_record_bytes(sh_degree) - at) width /= 2;
+  return width;
+}
+
+/// Where in its block a Gaussian keeps the part of its record in the plane that begins at byte
+/// `at`.
+CATGS_HD constexpr std::uint32_t packed_offset(int at, int width, std::uint32_t in_cluster) {
+  return static_cast<std::uint32_t>(at) * static_cast<std::uint32_t>(cluster_size) +
+         static_cast<std::uint32_t>(width) * in_cluster;
+}
+
+/// 2^exponent, -126 to 127.
+CATGS_HD inline float power_of_two(int exponent) {
+  const auto bits = static_cast<std::uint32_t>(127 + exponent) << 23;
+#if defined(__CUDA_ARCH__)
+  return __uint_as_float(bits);
+#else
+  return std::bit_cast<float>(bits);
+#endif
+}
+
+CATGS_HD inline float from_half(std::uint16_t bits) {
+#if defined(__CUDACC__)
+  return __half2float(__ushort_as_half(bits));
+#else
+  return glm::unpackHalf1x16(bits);
+#endif
+}
+
+/// 65536 levels from 0 to -8, where nothing is visible any more (log2_alpha_min).
+constexpr float log2_opacity_min = -8.0f;
+CATGS_HD inline float unpack_log2_opacity(std::uint32_t level) {
+  return static_cast<float>(level) * (log2_opacity_min / 65535.0f);
+}
+
+/// A covariance factor has one exponent for all entries, as many octaves below the cluster's unit,
+/// for it is their error beside the largest one that moves the ends of a needle: 2^-15 of it, where
+/// halves would leave 2^-12. Each word holds an entry beside the diagonal (bits 0 to 14, signed),
+/// one on it (bits 15 to 29, in half the unit) and two bits of the exponent: yx xx, zx yy, zy zz.
+CATGS_HD inline math::CovarianceFactor<float> unpack_factor(const std::uint32_t (&words)[3],
+                                                            float unit) {
+  const std::uint32_t octaves = words[0] >> 30 | words[1] >> 30 << 2 | words[2] >> 30 << 4;
+  const float step = unit * power_of_two(-static_cast<int>(octaves));
+  const auto beside = [&](int j) {
+    return static_cast<float>(static_cast<std::int32_t>(words[j] << 17) >> 17) * step;
+  };
+  const auto on = [&](int j) {
+    return static_cast<float>(words[j] >> 15 & 0x7fffu) * (0.5f * step);
+  };
+  return {on(0), beside(0), on(1), beside(1), beside(2), on(2)};
+}
+
+/// A harmonic in units of its degree, from byte j of four: (byte - 128) / 2^15.
+CATGS_HD inline float packed_sh(std::uint32_t word, int j) {
+#if defined(__CUDA_ARCH__)
+  // The byte in bits 8 to 15 of 1 + byte / 2^15: exact, and cheaper than a conversion.
+  return __uint_as_float(__byte_perm(word, 0x3f800000u, 0x7604u | j << 4)) - 1.00390625f;
+#else
+  return static_cast<float>(static_cast<int>(word >> 8 * j & 0xffu) - 128) * 0x1p-15f;
+#endif
+}
+
+struct PackedCluster {
+  PackedUnits units;
+  Cluster bounds;  // of the Gaussians as they are packed
+};
+
+/// Packs the `members` of the cloud (1 to cluster_size indices) into `block`, packed_block_bytes()
+/// of zeros. Everything is rounded to the nearest.
+PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
+                           std::span<std::byte> block);
+
+}  // namespace catgs::cuda

@@ -1,0 +1,226 @@
+// What the CUDA core's layout keeps of a scene, on the CPU.
+
+#include "render_core/cuda/packed_gaussian.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "render_core/math/ellipse-inl.h"
+#include "tests/support/test_scenes.h"
+
+namespace catgs::cuda {
+namespace {
+
+struct Unpacked {
+  PackedGeometry geometry;
+  math::CovarianceFactor<float> factor;
+  std::vector<float> sh;  // without the first, coefficient-major RGB
+};
+
+class PackedScene {
+ public:
+  explicit PackedScene(const GaussianCloud& cloud)
+      : degree_(cloud.sh_degree), order_(cloud.size()) {
+    std::iota(order_.begin(), order_.end(), 0u);
+    block_.resize(packed_block_bytes(degree_));
+    packed_ = pack_cluster(cloud, order_, block_);
+  }
+
+  [[nodiscard]] const PackedCluster& packed() const { return packed_; }
+
+  [[nodiscard]] Unpacked operator[](std::uint32_t i) const {
+    std::vector<std::byte> record(static_cast<std::size_t>(packed_record_bytes(degree_)) + 4);
+    for (int at = 0; at < packed_record_bytes(degree_);) {
+      const int width = packed_plane_width(degree_, at);
+      EXPECT_EQ(packed_offset(at, width, i) % width, 0u);  // a load of one word
+      std::memcpy(&record[at], &block_[packed_offset(at, width, i)], width);
+      at += width;
+    }
+    Unpacked out;
+    std::memcpy(&out.geometry, record.data(), sizeof(out.geometry));
+    out.factor = unpack_factor(out.geometry.factor, packed_.units.factor);
+    for (int b = 0; b < packed_sh_bytes(degree_); ++b) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, &record[sizeof(PackedGeometry) + b / 4 * 4], sizeof(word));
+      out.sh.push_back(packed_sh(word, b % 4) * packed_.units.sh[sh_degree_of(1 + b / 3) - 1]);
+    }
+    return out;
+  }
+
+ private:
+  int degree_;
+  std::vector<std::uint32_t> order_;
+  std::vector<std::byte> block_;
+  PackedCluster packed_;
+};
+
+std::array<double, 6> entries(const math::CovarianceFactor<float>& l) {
+  return {l.xx, l.yx, l.yy, l.zx, l.zy, l.zz};
+}
+
+std::array<double, 6> exact_entries(const GaussianCloud& cloud, std::uint32_t i) {
+  const glm::dquat q = glm::normalize(glm::dquat(cloud.rotation[i]));
+  const double rotation[4] = {q.x, q.y, q.z, q.w};
+  const glm::dvec3 s(cloud.scale[i]);
+  const auto l = math::covariance_factor<double>(rotation, {s.x, s.y, s.z});
+  return {l.xx, l.yx, l.yy, l.zx, l.zy, l.zz};
+}
+
+/// Each value within its bound, for the whole cluster.
+void expect_close(const GaussianCloud& cloud) {
+  const PackedScene scene(cloud);
+  float largest_sh[max_sh_degree + 1] = {};
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    for (int k = 1; k < cloud.sh_count(); ++k)
+      for (int c = 0; c < 3; ++c)
+        largest_sh[sh_degree_of(k)] =
+            std::max(largest_sh[sh_degree_of(k)], std::abs(cloud.sh_of(i)[k][c]));
+  for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+    const Unpacked u = scene[i];
+    for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(u.geometry.mean[axis], cloud.mean[i][axis]);
+    EXPECT_NEAR(unpack_log2_opacity(u.geometry.log2_opacity), std::log2(cloud.opacity[i]), 6.2e-5);
+    const std::uint16_t base[3] = {u.geometry.base_red, u.geometry.base_green,
+                                   u.geometry.base_blue};
+    for (int c = 0; c < 3; ++c) {
+      const float exact = (*cloud.sh_of(i))[c];
+      EXPECT_NEAR(from_half(base[c]), exact, 1e-7f + 0x1p-11f * std::abs(exact));
+    }
+    const auto exact = exact_entries(cloud, i), packed = entries(u.factor);
+    const double largest = std::abs(
+        *std::ranges::max_element(exact, {}, [](double entry) { return std::abs(entry); }));
+    for (std::size_t e = 0; e < 6; ++e)
+      EXPECT_NEAR(packed[e], exact[e], 0x1p-13 * largest) << "Gaussian " << i << " entry " << e;
+    for (int k = 1; k < cloud.sh_count(); ++k)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(u.sh[3 * (k - 1) + c], cloud.sh_of(i)[k][c],
+                    largest_sh[sh_degree_of(k)] / 253.0f);
+  }
+}
+
+TEST(PackedGaussian, IsWithinRoundingInEveryDegree) {
+  for (int degree = 0; degree <= max_sh_degree; ++degree) {
+    SCOPED_TRACE(degree);
+    for (const std::size_t count : {1, 31, 77, 256})
+      expect_close(test::random_cloud(count, degree, 7 + count));
+  }
+}
+
+TEST(PackedGaussian, FaintOnesStayFaint) {
+  GaussianCloud cloud = test::random_cloud(4, 0, 6);
+  cloud.opacity = {1e-38f, 0.0039f, 0.00393f, 0.99999f};  // 1/255 is between the middle ones
+  const PackedScene scene(cloud);
+  const auto reach = [&](std::uint32_t i) {
+    return math::reach_of(unpack_log2_opacity(scene[i].geometry.log2_opacity));
+  };
+  EXPECT_LT(reach(0), 0.0f);
+  EXPECT_LT(reach(1), 0.0f);
+  EXPECT_GT(reach(2), 0.0f);
+  EXPECT_NEAR(reach(3), 7.994f, 1e-3f);
+}
+
+TEST(PackedGaussian, TakesAtMost80Bytes) {
+  const auto bytes = [](int degree) {
+    return static_cast<double>(packed_block_bytes(degree) + sizeof(PackedUnits) + sizeof(Cluster)) /
+           static_cast<double>(cluster_size);
+  };
+  EXPECT_LE(bytes(3), 80.0);
+  EXPECT_LE(bytes(0), 33.0);
+}
+
+TEST(PackedGaussian, PlanesCoverTheBlockOnce) {
+  for (int degree = 0; degree <= max_sh_degree; ++degree) {
+    std::vector<int> covered(packed_block_bytes(degree));
+    for (int at = 0; at < packed_record_bytes(degree);) {
+      const int width = packed_plane_width(degree, at);
+      for (std::uint32_t i = 0; i < cluster_size; ++i)
+        for (int b = 0; b < width; ++b) ++covered[packed_offset(at, width, i) + b];
+      at += width;
+    }
+    EXPECT_EQ(std::ranges::count(covered, 1), static_cast<std::ptrdiff_t>(covered.size()));
+  }
+}
+
+// A grain beside a mountain keeps its shape, and so do clusters that are all tiny.
+TEST(PackedGaussian, KeepsShapesOfAllSizes) {
+  GaussianCloud cloud = test::random_cloud(256, 0, 1);
+  for (const float largest : {1.0f, 1e6f}) {
+    SCOPED_TRACE(largest);
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      cloud.scale[i] = glm::vec3(largest) * std::pow(10.0f, -static_cast<float>(i % 16));
+    expect_close(cloud);
+  }
+  for (glm::vec3& scale : cloud.scale) scale = glm::vec3(1e-12f);
+  expect_close(cloud);
+}
+
+// The ends of a needle 100000 times as long as thick stay where they are: within 2^-13 of its
+// length.
+TEST(PackedGaussian, KeepsTheDirectionOfNeedles) {
+  GaussianCloud cloud = test::random_cloud(256, 0, 2);
+  for (glm::vec3& scale : cloud.scale) scale = {1.0f, 1e-5f, 1e-5f};
+  const PackedScene scene(cloud);
+  for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+    const glm::dvec3 axis = glm::dmat3(glm::mat3_cast(glm::dquat(cloud.rotation[i])))[0];
+    const auto l = scene[i].factor;
+    // Sigma = L L^T: its longest axis is Sigma applied to about the axis.
+    const glm::dvec3 lt(l.xx * axis.x + l.yx * axis.y + l.zx * axis.z,
+                        l.yy * axis.y + l.zy * axis.z, l.zz * axis.z);
+    const glm::dvec3 end(l.xx * lt.x, l.yx * lt.x + l.yy * lt.y,
+                         l.zx * lt.x + l.zy * lt.y + l.zz * lt.z);
+    EXPECT_NEAR(glm::length(end), 1.0, 1e-3);
+    EXPECT_LT(glm::length(glm::cross(glm::normalize(end), axis)), 0x1p-13);
+  }
+}
+
+TEST(PackedGaussian, HarmonicsOfOneColourNeedNoRange) {
+  GaussianCloud cloud = test::random_cloud(40, 3, 3);
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    for (int k = 1; k < cloud.sh_count(); ++k) cloud.sh[i * 16 + k] = glm::vec3(0.0f);
+  const PackedScene scene(cloud);
+  for (std::uint32_t i = 0; i < cloud.size(); ++i)
+    for (const float value : scene[i].sh) EXPECT_EQ(value, 0.0f);
+}
+
+// Rounding must not shift a scene's colour: errors cancel.
+TEST(PackedGaussian, RoundsHarmonicsWithoutBias) {
+  const GaussianCloud cloud = test::random_cloud(256, 3, 4);
+  const PackedScene scene(cloud);
+  double error = 0.0, magnitude = 0.0;
+  for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+    const Unpacked u = scene[i];
+    for (int b = 0; b < 45; ++b) {
+      const double e = u.sh[b] - cloud.sh_of(i)[1 + b / 3][b % 3];
+      error += e;
+      magnitude += std::abs(e);
+    }
+  }
+  EXPECT_GT(magnitude, 0.0);
+  EXPECT_LT(std::abs(error), 0.03 * magnitude);
+}
+
+// Clusters are culled by bounds that hold for what is drawn.
+TEST(PackedGaussian, BoundsHoldForWhatIsPacked) {
+  GaussianCloud cloud = test::random_cloud(256, 0, 5);
+  for (glm::vec3& scale : cloud.scale) scale.y = 1e-4f * scale.x;
+  const PackedScene scene(cloud);
+  const Cluster& bounds = scene.packed().bounds;
+  for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+    const Unpacked u = scene[i];
+    double variance = 0.0;
+    for (const double entry : entries(u.factor)) variance += entry * entry;
+    const double visible = 255.0 * std::exp2(unpack_log2_opacity(u.geometry.log2_opacity));
+    EXPECT_GE(bounds.reach * (1.0 + 1e-6),
+              std::sqrt(2.0 * std::log(std::max(1.0, visible)) * variance));
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_LE(std::abs(cloud.mean[i][axis] - bounds.centre[axis]), bounds.half_extent[axis]);
+  }
+}
+
+}  // namespace
+}  // namespace catgs::cuda
