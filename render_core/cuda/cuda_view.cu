@@ -39,7 +39,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
   // while there is a choice of devices, not in the first frame.
   if (settings.pipeline == Pipeline::vanilla) return;
   set_shape({tile_size_px, tile_size_px});
-  memory_.reserve(shape_, scene_->arrays().count, settings_);
+  memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
   shape_ = {};
 }
 
@@ -94,7 +94,7 @@ void CudaView::make_room(glm::ivec2 size_px) {
   for (;;) {
     set_shape(size_px);
     try {
-      return memory_.reserve(shape_, scene_->arrays().count, settings_);
+      return memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
     } catch (const CudaError& error) {
       memory_ = {};
       reach_known_ = false;
@@ -120,7 +120,9 @@ void CudaView::mark(Stage stage) {
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   const bool sweeps = plan.window > 0;
   const CameraPair now = make_camera_pair(request.camera);
-  const FrameCameras cameras{now, sweeps ? make_camera_pair(plan.window_end).single : now.single};
+  const Camera& end = sweeps ? plan.window_end : request.camera;
+  const FrameCameras cameras{now, sweeps ? make_camera_pair(end).single : now.single};
+  const ClusterCuller cullers[2] = {ClusterCuller(request.camera), ClusterCuller(end)};
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
   do {
     make_room(request.camera.size_px);
@@ -129,7 +131,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
     check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
     if (!reach_known_)
       check(cudaMemsetAsync(memory_.reach.get(), 0xff, memory_.reach.bytes(), stream), "reach");
-    list_tiles(cameras, sweeps, min_depth);
+    list_tiles(cameras, cullers, sweeps, min_depth);
     split(nullptr);
     mark(Stage::sort);
     blend(request);
@@ -190,14 +192,16 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
 }
 
 /// Stages project, bin and most of sort of a key frame.
-void CudaView::list_tiles(const FrameCameras& cameras, bool sweeps, float min_depth) {
+void CudaView::list_tiles(const FrameCameras& cameras, const ClusterCuller (&cullers)[2],
+                          bool sweeps, float min_depth) {
   FrameMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
   const SceneArrays& scene = scene_->arrays();
   const SortScratch scratch{m.scratch.get(), m.scratch.bytes()};
   SplatPath* path = sweeps ? m.path.get() : nullptr;
-  launch_cull({scene, cameras, sweeps, shape_, m.cull_mask.get(), m.cull_before.get(),
-               m.visible.get(), m.counts.get(), scratch},
+  launch_cull({scene, cullers[0], cullers[1], cameras, sweeps, shape_, m.clusters.get(),
+               m.cull_mask.get(), m.cull_seen.get(), m.cull_before.get(), m.visible.get(),
+               m.counts.get(), scratch, processors_},
               stream);
   launch_project(
       {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), m.records.get(),

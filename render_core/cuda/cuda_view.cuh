@@ -10,6 +10,7 @@
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/renderer.h"
+#include "render_core/scene/clusters.h"
 
 namespace catgs::cuda {
 
@@ -33,7 +34,8 @@ class CudaView final : public View {
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   void draw_sub(const FrameRequest& request);
   void draw_vanilla(const FrameRequest& request);
-  void list_tiles(const FrameCameras& cameras, bool sweeps, float min_depth);
+  void list_tiles(const FrameCameras& cameras, const ClusterCuller (&cullers)[2], bool sweeps,
+                  float min_depth);
   void split(uint2* runs);
   void blend(const FrameRequest& request);
   void deliver();

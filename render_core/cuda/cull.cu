@@ -1,4 +1,8 @@
+#include <algorithm>
+
 #include <cub/device/device_scan.cuh>
+#include <cub/device/device_select.cuh>
+#include <thrust/iterator/counting_iterator.h>
 #include <thrust/iterator/transform_iterator.h>
 
 #include "render_core/cuda/cuda_check.h"
@@ -7,67 +11,106 @@
 namespace catgs::cuda {
 namespace {
 
-constexpr int block_size = 256;
+/// A block takes one cluster after another: as many are in sight as the device finds, which the
+/// host does not wait for.
+constexpr int block_size = cluster_size;
+constexpr int warps = block_size / warp_size;
+constexpr int blocks_per_processor = 8;
 
-/// A warp a word: no thread waits for another, so that loads of the scene are all that it takes.
+struct InSight {
+  const Cluster* clusters;
+  ClusterCuller now, end;
+  __device__ bool operator()(std::uint32_t c) const {
+    return !outside_on_the_way(now, end, clusters[c]);
+  }
+};
+
 template <bool sweeps>
 __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
-  const std::uint32_t i = blockIdx.x * block_size + threadIdx.x;
-  bool visible = false;
-  if (i < p.scene.count) {
-    visible = make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i)).in_view;
+  const std::uint32_t clusters = p.counts->clusters;
+  for (std::uint32_t rank = blockIdx.x; rank < clusters; rank += gridDim.x) {
+    const std::uint32_t i = p.clusters[rank] * block_size + threadIdx.x;
+    bool visible = false;
+    if (i < p.scene.count) {
+      visible = make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i)).in_view;
+    }
+    const unsigned word = __ballot_sync(~0u, visible);
+    if (threadIdx.x % warp_size == 0) p.mask[rank * warps + threadIdx.x / warp_size] = word;
+    const int seen = __syncthreads_count(visible);
+    if (threadIdx.x == 0) p.seen[rank] = static_cast<std::uint32_t>(seen);
   }
-  const unsigned word = __ballot_sync(~0u, visible);
-  if (threadIdx.x % warp_size == 0) p.mask[i / warp_size] = word;
 }
 
-struct BitsOf {
-  __host__ __device__ std::uint32_t operator()(std::uint32_t word) const {
-#if defined(__CUDA_ARCH__)
-    return static_cast<std::uint32_t>(__popc(word));
-#else
-    return static_cast<std::uint32_t>(__builtin_popcount(word));
-#endif
+/// seen[rank], and nothing beyond the clusters in sight.
+struct Seen {
+  const std::uint32_t* seen;
+  const FrameCounts* counts;
+  __device__ std::uint32_t operator()(std::uint32_t rank) const {
+    return rank < counts->clusters ? seen[rank] : 0;
   }
 };
 
 __global__ void __launch_bounds__(block_size) compact_kernel(const CullParams p) {
-  const std::uint32_t i = blockIdx.x * block_size + threadIdx.x;
-  const std::uint32_t lane = threadIdx.x % warp_size;
-  const std::uint32_t word = p.mask[i / warp_size];
-  const std::uint32_t before = p.before[i / warp_size];
-  const std::uint32_t at = before + BitsOf{}(word & ((1u << lane) - 1u));
-  if ((word >> lane & 1u) != 0 && at < p.shape.visible_bound) p.visible[at] = i;
-  if (i + 1 == gridDim.x * block_size) p.counts->visible = before + BitsOf{}(word);
+  const std::uint32_t clusters = p.counts->clusters;
+  const std::uint32_t lane = threadIdx.x % warp_size, warp = threadIdx.x / warp_size;
+  for (std::uint32_t rank = blockIdx.x; rank < clusters; rank += gridDim.x) {
+    const std::uint32_t* words = &p.mask[rank * warps];
+    const int in_lower_warps = __reduce_add_sync(~0u, lane < warp ? __popc(words[lane]) : 0);
+    const std::uint32_t word = words[warp];
+    const std::uint32_t at = p.before[rank] + static_cast<std::uint32_t>(in_lower_warps) +
+                             static_cast<std::uint32_t>(__popc(word & ((1u << lane) - 1u)));
+    if ((word >> lane & 1u) != 0 && at < p.shape.visible_bound)
+      p.visible[at] = p.clusters[rank] * block_size + threadIdx.x;
+    if (rank + 1 == clusters && threadIdx.x == 0) p.counts->visible = p.before[rank] + p.seen[rank];
+  }
 }
 
-auto bits_of(const std::uint32_t* mask) { return thrust::make_transform_iterator(mask, BitsOf{}); }
+cudaError_t select_clusters(void* scratch, std::size_t& bytes, const InSight& in_sight,
+                            std::uint32_t* clusters, std::uint32_t* selected, std::uint32_t count,
+                            cudaStream_t stream) {
+  return cub::DeviceSelect::If(scratch, bytes, thrust::make_counting_iterator(std::uint32_t{0}),
+                               clusters, selected, count, in_sight, stream);
+}
+
+cudaError_t sum_seen(void* scratch, std::size_t& bytes, const Seen& seen, std::uint32_t* before,
+                     std::uint32_t count, cudaStream_t stream) {
+  return cub::DeviceScan::ExclusiveSum(
+      scratch, bytes,
+      thrust::make_transform_iterator(thrust::make_counting_iterator(std::uint32_t{0}), seen),
+      before, count, stream);
+}
 
 }  // namespace
 
-std::uint32_t cull_words(std::uint32_t count) {
-  return blocks_for(count, block_size) * (block_size / warp_size);
-}
+std::uint32_t cull_words(std::uint32_t cluster_count) { return cluster_count * warps; }
 
-std::size_t cull_scratch_bytes(std::uint32_t count) {
-  std::size_t bytes = 0;
-  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, bits_of(nullptr),
-                                      static_cast<std::uint32_t*>(nullptr), cull_words(count)),
+std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
+  const ClusterCuller any(make_camera(Pose{}, {1, 1}, 1.0f));
+  std::size_t select = 0, sum = 0;
+  check(select_clusters(nullptr, select, {nullptr, any, any}, nullptr, nullptr, cluster_count,
+                        nullptr),
         "cull scratch size");
-  return bytes;
+  check(sum_seen(nullptr, sum, {nullptr, nullptr}, nullptr, cluster_count, nullptr),
+        "cull scratch size");
+  return std::max(select, sum);
 }
 
-void launch_cull(const CullParams& params, cudaStream_t stream) {
-  const std::uint32_t words = cull_words(params.scene.count);
-  if (words == 0) return;
-  const auto kernel = params.sweeps ? mask_kernel<true> : mask_kernel<false>;
-  kernel<<<words * warp_size / block_size, block_size, 0, stream>>>(params);
+void launch_cull(const CullParams& p, cudaStream_t stream) {
+  const std::uint32_t count = p.scene.cluster_count;
+  if (count == 0) return;
+  std::size_t bytes = p.scratch.bytes;
+  check(select_clusters(p.scratch.memory, bytes, {p.scene.clusters, p.now, p.end}, p.clusters,
+                        &p.counts->clusters, count, stream),
+        "cull clusters");
+  const std::uint32_t blocks =
+      std::min(count, static_cast<std::uint32_t>(p.processors * blocks_per_processor));
+  const auto kernel = p.sweeps ? mask_kernel<true> : mask_kernel<false>;
+  kernel<<<blocks, block_size, 0, stream>>>(p);
   check_launch("cull");
-  std::size_t bytes = params.scratch.bytes;
-  check(cub::DeviceScan::ExclusiveSum(params.scratch.memory, bytes, bits_of(params.mask),
-                                      params.before, words, stream),
+  bytes = p.scratch.bytes;
+  check(sum_seen(p.scratch.memory, bytes, {p.seen, p.counts}, p.before, count, stream),
         "cull scan");
-  compact_kernel<<<words * warp_size / block_size, block_size, 0, stream>>>(params);
+  compact_kernel<<<blocks, block_size, 0, stream>>>(p);
   check_launch("cull compaction");
 }
 

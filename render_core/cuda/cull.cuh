@@ -3,25 +3,32 @@
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
+#include "render_core/scene/clusters.h"
 
 namespace catgs::cuda {
 
-/// Finds the Gaussians in view (now, or with `sweeps` at some time of the window), in scene order
-/// (so that equal depths blend in scene order): the frustum cache of a key frame.
+/// Finds the Gaussians in view (now, or with `sweeps` at some time of the window), in the order of
+/// the scene's clusters: the frustum cache of a key frame. Clusters are tested first, so that the
+/// cost of the rest follows what is in sight, not the size of the scene.
 struct CullParams {
   SceneArrays scene;
+  ClusterCuller now, end;  // the same without a window
   FrameCameras camera;
   bool sweeps;
   FrameShape shape;
-  std::uint32_t* mask;     // [cull_words(count)], a bit a Gaussian
-  std::uint32_t* before;   // [cull_words(count)], set bits in earlier words
-  std::uint32_t* visible;  // [visible_bound], scene indices
-  FrameCounts* counts;     // `visible` is set, which may exceed visible_bound
-  SortScratch scratch;     // at least cull_scratch_bytes(count)
+  std::uint32_t* clusters;  // [scene.cluster_count], those in sight; their place here is their rank
+  std::uint32_t* mask;      // [cull_words(scene.cluster_count)], by rank, a bit a Gaussian
+  std::uint32_t* seen;      // [scene.cluster_count], by rank: set bits of the cluster
+  std::uint32_t* before;    // [scene.cluster_count], of clusters of lower rank
+  std::uint32_t* visible;   // [visible_bound], scene indices
+  FrameCounts* counts;      // `clusters` is set, and `visible`, which may exceed visible_bound
+  SortScratch scratch;      // at least cull_scratch_bytes(scene.cluster_count)
+  int processors;           // of the device
 };
 
-std::uint32_t cull_words(std::uint32_t count);
-std::size_t cull_scratch_bytes(std::uint32_t count);
+std::uint32_t cull_words(std::uint32_t cluster_count);
+std::size_t cull_scratch_bytes(std::uint32_t cluster_count);
+/// counts->visible must be 0.
 void launch_cull(const CullParams& params, cudaStream_t stream);
 
 }  // namespace catgs::cuda

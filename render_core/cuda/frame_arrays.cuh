@@ -28,6 +28,7 @@ constexpr int queue_classes = 8;
 /// the host reads them only then.
 struct FrameCounts {
   // Of the key frame; sub-frames keep them.
+  std::uint32_t clusters = 0;      // in sight
   std::uint32_t visible = 0;       // Gaussians in view
   std::uint32_t list_entries = 0;  // sum of all tile lists, before any bound was applied
   std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float

@@ -7,10 +7,12 @@
 
 namespace catgs::cuda {
 
-void FrameMemory::reserve(const FrameShape& shape, std::uint32_t gaussians,
+void FrameMemory::reserve(const FrameShape& shape, std::uint32_t cluster_count,
                           const ViewSettings& settings) {
-  cull_mask.reserve(cull_words(gaussians));
-  cull_before.reserve(cull_words(gaussians));
+  clusters.reserve(cluster_count);
+  cull_mask.reserve(cull_words(cluster_count));
+  cull_seen.reserve(cluster_count);
+  cull_before.reserve(cluster_count);
   visible.reserve(shape.visible_bound);
   records.reserve(shape.visible_bound);
   spans.reserve(shape.visible_bound);
@@ -35,7 +37,7 @@ void FrameMemory::reserve(const FrameShape& shape, std::uint32_t gaussians,
   slice_transmittance.reserve(slices * parts_per_tile);
   slice_pixels.reserve(slices * tile_size_px * tile_size_px);
   reach.reserve(shape.tiles());
-  scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(gaussians)));
+  scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(cluster_count)));
   reserve_image(shape, settings);
 }
 
@@ -53,13 +55,13 @@ void FrameMemory::reserve_image(const FrameShape& shape, const ViewSettings& set
 }
 
 std::size_t FrameMemory::bytes() const {
-  return cull_mask.bytes() + cull_before.bytes() + visible.bytes() + tasks.bytes() + queue.bytes() +
-         tile_slices.bytes() + spans.bytes() + path.bytes() + runs.bytes() + consumed.bytes() +
-         slice_transmittance.bytes() + slice_pixels.bytes() + reach.bytes() + records.bytes() +
-         tile_count.bytes() + first.bytes() + depth[0].bytes() + depth[1].bytes() +
-         order[0].bytes() + order[1].bytes() + tile[0].bytes() + tile[1].bytes() + slot[0].bytes() +
-         slot[1].bytes() + range.bytes() + counts.bytes() + scratch.bytes() + rgb.bytes() +
-         i420.bytes();
+  return clusters.bytes() + cull_mask.bytes() + cull_seen.bytes() + cull_before.bytes() +
+         visible.bytes() + tasks.bytes() + queue.bytes() + tile_slices.bytes() + spans.bytes() +
+         path.bytes() + runs.bytes() + consumed.bytes() + slice_transmittance.bytes() +
+         slice_pixels.bytes() + reach.bytes() + records.bytes() + tile_count.bytes() +
+         first.bytes() + depth[0].bytes() + depth[1].bytes() + order[0].bytes() + order[1].bytes() +
+         tile[0].bytes() + tile[1].bytes() + slot[0].bytes() + slot[1].bytes() + range.bytes() +
+         counts.bytes() + scratch.bytes() + rgb.bytes() + i420.bytes();
 }
 
 }  // namespace catgs::cuda

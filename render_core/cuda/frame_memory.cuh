@@ -10,7 +10,7 @@ namespace catgs::cuda {
 
 /// All device memory of a View, sized by a FrameShape. Buffers grow between frames.
 struct FrameMemory {
-  DeviceBuffer<std::uint32_t> cull_mask, cull_before, visible;
+  DeviceBuffer<std::uint32_t> clusters, cull_mask, cull_seen, cull_before, visible;
   DeviceBuffer<SplatRecord> records;
   DeviceBuffer<TileSpans> spans;
   DeviceBuffer<SplatPath> path;
@@ -31,7 +31,7 @@ struct FrameMemory {
   PinnedBuffer<std::byte> host_image;
 
   /// Makes room; throws CudaError.
-  void reserve(const FrameShape& shape, std::uint32_t gaussians, const ViewSettings& settings);
+  void reserve(const FrameShape& shape, std::uint32_t cluster_count, const ViewSettings& settings);
   /// The same for the image and the counts alone.
   void reserve_image(const FrameShape& shape, const ViewSettings& settings);
   [[nodiscard]] std::size_t bytes() const;
