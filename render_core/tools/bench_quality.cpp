@@ -218,6 +218,13 @@ void write_worst_frames(const std::filesystem::path& folder, const QualityReport
   write("sub_worst_block", report.worst_sub.block);
 }
 
+void Extent::add(const Extent& other) {
+  if (other.count == 0) return;
+  max = count == 0 ? other.max : std::max(max, other.max);
+  sum += other.sum;
+  count += other.count;
+}
+
 QualityReport judge(const RenderSetup& setup, const ViewSettings& settings, std::size_t every,
                     const ProgressReport& report) {
   return settings.pipeline == Pipeline::exact ? judge_by_reference(setup, settings, report)

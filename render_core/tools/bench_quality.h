@@ -46,6 +46,7 @@ struct Extent {
   double sum = 0.0, max = 0.0;
 
   void add(double value);
+  void add(const Extent& other);
   [[nodiscard]] double mean() const { return count == 0 ? 0.0 : sum / static_cast<double>(count); }
 };
 

@@ -126,6 +126,10 @@ std::vector<Measurement> PaperCase::runs(const ViewSettings& settings, std::stri
   return runs;
 }
 
+std::string PaperCase::trace_name(std::size_t trace) const {
+  return stem(options_->cases[index_][trace + 1]);
+}
+
 void PaperCase::for_each_trace(std::string_view doing, const Visit& visit) {
   const std::vector<std::string>& files = options_->cases[index_];
   if (files.size() < 2) {
@@ -133,7 +137,7 @@ void PaperCase::for_each_trace(std::string_view doing, const Visit& visit) {
   }
   for (std::size_t i = 1; i < files.size(); ++i) {
     set_path(setup_, with_trace(options_->render, files[i]));
-    Progress progress(fmt::format("{}: {}, {}", label_, doing, stem(files[i])), quiet_);
+    Progress progress(fmt::format("{}: {}, {}", label_, doing, trace_name(i - 1)), quiet_);
     visit(i - 1, [&](double fraction) { progress.update(fraction); });
   }
 }

@@ -68,6 +68,9 @@ class PaperCase {
   const std::vector<Measurement>& runs(const Variant& variant);
   std::vector<Measurement> runs(const ViewSettings& settings, std::string_view name);
 
+  /// What a trace is called in tables.
+  [[nodiscard]] std::string trace_name(std::size_t trace) const;
+
   /// Calls visit(index of the trace, progress) with setup() on each trace in turn; `doing` is what
   /// the terminal shows. Throws InputError where the case has no traces.
   using Visit = std::function<void(std::size_t trace, const ProgressReport& report)>;

@@ -102,6 +102,9 @@ Json settings_json(const PaperCase& scene) {
   const SpeculationSettings& speculation = setup.view.speculation;
   return {{"size_px", {setup.camera.size_px.x, setup.camera.size_px.y}},
           {"focal_px", setup.camera.focal_px.x},
+          {"fps", scene.options().render.fps ? Json(*scene.options().render.fps) : Json()},
+          {"anchor", scene.options().render.anchor},
+          {"frames", scene.options().render.frames},
           {"window", speculation.initial_window},
           {"max_trail_px", speculation.max_trail_px},
           {"min_depth", speculation.min_depth},
@@ -161,7 +164,7 @@ void add_device_rates(CLI::App& command, DeviceRates& rates) {
 }  // namespace
 
 std::span<const PaperTableKind> paper_table_kinds() {
-  static constexpr std::array<PaperTableKind, 10> kinds = {
+  static constexpr std::array<PaperTableKind, 11> kinds = {
       {{"fps", "Average frame rate", fps_table, side_by_side, true},
        {"quality", "Render quality", quality_table, side_by_side, true},
        {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first, true},
@@ -170,6 +173,7 @@ std::span<const PaperTableKind> paper_table_kinds() {
        {"window", "Impact of the window", window_table, one_each, true},
        {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side, true},
        {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side, true},
+       {"traces", "Each trace by itself", traces_table, one_each, false},
        {"scaling", "One view of scenes of several sizes", scaling_table, growing, false},
        {"floor", "Stages beside what their bytes and evaluations allow", floor_table, one_each,
         false}}};
@@ -223,7 +227,8 @@ void add_paper_command(CLI::App& app) {
   paper_app->add_option("--warmup", options.warmup, "Frames rendered before measuring")
       ->capture_default_str();
   paper_app
-      ->add_option("--every", options.every, "quality, tiles: look at one frame in N of a trace")
+      ->add_option("--every", options.every,
+                   "quality, tiles, traces: look at one frame in N of a trace")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   paper_app->add_option("--json", command->json,

@@ -24,6 +24,7 @@ PaperTable tiles_table(PaperCase& scene);     // Fig. 3: load of the tiles
 PaperTable pruned_table(PaperCase& scene);    // appendix: pruned scenes
 
 // Not in the paper.
+PaperTable traces_table(PaperCase& scene);   // each trace by itself, with its quality
 PaperTable scaling_table(PaperCase& scene);  // one view of scenes of several sizes
 PaperTable floor_table(PaperCase& scene);    // stages beside what bytes and evaluations allow
 

@@ -1,5 +1,6 @@
 // catgs-render paper on small scenes: rows and columns of each table, and values that follow from
 // what the pipelines are.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -158,6 +159,32 @@ TEST_F(Paper, LongerWindowsHaveLongerTrailsAndLists) {
     const double unit = trail.at("W-1").get<double>();
     EXPECT_NEAR(trail.at(columns[i]).get<double>() / unit, 1 << i, 0.02 * (1 << i)) << columns[i];
   }
+}
+
+TEST_F(Paper, TracesStandByThemselvesAndTogether) {
+  write_tum(folder_ / "brief.tum", glide(20));
+  const Outcome outcome = paper(
+      fmt::format("--table traces {} {} --every 2 --json -", cloud_case(), path("brief.tum")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Json table = Json::parse(outcome.out).at("tables").at("traces").at(0);
+  const Json& rows = table.at("rows");
+  EXPECT_THAT(names(rows), ElementsAre("glide", "brief", "All"));
+  const auto value = [&](const char* trace, const char* column) {
+    return rows.at(trace).at(column).get<double>();
+  };
+  EXPECT_DOUBLE_EQ(value("glide", "Frames per key"), 40.0 / 10);  // 2 keys, then groups of 5
+  EXPECT_DOUBLE_EQ(value("brief", "Frames per key"), 20.0 / 6);
+  EXPECT_DOUBLE_EQ(value("All", "Frames per key"), 60.0 / 16);
+  EXPECT_DOUBLE_EQ(value("All", "Keys without window"), 100.0 * 4 / 16);
+  EXPECT_NEAR(value("glide", "Ours over Exact"),
+              value("glide", "Ours FPS") / value("glide", "Exact FPS"), 1e-9);
+  for (const char* column : {"Worst sub dB", "Worst block dB", "0.1 % block dB"}) {
+    EXPECT_EQ(value("All", column), std::min(value("glide", column), value("brief", column)));
+  }
+  EXPECT_EQ(value("All", "Pop (1/255)"),
+            std::max(value("glide", "Pop (1/255)"), value("brief", "Pop (1/255)")));
+  EXPECT_GE(value("All", "Sub mean dB"), value("All", "Worst sub dB"));
+  EXPECT_EQ(table.at("notes").at(1), "glide: key frames by window 0: 2, 4: 8.");
 }
 
 TEST_F(Paper, ScalingComparesWithTheFirstScene) {
