@@ -63,7 +63,9 @@ struct FrameStats {
   // Pipeline::catgs
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
-  float nearest_depth = 0;  // of visible Gaussians deeper than speculation_min_depth(); world units
+  // Of visible Gaussians deeper than speculation_min_depth(): see SceneDepths.
+  float nearest_depth = 0;       // world units
+  float mean_inverse_depth = 0;  // 1 / world units
   std::array<float, stage_count> stage_ms{};
 };
 

@@ -29,6 +29,12 @@ class StageClock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+/// Sub-frames of this core find their tiles where they are in the key frame.
+SpeculationSettings on_fixed_grid(SpeculationSettings settings) {
+  settings.grid = GridKind::fixed;
+  return settings;
+}
+
 template <class T>
 void grow(std::vector<T>& buffer, std::size_t size) {
   if (buffer.size() < size) buffer.resize(size);
@@ -37,7 +43,7 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 }  // namespace
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
-    : scene_(std::move(scene)), settings_(settings), groups_(settings.speculation) {
+    : scene_(std::move(scene)), settings_(settings), groups_(on_fixed_grid(settings.speculation)) {
   if (settings.pipeline == Pipeline::catgs && settings.colour_cache)
     colours_.emplace(scene_->store.clusters().size());
 }
@@ -67,7 +73,7 @@ FrameStats CpuView::draw(const FrameRequest& request) {
   } else if (settings_.pipeline == Pipeline::exact) {
     draw_key_lists(camera, nullptr, stats);
   } else {
-    const FramePlan plan = groups_.plan(camera, request.forecast, nearest_depth_);
+    const FramePlan plan = groups_.plan(camera, request.forecast, {nearest_depth_, 0.0f});
     stats.kind = plan.kind;
     stats.window = plan.window;
     if (plan.kind == FrameKind::sub) {

@@ -19,14 +19,29 @@ static_assert(sizeof(BlendTask) == 16);
 constexpr int part_size_px = 8;
 constexpr int parts_per_tile = (tile_size_px / part_size_px) * (tile_size_px / part_size_px);
 
-/// Part of a pixel of a tile.
-__device__ inline int part_of(int in_tile_x, int in_tile_y) {
-  return in_tile_y / part_size_px * (tile_size_px / part_size_px) + in_tile_x / part_size_px;
+/// A pixel of the picture.
+struct PixelPlace {
+  std::uint16_t x, y;
+};
+
+/// The pixels of a tile, where the grid does not lie in the picture: a run that is blended in parts
+/// of part_pixels, the last of which takes the rest. Turned tiles have more pixels at the sides
+/// that the camera turns to.
+constexpr int part_pixels = part_size_px * part_size_px;
+constexpr int most_run_parts = 6;
+
+/// Pixels of a tile that there is room for.
+__host__ __device__ inline std::uint32_t run_bound_px(const FrameShape& shape) {
+  return static_cast<std::uint32_t>(shape.tile_parts * part_pixels);
 }
 
-/// Where a slice keeps a pixel of its tile.
-__device__ inline std::size_t slice_pixel(std::uint32_t slice, int in_tile_x, int in_tile_y) {
-  return (static_cast<std::size_t>(slice) * tile_size_px + in_tile_y) * tile_size_px + in_tile_x;
+/// Where a slice keeps a pixel of its tile, and what it knows of a part.
+__device__ inline std::size_t slice_pixel(const FrameShape& shape, std::uint32_t slice,
+                                          int in_tile) {
+  return static_cast<std::size_t>(slice) * run_bound_px(shape) + static_cast<unsigned>(in_tile);
+}
+__device__ inline std::uint32_t slice_part(const FrameShape& shape, std::uint32_t slice, int part) {
+  return slice * static_cast<unsigned>(shape.tile_parts) + static_cast<unsigned>(part);
 }
 
 /// Blends all tasks front to back. Whole tiles go straight to the image, slices to slice_pixels.
@@ -38,8 +53,11 @@ struct BlendParams {
   const std::uint32_t* queue;  // [queue_bound(shape)], tasks by class
   float3 background;
   float* rgb;  // [height][width][3], display-referred, in [0, 1]
-  // Of slices: their pixels [slice_bound][tile_size_px^2], colour and transmittance as in
-  // math::PixelState; and [slice_bound][parts_per_tile], one past the last entry looked at, and 1,
+  // Runs of the tiles' pixels, [tiles][run_bound_px(shape)] and [tiles]; null: they are squares.
+  const PixelPlace* pixels;
+  const std::uint32_t* pixel_count;
+  // Of slices: their pixels [slice_bound][run_bound_px(shape)], colour and transmittance as in
+  // math::PixelState; and [slice_bound][tile_parts], one past the last entry looked at, and 1,
   // then the largest transmittance that a slice leaves to what lies behind.
   float4* slice_pixels;
   std::uint32_t* consumed;
@@ -50,7 +68,7 @@ struct BlendParams {
   int warps;             // that the device holds at a time, by blend_warps()
 };
 
-/// Warps of the blend kernel that `processors` of the current device hold at a time.
+/// Warps of the blend kernels that `processors` of the current device hold at a time.
 int blend_warps(int processors);
 void launch_blend(const BlendParams& params, cudaStream_t stream);
 

@@ -9,6 +9,7 @@
 #include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/cuda_view.cuh"
 #include "render_core/cuda/cull.cuh"
+#include "render_core/cuda/pixel_runs.cuh"
 #include "render_core/cuda/project.cuh"
 #include "render_core/cuda/reorder.cuh"
 #include "render_core/cuda/sort.cuh"
@@ -22,6 +23,14 @@ int processors_of(int device) {
   int processors = 0;
   check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device), "device");
   return processors;
+}
+
+/// What of a shape concerns the picture alone: its Gaussians are in view, or not.
+FrameShape picture_of(FrameShape shape) {
+  shape.first_x_px = shape.first_y_px = 0;
+  shape.list_width_px = shape.width_px;
+  shape.list_height_px = shape.height_px;
+  return shape;
 }
 
 }  // namespace
@@ -38,7 +47,8 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
   // What does not depend on the image is most of a View: a device that cannot hold it should say so
   // while there is a choice of devices, not in the first frame.
   if (settings.pipeline == Pipeline::vanilla) return;
-  set_shape({tile_size_px, tile_size_px});
+  const glm::ivec2 one_tile(tile_size_px);
+  set_shape(one_tile, image_grid(one_tile));
   memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
   shape_ = {};
 }
@@ -48,16 +58,19 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
   try {
     check(cudaSetDevice(device_), "device");
     FramePlan plan;
+    plan.window_end = request.camera;
+    plan.grid = image_grid(request.camera.size_px);
+    plan.list_near_z = request.camera.near_z;
     if (settings_.pipeline == Pipeline::catgs)
-      plan = groups_.plan(request.camera, request.forecast, nearest_depth_);
+      plan = groups_.plan(request.camera, request.forecast, depths_);
     if (settings_.pipeline == Pipeline::vanilla) {
       draw_vanilla(request);
     } else if (plan.kind == FrameKind::sub) {
-      draw_sub(request);
+      draw_sub(request, plan);
     } else {
       draw_key(request, plan);
     }
-    frame = finished(plan);
+    frame = finished(plan, request.camera.near_z);
     return {};
   } catch (const CudaError& error) {
     forget_frames();
@@ -75,12 +88,21 @@ void CudaView::forget_frames() {
   reach_known_ = false;
 }
 
-void CudaView::set_shape(glm::ivec2 size_px) {
-  if (shape_.width_px != size_px.x || shape_.height_px != size_px.y) reach_known_ = false;
+void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
+  if (last_shape_.width_px != size_px.x || last_shape_.height_px != size_px.y) reach_known_ = false;
   shape_.width_px = size_px.x;
   shape_.height_px = size_px.y;
-  shape_.tiles_x = (size_px.x + tile_size_px - 1) / tile_size_px;
-  shape_.tiles_y = (size_px.y + tile_size_px - 1) / tile_size_px;
+  shape_.tiles_x = grid.tiles.x;
+  shape_.tiles_y = grid.tiles.y;
+  shape_.first_x_px = shape_.shown_x_px = grid.first_px.x;
+  shape_.first_y_px = shape_.shown_y_px = grid.first_px.y;
+  shape_.list_width_px = grid.size_px.x;
+  shape_.list_height_px = grid.size_px.y;
+  shape_.tile_parts = turns_tiles(settings_) ? most_run_parts : parts_per_tile;
+  const glm::ivec2 image_tiles = image_grid(size_px).tiles;
+  const auto in_image = static_cast<std::uint32_t>(image_tiles.x * image_tiles.y);
+  // Grids of sub-frames differ in size: room for all, so that buffers settle.
+  shape_.tile_bound = std::max(shape_.tiles(), in_image + in_image / 2 + 64);
   const FrameSizes room = room_.sizes();
   shape_.visible_bound = room.visible;
   shape_.list_bound = room.list_entries;
@@ -89,12 +111,15 @@ void CudaView::set_shape(glm::ivec2 size_px) {
 
 /// Sets the frame's shape and makes room for it; where the device has too little memory, without
 /// slices, and for the nearest part of the lists.
-void CudaView::make_room(glm::ivec2 size_px) {
+void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   const FrameRoom wanted = room_;
   for (;;) {
-    set_shape(size_px);
+    set_shape(size_px, grid);
     try {
-      return memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
+      const std::uint32_t* known = memory_.reach[last_reach_].get();
+      memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
+      if (memory_.reach[last_reach_].get() != known) reach_known_ = false;
+      return;
     } catch (const CudaError& error) {
       memory_ = {};
       reach_known_ = false;
@@ -119,28 +144,30 @@ void CudaView::mark(Stage stage) {
 
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   const bool sweeps = plan.window > 0;
-  const CameraPair now = make_camera_pair(request.camera);
-  const Camera& end = sweeps ? plan.window_end : request.camera;
-  const FrameCameras cameras{now, sweeps ? make_camera_pair(end).single : now.single};
-  const ClusterCuller cullers[2] = {ClusterCuller(request.camera), ClusterCuller(end)};
+  FrameCameras cameras{make_camera_pair(request.camera), {}, request.camera.near_z};
+  cameras.now.single.near_z = plan.list_near_z;
+  cameras.end = sweeps ? make_camera_pair(plan.window_end).single : cameras.now.single;
+  cameras.growth = math::convert<float>(plan.growth);
+  cameras.trail_shift_px = make_float2(static_cast<float>(plan.trail_shift_px.x),
+                                       static_cast<float>(plan.trail_shift_px.y));
+  const ListCuller culler(request.camera, plan);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
+  turned_ = false;
   do {
-    make_room(request.camera.size_px);
+    make_room(request.camera.size_px, plan.grid);
     const cudaStream_t stream = stream_.get();
     check(cudaEventRecord(start_.get(), stream), "event");
     check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
-    if (!reach_known_)
-      check(cudaMemsetAsync(memory_.reach.get(), 0xff, memory_.reach.bytes(), stream), "reach");
-    list_tiles(cameras, cullers, sweeps, min_depth);
-    split(nullptr);
+    list_tiles(cameras, culler, sweeps, min_depth);
+    split(nullptr, last_reach());
     mark(Stage::sort);
     blend(request);
     deliver();
-    reach_known_ = true;
   } while (needs_more_room());
+  remember_reach({});
 }
 
-void CudaView::draw_sub(const FrameRequest& request) {
+void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   FrameMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
   check(cudaEventRecord(start_.get(), stream), "event");
@@ -151,8 +178,8 @@ void CudaView::draw_sub(const FrameRequest& request) {
   const CameraPair now = make_camera_pair(request.camera);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
   launch_project({scene_->arrays(),
-                  {now, now.single},
-                  shape_,
+                  {now, now.single, request.camera.near_z},
+                  picture_of(shape_),
                   min_depth,
                   m.counts.get(),
                   m.visible.get(),
@@ -164,20 +191,55 @@ void CudaView::draw_sub(const FrameRequest& request) {
                   nullptr},
                  Listing::none, stream);
   mark(Stage::project);
+  place_tiles(plan);
   mark(Stage::bin);
   const bool reorders = settings_.order == BlendOrder::fresh;
   odd_sub_frame_ = !odd_sub_frame_;
-  split(reorders ? m.runs.get() : nullptr);
+  LastReach last = last_reach();
+  last.same_grid = true;
+  split(reorders ? m.runs.get() : nullptr, last);
   if (reorders)
     launch_reorder({m.runs.get(), m.counts.get(), m.depth[0].get(), lists_, processors_}, stream);
   mark(Stage::sort);
   blend(request);
   deliver();
+  remember_reach(plan.list_from_frame);
+}
+
+/// Says which pixels of a sub-frame belong to each tile of its key frame.
+void CudaView::place_tiles(const FramePlan& plan) {
+  turned_ = plan.warped;
+  shape_.shown_x_px = shape_.first_x_px - plan.shift_px.x;
+  shape_.shown_y_px = shape_.first_y_px - plan.shift_px.y;
+  if (!turned_) return;
+  launch_pixel_runs({shape_, math::convert<float>(plan.list_from_frame),
+                     math::convert<float>(math::inverse(plan.list_from_frame)),
+                     memory_.pixels.get(), memory_.pixel_count.get()},
+                    stream_.get());
+}
+
+LastReach CudaView::last_reach() const {
+  if (!reach_known_) return {};
+  return {memory_.reach[last_reach_].get(),
+          false,
+          math::convert<float>(last_list_from_frame_),
+          last_shape_.first_x_px,
+          last_shape_.first_y_px,
+          last_shape_.tiles_x,
+          last_shape_.tiles_y};
+}
+
+/// After a frame whose pixels found their tiles by `list_from_frame`.
+void CudaView::remember_reach(const Homography<double>& list_from_frame) {
+  last_reach_ = 1 - last_reach_;
+  last_shape_ = shape_;
+  last_list_from_frame_ = list_from_frame;
+  reach_known_ = true;
 }
 
 void CudaView::draw_vanilla(const FrameRequest& request) {
   const glm::vec3& b = request.background;
-  set_shape(request.camera.size_px);
+  set_shape(request.camera.size_px, image_grid(request.camera.size_px));
   shape_.list_bound = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
   memory_.reserve_image(shape_, settings_);
@@ -192,16 +254,16 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
 }
 
 /// Stages project, bin and most of sort of a key frame.
-void CudaView::list_tiles(const FrameCameras& cameras, const ClusterCuller (&cullers)[2],
-                          bool sweeps, float min_depth) {
+void CudaView::list_tiles(const FrameCameras& cameras, const ListCuller& culler, bool sweeps,
+                          float min_depth) {
   FrameMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
   const SceneArrays& scene = scene_->arrays();
   const SortScratch scratch{m.scratch.get(), m.scratch.bytes()};
   SplatPath* path = sweeps ? m.path.get() : nullptr;
-  launch_cull({scene, cullers[0], cullers[1], cameras, sweeps, shape_, m.clusters.get(),
-               m.cull_mask.get(), m.cull_seen.get(), m.cull_before.get(), m.visible.get(),
-               m.counts.get(), scratch, processors_},
+  launch_cull({scene, culler, cameras, sweeps, shape_, m.clusters.get(), m.cull_mask.get(),
+               m.cull_seen.get(), m.cull_before.get(), m.visible.get(), m.counts.get(), scratch,
+               processors_},
               stream);
   launch_project(
       {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), m.records.get(),
@@ -235,9 +297,10 @@ std::uint32_t CudaView::slice_length() const {
 }
 
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
-void CudaView::split(uint2* runs) {
+void CudaView::split(uint2* runs, const LastReach& last) {
   FrameMemory& m = memory_;
-  launch_split({shape_, m.range.get(), m.reach.get(), m.tasks.get(), m.tile_slices.get(),
+  launch_split({shape_, m.range.get(), last, m.reach[1 - last_reach_].get(),
+                turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(),
                 m.queue.get(), runs, odd_sub_frame_ ? reorder_run / 2 : 0,
                 m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
                stream_.get());
@@ -248,12 +311,16 @@ void CudaView::blend(const FrameRequest& request) {
   const cudaStream_t stream = stream_.get();
   const float3 background =
       make_float3(request.background.x, request.background.y, request.background.z);
-  launch_blend({shape_, m.records.get(), lists_, m.tasks.get(), m.queue.get(), background,
-                m.rgb.get(), m.slice_pixels.get(), m.consumed.get(), m.slice_transmittance.get(),
-                m.reach.get(), m.counts.get(), settings_.count_pairs, blend_warps_},
-               stream);
+  const PixelPlace* pixels = turned_ ? m.pixels.get() : nullptr;
+  const std::uint32_t* pixel_count = turned_ ? m.pixel_count.get() : nullptr;
+  std::uint32_t* reach = m.reach[1 - last_reach_].get();
+  launch_blend(
+      {shape_, m.records.get(), lists_, m.tasks.get(), m.queue.get(), background, m.rgb.get(),
+       pixels, pixel_count, m.slice_pixels.get(), m.consumed.get(), m.slice_transmittance.get(),
+       reach, m.counts.get(), settings_.count_pairs, blend_warps_},
+      stream);
   launch_composite({shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(),
-                    m.consumed.get(), background, m.rgb.get(), m.reach.get()},
+                    m.consumed.get(), pixels, pixel_count, background, m.rgb.get(), reach},
                    stream);
   mark(Stage::blend);
 }
@@ -291,11 +358,20 @@ std::vector<std::uint32_t> CudaView::tile_loads() const {
   check(cudaMemcpy(copy.data(), ranges, copy.size() * sizeof(uint2), cudaMemcpyDeviceToHost),
         "tile loads");
   std::vector<std::uint32_t> loads;
-  for (const uint2& range : copy) loads.push_back(range.y - range.x);
+  for (int y = 0; y < shape_.tiles_y; ++y) {
+    for (int x = 0; x < shape_.tiles_x; ++x) {
+      const int x_px = shape_.first_x_px + x * tile_size_px;
+      const int y_px = shape_.first_y_px + y * tile_size_px;
+      const uint2& range = copy[static_cast<std::size_t>(y * shape_.tiles_x + x)];
+      const bool in_image =
+          x_px >= 0 && y_px >= 0 && x_px < shape_.width_px && y_px < shape_.height_px;
+      if (in_image) loads.push_back(range.y - range.x);
+    }
+  }
   return loads;
 }
 
-FrameView CudaView::finished(const FramePlan& plan) {
+FrameView CudaView::finished(const FramePlan& plan, float near_z) {
   const FrameCounts& counts = *memory_.host_counts.get();
   FrameView frame;
   frame.format = settings_.format;
@@ -327,7 +403,11 @@ FrameView CudaView::finished(const FramePlan& plan) {
     stats.displacement_px = std::bit_cast<float>(counts.displacement);
   stats.nearest_depth = counts.nearness == 0 ? std::numeric_limits<float>::infinity()
                                              : std::bit_cast<float>(~counts.nearness);
-  nearest_depth_ = stats.nearest_depth;
+  if (counts.sampled > 0) {
+    const double inverse = static_cast<double>(counts.inverse_depths) / counts.sampled;
+    stats.mean_inverse_depth = static_cast<float>(inverse / (near_z * inverse_depth_scale));
+  }
+  depths_ = {stats.nearest_depth, stats.mean_inverse_depth};
   cudaEvent_t before = start_.get();
   for (std::size_t i = 0; i < stage_count; ++i) {
     check(cudaEventElapsedTime(&stats.stage_ms[i], before, after_[i].get()), "stage time");

@@ -6,9 +6,11 @@
 #include "render_core/cuda/frame_memory.cuh"
 #include "render_core/cuda/frame_room.h"
 #include "render_core/cuda/splat.cuh"
+#include "render_core/cuda/split.cuh"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/motion/frame_groups.h"
+#include "render_core/motion/list_culler.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/clusters.h"
 
@@ -27,19 +29,22 @@ class CudaView final : public View {
   }
 
  private:
-  void set_shape(glm::ivec2 size_px);
-  void make_room(glm::ivec2 size_px);
+  void set_shape(glm::ivec2 size_px, const TileGrid& grid);
+  void make_room(glm::ivec2 size_px, const TileGrid& grid);
   bool needs_more_room();
   void forget_frames();
   void draw_key(const FrameRequest& request, const FramePlan& plan);
-  void draw_sub(const FrameRequest& request);
+  void draw_sub(const FrameRequest& request, const FramePlan& plan);
   void draw_vanilla(const FrameRequest& request);
-  void list_tiles(const FrameCameras& cameras, const ClusterCuller (&cullers)[2], bool sweeps,
+  void list_tiles(const FrameCameras& cameras, const ListCuller& culler, bool sweeps,
                   float min_depth);
-  void split(uint2* runs);
+  void split(uint2* runs, const LastReach& last);
+  void place_tiles(const FramePlan& plan);
+  [[nodiscard]] LastReach last_reach() const;
+  void remember_reach(const Homography<double>& list_from_frame);
   void blend(const FrameRequest& request);
   void deliver();
-  [[nodiscard]] FrameView finished(const FramePlan& plan);
+  [[nodiscard]] FrameView finished(const FramePlan& plan, float near_z);
   [[nodiscard]] std::uint32_t slice_length() const;
   void mark(Stage stage);
 
@@ -61,8 +66,14 @@ class CudaView final : public View {
   FrameGroups groups_;
   std::uint32_t* lists_ = nullptr;  // [list_bound], slots by tile
   bool odd_sub_frame_ = false;
-  float nearest_depth_ = 0.0f;
+  SceneDepths depths_;
+  bool turned_ = false;  // the frame's tiles are runs of pixels
+
+  // What the last frame looked at: the reach of its tiles, and how they lay in its picture.
   bool reach_known_ = false;
+  int last_reach_ = 0;  // of FrameMemory::reach
+  FrameShape last_shape_;
+  Homography<double> last_list_from_frame_{};
 };
 
 }  // namespace catgs::cuda

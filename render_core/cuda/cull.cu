@@ -19,10 +19,8 @@ constexpr int blocks_per_processor = 8;
 
 struct InSight {
   const Cluster* clusters;
-  ClusterCuller now, end;
-  __device__ bool operator()(std::uint32_t c) const {
-    return !outside_on_the_way(now, end, clusters[c]);
-  }
+  ListCuller culler;
+  __device__ bool operator()(std::uint32_t c) const { return !culler.outside(clusters[c]); }
 };
 
 template <bool sweeps>
@@ -85,10 +83,9 @@ cudaError_t sum_seen(void* scratch, std::size_t& bytes, const Seen& seen, std::u
 std::uint32_t cull_words(std::uint32_t cluster_count) { return cluster_count * warps; }
 
 std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
-  const ClusterCuller any(make_camera(Pose{}, {1, 1}, 1.0f));
+  const ListCuller any(make_camera(Pose{}, {1, 1}, 1.0f), {});
   std::size_t select = 0, sum = 0;
-  check(select_clusters(nullptr, select, {nullptr, any, any}, nullptr, nullptr, cluster_count,
-                        nullptr),
+  check(select_clusters(nullptr, select, {nullptr, any}, nullptr, nullptr, cluster_count, nullptr),
         "cull scratch size");
   check(sum_seen(nullptr, sum, {nullptr, nullptr}, nullptr, cluster_count, nullptr),
         "cull scratch size");
@@ -99,7 +96,7 @@ void launch_cull(const CullParams& p, cudaStream_t stream) {
   const std::uint32_t count = p.scene.cluster_count;
   if (count == 0) return;
   std::size_t bytes = p.scratch.bytes;
-  check(select_clusters(p.scratch.memory, bytes, {p.scene.clusters, p.now, p.end}, p.clusters,
+  check(select_clusters(p.scratch.memory, bytes, {p.scene.clusters, p.culler}, p.clusters,
                         &p.counts->clusters, count, stream),
         "cull clusters");
   const std::uint32_t blocks =

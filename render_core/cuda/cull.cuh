@@ -3,7 +3,7 @@
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
-#include "render_core/scene/clusters.h"
+#include "render_core/motion/list_culler.h"
 
 namespace catgs::cuda {
 
@@ -12,7 +12,7 @@ namespace catgs::cuda {
 /// cost of the rest follows what is in sight, not the size of the scene.
 struct CullParams {
   SceneArrays scene;
-  ClusterCuller now, end;  // the same without a window
+  ListCuller culler;
   FrameCameras camera;
   bool sweeps;
   FrameShape shape;

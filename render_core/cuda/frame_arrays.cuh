@@ -34,7 +34,9 @@ struct FrameCounts {
   std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float
   // Of the frame.
   std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
-  std::uint32_t list_max = 0;  // longest tile list
+  std::uint32_t sampled = 0;   // counted Gaussians of which inverse_depths is the sum
+  unsigned long long inverse_depths = 0;     // in units of 1 / (near_z * inverse_depth_scale)
+  std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
   std::uint32_t runs = 0;                    // of the reorder stage
   std::uint32_t wanted_slices = 0;           // of long tiles; allocated_slices found room
@@ -44,13 +46,18 @@ struct FrameCounts {
   unsigned long long blended_pairs = 0;     // only when counted
 };
 
-/// Tiles of the image and the bounds of the frame's buffers.
+/// The picture, the grid of tile lists (see TileGrid) and the bounds of the frame's buffers.
 struct FrameShape {
   int width_px = 0, height_px = 0;
   int tiles_x = 0, tiles_y = 0;
-  std::uint32_t visible_bound = 0;  // room for visible Gaussians
-  std::uint32_t list_bound = 0;     // room for list entries
-  std::uint32_t slice_bound = 0;    // room for slices of long tiles
+  int first_x_px = 0, first_y_px = 0;         // where tile (0, 0) begins in the lists' image plane
+  int list_width_px = 0, list_height_px = 0;  // where lists end, from there
+  int shown_x_px = 0, shown_y_px = 0;         // where tile (0, 0) begins in the picture
+  int tile_parts = 0;                         // parts of a tile that slices have room for
+  std::uint32_t tile_bound = 0;               // room for tiles
+  std::uint32_t visible_bound = 0;            // room for visible Gaussians
+  std::uint32_t list_bound = 0;               // room for list entries
+  std::uint32_t slice_bound = 0;              // room for slices of long tiles
 
   __host__ __device__ std::uint32_t tiles() const {
     return static_cast<std::uint32_t>(tiles_x) * static_cast<std::uint32_t>(tiles_y);
@@ -58,6 +65,9 @@ struct FrameShape {
 };
 
 constexpr int warp_size = 32;
+
+/// near_z / depth as an integer; a warp's sum fits in 32 bits.
+constexpr float inverse_depth_scale = 1 << 20;
 
 constexpr std::uint32_t blocks_for(std::uint32_t threads, std::uint32_t block_size) {
   return (threads + block_size - 1) / block_size;

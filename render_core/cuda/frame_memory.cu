@@ -7,6 +7,11 @@
 
 namespace catgs::cuda {
 
+bool turns_tiles(const ViewSettings& settings) {
+  return settings.pipeline == Pipeline::catgs && settings.speculation.initial_window > 0 &&
+         settings.speculation.grid == GridKind::warp;
+}
+
 void FrameMemory::reserve(const FrameShape& shape, std::uint32_t cluster_count,
                           const ViewSettings& settings) {
   clusters.reserve(cluster_count);
@@ -28,15 +33,19 @@ void FrameMemory::reserve(const FrameShape& shape, std::uint32_t cluster_count,
     tile[i].reserve(shape.list_bound);
     slot[i].reserve(shape.list_bound);
   }
-  range.reserve(shape.tiles());
+  range.reserve(shape.tile_bound);
   tasks.reserve(task_bound(shape));
   queue.reserve(queue_bound(shape));
-  tile_slices.reserve(shape.tiles());
+  tile_slices.reserve(shape.tile_bound);
   const std::size_t slices = shape.slice_bound;
-  consumed.reserve(slices * parts_per_tile);
-  slice_transmittance.reserve(slices * parts_per_tile);
-  slice_pixels.reserve(slices * tile_size_px * tile_size_px);
-  reach.reserve(shape.tiles());
+  consumed.reserve(slices * static_cast<unsigned>(shape.tile_parts));
+  slice_transmittance.reserve(slices * static_cast<unsigned>(shape.tile_parts));
+  slice_pixels.reserve(slices * run_bound_px(shape));
+  for (auto& of_frame : reach) of_frame.reserve(shape.tile_bound);
+  if (turns_tiles(settings)) {
+    pixels.reserve(static_cast<std::size_t>(shape.tile_bound) * run_bound_px(shape));
+    pixel_count.reserve(shape.tile_bound);
+  }
   scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(cluster_count)));
   reserve_image(shape, settings);
 }
@@ -58,8 +67,9 @@ std::size_t FrameMemory::bytes() const {
   return clusters.bytes() + cull_mask.bytes() + cull_seen.bytes() + cull_before.bytes() +
          visible.bytes() + tasks.bytes() + queue.bytes() + tile_slices.bytes() + spans.bytes() +
          path.bytes() + runs.bytes() + consumed.bytes() + slice_transmittance.bytes() +
-         slice_pixels.bytes() + reach.bytes() + records.bytes() + tile_count.bytes() +
-         first.bytes() + depth[0].bytes() + depth[1].bytes() + order[0].bytes() + order[1].bytes() +
+         slice_pixels.bytes() + reach[0].bytes() + reach[1].bytes() + pixels.bytes() +
+         pixel_count.bytes() + records.bytes() + tile_count.bytes() + first.bytes() +
+         depth[0].bytes() + depth[1].bytes() + order[0].bytes() + order[1].bytes() +
          tile[0].bytes() + tile[1].bytes() + slot[0].bytes() + slot[1].bytes() + range.bytes() +
          counts.bytes() + scratch.bytes() + rgb.bytes() + i420.bytes();
 }

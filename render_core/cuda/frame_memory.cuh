@@ -8,6 +8,9 @@
 
 namespace catgs::cuda {
 
+/// Whether sub-frames of a View find their tiles by launch_pixel_runs().
+bool turns_tiles(const ViewSettings& settings);
+
 /// All device memory of a View, sized by a FrameShape. Buffers grow between frames.
 struct FrameMemory {
   DeviceBuffer<std::uint32_t> clusters, cull_mask, cull_seen, cull_before, visible;
@@ -19,7 +22,10 @@ struct FrameMemory {
   DeviceBuffer<std::uint32_t> tile[2], slot[2];
   DeviceBuffer<uint2> range;
   DeviceBuffer<BlendTask> tasks;
-  DeviceBuffer<std::uint32_t> queue, consumed, reach;
+  DeviceBuffer<std::uint32_t> queue, consumed;
+  DeviceBuffer<std::uint32_t> reach[2];  // of this frame and the last
+  DeviceBuffer<PixelPlace> pixels;
+  DeviceBuffer<std::uint32_t> pixel_count;
   DeviceBuffer<uint2> tile_slices, runs;
   DeviceBuffer<float> slice_transmittance;
   DeviceBuffer<float4> slice_pixels;

@@ -5,11 +5,16 @@
 
 namespace catgs::cuda {
 
+/// Tiles may lie partly or wholly outside.
+__device__ inline bool in_picture(const FrameShape& shape, int x_px, int y_px) {
+  return x_px >= 0 && y_px >= 0 && x_px < shape.width_px && y_px < shape.height_px;
+}
+
 /// Shows a blended pixel over its background. `rgb`: [height][width][3], display-referred, in
-/// [0, 1]. Pixels of edge tiles that lie outside the image go nowhere.
+/// [0, 1]. Pixels outside the picture go nowhere.
 __device__ inline void show_pixel(float* rgb, const FrameShape& shape, int x_px, int y_px,
                                   const math::PixelState<float>& pixel, float3 background) {
-  if (x_px >= shape.width_px || y_px >= shape.height_px) return;
+  if (!in_picture(shape, x_px, y_px)) return;
   const auto shown = math::resolve<float>(pixel, {background.x, background.y, background.z});
   float* out = rgb + 3 * (static_cast<std::size_t>(y_px) * shape.width_px + x_px);
   out[0] = shown.x;

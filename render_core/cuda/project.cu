@@ -15,6 +15,21 @@ __device__ void raise(std::uint32_t* target, std::uint32_t value) {
     atomicMax(target, largest);
 }
 
+// The mean depth is that of a part of the blocks: it needs no more, and their sums meet in one
+// place.
+constexpr unsigned sampled_blocks = 16;
+
+__device__ void add_inverse_depth(const ProjectParams& p, bool counted, float depth) {
+  const unsigned lanes = __activemask();
+  const auto share =
+      counted ? static_cast<unsigned>(inverse_depth_scale * p.camera.near_z / depth) : 0u;
+  const unsigned sum = __reduce_add_sync(lanes, share);
+  const unsigned count = __reduce_add_sync(lanes, counted ? 1u : 0u);
+  if (static_cast<int>(threadIdx.x % warp_size) != __ffs(static_cast<int>(lanes)) - 1) return;
+  atomicAdd(&p.counts->inverse_depths, static_cast<unsigned long long>(sum));
+  atomicAdd(&p.counts->sampled, count);
+}
+
 template <Listing listing>
 __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams p) {
   const std::uint32_t v = blockIdx.x * block_size + threadIdx.x;
@@ -32,9 +47,11 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const auto colour =
       shade(sh, p.scene.sh_degree, math::view_direction<float>(now.position, centre.mean));
   p.records[v] = make_record(splat.centre_px, splat.whitening, splat.log2_opacity, colour);
-  p.depth_key[v] = depth_key(splat.depth, now.near_z);
-  const bool counted = splat.in_view && splat.depth > p.min_depth;
+  p.depth_key[v] = depth_key(splat.depth, p.camera.near_z);
+  const bool listed = listing == Listing::none || splat.in_view;
+  const bool counted = listed && splat.depth > p.min_depth;
   raise(&p.counts->nearness, counted ? ~__float_as_uint(splat.depth) : 0u);
+  if (blockIdx.x % sampled_blocks == 0) add_inverse_depth(p, counted, splat.depth);
   if constexpr (listing != Listing::none) {
     TileSpans spans{};
     std::uint32_t tiles = 0;

@@ -2,6 +2,7 @@
 
 #include "render_core/cuda/gaussian.cuh"
 #include "render_core/cuda/tiles.cuh"
+#include "render_core/math/growth-inl.h"
 #include "render_core/math/sweep-inl.h"
 
 namespace catgs::cuda {
@@ -17,10 +18,14 @@ inline CameraPair make_camera_pair(const Camera& camera) {
   return {math::convert<float>(precise), precise};
 }
 
-/// The camera of a frame, and where its window ends (the same, when it has none).
+/// The camera of a frame and, for listing, where its window ends (the same, when it has none) and
+/// what else lists have to cover.
 struct FrameCameras {
-  CameraPair now;
+  CameraPair now;  // its near_z is where lists begin
   math::CameraModel<float> end;
+  float near_z;  // of what is drawn now
+  ListGrowth<float> growth{};
+  float2 trail_shift_px{};  // trails are that much longer
 };
 
 /// Logarithm of an opacity that reaches nothing.
@@ -32,8 +37,8 @@ struct Splat {
   math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
   float log2_opacity = never;
   float depth = 0.0f;
-  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, {}};
-  bool in_view = false;  // its box, or that of its path, meets the image
+  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, 0.0f, {}};
+  bool in_view = false;  // its box, or that of its path, meets what lists cover
 };
 
 /// With `sweeps`, splats that are in view at some time of the window; else those that are now.
@@ -45,31 +50,42 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const math::Vec3<float>& mean = centre.mean;
   out.depth = static_cast<float>(math::view_depth(camera.now.precise, math::convert<double>(mean)));
   const float reach = math::reach_of(centre.log2_opacity);
-  const bool in_front = out.depth > now.near_z;
-  const bool candidate = in_front || (sweeps && math::view_depth(camera.end, mean) > now.near_z);
+  const bool in_front = out.depth > camera.near_z;
+  const float end_depth = sweeps ? math::view_depth(camera.end, mean) : out.depth;
+  const bool candidate = out.depth > now.near_z || end_depth > now.near_z;
   if (!candidate || reach < 0.0f) return out;
 
   const math::CovarianceFactor<float> factor = load_factor(scene, i);
   math::Sweep<float> s{};
+  math::Vec2<float> half;
+  float grow = 0.0f;
   if (sweeps) {
     s = math::sweep(now, camera.end, mean, factor, out.depth);
+    s.displacement.x += camera.trail_shift_px.x;
+    s.displacement.y += camera.trail_shift_px.y;
+    half = math::half_extent(s.outline, reach);
+    const math::Vec2<float> slope{
+        (s.shape.centre_px.x - now.principal_point_px.x) / now.focal_px.x,
+        (s.shape.centre_px.y - now.principal_point_px.y) / now.focal_px.y};
+    grow = math::growth_px(camera.growth, slope, fmaxf(fminf(out.depth, end_depth), now.near_z),
+                           hypotf(half.x, half.y));
   } else {
     s.shape = math::project(now, mean, factor, out.depth);
+    half = math::half_extent(s.shape, reach);
   }
-  const math::Vec2<float> half =
-      sweeps ? math::half_extent(s.outline, reach) : math::half_extent(s.shape, reach);
   const float step_x = 0.5f * s.displacement.x, step_y = 0.5f * s.displacement.y;
-  const float x = s.shape.centre_px.x + step_x, y = s.shape.centre_px.y + step_y;
-  const float wide = half.x + fabsf(step_x), high = half.y + fabsf(step_y);
-  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.width_px) ||
-      y - high > static_cast<float>(shape.height_px)) {
+  const float x = s.shape.centre_px.x + step_x - static_cast<float>(shape.first_x_px);
+  const float y = s.shape.centre_px.y + step_y - static_cast<float>(shape.first_y_px);
+  const float wide = half.x + fabsf(step_x) + grow, high = half.y + fabsf(step_y) + grow;
+  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.list_width_px) ||
+      y - high > static_cast<float>(shape.list_height_px)) {
     return out;
   }
   out.in_view = true;
   out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
   out.whitening = math::whitening(s.shape);
   if (in_front) out.log2_opacity = centre.log2_opacity;
-  out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, {}};
+  out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, grow, {}};
   return out;
 }
 

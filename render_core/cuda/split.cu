@@ -14,6 +14,8 @@ constexpr std::uint32_t most_slices_per_tile = 1024;
 /// How a tile is cut.
 struct Cut {
   uint2 range;
+  bool seen;               // it has pixels in the picture
+  std::uint32_t reach;     // what it looked at last
   std::uint32_t expected;  // list entries that it will look at
   std::uint32_t slices;    // of these
   std::uint32_t reserve;   // slices of what lies behind them
@@ -21,19 +23,46 @@ struct Cut {
   __device__ std::uint32_t listed() const { return range.y - range.x; }
   /// Slices that need room: a whole tile needs none.
   __device__ std::uint32_t stored() const { return slices + reserve > 1 ? slices + reserve : 0; }
-  __device__ Cut without_reserve() const { return {range, expected, slices, 0}; }
-  __device__ Cut whole() const { return {range, listed(), 1, 0}; }
+  __device__ Cut without_reserve() const { return {range, seen, reach, expected, slices, 0}; }
+  __device__ Cut whole() const {
+    return {range, seen, reach, seen ? listed() : 0, seen ? 1u : 0u, 0};
+  }
 };
 
+/// What the tile, or the one that showed its middle, looked at in the last frame; all ones: not
+/// known.
+__device__ std::uint32_t last_reach(const SplitParams& p, std::uint32_t t) {
+  const LastReach& last = p.last;
+  if (last.reach == nullptr) return ~0u;
+  if (last.same_grid) return last.reach[t];
+  constexpr float middle = 0.5f * tile_size_px;
+  const int x = static_cast<int>(t) % p.shape.tiles_x, y = static_cast<int>(t) / p.shape.tiles_x;
+  const auto at = math::apply<float>(
+      last.list_from_frame, {static_cast<float>(p.shape.shown_x_px + x * tile_size_px) + middle,
+                             static_cast<float>(p.shape.shown_y_px + y * tile_size_px) + middle});
+  constexpr float tile = tile_size_px;
+  const int last_x = static_cast<int>((at.x - static_cast<float>(last.first_x_px)) / tile);
+  const int last_y = static_cast<int>((at.y - static_cast<float>(last.first_y_px)) / tile);
+  return last.reach[min(max(last_y, 0), last.tiles_y - 1) * last.tiles_x +
+                    min(max(last_x, 0), last.tiles_x - 1)];
+}
+
+__device__ bool is_seen(const SplitParams& p, std::uint32_t t) {
+  if (p.pixel_count != nullptr) return p.pixel_count[t] > 0;
+  const int x = p.shape.shown_x_px + static_cast<int>(t) % p.shape.tiles_x * tile_size_px;
+  const int y = p.shape.shown_y_px + static_cast<int>(t) / p.shape.tiles_x * tile_size_px;
+  return x > -tile_size_px && y > -tile_size_px && x < p.shape.width_px && y < p.shape.height_px;
+}
+
 __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
-  Cut cut{p.range[t], 0, 1, 0};
+  Cut cut{p.range[t], is_seen(p, t), last_reach(p, t), 0, 0, 0};
   cut = cut.whole();
-  if (!p.split) return cut;
+  if (!p.split || !cut.seen) return cut;
   const std::uint32_t length =
       p.slice_length > 0
           ? p.slice_length
           : max(shortest_slice, min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles());
-  const std::uint32_t reach = p.reach[t];
+  const std::uint32_t reach = cut.reach;
   if (reach < cut.listed()) cut.expected = min(cut.listed(), reach + reach / 4 + 2 * warp_size);
   if (cut.expected > 2 * length)
     cut.slices = min((cut.expected + length - 1) / length, most_slices_per_tile);
@@ -107,8 +136,8 @@ __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cu
   for (std::uint32_t s = 0; s < slices; ++s) {
     p.tasks[first_task + s] = {t, begin_of(s), s + 1 == slices ? cut.range.y : begin_of(s + 1),
                                static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(slices)};
-    for (int part = 0; part < parts_per_tile && slices > 1; ++part)
-      p.slice_transmittance[(first + s) * parts_per_tile + part] = 1.0f;
+    for (int part = 0; part < p.shape.tile_parts && slices > 1; ++part)
+      p.slice_transmittance[slice_part(p.shape, first + s, part)] = 1.0f;
     const bool in_last = s >= cut.slices || s + 1 >= queue_classes;
     const std::uint32_t c = in_last ? queue_classes - 1 : s;
     const std::uint32_t earlier = in_last ? s - min(cut.slices, queue_classes - 1u) : 0;
@@ -171,12 +200,49 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
   if (!present) return;
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) place[c] += queued[c];
-  p.reach[t] = 0;
+  p.reach[t] = cut.seen ? 0 : cut.reach;
   p.tile_slices[t] = make_uint2(first, cut.stored());
   write_tasks(p, t, cut, first, place);
 }
 
 constexpr int composite_block = tile_size_px * tile_size_px;
+
+/// A pixel of a tile: where it is in the picture, and the part that it was blended in.
+struct TilePixel {
+  int x_px, y_px, part;
+};
+
+__device__ TilePixel square_pixel(const CompositeParams& p, int tile, int in_tile) {
+  const int x = in_tile % tile_size_px, y = in_tile / tile_size_px;
+  return {p.shape.shown_x_px + tile % p.shape.tiles_x * tile_size_px + x,
+          p.shape.shown_y_px + tile / p.shape.tiles_x * tile_size_px + y,
+          y / part_size_px * (tile_size_px / part_size_px) + x / part_size_px};
+}
+
+__device__ TilePixel run_pixel(const CompositeParams& p, int tile, int in_tile) {
+  const PixelPlace place =
+      p.pixels[static_cast<std::size_t>(tile) * run_bound_px(p.shape) + in_tile];
+  return {place.x, place.y, in_tile / part_pixels};
+}
+
+/// Folds one pixel's slices and shows it. Returns one past the last entry that it looked at.
+__device__ std::uint32_t fold(const CompositeParams& p, uint2 slices, int in_tile,
+                              const TilePixel& at) {
+  math::PixelState<float> pixel = math::empty_pixel<float>();
+  std::uint32_t looked_at = 0;
+  for (std::uint32_t s = slices.x; s < slices.x + slices.y; ++s) {
+    const float4 slice = p.slice_pixels[slice_pixel(p.shape, s, in_tile)];
+    pixel.colour.x += pixel.transmittance * slice.x;
+    pixel.colour.y += pixel.transmittance * slice.y;
+    pixel.colour.z += pixel.transmittance * slice.z;
+    pixel.transmittance *= fabsf(slice.w);
+    looked_at = p.consumed[slice_part(p.shape, s, at.part)];
+    const bool finished = signbit(slice.w);
+    if (finished || pixel.transmittance < static_cast<float>(transmittance_min)) break;
+  }
+  show_pixel(p.rgb, p.shape, at.x_px, at.y_px, pixel, p.background);
+  return looked_at;
+}
 
 __global__ void __launch_bounds__(composite_block) composite_kernel(const CompositeParams p) {
   using Reduce = cub::BlockReduce<std::uint32_t, composite_block>;
@@ -184,27 +250,18 @@ __global__ void __launch_bounds__(composite_block) composite_kernel(const Compos
   const std::uint32_t tile = blockIdx.x;
   const uint2 slices = p.tile_slices[tile];
   if (slices.y == 0) return;
-  const int in_tile_x = static_cast<int>(threadIdx.x) % tile_size_px;
-  const int in_tile_y = static_cast<int>(threadIdx.x) / tile_size_px;
-  const int part = part_of(in_tile_x, in_tile_y);
-  math::PixelState<float> pixel = math::empty_pixel<float>();
+  const int index = static_cast<int>(tile), thread = static_cast<int>(threadIdx.x);
   std::uint32_t looked_at = 0;
-  for (std::uint32_t s = slices.x; s < slices.x + slices.y; ++s) {
-    const float4 slice = p.slice_pixels[slice_pixel(s, in_tile_x, in_tile_y)];
-    pixel.colour.x += pixel.transmittance * slice.x;
-    pixel.colour.y += pixel.transmittance * slice.y;
-    pixel.colour.z += pixel.transmittance * slice.z;
-    pixel.transmittance *= fabsf(slice.w);
-    looked_at = p.consumed[s * parts_per_tile + part];
-    const bool finished = signbit(slice.w);
-    if (finished || pixel.transmittance < static_cast<float>(transmittance_min)) break;
+  if (p.pixels == nullptr) {
+    looked_at = fold(p, slices, thread, square_pixel(p, index, thread));
+  } else {
+    const int count = static_cast<int>(p.pixel_count[tile]);
+    for (int k = thread; k < count; k += composite_block)
+      looked_at = max(looked_at, fold(p, slices, k, run_pixel(p, index, k)));
   }
   looked_at =
       Reduce(scratch).Reduce(looked_at, [](std::uint32_t a, std::uint32_t b) { return max(a, b); });
-  if (threadIdx.x == 0) p.reach[tile] = looked_at - p.tasks[p.shape.tiles() + slices.x].first;
-  show_pixel(p.rgb, p.shape, static_cast<int>(tile) % p.shape.tiles_x * tile_size_px + in_tile_x,
-             static_cast<int>(tile) / p.shape.tiles_x * tile_size_px + in_tile_y, pixel,
-             p.background);
+  if (thread == 0) p.reach[tile] = looked_at - p.tasks[p.shape.tiles() + slices.x].first;
 }
 
 }  // namespace

@@ -1,8 +1,19 @@
 #pragma once
 
 #include "render_core/cuda/blend.cuh"
+#include "render_core/math/homography-inl.h"
 
 namespace catgs::cuda {
+
+/// What tiles looked at in the View's last frame, and the grid that they were of.
+struct LastReach {
+  const std::uint32_t* reach = nullptr;  // [tiles]; null: not known
+  bool same_grid = false;
+  // Else: from this picture's pixels to the plane of the last lists.
+  Homography<float> list_from_frame{};
+  int first_x_px = 0, first_y_px = 0;
+  int tiles_x = 0, tiles_y = 0;
+};
 
 /// Cuts long tile lists into slices of about the mean length (paper 3.4, Algorithm 1): with l the
 /// mean, a tile longer than 2 l becomes ceil(length / l) tasks of equal length.
@@ -13,20 +24,23 @@ namespace catgs::cuda {
 /// slices that are drawn last: most find then that nothing shines through what lies before them.
 /// For the same reason all first slices are queued before all second ones, and so on.
 /// The mean is the last frame's too, so that nothing waits for this one's. Where slices find no
-/// room, blocks of tiles go without, first without those of the rest.
+/// room, blocks of tiles go without, first without those of the rest. Tiles without a pixel in the
+/// picture have no task.
 struct SplitParams {
   FrameShape shape;
-  const uint2* range;          // [tiles]
-  std::uint32_t* reach;        // [tiles], of the last frame (all ones: not known); zeroed here
-  BlendTask* tasks;            // [task_bound(shape)]
-  uint2* tile_slices;          // [tiles], first slice and how many; none: one task
-  std::uint32_t* queue;        // [queue_bound(shape)], see FrameCounts
-  uint2* runs;                 // [run_bound], for the reorder stage; null: it does not follow
-  std::uint32_t run_shift;     // how much shorter a tile's first run is
-  float* slice_transmittance;  // [slice_bound][parts_per_tile], set to 1
-  FrameCounts* counts;         // what split makes is set, and list_max
-  std::uint32_t slice_length;  // l; 0: not known, the mean list is taken
-  bool split;                  // else every tile is one task
+  const uint2* range;  // [tiles]
+  LastReach last;
+  std::uint32_t* reach;              // [tiles], zeroed here; of tiles that are not seen, kept
+  const std::uint32_t* pixel_count;  // [tiles]; null: tiles are squares in the picture
+  BlendTask* tasks;                  // [task_bound(shape)]
+  uint2* tile_slices;                // [tiles], first slice and how many; none: one task
+  std::uint32_t* queue;              // [queue_bound(shape)], see FrameCounts
+  uint2* runs;                       // [run_bound], for the reorder stage; null: it does not follow
+  std::uint32_t run_shift;           // how much shorter a tile's first run is
+  float* slice_transmittance;        // [slice_bound][tile_parts], set to 1
+  FrameCounts* counts;               // what split makes is set, and list_max
+  std::uint32_t slice_length;        // l; 0: not known, the mean list is taken
+  bool split;                        // else every tile is one task
 };
 void launch_split(const SplitParams& params, cudaStream_t stream);
 
@@ -34,21 +48,21 @@ void launch_split(const SplitParams& params, cudaStream_t stream);
 constexpr std::uint32_t shortest_slice = 4 * warp_size;
 
 inline std::uint32_t task_bound(const FrameShape& shape) {
-  return shape.tiles() + shape.slice_bound;
+  return shape.tile_bound + shape.slice_bound;
 }
 
 /// Room for the queue: a place a tile in all classes but the last.
 inline std::uint32_t queue_bound(const FrameShape& shape) {
-  return (queue_classes - 1) * shape.tiles() + shape.slice_bound;
+  return (queue_classes - 1) * shape.tile_bound + shape.slice_bound;
 }
 
 /// Slices that are worth their pixels: what the paper's rule can ask for, and as much again.
-inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tiles(); }
+inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tile_bound; }
 
 /// List entries that one warp of the reorder stage takes; the last run of a tile may be shorter.
 constexpr std::uint32_t reorder_run = 512;
 inline std::uint32_t run_bound(const FrameShape& shape) {
-  return 2 * shape.tiles() + shape.list_bound / reorder_run;
+  return 2 * shape.tile_bound + shape.list_bound / reorder_run;
 }
 
 /// Folds the slices of split tiles front to back:
@@ -59,6 +73,8 @@ struct CompositeParams {
   const uint2* tile_slices;
   const float4* slice_pixels;
   const std::uint32_t* consumed;
+  const PixelPlace* pixels;  // as in BlendParams
+  const std::uint32_t* pixel_count;
   float3 background;
   float* rgb;
   std::uint32_t* reach;  // of split tiles is set

@@ -12,7 +12,8 @@ struct __align__(16) SplatPath {
   float dx, dy;                      // px, from the record's centre
   math::Whitening<float> whitening;  // of the outline
   float log2_opacity;                // the record has none while the splat is behind the near plane
-  float unused[2];
+  float grow_px;                     // by which the outline is widened
+  float unused;
 };
 static_assert(sizeof(SplatPath) == 32);
 
@@ -21,8 +22,9 @@ static_assert(sizeof(SplatPath) == 32);
 template <class Outline>
 struct TileFootprint {
   Outline outline;
-  float2 centre_px;
-  float slack_px;  // that boxes are moved outwards by
+  float2 centre_px;  // from the grid's corner
+  float grow_px;     // by which the outline is widened
+  float slack_px;    // by which columns and rows are, against rounding
   int first_row, last_row;
   FrameShape shape;
 
@@ -31,11 +33,13 @@ struct TileFootprint {
   __device__ int2 columns(int row) const {
     constexpr float tile = tile_size_px;
     const float top = static_cast<float>(row) * tile + 0.5f;
-    const float bottom = fminf(top + (tile - 1.0f), static_cast<float>(shape.height_px) - 0.5f);
-    const auto cut = math::columns_in_band(outline, top - centre_px.y, bottom - centre_px.y);
-    const float low = cut.low + centre_px.x - slack_px;
-    const float high = cut.high + centre_px.x + slack_px;
-    if (cut.low > cut.high || high < 0.5f || low > static_cast<float>(shape.width_px) - 0.5f) {
+    const float bottom =
+        fminf(top + (tile - 1.0f), static_cast<float>(shape.list_height_px) - 0.5f);
+    const auto cut =
+        math::columns_in_band(outline, top - grow_px - centre_px.y, bottom + grow_px - centre_px.y);
+    const float low = cut.low + centre_px.x - grow_px - slack_px;
+    const float high = cut.high + centre_px.x + grow_px + slack_px;
+    if (cut.low > cut.high || high < 0.5f || low > static_cast<float>(shape.list_width_px) - 0.5f) {
       return make_int2(0, -1);
     }
     const float first = ceilf((low - (tile - 0.5f)) * (1.0f / tile));
@@ -44,16 +48,23 @@ struct TileFootprint {
                      static_cast<int>(fminf(last, static_cast<float>(shape.tiles_x - 1))));
   }
 
-  /// Sets the rows, for an outline that covers `top`…`bottom` (px).
+  /// Sets the rows, for an outline that covers `top`…`bottom` (px, from its centre).
   __device__ void set_rows(float top, float bottom) {
     constexpr float tile = tile_size_px;
-    const float first = ceilf((top - slack_px - (tile - 0.5f)) * (1.0f / tile));
-    const float last = floorf((bottom + slack_px - 0.5f) * (1.0f / tile));
+    const float slack = grow_px + slack_px;
+    const float first = ceilf((top + centre_px.y - slack - (tile - 0.5f)) * (1.0f / tile));
+    const float last = floorf((bottom + centre_px.y + slack - 0.5f) * (1.0f / tile));
     first_row = static_cast<int>(fmaxf(first, 0.0f));
     last_row = static_cast<int>(fminf(last, static_cast<float>(shape.tiles_y - 1)));
     if (!(first <= last)) last_row = first_row - 1;
   }
 };
+
+/// From the grid's corner.
+__device__ inline float2 in_grid(float2 centre_px, const FrameShape& shape) {
+  return make_float2(centre_px.x - static_cast<float>(shape.first_x_px),
+                     centre_px.y - static_cast<float>(shape.first_y_px));
+}
 
 /// Footprint of a splat as it is now. It reaches nothing when `log2_opacity` is too low.
 __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
@@ -63,10 +74,11 @@ __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
   const math::Vec2<float> half = math::half_extent(w, fmaxf(reach, 0.0f));
   TileFootprint<math::Ellipse<float>> f;
   f.outline = math::make_ellipse(w, reach, half.x, math::rightmost_y(w, fmaxf(reach, 0.0f)));
-  f.centre_px = centre_px;
+  f.centre_px = in_grid(centre_px, shape);
+  f.grow_px = 0.0f;
   f.slack_px = slack_px;
   f.shape = shape;
-  f.set_rows(centre_px.y - half.y, centre_px.y + half.y);
+  f.set_rows(-half.y, half.y);
   if (reach < 0.0f) f.last_row = f.first_row - 1;
   return f;
 }
@@ -81,10 +93,11 @@ __device__ inline TileFootprint<math::Trail<float>> make_footprint(
   TileFootprint<math::Trail<float>> f;
   f.outline = math::make_trail(math::make_ellipse(w, reach, half_x, math::rightmost_y(w, reach)),
                                {path.dx, path.dy});
-  f.centre_px = centre_px;
+  f.centre_px = in_grid(centre_px, shape);
+  f.grow_px = path.grow_px;
   f.slack_px = slack_px;
   f.shape = shape;
-  f.set_rows(centre_px.y + f.outline.top_y, centre_px.y + f.outline.bottom_y);
+  f.set_rows(f.outline.top_y, f.outline.bottom_y);
   return f;
 }
 

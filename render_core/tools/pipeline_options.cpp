@@ -19,6 +19,12 @@ BlendOrder parse_order(std::string_view name) {
                                 {{"fresh", BlendOrder::fresh}, {"key", BlendOrder::key}});
 }
 
+GridKind parse_grid(std::string_view name) {
+  return parse_name<GridKind>(
+      "--grid", name,
+      {{"fixed", GridKind::fixed}, {"shift", GridKind::shift}, {"warp", GridKind::warp}});
+}
+
 /// An option that changes nothing would spoil a comparison unnoticed.
 void refuse_without_caches(const PipelineOptions& options) {
   const auto refuse = [&](bool given, std::string_view flag) {
@@ -30,6 +36,8 @@ void refuse_without_caches(const PipelineOptions& options) {
   refuse(options.max_trail_px.has_value(), "--max-trail-px");
   refuse(options.min_depth.has_value(), "--min-depth");
   refuse(options.max_deviation_px.has_value(), "--max-deviation-px");
+  refuse(options.grid.has_value(), "--grid");
+  refuse(options.guard_px.has_value(), "--guard-px");
   refuse(options.order.has_value(), "--order");
   refuse(options.no_cache, "--no-cache");
   refuse(options.no_colour_cache, "--no-colour-cache");
@@ -68,8 +76,16 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
   command.add_option("--min-depth", options.min_depth,
                      "catgs: nearer Gaussians do not shorten the window (2 x near plane)");
   command.add_option("--max-deviation-px", options.max_deviation_px,
-                     fmt::format("catgs: farther from the forecast a key frame is due ({})",
+                     fmt::format("catgs: farther from the forecast a key frame is due, with the "
+                                 "fixed and the shift grid ({})",
                                  defaults.max_deviation_px));
+  command.add_option("--grid", options.grid,
+                     "catgs: how tiles follow a turn of the camera: fixed, shift (by whole pixels) "
+                     "or warp (warp)");
+  command.add_option("--guard-px", options.guard_px,
+                     fmt::format("catgs: px by which lists are widened for a camera that leaves "
+                                 "its path, with the warp grid ({})",
+                                 defaults.guard_px));
   command.add_option(
       "--order", options.order,
       "catgs: sub-frames blend by fresh depths or by those of the key frame (fresh)");
@@ -85,6 +101,8 @@ ViewSettings view_settings(const PipelineOptions& options) {
   speculation.max_trail_px = options.max_trail_px.value_or(speculation.max_trail_px);
   speculation.min_depth = options.min_depth.value_or(speculation.min_depth);
   speculation.max_deviation_px = options.max_deviation_px.value_or(speculation.max_deviation_px);
+  speculation.guard_px = options.guard_px.value_or(speculation.guard_px);
+  if (options.grid) speculation.grid = parse_grid(*options.grid);
   check_speculation(speculation);
   if (options.order) settings.order = parse_order(*options.order);
   settings.colour_cache = !options.no_colour_cache;

@@ -18,6 +18,8 @@ struct PipelineOptions {
   std::optional<float> max_trail_px{};
   std::optional<float> min_depth{};
   std::optional<float> max_deviation_px{};
+  std::optional<std::string> grid{};
+  std::optional<float> guard_px{};
   std::optional<std::string> order{};
   bool no_cache = false;
   bool no_colour_cache = false;

@@ -62,9 +62,12 @@ void add_groups(const Trajectory& trace, double rate_hz, const WindowsOptions& o
   setup.view = view_settings(pipeline);
   FrameFeed feed(setup, setup.view);
   FrameGroups groups(setup.view.speculation);
+  // Depths spread evenly from the nearest to 20 times as far.
+  const SceneDepths depths{options.nearest_depth,
+                           std::log(20.0f) / (19.0f * options.nearest_depth)};
   for (std::size_t i = 0; i < setup.poses.size(); ++i) {
     const FrameRequest request = feed.next();
-    const FramePlan plan = groups.plan(request.camera, request.forecast, options.nearest_depth);
+    const FramePlan plan = groups.plan(request.camera, request.forecast, depths);
     ++sum.frames;
     if (plan.kind == FrameKind::sub) continue;
     ++sum.keys;

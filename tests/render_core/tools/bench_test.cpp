@@ -31,7 +31,7 @@ class GreyView final : public View {
     FrameStats stats;
     float grey = 0.3f + request.camera.world_from_camera.position.x;
     if (settings_.pipeline == Pipeline::catgs) {
-      const FramePlan plan = groups_.plan(request.camera, request.forecast, 100.0f);
+      const FramePlan plan = groups_.plan(request.camera, request.forecast, {100.0f, 0.01f});
       stats.kind = plan.kind;
       stats.window = plan.window;
       grey += plan.kind == FrameKind::key ? key_error : sub_error;

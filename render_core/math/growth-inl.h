@@ -1,0 +1,41 @@
+#if defined(CATGS_MATH_GROWTH_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CATGS_MATH_GROWTH_INL_H
+#undef CATGS_MATH_GROWTH_INL_H
+#else
+#define CATGS_MATH_GROWTH_INL_H
+#endif
+
+#include "render_core/math/number-inl.h"
+#include "render_core/math/plane_maps.h"
+
+CATGS_BEFORE_MATH();
+namespace catgs {
+namespace CATGS_MATH_NAMESPACE {
+
+template <class T, class S>
+CATGS_HD_INLINE ListGrowth<T> convert(const ListGrowth<S>& g) {
+  return {T(g.parallax),    T(g.curvature),   T(g.constant),    T(g.wide),
+          T(g.slope_min_x), T(g.slope_min_y), T(g.slope_max_x), T(g.slope_max_y)};
+}
+
+/// Growth in px of an outline of `radius_px` around a centre at `slope` = (x/z, y/z), whose depth
+/// does not fall below `nearest_depth` on its way (world units).
+///
+/// A camera that is tau off its path sees a point at f tau sqrt(1 + |slope|^2) / z at most from
+/// where it should be. A turn maps the image by a homography H; to first order the projection of a
+/// Gaussian follows it (chain rule), and the second order is at most 1/2 |D^2 H| radius^2.
+template <class T>
+CATGS_HD_INLINE T growth_px(const ListGrowth<T>& g, const Vec2<T>& slope, T nearest_depth,
+                            T radius_px) {
+  const T oblique = sqrt(mul_add(slope.x, slope.x, mul_add(slope.y, slope.y, T(1.0))));
+  const auto wide = (slope.x < g.slope_min_x) | (slope.x > g.slope_max_x) |
+                    (slope.y < g.slope_min_y) | (slope.y > g.slope_max_y);
+  const T by_radius = mul_add(g.curvature, radius_px, select(wide, g.wide, T(0.0)));
+  return mul_add(by_radius, radius_px, g.parallax * oblique / nearest_depth) + g.constant;
+}
+
+}  // namespace CATGS_MATH_NAMESPACE
+}  // namespace catgs
+CATGS_AFTER_MATH();
+
+#endif

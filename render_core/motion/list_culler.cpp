@@ -1,0 +1,48 @@
+#include "render_core/motion/list_culler.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "render_core/math/constants.h"
+
+namespace catgs {
+namespace {
+
+/// The camera, with the plan's grid and what that grows by on all sides as its image.
+Camera camera_of_grid(Camera camera, const FramePlan& plan) {
+  const int margin = static_cast<int>(std::ceil(plan.growth.constant));
+  const glm::ivec2 shift = glm::abs(plan.trail_shift_px);
+  camera.principal_point_px -= glm::vec2(plan.grid.first_px - margin - shift);
+  camera.size_px = plan.grid.size_px + 2 * (margin + shift);
+  camera.near_z = plan.list_near_z;
+  return camera;
+}
+
+/// Of a camera's image from its axis.
+float steepest_slope(const Camera& camera) {
+  const glm::vec2 size(camera.size_px);
+  return glm::length(glm::max(camera.principal_point_px, size - camera.principal_point_px) /
+                     camera.focal_px);
+}
+
+}  // namespace
+
+ListCuller::ListCuller(const Camera& camera, const FramePlan& plan)
+    : now_(camera_of_grid(camera, plan)),
+      end_(camera_of_grid(plan.window_end, plan)),
+      position_(camera.world_from_camera.position),
+      forward_(camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f)),
+      near_z_(plan.list_near_z),
+      focal_px_(std::max(camera.focal_px.x, camera.focal_px.y)),
+      parallax_(static_cast<float>(plan.growth.parallax) / focal_px_),
+      curvature_(static_cast<float>(plan.growth.curvature)),
+      wide_(static_cast<float>(plan.growth.wide)) {
+  const auto clamp = static_cast<float>(fov_clamp);
+  const float oblique = std::hypot(1.0f, clamp * steepest_slope(camera_of_grid(camera, plan)));
+  parallax_ *= oblique;
+  focal_px_ *= oblique;  // so that it bounds a splat's radius
+}
+
+}  // namespace catgs
