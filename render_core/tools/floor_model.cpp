@@ -7,6 +7,7 @@ namespace catgs {
 namespace {
 
 // Bytes of one.
+constexpr double shape = 32.0;      // a resident Gaussian without harmonics above degree 0
 constexpr double record = 32.0;     // a projected Gaussian, as the blend reads it
 constexpr double depth_key = 4.0;   // 24 bits of it are sorted
 constexpr double slot = 4.0;        // index of a record
@@ -20,14 +21,8 @@ constexpr double gaussians_per_cluster = 256.0;
 constexpr double bits_per_pass = 8.0;
 constexpr double depth_passes = 24.0 / bits_per_pass;
 
-/// Bytes of a resident Gaussian, and of those without the harmonics: position, rotation, scale and
-/// opacity are 11 of the 14 to 59 numbers.
+/// Of a resident Gaussian with its harmonics.
 double whole(const FrameWork& f) { return f.scene_bytes / std::max(f.gaussians, 1.0); }
-double shape(const FrameWork& f) {
-  constexpr double numbers = 11.0;
-  const double harmonics = 3.0 * (f.sh_degree + 1) * (f.sh_degree + 1);
-  return whole(f) * numbers / (numbers + harmonics);
-}
 
 double tile_passes(const FrameWork& f) {
   return std::ceil(std::ceil(std::log2(std::max(f.tiles, 2.0))) / bits_per_pass);
@@ -53,7 +48,7 @@ StageWork key_stage(Stage stage, const FrameWork& f) {
 }
 
 StageWork sub_stage(Stage stage, const FrameWork& f) {
-  if (stage == Stage::project) return {f.visible * (shape(f) + colour + record + depth_key), 0.0};
+  if (stage == Stage::project) return {f.visible * (shape + colour + record + depth_key), 0.0};
   if (stage == Stage::sort) return {f.reached_entries * (2.0 * slot + depth_key), 0.0};
   return {};
 }

@@ -20,7 +20,6 @@ struct DeviceRates {
 struct FrameWork {
   double gaussians = 0.0;
   double scene_bytes = 0.0;  // resident, of all of them
-  int sh_degree = 0;
   double visible = 0.0;
   double list_entries = 0.0;      // of a sub-frame: those of its key frame
   double reached_entries = 0.0;   // as WorkCount has it

@@ -49,7 +49,6 @@ FrameWork frame_work(const PaperCase& scene, const MeanWork& work) {
   FrameWork frame;
   frame.gaussians = static_cast<double>(setup.cloud->size());
   frame.scene_bytes = static_cast<double>(setup.made.renderer->scene_bytes());
-  frame.sh_degree = setup.cloud->sh_degree;
   frame.reached_entries = work.reached_entries;
   frame.warp_evaluations = work.warp_evaluations;
   frame.tiles = static_cast<double>(tiles.x) * tiles.y;

@@ -9,8 +9,7 @@ namespace {
 FrameWork frame() {
   FrameWork frame;
   frame.gaussians = 256e4;
-  frame.scene_bytes = 236.0 * frame.gaussians;
-  frame.sh_degree = 3;
+  frame.scene_bytes = 77.0 * frame.gaussians;
   frame.visible = 1e6;
   frame.list_entries = 1e7;
   frame.reached_entries = 4e6;
@@ -23,7 +22,7 @@ FrameWork frame() {
 double bytes(Stage stage, FrameKind kind) { return stage_work(stage, kind, frame()).bytes; }
 
 TEST(FloorModel, KeyFramesMoveWhatTheirListsNeed) {
-  EXPECT_DOUBLE_EQ(bytes(Stage::project, FrameKind::key), 1e4 * 24 + 1e6 * (236 + 32 + 4 + 4));
+  EXPECT_DOUBLE_EQ(bytes(Stage::project, FrameKind::key), 1e4 * 24 + 1e6 * (77 + 32 + 4 + 4));
   EXPECT_DOUBLE_EQ(bytes(Stage::bin, FrameKind::key), 1e6 * 36 + 1e7 * 6);
   // Three passes over depths; 13 bits of tiles are two.
   EXPECT_DOUBLE_EQ(bytes(Stage::sort, FrameKind::key), 2 * (1e6 * 8 * 3 + 1e7 * 6 * 2));
@@ -31,8 +30,7 @@ TEST(FloorModel, KeyFramesMoveWhatTheirListsNeed) {
 }
 
 TEST(FloorModel, SubFramesNeedShapesAndWhatTheyReach) {
-  // 11 of 59 numbers are no harmonics.
-  EXPECT_DOUBLE_EQ(bytes(Stage::project, FrameKind::sub), 1e6 * (44 + 6 + 32 + 4));
+  EXPECT_DOUBLE_EQ(bytes(Stage::project, FrameKind::sub), 1e6 * (32 + 6 + 32 + 4));
   EXPECT_EQ(bytes(Stage::bin, FrameKind::sub), 0.0);
   EXPECT_DOUBLE_EQ(bytes(Stage::sort, FrameKind::sub), 4e6 * 12);
   EXPECT_EQ(bytes(Stage::blend, FrameKind::sub), bytes(Stage::blend, FrameKind::key));
