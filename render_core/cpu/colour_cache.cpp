@@ -3,11 +3,6 @@
 #include <algorithm>
 #include <new>
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-
-#include "render_core/math/constants.h"
-
 namespace catgs {
 namespace {
 
@@ -25,12 +20,7 @@ ColourCache::ColourCache(std::size_t clusters)
 ClusterColours ColourCache::of_cluster(std::size_t index, const Cluster& bounds,
                                        const glm::vec3& position) {
   Shading& shading = shadings_[index];
-  const glm::vec3 from_box =
-      glm::max(glm::abs(position - bounds.centre) - bounds.half_extent, glm::vec3(0.0f));
-  const float moved = glm::distance(position, shading.position);
-  if (moved > static_cast<float>(colour_reuse_rad) * glm::length(from_box)) {
-    shading = {position, {}};
-  }
+  if (!colours_hold(bounds, shading.position, position)) shading = {position, {}};
   return {colours_.get() + index * floats_per_cluster, &shading.shaded};
 }
 

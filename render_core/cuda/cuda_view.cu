@@ -49,7 +49,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
   if (settings.pipeline == Pipeline::vanilla) return;
   const glm::ivec2 one_tile(tile_size_px);
   set_shape(one_tile, image_grid(one_tile));
-  memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
+  memory_.reserve(shape_, scene_->arrays(), settings_);
   shape_ = {};
 }
 
@@ -86,6 +86,7 @@ void CudaView::forget_frames() {
   groups_.forget();
   shape_ = {};
   reach_known_ = false;
+  colours_known_ = false;
 }
 
 void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
@@ -117,12 +118,13 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
     set_shape(size_px, grid);
     try {
       const std::uint32_t* known = memory_.reach[last_reach_].get();
-      memory_.reserve(shape_, scene_->arrays().cluster_count, settings_);
+      memory_.reserve(shape_, scene_->arrays(), settings_);
       if (memory_.reach[last_reach_].get() != known) reach_known_ = false;
       return;
     } catch (const CudaError& error) {
       memory_ = {};
       reach_known_ = false;
+      colours_known_ = false;
       const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
       if (short_of_memory && room_.retreat()) continue;
       room_ = wanted;
@@ -153,7 +155,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   const ListCuller culler(request.camera, plan);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
   turned_ = false;
-  do {
+  for (;;) {
     make_room(request.camera.size_px, plan.grid);
     const cudaStream_t stream = stream_.get();
     check(cudaEventRecord(start_.get(), stream), "event");
@@ -163,7 +165,9 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
     mark(Stage::sort);
     blend(request);
     deliver();
-  } while (needs_more_room());
+    if (!needs_more_room()) break;
+    colours_known_ = false;  // not of Gaussians that found no room
+  }
   remember_reach({});
 }
 
@@ -177,12 +181,14 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
         "counts");
   const CameraPair now = make_camera_pair(request.camera);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
+  const ColourArrays colours = want_colours(now.single);
   launch_project({scene_->arrays(),
                   {now, now.single, request.camera.near_z},
                   picture_of(shape_),
                   min_depth,
                   m.counts.get(),
                   m.visible.get(),
+                  colours,
                   m.records.get(),
                   m.depth[0].get(),
                   nullptr,
@@ -237,6 +243,24 @@ void CudaView::remember_reach(const Homography<double>& list_from_frame) {
   reach_known_ = true;
 }
 
+/// Decides which Gaussians in view are shaded for the camera.
+ColourArrays CudaView::want_colours(const math::CameraModel<float>& camera) {
+  const FrameMemory& m = memory_;
+  if (settings_.pipeline != Pipeline::catgs || !settings_.colour_cache) return {};
+  if (!colours_known_) m.colours.forget(stream_.get());
+  colours_known_ = true;
+  const ColourArrays colours = m.colours.arrays();
+  const math::Vec3<float>& at = camera.position;
+  launch_want_colours({scene_->arrays(),
+                       {at.x, at.y, at.z},
+                       m.counts.get(),
+                       m.clusters.get(),
+                       m.cull_mask.get(),
+                       colours},
+                      stream_.get());
+  return colours;
+}
+
 void CudaView::draw_vanilla(const FrameRequest& request) {
   const glm::vec3& b = request.background;
   set_shape(request.camera.size_px, image_grid(request.camera.size_px));
@@ -265,8 +289,9 @@ void CudaView::list_tiles(const FrameCameras& cameras, const ListCuller& culler,
                m.cull_seen.get(), m.cull_before.get(), m.visible.get(), m.counts.get(), scratch,
                processors_},
               stream);
+  const ColourArrays colours = want_colours(cameras.now.single);
   launch_project(
-      {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), m.records.get(),
+      {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), colours, m.records.get(),
        m.depth[0].get(), m.tile_count.get(), m.spans.get(), path, m.order[0].get()},
       sweeps ? Listing::trails : Listing::ellipses, stream);
   mark(Stage::project);

@@ -38,6 +38,7 @@ class CudaView final : public View {
   void draw_vanilla(const FrameRequest& request);
   void list_tiles(const FrameCameras& cameras, const ListCuller& culler, bool sweeps,
                   float min_depth);
+  ColourArrays want_colours(const math::CameraModel<float>& camera);
   void split(uint2* runs, const LastReach& last);
   void place_tiles(const FramePlan& plan);
   [[nodiscard]] LastReach last_reach() const;
@@ -68,6 +69,7 @@ class CudaView final : public View {
   bool odd_sub_frame_ = false;
   SceneDepths depths_;
   bool turned_ = false;  // the frame's tiles are runs of pixels
+  bool colours_known_ = false;
 
   // What the last frame looked at: the reach of its tiles, and how they lay in its picture.
   bool reach_known_ = false;

@@ -8,15 +8,19 @@
 
 namespace catgs::cuda {
 
+/// A splat's colour: its rounding alone leaves 77 dB.
+struct __align__(8) PackedColour {
+  __half2 red_green;
+  __half blue;
+  __half unused;
+};
+
 /// What blending needs of one projected Gaussian: one 32-byte sector.
-/// Colour is half precision: its rounding alone leaves 77 dB.
 struct __align__(32) SplatRecord {
   float2 centre_px;
   math::Whitening<float> whitening;
   float log2_opacity;
-  __half2 red_green;
-  __half blue;
-  __half unused;
+  PackedColour colour;
 };
 static_assert(sizeof(SplatRecord) == 32);
 

@@ -12,16 +12,17 @@ bool turns_tiles(const ViewSettings& settings) {
          settings.speculation.grid == GridKind::warp;
 }
 
-void FrameMemory::reserve(const FrameShape& shape, std::uint32_t cluster_count,
+void FrameMemory::reserve(const FrameShape& shape, const SceneArrays& scene,
                           const ViewSettings& settings) {
-  clusters.reserve(cluster_count);
-  cull_mask.reserve(cull_words(cluster_count));
-  cull_seen.reserve(cluster_count);
-  cull_before.reserve(cluster_count);
+  clusters.reserve(scene.cluster_count);
+  cull_mask.reserve(cull_words(scene.cluster_count));
+  cull_seen.reserve(scene.cluster_count);
+  cull_before.reserve(scene.cluster_count);
   visible.reserve(shape.visible_bound);
   records.reserve(shape.visible_bound);
   spans.reserve(shape.visible_bound);
   if (settings.pipeline == Pipeline::catgs) {
+    if (settings.colour_cache) colours.reserve(scene);
     path.reserve(shape.visible_bound);
     if (settings.order == BlendOrder::fresh) runs.reserve(run_bound(shape));
   }
@@ -46,7 +47,7 @@ void FrameMemory::reserve(const FrameShape& shape, std::uint32_t cluster_count,
     pixels.reserve(static_cast<std::size_t>(shape.tile_bound) * run_bound_px(shape));
     pixel_count.reserve(shape.tile_bound);
   }
-  scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(cluster_count)));
+  scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene.cluster_count)));
   reserve_image(shape, settings);
 }
 
@@ -64,12 +65,12 @@ void FrameMemory::reserve_image(const FrameShape& shape, const ViewSettings& set
 }
 
 std::size_t FrameMemory::bytes() const {
-  return clusters.bytes() + cull_mask.bytes() + cull_seen.bytes() + cull_before.bytes() +
-         visible.bytes() + tasks.bytes() + queue.bytes() + tile_slices.bytes() + spans.bytes() +
-         path.bytes() + runs.bytes() + consumed.bytes() + slice_transmittance.bytes() +
-         slice_pixels.bytes() + reach[0].bytes() + reach[1].bytes() + pixels.bytes() +
-         pixel_count.bytes() + records.bytes() + tile_count.bytes() + first.bytes() +
-         depth[0].bytes() + depth[1].bytes() + order[0].bytes() + order[1].bytes() +
+  return colours.bytes() + clusters.bytes() + cull_mask.bytes() + cull_seen.bytes() +
+         cull_before.bytes() + visible.bytes() + tasks.bytes() + queue.bytes() +
+         tile_slices.bytes() + spans.bytes() + path.bytes() + runs.bytes() + consumed.bytes() +
+         slice_transmittance.bytes() + slice_pixels.bytes() + reach[0].bytes() + reach[1].bytes() +
+         pixels.bytes() + pixel_count.bytes() + records.bytes() + tile_count.bytes() +
+         first.bytes() + depth[0].bytes() + depth[1].bytes() + order[0].bytes() + order[1].bytes() +
          tile[0].bytes() + tile[1].bytes() + slot[0].bytes() + slot[1].bytes() + range.bytes() +
          counts.bytes() + scratch.bytes() + rgb.bytes() + i420.bytes();
 }

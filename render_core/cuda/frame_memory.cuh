@@ -1,6 +1,7 @@
 #pragma once
 
 #include "render_core/cuda/blend.cuh"
+#include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/tiles.cuh"
@@ -14,6 +15,7 @@ bool turns_tiles(const ViewSettings& settings);
 /// All device memory of a View, sized by a FrameShape. Buffers grow between frames.
 struct FrameMemory {
   DeviceBuffer<std::uint32_t> clusters, cull_mask, cull_seen, cull_before, visible;
+  ColourCache colours;
   DeviceBuffer<SplatRecord> records;
   DeviceBuffer<TileSpans> spans;
   DeviceBuffer<SplatPath> path;
@@ -37,7 +39,7 @@ struct FrameMemory {
   PinnedBuffer<std::byte> host_image;
 
   /// Makes room; throws CudaError.
-  void reserve(const FrameShape& shape, std::uint32_t cluster_count, const ViewSettings& settings);
+  void reserve(const FrameShape& shape, const SceneArrays& scene, const ViewSettings& settings);
   /// The same for the image and the counts alone.
   void reserve_image(const FrameShape& shape, const ViewSettings& settings);
   [[nodiscard]] std::size_t bytes() const;

@@ -15,6 +15,12 @@ __device__ void raise(std::uint32_t* target, std::uint32_t value) {
     atomicMax(target, largest);
 }
 
+/// Whether a Gaussian has no colour from an earlier frame.
+__device__ bool wants_shading(const ColourArrays& colours, std::uint32_t i) {
+  return colours.wanted == nullptr ||
+         (__ldg(&colours.wanted[i / warp_size]) >> i % warp_size & 1u) != 0;
+}
+
 // The mean depth is that of a part of the blocks: it needs no more, and their sums meet in one
 // place.
 constexpr unsigned sampled_blocks = 16;
@@ -41,12 +47,22 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   }
   const std::uint32_t i = p.visible[v];
   const Centre centre = load_centre(p.scene, i);
-  const ShCoefficients sh = load_sh(p.scene, i);
+  const bool shades = wants_shading(p.colours, i);
+  ShCoefficients sh{};
+  PackedColour colour{};
+  if (shades) {
+    sh = load_sh(p.scene, i);
+  } else {
+    colour = p.colours.colour[i];
+  }
   const Splat splat = make_splat<listing == Listing::trails>(p.scene, p.camera, p.shape, i, centre);
   const math::CameraModel<float>& now = p.camera.now.single;
-  const auto colour =
-      shade(sh, p.scene.sh_degree, math::view_direction<float>(now.position, centre.mean));
-  p.records[v] = make_record(splat.centre_px, splat.whitening, splat.log2_opacity, colour);
+  if (shades) {
+    colour =
+        pack(shade(sh, p.scene.sh_degree, math::view_direction<float>(now.position, centre.mean)));
+    if (p.colours.colour != nullptr) p.colours.colour[i] = colour;
+  }
+  p.records[v] = {splat.centre_px, splat.whitening, splat.log2_opacity, colour};
   p.depth_key[v] = depth_key(splat.depth, p.camera.near_z);
   const bool listed = listing == Listing::none || splat.in_view;
   const bool counted = listed && splat.depth > p.min_depth;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/splat.cuh"
 
@@ -14,6 +15,7 @@ struct ProjectParams {
   float min_depth;               // of splats that counts->displacement, ->nearness speak of
   FrameCounts* counts;           // displacement and nearness are raised
   const std::uint32_t* visible;  // [visible_bound], scene indices
+  ColourArrays colours;          // what was shaded in earlier frames; all null: nothing
   SplatRecord* records;          // [visible_bound]
   std::uint32_t* depth_key;   // [visible_bound], depth_key() of the view depth; no_depth_key beyond
   std::uint32_t* tile_count;  // key frames: [visible_bound], its part of the tile lists

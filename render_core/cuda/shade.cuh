@@ -79,14 +79,8 @@ __device__ inline math::Vec3<float> shade(const ShCoefficients& sh, int degree,
           math::colour_from_sh_sum(sum[2])};
 }
 
-__device__ inline SplatRecord make_record(float2 centre_px, const math::Whitening<float>& whitening,
-                                          float log2_opacity, const math::Vec3<float>& colour) {
-  return {centre_px,
-          whitening,
-          log2_opacity,
-          __floats2half2_rn(colour.x, colour.y),
-          __float2half_rn(colour.z),
-          __float2half_rn(0.0f)};
+__device__ inline PackedColour pack(const math::Vec3<float>& colour) {
+  return {__floats2half2_rn(colour.x, colour.y), __float2half_rn(colour.z), __float2half_rn(0.0f)};
 }
 
 }  // namespace catgs::cuda

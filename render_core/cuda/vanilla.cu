@@ -76,7 +76,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   if (tiles == 0) return;
   const auto colour = shade(load_sh(p.scene, i), p.scene.sh_degree,
                             math::view_direction<float>(camera.position, mean));
-  p.records[i] = make_record(centre, math::whitening(g), log2_opacity, colour);
+  p.records[i] = {centre, math::whitening(g), log2_opacity, pack(colour)};
   p.depth[i] = depth;
   p.box[i] = box;
   p.tile_count[i] = tiles;
@@ -135,9 +135,9 @@ __global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) 
           s.log2_opacity - math::whitened_square<float>(
                                s.whitening, {centre.x - s.centre_px.x, centre.y - s.centre_px.y});
       if (!math::contributes(exponent)) continue;
-      const float2 red_green = __half22float2(s.red_green);
-      const bool live =
-          math::blend<float>(pixel, exponent, {red_green.x, red_green.y, __half2float(s.blue)});
+      const float2 red_green = __half22float2(s.colour.red_green);
+      const bool live = math::blend<float>(pixel, exponent,
+                                           {red_green.x, red_green.y, __half2float(s.colour.blue)});
       if (p.count_pairs && live) ++pairs;
     }
   }

@@ -10,6 +10,7 @@
 
 #include "render_core/camera.h"
 #include "render_core/host_device.h"
+#include "render_core/math/constants.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/thread_pool.h"
 
@@ -86,6 +87,22 @@ CATGS_HD inline bool outside_on_the_way(const ClusterCuller& now, const ClusterC
                                         const Cluster& cluster) {
   const unsigned beyond = now.beyond(cluster);
   return beyond != 0 && (beyond & end.beyond(cluster)) != 0;
+}
+
+/// Whether colours that were shaded for a camera at `shaded_from` are good for one at `position`:
+/// the direction to no Gaussian of the cluster has turned by more than colour_reuse_rad.
+CATGS_HD inline bool colours_hold(const Cluster& cluster, const glm::vec3& shaded_from,
+                                  const glm::vec3& position) {
+  const auto squared = [](float x, float y, float z) { return x * x + y * y + z * z; };
+  const auto beyond = [](float at, float centre, float half_extent) {
+    return fmaxf(fabsf(at - centre) - half_extent, 0.0f);
+  };
+  const float from_box = squared(beyond(position.x, cluster.centre.x, cluster.half_extent.x),
+                                 beyond(position.y, cluster.centre.y, cluster.half_extent.y),
+                                 beyond(position.z, cluster.centre.z, cluster.half_extent.z));
+  const float moved =
+      squared(position.x - shaded_from.x, position.y - shaded_from.y, position.z - shaded_from.z);
+  return moved <= static_cast<float>(colour_reuse_rad * colour_reuse_rad) * from_box;
 }
 
 }  // namespace catgs

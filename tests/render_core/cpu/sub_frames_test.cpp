@@ -123,32 +123,6 @@ TEST(CpuSubFrames, ClustersThatComeIntoViewAreKept) {
   }
 }
 
-// Colours of strong harmonics, seen by a camera that turns and steps aside. Measured: 70 dB and
-// more.
-TEST(CpuSubFrames, ColoursAreKeptWhileTheirDirectionHolds) {
-  const TestScene scene = test::small_scenes().front();
-  const auto renderer =
-      make_renderer(scene.cloud, {RendererKind::cpu, pool_of(2), "auto"}).renderer;
-  const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
-  const auto exact = renderer->make_view({});
-  FrameRequest request = scene.request;
-  const auto psnr = [&] {
-    return test::psnr_db(render_in(*view, request).rgb, render_in(*exact, request).rgb);
-  };
-  EXPECT_GE(psnr(), 120.0);
-  Pose& pose = request.camera.world_from_camera;
-  pose.orientation = glm::quat(glm::vec3(0.1f, -0.2f, 0.3f)) * pose.orientation;
-  EXPECT_GE(psnr(), 120.0) << "turning changes no colour";
-  int kept = 0;
-  for (int step = 0; step < 20; ++step) {
-    pose.position.x += 0.004f;
-    const double db = psnr();
-    EXPECT_GE(db, 60.0) << "step " << step;
-    kept += db < 120.0;
-  }
-  EXPECT_GT(kept, 0);
-}
-
 }  // namespace
 
 namespace test {

@@ -93,5 +93,16 @@ TEST(ClusterCuller, OnTheWayIsNotOutsideAtBothEnds) {
   EXPECT_FALSE(outside_on_the_way(middle, right, cluster));
 }
 
+TEST(ColoursHold, UntilTheDirectionToTheNearestHasTurned) {
+  const Cluster cluster{{0, 0, 10}, {1, 1, 2}, 5.0f};  // nearest mean 8 away from the origin
+  const glm::vec3 here(0.0f);
+  const auto step = static_cast<float>(8.0 * colour_reuse_rad);
+  EXPECT_TRUE(colours_hold(cluster, here, here));
+  EXPECT_TRUE(colours_hold(cluster, {0.99f * step, 0, 0}, here));
+  EXPECT_FALSE(colours_hold(cluster, {0, -1.01f * step, 0}, here));
+  // Within the box some may be at hand.
+  EXPECT_FALSE(colours_hold(cluster, {0, 0, 10}, {0, 1e-3f, 10}));
+}
+
 }  // namespace
 }  // namespace catgs

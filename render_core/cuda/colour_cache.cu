@@ -1,0 +1,58 @@
+#include "render_core/cuda/colour_cache.cuh"
+#include "render_core/cuda/cuda_check.h"
+#include "render_core/scene/clusters.h"
+
+namespace catgs::cuda {
+namespace {
+
+constexpr int block_size = 128;
+constexpr std::uint32_t words_per_cluster = cluster_size / warp_size;
+
+/// A thread a cluster.
+__global__ void __launch_bounds__(block_size) want_colours_kernel(const WantColoursParams p) {
+  const std::uint32_t rank = blockIdx.x * block_size + threadIdx.x;
+  if (rank >= p.counts->clusters) return;
+  const std::uint32_t c = p.clusters[rank];
+  const bool hold = colours_hold(p.scene.clusters[c], p.colours.shaded_from[c], p.position);
+  if (!hold) p.colours.shaded_from[c] = p.position;
+  const std::uint32_t* visible = &p.mask[rank * words_per_cluster];
+  std::uint32_t* known = &p.colours.known[c * words_per_cluster];
+  std::uint32_t* wanted = &p.colours.wanted[c * words_per_cluster];
+#pragma unroll
+  for (std::uint32_t w = 0; w < words_per_cluster; ++w) {
+    const std::uint32_t kept = hold ? known[w] : 0;
+    wanted[w] = visible[w] & ~kept;
+    known[w] = visible[w] | kept;
+  }
+}
+
+}  // namespace
+
+void ColourCache::reserve(const SceneArrays& scene) {
+  shaded_from.reserve(scene.cluster_count);
+  known.reserve(scene.cluster_count * words_per_cluster);
+  wanted.reserve(scene.cluster_count * words_per_cluster);
+  colour.reserve(scene.count);
+}
+
+void ColourCache::forget(cudaStream_t stream) const {
+  check(cudaMemsetAsync(shaded_from.get(), 0, shaded_from.bytes(), stream), "colour cache");
+  check(cudaMemsetAsync(known.get(), 0, known.bytes(), stream), "colour cache");
+}
+
+ColourArrays ColourCache::arrays() const {
+  return {shaded_from.get(), known.get(), wanted.get(), colour.get()};
+}
+
+std::size_t ColourCache::bytes() const {
+  return shaded_from.bytes() + known.bytes() + wanted.bytes() + colour.bytes();
+}
+
+void launch_want_colours(const WantColoursParams& params, cudaStream_t stream) {
+  const std::uint32_t blocks = blocks_for(params.scene.cluster_count, block_size);
+  if (blocks == 0) return;
+  want_colours_kernel<<<blocks, block_size, 0, stream>>>(params);
+  check_launch("colour cache");
+}
+
+}  // namespace catgs::cuda
