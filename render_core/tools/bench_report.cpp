@@ -101,6 +101,8 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
     json["max_trail_px"] = speculation.max_trail_px;
     json["min_depth"] = speculation_min_depth(speculation, setup.camera.near_z);
     json["max_deviation_px"] = speculation.max_deviation_px;
+    json["grid"] = grid_name(speculation.grid);
+    json["guard_px"] = speculation.guard_px;
     json["order"] = settings.order == BlendOrder::fresh ? "fresh" : "key";
     json["colour_cache"] = settings.colour_cache;
     json["constant_velocity"] = options.pipeline.constant_velocity;

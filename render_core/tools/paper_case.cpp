@@ -48,6 +48,8 @@ std::vector<Variant> ablations(const PaperOptions& options) {
   std::vector<Variant> all = {
       variants::without_cache,
       {"Ours-w/o split", Pipeline::catgs, "--no-split"},
+      {"Ours-w/o grid that turns", Pipeline::catgs, "--grid shift"},
+      {"Ours-w/o grid that moves", Pipeline::catgs, "--grid fixed"},
       {"Ours-w/o colour cache", Pipeline::catgs, "--no-colour-cache"},
       {"Ours-w/o fresh order", Pipeline::catgs, "--order key"},
       {"Ours-w/o doubt", Pipeline::catgs, "--constant-velocity"},

@@ -109,6 +109,8 @@ Json settings_json(const PaperCase& scene) {
           {"max_trail_px", speculation.max_trail_px},
           {"min_depth", speculation.min_depth},
           {"max_deviation_px", speculation.max_deviation_px},
+          {"grid", grid_name(speculation.grid)},
+          {"guard_px", speculation.guard_px},
           {"order", setup.view.order == BlendOrder::fresh ? "fresh" : "key"},
           {"warmup", scene.options().warmup},
           {"every", scene.options().every}};

@@ -143,4 +143,16 @@ std::string_view pipeline_name(Pipeline pipeline) {
   return "catgs";
 }
 
+std::string_view grid_name(GridKind grid) {
+  switch (grid) {
+    case GridKind::fixed:
+      return "fixed";
+    case GridKind::shift:
+      return "shift";
+    case GridKind::warp:
+      break;
+  }
+  return "warp";
+}
+
 }  // namespace catgs

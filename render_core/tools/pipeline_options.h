@@ -44,5 +44,6 @@ PipelineOptions with_flags(PipelineOptions options, const std::string& flags);
 PredictorSettings predictor_settings(const PipelineOptions& options);
 
 std::string_view pipeline_name(Pipeline pipeline);
+std::string_view grid_name(GridKind grid);
 
 }  // namespace catgs

@@ -1,5 +1,6 @@
 // catgs-render trace windows: how long the windows of key frames are on recorded motion, by the
 // rules of motion/frame_groups.h alone, without a scene and without drawing anything.
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,7 +22,7 @@ namespace {
 struct WindowsOptions {
   std::vector<std::string> traces;
   std::vector<double> rates_hz{120.0, 60.0, 30.0};
-  float nearest_depth = 1.0f;
+  std::vector<float> depths{1.0f, 20.0f};  // nearest and farthest
   LensOptions lens{.size = "1920x1080", .focal_px = 1100.0f, .fov_y_deg = {}, .near_z = 0.2f};
   PipelineOptions pipeline;
   std::vector<std::string> variants;
@@ -35,9 +36,11 @@ struct Rule {
 
 std::vector<Rule> rules(const WindowsOptions& options) {
   std::vector<Rule> all = {
-      {"The paper's rule", "--max-deviation-px 1e9"},  // whatever comes true of a forecast
-      {"Ended where the forecast is left", ""},
-      {"The same, W0 = 8", "--window 8"},
+      {"The paper's rule", "--grid fixed --max-deviation-px 1e9"},  // right or wrong
+      {"Ended off the forecast", "--grid fixed"},
+      {"Grid shifted with the camera", "--grid shift"},
+      {"Grid turned with the camera", "--grid warp"},
+      {"The same, W0 = 8", "--grid warp --window 8"},
   };
   for (const std::string& flags : options.variants) all.push_back({flags, flags});
   return all;
@@ -49,7 +52,7 @@ struct Groups {
 };
 
 /// Goes along a trace at `rate_hz` as a View would: forecasts know the recorded samples up to each
-/// frame, and every frame finds its nearest Gaussian at the same depth.
+/// frame, and every frame finds the same depths, spread evenly.
 void add_groups(const Trajectory& trace, double rate_hz, const WindowsOptions& options,
                 const PipelineOptions& pipeline, Groups& sum) {
   RenderSetup setup;
@@ -62,9 +65,8 @@ void add_groups(const Trajectory& trace, double rate_hz, const WindowsOptions& o
   setup.view = view_settings(pipeline);
   FrameFeed feed(setup, setup.view);
   FrameGroups groups(setup.view.speculation);
-  // Depths spread evenly from the nearest to 20 times as far.
-  const SceneDepths depths{options.nearest_depth,
-                           std::log(20.0f) / (19.0f * options.nearest_depth)};
+  const float nearest = options.depths[0], farthest = options.depths[1];
+  const SceneDepths depths{nearest, std::log(farthest / nearest) / (farthest - nearest)};
   for (std::size_t i = 0; i < setup.poses.size(); ++i) {
     const FrameRequest request = feed.next();
     const FramePlan plan = groups.plan(request.camera, request.forecast, depths);
@@ -82,10 +84,10 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
       .corner = "Frames per key frame",
       .columns = {},
       .rows = {},
-      .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, the "
-                            "nearest Gaussian always {:g} away.",
+      .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, depths "
+                            "from {:g} to {:g}.",
                             traces.size(), options.lens.size, *options.lens.focal_px,
-                            options.nearest_depth)}};
+                            options.depths[0], options.depths[1])}};
   for (const double rate_hz : options.rates_hz) {
     table.columns.push_back(fmt::format("{:g} Hz", rate_hz));
     table.columns.push_back(fmt::format("no window, {:g} Hz", rate_hz));
@@ -107,6 +109,9 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
 
 void windows(const WindowsOptions& options, bool quiet) {
   (void)make_lens(options.lens, 0.0f);
+  if (!(options.depths[0] < options.depths[1])) {
+    throw InputError("--depths", "", "the nearest comes first", "like --depths 1 20");
+  }
   const std::vector<Rule> all_rules = rules(options);
   for (const Rule& rule : all_rules) (void)with_flags(options.pipeline, rule.flags);
   std::vector<Trajectory> traces;
@@ -124,7 +129,7 @@ void windows(const WindowsOptions& options, bool quiet) {
                             {"size", options.lens.size},
                             {"focal_px", *options.lens.focal_px},
                             {"near", *options.lens.near_z},
-                            {"depth", options.nearest_depth},
+                            {"depths", options.depths},
                             {"flags", flags},
                             {"table", to_json(table)}});
 }
@@ -142,8 +147,9 @@ void add_trace_windows_command(CLI::App& trace) {
       ->check(CLI::Range(1.0, 1000.0))
       ->capture_default_str();
   command
-      ->add_option("--depth", options->nearest_depth,
-                   "Of the nearest Gaussian in every frame, world units")
+      ->add_option("--depths", options->depths,
+                   "Of the nearest and the farthest Gaussian in every frame, world units")
+      ->expected(2)
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--size", options->lens.size, "Of the picture, pixels")
