@@ -1,8 +1,12 @@
 // catgs-render trace windows: how long the windows of key frames are on recorded motion, by the
 // rules of motion/frame_groups.h alone, without a scene and without drawing anything.
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -26,6 +30,7 @@ struct WindowsOptions {
   LensOptions lens{.size = "1920x1080", .focal_px = 1100.0f, .fov_y_deg = {}, .near_z = 0.2f};
   PipelineOptions pipeline;
   std::vector<std::string> variants;
+  bool ahead = false;
   std::string json;
 };
 
@@ -51,11 +56,17 @@ struct Groups {
   std::size_t frames = 0, keys = 0, keys_without_window = 0;
 };
 
-/// Goes along a trace at `rate_hz` as a View would: forecasts know the recorded samples up to each
-/// frame, and every frame finds the same depths, spread evenly.
-void add_groups(const Trajectory& trace, double rate_hz, const WindowsOptions& options,
-                const PipelineOptions& pipeline, Groups& sum) {
+/// A trace at a frame rate, without a scene. `setup` is what FrameFeed wants: forecasts know the
+/// recorded samples up to each frame.
+struct Journey {
   RenderSetup setup;
+  SceneDepths depths;  // of every frame
+};
+
+Journey make_journey(const Trajectory& trace, double rate_hz, const WindowsOptions& options,
+                     const PipelineOptions& pipeline) {
+  Journey journey;
+  RenderSetup& setup = journey.setup;
   setup.samples = trace;
   setup.poses = resample(trace, rate_hz);
   setup.fps = rate_hz;
@@ -63,13 +74,18 @@ void add_groups(const Trajectory& trace, double rate_hz, const WindowsOptions& o
   setup.predictor = predictor_settings(pipeline);
   setup.predictor.lever = forecast_lever(setup.camera.near_z);
   setup.view = view_settings(pipeline);
-  FrameFeed feed(setup, setup.view);
-  FrameGroups groups(setup.view.speculation);
   const float nearest = options.depths[0], farthest = options.depths[1];
-  const SceneDepths depths{nearest, std::log(farthest / nearest) / (farthest - nearest)};
-  for (std::size_t i = 0; i < setup.poses.size(); ++i) {
+  journey.depths = {nearest, std::log(farthest / nearest) / (farthest - nearest)};
+  return journey;
+}
+
+/// Groups as a View makes them: a key frame is cut and shown where a group has ended.
+void add_groups(const Journey& journey, Groups& sum) {
+  FrameFeed feed(journey.setup, journey.setup.view);
+  FrameGroups groups(journey.setup.view.speculation);
+  for (std::size_t i = 0; i < journey.setup.poses.size(); ++i) {
     const FrameRequest request = feed.next();
-    const FramePlan plan = groups.plan(request.camera, request.forecast, depths);
+    const FramePlan plan = groups.plan(request.camera, request.forecast, journey.depths);
     ++sum.frames;
     if (plan.kind == FrameKind::sub) continue;
     ++sum.keys;
@@ -77,17 +93,96 @@ void add_groups(const Trajectory& trace, double rate_hz, const WindowsOptions& o
   }
 }
 
+/// Groups whose key frames are cut in the background: while one is shown, the next one is cut for
+/// the frames behind it, from what is known when the shown one begins. Counts as key frames those
+/// that had to be waited for, because the camera was in neither.
+class GroupsAhead {
+ public:
+  GroupsAhead(const Journey& journey, Groups& sum)
+      : journey_(journey), sum_(sum), predictor_(patient(journey.setup)) {}
+
+  void run() {
+    const RenderSetup& setup = journey_.setup;
+    std::size_t sample = 0;
+    for (std::size_t i = 0; i < setup.poses.size(); ++i) {
+      now_us_ = setup.poses[i].time_us;
+      for (; sample < setup.samples.size() && setup.samples[sample].time_us <= now_us_; ++sample) {
+        predictor_.add(setup.samples[sample]);
+      }
+      ++sum_.frames;
+      show(setup.request(i).camera);
+    }
+  }
+
+ private:
+  /// Forecasts reach to the end of the next window.
+  static PredictorSettings patient(const RenderSetup& setup) {
+    PredictorSettings settings = setup.predictor;
+    const double frames = 2.0 * setup.view.speculation.initial_window;
+    settings.horizon_us =
+        std::max<std::int64_t>(settings.horizon_us, std::llround(1e6 * frames / setup.fps));
+    return settings;
+  }
+
+  void show(const Camera& now) {
+    if (holds(shown_, now)) return;
+    int frames = next_window_;  // of the group that begins here
+    if (holds(next_, now)) {
+      shown_ = std::move(next_);
+    } else {
+      ++sum_.keys;
+      const int window = cut(shown_, now, 0);
+      sum_.keys_without_window += window == 0 ? 1 : 0;
+      frames = window + 1;  // this one is shown itself
+    }
+    Camera then = now;
+    then.world_from_camera = at(frames);
+    next_window_ = cut(next_, then, frames);
+  }
+
+  /// Whether a group has lists for this frame; it is then drawn from them.
+  bool holds(std::optional<FrameGroups>& group, const Camera& now) const {
+    if (!group) return false;
+    const Forecast any{now.world_from_camera, 0};
+    return group->plan(now, any, journey_.depths).kind == FrameKind::sub;
+  }
+
+  /// A group that begins `frames` from now, as forecast, with the camera `key`; its window.
+  int cut(std::optional<FrameGroups>& group, const Camera& key, int frames) {
+    const SpeculationSettings& settings = journey_.setup.view.speculation;
+    const Forecast forecast{at(frames + settings.initial_window), settings.initial_window};
+    group.emplace(settings);
+    return group->plan(key, forecast, journey_.depths).window;
+  }
+
+  [[nodiscard]] Pose at(int frames) const {
+    return *predictor_.at(now_us_ + std::llround(1e6 * frames / journey_.setup.fps));
+  }
+
+  const Journey& journey_;
+  Groups& sum_;
+  MotionPredictor predictor_;
+  std::int64_t now_us_ = 0;
+  std::optional<FrameGroups> shown_, next_;
+  int next_window_ = 0;
+};
+
 PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajectory>& traces,
                          const std::vector<Rule>& all_rules, Progress& progress) {
   PaperTable table{
       .title = {},
-      .corner = "Frames per key frame",
+      .corner = options.ahead ? "Frames per key frame waited for" : "Frames per key frame",
       .columns = {},
       .rows = {},
       .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, depths "
                             "from {:g} to {:g}.",
                             traces.size(), options.lens.size, *options.lens.focal_px,
                             options.depths[0], options.depths[1])}};
+  if (options.ahead) {
+    table.notes.emplace_back(
+        "Key frames are cut while the window before theirs is shown: forecasts reach over two "
+        "windows. Waited for: where the camera is in neither.");
+  }
   for (const double rate_hz : options.rates_hz) {
     table.columns.push_back(fmt::format("{:g} Hz", rate_hz));
     table.columns.push_back(fmt::format("no window, {:g} Hz", rate_hz));
@@ -97,7 +192,14 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
     PaperTable::Row& row = table.rows.emplace_back(PaperTable::Row{rule.name, {}});
     for (const double rate_hz : options.rates_hz) {
       Groups sum;
-      for (const Trajectory& trace : traces) add_groups(trace, rate_hz, options, pipeline, sum);
+      for (const Trajectory& trace : traces) {
+        const Journey journey = make_journey(trace, rate_hz, options, pipeline);
+        if (options.ahead) {
+          GroupsAhead(journey, sum).run();
+        } else {
+          add_groups(journey, sum);
+        }
+      }
       const auto keys = static_cast<double>(sum.keys);
       row.numbers.push_back({static_cast<double>(sum.frames) / keys, 2});
       row.numbers.push_back({100.0 * static_cast<double>(sum.keys_without_window) / keys, 0, " %"});
@@ -130,6 +232,7 @@ void windows(const WindowsOptions& options, bool quiet) {
                             {"focal_px", *options.lens.focal_px},
                             {"near", *options.lens.near_z},
                             {"depths", options.depths},
+                            {"ahead", options.ahead},
                             {"flags", flags},
                             {"table", to_json(table)}});
 }
@@ -165,6 +268,8 @@ void add_trace_windows_command(CLI::App& trace) {
       ->add_option("--variant", options->variants,
                    "A row more, by these flags of bench, like \"--window 16 --constant-velocity\"")
       ->allow_extra_args(false);
+  command->add_flag("--ahead", options->ahead,
+                    "As if key frames were cut in the background, a window ahead");
   command->add_option("--json", options->json, "Write the table here too; - prints JSON instead");
   command->callback([options, command] { windows(*options, is_quiet(*command)); });
 }
