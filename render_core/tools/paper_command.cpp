@@ -62,7 +62,7 @@ std::vector<PaperTable> growing(std::vector<PaperTable> of_scenes) {
       growth.numbers.push_back({number.value / row.numbers.front().value, 3, "×"});
     }
   }
-  return {std::move(all)};
+  return {all};
 }
 
 std::vector<const PaperTableKind*> chosen_kinds(const std::vector<std::string>& names) {
