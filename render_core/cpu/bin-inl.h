@@ -22,21 +22,22 @@ namespace HWY_NAMESPACE {
 using RowLanes = Lanes<hn::CappedTag<float, 4>>;
 
 /// Appends to `runs` the tiles that a splat's ellipse or trail meets in RowLanes::count rows of
-/// tiles from `row` on; returns the new end.
+/// tiles from `row` on; returns the new end. `centre`: from the grid's first pixel.
 template <class Shape>
-HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, int row, std::uint32_t slot,
-                              TileRun* runs) {
+HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, Vec2<float> centre, int row,
+                              std::uint32_t slot, TileRun* runs) {
   using L = RowLanes;
   constexpr auto side = static_cast<float>(tile_size_px);
-  const L low_y = mul_add(L::iota(static_cast<float>(row)), L(side), L(0.5f - s.centre_y));
-  const Interval<L> columns = columns_in_band(convert<L>(shape), low_y, low_y + L(side - 1.0f));
+  const L low_y =
+      mul_add(L::iota(static_cast<float>(row)), L(side), L(0.5f - centre.y - s.growth_px));
+  const L height(side - 1.0f + 2.0f * s.growth_px);
+  const Interval<L> columns = columns_in_band(convert<L>(shape), low_y, low_y + height);
+  const float slack = static_cast<float>(listing_slack_px) + s.growth_px;
   // Pixel columns with centres inside, then tiles, both inside the splat's box of tiles.
   const L first =
-      max(ceil(columns.low + L(s.centre_x - 0.5f - static_cast<float>(listing_slack_px))),
-          L(static_cast<float>(s.tile_x) * side));
-  const L last =
-      min(floor(columns.high + L(s.centre_x - 0.5f + static_cast<float>(listing_slack_px))),
-          L(static_cast<float>(s.tile_end_x) * side - 1.0f));
+      max(ceil(columns.low + L(centre.x - 0.5f - slack)), L(static_cast<float>(s.tile_x) * side));
+  const L last = min(floor(columns.high + L(centre.x - 0.5f + slack)),
+                     L(static_cast<float>(s.tile_end_x) * side - 1.0f));
   const auto hit = (columns.low <= columns.high) & (first <= last);
   alignas(16) float begin[L::count], end[L::count];
   (first * L(1.0 / tile_size_px)).store(begin);
@@ -69,9 +70,11 @@ inline void list_tiles(const ListTask& task, std::vector<TileRun>& runs) {
   runs.resize(known + most);
   TileRun* end = runs.data() + known;
   std::uint32_t slot = task.first_slot;
+  const Vec2<float> first{static_cast<float>(task.first_px.x), static_cast<float>(task.first_px.y)};
   const auto list = [&](const Splat& s, const auto& shape) HWY_ATTR {
+    const Vec2<float> centre{s.centre_x - first.x, s.centre_y - first.y};
     for (int row = s.tile_y; row < s.tile_end_y; row += static_cast<int>(RowLanes::count))
-      end = list_rows(s, shape, row, slot, end);
+      end = list_rows(s, shape, centre, row, slot, end);
   };
   for (std::size_t i = 0; i < task.splats.size(); ++i, ++slot) {
     const Splat& s = task.splats[i];

@@ -125,16 +125,17 @@ HWY_INLINE std::uint64_t blend_hits(const Batch& batch, const Hits& hits, BlockP
 }
 
 template <bool cull, bool count_pairs>
-std::uint64_t blend_list(const BlendTask& task, BlockPixels* pixels) {
+BlendResult blend_list(const BlendTask& task, BlockPixels* pixels) {
   const PixelBlock origin = task.blocks[0];
   const Vec2<float> first{static_cast<float>(origin.x) + 0.5f, static_cast<float>(origin.y) + 0.5f};
   std::uint32_t live_blocks =
       static_cast<std::uint32_t>((std::uint64_t{1} << task.blocks.size()) - 1);
-  std::uint64_t pairs = 0;
+  BlendResult result;
   Batch batch;
   Hits hits;
-  for (std::size_t begin = 0; begin < task.list.size() && live_blocks != 0; begin += batch_size) {
-    load(task, task.list.subspan(begin), first, batch);
+  while (result.looked_at < task.list.size() && live_blocks != 0) {
+    load(task, task.list.subspan(result.looked_at), first, batch);
+    result.looked_at += batch.count;
     for (std::uint32_t left = live_blocks; left != 0; left &= left - 1) {
       const int block = std::countr_zero(left);
       find_hits<cull>(batch,
@@ -142,24 +143,25 @@ std::uint64_t blend_list(const BlendTask& task, BlockPixels* pixels) {
                        static_cast<float>(task.blocks[block].y - origin.y)},
                       hits);
       bool finished = false;
-      pairs += blend_hits<count_pairs>(batch, hits, pixels[block], finished);
+      result.pairs += blend_hits<count_pairs>(batch, hits, pixels[block], finished);
       if (finished) live_blocks &= ~(1u << block);
     }
   }
-  return pairs;
+  result.finished = live_blocks == 0;
+  return result;
 }
 
-inline std::uint64_t blend_blocks(const BlendTask& task) {
+inline BlendResult blend_blocks(const BlendTask& task) {
   BlockPixels pixels[max_task_blocks];
   for (std::size_t i = 0; i < task.blocks.size(); ++i)
     clear(pixels[i], task.blocks[i], task.image->size_px());
-  std::uint64_t pairs = 0;
+  BlendResult result;
   if (task.count_pairs) {
-    pairs = task.cull_blocks ? blend_list<true, true>(task, pixels)
-                             : blend_list<false, true>(task, pixels);
+    result = task.cull_blocks ? blend_list<true, true>(task, pixels)
+                              : blend_list<false, true>(task, pixels);
   } else {
-    pairs = task.cull_blocks ? blend_list<true, false>(task, pixels)
-                             : blend_list<false, false>(task, pixels);
+    result = task.cull_blocks ? blend_list<true, false>(task, pixels)
+                              : blend_list<false, false>(task, pixels);
   }
   for (std::size_t i = 0; i < task.blocks.size(); ++i) {
     resolve_block(pixels[i], task.background);
@@ -169,7 +171,7 @@ inline std::uint64_t blend_blocks(const BlendTask& task) {
       write_i420(pixels[i], task.blocks[i], *task.image);
     }
   }
-  return pairs;
+  return result;
 }
 
 }  // namespace HWY_NAMESPACE

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "render_core/cpu/list_culler.h"
 #include "render_core/math/constants.h"
 
 namespace catgs {
@@ -29,12 +30,6 @@ class StageClock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-/// Sub-frames of this core find their tiles where they are in the key frame.
-SpeculationSettings on_fixed_grid(SpeculationSettings settings) {
-  settings.grid = GridKind::fixed;
-  return settings;
-}
-
 template <class T>
 void grow(std::vector<T>& buffer, std::size_t size) {
   if (buffer.size() < size) buffer.resize(size);
@@ -43,7 +38,7 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 }  // namespace
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
-    : scene_(std::move(scene)), settings_(settings), groups_(on_fixed_grid(settings.speculation)) {
+    : scene_(std::move(scene)), settings_(settings), groups_(settings.speculation) {
   if (settings.pipeline == Pipeline::catgs && settings.colour_cache)
     colours_.emplace(scene_->store.clusters().size());
 }
@@ -56,6 +51,7 @@ RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noex
     frame = {settings_.format, MemorySpace::host, request.camera.size_px, image_.planes(), stats};
   } catch (const std::bad_alloc&) {
     groups_.forget();
+    reach_.forget();
     return {RenderStatus::Code::out_of_memory,
             "CPU core: no memory for " + std::to_string(clusters_.size()) + " clusters in view"};
   }
@@ -64,65 +60,101 @@ RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noex
 
 FrameStats CpuView::draw(const FrameRequest& request) {
   const Camera& camera = request.camera;
-  grid_ = (camera.size_px + (tile_size_px - 1)) / tile_size_px;
   image_.resize(settings_.format, camera.size_px);
-  blocks_.place(camera.size_px);
   FrameStats stats;
+  const FramePlan plan = this->plan(request);
+  stats.kind = plan.kind;
+  stats.window = plan.window;
+  grid_ = plan.grid;
+  blocks_.place(camera.size_px, plan);
+  if (settings_.pipeline == Pipeline::catgs) reach_.begin(plan);
   if (settings_.pipeline == Pipeline::vanilla) {
-    draw_boxes(camera, stats);
-  } else if (settings_.pipeline == Pipeline::exact) {
-    draw_key_lists(camera, nullptr, stats);
+    draw_boxes(camera, plan, stats);
+  } else if (plan.kind == FrameKind::key) {
+    draw_key_lists(camera, plan, stats);
   } else {
-    const FramePlan plan = groups_.plan(camera, request.forecast, {nearest_depth_, 0.0f});
-    stats.kind = plan.kind;
-    stats.window = plan.window;
-    if (plan.kind == FrameKind::sub) {
-      draw_sub_lists(camera, stats);
-    } else {
-      draw_key_lists(camera, plan.window > 0 ? &plan.window_end : nullptr, stats);
-    }
+    draw_sub_lists(camera, stats);
   }
   StageClock clock(stats);
   stats.blended_pairs = blend(request);
   clock.end(Stage::blend);
+  summarise(stats);
+  return stats;
+}
 
+/// What the frame's lists cover: its own image alone, unless they are for sub-frames too.
+FramePlan CpuView::plan(const FrameRequest& request) {
+  const Camera& camera = request.camera;
+  FramePlan plan;
+  plan.window_end = camera;
+  plan.grid = image_grid(camera.size_px);
+  plan.list_near_z = camera.near_z;
+  if (settings_.pipeline != Pipeline::catgs) return plan;
+  plan = groups_.plan(camera, request.forecast, depths_in_view_);
+  widen_for_blocks(plan, settings_.speculation.grid);
+  return plan;
+}
+
+void CpuView::summarise(FrameStats& stats) {
   stats.nearest_depth = std::numeric_limits<float>::infinity();
+  double inverse_depths = 0.0;
+  std::uint64_t counted = 0;
   for (const ClusterSummary& summary : std::span(summaries_).first(clusters_.size())) {
     stats.visible += summary.visible;
     stats.nearest_depth = std::min(stats.nearest_depth, summary.nearest_depth);
     stats.displacement_px = std::max(stats.displacement_px, summary.longest_path_px);
+    inverse_depths += static_cast<double>(summary.inverse_depth_sum);
+    counted += summary.counted;
   }
-  nearest_depth_ = stats.nearest_depth;
+  if (counted > 0)
+    stats.mean_inverse_depth = static_cast<float>(inverse_depths / static_cast<double>(counted));
+  depths_in_view_ = {stats.nearest_depth, stats.mean_inverse_depth};
   stats.tasks = lists_.tiles();  // each in one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();
   stats.overflowed_entries = lists_.overflowed_entries();
-  return stats;
 }
 
-void CpuView::draw_boxes(const Camera& camera, FrameStats& stats) {
+void CpuView::draw_boxes(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
   StageClock clock(stats);
-  cull_clusters(camera, nullptr);
-  project(camera, nullptr, [](std::size_t, std::size_t) {});
+  cull_clusters(camera, plan);
+  project(camera, plan, [](std::size_t, std::size_t) {});
   clock.end(Stage::project);
-  lists_.build_by_keys(table(false), grid_, settings_.max_list_entries, *scene_->pool);
+  lists_.build_by_keys(table(plan), grid_.tiles, settings_.max_list_entries, *scene_->pool);
   clock.end(Stage::sort);
 }
 
-/// Lists for `camera`, and with `window_end` for all cameras on the way there.
-void CpuView::draw_key_lists(const Camera& camera, const Camera* window_end, FrameStats& stats) {
+/// Lists for `camera`, and with a window for all cameras on the way to its end.
+void CpuView::draw_key_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
   StageClock clock(stats);
-  cull_clusters(camera, window_end);
-  lists_.begin(grid_, segments(), settings_.max_list_entries);
+  cull_clusters(camera, plan);
+  lists_.begin(grid_.tiles, segments(), settings_.max_list_entries);
   // Listed while they are in cache: reading them again would cost as much as the listing.
-  project(camera, window_end, [&](std::size_t segment, std::size_t rank) {
-    lists_.add(segment, table(window_end != nullptr).of_cluster(rank), scene_->kernels);
+  project(camera, plan, [&](std::size_t segment, std::size_t rank) {
+    lists_.add(segment, table(plan).of_cluster(rank), scene_->kernels);
   });
   clock.end(Stage::project);
-  lists_.finish(table(window_end != nullptr), scene_->kernels, *scene_->pool);
+  lists_.finish(table(plan), scene_->kernels, *scene_->pool);
   clock.end(Stage::bin);
-  lists_.sort(splats_, *scene_->pool);
+  if (settings_.pipeline == Pipeline::catgs) {
+    sort_seen_lists(
+        [&](std::size_t tile) { lists_.sort_front(tile, reach_.of_tile(tile), splats_); });
+  } else {
+    lists_.sort(splats_, *scene_->pool);
+  }
   clock.end(Stage::sort);
+}
+
+/// Calls sort(tile) for all tiles that have pixels in the image.
+template <class Sort>
+void CpuView::sort_seen_lists(const Sort& sort) {
+  constexpr std::size_t tiles_per_task = 16;
+  const std::size_t tiles = lists_.tiles();
+  scene_->pool->parallel_for((tiles + tiles_per_task - 1) / tiles_per_task, [&](std::size_t task) {
+    const std::size_t end = std::min(tiles, (task + 1) * tiles_per_task);
+    for (std::size_t tile = task * tiles_per_task; tile < end; ++tile)
+      if (!blocks_.of_tile(tile).empty()) sort(tile);
+  });
 }
 
 void CpuView::draw_sub_lists(const Camera& camera, FrameStats& stats) {
@@ -140,18 +172,23 @@ void CpuView::draw_sub_lists(const Camera& camera, FrameStats& stats) {
     }
   });
   clock.end(Stage::project);
-  if (settings_.order == BlendOrder::fresh) lists_.sort_again(splats_, depths_, *scene_->pool);
+  sort_seen_lists([&](std::size_t tile) {
+    if (settings_.order == BlendOrder::key) {
+      lists_.sort_front(tile, reach_.of_tile(tile), splats_);
+    } else {
+      lists_.sort_front_again(tile, reach_.of_tile(tile), splats_, depths_);
+    }
+  });
   clock.end(Stage::sort);
 }
 
-void CpuView::cull_clusters(const Camera& camera, const Camera* window_end) {
+void CpuView::cull_clusters(const Camera& camera, const FramePlan& plan) {
   const std::span<const Cluster> clusters = scene_->store.clusters();
-  const ClusterCuller now(camera), end(window_end != nullptr ? *window_end : camera);
+  const ListCuller culler(camera, plan);
   const bool cull = settings_.pipeline != Pipeline::vanilla;
   clusters_.clear();
   for (std::size_t c = 0; c < clusters.size(); ++c) {
-    if (!cull || !outside_on_the_way(now, end, clusters[c]))
-      clusters_.push_back(static_cast<std::uint32_t>(c));
+    if (!cull || !culler.outside(clusters[c])) clusters_.push_back(static_cast<std::uint32_t>(c));
   }
 }
 
@@ -162,8 +199,8 @@ std::size_t CpuView::segments() const {
   return std::min({threads * 8, std::max<std::size_t>(threads, 64), 1 + clusters_.size() / 8});
 }
 
-SplatTable CpuView::table(bool with_paths) const {
-  return {splats_, with_paths ? paths_.data() : nullptr, counts_};
+SplatTable CpuView::table(const FramePlan& plan) const {
+  return {splats_, plan.window > 0 ? paths_.data() : nullptr, counts_, plan.grid.first_px};
 }
 
 ClusterColours CpuView::colours_of(std::uint32_t cluster, const Camera& camera) {
@@ -174,8 +211,8 @@ ClusterColours CpuView::colours_of(std::uint32_t cluster, const Camera& camera) 
 
 /// Projects the visible clusters and calls done(share, rank) after each.
 template <class Done>
-void CpuView::project(const Camera& camera, const Camera* window_end, const Done& done) {
-  const bool sweeps = window_end != nullptr;
+void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& done) {
+  const bool sweeps = plan.window > 0;
   const std::size_t ranks = clusters_.size(), slots = ranks * cluster_size;
   grow(splats_, slots);
   if (sweeps) grow(paths_, slots);
@@ -191,9 +228,9 @@ void CpuView::project(const Camera& camera, const Camera* window_end, const Done
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;
       summaries_[rank] = scene_->kernels.project_cluster(
-          {&scene_->store, &camera, culling, clusters_[rank], splats_.data() + first, min_depth,
-           colours_of(clusters_[rank], camera), window_end,
-           sweeps ? paths_.data() + first : nullptr, sweeps ? &members_[rank] : nullptr});
+          {&scene_->store, &camera, &plan, culling, clusters_[rank], splats_.data() + first,
+           min_depth, colours_of(clusters_[rank], camera), sweeps ? paths_.data() + first : nullptr,
+           sweeps ? &members_[rank] : nullptr});
       counts_[rank] = summaries_[rank].visible;
       done(share, rank);
     }
@@ -205,18 +242,45 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
   const std::span<const std::uint32_t> tiles = lists_.tiles_by_length();
   scene_->pool->parallel_for(tiles.size(), [&](std::size_t i) {
     const std::uint32_t tile = tiles[i];
-    const std::uint64_t blended = scene_->kernels.blend_blocks(
-        {splats_.data(), lists_.list(tile), blocks_.of_tile(tile), request.background,
-         settings_.pipeline != Pipeline::vanilla, settings_.count_pairs, &image_});
-    if (settings_.count_pairs) pairs += blended;
+    if (blocks_.of_tile(tile).empty()) return;
+    BlendResult result = blend_tile(request, tile);
+    if (!result.finished && lists_.front(tile).size() < lists_.list(tile).size()) {
+      lists_.sort_rest(tile, splats_);
+      result = blend_tile(request, tile);
+    }
+    if (settings_.pipeline == Pipeline::catgs)
+      reach_.set(
+          tile, result.finished ? lists_.list(tile)[result.looked_at - 1].key : TileReach::unknown);
+    if (settings_.count_pairs) pairs += result.pairs;
   });
   return pairs;
 }
 
+/// Blends the ordered part of a tile's list.
+BlendResult CpuView::blend_tile(const FrameRequest& request, std::size_t tile) {
+  BlendResult sum{.finished = true};
+  for (std::span<const PixelBlock> blocks = blocks_.of_tile(tile); !blocks.empty();) {
+    const auto part = blocks.first(std::min<std::size_t>(blocks.size(), max_task_blocks));
+    const BlendResult result = scene_->kernels.blend_blocks(
+        {splats_.data(), lists_.front(tile), part, request.background,
+         settings_.pipeline != Pipeline::vanilla, settings_.count_pairs, &image_});
+    sum.pairs += result.pairs;
+    sum.looked_at = std::max(sum.looked_at, result.looked_at);
+    sum.finished = sum.finished && result.finished;
+    blocks = blocks.subspan(part.size());
+  }
+  return sum;
+}
+
 std::vector<std::uint32_t> CpuView::tile_loads() const {
-  std::vector<std::uint32_t> loads(lists_.tiles());
-  for (std::size_t tile = 0; tile < loads.size(); ++tile) {
-    loads[tile] = static_cast<std::uint32_t>(lists_.list(tile).size());
+  std::vector<std::uint32_t> loads;
+  const glm::ivec2 first = -grid_.first_px / tile_size_px;  // tile of the image's first pixel
+  const glm::ivec2 tiles = image_grid(image_.size_px()).tiles;
+  for (int y = first.y; y < first.y + tiles.y; ++y) {
+    for (int x = first.x; x < first.x + tiles.x; ++x) {
+      const auto tile = static_cast<std::size_t>(y * grid_.tiles.x + x);
+      loads.push_back(static_cast<std::uint32_t>(lists_.list(tile).size()));
+    }
   }
   return loads;
 }
@@ -224,8 +288,8 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         blocks_.memory_bytes() + bytes(clusters_) + bytes(members_) + bytes(summaries_) +
-         bytes(counts_) + bytes(splats_) + bytes(paths_) + bytes(depths_);
+         blocks_.memory_bytes() + reach_.memory_bytes() + bytes(clusters_) + bytes(members_) +
+         bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_) + bytes(depths_);
 }
 
 }  // namespace catgs

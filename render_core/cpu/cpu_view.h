@@ -10,6 +10,7 @@
 #include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
+#include "render_core/cpu/tile_reach.h"
 #include "render_core/host_image.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/renderer.h"
@@ -36,22 +37,27 @@ class CpuView final : public View {
 
  private:
   FrameStats draw(const FrameRequest& request);
-  void draw_boxes(const Camera& camera, FrameStats& stats);
-  void draw_key_lists(const Camera& camera, const Camera* window_end, FrameStats& stats);
+  FramePlan plan(const FrameRequest& request);
+  void draw_boxes(const Camera& camera, const FramePlan& plan, FrameStats& stats);
+  void draw_key_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats);
   void draw_sub_lists(const Camera& camera, FrameStats& stats);
-  void cull_clusters(const Camera& camera, const Camera* window_end);
+  void cull_clusters(const Camera& camera, const FramePlan& plan);
   template <class Done>
-  void project(const Camera& camera, const Camera* window_end, const Done& done);
+  void project(const Camera& camera, const FramePlan& plan, const Done& done);
+  template <class Sort>
+  void sort_seen_lists(const Sort& sort);
   std::uint64_t blend(const FrameRequest& request);
+  BlendResult blend_tile(const FrameRequest& request, std::size_t tile);
+  void summarise(FrameStats& stats);
   [[nodiscard]] std::size_t segments() const;
-  [[nodiscard]] SplatTable table(bool with_paths) const;
+  [[nodiscard]] SplatTable table(const FramePlan& plan) const;
   ClusterColours colours_of(std::uint32_t cluster, const Camera& camera);
 
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
   FrameGroups groups_;
-  float nearest_depth_ = 0.0f;  // FrameStats of the last frame
-  glm::ivec2 grid_{0};          // tiles
+  SceneDepths depths_in_view_;  // of the last frame
+  TileGrid grid_;               // of the lists
   HostImage image_;
   std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
   std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians
@@ -63,6 +69,7 @@ class CpuView final : public View {
   std::optional<ColourCache> colours_;
   TileLists lists_;
   PixelBlocks blocks_;
+  TileReach reach_;
 };
 
 }  // namespace catgs

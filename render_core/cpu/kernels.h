@@ -14,6 +14,7 @@
 #include "render_core/cpu/list_sort.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/host_image.h"
+#include "render_core/motion/frame_groups.h"
 #include "render_core/renderer.h"
 
 namespace catgs {
@@ -24,11 +25,12 @@ struct alignas(64) Splat {
   float centre_x, centre_y;          // px
   float whitening_xx, whitening_xy;  // math::Whitening
   float whitening_yy, log2_opacity;
-  float half_extent_x, half_extent_y;  // px, of the box around alpha >= alpha_min
+  float half_extent_x;  // px, of the ellipse alpha >= alpha_min
+  float growth_px;      // by which its outline is listed wider
   float red, green, blue;
   float depth;  // world units along the view axis
   std::uint32_t original_index;
-  std::uint16_t tile_x, tile_y, tile_end_x, tile_end_y;  // tiles its box touches, end exclusive
+  std::uint16_t tile_x, tile_y, tile_end_x, tile_end_y;  // of the grid: its box, end exclusive
   float rightmost_y;  // px below the centre: where the ellipse alpha >= alpha_min is rightmost
 };
 
@@ -59,15 +61,15 @@ struct ClusterColours {
 struct ProjectTask {
   const SceneStore* scene;
   const Camera* camera;
+  const FramePlan* plan;  // what the lists have to cover
   // What visible means, and the tiles of a splat's box: vanilla, the original's; exact, where its
-  // ellipse is; catgs, where its trail is until the camera is at `window_end`.
+  // ellipse is; catgs, where its trail is until the window's end.
   Pipeline pipeline;
   std::size_t cluster;
   Splat* splats;
   float min_depth;  // world units; nearer ones do not count in ClusterSummary
   ClusterColours colours{nullptr, nullptr};
   // catgs only.
-  const Camera* window_end = nullptr;
   SplatPath* paths = nullptr;         // as splats
   ClusterMembers* members = nullptr;  // which ones are visible
 };
@@ -86,9 +88,12 @@ struct RefreshTask {
 };
 
 struct ClusterSummary {
-  std::uint32_t visible = 0;                                     // splats written
-  float nearest_depth = std::numeric_limits<float>::infinity();  // of those deeper than min_depth
-  float longest_path_px = 0.0f;                                  // of the same
+  std::uint32_t visible = 0;  // splats written
+  // Of those deeper than min_depth.
+  std::uint32_t counted = 0;
+  float nearest_depth = std::numeric_limits<float>::infinity();
+  float inverse_depth_sum = 0.0f;
+  float longest_path_px = 0.0f;
 };
 
 /// Neighbouring tiles of one row that list the same splat.
@@ -102,6 +107,7 @@ struct ListTask {
   std::span<const Splat> splats;
   const SplatPath* paths;  // as splats; null: they do not move
   std::uint32_t first_slot;
+  glm::ivec2 first_px;  // of the grid
 };
 
 /// Pixels are blended in blocks of 4x4, which are culled as one: a register where that is wide
@@ -117,6 +123,12 @@ struct PixelBlock {
 /// Most blocks that one task blends; a tile has half as many.
 inline constexpr int max_task_blocks = 32;
 
+struct BlendResult {
+  std::uint64_t pairs = 0;    // (Gaussian, pixel) pairs blended, if they are counted
+  std::size_t looked_at = 0;  // entries of the list
+  bool finished = false;      // no pixel would look at more of them
+};
+
 /// Blends a tile's list in some blocks and writes them to the image.
 struct BlendTask {
   const Splat* splats;
@@ -124,7 +136,7 @@ struct BlendTask {
   std::span<const PixelBlock> blocks;
   glm::vec3 background;
   bool cull_blocks;  // skip blocks that a splat's ellipse does not meet; same image
-  bool count_pairs;  // else the result is 0
+  bool count_pairs;
   const HostImage* image;
 };
 
@@ -134,7 +146,7 @@ struct SimdKernels {
   ClusterSummary (*project_cluster)(const ProjectTask& task);
   ClusterSummary (*refresh_cluster)(const RefreshTask& task);
   void (*list_tiles)(const ListTask& task, std::vector<TileRun>& runs);  // appends
-  std::uint64_t (*blend_blocks)(const BlendTask& task);  // (Gaussian, pixel) pairs blended
+  BlendResult (*blend_blocks)(const BlendTask& task);
 };
 
 /// Kernels for instruction sets that this processor has, best first; the last is "SCALAR".

@@ -27,17 +27,12 @@ namespace HWY_NAMESPACE {
 struct ProjectionContext {
   CameraModel<Doubles> precise;
   CameraModel<Floats> camera;
-  Vec2<Floats> last_pixel;  // index of the last column and row
   Floats near_z;
 };
 
 inline ProjectionContext make_context(const Camera& camera) {
   const CameraModel<double> model = make_camera_model(camera);
-  return {convert<Doubles>(model),
-          convert<Floats>(model),
-          {Floats(static_cast<float>(camera.size_px.x - 1)),
-           Floats(static_cast<float>(camera.size_px.y - 1))},
-          Floats(camera.near_z)};
+  return {convert<Doubles>(model), convert<Floats>(model), Floats(camera.near_z)};
 }
 
 /// Depths of Floats::count Gaussians from `i` on.
@@ -188,7 +183,7 @@ struct SplatLook {
 
 /// What listing needs besides.
 struct SplatBox {
-  Vec2<Floats> half_extent_px;
+  Floats half_extent_x, growth_px;
   TileRange columns, rows;
   Floats rightmost_y;
 };
@@ -197,7 +192,7 @@ struct SplatBox {
 HWY_INLINE SplatBox no_box() {
   const Floats zero(0.0);
   const FloatMask nowhere = zero < zero;
-  return {{zero, zero}, {zero, zero, nowhere}, {zero, zero, nowhere}, zero};
+  return {zero, zero, {zero, zero, nowhere}, {zero, zero, nowhere}, zero};
 }
 
 /// Makes the splats that are not in front of the near plane draw nothing, at a depth that sorts.
@@ -211,8 +206,8 @@ HWY_INLINE void write_splats(const SplatLook& s, const SplatBox& box, std::uint3
                              Splat* out) {
   alignas(64) float splats[16 * Floats::count];
   interleave({s.centre_px.x, s.centre_px.y, s.w.xx, s.w.xy, s.w.yy, s.log2_opacity,
-              box.half_extent_px.x, box.half_extent_px.y, s.colour.x, s.colour.y, s.colour.z,
-              s.depth, s.original_index, pack_pair(box.columns.low, box.rows.low),
+              box.half_extent_x, box.growth_px, s.colour.x, s.colour.y, s.colour.z, s.depth,
+              s.original_index, pack_pair(box.columns.low, box.rows.low),
               pack_pair(box.columns.end, box.rows.end), box.rightmost_y},
              splats);
   for (; hits != 0; hits &= hits - 1)
@@ -221,22 +216,28 @@ HWY_INLINE void write_splats(const SplatLook& s, const SplatBox& box, std::uint3
 
 /// Collects a ClusterSummary.
 struct Extremes {
-  Floats nearest_depth, longest_square;
+  Floats nearest_depth, inverse_depths, longest_square;
+  std::uint32_t counted = 0;
 
   // Written out: the compiler's own constructor would not be of this instruction set.
   HWY_INLINE Extremes()
-      : nearest_depth(std::numeric_limits<float>::infinity()), longest_square(0.0f) {}
+      : nearest_depth(std::numeric_limits<float>::infinity()),
+        inverse_depths(0.0f),
+        longest_square(0.0f) {}
 
-  HWY_INLINE void add_depths(const FloatMask& counted, const Floats& depth) {
-    nearest_depth = select(counted, min(nearest_depth, depth), nearest_depth);
+  HWY_INLINE void add_depths(const FloatMask& deep, const Floats& depth) {
+    nearest_depth = select(deep, min(nearest_depth, depth), nearest_depth);
+    inverse_depths = select(deep, inverse_depths + Floats(1.0) / depth, inverse_depths);
+    counted += static_cast<std::uint32_t>(std::popcount(bits(deep)));
   }
-  HWY_INLINE void add_paths(const FloatMask& counted, const Vec2<Floats>& path) {
+  HWY_INLINE void add_paths(const FloatMask& deep, const Vec2<Floats>& path) {
     const Floats square = mul_add(path.x, path.x, path.y * path.y);
-    longest_square = select(counted, max(longest_square, square), longest_square);
+    longest_square = select(deep, max(longest_square, square), longest_square);
   }
   HWY_INLINE ClusterSummary summary(std::uint32_t visible) const {
     const hn::ScalableTag<float> d;
-    return {visible, hn::GetLane(hn::MinOfLanes(d, nearest_depth.v)),
+    return {visible, counted, hn::GetLane(hn::MinOfLanes(d, nearest_depth.v)),
+            hn::GetLane(hn::SumOfLanes(d, inverse_depths.v)),
             std::sqrt(hn::GetLane(hn::MaxOfLanes(d, longest_square.v)))};
   }
 };

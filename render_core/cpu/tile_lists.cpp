@@ -20,6 +20,29 @@ void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
   }
 }
 
+/// Room for as many entries, of the calling thread.
+std::span<DepthSlot> scratch_of(std::size_t size) {
+  thread_local std::vector<DepthSlot> scratch;
+  if (scratch.size() < size) scratch.resize(size);
+  return std::span(scratch).first(size);
+}
+
+/// Moves the entries up to a depth (bits) before the others, both in the order that they have.
+/// Returns them.
+std::span<DepthSlot> bring_to_front(std::span<DepthSlot> list, std::uint32_t reach) {
+  const std::span<DepthSlot> behind = scratch_of(list.size());
+  std::size_t front = 0, rest = 0;
+  for (const DepthSlot& entry : list) {  // without a branch that could be mispredicted
+    const bool is_front = entry.key <= reach;
+    behind[rest] = entry;
+    list[front] = entry;
+    front += is_front ? 1 : 0;
+    rest += is_front ? 0 : 1;
+  }
+  std::copy_n(behind.begin(), rest, list.begin() + static_cast<std::ptrdiff_t>(front));
+  return list.first(front);
+}
+
 /// Orders splats of equal depth.
 struct SceneOrder {
   std::span<const Splat> splats;
@@ -35,6 +58,7 @@ void TileLists::begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_e
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
   starts_.resize(static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y) + 1);
+  sorted_.assign(tiles(), 0);
   segments_.resize(segments);
   clear_segments();
 }
@@ -113,7 +137,7 @@ void TileLists::list_nearest(const SplatTable& table, const SimdKernels& kernels
 /// The nearest splat that has to be left out, with all behind it, so that the entries of those
 /// before it (entries_of_slot_) stay within the bound.
 TileLists::DepthOrder TileLists::find_first_left_out(const SplatTable& table, ThreadPool& pool) {
-  const auto& [splats, paths, counts] = table;
+  const auto& [splats, paths, counts, first_px] = table;
   by_depth_.clear();
   for (std::size_t rank = 0; rank < counts.size(); ++rank)
     for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank]; ++slot)
@@ -140,39 +164,43 @@ void TileLists::place_lists() {
   }
 }
 
-/// Calls visit(list, scratch) for all lists.
-template <class Visit>
-void TileLists::for_each_list(ThreadPool& pool, const Visit& visit) {
+void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
   constexpr std::size_t tiles_per_task = 16;
   pool.parallel_for((tiles() + tiles_per_task - 1) / tiles_per_task, [&](std::size_t task) {
-    thread_local std::vector<DepthSlot> scratch;
     const std::size_t end = std::min(tiles(), (task + 1) * tiles_per_task);
     for (std::size_t tile = task * tiles_per_task; tile < end; ++tile) {
-      const std::span<DepthSlot> list(entries_.data() + starts_[tile],
-                                      entries_.data() + starts_[tile + 1]);
-      if (scratch.size() < list.size()) scratch.resize(list.size());
-      visit(list, std::span(scratch).first(list.size()));
+      sorted_[tile] = 0;
+      sort_rest(tile, splats);
     }
   });
 }
 
-void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
-  for_each_list(pool, [&](std::span<DepthSlot> list, std::span<DepthSlot> scratch) {
-    sort_list(list, scratch, SceneOrder{splats});
-  });
+void TileLists::sort_front(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats) {
+  const std::span<DepthSlot> list = mutable_list(tile);
+  const std::span<DepthSlot> front = bring_to_front(list, reach);
+  sort_list(front, scratch_of(front.size()), SceneOrder{splats});
+  sorted_[tile] = static_cast<std::uint32_t>(front.size());
 }
 
-void TileLists::sort_again(std::span<const Splat> splats, std::span<const std::uint32_t> depths,
-                           ThreadPool& pool) {
-  for_each_list(pool, [&](std::span<DepthSlot> list, std::span<DepthSlot> scratch) {
-    for (DepthSlot& entry : list) entry.key = depths[entry.value];
-    sort_list_again(list, scratch, SceneOrder{splats});
-  });
+void TileLists::sort_front_again(std::size_t tile, std::uint32_t reach,
+                                 std::span<const Splat> splats,
+                                 std::span<const std::uint32_t> depths) {
+  const std::span<DepthSlot> list = mutable_list(tile);
+  for (DepthSlot& entry : list) entry.key = depths[entry.value];
+  const std::span<DepthSlot> front = bring_to_front(list, reach);
+  sort_list_again(front, scratch_of(front.size()), SceneOrder{splats});
+  sorted_[tile] = static_cast<std::uint32_t>(front.size());
+}
+
+void TileLists::sort_rest(std::size_t tile, std::span<const Splat> splats) {
+  const std::span<DepthSlot> rest = mutable_list(tile).subspan(sorted_[tile]);
+  sort_list(rest, scratch_of(rest.size()), SceneOrder{splats});
+  sorted_[tile] += static_cast<std::uint32_t>(rest.size());
 }
 
 void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
                               ThreadPool& pool) {
-  const auto& [splats, paths, counts] = table;
+  const auto& [splats, paths, counts, first_px] = table;
   const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
@@ -209,12 +237,15 @@ void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uin
     ++starts_[(keys_[i].key >> 32) + 1];
   }
   std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+  sorted_.resize(tile_count);
+  for (std::size_t tile = 0; tile < tile_count; ++tile)
+    sorted_[tile] = static_cast<std::uint32_t>(list(tile).size());
 }
 
 /// Counts the keys of each splat that is not left out (entries_of_slot_) and where those of each
 /// cluster begin (key_offsets_); returns their sum.
 std::uint64_t TileLists::count_keys(const SplatTable& table, ThreadPool& pool) {
-  const auto& [splats, paths, counts] = table;
+  const auto& [splats, paths, counts, first_px] = table;
   entries_of_slot_.resize(splats.size());
   key_offsets_.resize(counts.size());
   pool.parallel_for(counts.size(), [&](std::size_t rank) {
@@ -258,7 +289,7 @@ std::uint32_t TileLists::longest() const {
 
 std::size_t TileLists::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  std::size_t sum = bytes(starts_) + bytes(entries_) + bytes(tiles_by_length_) +
+  std::size_t sum = bytes(starts_) + bytes(entries_) + bytes(sorted_) + bytes(tiles_by_length_) +
                     bytes(key_offsets_) + bytes(keys_) + bytes(key_scratch_);
   for (const Segment& segment : segments_) sum += bytes(segment.runs) + bytes(segment.positions);
   return sum;

@@ -20,11 +20,12 @@ struct SplatTable {
   std::span<const Splat> splats;
   const SplatPath* paths;  // [slot]; null: ellipses are listed, not trails
   std::span<const std::uint32_t> counts;
+  glm::ivec2 first_px;  // of the grid
 
   [[nodiscard]] ListTask of_cluster(std::size_t rank) const {
     const std::size_t first = rank * cluster_size;
     return {splats.subspan(first, counts[rank]), paths == nullptr ? nullptr : paths + first,
-            static_cast<std::uint32_t>(first)};
+            static_cast<std::uint32_t>(first), first_px};
   }
 };
 
@@ -47,10 +48,17 @@ class TileLists {
   /// Brings each list into depth order; equal depths keep the order of the scene.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
 
-  /// The same for lists that were sorted before their splats moved a little: [slot] `depths` are
-  /// the bits of their depths now.
-  void sort_again(std::span<const Splat> splats, std::span<const std::uint32_t> depths,
-                  ThreadPool& pool);
+  /// Brings entries up to the depth `reach` (bits) to the front of a tile's list, in order. Lists
+  /// of several tiles may be ordered in parallel.
+  void sort_front(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats);
+
+  /// The same for a list whose front was sorted before its splats moved a little: [slot] `depths`
+  /// are the bits of their depths now.
+  void sort_front_again(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats,
+                        std::span<const std::uint32_t> depths);
+
+  /// Sorts what is behind the front of a list, too.
+  void sort_rest(std::size_t tile, std::span<const Splat> splats);
 
   /// Both at once in the original's way: a (tile | depth) key per splat and tile of its box, one
   /// sort of all keys.
@@ -58,6 +66,10 @@ class TileLists {
                      ThreadPool& pool);
 
   [[nodiscard]] std::size_t tiles() const { return starts_.size() - 1; }
+  /// The part of a tile's list that is in order.
+  [[nodiscard]] std::span<const DepthSlot> front(std::size_t tile) const {
+    return list(tile).first(sorted_[tile]);
+  }
   /// The splats of a tile (row-major index): depth bits and slot.
   [[nodiscard]] std::span<const DepthSlot> list(std::size_t tile) const {
     return {entries_.data() + starts_[tile], entries_.data() + starts_[tile + 1]};
@@ -88,8 +100,9 @@ class TileLists {
   void list_nearest(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool);
   DepthOrder find_first_left_out(const SplatTable& table, ThreadPool& pool);
   void place_lists();
-  template <class Visit>
-  void for_each_list(ThreadPool& pool, const Visit& visit);
+  std::span<DepthSlot> mutable_list(std::size_t tile) {
+    return {entries_.data() + starts_[tile], entries_.data() + starts_[tile + 1]};
+  }
   std::uint64_t count_keys(const SplatTable& table, ThreadPool& pool);
 
   glm::ivec2 grid_{0};
@@ -99,6 +112,7 @@ class TileLists {
   DepthOrder first_left_out_ = nothing_left_out;
   std::vector<std::uint64_t> starts_ = {0};  // tiles + 1
   std::vector<DepthSlot> entries_;
+  std::vector<std::uint32_t> sorted_;  // [tile]: entries at the front of its list, in order
   std::uint64_t overflowed_ = 0;
   std::vector<std::uint32_t> tiles_by_length_;
   // What is left out when memory is short.

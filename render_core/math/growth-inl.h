@@ -15,7 +15,8 @@ namespace CATGS_MATH_NAMESPACE {
 template <class T, class S>
 CATGS_HD_INLINE ListGrowth<T> convert(const ListGrowth<S>& g) {
   return {T(g.parallax),    T(g.curvature),   T(g.constant),    T(g.wide),
-          T(g.slope_min_x), T(g.slope_min_y), T(g.slope_max_x), T(g.slope_max_y)};
+          T(g.slope_min_x), T(g.slope_min_y), T(g.slope_max_x), T(g.slope_max_y),
+          T(g.turn_sine),   T(g.turn_cosine), T(g.steepest),    T(g.oblique)};
 }
 
 /// Growth in px of an outline of `radius_px` around a centre at `slope` = (x/z, y/z), whose depth
@@ -32,6 +33,19 @@ CATGS_HD_INLINE T growth_px(const ListGrowth<T>& g, const Vec2<T>& slope, T near
                     (slope.y < g.slope_min_y) | (slope.y > g.slope_max_y);
   const T by_radius = mul_add(g.curvature, radius_px, select(wide, g.wide, T(0.0)));
   return mul_add(by_radius, radius_px, g.parallax * oblique / nearest_depth) + g.constant;
+}
+
+/// Whether a turn may bring a Gaussian into the picture that is at `at` in camera space, behind the
+/// near plane on the camera's path: it comes before that plane, far to the side, and the footprint
+/// that is linearised at the clamped slope (fov_clamp) is as wide. `extent`: how far from its
+/// centre it reaches alpha_min at most, world units. True of giants and of those around the camera
+/// alone.
+template <class T>
+CATGS_HD_INLINE auto may_turn_in(const ListGrowth<T>& g, const Vec3<T>& at, T extent, T near_z) {
+  const T lateral2 = mul_add(at.x, at.x, at.y * at.y);
+  const T z = mul_add(g.turn_cosine, at.z, g.turn_sine * sqrt(lateral2));
+  const T aside = sqrt(max(mul_add(at.z, at.z, lateral2) - z * z, T(0.0)));
+  return (z > near_z) & (aside <= mul_add(g.oblique, extent, g.steepest * z));
 }
 
 }  // namespace CATGS_MATH_NAMESPACE

@@ -23,6 +23,8 @@ struct ListGrowth {
   T wide = T(0);  // share of their radius, for Gaussians that are linearised elsewhere after a turn
   T slope_min_x = T(0), slope_min_y = T(0);  // x/z and y/z of all others
   T slope_max_x = T(0), slope_max_y = T(0);
+  T turn_sine = T(0), turn_cosine = T(1);  // of how far the camera may turn
+  T steepest = T(0), oblique = T(1);       // slopes of the picture; sqrt(1 + slope^2) where clamped
 };
 
 }  // namespace catgs

@@ -191,7 +191,11 @@ ListGrowth<double> list_growth(const Camera& key, const GuardSet& guard) {
           low.x + inwards(low.x),
           low.y + inwards(low.y),
           high.x - inwards(high.x),
-          high.y - inwards(high.y)};
+          high.y - inwards(high.y),
+          sine,
+          std::cos(guard.max_turn_rad),
+          slope,
+          std::hypot(1.0, limit.x, limit.y)};
 }
 
 float guarded_near_z(const Camera& key, const GuardSet& guard) {

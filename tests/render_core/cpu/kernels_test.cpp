@@ -28,7 +28,7 @@ using test::TestScene;
 struct Projected {
   std::vector<Splat> splats;
   std::vector<std::uint32_t> counts;
-  [[nodiscard]] SplatTable table() const { return {splats, nullptr, counts}; }
+  [[nodiscard]] SplatTable table() const { return {splats, nullptr, counts, glm::ivec2(0)}; }
   template <class Visit>
   void for_each(const Visit& visit) const {
     for (std::size_t rank = 0; rank < counts.size(); ++rank)
@@ -40,10 +40,14 @@ struct Projected {
 Projected project_all(const SceneStore& store, const Camera& camera, const SimdKernels& kernels,
                       Pipeline pipeline = Pipeline::exact) {
   Projected out;
+  FramePlan plan;
+  plan.window_end = camera;
+  plan.grid = image_grid(camera.size_px);
+  plan.list_near_z = camera.near_z;
   out.splats.resize(store.clusters().size() * cluster_size);
   for (std::size_t c = 0; c < store.clusters().size(); ++c)
     out.counts.push_back(kernels
-                             .project_cluster({&store, &camera, pipeline, c,
+                             .project_cluster({&store, &camera, &plan, pipeline, c,
                                                out.splats.data() + c * cluster_size, 0.0f})
                              .visible);
   return out;
