@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "render_core/cpu/list_culler.h"
 #include "render_core/math/constants.h"
+#include "render_core/motion/list_culler.h"
 
 namespace catgs {
 namespace {

@@ -82,10 +82,7 @@ HWY_INLINE FloatMask turning_in(const ProjectionContext& context, const ListCont
   const Vec3<Floats> end = camera_from_world(lists.end_camera, mean);
   const auto behind = max(now.z, end.z) <= context.near_z;
   if (none(behind)) return behind;
-  const CovarianceFactor<Floats> l = load_factor(scene, i);
-  const Floats variance =
-      l.xx * l.xx + l.yx * l.yx + l.yy * l.yy + l.zx * l.zx + l.zy * l.zy + l.zz * l.zz;
-  const Floats extent = sqrt(reach * variance) * Floats(1.0 / exponent_scale);
+  const Floats extent = extent_bound(load_factor(scene, i), reach);
   return behind & (may_turn_in(lists.growth, now, extent, context.near_z) |
                    may_turn_in(lists.growth, end, extent, context.near_z));
 }

@@ -41,6 +41,20 @@ struct Splat {
   bool in_view = false;  // its box, or that of its path, meets what lists cover
 };
 
+/// Growth of an outline that covers all tiles.
+constexpr float everywhere_px = 1e6f;
+
+/// Whether a Gaussian that is behind the near plane at both ends of the window may come into the
+/// picture by a turn. `reach`: of its ellipse.
+__device__ inline bool turns_in(const SceneArrays& scene, const FrameCameras& camera,
+                                std::uint32_t i, const math::Vec3<float>& mean, float reach) {
+  const math::CameraModel<float>& now = camera.now.single;
+  const float extent = math::extent_bound(load_factor(scene, i), reach);
+  return math::may_turn_in(camera.growth, math::camera_from_world(now, mean), extent, now.near_z) ||
+         math::may_turn_in(camera.growth, math::camera_from_world(camera.end, mean), extent,
+                           now.near_z);
+}
+
 /// With `sweeps`, splats that are in view at some time of the window; else those that are now.
 template <bool sweeps>
 __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera,
@@ -52,8 +66,14 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const float reach = math::reach_of(centre.log2_opacity);
   const bool in_front = out.depth > camera.near_z;
   const float end_depth = sweeps ? math::view_depth(camera.end, mean) : out.depth;
-  const bool candidate = out.depth > now.near_z || end_depth > now.near_z;
-  if (!candidate || reach < 0.0f) return out;
+  if (reach < 0.0f) return out;
+  if (fmaxf(out.depth, end_depth) <= now.near_z) {
+    if (sweeps && turns_in(scene, camera, i, mean, reach)) {
+      out.in_view = true;
+      out.path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, centre.log2_opacity, everywhere_px, {}};
+    }
+    return out;
+  }
 
   const math::CovarianceFactor<float> factor = load_factor(scene, i);
   math::Sweep<float> s{};

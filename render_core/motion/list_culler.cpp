@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "render_core/math/constants.h"
+#include "render_core/math/growth-inl.h"
 
 namespace catgs {
 namespace {
@@ -29,20 +31,24 @@ float steepest_slope(const Camera& camera) {
 
 }  // namespace
 
+ListCuller::End::End(const Pose& pose)
+    : position(pose.position),
+      right(pose.orientation * glm::vec3(1.0f, 0.0f, 0.0f)),
+      down(pose.orientation * glm::vec3(0.0f, 1.0f, 0.0f)),
+      forward(pose.orientation * glm::vec3(0.0f, 0.0f, 1.0f)) {}
+
 ListCuller::ListCuller(const Camera& camera, const FramePlan& plan)
     : now_(camera_of_grid(camera, plan)),
       end_(camera_of_grid(plan.window_end, plan)),
-      position_(camera.world_from_camera.position),
-      forward_(camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f)),
-      near_z_(plan.list_near_z),
-      focal_px_(std::max(camera.focal_px.x, camera.focal_px.y)),
-      parallax_(static_cast<float>(plan.growth.parallax) / focal_px_),
-      curvature_(static_cast<float>(plan.growth.curvature)),
-      wide_(static_cast<float>(plan.growth.wide)) {
+      start_(camera.world_from_camera),
+      window_end_(plan.window_end.world_from_camera),
+      growth_(math::convert<float>(plan.growth)),
+      near_z_(plan.list_near_z) {
   const auto clamp = static_cast<float>(fov_clamp);
   const float oblique = std::hypot(1.0f, clamp * steepest_slope(camera_of_grid(camera, plan)));
-  parallax_ *= oblique;
-  focal_px_ *= oblique;  // so that it bounds a splat's radius
+  const float focal_px = std::max(camera.focal_px.x, camera.focal_px.y);
+  focal_px_ = focal_px * oblique;
+  off_path_ = growth_.parallax / focal_px * oblique;
 }
 
 }  // namespace catgs

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "render_core/math/growth-inl.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/scene/clusters.h"
 
@@ -12,28 +13,56 @@ class ListCuller {
   ListCuller(const Camera& camera, const FramePlan& plan);
 
   [[nodiscard]] CATGS_HD bool outside(const Cluster& cluster) const {
-    return outside_on_the_way(now_, end_, grown(cluster));
+    return outside_on_the_way(now_, end_, grown(cluster)) && !turns_in(cluster, start_) &&
+           !turns_in(cluster, window_end_);
   }
 
  private:
-  /// growth_px() as a longer reach: by the camera's way off, and by shares of the splats' radii.
+  /// An end of the camera's path: its position and axes, world.
+  struct End {
+    explicit End(const Pose& pose);
+    glm::vec3 position, right, down, forward;
+  };
+
+  [[nodiscard]] CATGS_HD static math::Vec3<float> seen_from(const End& end,
+                                                            const glm::vec3& point) {
+    const math::Vec3<float> offset{point.x - end.position.x, point.y - end.position.y,
+                                   point.z - end.position.z};
+    const auto along = [&](const glm::vec3& axis) {
+      return math::dot<float>({axis.x, axis.y, axis.z}, offset);
+    };
+    return {along(end.right), along(end.down), along(end.forward)};
+  }
+
+  /// math::may_turn_in() of any Gaussian in the cluster.
+  [[nodiscard]] CATGS_HD bool turns_in(const Cluster& cluster, const End& end) const {
+    const glm::vec3& half = cluster.half_extent;
+    const float radius = sqrtf(half.x * half.x + half.y * half.y + half.z * half.z);
+    return math::may_turn_in<float>(growth_, seen_from(end, cluster.centre),
+                                    cluster.reach + radius * (1.0f + growth_.steepest),
+                                    near_z_ - radius * (growth_.turn_cosine + growth_.turn_sine));
+  }
+
+  /// math::growth_px() as a longer reach: by the camera's way off, and by shares of the splats'
+  /// radii.
   [[nodiscard]] CATGS_HD Cluster grown(const Cluster& cluster) const {
-    const float depth =
-        forward_.x * (cluster.centre.x - position_.x) - fabsf(forward_.x) * cluster.half_extent.x +
-        forward_.y * (cluster.centre.y - position_.y) - fabsf(forward_.y) * cluster.half_extent.y +
-        forward_.z * (cluster.centre.z - position_.z) - fabsf(forward_.z) * cluster.half_extent.z;
-    const float radius_px = focal_px_ * cluster.reach / fmaxf(depth, near_z_);
+    const glm::vec3& half = cluster.half_extent;
+    const glm::vec3& forward = start_.forward;
+    const float nearest = seen_from(start_, cluster.centre).z - fabsf(forward.x) * half.x -
+                          fabsf(forward.y) * half.y - fabsf(forward.z) * half.z;
+    const float radius_px = focal_px_ * cluster.reach / fmaxf(nearest, near_z_);
     Cluster result = cluster;
-    result.reach = cluster.reach * (1.0f + wide_ + curvature_ * radius_px) + parallax_;
+    result.reach *= 1.0f + growth_.wide + growth_.curvature * radius_px;
+    result.reach += off_path_;
     return result;
   }
 
   ClusterCuller now_, end_;
-  glm::vec3 position_, forward_;  // world
+  End start_, window_end_;
+  ListGrowth<float> growth_;
   float near_z_;
-  float focal_px_;          // and so much more that it bounds a splat's radius at the sides
-  float parallax_;          // world units that a camera of the guard set may be off
-  float curvature_, wide_;  // ListGrowth
+  float focal_px_;  // and so much more that it bounds a splat's radius at the sides
+  float off_path_;  // world units that a camera of the guard set may be off, likewise
 };
 
 }  // namespace catgs
