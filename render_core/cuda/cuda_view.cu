@@ -140,10 +140,6 @@ bool CudaView::needs_more_room() {
       {counts.visible, counts.list_entries, std::min(counts.wanted_slices, most_slices(shape_))});
 }
 
-void CudaView::mark(Stage stage) {
-  check(cudaEventRecord(after_[static_cast<std::size_t>(stage)].get(), stream_.get()), "event");
-}
-
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   const bool sweeps = plan.window > 0;
   FrameCameras cameras{make_camera_pair(request.camera), {}, request.camera.near_z};
@@ -158,11 +154,11 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   for (;;) {
     make_room(request.camera.size_px, plan.grid);
     const cudaStream_t stream = stream_.get();
-    check(cudaEventRecord(start_.get(), stream), "event");
+    times_.begin(stream);
     check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
     list_tiles(cameras, culler, sweeps, min_depth);
     split(nullptr, last_reach());
-    mark(Stage::sort);
+    times_.end(Stage::sort, stream_.get());
     blend(request);
     deliver();
     if (!needs_more_room()) break;
@@ -174,7 +170,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
 void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   FrameMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
-  check(cudaEventRecord(start_.get(), stream), "event");
+  times_.begin(stream);
   constexpr std::size_t kept = offsetof(FrameCounts, nearness);
   check(cudaMemsetAsync(reinterpret_cast<std::byte*>(m.counts.get()) + kept, 0,
                         sizeof(FrameCounts) - kept, stream),
@@ -196,9 +192,9 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
                   nullptr,
                   nullptr},
                  Listing::none, stream);
-  mark(Stage::project);
+  times_.end(Stage::project, stream_.get());
   place_tiles(plan);
-  mark(Stage::bin);
+  times_.end(Stage::bin, stream_.get());
   const bool reorders = settings_.order == BlendOrder::fresh;
   odd_sub_frame_ = !odd_sub_frame_;
   LastReach last = last_reach();
@@ -206,7 +202,7 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   split(reorders ? m.runs.get() : nullptr, last);
   if (reorders)
     launch_reorder({m.runs.get(), m.counts.get(), m.depth[0].get(), lists_, processors_}, stream);
-  mark(Stage::sort);
+  times_.end(Stage::sort, stream_.get());
   blend(request);
   deliver();
   remember_reach(plan.list_from_frame);
@@ -268,12 +264,12 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
       std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
   memory_.reserve_image(shape_, settings_);
   const cudaStream_t stream = stream_.get();
-  check(cudaEventRecord(start_.get(), stream), "event");
+  times_.begin(stream);
   check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
   vanilla_.draw(
       {&scene_->arrays(), make_camera_pair(request.camera), shape_, make_float3(b.x, b.y, b.z),
        memory_.rgb.get(), memory_.counts.get(), settings_.count_pairs},
-      [this](Stage stage) { mark(stage); }, stream);
+      [this](Stage stage) { times_.end(stage, stream_.get()); }, stream);
   deliver();
 }
 
@@ -294,18 +290,18 @@ void CudaView::list_tiles(const FrameCameras& cameras, const ListCuller& culler,
       {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), colours, m.records.get(),
        m.depth[0].get(), m.tile_count.get(), m.spans.get(), path, m.order[0].get()},
       sweeps ? Listing::trails : Listing::ellipses, stream);
-  mark(Stage::project);
+  times_.end(Stage::project, stream_.get());
 
   PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
   PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
   sort_by_depth(shape_, depth, order, scratch, stream);
-  check(cudaEventRecord(depth_sorted_.get(), stream), "event");
+  times_.end_depth_sort(stream);
   scan_tile_counts(shape_, m.counts.get(), order.current, m.tile_count.get(), m.first.get(),
                    scratch, stream);
   launch_emit({shape_, m.counts.get(), m.records.get(), order.current, m.first.get(),
                m.tile_count.get(), m.spans.get(), path, m.tile[0].get(), m.slot[0].get()},
               stream);
-  mark(Stage::bin);
+  times_.end(Stage::bin, stream_.get());
 
   PingPong<std::uint32_t> tile{m.tile[0].get(), m.tile[1].get()};
   PingPong<std::uint32_t> slot{m.slot[0].get(), m.slot[1].get()};
@@ -347,7 +343,7 @@ void CudaView::blend(const FrameRequest& request) {
   launch_composite({shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(),
                     m.consumed.get(), pixels, pixel_count, background, m.rgb.get(), reach},
                    stream);
-  mark(Stage::blend);
+  times_.end(Stage::blend, stream_.get());
 }
 
 /// Brings the picture where the View's settings want it, and waits for the frame.
@@ -370,7 +366,7 @@ void CudaView::deliver() {
   check(cudaMemcpyAsync(m.host_counts.get(), m.counts.get(), sizeof(FrameCounts),
                         cudaMemcpyDeviceToHost, stream),
         "counts");
-  mark(Stage::convert);
+  times_.end(Stage::convert, stream_.get());
   check(cudaStreamSynchronize(stream), "frame");
 }
 
@@ -433,21 +429,8 @@ FrameView CudaView::finished(const FramePlan& plan, float near_z) {
     stats.mean_inverse_depth = static_cast<float>(inverse / (near_z * inverse_depth_scale));
   }
   depths_ = {stats.nearest_depth, stats.mean_inverse_depth};
-  cudaEvent_t before = start_.get();
-  for (std::size_t i = 0; i < stage_count; ++i) {
-    check(cudaEventElapsedTime(&stats.stage_ms[i], before, after_[i].get()), "stage time");
-    before = after_[i].get();
-  }
-  if (settings_.pipeline != Pipeline::vanilla && plan.kind == FrameKind::key) {
-    // Tiles are binned in depth order, so that a part of sorting comes first.
-    float depth_sort_ms = 0.0f;
-    check(
-        cudaEventElapsedTime(&depth_sort_ms, after_[static_cast<std::size_t>(Stage::project)].get(),
-                             depth_sorted_.get()),
-        "stage time");
-    stats.stage_ms[static_cast<std::size_t>(Stage::bin)] -= depth_sort_ms;
-    stats.stage_ms[static_cast<std::size_t>(Stage::sort)] += depth_sort_ms;
-  }
+  times_.read(settings_.pipeline != Pipeline::vanilla && plan.kind == FrameKind::key,
+              stats.stage_ms);
   return frame;
 }
 

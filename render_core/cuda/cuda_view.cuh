@@ -7,6 +7,7 @@
 #include "render_core/cuda/frame_room.h"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/split.cuh"
+#include "render_core/cuda/stage_times.h"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/motion/frame_groups.h"
@@ -47,15 +48,12 @@ class CudaView final : public View {
   void deliver();
   [[nodiscard]] FrameView finished(const FramePlan& plan, float near_z);
   [[nodiscard]] std::uint32_t slice_length() const;
-  void mark(Stage stage);
 
   std::shared_ptr<const DeviceScene> scene_;
   int device_;
   ViewSettings settings_;
   Stream stream_;
-  Event start_;
-  Event after_[stage_count];
-  Event depth_sorted_;
+  StageTimes times_;
   FrameShape shape_;
   FrameRoom room_;
   FrameMemory memory_;

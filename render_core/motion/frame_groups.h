@@ -85,8 +85,8 @@ struct FramePlan {
                       // GridKind::warp the key frame's orientation there
   TileGrid grid;      // of the group's lists, in the key frame's image plane
   glm::ivec2 trail_shift_px{0};  // GridKind::shift at the window's end: added to all trails
-  ListGrowth<double> growth{};  // of the group's lists
-  float list_near_z = 0.0f;     // they hold Gaussians beyond this view depth
+  ListGrowth<double> growth{};   // of the group's lists
+  float list_near_z = 0.0f;      // they hold Gaussians beyond this view depth
   // Sub-frames: pixel p of the picture has the lists of the tile that holds list_from_frame(p);
   // without GridKind::warp that is p + shift_px.
   Homography<double> list_from_frame{};

@@ -274,8 +274,8 @@ TEST_F(OpenGroup, EndsWhenTheCachesAreGone) {
   EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::sub);
 }
 
-/// A group on a grid that follows the camera: 1.2 degrees and 0.04 units in four frames, Gaussians at
-/// depth 20 and beyond, 40 in the mean.
+/// A group on a grid that follows the camera: 1.2 degrees and 0.04 units in four frames, Gaussians
+/// at depth 20 and beyond, 40 in the mean.
 class TurningGroup : public ::testing::TestWithParam<GridKind> {
  protected:
   TurningGroup() { key_ = groups_.plan(camera_at({}), Forecast{at(1.0f), 4}, depths); }
