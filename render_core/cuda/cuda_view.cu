@@ -201,7 +201,9 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   last.same_grid = true;
   split(reorders ? m.runs.get() : nullptr, last);
   if (reorders)
-    launch_reorder({m.runs.get(), m.counts.get(), m.depth[0].get(), lists_, processors_}, stream);
+    launch_reorder({shape_, m.range.get(), m.combed.get(), m.runs.get(), m.counts.get(),
+                    m.depth[0].get(), lists_, processors_},
+                   stream);
   times_.end(Stage::sort, stream_.get());
   blend(request);
   deliver();
@@ -320,11 +322,12 @@ std::uint32_t CudaView::slice_length() const {
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
 void CudaView::split(uint2* runs, const LastReach& last) {
   FrameMemory& m = memory_;
-  launch_split({shape_, m.range.get(), last, m.reach[1 - last_reach_].get(),
-                turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(),
-                m.queue.get(), runs, odd_sub_frame_ ? reorder_run / 2 : 0,
-                m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
-               stream_.get());
+  launch_split(
+      {shape_, m.range.get(), last, m.reach[1 - last_reach_].get(),
+       turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(), m.queue.get(),
+       runs, runs != nullptr ? m.combed.get() : nullptr, odd_sub_frame_ ? reorder_run / 2 : 0,
+       m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
+      stream_.get());
 }
 
 void CudaView::blend(const FrameRequest& request) {

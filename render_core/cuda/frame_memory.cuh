@@ -27,7 +27,7 @@ struct FrameMemory {
   DeviceBuffer<std::uint32_t> queue, consumed;
   DeviceBuffer<std::uint32_t> reach[2];  // of this frame and the last
   DeviceBuffer<PixelPlace> pixels;
-  DeviceBuffer<std::uint32_t> pixel_count;
+  DeviceBuffer<std::uint32_t> pixel_count, combed;
   DeviceBuffer<uint2> tile_slices, runs;
   DeviceBuffer<float> slice_transmittance;
   DeviceBuffer<float4> slice_pixels;

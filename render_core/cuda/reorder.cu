@@ -89,6 +89,57 @@ __device__ void reorder(const ReorderParams& p, std::uint32_t first, std::uint32
   }
 }
 
+// The comb: a block takes so many entries of a tile at a time, in as many interleaved windows.
+// Their number is odd, so that a warp's entries lie in different banks of shared memory.
+constexpr int comb_warps = 15;
+constexpr int comb_block = comb_warps * warp_size;
+constexpr int combed_at_once = comb_warps * window;
+constexpr unsigned comb_blocks_per_tile = 4;
+
+/// Sorts entries first, first + stride, … of `slots`, a window of them, by one warp.
+__device__ void comb(const ReorderParams& p, std::uint32_t* slots, int first, int stride,
+                     int count) {
+  const int lane = static_cast<int>(threadIdx.x) % warp_size;
+  const int present = (count - first + stride - 1) / stride;
+  std::uint32_t key[per_lane], slot[per_lane];
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) {
+    const int place = j * warp_size + lane;
+    key[j] = behind_all;
+    if (place < present)
+      key[j] = p.depth_key[slots[first + place * stride]] >> depth_bits_below << place_bits |
+               static_cast<std::uint32_t>(place);
+  }
+  sort_window(key);
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) {
+    if (per_lane * lane + j >= present) continue;
+    slot[j] = slots[first + static_cast<int>(key[j] & ((1u << place_bits) - 1u)) * stride];
+  }
+  __syncwarp();
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j)
+    if (per_lane * lane + j < present) slots[first + (per_lane * lane + j) * stride] = slot[j];
+}
+
+__global__ void __launch_bounds__(comb_block) comb_kernel(const ReorderParams p) {
+  __shared__ std::uint32_t slots[combed_at_once];
+  const int thread = static_cast<int>(threadIdx.x), warp = thread / warp_size;
+  const std::uint32_t combed = p.combed[blockIdx.x];
+  for (std::uint32_t begin = blockIdx.y * combed_at_once; begin + window < combed;
+       begin += comb_blocks_per_tile * combed_at_once) {
+    std::uint32_t* list = &p.slot[p.range[blockIdx.x].x + begin];
+    const int count = static_cast<int>(min(combed - begin, std::uint32_t{combed_at_once}));
+    for (int i = thread; i < count; i += comb_block) slots[i] = list[i];
+    __syncthreads();
+    const int stride = (count + window - 1) / window | 1;
+    if (warp < stride) comb(p, slots, warp, stride, count);
+    __syncthreads();
+    for (int i = thread; i < count; i += comb_block) list[i] = slots[i];
+    __syncthreads();
+  }
+}
+
 __global__ void __launch_bounds__(block_size) reorder_kernel(const ReorderParams p) {
   __shared__ std::uint32_t held[warps][window];
   const std::uint32_t warp = threadIdx.x / warp_size;
@@ -103,6 +154,8 @@ __global__ void __launch_bounds__(block_size) reorder_kernel(const ReorderParams
 }  // namespace
 
 void launch_reorder(const ReorderParams& params, cudaStream_t stream) {
+  comb_kernel<<<dim3(params.shape.tiles(), comb_blocks_per_tile), comb_block, 0, stream>>>(params);
+  check_launch("comb");
   constexpr int blocks_per_processor = 16;
   reorder_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
   check_launch("reorder");

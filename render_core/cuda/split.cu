@@ -119,6 +119,12 @@ __device__ std::uint32_t runs_of(const SplitParams& p, const Cut& cut) {
              : (cut.expected + p.run_shift + reorder_run - 1) / reorder_run;
 }
 
+/// What comes from behind may belong in front.
+__device__ std::uint32_t combed_of(const Cut& cut) {
+  constexpr std::uint32_t at_least = 512;
+  return cut.expected == 0 ? 0 : min(cut.listed(), cut.expected + cut.expected / 2 + at_least);
+}
+
 /// `first`: the tile's first slice, if it has any; `place`: its first in each class of the queue.
 __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cut,
                             std::uint32_t first, const std::uint32_t (&place)[queue_classes]) {
@@ -201,6 +207,7 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) place[c] += queued[c];
   p.reach[t] = cut.seen ? 0 : cut.reach;
+  if (p.combed != nullptr) p.combed[t] = combed_of(cut);
   p.tile_slices[t] = make_uint2(first, cut.stored());
   write_tasks(p, t, cut, first, place);
 }

@@ -35,12 +35,14 @@ struct SplitParams {
   BlendTask* tasks;                  // [task_bound(shape)]
   uint2* tile_slices;                // [tiles], first slice and how many; none: one task
   std::uint32_t* queue;              // [queue_bound(shape)], see FrameCounts
-  uint2* runs;                       // [run_bound], for the reorder stage; null: it does not follow
-  std::uint32_t run_shift;           // how much shorter a tile's first run is
-  float* slice_transmittance;        // [slice_bound][tile_parts], set to 1
-  FrameCounts* counts;               // what split makes is set, and list_max
-  std::uint32_t slice_length;        // l; 0: not known, the mean list is taken
-  bool split;                        // else every tile is one task
+  // For the reorder stage; null: it does not follow.
+  uint2* runs;                 // [run_bound]
+  std::uint32_t* combed;       // [tiles], entries of each list that are combed
+  std::uint32_t run_shift;     // how much shorter a tile's first run is
+  float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
+  FrameCounts* counts;         // what split makes is set, and list_max
+  std::uint32_t slice_length;  // l; 0: not known, the mean list is taken
+  bool split;                  // else every tile is one task
 };
 void launch_split(const SplitParams& params, cudaStream_t stream);
 
