@@ -11,7 +11,6 @@
 
 #include <gtest/gtest.h>
 
-#include "render_core/cpu/list_culler.h"
 #include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
@@ -20,6 +19,7 @@
 #include "render_core/math/projection-inl.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/motion/frame_groups.h"
+#include "render_core/motion/list_culler.h"
 #include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
 #include "render_core/motion/trajectory.h"
