@@ -68,7 +68,8 @@ struct BlendParams {
   int warps;             // that the device holds at a time, by blend_warps()
 };
 
-/// Warps of the blend kernels that `processors` of the current device hold at a time.
+/// Warps of the blend kernel for square tiles that `processors` of the current device hold at a
+/// time.
 int blend_warps(int processors);
 void launch_blend(const BlendParams& params, cudaStream_t stream);
 

@@ -117,9 +117,9 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   for (;;) {
     set_shape(size_px, grid);
     try {
-      const std::uint32_t* known = memory_.reach[last_reach_].get();
+      const std::size_t known = memory_.reach[last_reach_].bytes();
       memory_.reserve(shape_, scene_->arrays(), settings_);
-      if (memory_.reach[last_reach_].get() != known) reach_known_ = false;
+      if (memory_.reach[last_reach_].bytes() != known) reach_known_ = false;
       return;
     } catch (const CudaError& error) {
       memory_ = {};

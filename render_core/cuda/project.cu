@@ -65,7 +65,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   p.records[v] = {splat.centre_px, splat.whitening, splat.log2_opacity, colour};
   p.depth_key[v] = depth_key(splat.depth, p.camera.near_z);
   const bool listed = listing == Listing::none || splat.in_view;
-  const bool counted = listed && splat.depth > p.min_depth;
+  const bool counted = listed && splat.depth > fmaxf(p.min_depth, p.camera.near_z);
   raise(&p.counts->nearness, counted ? ~__float_as_uint(splat.depth) : 0u);
   if (blockIdx.x % sampled_blocks == 0) add_inverse_depth(p, counted, splat.depth);
   if constexpr (listing != Listing::none) {

@@ -29,7 +29,7 @@ struct TileFootprint {
   FrameShape shape;
 
   /// First and last column of one tile row; empty when first > last. A tile counts when the
-  /// rectangle of its pixel centres, as far as they lie in the image, meets the outline.
+  /// rectangle of its pixel centres, as far as lists reach, meets the outline.
   __device__ int2 columns(int row) const {
     constexpr float tile = tile_size_px;
     const float top = static_cast<float>(row) * tile + 0.5f;

@@ -182,8 +182,9 @@ void FrameGroups::begin_group(const Camera& now, const Forecast& forecast,
       speculation_window(longest, settings_.max_trail_px,
                          max_displacement_px(now, end_of(last), depths.nearest, shift_of(last)));
   if (warps) {
-    const double tau = settings_.guard_px /
-                       (std::max(now.focal_px.x, now.focal_px.y) * double{depths.mean_inverse});
+    const double tau =
+        std::min(most_tau(now), settings_.guard_px / (std::max(now.focal_px.x, now.focal_px.y) *
+                                                      double{depths.mean_inverse}));
     for (;; --window) {
       guard_ = make_guard_set(now, after(window), tau);
       if (window == 0 || in_guard_set(guard_, now, after(window), after(window))) break;

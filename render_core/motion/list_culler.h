@@ -43,13 +43,17 @@ class ListCuller {
                                     near_z_ - radius * (growth_.turn_cosine + growth_.turn_sine));
   }
 
+  [[nodiscard]] CATGS_HD static float nearest_depth(const End& end, const Cluster& cluster) {
+    const glm::vec3& half = cluster.half_extent;
+    return seen_from(end, cluster.centre).z - fabsf(end.forward.x) * half.x -
+           fabsf(end.forward.y) * half.y - fabsf(end.forward.z) * half.z;
+  }
+
   /// math::growth_px() as a longer reach: by the camera's way off, and by shares of the splats'
   /// radii.
   [[nodiscard]] CATGS_HD Cluster grown(const Cluster& cluster) const {
-    const glm::vec3& half = cluster.half_extent;
-    const glm::vec3& forward = start_.forward;
-    const float nearest = seen_from(start_, cluster.centre).z - fabsf(forward.x) * half.x -
-                          fabsf(forward.y) * half.y - fabsf(forward.z) * half.z;
+    const float nearest =
+        fminf(nearest_depth(start_, cluster), nearest_depth(window_end_, cluster));
     const float radius_px = focal_px_ * cluster.reach / fmaxf(nearest, near_z_);
     Cluster result = cluster;
     result.reach *= 1.0f + growth_.wide + growth_.curvature * radius_px;

@@ -24,6 +24,11 @@ constexpr double least_weight = 0.91;
 constexpr double turn_margin_rad = 0.35 * glm::pi<double>() / 180.0;
 constexpr double turn_margin_share = 0.25;
 
+// A long lens sees the same margin as more pixels: lists go no farther beyond the picture than half
+// of it for the margin, and end where their grid would be larger than so many pictures.
+constexpr double most_overscan = 0.5;
+constexpr double most_pictures = 3.0;
+
 glm::dvec2 slope_of(const Camera& camera, const glm::dvec2& pixel) {
   return (pixel - glm::dvec2(camera.principal_point_px)) / glm::dvec2(camera.focal_px);
 }
@@ -56,9 +61,8 @@ double turn_limit_rad(const Camera& camera) {
   return std::clamp(most, 0.0, most_turn_rad);
 }
 
-double margin_rad(const Pose& from, const Pose& to) {
-  const double turn = glm::length(rotation_between(from.orientation, to.orientation));
-  return turn_margin_rad + turn_margin_share * turn;
+double rotation_rad(const Pose& from, const Pose& to) {
+  return glm::length(rotation_between(from.orientation, to.orientation));
 }
 
 double distance_to_path(const glm::dvec3& from, const glm::dvec3& to, const glm::dvec3& point) {
@@ -121,11 +125,15 @@ glm::ivec2 image_shift_px(const Camera& key, const Pose& pose) {
   return glm::ivec2(glm::clamp(shift, -most, most));
 }
 
+double most_tau(const Camera& key) { return 0.1 * key.near_z; }
+
 GuardSet make_guard_set(const Camera& key, const Pose& end, double tau) {
   const Pose& start = key.world_from_camera;
-  const double margin = margin_rad(start, end);
+  const double rotation = rotation_rad(start, end);
+  const double margin = turn_margin_rad + turn_margin_share * rotation;
   GuardSet guard;
   guard.tau = tau;
+  guard.max_rotation_rad = rotation + margin;
   guard.max_turn_rad = std::min(axis_turn_rad(start, end) + margin, turn_limit_rad(key));
   guard.grid = image_grid(key.size_px);
   if (axis_turn_rad(start, end) > guard.max_turn_rad) return guard;
@@ -138,10 +146,15 @@ GuardSet make_guard_set(const Camera& key, const Pose& end, double tau) {
       high = glm::max(high, point);
     });
   }
+  const glm::dvec2 size(key.size_px);
+  // Of a picture of few pixels, a tile more is not much.
+  constexpr double some_tiles = 4.0 * tile_size_px;
+  if (glm::any(glm::greaterThan(high - low, most_pictures * size + some_tiles))) return guard;
   // A turn by a moves what is seen at the slope s by f (1 + s^2) a.
   const auto reach = [&](const glm::dvec2& edge) {
     const glm::dvec2 slope = slope_of(key, edge);
-    return margin * glm::dvec2(key.focal_px) * (1.0 + slope * slope);
+    return glm::min(margin * glm::dvec2(key.focal_px) * (1.0 + slope * slope),
+                    most_overscan * size + some_tiles);
   };
   guard.grid = covering_grid(low - reach(low), high + reach(high));
   return guard;
@@ -150,6 +163,7 @@ GuardSet make_guard_set(const Camera& key, const Pose& end, double tau) {
 bool in_guard_set(const GuardSet& guard, const Camera& key, const Pose& end, const Pose& pose) {
   const Pose& start = key.world_from_camera;
   if (axis_turn_rad(start, pose) > guard.max_turn_rad) return false;
+  if (rotation_rad(start, pose) > guard.max_rotation_rad) return false;
   if (distance_to_path(start.position, end.position, pose.position) > guard.tau) return false;
   const glm::dvec2 low(guard.grid.first_px), high = low + glm::dvec2(guard.grid.size_px);
   bool inside = true;
@@ -161,12 +175,14 @@ bool in_guard_set(const GuardSet& guard, const Camera& key, const Pose& end, con
 }
 
 ListGrowth<double> list_growth(const Camera& key, const GuardSet& guard) {
-  const double focal = std::max(key.focal_px.x, key.focal_px.y);
   const double slope = steepest(key, guard.grid);
   const double sine = std::sin(guard.max_turn_rad);
   const double weight = weight_after(guard.max_turn_rad, slope);
-  // H(p + d) = H(p) + DH d / (1 + e) with e = grad w . d / w and |grad w| = sin(turn) / f.
-  const double curvature = sine / (focal * weight * weight);
+  // H(p + d) = H(p) + DH d / (1 + e) with e = grad w . d / w and |grad w| <= sin(turn) / f.
+  const double curvature = sine / (std::min(key.focal_px.x, key.focal_px.y) * weight * weight);
+  // Depths are those from the path: a camera that is tau nearer sees them at tau less.
+  const double parallax = std::max(key.focal_px.x, key.focal_px.y) * guard.tau /
+                          (1.0 - guard.tau / guarded_near_z(key, guard));
   // A splat that is all low-pass filter does not follow the image's scale, which a turn changes by
   // 1 / weight^2 at most.
   const double low_pass_radius =
@@ -181,10 +197,10 @@ ListGrowth<double> list_growth(const Camera& key, const GuardSet& guard) {
   const glm::dvec2 margin = 0.5 * (fov_clamp - 1.0) * size / glm::dvec2(key.focal_px);
   const glm::dvec2 low = slope_of(key, glm::dvec2(0.0)) - margin;
   const glm::dvec2 high = slope_of(key, size) + margin;
-  const auto inwards = [&](double s) { return guard.max_turn_rad * (1.0 + s * s); };
+  const auto inwards = [&](double s) { return guard.max_rotation_rad * (1.0 + s * s); };
   const glm::dvec2 limit = glm::max(glm::abs(low), glm::abs(high));
   const double wide = inwards(std::max(limit.x, limit.y));
-  return {focal * guard.tau,
+  return {parallax,
           curvature,
           constant,
           wide,
@@ -200,7 +216,7 @@ ListGrowth<double> list_growth(const Camera& key, const GuardSet& guard) {
 
 float guarded_near_z(const Camera& key, const GuardSet& guard) {
   const double slope = steepest(key, guard.grid);
-  return static_cast<float>(key.near_z / weight_after(-guard.max_turn_rad, slope));
+  return static_cast<float>((key.near_z - guard.tau) / weight_after(-guard.max_turn_rad, slope));
 }
 
 }  // namespace catgs

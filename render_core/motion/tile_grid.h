@@ -42,13 +42,18 @@ glm::ivec2 image_shift_px(const Camera& key, const Pose& pose);
 
 /// Around an image that the camera may turn under: the cameras of a guard set and what they need.
 struct GuardSet {
-  double max_turn_rad = 0.0;  // of the view axis
-  double tau = 0.0;           // world units that the camera may be off its path
-  TileGrid grid;              // that corners of the picture stay in
+  double max_turn_rad = 0.0;      // of the view axis
+  double max_rotation_rad = 0.0;  // of the camera, its roll included
+  double tau = 0.0;               // world units that the camera may be off its path
+  TileGrid grid;                  // that corners of the picture stay in
 };
 
+/// World units that a guard set may reach off the path: little beside the nearest that is seen.
+double most_tau(const Camera& key);
+
 /// The guard set of a key frame from which the camera is expected to move uniformly to `end`.
-/// `tau` in world units.
+/// `tau` in world units, no more than most_tau(). Where the camera turns too far for any grid,
+/// `end` is not in the set.
 GuardSet make_guard_set(const Camera& key, const Pose& end, double tau);
 
 /// Whether a camera that should be somewhere between `key` and `end` is in the guard set.

@@ -75,6 +75,20 @@ TEST(GuardSets, HoldTheForecastAndALittleMore) {
   EXPECT_FALSE(in_guard_set(guard, key, end, turned(4, {0, 1, 0})));
 }
 
+TEST(GuardSets, OfLongLensesStayWithinBounds) {
+  for (const float focal_px : {1e4f, 1e6f, 1e8f}) {
+    const Camera key = make_camera({}, {1920, 1080}, focal_px);
+    const GuardSet still = make_guard_set(key, {}, 0.0);
+    EXPECT_TRUE(in_guard_set(still, key, {}, {}));
+    EXPECT_LE(still.grid.size_px.x, 2 * 1920 + 160);
+    EXPECT_LE(still.grid.size_px.y, 2 * 1080 + 160);
+    const Pose end = turned(2, {0, 1, 0});
+    const GuardSet turning = make_guard_set(key, end, 0.0);
+    EXPECT_LE(turning.grid.size_px.x, 4 * 1920 + 256);
+    EXPECT_EQ(in_guard_set(turning, key, end, end), focal_px < 1e5f);
+  }
+}
+
 TEST(GuardSets, EndWhereTilesWouldHaveTooManyPixels) {
   const Camera key = camera_at({});
   const Pose end = turned(6, {0, 1, 0});
@@ -116,14 +130,17 @@ class ListGrowthTest : public ::testing::Test {
 // What a camera of the guard set shows of a Gaussian lies inside what the key frame lists, wherever
 // the camera is in the set.
 TEST_F(ListGrowthTest, CoversEveryCameraOfTheGuardSet) {
-  const Camera key = camera_at({});
-  const auto now = math::make_camera_model(key);
   int checked = 0;
-  for (int trial = 0; trial < 60; ++trial) {
-    const glm::dvec3 axis = direction();
+  for (int trial = 0; trial < 120; ++trial) {
+    Camera key = camera_at({});
+    if (trial % 2 == 1) key.focal_px.y *= 0.5f;
+    const auto now = math::make_camera_model(key);
+    const bool rolls = trial % 3 == 0;
+    const glm::dvec3 axis = rolls ? glm::dvec3(0.0, 0.0, 1.0) : direction();
     const Pose end{glm::vec3(0.03 * direction()),
-                   glm::quat(glm::angleAxis(glm::radians(uniform(0.0, 3.0)), axis))};
-    const GuardSet guard = make_guard_set(key, end, 0.002);
+                   glm::quat(glm::angleAxis(glm::radians(uniform(0.0, rolls ? 8.0 : 3.0)), axis))};
+    const double tau = trial % 5 == 0 ? most_tau(key) : 0.002;
+    const GuardSet guard = make_guard_set(key, end, tau);
     if (!in_guard_set(guard, key, end, end)) continue;
     const ListGrowth<double> growth = list_growth(key, guard);
     Camera last = key;
@@ -132,7 +149,7 @@ TEST_F(ListGrowthTest, CoversEveryCameraOfTheGuardSet) {
     Camera frame = key;
     const double share = uniform(0.0, 1.0);
     frame.world_from_camera.position =
-        glm::vec3(share * glm::dvec3(end.position) + 0.00199 * direction());
+        glm::vec3(share * glm::dvec3(end.position) + 0.99 * tau * direction());
     frame.world_from_camera.orientation =
         glm::quat(glm::angleAxis(glm::radians(uniform(-0.3, 0.3)), direction()) *
                   glm::slerp(glm::dquat(1, 0, 0, 0), glm::dquat(end.orientation), share));
@@ -144,7 +161,7 @@ TEST_F(ListGrowthTest, CoversEveryCameraOfTheGuardSet) {
       const RandomGaussian g = gaussian();
       const double depth = math::view_depth(now, g.mean);
       const double shown_depth = math::view_depth(shown, g.mean);
-      if (depth < 1.5 * now.near_z || shown_depth < 1.5 * now.near_z) continue;
+      if (depth < now.near_z || shown_depth < now.near_z) continue;
       const auto s = math::sweep(now, at_end, g.mean, g.factor, depth);
       const auto half = math::half_extent(s.outline, reach);
       const double grow = math::growth_px<double>(
