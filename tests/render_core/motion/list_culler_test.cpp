@@ -1,7 +1,6 @@
 #include "render_core/motion/list_culler.h"
 
 #include <cmath>
-#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -9,6 +8,7 @@
 #include "render_core/math/camera-inl.h"
 #include "render_core/math/ellipse-inl.h"
 #include "render_core/math/projection-inl.h"
+#include "tests/support/random_source.h"
 
 namespace catgs {
 namespace {
@@ -17,14 +17,9 @@ Camera camera_at(const Pose& pose) { return make_camera(pose, {320, 192}, 183.0f
 
 class ListCullerTest : public ::testing::Test {
  protected:
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  glm::dvec3 direction() {
-    std::normal_distribution<double> normal;
-    return glm::normalize(glm::dvec3(normal(random_), normal(random_), normal(random_)));
-  }
-  std::mt19937_64 random_{3};
+  double uniform(double low, double high) { return random_.uniform(low, high); }
+  glm::dvec3 direction() { return random_.direction(); }
+  test::RandomSource random_{3};
 };
 
 // What a camera of the group shows is in a cluster that its key frame lists.

@@ -1,7 +1,6 @@
 #include "render_core/motion/tile_grid.h"
 
 #include <cmath>
-#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 #include "render_core/math/growth-inl.h"
 #include "render_core/math/homography-inl.h"
 #include "render_core/math/sweep-inl.h"
+#include "tests/support/random_source.h"
 
 namespace catgs {
 namespace {
@@ -107,13 +107,8 @@ struct RandomGaussian {
 
 class ListGrowthTest : public ::testing::Test {
  protected:
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  glm::dvec3 direction() {
-    std::normal_distribution<double> normal;
-    return glm::normalize(glm::dvec3(normal(random_), normal(random_), normal(random_)));
-  }
+  double uniform(double low, double high) { return random_.uniform(low, high); }
+  glm::dvec3 direction() { return random_.direction(); }
   RandomGaussian gaussian() {
     const double depth = std::exp(uniform(std::log(0.4), std::log(60.0)));
     const glm::dvec3 axis = direction();
@@ -124,7 +119,7 @@ class ListGrowthTest : public ::testing::Test {
             math::covariance_factor<double>(rotation, {scale(), scale(), scale()})};
   }
 
-  std::mt19937_64 random_{7};
+  test::RandomSource random_{7};
 };
 
 // What a camera of the guard set shows of a Gaussian lies inside what the key frame lists, wherever
