@@ -32,9 +32,12 @@ class WebsocketChannel final : public Channel {
   explicit WebsocketChannel(Arguments&&... arguments)
       : socket_(std::forward<Arguments>(arguments)...) {}
 
-  asio::awaitable<void> connect(const Url& url, std::chrono::seconds silence) override {
+  asio::awaitable<void> connect(const Url& url, const std::string& via_port,
+                                std::chrono::steady_clock::duration silence) override {
     asio::ip::tcp::resolver resolver(socket_.get_executor());
-    const auto addresses = co_await resolver.async_resolve(url.host, url.port, use_awaitable);
+    const std::string host = via_port.empty() ? url.host : "127.0.0.1";
+    const std::string& port = via_port.empty() ? url.port : via_port;
+    const auto addresses = co_await resolver.async_resolve(host, port, use_awaitable);
     auto& tcp = beast::get_lowest_layer(socket_);
     tcp.expires_after(connect_timeout);
     co_await tcp.async_connect(addresses, use_awaitable);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <string>
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/awaitable.hpp>
@@ -24,8 +25,10 @@ class Channel {
   Channel& operator=(const Channel&) = delete;
 
   /// Resolves, connects, shakes hands with subprotocol catgs.v1. Silence of the server for longer
-  /// than `silence` ends the connection from then on.
-  virtual boost::asio::awaitable<void> connect(const Url& url, std::chrono::seconds silence) = 0;
+  /// than `silence` ends the connection from then on. With `via_port` the connection goes to that
+  /// port of this machine, where somebody carries it on.
+  virtual boost::asio::awaitable<void> connect(const Url& url, const std::string& via_port,
+                                               std::chrono::steady_clock::duration silence) = 0;
   /// Replaces the buffer's contents by the next message.
   virtual boost::asio::awaitable<void> read(boost::beast::flat_buffer& message) = 0;
   virtual boost::asio::awaitable<void> write(std::span<const char> message) = 0;

@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include <boost/asio/bind_cancellation_slot.hpp>
-#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/strand.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/websocket/stream_base.hpp>
 
 #include "render_core/error.h"
 #include "tests/load/pose_replay.h"
+#include "tests/load/waiting.h"
 
 namespace catgs::load {
 namespace {
@@ -21,23 +19,6 @@ using asio::use_awaitable;
 
 constexpr std::chrono::seconds server_silence{3};
 constexpr std::size_t max_outbox = 256;  // two seconds of poses and acks that nobody reads
-constexpr std::size_t max_to_decode = 16;
-
-/// Waits until `timer` is cancelled, which is how its event is signalled here.
-asio::awaitable<void> signal_of(asio::steady_timer& timer) {
-  boost::system::error_code cancelled;
-  timer.expires_at(Clock::time_point::max());
-  co_await timer.async_wait(asio::redirect_error(use_awaitable, cancelled));
-}
-
-asio::awaitable<void> wait_until(Clock::time_point time) {
-  asio::steady_timer timer(co_await asio::this_coro::executor, time);
-  co_await timer.async_wait(use_awaitable);
-}
-
-Clock::time_point clock_time(std::int64_t time_us) {
-  return Clock::time_point(std::chrono::microseconds(time_us));
-}
 
 SceneHints hints_of(const v1::SceneFacts& scene) {
   SceneHints hints;
@@ -52,30 +33,37 @@ SceneHints hints_of(const v1::SceneFacts& scene) {
 
 }  // namespace
 
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
-      .count();
-}
-
 Connection::Connection(const SessionSettings& settings, SessionContext context, SessionState& state,
                        SessionReport& report, const asio::any_io_executor& executor)
     : settings_(settings),
-      context_(context),
       state_(state),
       report_(report),
       channel_(make_channel(executor, settings.url.tls, context.tls)),
       welcomed_(executor),
       outbox_filled_(executor),
-      frame_queued_(executor) {}
+      decode_stage_(
+          settings, context.decoders, report,
+          {.acknowledge = [this](const v1::Ack& ack, std::int64_t time) { acknowledge(ack, time); },
+           .request_idr =
+               [this] {
+                 v1::ClientMessage message;
+                 message.mutable_request_idr();
+                 say(message);
+               }},
+          executor) {}
 
 asio::awaitable<Connection::End> Connection::run() {
   using namespace asio::experimental::awaitable_operators;
-  co_await attempt(channel_->connect(settings_.url, server_silence));
+  // While a stalled client does not look, silence means nothing.
+  const bool stalls = settings_.stall_to_us > settings_.stall_from_us;
+  const Clock::duration silence =
+      stalls ? boost::beast::websocket::stream_base::none() : server_silence;
+  co_await attempt(channel_->connect(settings_.url, settings_.via_port, silence));
   if (failed_) co_return end_;
   say_hello();
   // The first part to end ends the others: the outbox after Bye, any part when the line is dead.
   co_await (attempt(send_poses()) || attempt(write_outbox()) || attempt(read_inbox()) ||
-            attempt(decode_frames()));
+            attempt(decode_stage_.run()) || attempt(flood()) || attempt(drop_line()));
   co_return end_;
 }
 
@@ -134,9 +122,13 @@ asio::awaitable<void> Connection::send_poses() {
                                        settings_.offset * static_cast<double>(replay.span_us())));
   begin_us_ = now_us();
   while (true) {
-    const auto due = clock_time(begin_us_ + replay.next_time_us());
-    if (due >= settings_.stop) break;
-    co_await wait_until(due);
+    const std::int64_t due_us = begin_us_ + replay.next_time_us();
+    if (due_us >= settings_.stop_us) break;
+    co_await wait_until(clock_time(due_us));
+    if (stalled()) {  // the poses meanwhile are never taken
+      co_await wait_until(clock_time(settings_.stall_to_us));
+      continue;
+    }
     const std::int64_t now = now_us();
     const Pose* newest = &replay.take();
     while (begin_us_ + replay.next_time_us() <= now) newest = &replay.take();  // as a browser does
@@ -150,18 +142,51 @@ asio::awaitable<void> Connection::send_poses() {
     report_.stats.pose_sent(sample.pose_id(), now);
     say(message);
   }
-  co_await wait_until(settings_.stop);
+  co_await wait_until(clock_time(settings_.stop_us));
   v1::ClientMessage message;
   message.mutable_bye();
   say(message);
   bye_said_ = true;
   end_ = End::finished;
-  co_await wait_until(settings_.stop + std::chrono::seconds(2));  // for the outbox to end it all
+  co_await wait_until(clock_time(settings_.stop_us + 2'000'000));  // for the outbox to end it all
+}
+
+bool Connection::stalled() const {
+  const std::int64_t now = now_us();
+  return now >= settings_.stall_from_us && now < settings_.stall_to_us;
+}
+
+/// Poses that no client would send so often. They say where the camera is already.
+asio::awaitable<void> Connection::flood() {
+  constexpr std::int64_t wake_us = 5'000;
+  if (settings_.flood_hz == 0) co_await wait_until(Clock::time_point::max());
+  while (!state_.last_pose) co_await wait_until(clock_time(now_us() + wake_us));
+  std::int64_t sent_us = now_us();
+  const std::int64_t interval_us = 1'000'000 / settings_.flood_hz;
+  while (true) {
+    co_await wait_until(clock_time(sent_us + std::max(wake_us, interval_us)));
+    for (const std::int64_t now = now_us(); sent_us < now; sent_us += interval_us) {
+      v1::ClientMessage message;
+      *message.mutable_pose() = *state_.last_pose;
+      say(message);
+    }
+  }
+}
+
+/// Ends the connection without a word at the run's next multiple of reconnect_every_us.
+asio::awaitable<void> Connection::drop_line() {
+  if (settings_.reconnect_every_us == 0) co_await wait_until(Clock::time_point::max());
+  const std::int64_t since_us = now_us() - settings_.run_begin_us;
+  const std::int64_t round = since_us / settings_.reconnect_every_us + 1;
+  const std::int64_t drop_us = settings_.run_begin_us + round * settings_.reconnect_every_us;
+  co_await wait_until(clock_time(std::min(drop_us, settings_.stop_us)));
+  if (drop_us >= settings_.stop_us) co_await wait_until(Clock::time_point::max());
 }
 
 asio::awaitable<void> Connection::write_outbox() {
   while (true) {
     while (!outbox_.empty()) {
+      if (stalled()) co_await wait_until(clock_time(settings_.stall_to_us));
       const std::string message = std::move(outbox_.front());
       outbox_.pop_front();
       co_await channel_->write(message);
@@ -176,6 +201,7 @@ asio::awaitable<void> Connection::read_inbox() {
   boost::beast::flat_buffer buffer;
   while (true) {
     co_await channel_->read(buffer);
+    if (stalled()) co_await wait_until(clock_time(settings_.stall_to_us));
     const auto data = buffer.cdata();
     const auto parsed =
         parse_server_message({static_cast<const std::byte*>(data.data()), data.size()});
@@ -196,7 +222,7 @@ void Connection::take_message(const v1::ServerMessage& message) {
     report_.stats.error("the server says: " + message.error().message().substr(0, 200));
     const auto code = message.error().code();
     const bool transient = code == v1::Error::RENDER_FAILED || code == v1::Error::INTERNAL ||
-                           code == v1::Error::SERVER_FULL;
+                           code == v1::Error::SERVER_FULL || settings_.flood_hz > 0;
     if (message.error().fatal() && !transient) end_ = End::refused;
   }
 }
@@ -206,6 +232,7 @@ void Connection::take_welcome(const v1::Welcome& welcome) {
   report_.renderer = welcome.renderer();
   report_.encoder = welcome.config().encoder();
   report_.server_version = welcome.server_version();
+  decode_stage_.set_scene(welcome.scene());
   trajectory_ = settings_.make_trajectory(hints_of(welcome.scene()));
   report_.stats.started(now_us());
   welcomed_.cancel();
@@ -218,6 +245,7 @@ void Connection::take_frame(const FrameMessage& frame) {
                                 .pose_id = header.pose_id(),
                                 .idr = header.idr(),
                                 .bytes = frame.bitstream.size(),
+                                .pixels = std::uint64_t{header.width_px()} * header.height_px(),
                                 .wait_us = header.wait_us(),
                                 .render_us = header.render_us(),
                                 .encode_us = header.encode_us(),
@@ -228,8 +256,8 @@ void Connection::take_frame(const FrameMessage& frame) {
   ack.set_received_us(now);
   ack.set_pose_age_us(static_cast<std::uint32_t>(
       std::clamp<std::int64_t>(now - header.pose_client_time_us(), 0, UINT32_MAX)));
-  if (settings_.decode) {
-    queue_for_decoding(frame, ack);
+  if (settings_.decode || settings_.decode_us > 0) {
+    decode_stage_.take(frame, ack);
   } else {
     acknowledge(ack, now);
   }
@@ -241,84 +269,10 @@ void Connection::acknowledge(v1::Ack ack, std::int64_t presented_us) {
     ack.set_decoded_us(presented_us);
     ack.set_presented_us(presented_us);
   }
-  ack.set_decoder_queue(static_cast<std::uint32_t>(to_decode_.size()));
+  ack.set_decoder_queue(static_cast<std::uint32_t>(decode_stage_.queued()));
   v1::ClientMessage message;
   *message.mutable_ack() = ack;
   say(message);
-}
-
-void Connection::queue_for_decoding(const FrameMessage& frame, const v1::Ack& ack) {
-  const v1::FrameHeader& header = frame.header;
-  const bool independent = header.idr() || header.codec() == v1::CODEC_MJPEG;
-  if (to_decode_.size() == max_to_decode) wait_for_idr_ = true;
-  if (to_decode_.size() == max_to_decode || (wait_for_idr_ && !independent)) {
-    ++report_.stats.frames_skipped;
-    v1::Ack dropped = ack;
-    dropped.set_dropped(true);
-    acknowledge(dropped, 0);
-    v1::ClientMessage message;
-    message.mutable_request_idr();
-    say(message);
-    return;
-  }
-  wait_for_idr_ = false;
-  to_decode_.push_back(
-      {.bitstream = {frame.bitstream.begin(), frame.bitstream.end()},
-       .codec = header.codec() == v1::CODEC_MJPEG ? Codec::mjpeg : Codec::h264,
-       .idr = header.idr(),
-       .size_px = {static_cast<int>(header.width_px()), static_cast<int>(header.height_px())},
-       .ack = ack});
-  frame_queued_.cancel();
-}
-
-asio::awaitable<void> Connection::decode_frames() {
-  while (true) {
-    while (to_decode_.empty()) co_await signal_of(frame_queued_);
-    EncodedMessage message = std::move(to_decode_.front());
-    to_decode_.pop_front();
-    co_await decode_one(message);
-  }
-}
-
-asio::awaitable<void> Connection::decode_one(EncodedMessage& message) {
-  struct Result {
-    EncodeStatus status;
-    glm::ivec2 size_px{0};
-    std::int64_t duration_us = 0;
-  };
-  if (decoder_codec_ != message.codec) {
-    decoder_ = std::make_unique<Decoder>(message.codec);
-    decoder_codec_ = message.codec;
-  }
-  // On the pool, so that decoding one session delays no other session's time stamps. The end of the
-  // run does not cancel it: co_spawn would send the cancellation to the pool's thread, where the
-  // picture may be finished and all that it refers to gone.
-  const Result result = co_await asio::co_spawn(
-      asio::make_strand(context_.decoders),
-      [&decoder = *decoder_, &message]() -> asio::awaitable<Result> {
-        Result decoded;
-        DecodedPicture picture;
-        const std::int64_t start = now_us();
-        decoded.status = decoder.decode(message.bitstream, picture);
-        decoded.duration_us = now_us() - start;
-        decoded.size_px = picture.size_px;
-        co_return decoded;
-      },
-      asio::bind_cancellation_slot(asio::cancellation_slot(), use_awaitable));
-  v1::Ack ack = message.ack;
-  if (!result.status.ok || result.size_px != message.size_px) {
-    ++report_.stats.decode_errors;
-    report_.stats.error(result.status.ok ? "a decoded picture has another size than its header says"
-                                         : "a frame cannot be decoded: " + result.status.message);
-    wait_for_idr_ = true;
-    ack.set_dropped(true);
-    v1::ClientMessage request;
-    request.mutable_request_idr();
-    say(request);
-  } else {
-    report_.stats.frame_decoded(result.duration_us);
-  }
-  acknowledge(ack, now_us());
 }
 
 }  // namespace catgs::load

@@ -4,12 +4,11 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <boost/asio/steady_timer.hpp>
 
-#include "server/encode/decoder.h"
 #include "tests/load/channel.h"
+#include "tests/load/decode_stage.h"
 #include "tests/load/session.h"
 #include "tests/load/wire_client.h"
 
@@ -22,7 +21,8 @@ struct SessionState {
   std::uint64_t next_pose_id = 1;
 };
 
-/// One connection of a session. Four coroutines on one executor: poses, outbox, inbox, decoding.
+/// One connection of a session. Its parts are coroutines on one executor: poses, outbox, inbox,
+/// decoding, and the bad habits that its settings give it.
 class Connection {
  public:
   enum class End { finished, lost, refused };
@@ -34,18 +34,11 @@ class Connection {
   boost::asio::awaitable<End> run();
 
  private:
-  struct EncodedMessage {
-    std::vector<std::byte> bitstream;
-    Codec codec = Codec::h264;
-    bool idr = false;
-    glm::ivec2 size_px{0};
-    v1::Ack ack;
-  };
-
   boost::asio::awaitable<void> send_poses();
   boost::asio::awaitable<void> write_outbox();
   boost::asio::awaitable<void> read_inbox();
-  boost::asio::awaitable<void> decode_frames();
+  boost::asio::awaitable<void> flood();
+  boost::asio::awaitable<void> drop_line();
   boost::asio::awaitable<void> attempt(boost::asio::awaitable<void> part);
 
   void say_hello();
@@ -54,30 +47,21 @@ class Connection {
   void take_message(const v1::ServerMessage& message);
   void take_welcome(const v1::Welcome& welcome);
   void take_frame(const FrameMessage& frame);
-  void queue_for_decoding(const FrameMessage& frame, const v1::Ack& ack);
-  boost::asio::awaitable<void> decode_one(EncodedMessage& message);
+  [[nodiscard]] bool stalled() const;
 
   const SessionSettings& settings_;
-  SessionContext context_;
   SessionState& state_;
   SessionReport& report_;
   std::unique_ptr<Channel> channel_;
   boost::asio::steady_timer welcomed_;       // cancelled when the Welcome is there
   boost::asio::steady_timer outbox_filled_;  // cancelled when there is something to write
-  boost::asio::steady_timer frame_queued_;   // cancelled when there is something to decode
   std::deque<std::string> outbox_;
-  std::deque<EncodedMessage> to_decode_;
-  std::unique_ptr<Decoder> decoder_;
-  std::optional<Codec> decoder_codec_;
-  bool wait_for_idr_ = true;
+  DecodeStage decode_stage_;
   bool bye_said_ = false;
   std::shared_ptr<const Trajectory> trajectory_;
   std::int64_t begin_us_ = 0;  // of the poses
   bool failed_ = false;
   End end_ = End::lost;
 };
-
-/// Microseconds on the clock of all sessions.
-std::int64_t now_us();
 
 }  // namespace catgs::load

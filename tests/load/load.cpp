@@ -1,30 +1,39 @@
 #include "tests/load/load.h"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <numbers>
+#include <set>
+#include <thread>
 
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ssl/context.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <fmt/format.h>
 
 #include "render_core/error.h"
 #include "render_core/motion/anchor.h"
-#include "render_core/tools/render_setup.h"
-#include "tests/load/url.h"
+#include "render_core/tools/scene_options.h"
+#include "tests/load/link_proxy.h"
+#include "tests/load/session.h"
+#include "tests/load/waiting.h"
 
 namespace catgs::load {
 namespace {
 
 namespace asio = boost::asio;
 
+std::int64_t microseconds(double seconds) { return std::llround(1e6 * seconds); }
+
 /// Traces are read once and shared; scripts are made for each session when its scene is known.
 class TrajectoryMaker {
  public:
-  explicit TrajectoryMaker(const LoadOptions& options) : options_(options) {
+  TrajectoryMaker(const GroupOptions& options, double duration_s)
+      : options_(options), duration_s_(duration_s) {
     if (options.traces.empty() == options.script.script.empty()) {
       throw InputError("--trace, --script", "", "one of them is needed",
                        "--script head plays recorded-like head motion");
@@ -40,7 +49,7 @@ class TrajectoryMaker {
     if (traces_.empty()) {
       ScriptOptions script = options_.script;
       script.seed += static_cast<std::uint64_t>(session);
-      script.duration_s = options_.duration_s;
+      script.duration_s = duration_s_;
       script.rate_hz = options_.fps;
       return std::make_shared<const Trajectory>(make_script(script, scene));
     }
@@ -50,77 +59,167 @@ class TrajectoryMaker {
   }
 
  private:
-  const LoadOptions& options_;
+  const GroupOptions& options_;
+  double duration_s_;
   std::vector<std::shared_ptr<const Trajectory>> traces_;
 };
 
-asio::awaitable<void> start_later(std::chrono::duration<double> delay, SessionSettings settings,
-                                  SessionContext context, SessionReport& report) {
-  asio::steady_timer timer(co_await asio::this_coro::executor,
-                           std::chrono::duration_cast<Clock::duration>(delay));
-  co_await timer.async_wait(asio::use_awaitable);
-  co_await run_session(std::move(settings), context, report);
+void check(const GroupOptions& group, double duration_s) {
+  const double end_s = group.end_s > 0.0 ? group.end_s : duration_s;
+  if (!(group.ramp_s >= 0.0 && group.start_s >= 0.0 && group.start_s + group.ramp_s < end_s &&
+        end_s <= duration_s)) {
+    throw InputError("--duration, --ramp", "", "the run must last longer than its ramp");
+  }
+  if (!(group.fov_y_deg > 6.0f && group.fov_y_deg < 160.0f)) {
+    throw InputError("--fov-deg", "", "must lie between 6 and 160 degrees");
+  }
+  for (const std::string& size : group.sizes) (void)parse_size("--size", size);
 }
 
 void check(const LoadOptions& options) {
-  if (!(options.duration_s > 0.0 && options.ramp_s >= 0.0 && options.ramp_s < options.duration_s)) {
-    throw InputError("--duration, --ramp", "", "the run must last longer than its ramp");
-  }
   // The clock counts nanoseconds in 64 bits: an end that overflows it would lie in the past.
   constexpr double longest_run_s = 7 * 24 * 3600.0;
-  if (options.duration_s > longest_run_s) {
-    throw InputError("--duration", "", "the run may last a week at most");
+  if (!(options.duration_s > 0.0 && options.duration_s <= longest_run_s)) {
+    throw InputError("--duration", "", "the run must last longer than nothing, a week at most");
   }
-  if (!(options.fov_y_deg > 6.0f && options.fov_y_deg < 160.0f)) {
-    throw InputError("--fov-deg", "", "must lie between 6 and 160 degrees");
+  std::set<std::string> names;
+  for (const GroupOptions& group : options.groups) {
+    check(group, options.duration_s);
+    if (!names.insert(group.name).second) {
+      throw InputError("clients", group.name, "there are two groups of this name");
+    }
   }
 }
 
-}  // namespace
-
-SessionReports run_load(const LoadOptions& options) {
-  check(options);
-  const TrajectoryMaker trajectories(options);
-  SessionSettings settings;
-  settings.url = parse_url(options.url);
-  settings.size_px = parse_size("--size", options.size);
-  settings.token = options.token;
-  settings.scene_id = options.scene;
-  settings.fps = options.fps;
-  settings.max_bitrate_kbps = options.max_bitrate_kbps;
-  settings.fov_y_rad = options.fov_y_deg * std::numbers::pi_v<float> / 180.0f;
-  settings.decode = options.decode;
-  settings.acknowledge = options.acknowledge;
-
-  asio::ssl::context tls(asio::ssl::context::tls_client);
-  if (!options.insecure) {
-    tls.set_default_verify_paths();
-    tls.set_verify_mode(asio::ssl::verify_peer);
+/// One run: what its sessions share, and the starting of them.
+class Run {
+ public:
+  explicit Run(const LoadOptions& options) : options_(options), url_(parse_url(options.url)) {
+    if (!options.insecure) {
+      tls_.set_default_verify_paths();
+      tls_.set_verify_mode(asio::ssl::verify_peer);
+    }
+    for (const GroupOptions& group : options.groups) {
+      trajectories_.push_back(std::make_unique<TrajectoryMaker>(group, options.duration_s));
+      sessions_ += group.sessions;
+    }
   }
-  asio::io_context io(1);
-  asio::thread_pool decoders(1);
-  SessionReports reports;
-  std::exception_ptr failure;
-  settings.stop = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                     std::chrono::duration<double>(options.duration_s));
-  for (int i = 0; i < options.sessions; ++i) {
-    reports.push_back(std::make_unique<SessionReport>(static_cast<double>(options.fps)));
-    settings.make_trajectory = [&trajectories, i](const SceneHints& scene) {
-      return trajectories.make(i, scene);
+
+  RunReport run() {
+    begin_us_ = now_us();
+    for (std::size_t i = 0; i < options_.groups.size(); ++i) start_group(i);
+    for (const TimedAction& action : options_.actions) {
+      asio::co_spawn(io_, act(action), asio::detached);
+    }
+    io_.run();
+    decoders_.join();
+    if (failure_) std::rethrow_exception(failure_);
+    return std::move(report_);
+  }
+
+ private:
+  void start_group(std::size_t index) {
+    const GroupOptions& group = options_.groups[index];
+    GroupReport& report = report_.groups.emplace_back();
+    report.name = group.name;
+    report.nominal_fps = group.fps;
+    report.series = std::make_unique<TimeSeries>(begin_us_);
+    for (int i = 0; i < group.sessions; ++i) {
+      report.sessions.push_back(
+          std::make_unique<SessionReport>(static_cast<double>(group.fps), report.series.get()));
+      start_session(group, *trajectories_[index], i, *report.sessions.back());
+    }
+  }
+
+  void start_session(const GroupOptions& group, const TrajectoryMaker& trajectories, int number,
+                     SessionReport& report) {
+    SessionSettings settings = settings_of(group, number);
+    settings.make_trajectory = [&trajectories, number](const SceneHints& scene) {
+      return trajectories.make(number, scene);
     };
-    // Multiples of the golden ratio spread any number of sessions evenly over a trace.
-    const double golden = i * std::numbers::phi;
-    settings.offset = golden - std::floor(golden);
-    const std::chrono::duration<double> delay(options.ramp_s * i / options.sessions);
-    asio::co_spawn(io, start_later(delay, settings, {tls, decoders}, *reports.back()),
-                   [&](std::exception_ptr error) {
-                     if (error && !failure) failure = error;
+    std::unique_ptr<LinkProxy> link;
+    if (group.link.shapes()) {
+      const auto seed = static_cast<std::uint64_t>(number) << 16;
+      link = std::make_unique<LinkProxy>(io_.get_executor(), url_.host, url_.port, group.link, seed,
+                                         begin_us_);
+      settings.via_port = link->port();
+      asio::co_spawn(io_, link->run(), asio::detached);
+    }
+    ++running_;
+    asio::co_spawn(io_, play(std::move(settings), std::move(link), report),
+                   [this](const std::exception_ptr& error) {
+                     if (error && !failure_) failure_ = error;
+                     if (--running_ == 0) io_.stop();  // what is left waits for nobody
                    });
   }
-  io.run();
-  decoders.join();
-  if (failure) std::rethrow_exception(failure);
-  return reports;
+
+  asio::awaitable<void> play(SessionSettings settings, std::unique_ptr<LinkProxy> link,
+                             SessionReport& report) {
+    const std::unique_ptr<LinkProxy> kept = std::move(link);  // until the session's end
+    co_await wait_until(clock_time(settings.start_us));
+    co_await run_session(std::move(settings), {tls_, decoders_}, report);
+  }
+
+  SessionSettings settings_of(const GroupOptions& group, int number) const {
+    SessionSettings settings;
+    settings.url = url_;
+    settings.token = options_.token;
+    settings.scene_id = group.scene;
+    settings.size_px =
+        parse_size("--size", group.sizes[static_cast<std::size_t>(number) % group.sizes.size()]);
+    settings.fps = group.fps;
+    settings.max_bitrate_kbps = group.max_bitrate_kbps;
+    settings.fov_y_rad = group.fov_y_deg * std::numbers::pi_v<float> / 180.0f;
+    // Multiples of the golden ratio spread any number of sessions evenly over a trace.
+    const double golden = number * std::numbers::phi;
+    settings.offset = golden - std::floor(golden);
+    settings.decode = group.decode;
+    settings.decode_us = microseconds(group.decode_time_s);
+    settings.acknowledge = group.acknowledge;
+    settings.flood_hz = group.flood_hz;
+    settings.reconnect_every_us = microseconds(group.reconnect_every_s);
+    if (group.stall_for_s > 0.0) {
+      settings.stall_from_us = begin_us_ + microseconds(group.stall_at_s);
+      settings.stall_to_us = settings.stall_from_us + microseconds(group.stall_for_s);
+    }
+    // At most four a session: they are kept in memory until the end.
+    settings.pictures = static_cast<std::size_t>(
+        group.decode ? std::min(4, (options_.pictures + sessions_ - 1) / sessions_) : 0);
+    settings.run_begin_us = begin_us_;
+    settings.start_us =
+        begin_us_ + microseconds(group.start_s + group.ramp_s * number / group.sessions);
+    settings.stop_us =
+        begin_us_ + microseconds(group.end_s > 0.0 ? group.end_s : options_.duration_s);
+    return settings;
+  }
+
+  asio::awaitable<void> act(const TimedAction& action) {
+    co_await wait_until(clock_time(begin_us_ + microseconds(action.at_s)));
+    action.action();
+    if (!action.recovers) co_return;
+    for (const GroupReport& group : report_.groups) {
+      for (const auto& session : group.sessions) session->stats.interrupted(now_us());
+    }
+  }
+
+  const LoadOptions& options_;
+  const Url url_;
+  asio::ssl::context tls_{asio::ssl::context::tls_client};
+  asio::io_context io_{1};
+  asio::thread_pool decoders_{std::max(1u, std::thread::hardware_concurrency())};
+  std::vector<std::unique_ptr<TrajectoryMaker>> trajectories_;
+  int sessions_ = 0;
+  int running_ = 0;
+  std::int64_t begin_us_ = 0;
+  RunReport report_;
+  std::exception_ptr failure_;
+};
+
+}  // namespace
+
+RunReport run_load(const LoadOptions& options) {
+  check(options);
+  return Run(options).run();
 }
 
 }  // namespace catgs::load

@@ -11,6 +11,7 @@
 
 #include "render_core/error.h"
 #include "render_core/motion/trajectory.h"
+#include "tests/load/report.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
@@ -27,12 +28,13 @@ std::string url_of(const RunningServer& server) {
 LoadOptions small_load(const std::string& url) {
   LoadOptions options;
   options.url = url;
-  options.sessions = 3;
-  options.script.script = "head";
   options.duration_s = 3.0;
-  options.size = "160x90";
-  options.fps = 30;
-  options.decode = true;
+  GroupOptions& group = options.groups.emplace_back();
+  group.sessions = 3;
+  group.script.script = "head";
+  group.sizes = {"160x90"};
+  group.fps = 30;
+  group.decode = true;
   return options;
 }
 
@@ -51,15 +53,15 @@ void wait_for_frames(const RunningServer& server) {
 }
 
 /// What went wrong, for the test's log.
-std::string errors_of(const SessionReports& reports) {
-  return to_json(reports, collect_metrics(reports, 30.0)).at("error_counts").dump(2);
+std::string errors_of(const RunReport& run) {
+  return to_json(run, collect_metrics(run, {}), {}).at("groups")[0].at("error_counts").dump(2);
 }
 
-void expect_clean(const SessionReports& reports) {
-  for (const auto& report : reports) {
+void expect_clean(const RunReport& run) {
+  for (const auto& report : run.groups.at(0).sessions) {
     const SessionStats& stats = report->stats;
     EXPECT_TRUE(stats.connected);
-    EXPECT_EQ(stats.errors, 0u) << errors_of(reports);
+    EXPECT_EQ(stats.errors, 0u) << errors_of(run);
     EXPECT_EQ(stats.reconnects, 0u);
     EXPECT_GE(stats.frames, 5u);
     EXPECT_GE(stats.idrs, 1u);
@@ -80,9 +82,10 @@ TEST(Load, SessionsGetFramesThatDecode) {
 
 TEST(Load, MjpegDecodesToo) {
   const RunningServer server([](ServerConfig& config) { config.encoder = EncoderKind::jpeg; });
-  const SessionReports reports = run_load(small_load(url_of(server)));
-  expect_clean(reports);
-  for (const auto& report : reports) EXPECT_THAT(report->encoder, ::testing::HasSubstr("jpeg"));
+  const RunReport run = run_load(small_load(url_of(server)));
+  expect_clean(run);
+  for (const auto& report : run.groups[0].sessions)
+    EXPECT_THAT(report->encoder, ::testing::HasSubstr("jpeg"));
 }
 
 TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
@@ -96,17 +99,18 @@ TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
   options.insecure = true;
   expect_clean(run_load(options));
   options.insecure = false;
-  const SessionReports refused = run_load(options);
-  EXPECT_FALSE(refused[0]->stats.connected);
+  const RunReport refused = run_load(options);
+  EXPECT_FALSE(refused.groups[0].sessions[0]->stats.connected);
   EXPECT_THAT(errors_of(refused), ::testing::HasSubstr("certificate verify failed"));
 }
 
 TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
-  options.acknowledge = false;
-  options.decode = false;
-  for (const auto& report : run_load(options)) {
+  options.groups[0].acknowledge = false;
+  options.groups[0].decode = false;
+  const RunReport run = run_load(options);
+  for (const auto& report : run.groups[0].sessions) {
     EXPECT_TRUE(report->stats.connected);
     EXPECT_EQ(report->stats.frames, 1u) << "without a measured round trip one may be in flight";
     EXPECT_GT(report->stats.poses_sent, 30u);
@@ -116,9 +120,9 @@ TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
 TEST(Load, OneSilentClientDisturbsNobody) {
   const RunningServer server;
   LoadOptions silent = small_load(url_of(server));
-  silent.acknowledge = false;
-  silent.decode = false;
-  silent.sessions = 1;
+  silent.groups[0].acknowledge = false;
+  silent.groups[0].decode = false;
+  silent.groups[0].sessions = 1;
   std::jthread stalled([&] { run_load(silent); });
   expect_clean(run_load(small_load(url_of(server))));
 }
@@ -126,12 +130,12 @@ TEST(Load, OneSilentClientDisturbsNobody) {
 TEST(Load, ARefusedSessionDoesNotComeBack) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
-  options.scene = "no such scene";
-  options.sessions = 1;
-  const SessionReports reports = run_load(options);
-  EXPECT_FALSE(reports[0]->stats.connected);
-  EXPECT_EQ(reports[0]->stats.errors, 1u) << errors_of(reports);
-  EXPECT_EQ(reports[0]->stats.reconnects, 0u);
+  options.groups[0].scene = "no such scene";
+  options.groups[0].sessions = 1;
+  const RunReport run = run_load(options);
+  EXPECT_FALSE(run.groups[0].sessions[0]->stats.connected);
+  EXPECT_EQ(run.groups[0].sessions[0]->stats.errors, 1u) << errors_of(run);
+  EXPECT_EQ(run.groups[0].sessions[0]->stats.reconnects, 0u);
 }
 
 TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
@@ -141,29 +145,75 @@ TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
     url = url_of(server);  // nobody listens there once it is gone
   }
   LoadOptions options = small_load(url);
-  options.sessions = 2;
-  const SessionReports reports = run_load(options);
-  for (const auto& report : reports) {
+  options.groups[0].sessions = 2;
+  const RunReport run = run_load(options);
+  for (const auto& report : run.groups[0].sessions) {
     EXPECT_FALSE(report->stats.connected);
     EXPECT_GE(report->stats.reconnects, 1u);
     EXPECT_EQ(report->stats.errors, report->stats.reconnects + 1);
   }
-  EXPECT_EQ(collect_metrics(reports, 30.0)[1],
-            (std::pair<std::string, double>{"sessions_connected", 0.0}));
+  EXPECT_EQ(value_of(collect_metrics(run, {}), "sessions_connected"), 0.0);
 }
 
 TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
   auto server = std::make_unique<RunningServer>();
   LoadOptions options = small_load(url_of(*server));
-  options.sessions = 1;
-  SessionReports reports;
-  std::jthread load([&] { reports = run_load(options); });
+  options.groups[0].sessions = 1;
+  RunReport run;
+  std::jthread load([&] { run = run_load(options); });
   wait_for_frames(*server);
   server.reset();
   load.join();
-  EXPECT_TRUE(reports[0]->stats.connected);
-  EXPECT_GE(reports[0]->stats.errors, 1u);
-  EXPECT_GE(reports[0]->stats.reconnects, 1u);
+  EXPECT_TRUE(run.groups[0].sessions[0]->stats.connected);
+  EXPECT_GE(run.groups[0].sessions[0]->stats.errors, 1u);
+  EXPECT_GE(run.groups[0].sessions[0]->stats.reconnects, 1u);
+}
+
+TEST(Load, SessionsComeBackWhenTheirSocketsAreDropped) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  options.groups[0].reconnect_every_s = 1.0;
+  const RunReport run = run_load(options);
+  for (const auto& report : run.groups[0].sessions) {
+    EXPECT_EQ(report->stats.reconnects, 2u) << "at 1 and 2 s of 3";
+    EXPECT_GE(report->stats.recovery.count(), 1u);
+    EXPECT_EQ(report->stats.errors, 0u) << errors_of(run);
+    EXPECT_EQ(report->stats.decode_errors, 0u);
+  }
+}
+
+TEST(Load, AStalledClientGoesOnWhereItStopped) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  options.groups[0].stall_at_s = 1.0;
+  options.groups[0].stall_for_s = 0.5;
+  expect_clean(run_load(options));
+}
+
+TEST(Load, AFloodingClientIsTurnedAwayAndDisturbsNobody) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  GroupOptions flood = options.groups[0];
+  flood.name = "flood";
+  flood.sessions = 1;
+  flood.flood_hz = 5000;
+  options.groups.push_back(flood);
+  const RunReport run = run_load(options);
+  expect_clean(run);
+  EXPECT_GE(run.groups[1].sessions[0]->stats.error_counts.at("the server says: too many messages"),
+            1u);
+}
+
+TEST(Load, ALinkDelaysButLosesNothing) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  options.groups[0].link = parse_link("", "rate=20mbit,delay=20ms,jitter=5ms,loss=1%,burst=2");
+  const RunReport run = run_load(options);
+  expect_clean(run);
+  for (const auto& report : run.groups[0].sessions) {
+    EXPECT_GE(report->stats.pose_to_frame.percentile_ms(0.0), 40.0)
+        << "no frame answers before a round trip";
+  }
 }
 
 TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {
@@ -173,23 +223,23 @@ TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {
     EXPECT_THROW(run_load(options), InputError);
   };
   refused([](LoadOptions& options) { options.url = "http://x"; });
-  refused([](LoadOptions& options) { options.size = "big"; });
-  refused([](LoadOptions& options) { options.script.script = "jump"; });
-  refused([](LoadOptions& options) { options.script.script = ""; });
-  refused([](LoadOptions& options) { options.traces = {"/nonexistent.tum"}; });
+  refused([](LoadOptions& options) { options.groups[0].sizes = {"big"}; });
+  refused([](LoadOptions& options) { options.groups[0].script.script = "jump"; });
+  refused([](LoadOptions& options) { options.groups[0].script.script = ""; });
+  refused([](LoadOptions& options) { options.groups[0].traces = {"/nonexistent.tum"}; });
   refused([](LoadOptions& options) { options.duration_s = 0.0; });
   const test::TemporaryFolder folder;
   const std::filesystem::path trace = folder / "still.tum";
   write_tum(trace, {{0, Pose()}, {1'000'000, Pose()}});
   for (const double endless_s : {1e30, std::numeric_limits<double>::infinity()}) {
     refused([&](LoadOptions& options) {
-      options.script.script = "";
-      options.traces = {trace.string()};
+      options.groups[0].script.script = "";
+      options.groups[0].traces = {trace.string()};
       options.duration_s = endless_s;
     });
   }
-  refused([](LoadOptions& options) { options.ramp_s = 3.0; });
-  refused([](LoadOptions& options) { options.fov_y_deg = 0.0f; });
+  refused([](LoadOptions& options) { options.groups[0].ramp_s = 3.0; });
+  refused([](LoadOptions& options) { options.groups[0].fov_y_deg = 0.0f; });
 }
 
 }  // namespace

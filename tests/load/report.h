@@ -1,25 +1,17 @@
 #pragma once
 
-#include <memory>
 #include <string>
-#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "tests/load/requirement.h"
-#include "tests/load/session.h"
+#include "tests/load/metrics.h"
 
 namespace catgs::load {
 
-using SessionReports = std::vector<std::unique_ptr<SessionReport>>;
+nlohmann::ordered_json to_json(const RunReport& report, const Metrics& metrics,
+                               const HoldBounds& bounds);
 
-/// Every named result of a run: what --require may bound and what JSON and table show. Durations
-/// are over the frames, poses or ticks of all sessions; rates are per session.
-Metrics collect_metrics(const SessionReports& sessions, double nominal_fps);
-
-nlohmann::ordered_json to_json(const SessionReports& sessions, const Metrics& metrics);
-
-/// For people: one screen.
-std::string to_table(const SessionReports& sessions, const Metrics& metrics);
+/// For people: one screen for each group.
+std::string to_table(const RunReport& report, const HoldBounds& bounds);
 
 }  // namespace catgs::load

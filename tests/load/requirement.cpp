@@ -58,11 +58,7 @@ void Requirement::check_name(const Metrics& metrics) const {
                    fmt::format("one of {}", names));
 }
 
-double Requirement::value(const Metrics& metrics) const {
-  const auto found =
-      std::ranges::find_if(metrics, [&](const auto& metric) { return metric.first == metric_; });
-  return found == metrics.end() ? std::nan("") : found->second;
-}
+double Requirement::value(const Metrics& metrics) const { return value_of(metrics, metric_); }
 
 bool Requirement::holds(const Metrics& metrics) const {
   const double measured = value(metrics);

@@ -2,13 +2,10 @@
 
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
+
+#include "tests/load/metrics.h"
 
 namespace catgs::load {
-
-/// Named results of a run, in the order of the report.
-using Metrics = std::vector<std::pair<std::string, double>>;
 
 /// A bound on one metric: METRIC OP NUMBER with OP of < <= > >= == !=, like
 /// "pose_to_frame_p95_ms<33".
@@ -20,13 +17,16 @@ class Requirement {
   /// Throws InputError that lists the metrics when there is none of this name: to be called with an
   /// empty run's metrics first, so that a slip of the pen is found before the load, not after it.
   void check_name(const Metrics& metrics) const;
+  [[nodiscard]] const std::string& metric() const { return metric_; }
+  [[nodiscard]] const std::string& text() const { return text_; }
   [[nodiscard]] bool holds(const Metrics& metrics) const;
+  /// NaN where it was not measured: then nothing holds but !=.
+  [[nodiscard]] double value(const Metrics& metrics) const;
   /// "pose_to_frame_p95_ms<33: is 41.2".
   [[nodiscard]] std::string explain(const Metrics& metrics) const;
 
  private:
   enum class Operator { less, less_equal, greater, greater_equal, equal, not_equal };
-  [[nodiscard]] double value(const Metrics& metrics) const;
 
   std::string text_;
   std::string metric_;

@@ -18,16 +18,17 @@ boost::asio::awaitable<void> run_session(SessionSettings settings, SessionContex
   std::minstd_rand jitter(static_cast<unsigned>(settings.offset * 1e6) + 1);
   SessionState state;
   std::chrono::milliseconds pause = first_pause;
-  while (Clock::now() < settings.stop) {
+  while (now_us() < settings.stop_us) {
     const std::uint64_t frames_before = report.stats.frames;
     Connection connection(settings, context, state, report, executor);
     const Connection::End end = co_await connection.run();
     if (end != Connection::End::lost) break;
+    report.stats.interrupted(now_us());
     if (report.stats.frames > frames_before) pause = first_pause;
     // Half of the pause is jitter: a fleet of clients must not come back at once.
     const auto wait = pause / 2 + std::chrono::milliseconds(jitter() % (pause.count() / 2 + 1));
     pause = std::min(2 * pause, longest_pause);
-    if (Clock::now() + wait >= settings.stop) break;
+    if (Clock::now() + wait >= clock_time(settings.stop_us)) break;
     boost::asio::steady_timer timer(executor, wait);
     co_await timer.async_wait(boost::asio::use_awaitable);
     ++report.stats.reconnects;

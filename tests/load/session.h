@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -14,29 +13,37 @@
 #include "proto/catgs.pb.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/scene.h"
-#include "tests/load/session_stats.h"
+#include "tests/load/clock.h"
+#include "tests/load/run_report.h"
 #include "tests/load/url.h"
 
 namespace catgs::load {
 
-using Clock = std::chrono::steady_clock;
-
 /// Poses for a session, known once the server has said what scene it shows.
 using MakeTrajectory = std::function<std::shared_ptr<const Trajectory>(const SceneHints& scene)>;
 
+/// Times are those of now_us().
 struct SessionSettings {
   Url url;
+  std::string via_port;  // of a LinkProxy on this machine; empty: straight to the server
   std::string token;
   std::string scene_id;
   glm::ivec2 size_px{0};
   int fps = 60;
   int max_bitrate_kbps = 0;  // 0: the server's default
   float fov_y_rad = 1.0f;
-  bool decode = false;
-  bool acknowledge = true;  // false plays a client that has stopped reading its screen
   MakeTrajectory make_trajectory;
   double offset = 0.0;  // where in the trajectory to begin, share of its length
-  Clock::time_point stop;
+
+  bool decode = false;
+  std::int64_t decode_us = 0;           // that decoding a frame takes, at least
+  bool acknowledge = true;              // false plays a client that has stopped reading its screen
+  int flood_hz = 0;                     // messages a second beyond what a client would send
+  std::int64_t reconnect_every_us = 0;  // of the run's time; 0: never
+  std::int64_t stall_from_us = 0, stall_to_us = 0;
+  std::size_t pictures = 0;  // to keep, evenly spread over its time
+
+  std::int64_t run_begin_us = 0, start_us = 0, stop_us = 0;
 };
 
 /// What all sessions share; must outlive them.
@@ -45,13 +52,7 @@ struct SessionContext {
   boost::asio::thread_pool& decoders;
 };
 
-struct SessionReport {
-  explicit SessionReport(double nominal_fps) : stats(nominal_fps) {}
-  SessionStats stats;
-  std::string renderer, encoder, server_version;  // as the last Welcome said
-};
-
-/// One client from now to `settings.stop`: connects, sends poses at the times of its trajectory,
+/// One client from now to `settings.stop_us`: connects, sends poses at the times of its trajectory,
 /// receives, decodes and acknowledges frames, reconnects with backoff. Never throws for what the
 /// server does: that is counted in the report. Everything runs on the awaiting executor but
 /// decoding.

@@ -1,6 +1,7 @@
 #include "tests/load/session_stats.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace catgs::load {
 
@@ -11,6 +12,10 @@ void SessionStats::started(std::int64_t now_us) {
   if (started_) return;
   started_ = true;
   start_us_ = end_us_ = now_us;
+}
+
+void SessionStats::interrupted(std::int64_t now_us) {
+  if (started_ && interrupted_us_ < 0) interrupted_us_ = now_us;
 }
 
 void SessionStats::pose_sent(std::uint64_t pose_id, std::int64_t now_us) {
@@ -25,7 +30,9 @@ void SessionStats::age_until(std::int64_t now_us) {
     if (tick_us >= now_us) return;
     ++ticks_;
     // A picture that has not come yet is as old as the session.
-    pose_age.add(tick_us - (shown_pose_us_ >= 0 ? shown_pose_us_ : start_us_));
+    const std::int64_t age_us = tick_us - (shown_pose_us_ >= 0 ? shown_pose_us_ : start_us_);
+    pose_age.add(age_us);
+    if (series_ != nullptr) series_->at(tick_us).pose_age.add(age_us);
   }
 }
 
@@ -37,6 +44,14 @@ void SessionStats::frame_received(const ReceivedFrame& frame, std::int64_t now_u
   if (frame.frame_id <= last_frame_id_) error("frame ids do not increase");
   last_frame_id_ = frame.frame_id;
   if (last_frame_us_ >= 0) frame_interval.add(now_us - last_frame_us_);
+  if (interrupted_us_ >= 0) recovery.add(now_us - std::exchange(interrupted_us_, -1));
+  if (series_ != nullptr) {
+    SeriesBin& bin = series_->at(now_us);
+    ++bin.frames;
+    bin.bytes += frame.bytes;
+    bin.pixels += frame.pixels;
+    if (last_frame_us_ < 0 || !series_->same_bin(last_frame_us_, now_us)) ++bin.sessions;
+  }
   last_frame_us_ = now_us;
   wait.add(frame.wait_us);
   render.add(frame.render_us);
@@ -54,6 +69,7 @@ void SessionStats::frame_received(const ReceivedFrame& frame, std::int64_t now_u
     shown_pose_id_ = frame.pose_id;
     shown_pose_us_ = sent.time_us;
     pose_to_frame.add(now_us - sent.time_us);
+    if (series_ != nullptr) series_->at(now_us).pose_to_frame.add(now_us - sent.time_us);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/load/histogram.h"
+#include "tests/load/time_series.h"
 
 namespace catgs::load {
 
@@ -15,18 +16,23 @@ struct ReceivedFrame {
   std::uint64_t pose_id = 0;
   bool idr = false;
   std::uint64_t bytes = 0;
+  std::uint64_t pixels = 0;
   std::uint32_t wait_us = 0, render_us = 0, encode_us = 0, send_us = 0;  // on the server
 };
 
 /// The books of one session, all on the client's own clock. Pure; memory is bounded.
 class SessionStats {
  public:
-  /// `nominal_fps` sets the ticks at which pose age is sampled.
-  explicit SessionStats(double nominal_fps) : tick_us_(1e6 / nominal_fps) {}
+  /// `nominal_fps` sets the ticks at which pose age is sampled. `series`, which may be null, is
+  /// shared with other sessions and outlives this one.
+  explicit SessionStats(double nominal_fps, TimeSeries* series = nullptr)
+      : tick_us_(1e6 / nominal_fps), series_(series) {}
 
   /// The session is admitted: its measured time begins (again, after a reconnection: the first
   /// call counts).
   void started(std::int64_t now_us);
+  /// The connection is gone, or the server was away until now: the next frame ends a recovery.
+  void interrupted(std::int64_t now_us);
   void pose_sent(std::uint64_t pose_id, std::int64_t now_us);
   void frame_received(const ReceivedFrame& frame, std::int64_t now_us);
   void frame_decoded(std::int64_t duration_us) { decode.add(duration_us); }
@@ -46,6 +52,7 @@ class SessionStats {
   DurationHistogram pose_to_frame;  // pose sent -> first frame that echoes it received
   DurationHistogram pose_age;       // at each nominal tick: age of the pose behind the newest frame
   DurationHistogram frame_interval;  // between receptions
+  DurationHistogram recovery;        // interruption -> next frame received
   DurationHistogram wait, render, encode, send;
   DurationHistogram decode;  // on this machine
   std::uint64_t frames = 0;
@@ -69,11 +76,13 @@ class SessionStats {
   void age_until(std::int64_t now_us);
 
   double tick_us_;
+  TimeSeries* series_;
   std::array<SentPose, 2048> sent_{};  // by pose_id modulo its size: seconds of poses
   bool started_ = false;
   std::int64_t start_us_ = 0;
   std::int64_t end_us_ = 0;
   std::int64_t last_frame_us_ = -1;
+  std::int64_t interrupted_us_ = -1;
   std::uint64_t last_frame_id_ = 0;
   std::uint64_t shown_pose_id_ = 0;
   std::int64_t shown_pose_us_ = -1;

@@ -1,0 +1,113 @@
+#include "tests/load/decode_stage.h"
+
+#include <utility>
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "tests/load/clock.h"
+#include "tests/load/waiting.h"
+
+namespace catgs::load {
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr std::size_t max_queued = 16;
+
+}  // namespace
+
+DecodeStage::DecodeStage(const SessionSettings& settings, asio::thread_pool& decoders,
+                         SessionReport& report, Callbacks callbacks,
+                         const asio::any_io_executor& executor)
+    : settings_(settings),
+      decoders_(decoders),
+      report_(report),
+      callbacks_(std::move(callbacks)),
+      filled_(executor) {}
+
+void DecodeStage::take(const FrameMessage& frame, const v1::Ack& ack) {
+  const bool independent = frame.header.idr() || frame.header.codec() == v1::CODEC_MJPEG;
+  const bool full = queue_.size() == max_queued;
+  wait_for_idr_ = full || (wait_for_idr_ && !independent);
+  if (wait_for_idr_) {
+    ++report_.stats.frames_skipped;
+    v1::Ack dropped = ack;
+    dropped.set_dropped(true);
+    callbacks_.acknowledge(dropped, 0);
+    return callbacks_.request_idr();
+  }
+  queue_.push_back({frame.header, {frame.bitstream.begin(), frame.bitstream.end()}, ack});
+  filled_.cancel();
+}
+
+asio::awaitable<void> DecodeStage::run() {
+  while (true) {
+    while (queue_.empty()) co_await signal_of(filled_);
+    Item item = std::move(queue_.front());
+    queue_.pop_front();
+    co_await decode(item);
+  }
+}
+
+asio::awaitable<void> DecodeStage::decode(Item& item) {
+  const std::int64_t begin_us = now_us();
+  if (settings_.decode) {
+    Decoded decoded = co_await decode_on_pool(item);
+    const bool fits =
+        decoded.picture.size_px == glm::ivec2(item.header.width_px(), item.header.height_px());
+    if (!decoded.status.ok || !fits) {
+      ++report_.stats.decode_errors;
+      report_.stats.error(fits || !decoded.status.ok
+                              ? "a frame cannot be decoded: " + decoded.status.message
+                              : "a decoded picture has another size than its header says");
+      wait_for_idr_ = true;
+      item.ack.set_dropped(true);
+      callbacks_.request_idr();
+    } else {
+      report_.stats.frame_decoded(decoded.duration_us);
+      keep_picture(item, decoded);
+    }
+  }
+  if (settings_.decode_us > 0) co_await wait_until(clock_time(begin_us + settings_.decode_us));
+  callbacks_.acknowledge(item.ack, now_us());
+}
+
+asio::awaitable<DecodeStage::Decoded> DecodeStage::decode_on_pool(const Item& item) {
+  if (codec_ != item.header.codec()) {
+    decoder_ = std::make_unique<Decoder>(item.header.codec() == v1::CODEC_MJPEG ? Codec::mjpeg
+                                                                                : Codec::h264);
+    codec_ = item.header.codec();
+  }
+  // On the pool, so that decoding one session delays no other session's time stamps. The end of the
+  // run does not cancel it: co_spawn would send the cancellation to the pool's thread, where the
+  // picture may be finished and all that it refers to gone.
+  co_return co_await asio::co_spawn(
+      asio::make_strand(decoders_),
+      [&decoder = *decoder_, &item]() -> asio::awaitable<Decoded> {
+        Decoded decoded;
+        const std::int64_t start_us = now_us();
+        decoded.status = decoder.decode(item.bitstream, decoded.picture);
+        decoded.duration_us = now_us() - start_us;
+        co_return decoded;
+      },
+      asio::bind_cancellation_slot(asio::cancellation_slot(), asio::use_awaitable));
+}
+
+void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
+  const std::size_t kept = report_.pictures.size();
+  if (kept == settings_.pictures) return;
+  // In the middles of equal parts of the session's time.
+  const double part = (static_cast<double>(kept) + 0.5) / static_cast<double>(settings_.pictures);
+  const auto span_us = static_cast<double>(settings_.stop_us - settings_.start_us);
+  if (now_us() < settings_.start_us + static_cast<std::int64_t>(part * span_us)) return;
+  report_.pictures.push_back({.render_pose = from_wire(item.header.render_pose()),
+                              .fov_y_rad = item.header.fov_y_rad(),
+                              .near_z = scene_.near_z(),
+                              .scene_id = scene_.scene_id(),
+                              .picture = std::move(decoded.picture)});
+}
+
+}  // namespace catgs::load

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
+
+#include "server/encode/decoder.h"
+#include "tests/load/session.h"
+#include "tests/load/wire_client.h"
+
+namespace catgs::load {
+
+/// Where a session decodes what it received, one frame after the other: really (`decode`), or only
+/// for as long as it would take (`decode_us`). Bounded: what does not fit is dropped, and decoding
+/// goes on with the next IDR.
+class DecodeStage {
+ public:
+  /// What a decoder tells its session.
+  struct Callbacks {
+    std::function<void(const v1::Ack& ack, std::int64_t presented_us)> acknowledge;
+    std::function<void()> request_idr;
+  };
+  DecodeStage(const SessionSettings& settings, boost::asio::thread_pool& decoders,
+              SessionReport& report, Callbacks callbacks,
+              const boost::asio::any_io_executor& executor);
+
+  void take(const FrameMessage& frame, const v1::Ack& ack);
+  /// Of the scene that frames show from here on; for the pictures that are kept.
+  void set_scene(const v1::SceneFacts& scene) { scene_ = scene; }
+  /// Decodes until it is cancelled. Throws InputError where a decoder is missing.
+  boost::asio::awaitable<void> run();
+  [[nodiscard]] std::size_t queued() const { return queue_.size(); }
+
+ private:
+  struct Item {
+    v1::FrameHeader header;
+    std::vector<std::byte> bitstream;
+    v1::Ack ack;
+  };
+  struct Decoded {
+    EncodeStatus status;
+    DecodedPicture picture;
+    std::int64_t duration_us = 0;
+  };
+  boost::asio::awaitable<void> decode(Item& item);
+  boost::asio::awaitable<Decoded> decode_on_pool(const Item& item);
+  void keep_picture(const Item& item, Decoded& decoded);
+
+  const SessionSettings& settings_;
+  boost::asio::thread_pool& decoders_;
+  SessionReport& report_;
+  Callbacks callbacks_;
+  boost::asio::steady_timer filled_;  // cancelled when there is something to decode
+  std::deque<Item> queue_;
+  std::unique_ptr<Decoder> decoder_;
+  std::optional<v1::Codec> codec_;
+  v1::SceneFacts scene_;
+  bool wait_for_idr_ = true;
+};
+
+}  // namespace catgs::load

@@ -1,0 +1,144 @@
+#include "tests/load/link.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/error.h"
+#include "tests/load/units.h"
+
+namespace catgs::load {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr std::size_t segment = LinkShaper::segment_bytes;
+
+TEST(Units, TakeWhatPeopleWrite) {
+  EXPECT_DOUBLE_EQ(parse_duration_s("", "500ms"), 0.5);
+  EXPECT_DOUBLE_EQ(parse_duration_s("", "2m"), 120.0);
+  EXPECT_DOUBLE_EQ(parse_duration_s("", "7"), 7.0);
+  EXPECT_DOUBLE_EQ(parse_bits_per_s("", "1.5mbit"), 1.5e6);
+  EXPECT_DOUBLE_EQ(parse_bits_per_s("", "0"), 0.0);
+  EXPECT_DOUBLE_EQ(parse_share("", "2.5%"), 0.025);
+  EXPECT_DOUBLE_EQ(parse_share("", "0.01"), 0.01);
+  for (const char* bad : {"", "5 s", "s", "-1s", "1d", "nan", "inf", "5ss"})
+    EXPECT_THROW(parse_duration_s("--x", bad), InputError) << bad;
+  for (const char* bad : {"", "5", "5mb", "-1mbit"})
+    EXPECT_THROW(parse_bits_per_s("--x", bad), InputError) << bad;
+  for (const char* bad : {"", "101%", "2", "-1%"})
+    EXPECT_THROW(parse_share("--x", bad), InputError) << bad;
+}
+
+TEST(Link, ParsesItsParts) {
+  const LinkSettings link = parse_link(
+      "--link",
+      "rate=50mbit@0s,5mbit@10s,0@20s,up=2mbit,delay=20ms,jitter=5ms,loss=1%,burst=4,queue=1s");
+  ASSERT_EQ(link.down.size(), 3u);
+  EXPECT_EQ(link.down[1].from_us, 10'000'000);
+  EXPECT_EQ(link.down[1].bits_per_s, 5e6);
+  EXPECT_EQ(link.down[2].bits_per_s, 0.0);
+  ASSERT_EQ(link.up.size(), 1u);
+  EXPECT_EQ(link.up[0].bits_per_s, 2e6);
+  EXPECT_EQ(link.delay_us, 20'000);
+  EXPECT_EQ(link.jitter_us, 5'000);
+  EXPECT_EQ(link.loss, 0.01);
+  EXPECT_EQ(link.burst, 4.0);
+  EXPECT_EQ(link.queue_us, 1'000'000);
+  EXPECT_TRUE(link.shapes());
+  EXPECT_FALSE(parse_link("--link", "").shapes());
+  EXPECT_EQ(parse_link("--link", "rate=5mbit").up.at(0).bits_per_s, 5e6);
+}
+
+TEST(Link, RefusesWhatIsNone) {
+  for (const char* bad : {"5mbit", "rate", "rate=", "rate=5", "rate=5mbit@3s", "speed=5mbit",
+                          "rate=5mbit@0s,1mbit@0s", "delay=20m,jitter=-1ms", "loss=60%", "burst=0",
+                          "rate=5mbit,,", "rate=5mbit,1mbit@2s,1mbit@1s"}) {
+    EXPECT_THROW(parse_link("--link", bad), InputError) << bad;
+  }
+  EXPECT_THAT([] { parse_link("--link", "speed=1mbit"); },
+              ThrowsMessage<InputError>(HasSubstr("a link has no \"speed\"")));
+}
+
+LinkShaper shaper(std::string_view text) {
+  const LinkSettings link = parse_link("", text);
+  return {link, link.down, 7};
+}
+
+TEST(LinkShaper, WithoutLimitsNothingIsLate) {
+  LinkShaper link = shaper("");
+  EXPECT_EQ(link.send(1'000'000, 5), 5);
+  EXPECT_EQ(link.room_bytes(5), SIZE_MAX);
+}
+
+TEST(LinkShaper, DelaysAndSerialises) {
+  LinkShaper link = shaper("rate=8mbit,delay=10ms");  // a byte a microsecond
+  EXPECT_EQ(link.send(1000, 0), 11'000);
+  EXPECT_EQ(link.send(1000, 0), 12'000) << "behind the first";
+  EXPECT_EQ(link.send(1000, 50'000), 61'000) << "the link was idle meanwhile";
+}
+
+TEST(LinkShaper, CarriesBytesAcrossStepsOfItsRate) {
+  LinkShaper link = shaper("rate=8mbit@0s,800kbit@1s,0@2s,8mbit@3s");
+  // 500 bytes before the step, 500 at a tenth of the rate behind it.
+  EXPECT_EQ(link.send(1000, 999'500), 1'005'000);
+  // 100 bytes until the outage, and 900 after it.
+  EXPECT_EQ(link.send(1000, 1'999'000), 3'000'900);
+}
+
+TEST(LinkShaper, AnOutageWithoutAnEndHasNone) {
+  LinkShaper link = shaper("rate=8mbit@0s,0@1s");
+  EXPECT_GE(link.send(1000, 1'500'000), LinkShaper::never_us);
+  EXPECT_GE(link.next_room_us(), LinkShaper::never_us);
+}
+
+TEST(LinkShaper, TheBottleneckBuffersSoMuchAndNoMore) {
+  LinkShaper link = shaper("rate=8mbit,queue=100ms");
+  EXPECT_EQ(link.room_bytes(0), 100'000u);
+  link.send(60'000, 0);
+  link.send(40'000, 0);
+  EXPECT_EQ(link.room_bytes(0), 0u);
+  EXPECT_EQ(link.next_room_us(), 60'000);
+  EXPECT_EQ(link.room_bytes(60'000), 60'000u);
+  EXPECT_EQ(link.room_bytes(100'000), 100'000u);
+}
+
+TEST(LinkShaper, KeepsTheOrderUnderJitterAndLoss) {
+  LinkShaper link = shaper("rate=80mbit,delay=20ms,jitter=30ms,loss=10%,burst=3");
+  std::int64_t last = 0;
+  for (std::int64_t now = 0; now < 2'000'000; now += 1000) {
+    const std::int64_t arrival = link.send(segment, now);
+    EXPECT_GE(arrival, last);
+    EXPECT_GE(arrival, now + 20'000);
+    last = arrival;
+  }
+}
+
+/// Share of segments that came later than the delay: lost ones, and those that waited for them.
+double late_share(std::string_view text, std::int64_t interval_us) {
+  LinkShaper link = shaper(text);
+  int late = 0;
+  constexpr int segments = 200'000;
+  for (int i = 0; i < segments; ++i)
+    late += link.send(segment, i * interval_us) > i * interval_us + 1000;
+  return static_cast<double>(late) / segments;
+}
+
+TEST(LinkShaper, LosesTheShareThatItShould) {
+  // So far apart that nothing waits for another: a lost one takes 2 ms more.
+  EXPECT_NEAR(late_share("delay=1ms,loss=2%", 10'000), 0.02, 0.002);
+  // Runs of five on average have the same share; none of it is late that was not lost.
+  EXPECT_NEAR(late_share("delay=1ms,loss=2%,burst=5", 1'000'000), 0.02, 0.004);
+}
+
+TEST(LinkShaper, WhatFollowsALossWaitsForIt) {
+  LinkShaper link = shaper("delay=10ms,loss=50%,burst=1000");
+  std::int64_t longest = 0;
+  for (std::int64_t now = 0; now < 3'000'000; now += 1000) {
+    longest = std::max(longest, link.send(segment, now) - now);
+  }
+  EXPECT_EQ(longest, 10'000 + 20'000 + 200'000) << "delay, round trip, retransmission timeout";
+}
+
+}  // namespace
+}  // namespace catgs::load

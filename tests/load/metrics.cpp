@@ -1,0 +1,209 @@
+#include "tests/load/metrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "render_core/error.h"
+#include "render_core/metrics/image_quality.h"
+#include "tests/load/units.h"
+
+namespace catgs::load {
+namespace {
+
+constexpr NamedHistogram histograms[] = {
+    {"pose_to_frame", "pose sent -> frame received", &SessionStats::pose_to_frame},
+    {"pose_age", "age of the picture at each tick", &SessionStats::pose_age},
+    {"frame_interval", "between frames", &SessionStats::frame_interval},
+    {"recovery", "interruption -> next frame", &SessionStats::recovery},
+    {"wait", "server: pose received -> render", &SessionStats::wait},
+    {"render", "server: render", &SessionStats::render},
+    {"encode", "server: encode", &SessionStats::encode},
+    {"send", "server: encoded -> socket", &SessionStats::send},
+    {"decode", "client: decode", &SessionStats::decode}};
+
+constexpr NamedCount counts[] = {{"frames", &SessionStats::frames},
+                                 {"bytes", &SessionStats::bytes},
+                                 {"idrs", &SessionStats::idrs},
+                                 {"repeated_poses", &SessionStats::repeated_poses},
+                                 {"poses_sent", &SessionStats::poses_sent},
+                                 {"errors", &SessionStats::errors},
+                                 {"decode_errors", &SessionStats::decode_errors},
+                                 {"frames_skipped", &SessionStats::frames_skipped},
+                                 {"reconnects", &SessionStats::reconnects}};
+
+struct Range {
+  double min = std::numeric_limits<double>::infinity(), mean = 0.0, max = 0.0;
+};
+
+template <typename Value>
+Range range_of(const SessionReports& sessions, Value value) {
+  Range range;
+  for (const auto& session : sessions) {
+    const double v = value(session->stats);
+    range.min = std::min(range.min, v);
+    range.max = std::max(range.max, v);
+    range.mean += v / static_cast<double>(sessions.size());
+  }
+  if (sessions.empty()) range.min = 0.0;
+  return range;
+}
+
+double squared_error(double psnr_db) { return std::pow(10.0, -0.1 * psnr_db); }
+
+void add_durations(const std::string& name, const DurationHistogram& histogram, Metrics& metrics) {
+  metrics.emplace_back(name + "_mean_ms", histogram.mean_ms());
+  metrics.emplace_back(name + "_p50_ms", histogram.percentile_ms(0.50));
+  metrics.emplace_back(name + "_p95_ms", histogram.percentile_ms(0.95));
+  metrics.emplace_back(name + "_p99_ms", histogram.percentile_ms(0.99));
+  metrics.emplace_back(name + "_max_ms", histogram.max_ms());
+}
+
+void add_pictures(const SessionReports& sessions, Metrics& metrics) {
+  double sum = 0.0, count = 0.0, min = std::numeric_limits<double>::infinity();
+  for (const auto& session : sessions) {
+    for (const PictureSample& sample : session->pictures) {
+      sum += squared_error(sample.psnr_db);
+      min = std::min(min, sample.psnr_db);
+      ++count;
+    }
+  }
+  const double none = std::nan("");
+  metrics.emplace_back("pictures", count);
+  metrics.emplace_back("psnr_mean_db", count > 0.0 ? psnr_db(sum / count) : none);
+  metrics.emplace_back("psnr_min_db", count > 0.0 ? min : none);
+}
+
+Metrics window_metrics(const SeriesBin& bin, double bin_s, std::size_t sessions) {
+  Metrics metrics;
+  add_durations("pose_to_frame", bin.pose_to_frame, metrics);
+  add_durations("pose_age", bin.pose_age, metrics);
+  const double session_s = bin_s * static_cast<double>(std::max<std::size_t>(sessions, 1));
+  metrics.emplace_back("fps_mean", static_cast<double>(bin.frames) / session_s);
+  metrics.emplace_back("bitrate_kbps_mean", 8e-3 * static_cast<double>(bin.bytes) / session_s);
+  const auto frames = static_cast<double>(std::max<std::uint64_t>(bin.frames, 1));
+  metrics.emplace_back("megapixels_mean", 1e-6 * static_cast<double>(bin.pixels) / frames);
+  return metrics;
+}
+
+}  // namespace
+
+std::span<const NamedHistogram> named_histograms() { return histograms; }
+std::span<const NamedCount> named_counts() { return counts; }
+
+double value_of(const Metrics& metrics, std::string_view name) {
+  const auto found = std::ranges::find_if(metrics, [&](const auto& m) { return m.first == name; });
+  return found == metrics.end() ? std::nan("") : found->second;
+}
+
+double mean_psnr_db(const SessionReport& session) {
+  if (session.pictures.empty()) return std::nan("");
+  double sum = 0.0;
+  for (const PictureSample& sample : session.pictures) sum += squared_error(sample.psnr_db);
+  return psnr_db(sum / static_cast<double>(session.pictures.size()));
+}
+
+bool holds(const SessionReport& session, double nominal_fps, const HoldBounds& bounds) {
+  const SessionStats& stats = session.stats;
+  return stats.fps() >= 0.95 * nominal_fps &&
+         stats.frame_interval.percentile_ms(0.99) <= 2e3 / nominal_fps &&
+         stats.pose_to_frame.percentile_ms(0.95) <= bounds.pose_to_frame_p95_ms &&
+         stats.pose_age.percentile_ms(0.95) <= bounds.pose_age_p95_ms &&
+         mean_psnr_db(session) >= bounds.psnr_db;
+}
+
+Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
+                        const HoldBounds& bounds) {
+  Metrics metrics;
+  const auto add = [&](const std::string& name, double value) {
+    metrics.emplace_back(name, value);
+  };
+  const auto count_if = [&](auto condition) {
+    return static_cast<double>(
+        std::ranges::count_if(sessions, [&](const auto& s) { return condition(*s); }));
+  };
+  const double held = count_if([&](const auto& s) { return holds(s, nominal_fps, bounds); });
+  add("sessions", static_cast<double>(sessions.size()));
+  add("sessions_connected", count_if([](const auto& s) { return s.stats.connected; }));
+  add("sessions_held", held);
+  add("held", held == static_cast<double>(sessions.size()) ? 1.0 : 0.0);
+  for (const NamedHistogram& histogram : histograms) {
+    DurationHistogram all;
+    for (const auto& session : sessions) all.add(session->stats.*histogram.member);
+    add_durations(histogram.name, all, metrics);
+  }
+  const Range fps = range_of(sessions, [](const SessionStats& stats) { return stats.fps(); });
+  add("fps_min", fps.min);
+  add("fps_mean", fps.mean);
+  add("fps_max", fps.max);
+  add("fps_min_percent", 100.0 * fps.min / nominal_fps);
+  add("fps_max_over_min", fps.max / fps.min);
+  const Range bitrate =
+      range_of(sessions, [](const SessionStats& stats) { return stats.bitrate_kbps(); });
+  add("bitrate_kbps_min", bitrate.min);
+  add("bitrate_kbps_mean", bitrate.mean);
+  add("bitrate_kbps_max", bitrate.max);
+  add_pictures(sessions, metrics);
+  for (const NamedCount& count : counts) {
+    double sum = 0.0;
+    for (const auto& session : sessions) {
+      sum += static_cast<double>(session->stats.*count.member);
+    }
+    add(count.name, sum);
+  }
+  return metrics;
+}
+
+bool is_window_metric(std::string_view name) { return name.find('@') != std::string_view::npos; }
+
+double window_metric(const RunReport& report, std::string_view name) {
+  const auto refuse = [&](std::string_view what, std::string_view remedy) {
+    throw InputError("--require", name, what, remedy);
+  };
+  const std::size_t at = std::min(name.find('@'), name.size());
+  const std::string_view window = name.substr(std::min(at + 1, name.size()));
+  const std::size_t dash = window.find('-');
+  if (dash == std::string_view::npos) refuse("is no part of the run", "like fps_mean@5s-10s");
+  const double from_s = parse_duration_s("--require", window.substr(0, dash));
+  const double to_s = parse_duration_s("--require", window.substr(dash + 1));
+  if (!(from_s < to_s)) refuse("is no part of the run", "FROM-TO, in seconds of the run");
+  const std::size_t dot = name.substr(0, at).rfind('.');
+  const std::string_view group = dot == std::string_view::npos ? "" : name.substr(0, dot);
+  const std::string_view metric =
+      dot == std::string_view::npos ? name.substr(0, at) : name.substr(dot + 1, at - dot - 1);
+  SeriesBin sum;
+  std::size_t sessions = 0;
+  bool known = false;
+  for (const GroupReport& one : report.groups) {
+    if (!group.empty() && one.name != group) continue;
+    known = true;
+    sum.add(one.series->sum(from_s, to_s));
+    sessions += one.sessions.size();
+  }
+  if (!known) refuse(fmt::format("there are no clients \"{}\"", group), "");
+  const Metrics metrics = window_metrics(sum, to_s - from_s, sessions);
+  std::string names;
+  for (const auto& [known_name, value] : metrics) {
+    if (known_name == metric) return value;
+    names += (names.empty() ? "" : ", ") + known_name;
+  }
+  throw InputError("--require", name, "is not known of a part of the run", "one of " + names);
+}
+
+Metrics collect_metrics(const RunReport& report, const HoldBounds& bounds) {
+  if (report.groups.size() == 1) {
+    return collect_metrics(report.groups.front().sessions, report.groups.front().nominal_fps,
+                           bounds);
+  }
+  Metrics all;
+  for (const GroupReport& group : report.groups) {
+    for (auto& [name, value] : collect_metrics(group.sessions, group.nominal_fps, bounds)) {
+      all.emplace_back(fmt::format("{}.{}", group.name, name), value);
+    }
+  }
+  return all;
+}
+
+}  // namespace catgs::load

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "render_core/motion/script.h"
+#include "tests/load/link.h"
+
+namespace catgs::load {
+
+/// Clients that are alike. Times are seconds since the run began.
+struct GroupOptions {
+  std::string name = "all";
+  int sessions = 1;
+  double start_s = 0.0;
+  double ramp_s = 0.0;  // spreads the starts
+  double end_s = 0.0;   // 0: the run's end
+
+  // What they look at and from where. Sessions take turns through traces and sizes.
+  std::string scene;  // empty: the server's first
+  std::vector<std::string> traces;
+  bool anchor = false;
+  ScriptOptions script;
+  std::vector<std::string> sizes = {"1280x720"};
+  int fps = 60;
+  int max_bitrate_kbps = 0;
+  float fov_y_deg = 60.0f;
+
+  // How well they behave.
+  LinkSettings link;
+  bool decode = false;
+  double decode_time_s = 0.0;  // that decoding a frame takes, at least
+  bool acknowledge = true;
+  int flood_hz = 0;                // messages a second beyond what a client would send
+  double reconnect_every_s = 0.0;  // 0: never; all sockets are dropped at the same time
+  double stall_at_s = 0.0;   // neither reads nor writes from here on, as a stopped process …
+  double stall_for_s = 0.0;  // … for this long; 0: no stall
+};
+
+/// Something that happens to the server during a run.
+struct TimedAction {
+  double at_s = 0.0;
+  std::function<void()> action;
+  bool recovers = false;  // from here on sessions are timed until their next frame
+};
+
+struct LoadOptions {
+  std::string url;
+  std::string token;
+  bool insecure = false;
+  double duration_s = 30.0;
+  std::vector<GroupOptions> groups;  // with different names
+  int pictures = 0;  // decoded frames that sessions keep for check_pictures(), in all
+  std::vector<TimedAction> actions;
+};
+
+}  // namespace catgs::load
