@@ -8,76 +8,19 @@
 #include <sstream>
 
 #include <fmt/format.h>
-#include <openssl/crypto.h>
-#include <openssl/evp.h>
-#include <openssl/hmac.h>
-#include <openssl/sha.h>
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
 #include "server/required_file.h"
+#include "server/signed_token.h"
 
 namespace catgs {
 namespace {
 
-// Bound to its purpose, so that no other HMAC under the same key can be taken for a link.
-constexpr std::string_view mac_context = "catgs-link-v1\n";
+constexpr std::string_view link_purpose = "catgs-link-v1";
 constexpr std::size_t min_key_bytes = 16;
 constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
-
-using Digest = std::array<unsigned char, SHA256_DIGEST_LENGTH>;
-
-const unsigned char* bytes_of(std::string_view text) {
-  return reinterpret_cast<const unsigned char*>(text.data());
-}
-
-Digest sha256(std::string_view text) {
-  Digest digest{};
-  SHA256(bytes_of(text), text.size(), digest.data());
-  return digest;
-}
-
-std::string hmac(std::string_view payload, std::string_view key) {
-  const std::string message = std::string(mac_context).append(payload);
-  Digest digest{};
-  unsigned int size = 0;
-  HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes_of(message), message.size(),
-       digest.data(), &size);
-  return {reinterpret_cast<const char*>(digest.data()), size};
-}
-
-std::string base64url(std::string_view bytes) {
-  std::string out((bytes.size() + 2) / 3 * 4 + 1, '\0');
-  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()), bytes_of(bytes),
-                                   static_cast<int>(bytes.size()));
-  out.resize(static_cast<std::size_t>(size));
-  while (out.ends_with('=')) out.pop_back();
-  std::ranges::replace(out, '+', '-');
-  std::ranges::replace(out, '/', '_');
-  return out;
-}
-
-std::optional<std::string> from_base64url(std::string_view text) {
-  std::string in(text);
-  if (in.find_first_of("+/=") != std::string::npos) return std::nullopt;
-  std::ranges::replace(in, '-', '+');
-  std::ranges::replace(in, '_', '/');
-  const std::size_t padding = (4 - in.size() % 4) % 4;
-  in.append(padding, '=');
-  std::string out(in.size() / 4 * 3, '\0');
-  const int size = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(out.data()), bytes_of(in),
-                                   static_cast<int>(in.size()));
-  if (size < 0 || padding == 3) return std::nullopt;
-  out.resize(static_cast<std::size_t>(size) - padding);
-  return out;
-}
-
-bool equal_in_constant_time(std::string_view a, std::string_view b) {
-  const Digest x = sha256(a);
-  const Digest y = sha256(b);
-  return CRYPTO_memcmp(x.data(), y.data(), x.size()) == 0;
-}
 
 bool is_role(std::string_view role) {
   return !role.empty() && role.size() <= 32 && std::ranges::all_of(role, [](char c) {
@@ -99,15 +42,12 @@ std::string make_link_token(const LinkGrant& grant, std::string_view key) {
     throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
   const std::string payload =
       fmt::format("{}\n{}\n{}", grant.scene_id, grant.role, grant.expires_unix_s);
-  return base64url(payload) + "." + base64url(hmac(payload, key));
+  return sign_token(link_purpose, payload, key);
 }
 
 std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key) {
-  const auto dot = token.find('.');
-  if (dot == std::string_view::npos) return std::nullopt;
-  const auto payload = from_base64url(token.substr(0, dot));
-  const auto mac = from_base64url(token.substr(dot + 1));
-  if (!payload || !mac || !equal_in_constant_time(*mac, hmac(*payload, key))) return std::nullopt;
+  const auto payload = read_signed_token(link_purpose, token, key);
+  if (!payload) return std::nullopt;
   LinkGrant grant;
   std::istringstream lines(*payload);
   std::string expires;

@@ -31,10 +31,14 @@ struct ServerConfig {
   int bitrate_kbps = 8000;
   int max_sessions = 16;
   int max_sessions_per_address = 64;
+  int max_queue = 64;
   int idle_timeout_s = 900;  // 0: never
+  int drain_wait_s = 4;
+  int drain_deadline_s = 10;
   bool open = false;
   std::string token_file;
   std::string token_key_file;
+  std::string resume_key_file;  // empty: that of tokens, else a random key
   std::string tls_cert;
   std::string tls_key;
   std::vector<std::string> allow_origins;

@@ -46,6 +46,10 @@ Metrics::Metrics()
                  .Register(registry_)),
       connections(gauge(registry_, "catgs_connections", "Open websockets")),
       sessions(gauge(registry_, "catgs_sessions", "Admitted sessions")),
+      sessions_lost(
+          gauge(registry_, "catgs_sessions_lost", "Admitted sessions whose client may come back")),
+      sessions_waiting(
+          gauge(registry_, "catgs_sessions_waiting", "Clients in the queue for a place")),
       frames_running(gauge(registry_, "catgs_frames_running", "Frames being rendered or encoded")),
       frames_queued(
           gauge(registry_, "catgs_frames_queued", "Encoded frames waiting for their sockets")),
@@ -54,6 +58,8 @@ Metrics::Metrics()
       sessions_admitted(counter(registry_, "catgs_sessions_admitted_total", "Sessions admitted")),
       sessions_refused(counter(registry_, "catgs_sessions_refused_total",
                                "Sessions refused or closed for an error")),
+      sessions_resumed(
+          counter(registry_, "catgs_sessions_resumed_total", "Sessions whose client came back")),
       frames_rendered(counter(registry_, "catgs_frames_rendered_total", "Frames rendered")),
       frames_refined(counter(registry_, "catgs_frames_refined_total",
                              "Frames that sharpened a still picture, not rendered again")),

@@ -36,11 +36,14 @@ class Metrics {
  public:
   prometheus::Gauge& connections;
   prometheus::Gauge& sessions;
-  prometheus::Gauge& frames_running;  // being rendered or encoded
-  prometheus::Gauge& frames_queued;   // encoded, waiting for their sockets
+  prometheus::Gauge& sessions_lost;     // admitted, waiting for their clients to come back
+  prometheus::Gauge& sessions_waiting;  // for a place
+  prometheus::Gauge& frames_running;    // being rendered or encoded
+  prometheus::Gauge& frames_queued;     // encoded, waiting for their sockets
   prometheus::Gauge& frames_in_flight;
   prometheus::Counter& sessions_admitted;
   prometheus::Counter& sessions_refused;
+  prometheus::Counter& sessions_resumed;
   prometheus::Counter& frames_rendered;
   prometheus::Counter& frames_refined;
   prometheus::Counter& frames_sent;

@@ -25,13 +25,15 @@
 #include "server/scene_catalog.h"
 #include "server/schedule/pool_executor.h"
 #include "server/session/session_registry.h"
+#include "server/signed_token.h"
 
 namespace catgs {
 namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto drain_deadline = 1000ms;
+constexpr auto quick_stop_deadline = 1000ms;
+constexpr auto farewell_time = 500ms;  // for close frames, after the deadline
 constexpr auto drain_poll = 20ms;
 
 constexpr std::string_view no_client_page =
@@ -49,11 +51,6 @@ StaticFiles find_client(const std::string& client_dir) {
   return {};
 }
 
-std::int64_t unix_now_s() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::seconds>(now).count();
-}
-
 RegistryOptions registry_options(const ServerConfig& config) {
   RegistryOptions options;
   options.policy.idle_timeout = std::chrono::seconds(config.idle_timeout_s);
@@ -61,7 +58,16 @@ RegistryOptions registry_options(const ServerConfig& config) {
   options.policy.default_bitrate_kbps = config.bitrate_kbps;
   options.max_sessions = config.max_sessions;
   options.max_sessions_per_address = config.max_sessions_per_address;
+  options.max_queue = config.max_queue;
   return options;
+}
+
+SessionTokens session_tokens(const ServerConfig& config) {
+  if (!config.resume_key_file.empty())
+    return SessionTokens(read_key_file("--resume-key-file", config.resume_key_file));
+  if (!config.token_key_file.empty())
+    return SessionTokens(read_key_file("--token-key-file", config.token_key_file));
+  return SessionTokens(random_key());
 }
 
 /// The token of "Authorization: Bearer TOKEN"; empty: none.
@@ -89,8 +95,12 @@ struct Server::State {
   HttpResponse respond_admin(const HttpRequest& request);
   void print_banner() const;
   void wait_for_signal();
-  void begin_stop();
-  void finish_stop_when_empty(TimePoint deadline);
+  /// Readiness ends; after `wait` clients are told, and after `deadline` more they are closed.
+  void begin_stop(std::chrono::milliseconds wait, std::chrono::milliseconds deadline);
+  void drain(std::chrono::milliseconds deadline);
+  /// Goes on with `then` when nobody is connected any more, and at the latest at `deadline`.
+  void when_empty(TimePoint deadline, std::function<void()> then);
+  void finish_stop();
 
   const ServerConfig config;
   AccessControl access;
@@ -170,9 +180,9 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
   auto authorize = [&s](const std::string& token, const std::string& scene_id) {
     return s.access.refusal(token, scene_id, unix_now_s());
   };
-  s.registry = std::make_unique<SessionRegistry>(s.io, registry_options(s.config),
-                                                 std::make_shared<PoolExecutor>(s.pool), s.scenes,
-                                                 s.encoders, std::move(authorize), s.metrics);
+  s.registry = std::make_unique<SessionRegistry>(
+      s.io, registry_options(s.config), std::make_shared<PoolExecutor>(s.pool), s.scenes,
+      s.encoders, std::move(authorize), session_tokens(s.config), s.metrics);
 }
 
 Server::~Server() {
@@ -194,7 +204,7 @@ void Server::run() {
 }
 
 void Server::stop() {
-  boost::asio::post(state_->io, [this] { state_->begin_stop(); });
+  boost::asio::post(state_->io, [this] { state_->begin_stop(0ms, quick_stop_deadline); });
 }
 
 int Server::port() const { return state_->net.port(); }
@@ -214,29 +224,45 @@ void Server::State::print_banner() const {
 }
 
 void Server::State::wait_for_signal() {
-  stop_signals.async_wait([this](const boost::system::error_code& error, int) {
+  stop_signals.async_wait([this](const boost::system::error_code& error, int signal) {
     if (error) return;
     if (stopping) ::_exit(1);
     wait_for_signal();
-    begin_stop();
+    if (signal == SIGTERM)
+      begin_stop(std::chrono::seconds(config.drain_wait_s),
+                 std::chrono::seconds(config.drain_deadline_s));
+    else
+      begin_stop(0ms, quick_stop_deadline);  // somebody at a terminal waits for the prompt
   });
 }
 
-void Server::State::begin_stop() {
+void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::milliseconds deadline) {
   if (std::exchange(stopping, true)) return;
-  spdlog::info("stopping: {} connections are told", registry->connections());
   ready = false;
-  registry->drain(drain_deadline);
-  finish_stop_when_empty(Clock::now() + drain_deadline);
+  if (wait == 0ms) return drain(deadline);
+  spdlog::info("stopping: not ready any more, clients are told in {} s",
+               std::chrono::duration_cast<std::chrono::seconds>(wait).count());
+  drain_timer.expires_after(wait);
+  drain_timer.async_wait([this, deadline](const boost::system::error_code&) { drain(deadline); });
 }
 
-void Server::State::finish_stop_when_empty(TimePoint deadline) {
-  if (registry->connections() > 0 && Clock::now() < deadline) {
-    drain_timer.expires_after(drain_poll);
-    drain_timer.async_wait(
-        [this, deadline](const boost::system::error_code&) { finish_stop_when_empty(deadline); });
-    return;
-  }
+void Server::State::drain(std::chrono::milliseconds deadline) {
+  spdlog::info("stopping: {} connections are told", registry->connections());
+  registry->drain(deadline);
+  when_empty(Clock::now() + deadline, [this] {
+    registry->close_all();
+    when_empty(Clock::now() + farewell_time, [this] { finish_stop(); });
+  });
+}
+
+void Server::State::when_empty(TimePoint deadline, std::function<void()> then) {
+  if (registry->connections() == 0 || Clock::now() >= deadline) return then();
+  drain_timer.expires_after(drain_poll);
+  drain_timer.async_wait([this, deadline, then = std::move(then)](
+                             const boost::system::error_code&) { when_empty(deadline, then); });
+}
+
+void Server::State::finish_stop() {
   net.stop();
   registry->stop_timers();
   stop_signals.cancel();  // nothing is left to wait for but frames under way: io.run() returns

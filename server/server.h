@@ -16,7 +16,8 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   /// Serves until SIGINT, SIGTERM or stop(): then readiness ends, clients are told, and run()
-  /// returns within two seconds. A second signal ends the process at once.
+  /// returns when they have left, within two seconds; on SIGTERM --drain-wait and --drain-deadline
+  /// give proxies and clients more time. A second signal ends the process at once.
   void run();
   /// Any thread.
   void stop();

@@ -52,7 +52,8 @@ class ConnectionListener {
   /// The frame was handed to the socket.
   virtual void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                              TimePoint now) = 0;
-  virtual void on_close() = 0;  // last call
+  /// The last call. `by_leaving`: the peer has said that it goes for good (its page was closed).
+  virtual void on_close(bool by_leaving) = 0;
 };
 
 /// Makes the listener of a new connection. Called on the network thread.

@@ -155,6 +155,13 @@ int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
   return 0;
 }
 
+void LwsWebsocket::service_peer_closes(std::span<const std::byte> payload) {
+  // Browsers send this code when a page is closed or left; whoever reconnects closes otherwise.
+  constexpr auto leaves = static_cast<unsigned>(CloseCode::going_away);
+  peer_leaves_ = payload.size() >= 2 && (std::to_integer<unsigned>(payload[0]) << 8 |
+                                         std::to_integer<unsigned>(payload[1])) == leaves;
+}
+
 void LwsWebsocket::service_closed() {
   wsi_ = nullptr;
   {
@@ -162,7 +169,7 @@ void LwsWebsocket::service_closed() {
     closed_ = true;
     ring_ = PacketRing();
   }
-  if (listener_) listener_->on_close();
+  if (listener_) listener_->on_close(peer_leaves_);
   listener_.reset();
 }
 

@@ -48,6 +48,8 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
   /// Nonzero: libwebsockets shall close the socket, as its callbacks say it.
   int service_receive(std::span<const std::byte> fragment);
   int service_writeable(std::vector<std::byte>& scratch);
+  /// The peer's close frame: two bytes of code, then a reason.
+  void service_peer_closes(std::span<const std::byte> payload);
   void service_closed();
 
  private:
@@ -62,6 +64,7 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
   lws* wsi_;
   std::shared_ptr<ConnectionListener> listener_;
   std::vector<std::byte> received_;
+  bool peer_leaves_ = false;
 
   mutable std::mutex mutex_;  // guards what follows
   PacketRing ring_;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -32,6 +34,8 @@ struct Settings {
   glm::ivec2 size_px{0};  // 0: the viewport's
   int max_fps = 0;        // 0: the server's default
   int max_bitrate_kbps = 0;
+
+  bool operator==(const Settings&) const = default;
 };
 
 struct Hello {
@@ -42,6 +46,8 @@ struct Hello {
   std::vector<Codec> decoders;  // best first
   std::string token;
   std::string resume_token;
+  std::optional<PoseSample> resume_pose;
+  std::string watch_token;
   Settings settings;
 };
 
@@ -98,6 +104,8 @@ struct Welcome {
   std::string renderer;
   std::string server_version;
   std::vector<std::string> scene_ids;
+  std::string watch_token;
+  bool watching = false;
 };
 
 struct Stats {
@@ -124,6 +132,7 @@ enum class ErrorCode {
   render_failed,
   idle_timeout,
   internal,
+  session_ended,
 };
 
 struct ErrorMessage {
@@ -136,6 +145,13 @@ struct Drain {
   std::uint32_t deadline_ms = 0;
 };
 
-using ServerMessage = std::variant<Welcome, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain>;
+/// Where a client stands that waits for a place.
+struct QueuePlace {
+  int position = 1;                 // 1: next
+  std::chrono::seconds estimate{};  // of the whole wait
+};
+
+using ServerMessage =
+    std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain>;
 
 }  // namespace catgs

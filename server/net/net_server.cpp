@@ -149,6 +149,9 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
       return (*slot->connection)->service_receive(bytes);
     case LWS_CALLBACK_SERVER_WRITEABLE:
       return (*slot->connection)->service_writeable(service_of(wsi).scratch);
+    case LWS_CALLBACK_WS_PEER_INITIATED_CLOSE:
+      (*slot->connection)->service_peer_closes(bytes);
+      return 0;
     case LWS_CALLBACK_CLOSED:
       if (slot && slot->connection) {
         (*slot->connection)->service_closed();

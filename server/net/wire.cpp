@@ -110,6 +110,8 @@ Hello parse(const v1::Hello& message) {
   }
   hello.token = checked_length("hello.token", message.token(), 512);
   hello.resume_token = checked_length("hello.resume.token", message.resume().token(), 512);
+  if (message.resume().has_pose()) hello.resume_pose = parse(message.resume().pose());
+  hello.watch_token = checked_length("hello.watch", message.watch(), 512);
   hello.settings = parse(message.settings());
   return hello;
 }
@@ -195,6 +197,14 @@ void fill(const Welcome& welcome, v1::ServerMessage& out) {
   message.set_renderer(welcome.renderer);
   message.set_server_version(welcome.server_version);
   for (const auto& id : welcome.scene_ids) message.add_scene_ids(id);
+  message.set_watch_token(welcome.watch_token);
+  message.set_watching(welcome.watching);
+}
+
+void fill(const QueuePlace& place, v1::ServerMessage& out) {
+  auto& message = *out.mutable_queue();
+  message.set_position(static_cast<std::uint32_t>(place.position));
+  message.set_estimate_s(static_cast<std::uint32_t>(place.estimate.count()));
 }
 
 void fill(const StreamConfig& config, v1::ServerMessage& out) {

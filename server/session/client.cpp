@@ -11,100 +11,66 @@
 #include "server/session/session_registry.h"
 
 namespace catgs {
-namespace {
-
-// Poses and acks at 240 Hz each, and room for bursts after a stall.
-constexpr double messages_per_second = 600.0;
-constexpr double message_burst = 1200.0;
-
-}  // namespace
-
-Client::Client(SessionRegistry& registry, std::shared_ptr<Connection> connection,
-               std::string session_id)
+Client::Client(SessionRegistry& registry, std::string session_id, std::string peer_address)
     : registry_(registry),
-      connection_(std::move(connection)),
-      rate_(messages_per_second, message_burst, Clock::now()),
+      peer_address_(std::move(peer_address)),
       executor_(registry.executor_),
       session_(std::move(session_id), registry.options_.policy, *this, Clock::now()) {}
 
 Client::~Client() { executor_->close(std::move(stream_)); }
 
-template <typename Handle>
-void Client::post(Handle handle) {
-  boost::asio::post(registry_.io_,
-                    [self = shared_from_this(), handle = std::move(handle)]() mutable {
-                      handle(*self);
-                      self->registry_.give_frames();
-                    });
+void Client::attach(const std::shared_ptr<Peer>& peer) {
+  if (peer_) peer_->dismiss(CloseCode::going_away, "the session goes on in another connection");
+  peer_ = peer;
+  peer_address_ = peer->connection().peer_address();
+  peer->belong_to(shared_from_this());
 }
 
-void Client::on_message(std::span<const std::byte> bytes) {
-  if (refused_) return;
-  const TimePoint now = Clock::now();
-  if (!rate_.take(now)) {
-    refused_ = true;
-    return post([](Client& c) { c.session_.fail(ErrorCode::rate_limited, "too many messages"); });
+void Client::on_message(Peer& from, const ClientMessage& message, TimePoint now) {
+  if (const auto* hello = std::get_if<Hello>(&message);
+      hello && session_.state() == Session::State::awaiting_hello)
+    return registry_.on_hello(from.shared_from_this(), shared_from_this(), *hello, now);
+  if (const auto* ack = std::get_if<Ack>(&message)) {
+    if (ack->presented_us > 0) registry_.metrics_.pose_age_seconds.Observe(1e-6 * ack->pose_age_us);
+    if (ack->dropped) registry_.metrics_.frames_dropped_by_client.Increment();
   }
-  auto parsed = wire::parse_client_message(bytes);
-  if (auto* error = std::get_if<wire::ParseError>(&parsed)) {
-    refused_ = true;
-    registry_.metrics_.bad_messages.Increment();
-    return post([what = std::move(error->what)](Client& c) { c.session_.on_bad_message(what); });
-  }
-  auto& message = std::get<ClientMessage>(parsed);
-  if (const auto* sample = std::get_if<PoseSample>(&message)) {
-    registry_.metrics_.poses_received.Increment();
-    if (latest_pose_.store({*sample, now}))
-      post([](Client& c) { c.take_pose(); });
-    else
-      registry_.metrics_.poses_superseded.Increment();
-    return;
-  }
-  post([message = std::move(message), now](Client& c) {
-    if (const auto* ack = std::get_if<Ack>(&message)) {
-      if (ack->presented_us > 0)
-        c.registry_.metrics_.pose_age_seconds.Observe(1e-6 * ack->pose_age_us);
-      if (ack->dropped) c.registry_.metrics_.frames_dropped_by_client.Increment();
-    }
-    c.session_.on_message(message, now);
-  });
+  session_.on_message(message, now);
 }
 
-void Client::take_pose() {
-  if (const auto pose = latest_pose_.take()) session_.on_message(pose->sample, pose->received);
+void Client::on_frame_sent(Peer&, const FrameTicket& ticket, std::size_t packet_bytes) {
+  session_.on_frame_sent(ticket, packet_bytes);
 }
 
-void Client::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) {
-  Metrics& metrics = registry_.metrics_;
-  metrics.frames_sent.Increment();
-  metrics.bytes_sent.Increment(static_cast<double>(packet_bytes));
-  metrics.observe_frame(ticket, now);
-  // Not post(): nothing becomes due by it.
-  boost::asio::post(registry_.io_, [self = shared_from_this(), ticket, packet_bytes] {
-    self->session_.on_frame_sent(ticket, packet_bytes);
-  });
+void Client::on_close(Peer&, bool by_leaving) {
+  peer_.reset();
+  if (by_leaving || !admitted_at_)
+    session_.on_disconnected();
+  else
+    session_.on_lost(Clock::now());
+  if (session_.state() == Session::State::closed) registry_.remove(*this);
 }
 
-void Client::on_close() {
-  post([](Client& c) {
-    c.session_.on_disconnected();
-    c.registry_.remove(c);
-  });
-}
+void Client::refuse(Peer&, ErrorCode code, std::string_view why) { session_.fail(code, why); }
 
-std::variant<Admission, ErrorMessage> Client::admit(const Hello& hello) {
+AdmissionAnswer Client::admit(const Hello& hello) {
   token_ = hello.token;
-  auto result = registry_.admit(hello);
-  if (const auto* admission = std::get_if<Admission>(&result)) {
-    admitted_ = true;
-    ++registry_.admitted_;
-    registry_.metrics_.sessions_admitted.Increment();
+  auto answer = registry_.admit(*this, hello);
+  if (const auto* admission = std::get_if<Admission>(&answer)) {
+    admitted_at_ = Clock::now();
     const LogSession about(session_.id());
-    spdlog::info("{} looks at {}, {}x{}, {}", connection_->peer_address(),
-                 admission->scene->facts.scene_id, hello.viewport_px.x, hello.viewport_px.y,
-                 admission->encoder.text);
+    spdlog::info("{} looks at {}, {}x{}, {}", peer_address_, admission->scene->facts.scene_id,
+                 hello.viewport_px.x, hello.viewport_px.y, admission->encoder.text);
   }
-  return result;
+  return answer;
+}
+
+void Client::resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,
+                    TimePoint now) {
+  token_ = hello.token;
+  attach(peer);
+  const LogSession about(session_.id());
+  spdlog::info("{} is back", peer_address_);
+  session_.on_resumed(hello, std::move(admission), now);
 }
 
 std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> Client::find_scene(
@@ -126,22 +92,34 @@ std::vector<std::string> Client::scene_ids() {
 
 std::uint32_t Client::session_count() { return registry_.admitted_; }
 
+void Client::sign(Welcome& welcome) {
+  welcome.resume_token =
+      registry_.tokens_.resume_token(welcome.session_id, welcome.scene.scene_id, unix_now_s());
+}
+
 void Client::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message)) {
     const LogSession about(session_.id());
-    spdlog::warn("{}: {}", connection_->peer_address(), error->message);
+    spdlog::warn("{}: {}", peer_address_, error->message);
     if (error->fatal) registry_.metrics_.sessions_refused.Increment();
   }
-  connection_->send(wire::serialize(message));
+  if (peer_) peer_->connection().send(wire::serialize(message));
 }
 
 std::vector<std::uint64_t> Client::send(OutgoingFrame frame) {
-  auto dropped = connection_->send(std::move(frame));
+  if (!peer_) return {};
+  auto dropped = peer_->connection().send(std::move(frame));
   registry_.metrics_.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));
   return dropped;
 }
 
-void Client::close(CloseCode code, std::string_view reason) { connection_->close(code, reason); }
+void Client::close(CloseCode code, std::string_view reason) {
+  if (peer_) peer_->connection().close(code, reason);
+}
+
+std::size_t Client::queued_frames() const {
+  return peer_ ? peer_->connection().queued_frames() : 0;
+}
 
 template <typename Result, typename Handle>
 std::function<void(Result)> Client::on_session_thread(Handle handle) {

@@ -4,72 +4,68 @@
 #include <memory>
 #include <string>
 
-#include "server/net/connection.h"
-#include "server/pipeline/latest_slot.h"
-#include "server/session/rate_limit.h"
+#include "server/session/peer.h"
 #include "server/session/session.h"
 
 namespace catgs {
 
 class SessionRegistry;
 
-/// One connected client: joins its Connection (network thread) to its Session (session thread).
-/// Poses wait in a slot where the newest wins; other messages are few, limited in rate, and posted
-/// one by one.
-class Client final : public ConnectionListener,
-                     public SessionHost,
-                     public std::enable_shared_from_this<Client> {
+/// Joins a Session to what is around it: the connection that it speaks through, as long as there is
+/// one, the executor that makes its frames, the registry with its places. Session thread only.
+class Client final : public SessionHost, public std::enable_shared_from_this<Client> {
  public:
-  Client(SessionRegistry& registry, std::shared_ptr<Connection> connection, std::string session_id);
+  Client(SessionRegistry& registry, std::string session_id, std::string peer_address);
   ~Client() override;  // any thread but the executor's, even after the registry's end
 
-  // Network thread.
-  void on_message(std::span<const std::byte> bytes) override;
-  void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) override;
-  void on_close() override;
+  /// The session speaks through `peer` from here on; a connection that it had before is closed.
+  void attach(const std::shared_ptr<Peer>& peer);
+  /// Its connection goes over to another client.
+  void detach() { peer_.reset(); }
+  void on_message(Peer& from, const ClientMessage& message, TimePoint now);
+  void on_frame_sent(Peer& by, const FrameTicket& ticket, std::size_t packet_bytes);
+  /// `by_leaving`: the page was closed, nobody comes back.
+  void on_close(Peer& closed, bool by_leaving);
+  /// A message that cannot be taken closes the connection it came from.
+  void refuse(Peer& from, ErrorCode code, std::string_view why);
 
-  // Session thread.
-  std::variant<Admission, ErrorMessage> admit(const Hello& hello) override;
+  // SessionHost
+  AdmissionAnswer admit(const Hello& hello) override;
   std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
       const std::string& scene_id) override;
   std::vector<std::string> scene_ids() override;
   std::uint32_t session_count() override;
+  void sign(Welcome& welcome) override;
   void send(const ServerMessage& message) override;
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;
   void close(CloseCode code, std::string_view reason) override;
   void open_stream(StreamSettings settings) override;
 
+  /// Continues the session of a client that was lost, through `peer`.
+  void resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,
+              TimePoint now);
   /// Starts the frame that the session's next_frame() announced.
   void start_frame(TimePoint now);
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
-  [[nodiscard]] const Connection& connection() const { return *connection_; }
-  [[nodiscard]] bool admitted() const { return admitted_; }
+  [[nodiscard]] const std::string& peer_address() const { return peer_address_; }
+  [[nodiscard]] std::size_t queued_frames() const;
+  [[nodiscard]] bool connected() const { return peer_ != nullptr; }
+  [[nodiscard]] std::optional<TimePoint> admitted_at() const { return admitted_at_; }
 
  private:
-  struct ReceivedPose {
-    PoseSample sample;
-    TimePoint received;
-  };
-  void take_pose();
-  /// Posts `handle(*this)` to the session thread, then lets the registry look for work.
-  template <typename Handle>
-  void post(Handle handle);
-  /// An executor's `done` that posts `handle(*this, result)` in the same way.
+  /// An executor's `done` that posts `handle(*this, result)` to the session thread, then lets the
+  /// registry look for work.
   template <typename Result, typename Handle>
   std::function<void(Result)> on_session_thread(Handle handle);
 
   SessionRegistry& registry_;
-  const std::shared_ptr<Connection> connection_;
-
-  RateLimit rate_;        // network thread
-  bool refused_ = false;  // network thread: nothing more is read
-  LatestSlot<ReceivedPose> latest_pose_;
-
+  std::shared_ptr<Peer> peer_;  // null: its connection was lost
+  std::string peer_address_;    // of the last one
   const std::shared_ptr<FrameExecutor> executor_;
   std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
   std::string token_;  // of the hello; a link may open one scene only
-  bool admitted_ = false;
+  std::optional<TimePoint> admitted_at_;
   Session session_;
 };
 

@@ -53,6 +53,7 @@ Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host,
 
 void Session::on_message(const ClientMessage& message, TimePoint now) {
   if (state_ == State::closed) return;
+  if (state_ == State::queued) return on_queued(message);
   const bool is_hello = std::holds_alternative<Hello>(message);
   if (std::holds_alternative<Bye>(message) || std::holds_alternative<UnknownMessage>(message) ||
       is_hello == (state_ == State::awaiting_hello))
@@ -83,16 +84,81 @@ void Session::on(const Hello& hello, TimePoint now) {
                 fmt::format("this server speaks catgs wire version {}, the client at most {}: "
                             "reload the page or update the client",
                             wire::version, hello.version));
-  auto admitted = host_.admit(hello);
-  if (const auto* error = std::get_if<ErrorMessage>(&admitted))
+  greet(hello, now);
+}
+
+void Session::greet(const Hello& hello, TimePoint now) {
+  auto answer = host_.admit(hello);
+  if (const auto* error = std::get_if<ErrorMessage>(&answer))
     return fail(error->code, error->message);
-  admission_ = std::get<Admission>(std::move(admitted));
-  predictor_ = predictor_for(*admission_.scene);
+  if (const auto* place = std::get_if<QueuePlace>(&answer)) {
+    waiting_hello_ = hello;
+    state_ = State::queued;
+    return on_queue_moved(*place, now);
+  }
+  note_activity(now);
+  admission_.encoder = std::get<Admission>(answer).encoder;
+  enter_scene(std::get<Admission>(answer).scene);
   viewport_px_ = hello.viewport_px;
   settings_ = hello.settings;
-  welcome_due_ = true;
   state_ = State::opening;
+  if (hello.resume_pose) on(*hello.resume_pose, now);
   request_stream();
+}
+
+void Session::on_queue_moved(const QueuePlace& place, TimePoint now) {
+  if (state_ == State::queued) say(place, now);
+}
+
+void Session::ask_again(TimePoint now) {
+  if (state_ == State::queued) greet(waiting_hello_, now);
+}
+
+void Session::on_queued(const ClientMessage& message) {
+  if (const auto* settings = std::get_if<Settings>(&message)) waiting_hello_.settings = *settings;
+  if (const auto* pause = std::get_if<Pause>(&message)) paused_ = pause->paused;
+  if (std::holds_alternative<Hello>(message)) on_bad_message("a second hello");
+  if (const auto* bye = std::get_if<Bye>(&message)) on(*bye, {});
+}
+
+/// A pose in the scene before means nothing in this one.
+void Session::enter_scene(std::shared_ptr<const SceneEntry> scene) {
+  admission_.scene = std::move(scene);
+  pose_.reset();
+  predictor_ = predictor_for(*admission_.scene);
+  welcome_due_ = true;
+}
+
+void Session::on_lost(TimePoint now) {
+  lost_at_ = now;
+  obsolete_frames_ = frames_started_;
+  credit_.reset();
+}
+
+void Session::on_resumed(const Hello& hello, Admission admission, TimePoint now) {
+  lost_at_.reset();
+  obsolete_frames_ = frames_started_;
+  credit_.reset();
+  note_activity(now);
+  paused_ = false;  // a page that is still hidden says so again
+  idr_due_ = true;
+  idr_request_waits_ = false;
+  const bool same_stream = admission.scene == admission_.scene &&
+                           admission.encoder.kind == admission_.encoder.kind &&
+                           hello.settings == settings_ && hello.viewport_px == viewport_px_;
+  admission_.encoder = std::move(admission.encoder);
+  if (admission.scene != admission_.scene) enter_scene(std::move(admission.scene));
+  welcome_due_ = true;
+  viewport_px_ = hello.viewport_px;
+  settings_ = hello.settings;
+  if (hello.resume_pose) {
+    pose_.reset();  // its numbers begin anew when the page does
+    on(*hello.resume_pose, now);
+  }
+  if (!same_stream)
+    request_stream();
+  else if (state_ == State::live && !opening_stream_)
+    say_config(now);
 }
 
 void Session::on(const PoseSample& sample, TimePoint now) {
@@ -122,11 +188,7 @@ void Session::on(const SelectScene& select, TimePoint now) {
   note_activity(now);
   auto found = host_.find_scene(select.scene_id);
   if (const auto* error = std::get_if<ErrorMessage>(&found)) return say(*error, now);
-  admission_.scene = std::get<std::shared_ptr<const SceneEntry>>(std::move(found));
-  welcome_due_ = true;
-  // A pose in the old scene means nothing in the new one.
-  pose_.reset();
-  predictor_ = predictor_for(*admission_.scene);
+  enter_scene(std::get<std::shared_ptr<const SceneEntry>>(std::move(found)));
   request_stream();
 }
 
@@ -199,6 +261,7 @@ void Session::say_config(TimePoint now) {
   welcome.renderer = admission_.scene->renderer_text;
   welcome.server_version = build_version;
   welcome.scene_ids = host_.scene_ids();
+  host_.sign(welcome);
   say(welcome, now);
 }
 
@@ -211,7 +274,7 @@ bool Session::picture_is_stale() const {
 }
 
 std::optional<FrameCandidate> Session::next_frame() const {
-  if (state_ != State::live || paused_ || rendering_ || opening_stream_ || !pose_ ||
+  if (state_ != State::live || lost_at_ || paused_ || rendering_ || opening_stream_ || !pose_ ||
       !credit_.available())
     return std::nullopt;
   TimePoint ready = next_start_;
@@ -277,6 +340,7 @@ void Session::on_frame(FrameResult result, TimePoint now) {
     return;
   }
   failures_ = 0;
+  if (result.frame.ticket.frame_id <= obsolete_frames_) return;
   last_said_ = now;
   if (!result.frame.ticket.refined) shown_is_sub_frame_ = result.frame.ticket.speculated;
   credit_.sent(result.frame.ticket.frame_id, now);
@@ -304,7 +368,11 @@ void Session::say(const ServerMessage& message, TimePoint now) {
 void Session::on_tick(TimePoint now) {
   if (state_ == State::awaiting_hello && now - created_ >= policy_.hello_timeout)
     return fail(ErrorCode::bad_message, "no hello within the time limit");
-  if (state_ == State::closed) return;
+  if (state_ == State::closed || state_ == State::queued) return;
+  if (lost_at_) {
+    if (now - *lost_at_ >= policy_.resume_grace) state_ = State::closed;
+    return;
+  }
   if (idr_request_waits_) on(RequestIdr{}, now);
   if (policy_.idle_timeout > 0ms) {
     const auto left = last_activity_ + policy_.idle_timeout - now;
@@ -343,8 +411,12 @@ void Session::send_statistics(TimePoint now) {
 void Session::drain(std::chrono::milliseconds deadline) {
   if (state_ == State::closed) return;
   host_.send(Drain{static_cast<std::uint32_t>(deadline.count())});
+}
+
+void Session::end(std::string_view reason) {
+  if (state_ == State::closed) return;
   state_ = State::closed;
-  host_.close(CloseCode::going_away, "the server is shutting down");
+  host_.close(CloseCode::going_away, reason);
 }
 
 }  // namespace catgs

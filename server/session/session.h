@@ -14,6 +14,7 @@
 #include "server/net/messages.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"
+#include "server/session/admission_queue.h"
 #include "server/session/credit.h"
 
 namespace catgs {
@@ -38,10 +39,14 @@ struct Admission {
   EncoderChoice encoder;
 };
 
+/// What a hello comes to.
+using AdmissionAnswer = std::variant<Admission, QueuePlace, ErrorMessage>;
+
 struct SessionPolicy {
   std::chrono::milliseconds hello_timeout{5000};
   std::chrono::milliseconds idle_timeout{15 * 60 * 1000};  // 0: never
   std::chrono::milliseconds idle_warning{30'000};          // before the timeout
+  std::chrono::milliseconds resume_grace{30'000};  // a lost client may come back for so long
   int default_fps = 60;
   int max_fps = 120;
   int default_bitrate_kbps = 8000;
@@ -55,11 +60,13 @@ struct SessionPolicy {
 class SessionHost {
  public:
   virtual ~SessionHost() = default;
-  virtual std::variant<Admission, ErrorMessage> admit(const Hello& hello) = 0;
+  virtual AdmissionAnswer admit(const Hello& hello) = 0;
   virtual std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
       const std::string& scene_id) = 0;
   virtual std::vector<std::string> scene_ids() = 0;
   virtual std::uint32_t session_count() = 0;
+  /// Fills in the welcome's tokens.
+  virtual void sign(Welcome& welcome) = 0;
   virtual void send(const ServerMessage& message) = 0;
   /// Returns the ids of the frames that were dropped for it.
   virtual std::vector<std::uint64_t> send(OutgoingFrame frame) = 0;
@@ -76,13 +83,14 @@ struct FrameOrder {
   bool force_idr = false;
 };
 
-/// One client's life: hello -> admission -> welcome -> poses, frames, acks -> bye. It knows no
-/// socket, no thread and no clock: events come with their time, effects leave through the host.
+/// One client's life: hello -> admission, perhaps after a wait -> welcome -> poses, frames, acks ->
+/// bye. A client that was lost is waited for with everything kept, but nothing rendered. It knows
+/// no socket, no thread and no clock: events come with their time, effects leave through the host.
 /// Rendering is on demand: a frame is due when the newest pose shows another picture than the last
 /// frame and the client has credit. Not thread-safe.
 class Session {
  public:
-  enum class State { awaiting_hello, opening, live, closed };
+  enum class State { awaiting_hello, queued, opening, live, closed };
 
   Session(std::string id, const SessionPolicy& policy, SessionHost& host, TimePoint now);
 
@@ -97,8 +105,21 @@ class Session {
   void on_tick(TimePoint now);
   /// Tells the client why and closes; for reasons outside the session.
   void fail(ErrorCode code, std::string_view message);
+  /// Asks the client to go on elsewhere; frames go on until it does.
   void drain(std::chrono::milliseconds deadline);
+  /// Closes the connection of a server that goes away.
+  void end(std::string_view reason);
+  /// While queued: it moved up, or a second has passed.
+  void on_queue_moved(const QueuePlace& place, TimePoint now);
+  /// While queued: there may be a place now.
+  void ask_again(TimePoint now);
   void on_disconnected() { state_ = State::closed; }
+  /// The connection is gone without a farewell. After the grace the session closes.
+  void on_lost(TimePoint now);
+  /// The client is back, perhaps with other wishes. It gets a welcome, then an IDR. Only while
+  /// resumable().
+  void on_resumed(const Hello& hello, Admission admission, TimePoint now);
+  [[nodiscard]] bool resumable() const { return state_ == State::opening || state_ == State::live; }
 
   /// When the next frame may start; none: there is nothing to show or no credit.
   [[nodiscard]] std::optional<FrameCandidate> next_frame() const;
@@ -115,6 +136,7 @@ class Session {
   [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
   [[nodiscard]] bool paused() const { return paused_; }
+  [[nodiscard]] bool lost() const { return lost_at_.has_value(); }
 
  private:
   void on(const UnknownMessage&, TimePoint) {}
@@ -128,6 +150,9 @@ class Session {
   void on(const Pause& pause, TimePoint now);
   void on(const Bye&, TimePoint);
 
+  void greet(const Hello& hello, TimePoint now);
+  void on_queued(const ClientMessage& message);
+  void enter_scene(std::shared_ptr<const SceneEntry> scene);
   /// Somebody is there: the time to release starts anew, and so does its warning.
   void note_activity(TimePoint now);
   void say(const ServerMessage& message, TimePoint now);
@@ -145,6 +170,7 @@ class Session {
   State state_ = State::awaiting_hello;
   const TimePoint created_;
 
+  Hello waiting_hello_;  // while queued
   Admission admission_;
   glm::ivec2 viewport_px_{0};
   Settings settings_;
@@ -163,6 +189,8 @@ class Session {
   bool shown_is_sub_frame_ = false;
   int refinements_left_ = 0;
   bool rendering_ = false;
+  std::optional<TimePoint> lost_at_;
+  std::uint64_t obsolete_frames_ = 0;  // up to this id they were made for a lost connection
   bool idr_due_ = false;
   bool paused_ = false;
   int failures_ = 0;  // of rendering or encoding, in a row

@@ -8,12 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
+#include "server/net/wire.h"
 #include "server/session/log_session.h"
 
 namespace catgs {
 namespace {
 
 constexpr std::chrono::milliseconds tick_interval{250};
+constexpr std::chrono::milliseconds queue_tell_interval{750};  // once a second, with the tick
 
 /// For people and logs: tells sessions apart, protects nothing.
 std::string random_session_id() {
@@ -21,10 +23,13 @@ std::string random_session_id() {
   return fmt::format("{:08x}", engine());
 }
 
-std::string_view name_of(Session::State state) {
-  switch (state) {
+std::string_view state_name(const Session& session) {
+  if (session.lost()) return "lost";
+  switch (session.state()) {
     case Session::State::awaiting_hello:
       return "awaiting_hello";
+    case Session::State::queued:
+      return "queued";
     case Session::State::opening:
       return "opening";
     case Session::State::live:
@@ -37,57 +42,126 @@ std::string_view name_of(Session::State state) {
 
 }  // namespace
 
+std::int64_t unix_now_s() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::seconds>(now).count();
+}
+
 SessionRegistry::SessionRegistry(boost::asio::io_context& io, RegistryOptions options,
                                  std::shared_ptr<FrameExecutor> executor,
                                  std::vector<std::shared_ptr<const SceneEntry>> scenes,
                                  std::vector<EncoderChoice> encoders, Authorize authorize,
-                                 Metrics& metrics)
+                                 SessionTokens tokens, Metrics& metrics)
     : io_(io),
       options_(std::move(options)),
       executor_(std::move(executor)),
       scenes_(std::move(scenes)),
       encoders_(std::move(encoders)),
       authorize_(std::move(authorize)),
+      tokens_(std::move(tokens)),
       metrics_(metrics),
       scheduler_(executor_->slots()),
       pace_timer_(io),
-      tick_timer_(io) {
+      tick_timer_(io),
+      queue_(options_.max_queue) {
   tick();
 }
 
 std::shared_ptr<ConnectionListener> SessionRegistry::accept(
     std::shared_ptr<Connection> connection) {
-  auto client = std::make_shared<Client>(*this, std::move(connection), random_session_id());
-  boost::asio::post(io_, [this, client] { add(client); });
-  return client;
+  auto client = std::make_shared<Client>(*this, random_session_id(), connection->peer_address());
+  auto peer = std::make_shared<Peer>(*this, std::move(connection));
+  boost::asio::post(io_, [this, peer, client] { add(peer, client); });
+  return peer;
 }
 
-void SessionRegistry::add(const std::shared_ptr<Client>& client) {
-  const std::string address = client->connection().peer_address();
-  const auto same_address = std::ranges::count_if(
-      clients_, [&](const auto& c) { return c->connection().peer_address() == address; });
+void SessionRegistry::add(const std::shared_ptr<Peer>& peer,
+                          const std::shared_ptr<Client>& client) {
+  const std::string address = peer->connection().peer_address();
+  const int same_address = ++connections_by_address_[address];
+  ++connections_;
   clients_.push_back(client);
+  client->attach(peer);
+  const auto refuse = [&](std::string_view why) {
+    client->session().fail(ErrorCode::server_full, why);
+  };
   if (draining_)
-    client->session().fail(ErrorCode::server_full, "this server is shutting down");
-  else if (clients_.size() > static_cast<std::size_t>(options_.max_sessions + options_.max_waiting))
-    client->session().fail(ErrorCode::server_full, "too many connections: try again in a minute");
-  else if (same_address >= options_.max_sessions_per_address)
-    client->session().fail(
-        ErrorCode::server_full,
-        fmt::format("{} sessions from {} already: close one first", same_address, address));
+    refuse("this server is shutting down");
+  else if (connections_ > options_.max_sessions + options_.max_queue + options_.max_greeting)
+    refuse("too many connections: try again in a minute");
+  else if (same_address > options_.max_sessions_per_address)
+    refuse(
+        fmt::format("{} connections from {} already: close one first", same_address - 1, address));
+}
+
+void SessionRegistry::forget_connection(const std::string& address) {
+  --connections_;
+  const auto it = connections_by_address_.find(address);
+  if (--it->second == 0) connections_by_address_.erase(it);
+}
+
+void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_ptr<Client> newcomer,
+                               Hello hello, TimePoint now) {
+  const auto resumed = tokens_.read_resume_token(hello.resume_token, unix_now_s());
+  if (resumed && hello.version >= wire::version) {
+    if (hello.scene_id.empty()) hello.scene_id = resumed->scene_id;
+    if (const auto known = find(resumed->session_id)) {
+      auto choice = choose(hello);
+      if (auto* admission = std::get_if<Admission>(&choice);
+          admission && known->session().resumable()) {
+        metrics_.sessions_resumed.Increment();
+        newcomer->detach();
+        remove(*newcomer);
+        return known->resume(peer, hello, std::move(*admission), now);
+      }
+    } else {
+      // It comes from another server of the fleet, or comes late: its id goes on.
+      newcomer->detach();
+      const auto place = std::ranges::find(clients_, newcomer);
+      newcomer = std::make_shared<Client>(*this, resumed->session_id, newcomer->peer_address());
+      *place = newcomer;
+      newcomer->attach(peer);
+    }
+  }
+  newcomer->session().on_message(hello, now);
 }
 
 void SessionRegistry::remove(const Client& client) {
   const auto it = std::ranges::find(clients_, &client, [](const auto& c) { return c.get(); });
   if (it == clients_.end()) return;
-  if (client.admitted()) {
+  const TimePoint now = Clock::now();
+  if (const auto admitted_at = client.admitted_at()) {
     --admitted_;
+    queue_.session_ended(now - *admitted_at);
     const Session& session = client.session();
     const LogSession about(session.id());
     spdlog::info("ended after {} frames, {} bytes, {} dropped", session.frames_sent(),
                  session.bytes_sent(), session.frames_dropped());
   }
+  queue_.leave(client.session().id());
   clients_.erase(it);
+  admit_waiting(now);
+}
+
+void SessionRegistry::admit_waiting(TimePoint now) {
+  while (!queue_.empty()) {
+    const std::string id = queue_.front();
+    const auto next = find(id);
+    if (!has_place_for(*next)) break;
+    next->session().ask_again(now);  // leaves the queue, admitted or refused
+  }
+  queue_told_ = now;
+  for (const auto& client : clients_)
+    if (client->session().state() == Session::State::queued)
+      if (const auto position = queue_.join(client->session().id()))
+        client->session().on_queue_moved(
+            {*position, queue_.estimate(*position, static_cast<int>(admitted_))}, now);
+}
+
+std::shared_ptr<Client> SessionRegistry::find(std::string_view session_id) const {
+  const auto it = std::ranges::find_if(
+      clients_, [&](const auto& client) { return client->session().id() == session_id; });
+  return it == clients_.end() ? nullptr : *it;
 }
 
 std::shared_ptr<const SceneEntry> SessionRegistry::find_scene(const std::string& scene_id) const {
@@ -97,7 +171,7 @@ std::shared_ptr<const SceneEntry> SessionRegistry::find_scene(const std::string&
   return it == scenes_.end() ? nullptr : *it;
 }
 
-std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Hello& hello) {
+std::variant<Admission, ErrorMessage> SessionRegistry::choose(const Hello& hello) const {
   const auto scene = find_scene(hello.scene_id);
   // The token first: a refusal does not depend on what is here.
   const std::string& wanted_scene = scene ? scene->facts.scene_id : hello.scene_id;
@@ -106,10 +180,6 @@ std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Hello& hello)
   if (!scene)
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("there is no scene \"{}\" here", hello.scene_id), true};
-  if (static_cast<int>(admitted_) >= options_.max_sessions)
-    return ErrorMessage{
-        ErrorCode::server_full,
-        fmt::format("all {} places are taken: try again in a minute", options_.max_sessions), true};
   for (const Codec codec : hello.decoders)
     for (const auto& encoder : encoders_)
       if (encoder.codec == codec) return Admission{scene, encoder};
@@ -117,6 +187,43 @@ std::variant<Admission, ErrorMessage> SessionRegistry::admit(const Hello& hello)
   for (const auto& encoder : encoders_) offered += (offered.empty() ? "" : "; ") + encoder.text;
   return ErrorMessage{ErrorCode::no_common_codec,
                       "the client decodes nothing that this server encodes: " + offered, true};
+}
+
+bool SessionRegistry::has_place_for(const Client& client) const {
+  if (draining_ || (!queue_.empty() && queue_.front() != client.session().id())) return false;
+  return static_cast<int>(admitted_) < options_.max_sessions;
+}
+
+AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello) {
+  const std::string& id = client.session().id();
+  auto choice = choose(hello);
+  if (auto* error = std::get_if<ErrorMessage>(&choice)) {
+    queue_.leave(id);
+    return std::move(*error);
+  }
+  const auto same_address = std::ranges::count_if(clients_, [&](const auto& c) {
+    return c->admitted_at() && c->peer_address() == client.peer_address();
+  });
+  if (same_address >= options_.max_sessions_per_address) {
+    queue_.leave(id);
+    return ErrorMessage{ErrorCode::server_full,
+                        fmt::format("{} sessions from {} already: close one first", same_address,
+                                    client.peer_address()),
+                        true};
+  }
+  if (has_place_for(client)) {
+    queue_.leave(id);
+    ++admitted_;
+    metrics_.sessions_admitted.Increment();
+    return std::get<Admission>(std::move(choice));
+  }
+  if (const auto position = queue_.join(id))
+    return QueuePlace{*position, queue_.estimate(*position, static_cast<int>(admitted_))};
+  return ErrorMessage{ErrorCode::server_full,
+                      fmt::format("all {} places are taken, and {} wait for one: try again in a "
+                                  "minute",
+                                  admitted_, queue_.size()),
+                      true};
 }
 
 void SessionRegistry::give_frames() {
@@ -148,7 +255,14 @@ void SessionRegistry::give_frames() {
 void SessionRegistry::tick() {
   if (stopped_) return;
   const TimePoint now = Clock::now();
-  for (const auto& client : clients_) client->session().on_tick(now);
+  std::vector<std::shared_ptr<Client>> gone;
+  for (const auto& client : clients_) {
+    client->session().on_tick(now);
+    if (!client->connected() && client->session().state() == Session::State::closed)
+      gone.push_back(client);
+  }
+  for (const auto& client : gone) remove(*client);
+  if (now - queue_told_ >= queue_tell_interval) admit_waiting(now);
   give_frames();
   publish();
   tick_timer_.expires_after(tick_interval);
@@ -161,13 +275,15 @@ void SessionRegistry::publish() {
   auto sessions = nlohmann::json::array();
   std::size_t queued = 0;
   int in_flight = 0;
+  int lost = 0;
   for (const auto& client : clients_) {
     const Session& session = client->session();
-    queued += client->connection().queued_frames();
+    queued += client->queued_frames();
+    lost += session.lost() ? 1 : 0;
     in_flight += session.credit().in_flight();
     sessions.push_back({
         {"id", session.id()},
-        {"state", name_of(session.state())},
+        {"state", state_name(session)},
         {"paused", session.paused()},
         {"scene", session.scene() ? session.scene()->facts.scene_id : ""},
         {"width_px", session.config().size_px.x},
@@ -180,11 +296,13 @@ void SessionRegistry::publish() {
         {"frames_in_flight", session.credit().in_flight()},
         {"credit", session.credit().limit()},
         {"base_rtt_us", session.credit().base_rtt().count()},
-        {"frames_queued", client->connection().queued_frames()},
+        {"frames_queued", client->queued_frames()},
     });
   }
-  metrics_.connections.Set(static_cast<double>(clients_.size()));
+  metrics_.connections.Set(connections_);
   metrics_.sessions.Set(admitted_);
+  metrics_.sessions_lost.Set(lost);
+  metrics_.sessions_waiting.Set(static_cast<double>(queue_.size()));
   metrics_.frames_running.Set(scheduler_.running());
   metrics_.frames_queued.Set(static_cast<double>(queued));
   metrics_.frames_in_flight.Set(in_flight);
@@ -200,6 +318,10 @@ std::string SessionRegistry::published_json() const {
 void SessionRegistry::drain(std::chrono::milliseconds deadline) {
   draining_ = true;
   for (const auto& client : clients_) client->session().drain(deadline);
+}
+
+void SessionRegistry::close_all() {
+  for (const auto& client : clients_) client->session().end("the server is shutting down");
 }
 
 void SessionRegistry::stop_timers() {

@@ -2,8 +2,10 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include <boost/asio/io_context.hpp>
@@ -12,7 +14,9 @@
 #include "server/metrics.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"
+#include "server/session/admission_queue.h"
 #include "server/session/client.h"
+#include "server/session/session_tokens.h"
 
 namespace catgs {
 
@@ -20,12 +24,16 @@ struct RegistryOptions {
   SessionPolicy policy;
   int max_sessions = 16;
   int max_sessions_per_address = 64;  // a museum behind one address
-  int max_waiting = 64;               // connections beyond the sessions: not greeted, or refused
+  int max_queue = 64;                 // clients that wait for a place
+  int max_greeting = 64;              // connections beyond: their hello is to come, or was refused
 };
 
 /// Why a token does not admit to a scene, for people; nothing: it does.
 using Authorize = std::function<std::optional<std::string>(const std::string& token,
                                                            const std::string& scene_id)>;
+
+/// Of the wall clock, as tokens have it.
+std::int64_t unix_now_s();
 
 /// Every session of the server, and the loop that gives them frames. All but accept() and
 /// published_json() run on the thread of the io_context (the session thread): sessions need no
@@ -37,7 +45,8 @@ class SessionRegistry {
   SessionRegistry(boost::asio::io_context& io, RegistryOptions options,
                   std::shared_ptr<FrameExecutor> executor,
                   std::vector<std::shared_ptr<const SceneEntry>> scenes,
-                  std::vector<EncoderChoice> encoders, Authorize authorize, Metrics& metrics);
+                  std::vector<EncoderChoice> encoders, Authorize authorize, SessionTokens tokens,
+                  Metrics& metrics);
 
   /// Any thread: the listener of a new websocket.
   std::shared_ptr<ConnectionListener> accept(std::shared_ptr<Connection> connection);
@@ -46,15 +55,28 @@ class SessionRegistry {
 
   /// Tells every client that the server goes away, and admits nobody any more.
   void drain(std::chrono::milliseconds deadline);
+  /// Closes what drain() has not emptied.
+  void close_all();
   void stop_timers();
-  [[nodiscard]] std::size_t connections() const { return clients_.size(); }
+  [[nodiscard]] int connections() const { return connections_; }
 
  private:
   friend class Client;
-  std::variant<Admission, ErrorMessage> admit(const Hello& hello);
-  std::shared_ptr<const SceneEntry> find_scene(const std::string& scene_id) const;
-  void add(const std::shared_ptr<Client>& client);
+  friend class Peer;
+  void add(const std::shared_ptr<Peer>& peer, const std::shared_ptr<Client>& client);
+  void forget_connection(const std::string& address);
+  /// Leads to the session of a resume token, or begins the newcomer's.
+  void on_hello(const std::shared_ptr<Peer>& peer, std::shared_ptr<Client> newcomer, Hello hello,
+                TimePoint now);
+  /// Scene and encoder for a hello, whether there is a place or not.
+  std::variant<Admission, ErrorMessage> choose(const Hello& hello) const;
+  AdmissionAnswer admit(const Client& client, const Hello& hello);
+  [[nodiscard]] bool has_place_for(const Client& client) const;
   void remove(const Client& client);
+  /// Those next in the queue ask again; the others hear where they stand.
+  void admit_waiting(TimePoint now);
+  [[nodiscard]] std::shared_ptr<Client> find(std::string_view session_id) const;
+  std::shared_ptr<const SceneEntry> find_scene(const std::string& scene_id) const;
   /// Starts frames while a slot is free and a session is ready; sets the timer for the next one.
   void give_frames();
   void tick();
@@ -66,6 +88,7 @@ class SessionRegistry {
   const std::vector<std::shared_ptr<const SceneEntry>> scenes_;
   const std::vector<EncoderChoice> encoders_;
   const Authorize authorize_;
+  const SessionTokens tokens_;
   Metrics& metrics_;
 
   std::vector<std::shared_ptr<Client>> clients_;
@@ -74,7 +97,11 @@ class SessionRegistry {
   boost::asio::steady_timer tick_timer_;
   bool stopped_ = false;
   bool draining_ = false;
+  int connections_ = 0;
+  std::unordered_map<std::string, int> connections_by_address_;
   std::uint32_t admitted_ = 0;
+  AdmissionQueue queue_;
+  TimePoint queue_told_{};
   std::vector<FrameCandidate> candidates_;  // scratch of give_frames()
   std::vector<Client*> candidate_clients_;
   mutable std::mutex published_mutex_;

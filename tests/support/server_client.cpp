@@ -189,8 +189,18 @@ v1::Welcome WireClient::greet(int width_px, int height_px, v1::Codec codec,
                               const std::string& token) {
   auto message = hello_message(width_px, height_px, codec);
   message.mutable_hello()->set_token(token);
-  send(message);
+  return greet(message);
+}
+
+v1::Welcome WireClient::greet(const v1::ClientMessage& hello) {
+  send(hello);
   return receive_message(v1::ServerMessage::kWelcome).welcome();
+}
+
+void WireClient::close(int code) {
+  require(state_->run([&](auto done) {
+    state_->socket.async_close(websocket::close_code(static_cast<std::uint16_t>(code)), done);
+  }));
 }
 
 void WireClient::send_pose(std::uint64_t pose_id, float x) {

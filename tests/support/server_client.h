@@ -56,7 +56,7 @@ struct Received {
 };
 
 /// A blocking websocket client. Throws std::runtime_error when nothing comes for twenty seconds: a
-/// bound against hanging, not a measurement.
+/// bound against hanging, not a measurement. Its end drops the connection without a farewell.
 class WireClient {
  public:
   struct Options {
@@ -81,6 +81,10 @@ class WireClient {
   /// hello -> welcome. `token` may be empty.
   v1::Welcome greet(int width_px = 160, int height_px = 96, v1::Codec codec = v1::CODEC_H264,
                     const std::string& token = {});
+  /// The same with a hello of the caller's making.
+  v1::Welcome greet(const v1::ClientMessage& hello);
+  /// Closes as a peer of RFC 6455 does, and waits for the answer.
+  void close(int code);
   void send_pose(std::uint64_t pose_id, float x = 0.0f);
   void send_ack(std::uint64_t frame_id, bool dropped = false);
 

@@ -35,7 +35,12 @@ export interface RunningServer {
 export async function start_server(scene: string, args: string[] = []): Promise<RunningServer> {
   const child = spawn(
     program('catgs-server'),
-    ['--scene', scene, '--port', '0', '--admin-bind', 'off', ...args],
+    // No proxy is there to see /readyz fail, and no other server to go to.
+    [
+      ...['--scene', scene, '--port', '0', '--admin-bind', 'off'],
+      ...['--drain-wait', '0', '--drain-deadline', '1'],
+      ...args,
+    ],
     { stdio: ['ignore', 'pipe', 'pipe'] },
   );
   running.add(child);

@@ -174,7 +174,10 @@ TEST(Server, RefusesWhatIsNoMessage) {
 }
 
 TEST(Server, RefusesAnUnknownSceneAndAFullHouse) {
-  RunningServer server([](ServerConfig& config) { config.max_sessions = 1; });
+  RunningServer server([](ServerConfig& config) {
+    config.max_sessions = 1;
+    config.max_queue = 0;
+  });
   std::optional<v1::Error> error;
   WireClient lost(server.port());
   auto hello = hello_message(64, 64, v1::CODEC_H264);
@@ -392,7 +395,7 @@ TEST(ServerProgram, EndsCleanlyOnSigterm) {
   if (child == 0) {
     ::dup2(ports[1], STDERR_FILENO);
     ::execl(CATGS_SERVER_PROGRAM, "catgs-server", "--scene", "synth:city:2000", "--port", "0",
-            "--admin-bind", "off", static_cast<char*>(nullptr));
+            "--admin-bind", "off", "--drain-wait", "1", static_cast<char*>(nullptr));
     ::_exit(127);
   }
   ::close(ports[1]);

@@ -12,14 +12,14 @@ namespace catgs::test {
 using namespace std::chrono_literals;
 
 struct FakeHost final : SessionHost {
-  std::variant<Admission, ErrorMessage> admission = Admission{};
+  AdmissionAnswer admission = Admission{};
   std::vector<ServerMessage> said;
   std::vector<OutgoingFrame> frames;
   std::vector<StreamSettings> opened;
   std::vector<std::uint64_t> drop_next;
   std::optional<CloseCode> closed;
 
-  std::variant<Admission, ErrorMessage> admit(const Hello&) override { return admission; }
+  AdmissionAnswer admit(const Hello&) override { return admission; }
   std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
       const std::string& id) override {
     auto scene = std::make_shared<SceneEntry>();
@@ -28,6 +28,7 @@ struct FakeHost final : SessionHost {
   }
   std::vector<std::string> scene_ids() override { return {"a"}; }
   std::uint32_t session_count() override { return 1; }
+  void sign(Welcome& welcome) override { welcome.resume_token = "again"; }
   void send(const ServerMessage& message) override { said.push_back(message); }
   std::vector<std::uint64_t> send(OutgoingFrame frame) override {
     frames.push_back(std::move(frame));

@@ -1,0 +1,89 @@
+#include "server/session/peer.h"
+
+#include <utility>
+
+#include <boost/asio/post.hpp>
+
+#include "server/net/wire.h"
+#include "server/session/client.h"
+#include "server/session/session_registry.h"
+
+namespace catgs {
+namespace {
+
+// Poses and acks at 240 Hz each, and room for bursts after a stall.
+constexpr double messages_per_second = 600.0;
+constexpr double message_burst = 1200.0;
+
+}  // namespace
+
+Peer::Peer(SessionRegistry& registry, std::shared_ptr<Connection> connection)
+    : registry_(registry),
+      connection_(std::move(connection)),
+      rate_(messages_per_second, message_burst, Clock::now()) {}
+
+template <typename Handle>
+void Peer::post(Handle handle) {
+  boost::asio::post(registry_.io_,
+                    [self = shared_from_this(), handle = std::move(handle)]() mutable {
+                      if (const auto client = self->client_.lock()) handle(*self, *client);
+                      self->registry_.give_frames();
+                    });
+}
+
+void Peer::on_message(std::span<const std::byte> bytes) {
+  if (refused_) return;
+  const TimePoint now = Clock::now();
+  if (!rate_.take(now)) {
+    refused_ = true;
+    return post([](Peer& self, Client& c) {
+      c.refuse(self, ErrorCode::rate_limited, "too many messages");
+    });
+  }
+  auto parsed = wire::parse_client_message(bytes);
+  if (auto* error = std::get_if<wire::ParseError>(&parsed)) {
+    refused_ = true;
+    registry_.metrics_.bad_messages.Increment();
+    return post([what = std::move(error->what)](Peer& self, Client& c) {
+      c.refuse(self, ErrorCode::bad_message, what);
+    });
+  }
+  auto& message = std::get<ClientMessage>(parsed);
+  if (const auto* sample = std::get_if<PoseSample>(&message)) {
+    registry_.metrics_.poses_received.Increment();
+    if (!latest_pose_.store({*sample, now})) return registry_.metrics_.poses_superseded.Increment();
+    return post([](Peer& self, Client& c) {
+      if (const auto pose = self.latest_pose_.take())
+        c.on_message(self, pose->sample, pose->received);
+    });
+  }
+  post([message = std::move(message), now](Peer& self, Client& c) {
+    c.on_message(self, message, now);
+  });
+}
+
+void Peer::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) {
+  Metrics& metrics = registry_.metrics_;
+  metrics.frames_sent.Increment();
+  metrics.bytes_sent.Increment(static_cast<double>(packet_bytes));
+  metrics.observe_frame(ticket, now);
+  // Not post(): nothing becomes due by it.
+  boost::asio::post(registry_.io_, [self = shared_from_this(), ticket, packet_bytes] {
+    if (const auto client = self->client_.lock())
+      client->on_frame_sent(*self, ticket, packet_bytes);
+  });
+}
+
+void Peer::on_close(bool by_leaving) {
+  post([by_leaving](Peer& self, Client& c) { c.on_close(self, by_leaving); });
+  boost::asio::post(registry_.io_, [self = shared_from_this()] {
+    self->registry_.forget_connection(self->connection_->peer_address());
+  });
+}
+
+void Peer::dismiss(CloseCode code, std::string_view reason) {
+  client_.reset();
+  connection_->close(code, reason);
+}
+
+}  // namespace catgs

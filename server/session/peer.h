@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "server/net/connection.h"
+#include "server/net/messages.h"
+#include "server/pipeline/latest_slot.h"
+#include "server/session/rate_limit.h"
+
+namespace catgs {
+
+class Client;
+class SessionRegistry;
+
+/// One websocket as sessions see it. What comes in on the network thread is limited in rate, parsed
+/// and posted to the session thread, where it belongs to a Client: that of its own session, the one
+/// that a resume token led to, or the one it watches. Poses wait in a slot where the newest wins;
+/// other messages are few and posted one by one.
+class Peer final : public ConnectionListener, public std::enable_shared_from_this<Peer> {
+ public:
+  Peer(SessionRegistry& registry, std::shared_ptr<Connection> connection);
+
+  // Network thread.
+  void on_message(std::span<const std::byte> bytes) override;
+  void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) override;
+  void on_close(bool by_leaving) override;
+
+  // Session thread, and the constructing one.
+  /// From here on messages are for this client.
+  void belong_to(const std::shared_ptr<Client>& client) { client_ = client; }
+  /// Closes, and nothing that still comes in is for anybody.
+  void dismiss(CloseCode code, std::string_view reason);
+  [[nodiscard]] Connection& connection() const { return *connection_; }
+
+ private:
+  struct ReceivedPose {
+    PoseSample sample;
+    TimePoint received;
+  };
+  /// Posts `handle(client)` to the session thread, then lets the registry look for work.
+  template <typename Handle>
+  void post(Handle handle);
+
+  SessionRegistry& registry_;
+  const std::shared_ptr<Connection> connection_;
+
+  RateLimit rate_;        // network thread
+  bool refused_ = false;  // network thread: nothing more is read
+  LatestSlot<ReceivedPose> latest_pose_;
+  std::weak_ptr<Client> client_;  // session thread
+};
+
+}  // namespace catgs

@@ -1,0 +1,286 @@
+// Integration: what becomes of sessions when sockets are lost, the house is full or the server
+// goes. Real sockets on loopback, whole servers in this process.
+
+#include <algorithm>
+#include <filesystem>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+namespace {
+
+using testing::HasSubstr;
+
+nlohmann::json sessions(const RunningServer& server) {
+  return nlohmann::json::parse(http_get(server.admin_port(), "/api/sessions").body);
+}
+
+/// Of a gauge or counter without labels.
+double metric(const RunningServer& server, const std::string& name) {
+  const std::string text = http_get(server.admin_port(), "/metrics").body;
+  const auto at = text.find("\n" + name + " ");
+  if (at == std::string::npos) throw std::runtime_error(name + " is not in /metrics");
+  return std::stod(text.substr(at + name.size() + 2));
+}
+
+/// Whether the condition comes true. Twenty seconds are a bound against hanging, no measurement.
+template <typename Condition>
+bool eventually(Condition condition) {
+  for (int polls = 0; polls < 1000; ++polls) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return false;
+}
+
+v1::ClientMessage resuming_hello(const std::string& resume_token, std::uint64_t pose_id = 0) {
+  v1::ClientMessage message = hello_message(160, 96, v1::CODEC_H264);
+  auto& resume = *message.mutable_hello()->mutable_resume();
+  resume.set_token(resume_token);
+  if (pose_id > 0) {
+    auto& pose = *resume.mutable_pose();
+    pose.set_pose_id(pose_id);
+    pose.set_client_time_us(static_cast<std::int64_t>(pose_id) * 1000);
+    pose.mutable_world_from_camera()->mutable_position()->set_x(0.1f);
+    pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
+    pose.set_fov_y_rad(1.0f);
+  }
+  return message;
+}
+
+TEST(SessionLifeOnSockets, ALostSocketFindsItsSessionAgain) {
+  RunningServer server;
+  std::string id;
+  std::string token;
+  {
+    WireClient client(server.port());
+    const v1::Welcome welcome = client.greet();
+    id = welcome.session_id();
+    token = welcome.resume_token();
+    EXPECT_FALSE(token.empty());
+    client.send_pose(1);
+    client.send_ack(client.receive_frame().header.frame_id());
+  }
+  ASSERT_TRUE(eventually([&] { return metric(server, "catgs_sessions_lost") == 1; }));
+  EXPECT_EQ(sessions(server)[0].at("state"), "lost");
+
+  WireClient again(server.port());
+  const v1::Welcome welcome = again.greet(resuming_hello(token, 2));
+  EXPECT_EQ(welcome.session_id(), id);
+  const ReceivedFrame first = again.receive_frame();
+  EXPECT_TRUE(first.header.idr());
+  EXPECT_GT(first.header.frame_id(), 1u) << "the session goes on";
+  EXPECT_EQ(first.header.pose_id(), 2u) << "at the pose of the hello";
+  again.send_ack(first.header.frame_id());
+  for (std::uint64_t pose = 3; pose < 8; ++pose) {
+    again.send_pose(pose, 0.1f * static_cast<float>(pose));
+    const ReceivedFrame next = again.receive_frame();
+    EXPECT_FALSE(next.header.idr()) << "one IDR is enough";
+    again.send_ack(next.header.frame_id());
+  }
+  EXPECT_EQ(metric(server, "catgs_sessions"), 1);
+  EXPECT_EQ(metric(server, "catgs_sessions_resumed_total"), 1);
+}
+
+TEST(SessionLifeOnSockets, ASecondSocketTakesTheSessionOver) {
+  RunningServer server;
+  WireClient first(server.port());
+  const v1::Welcome welcome = first.greet();
+  WireClient second(server.port());
+  EXPECT_EQ(second.greet(resuming_hello(welcome.resume_token())).session_id(),
+            welcome.session_id());
+  EXPECT_EQ(first.receive_until_closed().close_code, 1001);
+  second.send_pose(1);
+  EXPECT_TRUE(second.receive_frame().header.idr());
+  EXPECT_TRUE(eventually([&] { return metric(server, "catgs_connections") == 1; }));
+  EXPECT_EQ(sessions(server).size(), 1u);
+}
+
+TEST(SessionLifeOnSockets, WhoSaysGoodbyeIsNotWaitedFor) {
+  RunningServer server;
+  WireClient polite(server.port());
+  polite.greet();
+  WireClient closed_page(server.port());
+  closed_page.greet();
+  ASSERT_TRUE(eventually([&] { return sessions(server).size() == 2; }));
+  v1::ClientMessage bye;
+  bye.mutable_bye();
+  polite.send(bye);
+  polite.receive_until_closed();
+  closed_page.close(1001);
+  ASSERT_TRUE(eventually([&] { return sessions(server).empty(); }));
+  EXPECT_EQ(metric(server, "catgs_sessions"), 0);
+}
+
+TEST(SessionLifeOnSockets, AServerOfTheSameFleetGoesOn) {
+  const TemporaryFolder folder;
+  const auto key = folder.write("key", "0123456789abcdef0123456789abcdef\n").string();
+  const auto in_fleet = [&](ServerConfig& config) { config.resume_key_file = key; };
+  RunningServer a(in_fleet);
+  RunningServer b(in_fleet);
+  RunningServer stranger;
+  WireClient first(a.port());
+  const v1::Welcome welcome = first.greet();
+  WireClient second(b.port());
+  EXPECT_EQ(second.greet(resuming_hello(welcome.resume_token(), 9)).session_id(),
+            welcome.session_id());
+  EXPECT_EQ(second.receive_frame().header.pose_id(), 9u);
+  WireClient third(stranger.port());
+  EXPECT_NE(third.greet(resuming_hello(welcome.resume_token(), 9)).session_id(),
+            welcome.session_id());
+  EXPECT_EQ(third.receive_frame().header.pose_id(), 9u) << "the pose is the client's own";
+}
+
+TEST(SessionLifeOnSockets, AResumeTokenOpensNoDoorByItself) {
+  const TemporaryFolder folder;
+  const auto tokens = folder.write("tokens", "open-sesame-1\n");
+  RunningServer server([&](ServerConfig& config) { config.token_file = tokens.string(); });
+  WireClient guest(server.port());
+  const v1::Welcome welcome = guest.greet(64, 64, v1::CODEC_H264, "open-sesame-1");
+  WireClient thief(server.port());
+  thief.send(resuming_hello(welcome.resume_token()));
+  std::optional<v1::Error> error;
+  thief.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::UNAUTHORIZED);
+  guest.send_pose(1);
+  EXPECT_TRUE(guest.receive_frame().header.idr()) << "the guest was not disturbed";
+}
+
+TEST(SessionLifeOnSockets, WaitsInLineForAPlace) {
+  RunningServer server([](ServerConfig& config) {
+    config.max_sessions = 1;
+    config.max_queue = 2;
+  });
+  auto host = std::make_unique<WireClient>(server.port());
+  host->greet();
+  std::vector<std::unique_ptr<WireClient>> waiting;
+  for (std::uint32_t position = 1; position <= 2; ++position) {
+    waiting.push_back(std::make_unique<WireClient>(server.port()));
+    waiting.back()->send(hello_message(160, 96, v1::CODEC_H264));
+    const auto queue = waiting.back()->receive_message(v1::ServerMessage::kQueue).queue();
+    EXPECT_EQ(queue.position(), position);
+    EXPECT_GT(queue.estimate_s(), 0u);
+  }
+  WireClient refused(server.port());
+  refused.send(hello_message(160, 96, v1::CODEC_H264));
+  std::optional<v1::Error> error;
+  EXPECT_EQ(refused.receive_until_closed(&error).close_code, 1013);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+  EXPECT_THAT(error->message(), HasSubstr("2 wait"));
+
+  host->close(1001);
+  waiting[0]->receive_message(v1::ServerMessage::kWelcome);
+  for (std::uint32_t position = 2; position != 1;)
+    position = waiting[1]->receive_message(v1::ServerMessage::kQueue).queue().position();
+  waiting[0]->send_pose(1);
+  EXPECT_TRUE(waiting[0]->receive_frame().header.idr());
+  waiting[0]->close(1001);
+  waiting[1]->receive_message(v1::ServerMessage::kWelcome);
+}
+
+TEST(SessionLifeOnSockets, WhoGivesUpWaitingMakesRoom) {
+  RunningServer server([](ServerConfig& config) {
+    config.max_sessions = 1;
+    config.max_queue = 1;
+  });
+  WireClient host(server.port());
+  host.greet();
+  {
+    WireClient impatient(server.port());
+    impatient.send(hello_message(160, 96, v1::CODEC_H264));
+    impatient.receive_message(v1::ServerMessage::kQueue);
+  }
+  ASSERT_TRUE(eventually([&] { return metric(server, "catgs_sessions_waiting") == 0; }));
+  WireClient next(server.port());
+  next.send(hello_message(160, 96, v1::CODEC_H264));
+  EXPECT_EQ(next.receive_message(v1::ServerMessage::kQueue).queue().position(), 1u);
+}
+
+TEST(SessionLifeOnSockets, LostSessionsCountForTheirAddress) {
+  RunningServer server([](ServerConfig& config) { config.max_sessions_per_address = 1; });
+  std::string token;
+  {
+    WireClient client(server.port());
+    token = client.greet().resume_token();
+  }
+  ASSERT_TRUE(eventually([&] { return metric(server, "catgs_sessions_lost") == 1; }));
+  WireClient another(server.port());
+  another.send(hello_message(160, 96, v1::CODEC_H264));
+  std::optional<v1::Error> error;
+  another.receive_until_closed(&error);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+  ASSERT_TRUE(eventually([&] { return metric(server, "catgs_connections") == 0; }));
+  WireClient back(server.port());
+  EXPECT_NO_THROW(back.greet(resuming_hello(token)));
+}
+
+TEST(SessionLifeOnSockets, FramesGoOnUntilTheClientHasMoved) {
+  const TemporaryFolder folder;
+  const auto key = folder.write("key", "0123456789abcdef0123456789abcdef\n").string();
+  const auto in_fleet = [&](ServerConfig& config) { config.resume_key_file = key; };
+  RunningServer old_server(in_fleet);
+  RunningServer new_server(in_fleet);
+  WireClient old_link(old_server.port());
+  const v1::Welcome welcome = old_link.greet();
+  old_link.send_pose(1);
+  old_link.send_ack(old_link.receive_frame().header.frame_id());
+  old_server.stop();
+  EXPECT_GT(old_link.receive_message(v1::ServerMessage::kDrain).drain().deadline_ms(), 0u);
+  EXPECT_EQ(http_get(old_server.port(), "/readyz").status, 503);
+  old_link.send_pose(2, 0.2f);
+  EXPECT_EQ(old_link.receive_frame().header.pose_id(), 2u);
+
+  WireClient new_link(new_server.port());
+  EXPECT_EQ(new_link.greet(resuming_hello(welcome.resume_token(), 3)).session_id(),
+            welcome.session_id());
+  EXPECT_TRUE(new_link.receive_frame().header.idr());
+  v1::ClientMessage bye;
+  bye.mutable_bye();
+  old_link.send(bye);
+  EXPECT_EQ(old_link.receive_until_closed().close_code, 1000);
+  old_server.join();  // nobody is left, so it does not wait for the deadline
+}
+
+std::ptrdiff_t open_descriptors() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
+}
+
+TEST(SessionLifeOnSockets, NothingLeaksOverManyLossesAndReturns) {
+  constexpr int cycles = 500;
+  RunningServer server;
+  auto client = std::make_unique<WireClient>(server.port());
+  v1::Welcome welcome = client->greet();
+  const std::string id = welcome.session_id();
+  const auto one_connection = [&] { return metric(server, "catgs_connections") == 1; };
+  ASSERT_TRUE(eventually(one_connection));
+  const auto descriptors = open_descriptors();
+  for (int i = 1; i <= cycles; ++i) {
+    client =
+        std::make_unique<WireClient>(server.port());  // drops the one before, half of them late
+    welcome = client->greet(resuming_hello(welcome.resume_token(), static_cast<unsigned>(i)));
+    ASSERT_EQ(welcome.session_id(), id) << "cycle " << i;
+    const ReceivedFrame frame = client->receive_frame();
+    ASSERT_TRUE(frame.header.idr());
+    client->send_ack(frame.header.frame_id());
+  }
+  ASSERT_TRUE(eventually(one_connection));
+  EXPECT_EQ(sessions(server).size(), 1u);
+  EXPECT_EQ(metric(server, "catgs_sessions"), 1);
+  EXPECT_EQ(metric(server, "catgs_sessions_admitted_total"), 1);
+  EXPECT_EQ(metric(server, "catgs_sessions_resumed_total"), cycles);
+  // The request before may not be closed yet at the server's end.
+  EXPECT_TRUE(eventually([&] { return open_descriptors() <= descriptors; }))
+      << open_descriptors() << " descriptors, " << descriptors << " before";
+}
+
+}  // namespace
+}  // namespace catgs::test
