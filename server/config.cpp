@@ -145,6 +145,17 @@ Setting admin_bind() {
   return setting;
 }
 
+Setting trusted_proxy() {
+  Setting setting = list("trusted-proxy", "CIDR",
+                         "Networks of proxies whose X-Forwarded-For is believed, 10.0.0.0/8",
+                         &ServerConfig::trusted_proxies);
+  setting.set = [](ServerConfig& c, const Values& v) {
+    TrustedProxies{v};
+    c.trusted_proxies = v;
+  };
+  return setting;
+}
+
 std::vector<Setting> make_settings() {
   using C = ServerConfig;
   return {
@@ -206,6 +217,7 @@ std::vector<Setting> make_settings() {
            &C::allow_origins),
       list("embed-origin", "ORIGIN", "Sites that may show the client in a frame",
            &C::embed_origins),
+      trusted_proxy(),
       choice<std::string>("log-format", "Form of the log on standard error", &C::log_format,
                           words({"human", "json"})),
       choice<std::string>("log-level", "Least level that is logged", &C::log_level,

@@ -128,6 +128,7 @@ NetOptions Server::State::net_options() {
   };
   options.allowed_origins = config.allow_origins;
   options.embed_origins = config.embed_origins;
+  options.trusted_proxies = config.trusted_proxies;
   options.tls_certificate = config.tls_cert;
   options.tls_key = config.tls_key;
   if (config.admin_bind != "off") {

@@ -1,7 +1,5 @@
 #include "server/net/lws_websocket.h"
 
-#include <array>
-
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
@@ -12,15 +10,6 @@ namespace catgs {
 namespace {
 
 constexpr int close_timeout_s = 2;
-
-std::string peer_address_of(lws* wsi) {
-  std::array<char, 64> name{};
-  lws_get_peer_simple(wsi, name.data(), name.size());
-  std::string address = name.data();
-  // One spelling for one host: an IPv4 peer of a dual-stack socket.
-  if (address.starts_with("::ffff:")) address.erase(0, 7);
-  return address;
-}
 
 /// Small writes leave at once, and the kernel keeps at most about one frame of unsent bytes: what
 /// waits, waits in the ring, where it is counted and can be dropped.
@@ -61,8 +50,8 @@ std::vector<std::shared_ptr<LwsWebsocket>> LwsWaker::take() {
   return std::exchange(pending_, {});
 }
 
-LwsWebsocket::LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker)
-    : waker_(std::move(waker)), peer_address_(peer_address_of(wsi)), wsi_(wsi) {
+LwsWebsocket::LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address)
+    : waker_(std::move(waker)), peer_address_(std::move(peer_address)), wsi_(wsi) {
   tune_socket(lws_get_socket_fd(wsi));
 }
 

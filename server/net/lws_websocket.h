@@ -35,7 +35,7 @@ class LwsWaker {
 /// are the only ones to touch `wsi_`.
 class LwsWebsocket final : public Connection, public std::enable_shared_from_this<LwsWebsocket> {
  public:
-  LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker);
+  LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address);
 
   void send(std::vector<std::byte> message) override;
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;

@@ -1,8 +1,10 @@
 #include "server/net/net_server.h"
 
+#include <array>
 #include <atomic>
 #include <csignal>
 #include <exception>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -11,6 +13,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
+#include "server/net/certificate_watch.h"
 #include "server/net/lws_http.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/wire.h"
@@ -31,6 +34,7 @@ struct Site {
   std::vector<std::string> allowed_origins;
   std::string policy;
   bool loopback = false;  // listens on a loopback address
+  TrustedProxies proxies;
 };
 
 /// Per-connection memory that libwebsockets owns, zeroed at its birth.
@@ -66,6 +70,12 @@ HttpResponse refuse_host(const std::string& host) {
       403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
                        "Open it as localhost, or start it with --allow-origin https://{0}\n",
                        host));
+}
+
+std::string peer_address_of(lws* wsi) {
+  std::array<char, 64> name{};
+  lws_get_peer_simple(wsi, name.data(), name.size());
+  return name.data();
 }
 
 void forget(HttpSlot& slot) { delete std::exchange(slot.exchange, nullptr); }
@@ -140,7 +150,10 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
       return -1;
     }
     case LWS_CALLBACK_ESTABLISHED: {
-      auto connection = std::make_shared<LwsWebsocket>(wsi, service_of(wsi).waker);
+      auto connection = std::make_shared<LwsWebsocket>(
+          wsi, service_of(wsi).waker,
+          site_of(wsi).proxies.client_address(peer_address_of(wsi),
+                                              request_header(wsi, WSI_TOKEN_X_FORWARDED_FOR)));
       slot->connection = new std::shared_ptr<LwsWebsocket>(connection);
       connection->service_listen(site_of(wsi).accept(connection));
       return 0;
@@ -209,6 +222,7 @@ struct NetServer::State {
   Service service;
   lws_retry_bo_t idle_policy{};
   lws_context* context = nullptr;
+  std::optional<CertificateWatch> certificates;
   int port = 0;
   int admin_port = 0;
   std::atomic<bool> stopping{false};
@@ -260,10 +274,18 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
     open_required_file("--tls-key", options.tls_key);
   }
   State& s = *state_;
-  s.site = {std::move(options.http), std::move(options.accept), options.allowed_origins,
-            content_security_policy(options.embed_origins), is_loopback(options.listen.address)};
-  s.admin_site = {std::move(options.admin_http), nullptr, options.allowed_origins,
-                  content_security_policy({}), is_loopback(options.admin_listen.address)};
+  s.site = {std::move(options.http),
+            std::move(options.accept),
+            options.allowed_origins,
+            content_security_policy(options.embed_origins),
+            is_loopback(options.listen.address),
+            TrustedProxies(options.trusted_proxies)};
+  s.admin_site = {std::move(options.admin_http),
+                  nullptr,
+                  options.allowed_origins,
+                  content_security_policy({}),
+                  is_loopback(options.admin_listen.address),
+                  {}};
   s.idle_policy.secs_since_valid_ping = ping_after_s;
   s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
 
@@ -283,6 +305,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
     lws_context_destroy(s.context);
     throw;
   }
+  if (tls) s.certificates.emplace(s.context, options.tls_certificate, options.tls_key);
   s.service.waker->attach(s.context);
 }
 
@@ -294,6 +317,7 @@ void NetServer::start() {
     while (!s.stopping.load() && lws_service(s.context, 0) >= 0) {
     }
     s.service.waker->detach();
+    s.certificates.reset();
     lws_context_destroy(s.context);  // calls the callbacks of what is still open
   });
 }
@@ -306,6 +330,7 @@ void NetServer::stop() {
     s.thread.join();
   } else if (s.context) {
     s.service.waker->detach();
+    s.certificates.reset();
     lws_context_destroy(s.context);
   }
   s.context = nullptr;

@@ -6,6 +6,7 @@
 
 #include "server/net/connection.h"
 #include "server/net/http.h"
+#include "server/net/trusted_proxies.h"
 
 namespace catgs {
 
@@ -21,7 +22,8 @@ struct NetOptions {
   ConnectionAcceptor accept;  // websockets of subprotocol catgs.v1, on any path
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;
-  std::string tls_certificate;  // PEM files; both or neither
+  std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
+  std::string tls_certificate;               // PEM files; both or neither
   std::string tls_key;
 
   bool admin = false;

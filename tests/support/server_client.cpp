@@ -121,6 +121,7 @@ WireClient::WireClient(int port, const Options& options) : state_(std::make_uniq
     if (!options.origin.empty()) request.set(http::field::origin, options.origin);
     if (!options.subprotocol.empty())
       request.set(http::field::sec_websocket_protocol, options.subprotocol);
+    if (!options.forwarded_for.empty()) request.set("X-Forwarded-For", options.forwarded_for);
   }));
   const std::string own = "127.0.0.1:" + std::to_string(port);
   const std::string& host = options.host.empty() ? own : options.host;

@@ -62,7 +62,8 @@ class WireClient {
   struct Options {
     std::string origin;
     std::string subprotocol = "catgs.v1";
-    std::string host = {};  // empty: 127.0.0.1 and the port
+    std::string host = {};           // empty: 127.0.0.1 and the port
+    std::string forwarded_for = {};  // X-Forwarded-For; empty: none
   };
   /// Throws boost::system::system_error when the handshake is refused.
   explicit WireClient(int port) : WireClient(port, Options()) {}

@@ -31,10 +31,11 @@ File open_for_writing(const std::filesystem::path& path) {
 
 }  // namespace
 
-void write_self_signed(const std::filesystem::path& certificate, const std::filesystem::path& key) {
+void write_self_signed(const std::filesystem::path& certificate, const std::filesystem::path& key,
+                       long serial) {
   const std::unique_ptr<EVP_PKEY, FreeWith<EVP_PKEY_free>> pair(EVP_EC_gen("P-256"));
   const std::unique_ptr<X509, FreeWith<X509_free>> x509(X509_new());
-  ASN1_INTEGER_set(X509_get_serialNumber(x509.get()), 1);
+  ASN1_INTEGER_set(X509_get_serialNumber(x509.get()), serial);
   X509_gmtime_adj(X509_getm_notBefore(x509.get()), 0);
   X509_gmtime_adj(X509_getm_notAfter(x509.get()), 3600);
   X509_set_pubkey(x509.get(), pair.get());
@@ -63,6 +64,8 @@ TlsReply tls_get(int port, const std::string& target) {
   SSL_get0_alpn_selected(ssl, &protocol, &length);
   TlsReply reply;
   reply.protocol.assign(reinterpret_cast<const char*>(protocol), length);
+  const std::unique_ptr<X509, FreeWith<X509_free>> shown(SSL_get1_peer_certificate(ssl));
+  reply.serial = ASN1_INTEGER_get(X509_get0_serialNumber(shown.get()));
   const std::string request =
       "GET " + target + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
   BIO_write(bio.get(), request.data(), static_cast<int>(request.size()));

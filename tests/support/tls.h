@@ -6,10 +6,12 @@
 namespace catgs::test {
 
 /// Writes a fresh self-signed P-256 certificate for localhost and its key, PEM.
-void write_self_signed(const std::filesystem::path& certificate, const std::filesystem::path& key);
+void write_self_signed(const std::filesystem::path& certificate, const std::filesystem::path& key,
+                       long serial = 1);
 
 struct TlsReply {
   std::string protocol;  // negotiated by ALPN
+  long serial = 0;       // of the server's certificate
   std::string text;      // status line, headers, body
 };
 

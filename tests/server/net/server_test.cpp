@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <set>
+#include <thread>
 
 #include <boost/system/system_error.hpp>
 #include <gmock/gmock.h>
@@ -227,6 +228,37 @@ TEST(Server, LimitsConnectionsOfOneAddress) {
   EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
 }
 
+TEST(Server, LimitsTheAddressesBehindAProxy) {
+  const auto one_each = [](ServerConfig& config) { config.max_sessions_per_address = 1; };
+  const auto via_proxy = [](const std::string& client) {
+    return WireClient::Options{.origin = "", .forwarded_for = client};
+  };
+  const auto refused = [](WireClient& client) {
+    client.send(hello_message(64, 64, v1::CODEC_H264));
+    for (;;) {
+      const Received received = client.receive();
+      if (received.closed) return true;
+      if (received.message && received.message->has_welcome()) return false;
+    }
+  };
+  RunningServer behind([&](ServerConfig& config) {
+    one_each(config);
+    config.trusted_proxies = {"127.0.0.0/8"};
+  });
+  WireClient a(behind.port(), via_proxy("198.51.100.1"));
+  WireClient b(behind.port(), via_proxy("198.51.100.2"));
+  WireClient c(behind.port(), via_proxy("198.51.100.9, 198.51.100.1"));
+  EXPECT_FALSE(refused(a));
+  EXPECT_FALSE(refused(b)) << "another visitor of the same proxy";
+  EXPECT_TRUE(refused(c)) << "what the visitor made up counts for nothing";
+
+  RunningServer alone(one_each);
+  WireClient d(alone.port(), via_proxy("198.51.100.1"));
+  WireClient e(alone.port(), via_proxy("198.51.100.2"));
+  EXPECT_FALSE(refused(d));
+  EXPECT_TRUE(refused(e)) << "nobody is believed unasked";
+}
+
 TEST(Server, RefusesForeignOriginsAndProtocols) {
   RunningServer server(
       [](ServerConfig& config) { config.allow_origins = {"https://friend.example"}; });
@@ -359,6 +391,31 @@ TEST(Server, ServesTlsWithTheGivenCertificate) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("--tls-key"));
   }
+}
+
+TEST(Server, TakesARenewedCertificate) {
+  const TemporaryFolder folder;
+  const auto certificate = folder / "certificate.pem";
+  const auto key = folder / "key.pem";
+  write_self_signed(certificate, key, 1);
+  RunningServer server([&](ServerConfig& config) {
+    config.tls_cert = certificate.string();
+    config.tls_key = key.string();
+  });
+  EXPECT_EQ(tls_get(server.port(), "/healthz").serial, 1);
+  const auto shown_after = [&](long before) {
+    long serial = before;
+    for (int looks = 0; serial == before && looks < 100; ++looks) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      serial = tls_get(server.port(), "/healthz").serial;
+    }
+    return serial;
+  };
+  write_self_signed(certificate, folder / "other-key.pem", 2);  // not that of --tls-key
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  EXPECT_EQ(tls_get(server.port(), "/healthz").serial, 1) << "half a pair changes nothing";
+  write_self_signed(certificate, key, 3);
+  EXPECT_EQ(shown_after(1), 3);
 }
 
 TEST(Server, NamesABusyPort) {
