@@ -3,9 +3,7 @@
 #include "server/server.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <set>
-#include <thread>
 
 #include <boost/system/system_error.hpp>
 #include <gmock/gmock.h>
@@ -18,15 +16,12 @@
 #include "render_core/error.h"
 #include "render_core/scene/save_scene.h"
 #include "render_core/scene/synth.h"
-#include "server/access.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/tls.h"
 
 namespace catgs::test {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -217,123 +212,6 @@ TEST(Server, ServesScenesWhateverTheirFilesAreCalled) {
   EXPECT_TRUE(nlohmann::json::accept(sessions_json(server)));
 }
 
-TEST(Server, LimitsConnectionsOfOneAddress) {
-  RunningServer server([](ServerConfig& config) { config.max_sessions_per_address = 1; });
-  WireClient first(server.port());
-  first.greet();
-  WireClient second(server.port());
-  std::optional<v1::Error> error;
-  second.receive_until_closed(&error);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
-}
-
-TEST(Server, LimitsTheAddressesBehindAProxy) {
-  const auto one_each = [](ServerConfig& config) { config.max_sessions_per_address = 1; };
-  const auto via_proxy = [](const std::string& client) {
-    return WireClient::Options{.origin = "", .forwarded_for = client};
-  };
-  const auto refused = [](WireClient& client) {
-    client.send(hello_message(64, 64, v1::CODEC_H264));
-    for (;;) {
-      const Received received = client.receive();
-      if (received.closed) return true;
-      if (received.message && received.message->has_welcome()) return false;
-    }
-  };
-  RunningServer behind([&](ServerConfig& config) {
-    one_each(config);
-    config.trusted_proxies = {"127.0.0.0/8"};
-  });
-  WireClient a(behind.port(), via_proxy("198.51.100.1"));
-  WireClient b(behind.port(), via_proxy("198.51.100.2"));
-  WireClient c(behind.port(), via_proxy("198.51.100.9, 198.51.100.1"));
-  EXPECT_FALSE(refused(a));
-  EXPECT_FALSE(refused(b)) << "another visitor of the same proxy";
-  EXPECT_TRUE(refused(c)) << "what the visitor made up counts for nothing";
-
-  RunningServer alone(one_each);
-  WireClient d(alone.port(), via_proxy("198.51.100.1"));
-  WireClient e(alone.port(), via_proxy("198.51.100.2"));
-  EXPECT_FALSE(refused(d));
-  EXPECT_TRUE(refused(e)) << "nobody is believed unasked";
-}
-
-TEST(Server, RefusesForeignOriginsAndProtocols) {
-  RunningServer server(
-      [](ServerConfig& config) { config.allow_origins = {"https://friend.example"}; });
-  const std::string own = "http://127.0.0.1:" + std::to_string(server.port());
-  EXPECT_NO_THROW(WireClient(server.port(), {own, "catgs.v1"}));
-  EXPECT_NO_THROW(WireClient(server.port(), {"https://friend.example", "catgs.v1"}));
-  EXPECT_THROW(WireClient(server.port(), {"https://evil.example", "catgs.v1"}),
-               boost::system::system_error);
-  EXPECT_THROW(WireClient(server.port(), {"", "catgs.v99"}), boost::system::system_error);
-  EXPECT_THROW(WireClient(server.port(), {"", ""}), boost::system::system_error);
-}
-
-TEST(Server, AnswersNoForeignNameOnALoopbackAddress) {
-  // What a page of evil.example sends after its name was made to resolve to 127.0.0.1.
-  RunningServer server([](ServerConfig& config) { config.allow_origins = {"https://a.example"}; });
-  for (const int port : {server.port(), server.admin_port()}) {
-    const HttpReply refused = http_get(port, "/api/scenes", {{"host", "evil.example:8080"}});
-    EXPECT_EQ(refused.status, 403);
-    EXPECT_THAT(refused.body, HasSubstr("--allow-origin https://evil.example:8080"));
-  }
-  EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "a.example"}}).status, 200);
-  EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "localhost"}}).status, 200);
-  const WireClient::Options rebound{"http://evil.example:8080", "catgs.v1", "evil.example:8080"};
-  EXPECT_THROW(WireClient(server.port(), rebound), boost::system::system_error);
-}
-
-TEST(Server, LinksOpenTheirSceneOnly) {
-  const TemporaryFolder folder;
-  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
-  RunningServer server([&](ServerConfig& config) {
-    config.scenes = {"synth:city:2000", "synth:garden:2000"};
-    config.token_key_file = key_file.string();
-  });
-  const std::string link =
-      make_link_token({"city", "viewer", 1'000'000'000'000}, read_key_file("", key_file));
-  WireClient guest(server.port());
-  EXPECT_THAT(guest.greet(64, 64, v1::CODEC_H264, link).scene_ids(), testing::ElementsAre("city"));
-
-  v1::ClientMessage select;
-  select.mutable_select_scene()->set_scene_id("garden");
-  guest.send(select);
-  const auto error = guest.receive_message(v1::ServerMessage::kError).error();
-  EXPECT_EQ(error.code(), v1::Error::UNAUTHORIZED);
-  EXPECT_FALSE(error.fatal());
-  select.mutable_select_scene()->set_scene_id("city");
-  guest.send(select);
-  EXPECT_EQ(guest.receive_message(v1::ServerMessage::kWelcome).welcome().scene().scene_id(),
-            "city");
-
-  const auto scenes = [&](const std::string& token) {
-    return http_get(server.port(), "/api/scenes", {{"authorization", "Bearer " + token}});
-  };
-  EXPECT_THAT(scenes(link).body, AllOf(HasSubstr("\"city\""), Not(HasSubstr("garden"))));
-  EXPECT_EQ(scenes("guess").status, 401);
-  const HttpReply stranger = http_get(server.port(), "/api/scenes");
-  EXPECT_EQ(stranger.status, 401);
-  EXPECT_THAT(stranger.body, AllOf(HasSubstr("Bearer"), Not(HasSubstr("city"))));
-}
-
-TEST(Server, AdmitsByTokenAndNeverSaysIt) {
-  const TemporaryFolder folder;
-  const auto token_file = folder.write("tokens", "# museum\nopen-sesame-1\n");
-  RunningServer server([&](ServerConfig& config) { config.token_file = token_file.string(); });
-  WireClient stranger(server.port());
-  stranger.send(hello_message(64, 64, v1::CODEC_H264));
-  std::optional<v1::Error> error;
-  stranger.receive_until_closed(&error);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), v1::Error::UNAUTHORIZED);
-
-  WireClient guest(server.port());
-  guest.greet(64, 64, v1::CODEC_H264, "open-sesame-1");
-  EXPECT_THAT(sessions_json(server), Not(HasSubstr("sesame")));
-}
-
 TEST(Server, ServesPagesAndNothingElse) {
   const TemporaryFolder folder;
   folder.write("web/index.html", "<!doctype html>");
@@ -362,60 +240,6 @@ TEST(Server, ServesPagesAndNothingElse) {
   EXPECT_THAT(http_get(server.port(), "/api/scenes").body, HasSubstr("\"id\":\"city\""));
   EXPECT_EQ(http_get(server.port(), "/metrics").status, 404);
   EXPECT_THAT(http_get(server.admin_port(), "/metrics").body, HasSubstr("catgs_sessions 0"));
-}
-
-TEST(Server, ServesTlsWithTheGivenCertificate) {
-  const TemporaryFolder folder;
-  const auto certificate = folder / "certificate.pem";
-  const auto key = folder / "key.pem";
-  write_self_signed(certificate, key);
-  {
-    RunningServer server([&](ServerConfig& config) {
-      config.tls_cert = certificate.string();
-      config.tls_key = key.string();
-    });
-    const TlsReply reply = tls_get(server.port(), "/healthz");
-    EXPECT_EQ(reply.protocol, "http/1.1");
-    EXPECT_THAT(reply.text, testing::StartsWith("HTTP/1.1 200"));
-  }
-  std::filesystem::remove(key);
-  ServerConfig config;
-  config.scenes = {"synth:city:2000"};
-  config.port = 0;
-  config.admin_bind = "off";
-  config.tls_cert = certificate.string();
-  config.tls_key = key.string();
-  try {
-    Server keyless(config);
-    FAIL() << "a certificate without its key";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("--tls-key"));
-  }
-}
-
-TEST(Server, TakesARenewedCertificate) {
-  const TemporaryFolder folder;
-  const auto certificate = folder / "certificate.pem";
-  const auto key = folder / "key.pem";
-  write_self_signed(certificate, key, 1);
-  RunningServer server([&](ServerConfig& config) {
-    config.tls_cert = certificate.string();
-    config.tls_key = key.string();
-  });
-  EXPECT_EQ(tls_get(server.port(), "/healthz").serial, 1);
-  const auto shown_after = [&](long before) {
-    long serial = before;
-    for (int looks = 0; serial == before && looks < 100; ++looks) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-      serial = tls_get(server.port(), "/healthz").serial;
-    }
-    return serial;
-  };
-  write_self_signed(certificate, folder / "other-key.pem", 2);  // not that of --tls-key
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
-  EXPECT_EQ(tls_get(server.port(), "/healthz").serial, 1) << "half a pair changes nothing";
-  write_self_signed(certificate, key, 3);
-  EXPECT_EQ(shown_after(1), 3);
 }
 
 TEST(Server, NamesABusyPort) {
