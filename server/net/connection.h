@@ -23,6 +23,14 @@ enum class CloseCode : std::uint16_t {
   try_again_later = 1013,
 };
 
+/// What the kernel knows of a connection's way to its peer, which may be a proxy.
+struct LinkState {
+  std::uint32_t rtt_us = 0;               // smoothed
+  std::uint64_t delivery_bits_per_s = 0;  // lately; at least that much is possible
+  std::uint32_t window_bytes = 0;         // congestion window
+  std::uint32_t unsent_bytes = 0;         // not yet on the way, for want of a window
+};
+
 /// One open websocket. Every function may be called from any thread and none waits; after the peer
 /// has gone they do nothing.
 class Connection {
@@ -47,8 +55,8 @@ class Connection {
 class ConnectionListener {
  public:
   virtual ~ConnectionListener() = default;
-  /// One whole binary message within the size limit.
-  virtual void on_message(std::span<const std::byte> bytes) = 0;
+  /// One whole binary message within the size limit, and the link as it is now.
+  virtual void on_message(std::span<const std::byte> bytes, const LinkState& link) = 0;
   /// The frame was handed to the socket.
   virtual void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                              TimePoint now) = 0;

@@ -1,7 +1,7 @@
 #include "server/net/lws_websocket.h"
 
+#include <linux/tcp.h>  // glibc's tcp_info lacks the newer fields
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/socket.h>
 
 #include "server/net/wire.h"
@@ -11,13 +11,21 @@ namespace {
 
 constexpr int close_timeout_s = 2;
 
-/// Small writes leave at once, and the kernel keeps at most about one frame of unsent bytes: what
-/// waits, waits in the ring, where it is counted and can be dropped.
+/// Small writes leave at once, and the next packet is taken from the ring only when hardly anything
+/// is unsent: what waits, waits where it is counted and can be dropped.
 void tune_socket(int fd) {
   const int on = 1;
-  const int lowat_bytes = 128 * 1024;
+  const int lowat_bytes = 16 * 1024;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &lowat_bytes, sizeof lowat_bytes);
+}
+
+LinkState link_state(int fd) {
+  tcp_info info{};
+  socklen_t size = sizeof info;  // an older kernel fills less, and the rest stays 0
+  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return {};
+  return {info.tcpi_rtt, 8 * info.tcpi_delivery_rate, info.tcpi_snd_cwnd * info.tcpi_snd_mss,
+          info.tcpi_notsent_bytes};
 }
 
 }  // namespace
@@ -112,7 +120,7 @@ int LwsWebsocket::service_receive(std::span<const std::byte> fragment) {
     return close_now(CloseCode::too_big, "message over 64 KiB");
   received_.insert(received_.end(), fragment.begin(), fragment.end());
   if (lws_is_final_fragment(wsi_) && lws_remaining_packet_payload(wsi_) == 0) {
-    listener_->on_message(received_);
+    listener_->on_message(received_, link_state(lws_get_socket_fd(wsi_)));
     received_.clear();
   }
   return 0;

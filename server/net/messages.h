@@ -34,6 +34,7 @@ struct Settings {
   glm::ivec2 size_px{0};  // 0: the viewport's
   int max_fps = 0;        // 0: the server's default
   int max_bitrate_kbps = 0;
+  bool fixed_quality = false;
 
   bool operator==(const Settings&) const = default;
 };
@@ -115,6 +116,11 @@ struct Stats {
   std::uint32_t sub_frames = 0;
   std::uint32_t dropped_packets = 0;
   std::uint32_t sessions = 0;
+  int target_bitrate_kbps = 0;
+  int target_fps = 0;
+  std::uint32_t steps_down = 0;
+  std::uint32_t queue_delay_us = 0;
+  std::uint32_t rtt_us = 0;
 };
 
 struct Heartbeat {

@@ -15,6 +15,8 @@ namespace {
 
 /// Positions beyond this are no place in a scene, and their squares overflow a float's precision.
 constexpr float max_coordinate = 1.0e9f;
+/// Beyond it differences of times might overflow, and a browser's numbers are no longer exact.
+constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
 constexpr int max_path_samples = 256;
 constexpr int max_decoders = 8;
 
@@ -63,7 +65,8 @@ Pose parse(const v1::Pose& message) {
 PoseSample parse(const v1::PoseSample& message) {
   PoseSample sample;
   sample.pose_id = message.pose_id();
-  sample.client_time_us = message.client_time_us();
+  sample.client_time_us =
+      checked("pose.client_time_us", message.client_time_us(), -max_time_us, max_time_us);
   sample.world_from_camera = parse(message.world_from_camera());
   sample.fov_y_rad = checked("pose.fov_y_rad", message.fov_y_rad(), 0.1f, 2.8f);
   return sample;
@@ -90,6 +93,7 @@ Settings parse(const v1::Settings& message) {
   settings.max_fps = checked_or_zero("settings.max_fps", message.max_fps(), 1, 240);
   settings.max_bitrate_kbps =
       checked_or_zero("settings.max_bitrate_kbps", message.max_bitrate_kbps(), 100, 200'000);
+  settings.fixed_quality = message.fixed_quality();
   return settings;
 }
 
@@ -117,8 +121,18 @@ Hello parse(const v1::Hello& message) {
 }
 
 Ack parse(const v1::Ack& message) {
-  return {message.frame_id(), message.received_us(), message.decoded_us(),   message.presented_us(),
-          message.dropped(),  message.pose_age_us(), message.decoder_queue()};
+  const auto time = [](std::string_view field, std::int64_t time_us) {
+    return checked(field, time_us, std::int64_t{0}, max_time_us);
+  };
+  Ack ack;
+  ack.frame_id = message.frame_id();
+  ack.received_us = time("ack.received_us", message.received_us());
+  ack.decoded_us = time("ack.decoded_us", message.decoded_us());
+  ack.presented_us = time("ack.presented_us", message.presented_us());
+  ack.dropped = message.dropped();
+  ack.pose_age_us = message.pose_age_us();
+  ack.decoder_queue = message.decoder_queue();
+  return ack;
 }
 
 ClientMessage parse(const v1::ClientMessage& message) {
@@ -219,6 +233,11 @@ void fill(const Stats& stats, v1::ServerMessage& out) {
   message.set_sub_frames(stats.sub_frames);
   message.set_dropped_packets(stats.dropped_packets);
   message.set_sessions(stats.sessions);
+  message.set_target_bitrate_kbps(static_cast<std::uint32_t>(stats.target_bitrate_kbps));
+  message.set_target_fps(static_cast<std::uint32_t>(stats.target_fps));
+  message.set_steps_down(stats.steps_down);
+  message.set_queue_delay_us(stats.queue_delay_us);
+  message.set_rtt_us(stats.rtt_us);
 }
 
 void fill(const Heartbeat& heartbeat, v1::ServerMessage& out) {

@@ -40,7 +40,8 @@ struct FrameJob {
   std::shared_ptr<Stream> stream;
   FrameTicket ticket;  // refined: nothing is rendered
   FrameRequest request;
-  int real_fps = 1;  // what the session reaches: shares the bitrate out
+  int bitrate_kbps = min_bitrate_kbps;  // for now
+  int real_fps = 1;                     // what the session reaches: shares the bitrate out
   bool force_idr = false;
 };
 

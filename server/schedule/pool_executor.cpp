@@ -48,7 +48,7 @@ FrameResult run_now(FrameJob& job) {
   }
   ticket.render_end = Clock::now();
   EncodedFrame encoded;
-  stream.encoder->set_rate(stream.settings.encoding.bitrate_kbps, job.real_fps);
+  stream.encoder->set_rate(job.bitrate_kbps, job.real_fps);
   const EncodeStatus status = stream.encoder->encode(stream.picture, job.force_idr, encoded);
   ticket.encode_end = Clock::now();
   if (!status.ok) {

@@ -37,6 +37,8 @@ void Client::on_message(Peer& from, const ClientMessage& message, TimePoint now)
   session_.on_message(message, now);
 }
 
+void Client::on_link(Peer&, const LinkState& link, TimePoint now) { session_.on_link(link, now); }
+
 void Client::on_frame_sent(Peer&, const FrameTicket& ticket, std::size_t packet_bytes) {
   session_.on_frame_sent(ticket, packet_bytes);
 }
@@ -145,7 +147,8 @@ void Client::open_stream(StreamSettings settings) {
 
 void Client::start_frame(TimePoint now) {
   FrameOrder order = session_.start_frame(now);
-  FrameJob job{stream_, order.ticket, order.request, order.real_fps, order.force_idr};
+  FrameJob job{stream_,        order.ticket,   order.request, order.bitrate_kbps,
+               order.real_fps, order.force_idr};
   registry_.scheduler_.frame_started();
   executor_->submit(
       std::move(job), on_session_thread<FrameResult>([](Client& client, FrameResult result) {

@@ -23,6 +23,7 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   /// Its connection goes over to another client.
   void detach() { peer_.reset(); }
   void on_message(Peer& from, const ClientMessage& message, TimePoint now);
+  void on_link(Peer& of, const LinkState& link, TimePoint now);
   void on_frame_sent(Peer& by, const FrameTicket& ticket, std::size_t packet_bytes);
   /// `by_leaving`: the page was closed, nobody comes back.
   void on_close(Peer& closed, bool by_leaving);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <glm/vec2.hpp>
 
@@ -17,6 +18,13 @@ inline glm::ivec2 frame_size(glm::ivec2 wish_px, int max_pixels) {
     return std::clamp(scaled - scaled % 2, 16, 8192);
   };
   return {side(wish_px.x), side(wish_px.y)};
+}
+
+/// A frame of `scale` times the sides, with sides as frame_size() makes them.
+inline glm::ivec2 scaled_size(glm::ivec2 size_px, double scale) {
+  return frame_size({static_cast<int>(std::lround(size_px.x * scale)),
+                     static_cast<int>(std::lround(size_px.y * scale))},
+                    std::numeric_limits<int>::max());
 }
 
 }  // namespace catgs

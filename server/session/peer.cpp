@@ -31,7 +31,7 @@ void Peer::post(Handle handle) {
                     });
 }
 
-void Peer::on_message(std::span<const std::byte> bytes) {
+void Peer::on_message(std::span<const std::byte> bytes, const LinkState& link) {
   if (refused_) return;
   const TimePoint now = Clock::now();
   if (!rate_.take(now)) {
@@ -51,13 +51,17 @@ void Peer::on_message(std::span<const std::byte> bytes) {
   auto& message = std::get<ClientMessage>(parsed);
   if (const auto* sample = std::get_if<PoseSample>(&message)) {
     registry_.metrics_.poses_received.Increment();
-    if (!latest_pose_.store({*sample, now})) return registry_.metrics_.poses_superseded.Increment();
+    if (!latest_pose_.store({*sample, now, link}))
+      return registry_.metrics_.poses_superseded.Increment();
     return post([](Peer& self, Client& c) {
-      if (const auto pose = self.latest_pose_.take())
-        c.on_message(self, pose->sample, pose->received);
+      const auto pose = self.latest_pose_.take();
+      if (!pose) return;
+      c.on_link(self, pose->link, pose->received);
+      c.on_message(self, pose->sample, pose->received);
     });
   }
-  post([message = std::move(message), now](Peer& self, Client& c) {
+  post([message = std::move(message), now, link](Peer& self, Client& c) {
+    c.on_link(self, link, now);
     c.on_message(self, message, now);
   });
 }

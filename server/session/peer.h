@@ -22,7 +22,7 @@ class Peer final : public ConnectionListener, public std::enable_shared_from_thi
   Peer(SessionRegistry& registry, std::shared_ptr<Connection> connection);
 
   // Network thread.
-  void on_message(std::span<const std::byte> bytes) override;
+  void on_message(std::span<const std::byte> bytes, const LinkState& link) override;
   void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) override;
   void on_close(bool by_leaving) override;
 
@@ -37,6 +37,7 @@ class Peer final : public ConnectionListener, public std::enable_shared_from_thi
   struct ReceivedPose {
     PoseSample sample;
     TimePoint received;
+    LinkState link;
   };
   /// Posts `handle(client)` to the session thread, then lets the registry look for work.
   template <typename Handle>

@@ -46,7 +46,6 @@ Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host,
       policy_(policy),
       host_(host),
       created_(now),
-      credit_(std::chrono::microseconds(1'000'000 / policy.default_fps)),
       last_said_(now),
       last_activity_(now),
       second_start_(now) {}
@@ -132,13 +131,13 @@ void Session::enter_scene(std::shared_ptr<const SceneEntry> scene) {
 void Session::on_lost(TimePoint now) {
   lost_at_ = now;
   obsolete_frames_ = frames_started_;
-  credit_.reset();
+  flow_.forget_in_flight();
 }
 
 void Session::on_resumed(const Hello& hello, Admission admission, TimePoint now) {
   lost_at_.reset();
   obsolete_frames_ = frames_started_;
-  credit_.reset();
+  flow_.forget_path();
   note_activity(now);
   paused_ = false;  // a page that is still hidden says so again
   idr_due_ = true;
@@ -174,8 +173,10 @@ void Session::on(const PoseSample& sample, TimePoint now) {
 }
 
 void Session::on(const Ack& ack, TimePoint now) {
-  if (!credit_.acknowledged(ack.frame_id, ack.dropped, now)) return;
+  const bool held_back = !flow_.may_send();
+  if (!flow_.acknowledged(ack, now)) return;
   if (ack.dropped) ++frames_dropped_;
+  if (held_back && flow_.may_send()) credit_since_ = now;
 }
 
 void Session::on(const Settings& settings, TimePoint now) {
@@ -204,7 +205,7 @@ void Session::on(const Pause& pause, TimePoint now) {
   note_activity(now);
   if (paused_ && !pause.paused) {
     // A hidden page presents nothing, so its frames in flight were never acknowledged.
-    credit_.reset();
+    flow_.forget_in_flight();
     idr_due_ = true;
   }
   paused_ = pause.paused;
@@ -222,18 +223,25 @@ void Session::request_stream() {
   }
   opening_stream_ = true;
   stream_outdated_ = false;
-  const int fps = settings_.max_fps > 0 ? settings_.max_fps : policy_.default_fps;
-  const int kbps =
-      settings_.max_bitrate_kbps > 0 ? settings_.max_bitrate_kbps : policy_.default_bitrate_kbps;
-  const glm::ivec2 wish = settings_.size_px.x > 0 ? settings_.size_px : viewport_px_;
+  const FlowWish wish = flow_wish();
+  flow_.set_wish(wish);
   EncoderSettings encoding;
-  encoding.size_px = frame_size(wish, policy_.max_pixels);
-  encoding.fps = std::min(fps, policy_.max_fps);
-  encoding.bitrate_kbps = std::min(kbps, policy_.max_bitrate_kbps);
+  encoding.size_px = scaled_size(wish.size_px, flow_.rung().scale);
+  encoding.fps = wish.fps;
+  encoding.bitrate_kbps = wish.bitrate_kbps;
   config_.size_px = encoding.size_px;
   config_.fps = encoding.fps;
   config_.bitrate_kbps = encoding.bitrate_kbps;
   host_.open_stream({admission_.scene->renderer, admission_.encoder.kind, encoding});
+}
+
+FlowWish Session::flow_wish() const {
+  const int fps = settings_.max_fps > 0 ? settings_.max_fps : policy_.default_fps;
+  const int kbps =
+      settings_.max_bitrate_kbps > 0 ? settings_.max_bitrate_kbps : policy_.default_bitrate_kbps;
+  const glm::ivec2 wish_px = settings_.size_px.x > 0 ? settings_.size_px : viewport_px_;
+  return {frame_size(wish_px, policy_.max_pixels), std::min(fps, policy_.max_fps),
+          std::min(kbps, policy_.max_bitrate_kbps), settings_.fixed_quality};
 }
 
 void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
@@ -246,7 +254,6 @@ void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   config_.codec_string = opened.codec_string;
   config_.encoder = admission_.encoder.text;
   device_ = opened.device;
-  credit_.set_frame_interval(frame_interval());
   state_ = State::live;
   idr_due_ = true;
   say_config(now);
@@ -265,17 +272,13 @@ void Session::say_config(TimePoint now) {
   say(welcome, now);
 }
 
-std::chrono::microseconds Session::frame_interval() const {
-  return std::chrono::microseconds(1'000'000 / std::max(1, config_.fps));
-}
-
 bool Session::picture_is_stale() const {
   return idr_due_ || !shown_ || !same_view(*shown_, *pose_, admission_.scene->facts.near_z);
 }
 
 std::optional<FrameCandidate> Session::next_frame() const {
   if (state_ != State::live || lost_at_ || paused_ || rendering_ || opening_stream_ || !pose_ ||
-      !credit_.available())
+      !flow_.may_send())
     return std::nullopt;
   TimePoint ready = next_start_;
   if (!picture_is_stale()) {
@@ -283,19 +286,20 @@ std::optional<FrameCandidate> Session::next_frame() const {
     // Between two poses of a moving camera a refinement would only be in the next one's way.
     ready = std::max(ready, last_motion_ + policy_.still_after);
   }
-  return FrameCandidate{ready, ready + frame_interval()};
+  return FrameCandidate{ready, ready + flow_.frame_interval()};
 }
 
 FrameOrder Session::start_frame(TimePoint now) {
   // The nominal rate is kept on average; what is lost is not caught up.
-  next_start_ = std::max(next_start_, now - frame_interval()) + frame_interval();
   const int real_fps = measure_rate(now);
+  next_start_ = std::max(next_start_, now - flow_.frame_interval()) + flow_.frame_interval();
   rendering_ = true;
   FrameOrder order;
   const bool still = !picture_is_stale();
   // What stays is a key frame: a sub-frame may lack a little at the edges of tiles.
   order.ticket.refined = still && !shown_is_sub_frame_;
   order.force_idr = std::exchange(idr_due_, false);
+  order.bitrate_kbps = flow_.bitrate_kbps();
   order.real_fps = real_fps;
   if (order.ticket.refined)
     --refinements_left_;
@@ -322,8 +326,13 @@ FrameOrder Session::start_frame(TimePoint now) {
 int Session::measure_rate(TimePoint now) {
   // Over about eight frames. A longer gap is a pause of the motion, not a slow renderer.
   constexpr auto longest_interval = 500ms;
-  const std::chrono::duration<double> interval = now - std::exchange(last_start_, now);
-  if (interval < longest_interval) mean_interval_ += (interval - mean_interval_) / 8.0;
+  std::chrono::duration<double> interval = now - std::exchange(last_start_, now);
+  // It waited for credit: larger frames would make it wait longer.
+  if (credit_since_ > next_start_) interval = flow_.frame_interval();
+  if (interval < longest_interval) {
+    mean_interval_ += (interval - mean_interval_) / 8.0;
+    flow_.set_real_interval(std::chrono::duration_cast<std::chrono::microseconds>(mean_interval_));
+  }
   const double fps = 1.0 / std::max(mean_interval_.count(), 1e-3);
   return std::clamp(static_cast<int>(std::lround(fps)), 1, config_.fps);
 }
@@ -343,9 +352,10 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   if (result.frame.ticket.frame_id <= obsolete_frames_) return;
   last_said_ = now;
   if (!result.frame.ticket.refined) shown_is_sub_frame_ = result.frame.ticket.speculated;
-  credit_.sent(result.frame.ticket.frame_id, now);
+  flow_.sent(result.frame.ticket.frame_id, result.frame.bitstream.size(),
+             result.frame.ticket.size_px, now);
   const auto dropped = host_.send(std::move(result.frame));
-  for (const std::uint64_t id : dropped) credit_.lost(id);
+  for (const std::uint64_t id : dropped) flow_.lost(id);
   if (dropped.empty()) return;
   idr_due_ = true;
   frames_dropped_ += dropped.size();
@@ -374,6 +384,7 @@ void Session::on_tick(TimePoint now) {
     return;
   }
   if (idr_request_waits_) on(RequestIdr{}, now);
+  if (flow_.update(now)) follow_ladder();
   if (policy_.idle_timeout > 0ms) {
     const auto left = last_activity_ + policy_.idle_timeout - now;
     if (left <= 0ms) return fail(ErrorCode::idle_timeout, "nothing has moved for a long time");
@@ -402,10 +413,20 @@ void Session::send_statistics(TimePoint now) {
   stats_.fps = static_cast<float>(second_frames_) / seconds;
   stats_.bitrate_kbps = static_cast<float>(second_bytes_) * 8e-3f / seconds;
   stats_.sessions = host_.session_count();
+  stats_.target_bitrate_kbps = flow_.bitrate_kbps();
+  stats_.target_fps = static_cast<int>(1s / flow_.frame_interval());
+  stats_.steps_down = static_cast<std::uint32_t>(flow_.steps_down());
+  stats_.queue_delay_us = static_cast<std::uint32_t>(flow_.queue_delay().count());
+  stats_.rtt_us = static_cast<std::uint32_t>(flow_.credit().base_rtt().count());
   say(stats_, now);
   stats_ = {};
   second_frames_ = 0;
   second_bytes_ = 0;
+}
+
+void Session::follow_ladder() {
+  const glm::ivec2 size_px = scaled_size(flow_wish().size_px, flow_.rung().scale);
+  if (state_ == State::live && size_px != config_.size_px) request_stream();
 }
 
 void Session::drain(std::chrono::milliseconds deadline) {

@@ -15,7 +15,7 @@
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"
 #include "server/session/admission_queue.h"
-#include "server/session/credit.h"
+#include "server/session/flow_control.h"
 
 namespace catgs {
 
@@ -79,6 +79,7 @@ class SessionHost {
 struct FrameOrder {
   FrameTicket ticket;
   FrameRequest request;
+  int bitrate_kbps = min_bitrate_kbps;
   int real_fps = 1;
   bool force_idr = false;
 };
@@ -99,6 +100,7 @@ class Session {
   void on_bad_message(std::string_view what);
   void on_stream_opened(const StreamOpened& opened, TimePoint now);
   void on_frame(FrameResult result, TimePoint now);
+  void on_link(const LinkState& link, TimePoint now) { flow_.observed(link, now); }
   /// A frame has left through the socket: only now it counts as sent.
   void on_frame_sent(const FrameTicket& ticket, std::size_t bytes);
   /// At least four times a second: timeouts, statistics, heartbeat.
@@ -128,7 +130,7 @@ class Session {
 
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] const std::string& id() const { return id_; }
-  [[nodiscard]] const CreditWindow& credit() const { return credit_; }
+  [[nodiscard]] const FlowControl& flow() const { return flow_; }
   [[nodiscard]] const StreamConfig& config() const { return config_; }
   [[nodiscard]] const SceneEntry* scene() const { return admission_.scene.get(); }
   [[nodiscard]] std::optional<int> device() const { return device_; }
@@ -162,7 +164,9 @@ class Session {
   int measure_rate(TimePoint now);
   void send_statistics(TimePoint now);
   [[nodiscard]] bool picture_is_stale() const;
-  [[nodiscard]] std::chrono::microseconds frame_interval() const;
+  [[nodiscard]] FlowWish flow_wish() const;
+  /// The stream has another size on the rung that holds now.
+  void follow_ladder();
 
   const std::string id_;
   const SessionPolicy& policy_;
@@ -180,7 +184,7 @@ class Session {
   bool stream_outdated_ = false;  // settings changed while the stream was busy
   bool welcome_due_ = false;      // the scene is new to the client
 
-  CreditWindow credit_;
+  FlowControl flow_;
   std::optional<PoseSample> pose_;  // newest
   TimePoint pose_received_{};
   MotionPredictor predictor_;  // on the client's clock
@@ -196,6 +200,7 @@ class Session {
   int failures_ = 0;  // of rendering or encoding, in a row
   TimePoint next_start_{};
   TimePoint last_start_{};
+  TimePoint credit_since_{};  // when an acknowledgement last gave credit that was missing
   std::chrono::duration<double> mean_interval_{0.05};  // between starts of frames in a row
   std::uint64_t frames_started_ = 0;
 

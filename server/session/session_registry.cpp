@@ -280,7 +280,7 @@ void SessionRegistry::publish() {
     const Session& session = client->session();
     queued += client->queued_frames();
     lost += session.lost() ? 1 : 0;
-    in_flight += session.credit().in_flight();
+    in_flight += session.flow().credit().in_flight();
     sessions.push_back({
         {"id", session.id()},
         {"state", state_name(session)},
@@ -293,9 +293,16 @@ void SessionRegistry::publish() {
         {"frames_sent", session.frames_sent()},
         {"frames_dropped", session.frames_dropped()},
         {"bytes_sent", session.bytes_sent()},
-        {"frames_in_flight", session.credit().in_flight()},
-        {"credit", session.credit().limit()},
-        {"base_rtt_us", session.credit().base_rtt().count()},
+        {"frames_in_flight", session.flow().credit().in_flight()},
+        {"credit", session.flow().credit().limit()},
+        {"base_rtt_us", session.flow().credit().base_rtt().count()},
+        {"queue_delay_us", session.flow().queue_delay().count()},
+        {"target_bitrate_kbps", session.flow().bitrate_kbps()},
+        {"steps_down", session.flow().steps_down()},
+        {"tcp_rtt_us", session.flow().link().rtt_us},
+        {"tcp_delivery_kbps", session.flow().link().delivery_bits_per_s / 1000},
+        {"tcp_window_bytes", session.flow().link().window_bytes},
+        {"tcp_unsent_bytes", session.flow().link().unsent_bytes},
         {"frames_queued", client->queued_frames()},
     });
   }

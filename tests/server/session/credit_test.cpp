@@ -20,7 +20,7 @@ TEST(CreditWindow, LimitFollowsTheRoundTrip) {
     CreditWindow credit(10ms);
     const TimePoint start = TimePoint{} + 1h;
     EXPECT_EQ(credit.limit(), 1) << "nothing is known before the first acknowledgement";
-    credit.sent(1, start);
+    credit.sent({1, 1000, 100, start});
     EXPECT_TRUE(credit.acknowledged(1, false, start + rtt));
     EXPECT_EQ(credit.limit(), limit) << rtt.count();
   }
@@ -29,7 +29,7 @@ TEST(CreditWindow, LimitFollowsTheRoundTrip) {
 TEST(CreditWindow, APresentedFrameSettlesOlderOnes) {
   CreditWindow credit(16ms);
   TimePoint now = TimePoint{} + 1h;
-  for (std::uint64_t id = 1; id <= 4; ++id) credit.sent(id, now);
+  for (std::uint64_t id = 1; id <= 4; ++id) credit.sent({id, 1000, 100, now});
   EXPECT_TRUE(credit.acknowledged(2, true, now));
   EXPECT_EQ(credit.in_flight(), 3);
   EXPECT_TRUE(credit.acknowledged(3, false, now + 1ms));
@@ -44,7 +44,7 @@ TEST(CreditWindow, ForgetsAnOldMinimum) {
   TimePoint now = TimePoint{} + 1h;
   std::uint64_t id = 0;
   const auto round_trip = [&](std::chrono::milliseconds rtt) {
-    credit.sent(++id, now);
+    credit.sent({++id, 1000, 100, now});
     now += rtt;
     credit.acknowledged(id, false, now);
   };

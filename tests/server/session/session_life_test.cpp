@@ -110,7 +110,7 @@ TEST_F(SessionLife, AFrameOfTheLostConnectionNeverReachesTheNewOne) {
   resume();
   finish(old);
   EXPECT_TRUE(host.frames.empty());
-  EXPECT_EQ(session.credit().in_flight(), 0);
+  EXPECT_EQ(session.flow().credit().in_flight(), 0);
   ASSERT_TRUE(frame_is_due());
   EXPECT_TRUE(run_frame().force_idr);
   EXPECT_EQ(host.frames.size(), 1u);

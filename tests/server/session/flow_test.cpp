@@ -1,0 +1,167 @@
+// Rate control end to end, without a clock: a Session behind a simulated link and a simulated
+// client. Times are simulated, so that they may be asserted.
+
+#include "tests/server/session/flow_simulation.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::microseconds;
+using test::FlowScenario;
+using test::FlowSimulation;
+using test::FrameTrace;
+
+int least_bitrate_kbps(const std::vector<FrameTrace>& frames) {
+  return std::ranges::min(frames, {}, &FrameTrace::bitrate_kbps).bitrate_kbps;
+}
+
+struct Path {
+  const char* name;
+  microseconds delay;
+  microseconds jitter;
+};
+
+class OnEveryPath : public testing::TestWithParam<Path> {
+ protected:
+  static FlowScenario scenario(std::vector<test::LinkRate> rates) {
+    FlowScenario scenario;
+    scenario.link.delay = GetParam().delay;
+    scenario.link.jitter = GetParam().jitter;
+    scenario.link.rates = std::move(rates);
+    return scenario;
+  }
+};
+
+TEST_P(OnEveryPath, FollowsALinkThatSlowsDownAndRecovers) {
+  FlowSimulation simulation(scenario({{0us, 50e6}, {10s, 5e6}, {20s, 50e6}}));
+  simulation.run(30s);
+  const double before = simulation.sent_kbps(5s, 9s);
+  EXPECT_GE(before, 30'000.0);
+  EXPECT_LT(simulation.longest_queueing(12s, 20s), 100ms) << "within two seconds, and stays";
+  EXPECT_GE(simulation.share_queueing_at_most(50ms, 12s, 20s), 0.8);
+  EXPECT_GE(simulation.sent_kbps(12s, 20s), 0.8 * 5000.0) << "the link is made use of";
+  EXPECT_GE(simulation.sent_kbps(25s, 30s), 0.9 * before) << "quality is back within five seconds";
+  EXPECT_LT(simulation.longest_queueing(21s, 30s), 50ms);
+  EXPECT_EQ(simulation.streams_opened(), 1) << "a want of quality that the bitrate alone can meet";
+}
+
+TEST_P(OnEveryPath, KeepsItsNominalRateWhereTheLinkIsEnough) {
+  FlowSimulation simulation(scenario({{0us, 50e6}}));
+  simulation.run(10s);
+  EXPECT_GE(simulation.sent(2s, 10s).size(), static_cast<std::size_t>(0.95 * 60 * 8));
+}
+
+INSTANTIATE_TEST_SUITE_P(Paths, OnEveryPath,
+                         testing::Values(Path{"Near", 2ms, 0ms}, Path{"Usual", 10ms, 0ms},
+                                         Path{"Wireless", 10ms, 15ms}, Path{"Far", 50ms, 10ms}),
+                         [](const auto& instance) { return std::string(instance.param.name); });
+
+// Room for 200 ms of the link in its queue, which any sender that only minds losses would fill.
+TEST(Flow, LeavesADeepQueueEmpty) {
+  FlowScenario scenario;
+  scenario.link.rates = {{0us, 3e6}};
+  scenario.link.queue_bytes = 75'000;
+  FlowSimulation simulation(scenario);
+  simulation.run(20s);
+  EXPECT_LT(simulation.longest_queueing(2s, 20s), 100ms);
+  EXPECT_GE(simulation.share_queueing_at_most(50ms, 2s, 20s), 0.8);
+  EXPECT_GE(simulation.sent_kbps(2s, 20s), 0.8 * 3000.0);
+}
+
+// TCP delivers nothing for 300 ms every two seconds. That makes nothing of the bitrate.
+TEST(Flow, TakesBurstsOfLossesForWhatTheyAre) {
+  FlowScenario scenario;
+  scenario.link.rates = {{0us, 20e6}};
+  for (microseconds at = 3s; at < 20s; at += 2s) scenario.link.stalls.push_back({at, at + 300ms});
+  FlowSimulation simulation(scenario);
+  simulation.run(20s);
+  EXPECT_GE(least_bitrate_kbps(simulation.sent(3s, 20s)), 14'000);
+  for (const auto& stall : scenario.link.stalls) {
+    const auto during = simulation.sent(stall.from + 100ms, stall.to);
+    EXPECT_LE(during.size(), 2u) << "what would only queue is not rendered";
+    EXPECT_LT(simulation.longest_queueing(stall.to + 100ms, stall.to + 1s), 100ms);
+  }
+}
+
+TEST(Flow, PacesAndShrinksForASlowDecoder) {
+  FlowScenario scenario;
+  scenario.client.decode_s_per_megapixel = 0.040;  // 27 frames of 1280x720 a second
+  FlowSimulation simulation(scenario);
+  simulation.run(60s);
+  EXPECT_EQ(simulation.frames().back().ticket.size_px, glm::ivec2(960, 540));
+  EXPECT_GE(simulation.presented(5s, 60s), 40 * 55);
+  EXPECT_LT(simulation.oldest_shown(5s, 60s), 150ms)
+      << "frames do not wait in front of the decoder";
+  EXPECT_LE(simulation.streams_opened(), 6) << "no flapping";
+}
+
+TEST(Flow, WaitsForAPhoneThatSleeps) {
+  FlowScenario scenario;
+  scenario.client.sleeps = {{5s, 15s}};
+  FlowSimulation simulation(scenario);
+  simulation.run(25s);
+  EXPECT_LE(simulation.sent(5s, 15s).size(), 8u);
+  EXPECT_GE(simulation.presented(15s, 16s), 50);
+  EXPECT_LT(simulation.oldest_shown(15s + 200ms, 25s), 100ms);
+  EXPECT_LT(simulation.longest_queueing(15s, 25s), 50ms);
+  EXPECT_GE(least_bitrate_kbps(simulation.sent(20s, 25s)), 30'000);
+}
+
+TEST(Flow, StepsDownTheLadderAndUpAgain) {
+  FlowScenario scenario;
+  scenario.link.rates = {{0us, 50e6}, {5s, 0.5e6}, {20s, 50e6}};
+  FlowSimulation simulation(scenario);
+  simulation.run(35s);
+  EXPECT_EQ(simulation.sent(15s, 20s).back().ticket.size_px, glm::ivec2(640, 360));
+  EXPECT_LT(simulation.longest_queueing(12s, 20s), 150ms);
+  EXPECT_EQ(simulation.frames().back().ticket.size_px, glm::ivec2(1280, 720));
+  EXPECT_EQ(simulation.streams_opened(), 5) << "the first, two steps down, two up";
+}
+
+// A link that is hardly enough for a rung, and content that asks for all of it.
+TEST(Flow, DoesNotFlap) {
+  for (const double bits_per_s : {1.2e6, 1.4e6, 1.6e6, 1.8e6, 2.2e6, 2.6e6}) {
+    FlowScenario scenario;
+    scenario.link.rates = {{0us, bits_per_s}};
+    FlowSimulation simulation(scenario);
+    simulation.run(120s);
+    EXPECT_LE(simulation.streams_opened(), 6) << bits_per_s;
+  }
+}
+
+TEST(Flow, SimpleContentKeepsItsSize) {
+  FlowScenario scenario;
+  scenario.link.rates = {{0us, 3e6}};
+  scenario.demand_bits_per_pixel = 0.01;
+  FlowSimulation simulation(scenario);
+  simulation.run(10s);
+  EXPECT_EQ(simulation.streams_opened(), 1);
+}
+
+TEST(Flow, LeavesAFixedQualityAlone) {
+  FlowScenario scenario;
+  scenario.link.rates = {{0us, 5e6}};
+  scenario.fixed_quality = true;
+  FlowSimulation simulation(scenario);
+  simulation.run(10s);
+  EXPECT_EQ(least_bitrate_kbps(simulation.frames()), scenario.max_bitrate_kbps);
+  EXPECT_EQ(simulation.streams_opened(), 1);
+}
+
+// What sharpens a picture comes as soon as the camera rests.
+TEST(Flow, RefinesWithin200Milliseconds) {
+  FlowScenario scenario;
+  scenario.link.rates = {{0us, 25e6}};
+  scenario.rests = {{5s, 10s}};
+  FlowSimulation simulation(scenario);
+  simulation.run(10s);
+  const auto sharper = simulation.sent(5s + 30ms, 5s + 200ms);
+  EXPECT_GE(std::ranges::count_if(sharper, [](const FrameTrace& f) { return f.ticket.refined; }),
+            4);
+  EXPECT_LT(simulation.longest_queueing(5s, 10s), 100ms);
+  EXPECT_TRUE(simulation.sent(6s, 10s).empty()) << "then there is nothing to send";
+}
+
+}  // namespace
+}  // namespace catgs
