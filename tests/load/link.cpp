@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -79,6 +78,7 @@ void set_value(std::string_view source, std::string_view key, std::string_view v
 
 LinkSettings parse_link(std::string_view source, std::string_view text) {
   LinkSettings link;
+  link.text = text;
   std::string_view key;
   while (!text.empty()) {
     std::string_view value = take_until(text, ',');

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <random>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -20,6 +21,7 @@ using RateSchedule = std::vector<RateStep>;
 
 /// A client's line, as a TCP connection over it sees it: bytes are late, never lost or reordered.
 struct LinkSettings {
+  std::string text;                 // as it was written
   RateSchedule down, up;            // server to client, client to server
   std::int64_t delay_us = 0;        // one way
   std::int64_t jitter_us = 0;       // further delay of each segment, uniform in 0…jitter

@@ -50,7 +50,8 @@ class TrajectoryMaker {
       ScriptOptions script = options_.script;
       script.seed += static_cast<std::uint64_t>(session);
       script.duration_s = duration_s_;
-      script.rate_hz = options_.fps;
+      constexpr int display_hz = 60;
+      script.rate_hz = options_.pose_hz > 0 ? options_.pose_hz : std::max(display_hz, options_.fps);
       return std::make_shared<const Trajectory>(make_script(script, scene));
     }
     const auto& trace = traces_[static_cast<std::size_t>(session) % traces_.size()];

@@ -1,14 +1,20 @@
 // catgs-load: many headless clients of catgs-server, and what they got.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
 
 #include "render_core/build_info.h"
 #include "render_core/error.h"
 #include "render_core/tools/json_report.h"
-#include "tests/load/load.h"
+#include "tests/load/html_report.h"
 #include "tests/load/report.h"
-#include "tests/load/requirement.h"
+#include "tests/load/run_scenario.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {
@@ -19,19 +25,25 @@ constexpr int exit_bad_input = 2;
 constexpr int exit_internal = 3;
 
 struct ProgramOptions {
-  LoadOptions load;
+  Scenario scenario;  // what no scenario file says
   GroupOptions group;
-  std::string duration = "30s";
-  std::string ramp = "0s";
-  std::string link;
-  std::string decode_time = "0s";
-  std::string reconnect_every = "0s";
-  std::string json;
+  std::string file, server, server_log, url, token;
+  std::string duration, ramp = "0s", link, decode_time = "0s", reconnect_every = "0s";
+  bool insecure = false;
+  std::string json, html;
   std::vector<std::string> requirements;
 };
 
+// Options that a scenario file replaces.
+constexpr const char* client_group = "Clients";
+
 void add_client_options(CLI::App& app, ProgramOptions& options) {
   GroupOptions& group = options.group;
+  app.option_defaults()->group(client_group);
+  app.add_option("--sessions", group.sessions, "Clients at the same time")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--ramp", options.ramp, "Spread the starts over this time")->capture_default_str();
   auto* trace = app.add_option("--trace", group.traces,
                                "TUM files, replayed at their own times, forth and back; sessions "
                                "take turns and begin at different places");
@@ -46,6 +58,8 @@ void add_client_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--fps", group.fps, "Wanted and nominal frame rate")
       ->check(CLI::Range(1, 240))
       ->capture_default_str();
+  app.add_option("--pose-hz", group.pose_hz, "Poses of a script; 0: display rate, 60 or --fps")
+      ->check(CLI::Range(0, 1000));
   app.add_option("--max-bitrate-kbps", group.max_bitrate_kbps, "0: the server's default")
       ->check(CLI::Range(0, 200'000))
       ->capture_default_str();
@@ -61,20 +75,30 @@ void add_client_options(CLI::App& app, ProgramOptions& options) {
       ->check(CLI::Range(0, 100'000));
   app.add_option("--reconnect-every", options.reconnect_every,
                  "Drop all sockets at once, again and again");
+  app.option_defaults()->group("Options");
 }
 
 void add_options(CLI::App& app, ProgramOptions& options) {
-  app.add_option("--url", options.load.url, "ws://HOST:PORT or wss://HOST:PORT")->required();
-  app.add_option("--sessions", options.group.sessions, "Clients at the same time")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  app.add_option("--duration", options.duration, "Of the whole run")->capture_default_str();
-  app.add_option("--ramp", options.ramp, "Spread the starts over this time")->capture_default_str();
+  auto* file = app.add_option("--scenario", options.file, "TOML file with a whole run");
+  app.add_option("--url", options.url, "ws://HOST:PORT or wss://HOST:PORT");
+  app.add_option("--server", options.server,
+                 "Without --url a scenario starts this command itself (default: the catgs-server "
+                 "beside this program)");
+  app.add_option("--server-log", options.server_log, "Its log (default: catgs-load-server.log)")
+      ->default_val("catgs-load-server.log");
+  app.add_option("--duration", options.duration, "Of the whole run (default: 30s)");
   add_client_options(app, options);
-  app.add_option("--token", options.load.token, "Access token (better: the variable)")
+  for (CLI::Option* option : app.get_options()) {
+    const bool of_clients = option->get_group() == client_group;
+    if (of_clients) option->excludes(file);
+  }
+  app.add_option("--token", options.token, "Access token (better: the variable)")
       ->envname("CATGS_TOKEN");
-  app.add_flag("--insecure", options.load.insecure, "Accept any TLS certificate");
+  app.add_flag("--insecure", options.insecure, "Accept any TLS certificate");
+  app.add_option("--check-scene", options.scenario.check_scene,
+                 "Compare decoded pictures with this scene, rendered here: a file or synth:…");
   app.add_option("--json", options.json, "Write the report here; - prints it instead");
+  app.add_option("--html", options.html, "Write a page with plots here");
   app.add_option("--require", options.requirements,
                  "METRIC OP NUMBER, repeatable: exit with 1 where it does not hold; METRIC@FROM-TO "
                  "is about a part of the run")
@@ -85,62 +109,91 @@ void add_options(CLI::App& app, ProgramOptions& options) {
       "--decode --require 'errors==0' --require 'pose_to_frame_p95_ms<100'");
 }
 
-void write_report(const ProgramOptions& options, const RunReport& report, const Metrics& metrics) {
-  const HoldBounds bounds;
-  if (options.json != "-") fmt::print("{}", to_table(report, bounds));
-  if (options.json.empty()) return;
-  const GroupOptions& group = options.group;
-  nlohmann::ordered_json json = {{"version", build_version}, {"commit", build_commit}};
-  json["settings"] = {{"url", options.load.url},   {"sessions", group.sessions},
-                      {"traces", group.traces},    {"script", group.script.script},
-                      {"seed", group.script.seed}, {"duration_s", options.load.duration_s},
-                      {"ramp_s", group.ramp_s},    {"sizes", group.sizes},
-                      {"fps", group.fps},          {"link", options.link},
-                      {"decode", group.decode}};
-  json.update(to_json(report, metrics, bounds));
-  write_json(options.json, json);
+/// The scenario of the file, or the one that the flags describe.
+Scenario scenario_of(const ProgramOptions& options) {
+  Scenario scenario = options.scenario;
+  if (options.file.empty()) {
+    if (options.url.empty()) throw InputError("--url, --scenario", "", "one of them is needed");
+    GroupOptions group = options.group;
+    group.ramp_s = parse_duration_s("--ramp", options.ramp);
+    group.link = parse_link("--link", options.link);
+    group.decode_time_s = parse_duration_s("--decode-time", options.decode_time);
+    group.reconnect_every_s = parse_duration_s("--reconnect-every", options.reconnect_every);
+    scenario.load.groups = {group};
+  } else {
+    scenario = read_scenario(options.file);
+    if (!options.scenario.check_scene.empty()) {
+      scenario.check_scene = options.scenario.check_scene;
+    }
+  }
+  if (!options.duration.empty()) {
+    scenario.load.duration_s = parse_duration_s("--duration", options.duration);
+  }
+  scenario.load.url = options.url;
+  scenario.load.token = options.token;
+  scenario.load.insecure = options.insecure;
+  scenario.requirements.insert(scenario.requirements.end(), options.requirements.begin(),
+                               options.requirements.end());
+  return scenario;
 }
 
-/// Everything that requirements may name, of a run that has not been yet.
-void check_requirements(const std::vector<Requirement>& requirements, const LoadOptions& load) {
-  RunReport empty;
-  for (const GroupOptions& group : load.groups) {
-    empty.groups.push_back(
-        {group.name, static_cast<double>(group.fps), std::make_unique<TimeSeries>(0), {}});
+/// The words of --server, or the catgs-server beside this program.
+std::vector<std::string> server_command(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words{std::istream_iterator<std::string>(stream), {}};
+  if (words.empty()) {
+    const auto self = std::filesystem::read_symlink("/proc/self/exe");
+    words.push_back((self.parent_path() / "catgs-server").string());
   }
-  const Metrics metrics = collect_metrics(empty, {});
-  for (const Requirement& requirement : requirements) {
-    if (is_window_metric(requirement.metric()))
-      (void)window_metric(empty, requirement.metric());
-    else
-      requirement.check_name(metrics);
-  }
+  return words;
 }
 
-int run_checked(ProgramOptions& options) {
-  options.load.duration_s = parse_duration_s("--duration", options.duration);
-  options.group.ramp_s = parse_duration_s("--ramp", options.ramp);
-  options.group.link = parse_link("--link", options.link);
-  options.group.decode_time_s = parse_duration_s("--decode-time", options.decode_time);
-  options.group.reconnect_every_s = parse_duration_s("--reconnect-every", options.reconnect_every);
-  options.load.groups = {options.group};
-  std::vector<Requirement> requirements;
-  for (const std::string& text : options.requirements) requirements.emplace_back(text);
-  check_requirements(requirements, options.load);
-  const RunReport report = run_load(options.load);
-  Metrics metrics = collect_metrics(report, {});
-  for (const Requirement& requirement : requirements) {
-    const std::string& name = requirement.metric();
-    if (is_window_metric(name)) metrics.emplace_back(name, window_metric(report, name));
+nlohmann::ordered_json settings_json(const Scenario& scenario) {
+  nlohmann::ordered_json json = {{"title", scenario.title},
+                                 {"url", scenario.load.url},
+                                 {"server_args", scenario.server_args},
+                                 {"duration_s", scenario.load.duration_s}};
+  for (const GroupOptions& group : scenario.load.groups) {
+    json["clients"].push_back({{"name", group.name},
+                               {"sessions", group.sessions},
+                               {"traces", group.traces},
+                               {"script", group.script.script},
+                               {"seed", group.script.seed},
+                               {"ramp_s", group.ramp_s},
+                               {"sizes", group.sizes},
+                               {"fps", group.fps},
+                               {"link", group.link.text},
+                               {"decode", group.decode}});
   }
-  write_report(options, report, metrics);
-  int exit_code = 0;
-  for (const Requirement& requirement : requirements) {
-    if (requirement.holds(metrics)) continue;
-    fmt::print(stderr, "catgs-load: requirement failed: {}\n", requirement.explain(metrics));
-    exit_code = exit_requirement_failed;
+  return json;
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw InputError(path, "", "cannot be written");
+}
+
+int run_checked(const ProgramOptions& options) {
+  const Scenario scenario = scenario_of(options);
+  const Outcome outcome =
+      run_scenario(scenario, server_command(options.server), options.server_log);
+  if (options.json != "-") fmt::print("{}", to_table(outcome.report, scenario.bounds));
+  if (!options.json.empty()) {
+    nlohmann::ordered_json json = {{"version", build_version},
+                                   {"commit", build_commit},
+                                   {"settings", settings_json(scenario)}};
+    json.update(to_json(outcome.report, outcome.metrics, scenario.bounds));
+    write_json(options.json, json);
   }
-  return exit_code;
+  if (!options.html.empty()) write_file(options.html, to_html(scenario, outcome));
+  for (const Requirement& requirement : outcome.requirements) {
+    const bool held = requirement.holds(outcome.metrics);
+    fmt::print(stderr, "catgs-load: {}: {}\n", held ? "holds" : "requirement failed",
+               requirement.explain(outcome.metrics));
+  }
+  return outcome.all_hold() ? 0 : exit_requirement_failed;
 }
 
 int run(int argc, char** argv) {
@@ -152,6 +205,7 @@ int run(int argc, char** argv) {
   });
   ProgramOptions options;
   add_options(app, options);
+  spdlog::set_level(spdlog::level::warn);  // loading a scene tells a server's operator, not us
   try {
     app.parse(argc, argv);
     return run_checked(options);

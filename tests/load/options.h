@@ -24,6 +24,7 @@ struct GroupOptions {
   ScriptOptions script;
   std::vector<std::string> sizes = {"1280x720"};
   int fps = 60;
+  int pose_hz = 0;  // of a script; 0: display rate, as browsers do: 60, or fps where that is more
   int max_bitrate_kbps = 0;
   float fov_y_deg = 60.0f;
 

@@ -1,0 +1,174 @@
+#include "tests/load/scenario.h"
+
+#include <csignal>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/error.h"
+#include "tests/load/html_report.h"
+#include "tests/load/picture_check.h"
+#include "tests/load/prometheus_text.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::load {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::ThrowsMessage;
+
+class ScenarioFile : public ::testing::Test {
+ protected:
+  Scenario read(const std::string& text) {
+    std::ofstream(folder_ / "s.toml") << text;
+    return read_scenario(folder_ / "s.toml");
+  }
+  void expect_refused(const std::string& text, const std::string& message) {
+    EXPECT_THAT([&] { read(text); }, ThrowsMessage<InputError>(HasSubstr(message)));
+  }
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(ScenarioFile, SaysEverythingAboutARun) {
+  const Scenario scenario = read(R"(
+title = "t"
+duration = "20s"
+require = ["a.errors==0"]
+check-scene = "synth:city:100"
+[held]
+pose-age-p95-ms = 60
+[server]
+args = ["--scene", "x"]
+[[server.signals]]
+at = "5s"
+signal = "STOP"
+[[clients]]
+name = "a"
+sessions = 3
+traces = ["t.tum"]
+sizes = ["160x90", "320x180"]
+link = "rate=1mbit"
+[[clients]]
+name = "b"
+script = "head"
+acks = false
+stall-at = "1s"
+stall-for = "2s"
+)");
+  EXPECT_EQ(scenario.title, "t");
+  EXPECT_EQ(scenario.load.duration_s, 20.0);
+  EXPECT_EQ(scenario.bounds.pose_age_p95_ms, 60.0);
+  EXPECT_EQ(scenario.bounds.pose_to_frame_p95_ms, 33.0);
+  ASSERT_EQ(scenario.signals.size(), 1u);
+  EXPECT_EQ(scenario.signals[0].number, SIGSTOP);
+  EXPECT_EQ(scenario.signals[0].at_s, 5.0);
+  ASSERT_EQ(scenario.load.groups.size(), 2u);
+  const GroupOptions& a = scenario.load.groups[0];
+  EXPECT_EQ(a.sessions, 3);
+  EXPECT_EQ(a.traces, std::vector<std::string>{(folder_ / "t.tum").string()});
+  EXPECT_EQ(a.sizes.size(), 2u);
+  EXPECT_EQ(a.link.down.at(0).bits_per_s, 1e6);
+  const GroupOptions& b = scenario.load.groups[1];
+  EXPECT_FALSE(b.acknowledge);
+  EXPECT_EQ(b.stall_for_s, 2.0);
+}
+
+TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
+  expect_refused("", "has no [[clients]]");
+  expect_refused("duration = 5\n[[clients]]\n", "line 1: duration has another type");
+  expect_refused("[[clients]]\nsession = 3\n", "line 2: nothing is called \"session\" here");
+  expect_refused("[[clients]]\nsessions = 0\n", "line 2: sessions is not in 1…1000");
+  expect_refused("[[clients]]\nlink = \"speed=1mbit\"\n", "line 2: link");
+  expect_refused("[[clients]]\nsizes = [1]\n", "line 2: sizes is no list of texts");
+  expect_refused("clients = 3\n", "line 1: clients is no table");
+  expect_refused("[[clients]]\n[[server.signals]]\nsignal = \"BOOM\"\n", "unknown signal \"BOOM\"");
+  expect_refused("[[clients]\n", "line 1");
+}
+
+TEST(PrometheusText, ChangesBetweenScrapesAreMeasured) {
+  const auto before = parse_prometheus(
+      "# HELP x y\n"
+      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.001\"} 100\n"
+      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.01\"} 100\n"
+      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"+Inf\"} 100\n"
+      "catgs_stage_seconds_sum{stage=\"wait\"} 1\n"
+      "catgs_stage_seconds_count{stage=\"wait\"} 100\n"
+      "catgs_frames_total 7\ncatgs_sessions 3\n");
+  const auto after = parse_prometheus(
+      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.001\"} 150\n"
+      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.01\"} 200\n"
+      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"+Inf\"} 200\n"
+      "catgs_stage_seconds_sum{stage=\"wait\"} 1.5\n"
+      "catgs_frames_total 17\ncatgs_sessions 4\n");
+  const Metrics change = change_between(before, after, "server.");
+  EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_p50_ms"), 1.0);
+  EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_p95_ms"), 1.0 + 9.0 * 45.0 / 50.0);
+  EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_mean_ms"), 5.0);
+  EXPECT_DOUBLE_EQ(value_of(change, "server.frames_total"), 10.0);
+  EXPECT_DOUBLE_EQ(value_of(change, "server.sessions"), 4.0);
+  EXPECT_TRUE(std::isnan(value_of(change_between(after, after, ""), "stage_wait_p50_ms")));
+}
+
+DecodedPicture grey(std::uint8_t luma, std::uint8_t cb, std::uint8_t cr, bool full_range) {
+  DecodedPicture picture;
+  picture.size_px = {2, 2};
+  picture.planes = {std::vector<std::uint8_t>(4, luma), {cb}, {cr}};
+  picture.full_range = full_range;
+  return picture;
+}
+
+TEST(PictureCheck, ColoursOfBothRanges) {
+  const auto expect_pixel = [](const DecodedPicture& picture, float r, float g, float b) {
+    const std::vector<float> rgb = rgb_of(picture);
+    ASSERT_EQ(rgb.size(), 12u);
+    EXPECT_NEAR(rgb[9], r, 0.01f);
+    EXPECT_NEAR(rgb[10], g, 0.01f);
+    EXPECT_NEAR(rgb[11], b, 0.01f);
+  };
+  expect_pixel(grey(16, 128, 128, false), 0, 0, 0);
+  expect_pixel(grey(235, 128, 128, false), 1, 1, 1);
+  expect_pixel(grey(63, 102, 240, false), 1, 0, 0);  // BT.709 red
+  expect_pixel(grey(255, 128, 128, true), 1, 1, 1);
+  expect_pixel(grey(76, 85, 255, true), 1, 0, 0);  // JFIF red
+}
+
+TEST(HtmlReport, IsAPageOfItsOwnThatEscapesWhatItQuotes) {
+  Scenario scenario;
+  scenario.title = "<b>&\"";
+  Outcome outcome;
+  GroupReport& group = outcome.report.groups.emplace_back();
+  group.name = "<i>";
+  group.nominal_fps = 60.0;
+  group.series = std::make_unique<TimeSeries>(0);
+  group.sessions.push_back(std::make_unique<SessionReport>(60.0, group.series.get()));
+  SessionStats& stats = group.sessions[0]->stats;
+  stats.started(0);
+  for (std::uint64_t i = 1; i <= 200; ++i) {
+    const auto time_us = static_cast<std::int64_t>(i) * 16'000;
+    stats.pose_sent(i, time_us);
+    stats.frame_received({.frame_id = i, .pose_id = i, .bytes = 1000}, time_us + 9'000);
+  }
+  outcome.metrics = collect_metrics(outcome.report, {});
+  outcome.requirements.emplace_back("errors<1");
+  const std::string html = to_html(scenario, outcome);
+  EXPECT_THAT(html, HasSubstr("<h1>&lt;b&gt;&amp;&quot;</h1>"));
+  EXPECT_THAT(html, HasSubstr("errors&lt;1"));
+  EXPECT_THAT(html, HasSubstr("<path class=\"curve c0\" d=\"M"));
+  EXPECT_THAT(html, Not(HasSubstr("<i>")));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
+  EXPECT_THAT(html, Not(HasSubstr("://"))) << "nothing comes from elsewhere";
+}
+
+TEST(TimeSeries, StaysBoundedAndKeepsItsSums) {
+  TimeSeries series(0);
+  for (std::int64_t s = 0; s < 5000; ++s) ++series.at(s * 1'000'000).frames;
+  EXPECT_LE(series.bins().size(), 600u);
+  EXPECT_EQ(series.bin_s(), 16.0);
+  EXPECT_EQ(series.sum(0.0, 1e9).frames, 5000u);
+  EXPECT_EQ(series.sum(160.0, 320.0).frames, 160u);
+}
+
+}  // namespace
+}  // namespace catgs::load
