@@ -189,6 +189,10 @@ std::vector<Setting> make_settings() {
       integer("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
               200'000),
       integer("max-sessions", "N", "Sessions at the same time", &C::max_sessions, 1, 10'000),
+      integer(
+          "min-fps", "N",
+          "Admit sessions while measured costs leave everybody this rate; 0: --max-sessions only",
+          &C::min_fps, 0, 240),
       integer("max-sessions-per-address", "N", "Sessions at the same time from one address",
               &C::max_sessions_per_address, 1, 10'000),
       integer("max-queue", "N", "Clients that may wait for a place; others are refused",

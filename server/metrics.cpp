@@ -27,10 +27,16 @@ Histogram& stage(Registry& registry, const char* name) {
   return prometheus::BuildHistogram()
       .Name("catgs_frame_stage_seconds")
       .Help(
-          "Duration of a frame's stages: wait (pose received to render start), render, encode, "
-          "send (encoded to handed to the socket)")
+          "Duration of a frame's stages: queue_wait (it could start, others' turns came first), "
+          "hand_off (to the thread that renders), render_key, render_sub, encode, send (encoded to "
+          "handed to the socket)")
       .Register(registry)
       .Add({{"stage", name}}, latency_buckets_s);
+}
+
+Histogram& latency(Registry& registry, const char* name, const char* help) {
+  return prometheus::BuildHistogram().Name(name).Help(help).Register(registry).Add(
+      {}, latency_buckets_s);
 }
 
 double seconds(TimePoint from, TimePoint to) {
@@ -80,15 +86,16 @@ Metrics::Metrics()
           counter(registry_, "catgs_bad_messages_total", "Messages that closed their session")),
       list_entries_overflowed(counter(registry_, "catgs_list_entries_overflowed_total",
                                       "Tile list entries that found no memory")),
-      wait_seconds(stage(registry_, "wait")),
-      render_seconds(stage(registry_, "render")),
+      queue_wait_seconds(stage(registry_, "queue_wait")),
+      hand_off_seconds(stage(registry_, "hand_off")),
+      render_key_seconds(stage(registry_, "render_key")),
+      render_sub_seconds(stage(registry_, "render_sub")),
       encode_seconds(stage(registry_, "encode")),
       send_seconds(stage(registry_, "send")),
-      pose_age_seconds(prometheus::BuildHistogram()
-                           .Name("catgs_pose_age_seconds")
-                           .Help("Age of a frame's pose when the client showed it")
-                           .Register(registry_)
-                           .Add({}, latency_buckets_s)) {}
+      pose_to_frame_seconds(latency(registry_, "catgs_pose_to_frame_seconds",
+                                    "Pose received to its frame handed to the socket")),
+      motion_to_photon_seconds(latency(registry_, "catgs_motion_to_photon_seconds",
+                                       "Age of a frame's pose when the client showed it")) {}
 
 std::string Metrics::scrape() const {
   return prometheus::TextSerializer().Serialize(registry_.Collect());
@@ -99,10 +106,14 @@ void Metrics::set_views(int device, int views) {
 }
 
 void Metrics::observe_frame(const FrameTicket& ticket, TimePoint now) {
-  wait_seconds.Observe(seconds(ticket.pose_received, ticket.render_start));
-  render_seconds.Observe(seconds(ticket.render_start, ticket.render_end));
   encode_seconds.Observe(seconds(ticket.render_end, ticket.encode_end));
   send_seconds.Observe(seconds(ticket.encode_end, now));
+  if (ticket.refined) return;  // late on purpose, and nothing is rendered for it
+  queue_wait_seconds.Observe(seconds(ticket.ready, ticket.started));
+  hand_off_seconds.Observe(seconds(ticket.started, ticket.render_start));
+  (ticket.speculated ? render_sub_seconds : render_key_seconds)
+      .Observe(seconds(ticket.render_start, ticket.render_end));
+  pose_to_frame_seconds.Observe(seconds(ticket.pose_received, now));
 }
 
 }  // namespace catgs

@@ -55,11 +55,14 @@ class Metrics {
   prometheus::Counter& poses_superseded;  // replaced by a newer one before they were looked at
   prometheus::Counter& bad_messages;
   prometheus::Counter& list_entries_overflowed;
-  prometheus::Histogram& wait_seconds;
-  prometheus::Histogram& render_seconds;
+  prometheus::Histogram& queue_wait_seconds;
+  prometheus::Histogram& hand_off_seconds;
+  prometheus::Histogram& render_key_seconds;
+  prometheus::Histogram& render_sub_seconds;
   prometheus::Histogram& encode_seconds;
   prometheus::Histogram& send_seconds;
-  prometheus::Histogram& pose_age_seconds;  // on the client's clock, when the frame was shown
+  prometheus::Histogram& pose_to_frame_seconds;
+  prometheus::Histogram& motion_to_photon_seconds;  // on the client's clock
 };
 
 }  // namespace catgs

@@ -59,6 +59,7 @@ RegistryOptions registry_options(const ServerConfig& config) {
   options.max_sessions = config.max_sessions;
   options.max_sessions_per_address = config.max_sessions_per_address;
   options.max_queue = config.max_queue;
+  options.min_fps = config.min_fps;
   return options;
 }
 
@@ -181,9 +182,11 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
   auto authorize = [&s](const std::string& token, const std::string& scene_id) {
     return s.access.refusal(token, scene_id, unix_now_s());
   };
+  RegistryOptions options = registry_options(s.config);
+  options.gpus = static_cast<int>(s.devices->views().size());
   s.registry = std::make_unique<SessionRegistry>(
-      s.io, registry_options(s.config), std::make_shared<PoolExecutor>(s.pool), s.scenes,
-      s.encoders, std::move(authorize), session_tokens(s.config), s.metrics);
+      s.io, std::move(options), std::make_shared<PoolExecutor>(s.pool), s.scenes, s.encoders,
+      std::move(authorize), session_tokens(s.config), s.metrics);
 }
 
 Server::~Server() {

@@ -29,6 +29,8 @@ struct FrameTicket {
   std::uint32_t window = 0;  // W of its key frame
 
   TimePoint pose_received{};
+  TimePoint ready{};    // the session could have started it, had its turn come
+  TimePoint started{};  // handed to the executor
   TimePoint render_start{};
   TimePoint render_end{};
   TimePoint encode_end{};

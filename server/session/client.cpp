@@ -1,5 +1,7 @@
 #include "server/session/client.h"
 
+#include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -31,15 +33,28 @@ void Client::on_message(Peer& from, const ClientMessage& message, TimePoint now)
       hello && session_.state() == Session::State::awaiting_hello)
     return registry_.on_hello(from.shared_from_this(), shared_from_this(), *hello, now);
   if (const auto* ack = std::get_if<Ack>(&message)) {
-    if (ack->presented_us > 0) registry_.metrics_.pose_age_seconds.Observe(1e-6 * ack->pose_age_us);
+    if (ack->presented_us > 0) {
+      registry_.metrics_.motion_to_photon_seconds.Observe(1e-6 * ack->pose_age_us);
+      usage_.frame_shown(1e-6 * ack->pose_age_us);
+    }
     if (ack->dropped) registry_.metrics_.frames_dropped_by_client.Increment();
   }
   session_.on_message(message, now);
+  note_readiness(Clock::now());
 }
 
 void Client::on_link(Peer&, const LinkState& link, TimePoint now) { session_.on_link(link, now); }
 
-void Client::on_frame_sent(Peer&, const FrameTicket& ticket, std::size_t packet_bytes) {
+void Client::note_readiness(TimePoint now) {
+  const auto candidate = session_.next_frame();
+  if (!candidate) return ready_since_.reset();
+  const TimePoint ready = std::max(now, candidate->ready);
+  ready_since_ = std::min(ready_since_.value_or(ready), ready);
+}
+
+void Client::on_frame_sent(Peer&, const FrameTicket& ticket, std::size_t packet_bytes,
+                           TimePoint now) {
+  usage_.frame_sent(ticket, now);
   session_.on_frame_sent(ticket, packet_bytes);
 }
 
@@ -138,6 +153,11 @@ std::function<void(Result)> Client::on_session_thread(Handle handle) {
   };
 }
 
+double Client::device_seconds(const FrameStats& stats) const {
+  if (!session_.device()) return 0.0;
+  return 1e-3 * std::accumulate(stats.stage_ms.begin(), stats.stage_ms.end(), 0.0);
+}
+
 void Client::open_stream(StreamSettings settings) {
   executor_->open(stream_, std::move(settings),
                   on_session_thread<StreamOpened>([](Client& client, const StreamOpened& opened) {
@@ -147,6 +167,9 @@ void Client::open_stream(StreamSettings settings) {
 
 void Client::start_frame(TimePoint now) {
   FrameOrder order = session_.start_frame(now);
+  order.ticket.ready = std::min(std::exchange(ready_since_, std::nullopt).value_or(now), now);
+  order.ticket.started = now;
+  usage_.frame_started(now);
   FrameJob job{stream_,        order.ticket,   order.request, order.bitrate_kbps,
                order.real_fps, order.force_idr};
   registry_.scheduler_.frame_started();
@@ -160,7 +183,10 @@ void Client::start_frame(TimePoint now) {
             .Increment();
         metrics.list_entries_overflowed.Increment(
             static_cast<double>(result.stats.overflowed_entries));
-        client.session_.on_frame(std::move(result), Clock::now());
+        const TimePoint ended = Clock::now();
+        client.usage_.frame_ended(result.frame.ticket, client.device_seconds(result.stats), ended);
+        client.session_.on_frame(std::move(result), ended);
+        client.note_readiness(ended);
       }));
 }
 

@@ -6,6 +6,7 @@
 
 #include "server/session/peer.h"
 #include "server/session/session.h"
+#include "server/session/session_usage.h"
 
 namespace catgs {
 
@@ -24,7 +25,7 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   void detach() { peer_.reset(); }
   void on_message(Peer& from, const ClientMessage& message, TimePoint now);
   void on_link(Peer& of, const LinkState& link, TimePoint now);
-  void on_frame_sent(Peer& by, const FrameTicket& ticket, std::size_t packet_bytes);
+  void on_frame_sent(Peer& by, const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now);
   /// `by_leaving`: the page was closed, nobody comes back.
   void on_close(Peer& closed, bool by_leaving);
   /// A message that cannot be taken closes the connection it came from.
@@ -45,12 +46,16 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   /// Continues the session of a client that was lost, through `peer`.
   void resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,
               TimePoint now);
+  /// Something happened: since when could a frame start?
+  void note_readiness(TimePoint now);
   /// Starts the frame that the session's next_frame() announced.
   void start_frame(TimePoint now);
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const std::string& peer_address() const { return peer_address_; }
   [[nodiscard]] std::size_t queued_frames() const;
+  [[nodiscard]] SessionUsage& usage() { return usage_; }
+  [[nodiscard]] const SessionUsage& usage() const { return usage_; }
   [[nodiscard]] bool connected() const { return peer_ != nullptr; }
   [[nodiscard]] std::optional<TimePoint> admitted_at() const { return admitted_at_; }
 
@@ -60,6 +65,9 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   template <typename Result, typename Handle>
   std::function<void(Result)> on_session_thread(Handle handle);
 
+  /// That a GPU worked for a frame; 0 on the CPU core.
+  [[nodiscard]] double device_seconds(const FrameStats& stats) const;
+
   SessionRegistry& registry_;
   std::shared_ptr<Peer> peer_;  // null: its connection was lost
   std::string peer_address_;    // of the last one
@@ -68,6 +76,8 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   std::string token_;  // of the hello; a link may open one scene only
   std::optional<TimePoint> admitted_at_;
   Session session_;
+  SessionUsage usage_;
+  std::optional<TimePoint> ready_since_;
 };
 
 }  // namespace catgs

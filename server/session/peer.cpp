@@ -72,9 +72,9 @@ void Peer::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, Ti
   metrics.bytes_sent.Increment(static_cast<double>(packet_bytes));
   metrics.observe_frame(ticket, now);
   // Not post(): nothing becomes due by it.
-  boost::asio::post(registry_.io_, [self = shared_from_this(), ticket, packet_bytes] {
+  boost::asio::post(registry_.io_, [self = shared_from_this(), ticket, packet_bytes, now] {
     if (const auto client = self->client_.lock())
-      client->on_frame_sent(*self, ticket, packet_bytes);
+      client->on_frame_sent(*self, ticket, packet_bytes, now);
   });
 }
 

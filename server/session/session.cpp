@@ -41,6 +41,16 @@ MotionPredictor predictor_for(const SceneEntry& scene) {
 
 }  // namespace
 
+FlowWish wish_within(const SessionPolicy& policy, const Settings& settings,
+                     glm::ivec2 viewport_px) {
+  const int fps = settings.max_fps > 0 ? settings.max_fps : policy.default_fps;
+  const int kbps =
+      settings.max_bitrate_kbps > 0 ? settings.max_bitrate_kbps : policy.default_bitrate_kbps;
+  const glm::ivec2 wish_px = settings.size_px.x > 0 ? settings.size_px : viewport_px;
+  return {frame_size(wish_px, policy.max_pixels), std::min(fps, policy.max_fps),
+          std::min(kbps, policy.max_bitrate_kbps), settings.fixed_quality};
+}
+
 Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host, TimePoint now)
     : id_(std::move(id)),
       policy_(policy),
@@ -235,14 +245,7 @@ void Session::request_stream() {
   host_.open_stream({admission_.scene->renderer, admission_.encoder.kind, encoding});
 }
 
-FlowWish Session::flow_wish() const {
-  const int fps = settings_.max_fps > 0 ? settings_.max_fps : policy_.default_fps;
-  const int kbps =
-      settings_.max_bitrate_kbps > 0 ? settings_.max_bitrate_kbps : policy_.default_bitrate_kbps;
-  const glm::ivec2 wish_px = settings_.size_px.x > 0 ? settings_.size_px : viewport_px_;
-  return {frame_size(wish_px, policy_.max_pixels), std::min(fps, policy_.max_fps),
-          std::min(kbps, policy_.max_bitrate_kbps), settings_.fixed_quality};
-}
+FlowWish Session::flow_wish() const { return wish_within(policy_, settings_, viewport_px_); }
 
 void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   opening_stream_ = false;

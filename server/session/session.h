@@ -56,6 +56,9 @@ struct SessionPolicy {
   std::chrono::milliseconds still_after{100};  // without another view: motion has stopped
 };
 
+/// What a client's wishes come to within the server's limits.
+FlowWish wish_within(const SessionPolicy& policy, const Settings& settings, glm::ivec2 viewport_px);
+
 /// What a session needs from the server around it. Its owner implements it; tests fake it.
 class SessionHost {
  public:

@@ -40,6 +40,15 @@ std::string_view state_name(const Session& session) {
   return "closed";
 }
 
+nlohmann::json times_json(const SessionUsage& usage) {
+  auto times = nlohmann::json::object();
+  for (std::size_t i = 0; i < session_time_count; ++i)
+    if (const auto p = usage.times(static_cast<SessionTime>(i)).percentiles())
+      times[std::string(session_time_names[i])] = {
+          {"p50", 1e3 * p->p50}, {"p95", 1e3 * p->p95}, {"p99", 1e3 * p->p99}};
+  return times;
+}
+
 }  // namespace
 
 std::int64_t unix_now_s() {
@@ -63,6 +72,9 @@ SessionRegistry::SessionRegistry(boost::asio::io_context& io, RegistryOptions op
       scheduler_(executor_->slots()),
       pace_timer_(io),
       tick_timer_(io),
+      cpu_seconds_charged_(process_cpu_seconds()),
+      budget_({static_cast<double>(executor_->slots()), static_cast<double>(options_.gpus)},
+              options_.min_fps),
       queue_(options_.max_queue) {
   tick();
 }
@@ -146,14 +158,14 @@ void SessionRegistry::remove(const Client& client) {
 void SessionRegistry::admit_waiting(TimePoint now) {
   while (!queue_.empty()) {
     const std::string id = queue_.front();
-    const auto next = find(id);
-    if (!has_place_for(*next)) break;
-    next->session().ask_again(now);  // leaves the queue, admitted or refused
+    find(id)->session().ask_again(
+        now);  // leaves the queue, admitted or refused, or hears its place
+    if (!queue_.empty() && queue_.front() == id) break;
   }
   queue_told_ = now;
   for (const auto& client : clients_)
     if (client->session().state() == Session::State::queued)
-      if (const auto position = queue_.join(client->session().id()))
+      if (const auto position = queue_.join(client->session().id()); position > 1)
         client->session().on_queue_moved(
             {*position, queue_.estimate(*position, static_cast<int>(admitted_))}, now);
 }
@@ -189,9 +201,20 @@ std::variant<Admission, ErrorMessage> SessionRegistry::choose(const Hello& hello
                       "the client decodes nothing that this server encodes: " + offered, true};
 }
 
-bool SessionRegistry::has_place_for(const Client& client) const {
+bool SessionRegistry::has_place_for(const Client& client, const Hello& hello) const {
   if (draining_ || (!queue_.empty() && queue_.front() != client.session().id())) return false;
-  return static_cast<int>(admitted_) < options_.max_sessions;
+  if (static_cast<int>(admitted_) >= options_.max_sessions) return false;
+  const auto demand = [](glm::ivec2 size_px, int fps) {
+    return SessionDemand{std::nullopt, 1e-6 * size_px.x * size_px.y, fps};
+  };
+  std::vector<SessionDemand> present;
+  for (const auto& c : clients_) {
+    if (!c->admitted_at()) continue;
+    present.push_back(demand(c->session().config().size_px, c->session().config().fps));
+    present.back().frame_cost = c->usage().frame_cost();
+  }
+  const FlowWish wish = wish_within(options_.policy, hello.settings, hello.viewport_px);
+  return budget_.has_room(present, demand(wish.size_px, wish.fps));
 }
 
 AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello) {
@@ -211,7 +234,7 @@ AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello)
                                     client.peer_address()),
                         true};
   }
-  if (has_place_for(client)) {
+  if (has_place_for(client, hello)) {
     queue_.leave(id);
     ++admitted_;
     metrics_.sessions_admitted.Increment();
@@ -262,6 +285,7 @@ void SessionRegistry::tick() {
       gone.push_back(client);
   }
   for (const auto& client : gone) remove(*client);
+  charge_cpu(now);
   if (now - queue_told_ >= queue_tell_interval) admit_waiting(now);
   give_frames();
   publish();
@@ -269,6 +293,16 @@ void SessionRegistry::tick() {
   tick_timer_.async_wait([this](const boost::system::error_code& error) {
     if (!error) tick();
   });
+}
+
+void SessionRegistry::charge_cpu(TimePoint now) {
+  const double used = process_cpu_seconds();
+  const double seconds = used - std::exchange(cpu_seconds_charged_, used);
+  std::vector<double> busy_seconds;
+  for (const auto& client : clients_)
+    busy_seconds.push_back(client->usage().take_busy_seconds(now));
+  const auto shares = share_out(seconds, busy_seconds);
+  for (std::size_t i = 0; i < clients_.size(); ++i) clients_[i]->usage().charge_cpu(shares[i]);
 }
 
 void SessionRegistry::publish() {
@@ -304,6 +338,9 @@ void SessionRegistry::publish() {
         {"tcp_window_bytes", session.flow().link().window_bytes},
         {"tcp_unsent_bytes", session.flow().link().unsent_bytes},
         {"frames_queued", client->queued_frames()},
+        {"cpu_seconds", client->usage().cpu_seconds()},
+        {"gpu_seconds", client->usage().gpu_seconds()},
+        {"times_ms", times_json(client->usage())},
     });
   }
   metrics_.connections.Set(connections_);

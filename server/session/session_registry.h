@@ -14,6 +14,7 @@
 #include "server/metrics.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"
+#include "server/session/admission_budget.h"
 #include "server/session/admission_queue.h"
 #include "server/session/client.h"
 #include "server/session/session_tokens.h"
@@ -23,6 +24,8 @@ namespace catgs {
 struct RegistryOptions {
   SessionPolicy policy;
   int max_sessions = 16;
+  int min_fps = 10;                   // that admission leaves everybody; 0: it counts sessions only
+  int gpus = 0;                       // that render
   int max_sessions_per_address = 64;  // a museum behind one address
   int max_queue = 64;                 // clients that wait for a place
   int max_greeting = 64;              // connections beyond: their hello is to come, or was refused
@@ -71,7 +74,9 @@ class SessionRegistry {
   /// Scene and encoder for a hello, whether there is a place or not.
   std::variant<Admission, ErrorMessage> choose(const Hello& hello) const;
   AdmissionAnswer admit(const Client& client, const Hello& hello);
-  [[nodiscard]] bool has_place_for(const Client& client) const;
+  [[nodiscard]] bool has_place_for(const Client& client, const Hello& hello) const;
+  /// Shares the processor time since the last call out among the sessions.
+  void charge_cpu(TimePoint now);
   void remove(const Client& client);
   /// Those next in the queue ask again; the others hear where they stand.
   void admit_waiting(TimePoint now);
@@ -95,11 +100,13 @@ class SessionRegistry {
   FrameScheduler scheduler_;
   boost::asio::steady_timer pace_timer_;
   boost::asio::steady_timer tick_timer_;
+  double cpu_seconds_charged_;
   bool stopped_ = false;
   bool draining_ = false;
   int connections_ = 0;
   std::unordered_map<std::string, int> connections_by_address_;
   std::uint32_t admitted_ = 0;
+  const AdmissionBudget budget_;
   AdmissionQueue queue_;
   TimePoint queue_told_{};
   std::vector<FrameCandidate> candidates_;  // scratch of give_frames()

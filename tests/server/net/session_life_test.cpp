@@ -204,6 +204,62 @@ TEST(SessionLifeOnSockets, WhoGivesUpWaitingMakesRoom) {
   EXPECT_EQ(next.receive_message(v1::ServerMessage::kQueue).queue().position(), 1u);
 }
 
+/// Frames of a camera that moves, acknowledged one by one.
+void stream(WireClient& client, std::uint64_t frames) {
+  for (std::uint64_t pose = 1; pose <= frames; ++pose) {
+    client.send_pose(pose, 0.05f * static_cast<float>(pose));
+    client.send_ack(client.receive_frame().header.frame_id());
+  }
+}
+
+TEST(SessionLifeOnSockets, AdmitsByWhatFramesWereMeasuredToCost) {
+  RunningServer server([](ServerConfig& config) {
+    config.max_sessions = 100;
+    config.min_fps = 240;
+    config.fps = 240;
+  });
+  WireClient small(server.port());
+  small.greet(320, 180);
+  stream(small, 20);
+  ASSERT_TRUE(eventually([&] { return sessions(server)[0].at("frames_sent") >= 20; }));
+  // 144 times the pixels, 240 times a second: no two threads can do that.
+  WireClient huge(server.port());
+  huge.send(hello_message(3840, 2160, v1::CODEC_H264));
+  EXPECT_EQ(huge.receive_message(v1::ServerMessage::kQueue).queue().position(), 1u);
+  small.close(1001);
+  huge.receive_message(v1::ServerMessage::kWelcome);  // alone it is as welcome as anybody
+}
+
+TEST(SessionLifeOnSockets, TellsWhatASessionTakesAndWhereItsTimeGoes) {
+  RunningServer server;
+  WireClient client(server.port());
+  const std::string id = client.greet(320, 180).session_id();
+  stream(client, 20);
+  ASSERT_TRUE(eventually([&] { return sessions(server)[0].at("frames_sent") >= 20; }));
+  const auto session = sessions(server)[0];
+  EXPECT_EQ(session.at("id"), id);
+  EXPECT_GT(session.at("cpu_seconds"), 0.0);
+  EXPECT_EQ(session.at("gpu_seconds"), 0.0);
+  EXPECT_GT(session.at("bytes_sent"), 0);
+  for (const char* time :
+       {"queue_wait", "render", "encode", "send", "pose_to_frame", "motion_to_photon"}) {
+    const auto& percentiles = session.at("times_ms").at(time);
+    EXPECT_LE(percentiles.at("p50"), percentiles.at("p95")) << time;
+    EXPECT_LE(percentiles.at("p95"), percentiles.at("p99")) << time;
+  }
+  EXPECT_GT(session.at("times_ms").at("render").at("p50"), 0.0);
+  EXPECT_GE(session.at("times_ms").at("pose_to_frame").at("p50"),
+            session.at("times_ms").at("render").at("p50"));
+
+  const std::string metrics = http_get(server.admin_port(), "/metrics").body;
+  for (const char* stage : {"queue_wait", "hand_off", "render_key", "render_sub", "encode", "send"})
+    EXPECT_THAT(metrics,
+                HasSubstr("catgs_frame_stage_seconds_count{stage=\"" + std::string(stage) + "\"}"));
+  EXPECT_GE(metric(server, "catgs_pose_to_frame_seconds_count"), 20);
+  EXPECT_EQ(metric(server, "catgs_motion_to_photon_seconds_count"), 20);
+  EXPECT_THAT(metrics, testing::Not(HasSubstr(id))) << "no label names a session";
+}
+
 TEST(SessionLifeOnSockets, LostSessionsCountForTheirAddress) {
   RunningServer server([](ServerConfig& config) { config.max_sessions_per_address = 1; });
   std::string token;

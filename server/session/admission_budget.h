@@ -1,0 +1,38 @@
+#pragma once
+
+#include <span>
+
+#include "server/session/session_usage.h"
+
+namespace catgs {
+
+/// What a session asks of the machine.
+struct SessionDemand {
+  std::optional<SessionUsage::FrameCost> frame_cost;  // as measured
+  double megapixels = 0;                              // of a frame
+  int fps = 60;                                       // nominal
+};
+
+/// Whether one more session leaves everybody a decent rate, judged by what the frames of the
+/// present ones were measured to cost. Processors and GPUs are counted apart. Pure.
+class AdmissionBudget {
+ public:
+  struct Capacity {
+    double cpus = 1;  // that work at the same time
+    double gpus = 0;
+  };
+  /// `min_fps`: the rate that everybody shall keep, or the own nominal one where that is lower; 0:
+  /// there is always room.
+  AdmissionBudget(Capacity capacity, int min_fps) : capacity_(capacity), min_fps_(min_fps) {}
+
+  /// A session without a measured cost is taken to cost the mean of the others by its pixels. With
+  /// nothing measured there is room; so there is for the first session, whatever it costs.
+  [[nodiscard]] bool has_room(std::span<const SessionDemand> present,
+                              const SessionDemand& newcomer) const;
+
+ private:
+  const Capacity capacity_;
+  const int min_fps_;
+};
+
+}  // namespace catgs

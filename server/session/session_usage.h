@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "render_core/renderer.h"
+#include "server/pipeline/frame_ticket.h"
+
+namespace catgs {
+
+/// What /api/sessions tells the times of; the last two span several stages.
+enum class SessionTime {
+  queue_wait,
+  render,
+  encode,
+  send,
+  pose_to_frame,     // pose received to frame handed to the socket
+  motion_to_photon,  // pose sampled to frame shown, on the client's clock
+};
+inline constexpr std::size_t session_time_count = 6;
+inline constexpr std::array<std::string_view, session_time_count> session_time_names = {
+    "queue_wait", "render", "encode", "send", "pose_to_frame", "motion_to_photon"};
+
+struct Percentiles {
+  double p50 = 0;
+  double p95 = 0;
+  double p99 = 0;
+};
+
+/// The last 128 values of a duration. Not thread-safe.
+class RecentTimes {
+ public:
+  void add(double seconds);
+  /// Nothing before the first value.
+  [[nodiscard]] std::optional<Percentiles> percentiles() const;
+
+ private:
+  static constexpr std::size_t capacity = 128;
+  std::vector<double> values_;
+  std::size_t next_ = 0;
+};
+
+/// What one session takes of the machine, and how long its frames take. Frames of a session are
+/// under way one at a time. Pure; not thread-safe.
+class SessionUsage {
+ public:
+  void frame_started(TimePoint now);
+  /// `device_seconds`: that a GPU worked for it; 0 on the CPU core.
+  void frame_ended(const FrameTicket& ticket, double device_seconds, TimePoint now);
+  void frame_sent(const FrameTicket& ticket, TimePoint now);
+  void frame_shown(double motion_to_photon_s);
+
+  /// Time since the last call in which a frame was under way.
+  double take_busy_seconds(TimePoint now);
+  /// Processor time of all threads that worked for it since the last call.
+  void charge_cpu(double seconds);
+
+  [[nodiscard]] double cpu_seconds() const { return cpu_seconds_; }
+  [[nodiscard]] double gpu_seconds() const { return gpu_seconds_; }
+  /// Of one rendered frame, over the last dozens; nothing until some were measured.
+  struct FrameCost {
+    double cpu_seconds = 0;
+    double gpu_seconds = 0;
+  };
+  [[nodiscard]] std::optional<FrameCost> frame_cost() const;
+  [[nodiscard]] const RecentTimes& times(SessionTime time) const {
+    return times_[static_cast<std::size_t>(time)];
+  }
+
+ private:
+  void add(SessionTime time, TimePoint from, TimePoint to);
+
+  std::optional<TimePoint> under_way_since_;
+  double busy_seconds_ = 0;
+  double cpu_seconds_ = 0;
+  double gpu_seconds_ = 0;
+  // Since the last charge_cpu().
+  int rendered_ = 0;
+  double rendered_gpu_seconds_ = 0;
+  int frames_measured_ = 0;
+  FrameCost cost_;
+  std::array<RecentTimes, session_time_count> times_;
+};
+
+/// Shares processor time out in proportion to the time that each was busy. Helpers of a frame run
+/// on threads of a common pool, so that the process is measured and not the threads.
+std::vector<double> share_out(double seconds, const std::vector<double>& busy_seconds);
+
+/// Processor time of this process so far, all threads.
+double process_cpu_seconds();
+
+}  // namespace catgs

@@ -1,0 +1,66 @@
+#include "server/session/admission_budget.h"
+
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+using FrameCost = SessionUsage::FrameCost;
+
+SessionDemand session(double cpu_s, double gpu_s = 0.0, double megapixels = 1.0, int fps = 60) {
+  return {FrameCost{cpu_s, gpu_s}, megapixels, fps};
+}
+SessionDemand unknown(double megapixels = 1.0, int fps = 60) {
+  return {std::nullopt, megapixels, fps};
+}
+
+TEST(AdmissionBudget, AdmitsWhileTheProcessorsKeepTheRate) {
+  const AdmissionBudget budget({.cpus = 2}, 10);
+  std::vector<SessionDemand> present;
+  // 0.04 s x 10 Hz: five sessions fill two processors.
+  for (int i = 0; i < 4; ++i) {
+    present.push_back(session(0.04));
+    EXPECT_TRUE(budget.has_room(present, unknown())) << i;
+  }
+  present.push_back(session(0.04));
+  EXPECT_FALSE(budget.has_room(present, unknown()));
+  EXPECT_FALSE(budget.has_room(present, unknown(0.01)));
+}
+
+TEST(AdmissionBudget, TheFirstSessionAlwaysFindsRoom) {
+  const AdmissionBudget budget({.cpus = 1}, 60);
+  EXPECT_TRUE(budget.has_room({}, unknown(8.0)));
+  EXPECT_FALSE(budget.has_room(std::vector{session(1.0)}, unknown()));
+}
+
+TEST(AdmissionBudget, JudgesNewcomersByTheirPixelsAndRate) {
+  const AdmissionBudget budget({.cpus = 1}, 10);
+  const std::vector present{session(0.05)};  // half the processor
+  EXPECT_TRUE(budget.has_room(present, unknown(1.0)));
+  EXPECT_FALSE(budget.has_room(present, unknown(1.1)));
+  EXPECT_TRUE(budget.has_room(present, unknown(2.0, 5))) << "who wants less gets in";
+}
+
+TEST(AdmissionBudget, CountsThoseNotMeasuredYet) {
+  const AdmissionBudget budget({.cpus = 1}, 10);
+  EXPECT_TRUE(budget.has_room(std::vector{unknown(), unknown(), unknown()}, unknown()))
+      << "nothing is known";
+  EXPECT_FALSE(budget.has_room(std::vector{session(0.05), unknown()}, unknown()));
+}
+
+TEST(AdmissionBudget, TheScarcerOfProcessorsAndGpusDecides) {
+  const AdmissionBudget budget({.cpus = 16, .gpus = 1}, 10);
+  EXPECT_TRUE(budget.has_room(std::vector{session(0.001, 0.04)}, unknown()));
+  EXPECT_FALSE(budget.has_room(std::vector{session(0.001, 0.06)}, unknown()));
+  EXPECT_FALSE(budget.has_room(std::vector{session(0.9, 0.001)}, unknown()));
+}
+
+TEST(AdmissionBudget, CanBeSwitchedOff) {
+  const AdmissionBudget budget({.cpus = 1}, 0);
+  EXPECT_TRUE(budget.has_room(std::vector{session(100.0)}, unknown()));
+}
+
+}  // namespace
+}  // namespace catgs
