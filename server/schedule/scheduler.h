@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <span>
 
@@ -10,29 +11,40 @@ namespace catgs {
 
 /// A session that could start a frame.
 struct FrameCandidate {
-  TimePoint ready;     // not before (its nominal rate)
-  TimePoint deadline;  // when its nominal rate says that the frame is due
+  TimePoint ready;              // not before (its nominal rate)
+  TimePoint deadline;           // when its nominal rate says that the frame is due
+  Clock::duration cost{};       // measured: what it will probably take
+  bool key = false;             // probably a key frame
+  std::optional<int> device{};  // that renders it, where devices have numbers
 };
 
-/// Who renders next on one device: earliest deadline first. Each frame moves its session's deadline
-/// on from the moment it started, so that under overload the sessions take turns: everyone's rate
-/// falls and nobody starves. Pure; not thread-safe.
+/// Who renders next: earliest deadline first, the deadline being the last moment at which a frame
+/// can start to be ready in time by what its session's frames have cost. Each frame moves its
+/// session's deadline on from the moment it started, so that under overload the sessions take
+/// turns: everyone's rate falls and nobody starves. Key frames cost several times a sub-frame, and
+/// sessions that began together need theirs together: while a device renders one, sub-frames go
+/// first there, as long as the next key frame can wait without missing its deadline. No slot stays
+/// empty for it. Pure; not thread-safe.
 class FrameScheduler {
  public:
   explicit FrameScheduler(int slots) : slots_(slots) {}
 
   [[nodiscard]] bool has_free_slot() const { return running_ < slots_; }
-  void frame_started() { ++running_; }
-  void frame_ended() { --running_; }
+  void frame_started(const FrameCandidate& frame);
+  /// `frame` is what frame_started() was told.
+  void frame_ended(const FrameCandidate& frame);
   [[nodiscard]] int running() const { return running_; }
 
   /// Index of the candidate to start now; none: nobody is ready.
-  [[nodiscard]] static std::optional<std::size_t> choose(std::span<const FrameCandidate> candidates,
-                                                         TimePoint now);
+  [[nodiscard]] std::optional<std::size_t> choose(std::span<const FrameCandidate> candidates,
+                                                  TimePoint now) const;
 
  private:
+  [[nodiscard]] bool can_wait(const FrameCandidate& candidate, TimePoint now) const;
+
   int slots_;
   int running_ = 0;
+  std::map<std::optional<int>, int> key_frames_running_;  // by device
 };
 
 }  // namespace catgs

@@ -165,17 +165,18 @@ void Client::open_stream(StreamSettings settings) {
                   }));
 }
 
-void Client::start_frame(TimePoint now) {
+void Client::start_frame(const FrameCandidate& candidate, TimePoint now) {
   FrameOrder order = session_.start_frame(now);
   order.ticket.ready = std::min(std::exchange(ready_since_, std::nullopt).value_or(now), now);
   order.ticket.started = now;
   usage_.frame_started(now);
   FrameJob job{stream_,        order.ticket,   order.request, order.bitrate_kbps,
                order.real_fps, order.force_idr};
-  registry_.scheduler_.frame_started();
+  registry_.scheduler_.frame_started(candidate);
   executor_->submit(
-      std::move(job), on_session_thread<FrameResult>([](Client& client, FrameResult result) {
-        client.registry_.scheduler_.frame_ended();
+      std::move(job),
+      on_session_thread<FrameResult>([candidate](Client& client, FrameResult result) {
+        client.registry_.scheduler_.frame_ended(candidate);
         Metrics& metrics = client.registry_.metrics_;
         (result.ok
              ? (result.frame.ticket.refined ? metrics.frames_refined : metrics.frames_rendered)

@@ -49,7 +49,7 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   /// Something happened: since when could a frame start?
   void note_readiness(TimePoint now);
   /// Starts the frame that the session's next_frame() announced.
-  void start_frame(TimePoint now);
+  void start_frame(const FrameCandidate& candidate, TimePoint now);
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const std::string& peer_address() const { return peer_address_; }

@@ -283,18 +283,21 @@ std::optional<FrameCandidate> Session::next_frame() const {
   if (state_ != State::live || lost_at_ || paused_ || rendering_ || opening_stream_ || !pose_ ||
       !flow_.may_send())
     return std::nullopt;
-  TimePoint ready = next_start_;
+  FrameCandidate frame{next_start_, {}, cost_.next(), cost_.key_is_next(), device_};
   if (!picture_is_stale()) {
     if (refinements_left_ == 0 && !shown_is_sub_frame_) return std::nullopt;
     // Between two poses of a moving camera a refinement would only be in the next one's way.
-    ready = std::max(ready, last_motion_ + policy_.still_after);
+    frame.ready = std::max(frame.ready, last_motion_ + policy_.still_after);
+    frame.key = shown_is_sub_frame_;
+    if (!frame.key) frame.cost = cost_.refinement();
   }
-  return FrameCandidate{ready, ready + flow_.frame_interval()};
+  frame.deadline = frame.ready + flow_.frame_interval();
+  return frame;
 }
 
 FrameOrder Session::start_frame(TimePoint now) {
-  // The nominal rate is kept on average; what is lost is not caught up.
   const int real_fps = measure_rate(now);
+  // The nominal rate is kept on average; what is lost is not caught up.
   next_start_ = std::max(next_start_, now - flow_.frame_interval()) + flow_.frame_interval();
   rendering_ = true;
   FrameOrder order;
@@ -354,6 +357,7 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   failures_ = 0;
   if (result.frame.ticket.frame_id <= obsolete_frames_) return;
   last_said_ = now;
+  cost_.add(result.frame.ticket);
   if (!result.frame.ticket.refined) shown_is_sub_frame_ = result.frame.ticket.speculated;
   flow_.sent(result.frame.ticket.frame_id, result.frame.bitstream.size(),
              result.frame.ticket.size_px, now);

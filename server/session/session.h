@@ -13,6 +13,7 @@
 #include "server/net/connection.h"
 #include "server/net/messages.h"
 #include "server/schedule/frame_executor.h"
+#include "server/schedule/next_frame_cost.h"
 #include "server/schedule/scheduler.h"
 #include "server/session/admission_queue.h"
 #include "server/session/flow_control.h"
@@ -188,6 +189,7 @@ class Session {
   bool welcome_due_ = false;      // the scene is new to the client
 
   FlowControl flow_;
+  NextFrameCost cost_;
   std::optional<PoseSample> pose_;  // newest
   TimePoint pose_received_{};
   MotionPredictor predictor_;  // on the client's clock

@@ -262,7 +262,7 @@ void SessionRegistry::give_frames() {
     }
     if (candidates_.empty()) return;
     const TimePoint now = Clock::now();
-    const auto chosen = FrameScheduler::choose(candidates_, now);
+    const auto chosen = scheduler_.choose(candidates_, now);
     if (!chosen) {
       const auto next = std::ranges::min_element(candidates_, {}, &FrameCandidate::ready);
       pace_timer_.expires_at(next->ready);
@@ -271,7 +271,7 @@ void SessionRegistry::give_frames() {
       });
       return;
     }
-    candidate_clients_[*chosen]->start_frame(now);
+    candidate_clients_[*chosen]->start_frame(candidates_[*chosen], now);
   }
 }
 
