@@ -9,6 +9,7 @@
 #include "render_core/build_info.h"
 #include "server/net/wire.h"
 #include "server/session/frame_size.h"
+#include "server/session/same_view.h"
 
 namespace catgs {
 namespace {
@@ -19,20 +20,6 @@ using namespace std::chrono_literals;
 constexpr auto speak_at_least_every = 750ms;
 constexpr auto min_idr_request_interval = 250ms;
 constexpr int max_failures_in_a_row = 3;
-
-/// Do two poses show the same picture? The bounds are a hundredth of a pixel for a focal length of
-/// 1000 px, turned, or moved beside something at the near plane.
-bool same_view(const PoseSample& a, const PoseSample& b, float near_z) {
-  constexpr float tolerance = 1.0e-5f;
-  const Pose& p = a.world_from_camera;
-  const Pose& q = b.world_from_camera;
-  // For unit quaternions |qa - ±qb| is half the angle between them.
-  const glm::quat delta = p.orientation - q.orientation;
-  const glm::quat sum = p.orientation + q.orientation;
-  const float half_angle = std::min(glm::length(delta), glm::length(sum));
-  return 2.0f * half_angle <= tolerance && std::abs(a.fov_y_rad - b.fov_y_rad) <= tolerance &&
-         glm::length(p.position - q.position) <= tolerance * near_z;
-}
 
 /// Knows nothing yet of the motion through the scene.
 MotionPredictor predictor_for(const SceneEntry& scene) {
@@ -180,6 +167,11 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   pose_ = sample;
   pose_received_ = now;
   predictor_.add({sample.client_time_us, sample.world_from_camera});
+  // What is drawn now is seen as much later as pictures have come after their poses lately.
+  aimed_ahead_us_ = flow_.pose_to_photon().count();
+  aim_ = sample;
+  if (const auto ahead = predictor_.at(sample.client_time_us + aimed_ahead_us_))
+    aim_.world_from_camera = *ahead;
 }
 
 void Session::on(const Ack& ack, TimePoint now) {
@@ -276,7 +268,7 @@ void Session::say_config(TimePoint now) {
 }
 
 bool Session::picture_is_stale() const {
-  return idr_due_ || !shown_ || !same_view(*shown_, *pose_, admission_.scene->facts.near_z);
+  return idr_due_ || !shown_ || !same_view(*shown_, aim_, admission_.scene->facts.near_z);
 }
 
 std::optional<FrameCandidate> Session::next_frame() const {
@@ -285,10 +277,10 @@ std::optional<FrameCandidate> Session::next_frame() const {
     return std::nullopt;
   FrameCandidate frame{next_start_, {}, cost_.next(), cost_.key_is_next(), device_};
   if (!picture_is_stale()) {
-    if (refinements_left_ == 0 && !shown_is_sub_frame_) return std::nullopt;
+    if (refinements_left_ == 0 && !shown_is_passing_) return std::nullopt;
     // Between two poses of a moving camera a refinement would only be in the next one's way.
     frame.ready = std::max(frame.ready, last_motion_ + policy_.still_after);
-    frame.key = shown_is_sub_frame_;
+    frame.key = shown_is_passing_;
     if (!frame.key) frame.cost = cost_.refinement();
   }
   frame.deadline = frame.ready + flow_.frame_interval();
@@ -302,18 +294,21 @@ FrameOrder Session::start_frame(TimePoint now) {
   rendering_ = true;
   FrameOrder order;
   const bool still = !picture_is_stale();
-  // What stays is a key frame: a sub-frame may lack a little at the edges of tiles.
-  order.ticket.refined = still && !shown_is_sub_frame_;
+  // What stays is a key frame of the pose itself: a sub-frame may lack a little at the edges of
+  // tiles, and a forecast goes further than a camera that stops.
+  order.ticket.refined = still && !shown_is_passing_;
+  if (still) aim_ = *pose_;
   order.force_idr = std::exchange(idr_due_, false);
   order.bitrate_kbps = flow_.bitrate_kbps();
   order.real_fps = real_fps;
+  shown_is_passing_ = !same_view(aim_, *pose_, admission_.scene->facts.near_z);
   if (order.ticket.refined)
     --refinements_left_;
   else
     refinements_left_ = config_.codec == Codec::h264 ? policy_.refine_frames : 0;
-  shown_ = pose_;
+  shown_ = aim_;
 
-  const Pose& pose = pose_->world_from_camera;
+  const Pose& pose = aim_.world_from_camera;
   order.ticket.frame_id = ++frames_started_;
   order.ticket.pose_id = pose_->pose_id;
   order.ticket.pose_client_time_us = pose_->client_time_us;
@@ -324,8 +319,9 @@ FrameOrder Session::start_frame(TimePoint now) {
   order.request.camera =
       make_camera(pose, config_.size_px, focal_from_fov_y(pose_->fov_y_rad, config_.size_px.y),
                   admission_.scene->facts.near_z);
-  order.request.forecast =
-      predictor_.forecast(pose_->client_time_us, real_fps, SpeculationSettings{}.initial_window);
+  if (!still)
+    order.request.forecast = predictor_.forecast(pose_->client_time_us + aimed_ahead_us_, real_fps,
+                                                 SpeculationSettings{}.initial_window);
   return order;
 }
 
@@ -358,7 +354,7 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   if (result.frame.ticket.frame_id <= obsolete_frames_) return;
   last_said_ = now;
   cost_.add(result.frame.ticket);
-  if (!result.frame.ticket.refined) shown_is_sub_frame_ = result.frame.ticket.speculated;
+  if (result.frame.ticket.speculated) shown_is_passing_ = true;
   flow_.sent(result.frame.ticket.frame_id, result.frame.bitstream.size(),
              result.frame.ticket.size_px, now);
   const auto dropped = host_.send(std::move(result.frame));

@@ -193,9 +193,11 @@ class Session {
   std::optional<PoseSample> pose_;  // newest
   TimePoint pose_received_{};
   MotionPredictor predictor_;  // on the client's clock
+  PoseSample aim_;             // `pose_`, where the camera will be when the next picture is seen
+  std::int64_t aimed_ahead_us_ = 0;
   TimePoint last_motion_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
-  bool shown_is_sub_frame_ = false;
+  bool shown_is_passing_ = false;    // it may not stay: a sub-frame, or of a forecast
   int refinements_left_ = 0;
   bool rendering_ = false;
   std::optional<TimePoint> lost_at_;

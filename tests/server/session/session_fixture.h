@@ -97,10 +97,11 @@ class SessionTest : public testing::Test {
     session.on_frame(std::move(result), now);
     if (!dropped) session.on_frame_sent(order.ticket, 100);
   }
-  void ack(std::uint64_t id) {
+  void ack(std::uint64_t id, std::uint32_t pose_age_us = 0) {
     Ack message;
     message.frame_id = id;
     message.presented_us = 1;
+    message.pose_age_us = pose_age_us;
     session.on_message(message, now);
   }
 
