@@ -23,9 +23,15 @@ constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
 
 bool is_role(std::string_view role) {
-  return !role.empty() && role.size() <= 32 && std::ranges::all_of(role, [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
-  });
+  return role == "viewer" || role == "spectator" || role == "solo";
+}
+
+/// Why the role forbids it; nothing: it does not.
+std::optional<std::string> forbidden(std::string_view role, Use use) {
+  if (use == Use::own_session && role == "spectator")
+    return "this link lets you watch others, not move by yourself";
+  if (use == Use::watch && role == "solo") return "this link does not let you watch others";
+  return std::nullopt;
 }
 
 std::string read_text(const std::filesystem::path& path, std::string_view flag) {
@@ -37,7 +43,7 @@ std::string read_text(const std::filesystem::path& path, std::string_view flag) 
 
 std::string make_link_token(const LinkGrant& grant, std::string_view key) {
   if (!is_role(grant.role))
-    throw InputError("--role " + grant.role, {}, "is no role", "use a-z, 0-9 and -");
+    throw InputError("--role " + grant.role, {}, "is no role", "use viewer, spectator or solo");
   if (grant.scene_id.find('\n') != std::string::npos || grant.scene_id.size() > 128)
     throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
   const std::string payload =
@@ -55,6 +61,7 @@ std::optional<LinkGrant> read_link_token(std::string_view token, std::string_vie
   std::getline(lines, grant.role);
   std::getline(lines, expires);
   const char* end = expires.data() + expires.size();
+  if (!is_role(grant.role)) return std::nullopt;
   if (std::from_chars(expires.data(), end, grant.expires_unix_s).ptr != end) return std::nullopt;
   return grant;
 }
@@ -94,7 +101,7 @@ AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::
 }
 
 std::optional<std::string> AccessControl::refusal(std::string_view token, std::string_view scene_id,
-                                                  std::int64_t now_unix_s) {
+                                                  std::int64_t now_unix_s, Use use) {
   const std::lock_guard lock(mutex_);
   if (token_file_.empty() && key_.empty()) return std::nullopt;
   if (token.empty()) return "this server needs an access token: open the link you were given";
@@ -107,7 +114,7 @@ std::optional<std::string> AccessControl::refusal(std::string_view token, std::s
       if (now_unix_s >= grant->expires_unix_s) return "this link has expired: ask for a new one";
       if (!grant->scene_id.empty() && grant->scene_id != scene_id)
         return "this link is for another scene";
-      return std::nullopt;
+      return forbidden(grant->role, use);
     }
   }
   return "the access token is not valid here";

@@ -8,12 +8,16 @@
 #include <string_view>
 #include <vector>
 
+#include "server/session/authorize.h"
+
 namespace catgs {
 
 /// What an expiring link allows.
 struct LinkGrant {
-  std::string scene_id;         // empty: every scene
-  std::string role = "viewer";  // [a-z0-9-]{1,32}; for logs today
+  std::string scene_id;  // empty: every scene
+  /// "viewer": may do everything; "spectator": only watch others' sessions; "solo": neither watch
+  /// nor be watched.
+  std::string role = "viewer";
   std::int64_t expires_unix_s = 0;
 };
 
@@ -39,7 +43,7 @@ class AccessControl {
   /// Why `token` does not admit to the scene, for people; nothing: it does. The token file is read
   /// again when it has changed; when that fails, its last good content stays in force.
   std::optional<std::string> refusal(std::string_view token, std::string_view scene_id,
-                                     std::int64_t now_unix_s);
+                                     std::int64_t now_unix_s, Use use = Use::own_session);
 
  private:
   void reload_when_changed();

@@ -29,7 +29,9 @@ void add_token_command(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("token", "Make an access token for an expiring link");
   auto options = std::make_shared<TokenOptions>();
   command->add_option("--scene", options->grant.scene_id, "Scene id; without it every scene");
-  command->add_option("--role", options->grant.role, "Role of the visitor, recorded in the token")
+  command
+      ->add_option("--role", options->grant.role,
+                   "viewer; spectator: only watches others; solo: neither watches nor is watched")
       ->capture_default_str();
   command->add_option("--expires", options->expires, "Life of the link: 90s, 30m, 12h, 7d")
       ->capture_default_str();

@@ -199,6 +199,8 @@ std::vector<Setting> make_settings() {
               &C::max_queue, 0, 10'000),
       integer("idle-timeout", "SECONDS", "Close a session in which nothing moved; 0: never",
               &C::idle_timeout_s, 0, 86'400),
+      integer("max-spectators", "N", "Clients that may watch one session; 0: nobody",
+              &C::max_spectators, 0, 1000),
       integer("drain-wait", "SECONDS",
               "After SIGTERM, time for proxies to see /readyz fail before clients are told",
               &C::drain_wait_s, 0, 600),

@@ -32,6 +32,7 @@ struct ServerConfig {
   int max_sessions = 16;
   int max_sessions_per_address = 64;
   int max_queue = 64;
+  int max_spectators = 16;
   int min_fps = 10;
   int idle_timeout_s = 900;  // 0: never
   int drain_wait_s = 4;

@@ -56,6 +56,7 @@ Metrics::Metrics()
           gauge(registry_, "catgs_sessions_lost", "Admitted sessions whose client may come back")),
       sessions_waiting(
           gauge(registry_, "catgs_sessions_waiting", "Clients in the queue for a place")),
+      spectators(gauge(registry_, "catgs_spectators", "Clients that watch others' sessions")),
       frames_running(gauge(registry_, "catgs_frames_running", "Frames being rendered or encoded")),
       frames_queued(
           gauge(registry_, "catgs_frames_queued", "Encoded frames waiting for their sockets")),

@@ -38,8 +38,9 @@ class Metrics {
   prometheus::Gauge& sessions;
   prometheus::Gauge& sessions_lost;     // admitted, waiting for their clients to come back
   prometheus::Gauge& sessions_waiting;  // for a place
-  prometheus::Gauge& frames_running;    // being rendered or encoded
-  prometheus::Gauge& frames_queued;     // encoded, waiting for their sockets
+  prometheus::Gauge& spectators;
+  prometheus::Gauge& frames_running;  // being rendered or encoded
+  prometheus::Gauge& frames_queued;   // encoded, waiting for their sockets
   prometheus::Gauge& frames_in_flight;
   prometheus::Counter& sessions_admitted;
   prometheus::Counter& sessions_refused;

@@ -59,6 +59,7 @@ RegistryOptions registry_options(const ServerConfig& config) {
   options.max_sessions = config.max_sessions;
   options.max_sessions_per_address = config.max_sessions_per_address;
   options.max_queue = config.max_queue;
+  options.max_spectators = config.max_spectators;
   options.min_fps = config.min_fps;
   return options;
 }
@@ -155,7 +156,7 @@ HttpResponse Server::State::list_scenes(const std::string& token) {
   std::string refusal;
   for (const auto& scene : scenes) {
     const SceneFacts& facts = scene->facts;
-    if (const auto refused = access.refusal(token, facts.scene_id, unix_now_s()))
+    if (const auto refused = access.refusal(token, facts.scene_id, unix_now_s(), Use::list))
       refusal = *refused;
     else
       list.push_back(
@@ -179,8 +180,8 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
   State& s = *state_;
   s.scenes = load_scenes(s.config, {s.config.renderer, s.pool, s.config.simd, s.devices});
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
-  auto authorize = [&s](const std::string& token, const std::string& scene_id) {
-    return s.access.refusal(token, scene_id, unix_now_s());
+  auto authorize = [&s](const std::string& token, const std::string& scene_id, Use use) {
+    return s.access.refusal(token, scene_id, unix_now_s(), use);
   };
   RegistryOptions options = registry_options(s.config);
   options.gpus = static_cast<int>(s.devices->views().size());

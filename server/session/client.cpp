@@ -13,11 +13,24 @@
 #include "server/session/session_registry.h"
 
 namespace catgs {
+namespace {
+
+/// The host's secrets stay the host's, and so does the choice of the scene.
+Welcome for_spectators(Welcome welcome) {
+  welcome.resume_token.clear();
+  welcome.watch_token.clear();
+  welcome.scene_ids = {welcome.scene.scene_id};
+  welcome.watching = true;
+  return welcome;
+}
+
+}  // namespace
 Client::Client(SessionRegistry& registry, std::string session_id, std::string peer_address)
     : registry_(registry),
       peer_address_(std::move(peer_address)),
       executor_(registry.executor_),
-      session_(std::move(session_id), registry.options_.policy, *this, Clock::now()) {}
+      session_(std::move(session_id), registry.options_.policy, *this, Clock::now()),
+      spectators_(registry.options_.max_spectators) {}
 
 Client::~Client() { executor_->close(std::move(stream_)); }
 
@@ -29,6 +42,7 @@ void Client::attach(const std::shared_ptr<Peer>& peer) {
 }
 
 void Client::on_message(Peer& from, const ClientMessage& message, TimePoint now) {
+  if (!is_host(from)) return on_spectator_message(from, message);
   if (const auto* hello = std::get_if<Hello>(&message);
       hello && session_.state() == Session::State::awaiting_hello)
     return registry_.on_hello(from.shared_from_this(), shared_from_this(), *hello, now);
@@ -43,7 +57,31 @@ void Client::on_message(Peer& from, const ClientMessage& message, TimePoint now)
   note_readiness(Clock::now());
 }
 
-void Client::on_link(Peer&, const LinkState& link, TimePoint now) { session_.on_link(link, now); }
+void Client::on_link(Peer& of, const LinkState& link, TimePoint now) {
+  if (is_host(of)) session_.on_link(link, now);
+}
+
+void Client::add_spectator(const std::shared_ptr<Peer>& peer) {
+  Welcome welcome = session_.welcome();
+  peer->watch(shared_from_this());
+  spectators_.add(peer, for_spectators(std::move(welcome)));
+  const LogSession about(session_.id());
+  spdlog::info("{} watches", peer->connection().peer_address());
+  if (spectators_.wants_idr(Clock::now())) session_.want_idr();
+}
+
+void Client::on_spectator_message(Peer& from, const ClientMessage& message) {
+  if (std::holds_alternative<RequestIdr>(message)) spectators_.needs_idr(from);
+  if (!std::holds_alternative<Bye>(message)) return;
+  spectators_.remove(from);
+  from.dismiss(CloseCode::normal, "bye");
+}
+
+void Client::on_tick(TimePoint now) {
+  session_.on_tick(now);
+  spectators_.keep_talking(now);
+  if (spectators_.wants_idr(now)) session_.want_idr();
+}
 
 void Client::note_readiness(TimePoint now) {
   const auto candidate = session_.next_frame();
@@ -52,13 +90,15 @@ void Client::note_readiness(TimePoint now) {
   ready_since_ = std::min(ready_since_.value_or(ready), ready);
 }
 
-void Client::on_frame_sent(Peer&, const FrameTicket& ticket, std::size_t packet_bytes,
+void Client::on_frame_sent(Peer& by, const FrameTicket& ticket, std::size_t packet_bytes,
                            TimePoint now) {
+  if (!is_host(by)) return;
   usage_.frame_sent(ticket, now);
   session_.on_frame_sent(ticket, packet_bytes);
 }
 
-void Client::on_close(Peer&, bool by_leaving) {
+void Client::on_close(Peer& closed, bool by_leaving) {
+  if (!is_host(closed)) return spectators_.remove(closed);
   peer_.reset();
   if (by_leaving || !admitted_at_)
     session_.on_disconnected();
@@ -67,7 +107,12 @@ void Client::on_close(Peer&, bool by_leaving) {
   if (session_.state() == Session::State::closed) registry_.remove(*this);
 }
 
-void Client::refuse(Peer&, ErrorCode code, std::string_view why) { session_.fail(code, why); }
+void Client::refuse(Peer& from, ErrorCode code, std::string_view why) {
+  if (is_host(from)) return session_.fail(code, why);
+  spectators_.remove(from);
+  from.connection().send(wire::serialize(ErrorMessage{code, std::string(why), true}));
+  from.dismiss(CloseCode::policy_violation, why);
+}
 
 AdmissionAnswer Client::admit(const Hello& hello) {
   token_ = hello.token;
@@ -93,7 +138,8 @@ void Client::resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admis
 std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> Client::find_scene(
     const std::string& scene_id) {
   auto scene = registry_.find_scene(scene_id);
-  if (const auto refusal = registry_.authorize_(token_, scene ? scene->facts.scene_id : scene_id))
+  if (const auto refusal =
+          registry_.authorize_(token_, scene ? scene->facts.scene_id : scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
   if (scene) return scene;
   return ErrorMessage{ErrorCode::unknown_scene, "there is no scene \"" + scene_id + "\" here",
@@ -103,15 +149,20 @@ std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> Client::find_scene
 std::vector<std::string> Client::scene_ids() {
   std::vector<std::string> ids;
   for (const auto& scene : registry_.scenes_)
-    if (!registry_.authorize_(token_, scene->facts.scene_id)) ids.push_back(scene->facts.scene_id);
+    if (!registry_.authorize_(token_, scene->facts.scene_id, Use::own_session))
+      ids.push_back(scene->facts.scene_id);
   return ids;
 }
 
 std::uint32_t Client::session_count() { return registry_.admitted_; }
 
 void Client::sign(Welcome& welcome) {
-  welcome.resume_token =
-      registry_.tokens_.resume_token(welcome.session_id, welcome.scene.scene_id, unix_now_s());
+  const std::string& scene_id = welcome.scene.scene_id;
+  const SessionTokens& tokens = registry_.tokens_;
+  welcome.resume_token = tokens.resume_token(session_.id(), scene_id, unix_now_s());
+  const bool shareable =
+      registry_.options_.max_spectators > 0 && !registry_.authorize_(token_, scene_id, Use::watch);
+  if (shareable) welcome.watch_token = tokens.watch_token(session_.id());
 }
 
 void Client::send(const ServerMessage& message) {
@@ -121,9 +172,15 @@ void Client::send(const ServerMessage& message) {
     if (error->fatal) registry_.metrics_.sessions_refused.Increment();
   }
   if (peer_) peer_->connection().send(wire::serialize(message));
+  const TimePoint now = Clock::now();
+  if (const auto* welcome = std::get_if<Welcome>(&message))
+    spectators_.send(for_spectators(*welcome), now);
+  else if (std::holds_alternative<StreamConfig>(message) || std::holds_alternative<Drain>(message))
+    spectators_.send(message, now);
 }
 
 std::vector<std::uint64_t> Client::send(OutgoingFrame frame) {
+  spectators_.send(frame, Clock::now());
   if (!peer_) return {};
   auto dropped = peer_->connection().send(std::move(frame));
   registry_.metrics_.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));

@@ -7,6 +7,7 @@
 #include "server/session/peer.h"
 #include "server/session/session.h"
 #include "server/session/session_usage.h"
+#include "server/session/spectator_hub.h"
 
 namespace catgs {
 
@@ -46,6 +47,9 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   /// Continues the session of a client that was lost, through `peer`.
   void resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,
               TimePoint now);
+  void add_spectator(const std::shared_ptr<Peer>& peer);
+  [[nodiscard]] SpectatorHub& spectators() { return spectators_; }
+  void on_tick(TimePoint now);
   /// Something happened: since when could a frame start?
   void note_readiness(TimePoint now);
   /// Starts the frame that the session's next_frame() announced.
@@ -68,6 +72,10 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   /// That a GPU worked for a frame; 0 on the CPU core.
   [[nodiscard]] double device_seconds(const FrameStats& stats) const;
 
+  /// Everything but good-bye and lost decoders is the host's business.
+  void on_spectator_message(Peer& from, const ClientMessage& message);
+  [[nodiscard]] bool is_host(const Peer& peer) const { return peer_.get() == &peer; }
+
   SessionRegistry& registry_;
   std::shared_ptr<Peer> peer_;  // null: its connection was lost
   std::string peer_address_;    // of the last one
@@ -78,6 +86,7 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   Session session_;
   SessionUsage usage_;
   std::optional<TimePoint> ready_since_;
+  SpectatorHub spectators_;
 };
 
 }  // namespace catgs

@@ -70,6 +70,7 @@ void Peer::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, Ti
   Metrics& metrics = registry_.metrics_;
   metrics.frames_sent.Increment();
   metrics.bytes_sent.Increment(static_cast<double>(packet_bytes));
+  if (watching_) return;
   metrics.observe_frame(ticket, now);
   // Not post(): nothing becomes due by it.
   boost::asio::post(registry_.io_, [self = shared_from_this(), ticket, packet_bytes, now] {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -29,6 +30,11 @@ class Peer final : public ConnectionListener, public std::enable_shared_from_thi
   // Session thread, and the constructing one.
   /// From here on messages are for this client.
   void belong_to(const std::shared_ptr<Client>& client) { client_ = client; }
+  /// The same, and what is sent counts for nobody's latency.
+  void watch(const std::shared_ptr<Client>& client) {
+    watching_ = true;
+    belong_to(client);
+  }
   /// Closes, and nothing that still comes in is for anybody.
   void dismiss(CloseCode code, std::string_view reason);
   [[nodiscard]] Connection& connection() const { return *connection_; }
@@ -50,6 +56,7 @@ class Peer final : public ConnectionListener, public std::enable_shared_from_thi
   bool refused_ = false;  // network thread: nothing more is read
   LatestSlot<ReceivedPose> latest_pose_;
   std::weak_ptr<Client> client_;  // session thread
+  std::atomic<bool> watching_{false};
 };
 
 }  // namespace catgs

@@ -255,7 +255,11 @@ void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
 }
 
 void Session::say_config(TimePoint now) {
-  if (!std::exchange(welcome_due_, false)) return say(config_, now);
+  if (std::exchange(welcome_due_, false)) return say(welcome(), now);
+  say(config_, now);
+}
+
+Welcome Session::welcome() {
   Welcome welcome;
   welcome.session_id = id_;
   welcome.scene = admission_.scene->facts;
@@ -264,7 +268,7 @@ void Session::say_config(TimePoint now) {
   welcome.server_version = build_version;
   welcome.scene_ids = host_.scene_ids();
   host_.sign(welcome);
-  say(welcome, now);
+  return welcome;
 }
 
 bool Session::picture_is_stale() const {

@@ -113,6 +113,10 @@ class Session {
   void fail(ErrorCode code, std::string_view message);
   /// Asks the client to go on elsewhere; frames go on until it does.
   void drain(std::chrono::milliseconds deadline);
+  /// The next frame shall be an IDR.
+  void want_idr() { idr_due_ = true; }
+  /// What a client is told first. Only while live.
+  [[nodiscard]] Welcome welcome();
   /// Closes the connection of a server that goes away.
   void end(std::string_view reason);
   /// While queued: it moved up, or a second has passed.

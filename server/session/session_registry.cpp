@@ -99,7 +99,8 @@ void SessionRegistry::add(const std::shared_ptr<Peer>& peer,
   };
   if (draining_)
     refuse("this server is shutting down");
-  else if (connections_ > options_.max_sessions + options_.max_queue + options_.max_greeting)
+  else if (connections_ > options_.max_sessions * (1 + options_.max_spectators) +
+                              options_.max_queue + options_.max_greeting)
     refuse("too many connections: try again in a minute");
   else if (same_address > options_.max_sessions_per_address)
     refuse(
@@ -114,6 +115,7 @@ void SessionRegistry::forget_connection(const std::string& address) {
 
 void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_ptr<Client> newcomer,
                                Hello hello, TimePoint now) {
+  if (!hello.watch_token.empty()) return watch(peer, *newcomer, hello);
   const auto resumed = tokens_.read_resume_token(hello.resume_token, unix_now_s());
   if (resumed && hello.version >= wire::version) {
     if (hello.scene_id.empty()) hello.scene_id = resumed->scene_id;
@@ -138,6 +140,32 @@ void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_pt
   newcomer->session().on_message(hello, now);
 }
 
+void SessionRegistry::watch(const std::shared_ptr<Peer>& peer, Client& newcomer,
+                            const Hello& hello) {
+  const auto refuse = [&](ErrorCode code, std::string_view why) {
+    newcomer.session().fail(code, why);
+  };
+  const auto id = tokens_.read_watch_token(hello.watch_token);
+  if (!id) return refuse(ErrorCode::unauthorized, "this link to watch a session is not valid here");
+  const auto host = find(*id);
+  if (!host || !host->session().resumable())
+    return refuse(ErrorCode::session_ended, "the session of this link has ended");
+  const Session& session = host->session();
+  if (const auto why = authorize_(hello.token, session.scene()->facts.scene_id, Use::watch))
+    return refuse(ErrorCode::unauthorized, *why);
+  if (session.state() != Session::State::live)
+    return refuse(ErrorCode::server_full, "the session of this link is about to start");
+  if (std::ranges::count(hello.decoders, session.config().codec) == 0)
+    return refuse(ErrorCode::no_common_codec,
+                  "the client cannot decode what the session of this link is encoded as");
+  if (host->spectators().full())
+    return refuse(ErrorCode::server_full,
+                  fmt::format("{} people watch this session already", host->spectators().size()));
+  newcomer.detach();
+  remove(newcomer);
+  host->add_spectator(peer);
+}
+
 void SessionRegistry::remove(const Client& client) {
   const auto it = std::ranges::find(clients_, &client, [](const auto& c) { return c.get(); });
   if (it == clients_.end()) return;
@@ -151,6 +179,7 @@ void SessionRegistry::remove(const Client& client) {
                  session.bytes_sent(), session.frames_dropped());
   }
   queue_.leave(client.session().id());
+  (*it)->spectators().dismiss_all();
   clients_.erase(it);
   admit_waiting(now);
 }
@@ -187,7 +216,7 @@ std::variant<Admission, ErrorMessage> SessionRegistry::choose(const Hello& hello
   const auto scene = find_scene(hello.scene_id);
   // The token first: a refusal does not depend on what is here.
   const std::string& wanted_scene = scene ? scene->facts.scene_id : hello.scene_id;
-  if (const auto refusal = authorize_(hello.token, wanted_scene))
+  if (const auto refusal = authorize_(hello.token, wanted_scene, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, true};
   if (!scene)
     return ErrorMessage{ErrorCode::unknown_scene,
@@ -280,7 +309,7 @@ void SessionRegistry::tick() {
   const TimePoint now = Clock::now();
   std::vector<std::shared_ptr<Client>> gone;
   for (const auto& client : clients_) {
-    client->session().on_tick(now);
+    client->on_tick(now);
     if (!client->connected() && client->session().state() == Session::State::closed)
       gone.push_back(client);
   }
@@ -310,15 +339,18 @@ void SessionRegistry::publish() {
   std::size_t queued = 0;
   int in_flight = 0;
   int lost = 0;
+  std::size_t spectators = 0;
   for (const auto& client : clients_) {
     const Session& session = client->session();
     queued += client->queued_frames();
     lost += session.lost() ? 1 : 0;
+    spectators += client->spectators().size();
     in_flight += session.flow().credit().in_flight();
     sessions.push_back({
         {"id", session.id()},
         {"state", state_name(session)},
         {"paused", session.paused()},
+        {"spectators", client->spectators().size()},
         {"scene", session.scene() ? session.scene()->facts.scene_id : ""},
         {"width_px", session.config().size_px.x},
         {"height_px", session.config().size_px.y},
@@ -346,6 +378,7 @@ void SessionRegistry::publish() {
   metrics_.connections.Set(connections_);
   metrics_.sessions.Set(admitted_);
   metrics_.sessions_lost.Set(lost);
+  metrics_.spectators.Set(static_cast<double>(spectators));
   metrics_.sessions_waiting.Set(static_cast<double>(queue_.size()));
   metrics_.frames_running.Set(scheduler_.running());
   metrics_.frames_queued.Set(static_cast<double>(queued));

@@ -16,6 +16,7 @@
 #include "server/schedule/scheduler.h"
 #include "server/session/admission_budget.h"
 #include "server/session/admission_queue.h"
+#include "server/session/authorize.h"
 #include "server/session/client.h"
 #include "server/session/session_tokens.h"
 
@@ -28,12 +29,9 @@ struct RegistryOptions {
   int gpus = 0;                       // that render
   int max_sessions_per_address = 64;  // a museum behind one address
   int max_queue = 64;                 // clients that wait for a place
+  int max_spectators = 16;            // of one session
   int max_greeting = 64;              // connections beyond: their hello is to come, or was refused
 };
-
-/// Why a token does not admit to a scene, for people; nothing: it does.
-using Authorize = std::function<std::optional<std::string>(const std::string& token,
-                                                           const std::string& scene_id)>;
 
 /// Of the wall clock, as tokens have it.
 std::int64_t unix_now_s();
@@ -71,6 +69,8 @@ class SessionRegistry {
   /// Leads to the session of a resume token, or begins the newcomer's.
   void on_hello(const std::shared_ptr<Peer>& peer, std::shared_ptr<Client> newcomer, Hello hello,
                 TimePoint now);
+  /// Lets a newcomer look on at the session of its watch token, or says why not.
+  void watch(const std::shared_ptr<Peer>& peer, Client& newcomer, const Hello& hello);
   /// Scene and encoder for a hello, whether there is a place or not.
   std::variant<Admission, ErrorMessage> choose(const Hello& hello) const;
   AdmissionAnswer admit(const Client& client, const Hello& hello);

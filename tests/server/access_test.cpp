@@ -57,6 +57,22 @@ TEST_F(AccessTest, LinksExpireAndBelongToAScene) {
   EXPECT_TRUE(access.refusal("guess", "city", 0));
 }
 
+TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
+  AccessControl access({}, folder.write("key", std::string(key) + "\n"));
+  const auto may = [&](const char* role, Use use) {
+    return !access.refusal(make_link_token({"city", role, 1000}, key), "city", 0, use);
+  };
+  for (const char* role : {"viewer", "spectator", "solo"})
+    EXPECT_TRUE(may(role, Use::list)) << role;
+  EXPECT_TRUE(may("viewer", Use::own_session));
+  EXPECT_TRUE(may("viewer", Use::watch));
+  EXPECT_FALSE(may("spectator", Use::own_session));
+  EXPECT_TRUE(may("spectator", Use::watch));
+  EXPECT_TRUE(may("solo", Use::own_session));
+  EXPECT_FALSE(may("solo", Use::watch));
+  EXPECT_THROW(make_link_token({"city", "emperor", 1000}, key), InputError);
+}
+
 TEST_F(AccessTest, StaticTokensAreReadAgain) {
   const auto path = folder.write("tokens", "# first\nalpha-alpha\n");
   AccessControl access(path, {});

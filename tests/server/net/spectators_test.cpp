@@ -1,0 +1,161 @@
+// Integration: clients that look on at a session. Real sockets on loopback, a whole server in this
+// process.
+
+#include <atomic>
+#include <map>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "server/access.h"
+#include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+namespace {
+
+v1::ClientMessage watching_hello(const std::string& watch_token, const std::string& token = {}) {
+  v1::ClientMessage message = hello_message(64, 64, v1::CODEC_H264);
+  message.mutable_hello()->set_watch(watch_token);
+  message.mutable_hello()->set_token(token);
+  return message;
+}
+
+std::optional<v1::Error> refusal(const RunningServer& server, const v1::ClientMessage& hello) {
+  WireClient client(server.port());
+  client.send(hello);
+  std::optional<v1::Error> error;
+  client.receive_until_closed(&error);
+  return error;
+}
+
+/// A host that reads, acknowledges and, when asked, moves.
+class BusyHost {
+ public:
+  explicit BusyHost(const RunningServer& server) : client_(server.port()) {
+    welcome = client_.greet(160, 96);
+    client_.send_pose(1);
+  }
+  void run(const std::stop_token& stop) {
+    for (std::uint64_t pose = 2; !stop.stop_requested();) {
+      const Received received = client_.receive();  // a heartbeat at least
+      if (received.frame) {
+        seen[received.frame->header.frame_id()] = received.frame->bitstream;
+        client_.send_ack(received.frame->header.frame_id());
+      }
+      if (!moves) continue;
+      client_.send_pose(pose, 0.1f * static_cast<float>(pose));
+      ++pose;
+    }
+    client_.close(1001);
+  }
+
+  v1::Welcome welcome;
+  std::map<std::uint64_t, std::vector<std::byte>> seen;
+  std::atomic<bool> moves{false};
+
+ private:
+  WireClient client_;
+};
+
+TEST(Spectators, SeeWhatTheHostSeesInOneEncoding) {
+  RunningServer server;
+  BusyHost host(server);
+  EXPECT_FALSE(host.welcome.watching());
+  std::jthread host_thread([&](const std::stop_token& stop) { host.run(stop); });
+
+  WireClient spectator(server.port());
+  const v1::Welcome welcome = spectator.greet(watching_hello(host.welcome.watch_token()));
+  EXPECT_TRUE(welcome.watching());
+  EXPECT_EQ(welcome.session_id(), host.welcome.session_id());
+  EXPECT_EQ(welcome.config().width_px(), 160u) << "the host's picture, whatever was wished for";
+  EXPECT_EQ(welcome.resume_token(), "") << "the host's secrets stay the host's";
+  EXPECT_EQ(welcome.watch_token(), "");
+
+  std::map<std::uint64_t, std::vector<std::byte>> seen;
+  const ReceivedFrame first = spectator.receive_frame();
+  EXPECT_TRUE(first.header.idr()) << "although the host stands still";
+  seen[first.header.frame_id()] = first.bitstream;
+  spectator.send_pose(1'000'000, 5.0f);  // moves nothing
+  host.moves = true;
+  while (seen.size() < 30) {  // never acknowledged: that throttles nobody
+    const ReceivedFrame frame = spectator.receive_frame();
+    EXPECT_LT(frame.header.pose_id(), 1'000'000u);
+    seen[frame.header.frame_id()] = frame.bitstream;
+  }
+  const auto sessions = nlohmann::json::parse(http_get(server.admin_port(), "/api/sessions").body);
+  ASSERT_EQ(sessions.size(), 1u);
+
+  host_thread.request_stop();
+  host_thread.join();
+  for (const auto& [frame_id, bitstream] : seen)
+    if (host.seen.count(frame_id) > 0) {
+      EXPECT_EQ(bitstream, host.seen[frame_id]);
+    }
+  EXPECT_GE(host.seen.count(seen.begin()->first), 1u);
+  std::optional<v1::Error> error;
+  EXPECT_EQ(spectator.receive_until_closed(&error).close_code, 1000);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::SESSION_ENDED);
+}
+
+TEST(Spectators, HearOfNewSettingsAndMayLeave) {
+  RunningServer server;
+  WireClient host(server.port());
+  const std::string link = host.greet(160, 96).watch_token();
+  WireClient spectator(server.port());
+  spectator.greet(watching_hello(link));
+  v1::ClientMessage settings;
+  settings.mutable_settings()->set_width_px(320);
+  settings.mutable_settings()->set_height_px(180);
+  host.send(settings);
+  EXPECT_EQ(spectator.receive_message(v1::ServerMessage::kConfig).config().width_px(), 320u);
+  v1::ClientMessage bye;
+  bye.mutable_bye();
+  spectator.send(bye);
+  EXPECT_EQ(spectator.receive_until_closed().close_code, 1000);
+  host.send_pose(1);
+  EXPECT_TRUE(host.receive_frame().header.idr()) << "the host goes on";
+}
+
+TEST(Spectators, AreLimitedAndNeedARealLink) {
+  RunningServer server([](ServerConfig& config) { config.max_spectators = 1; });
+  WireClient host(server.port());
+  const v1::Welcome welcome = host.greet();
+  EXPECT_EQ(refusal(server, watching_hello("made.up"))->code(), v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server, watching_hello(welcome.session_id()))->code(), v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server, watching_hello(welcome.resume_token()))->code(),
+            v1::Error::UNAUTHORIZED);
+  WireClient first(server.port());
+  first.greet(watching_hello(welcome.watch_token()));
+  EXPECT_EQ(refusal(server, watching_hello(welcome.watch_token()))->code(), v1::Error::SERVER_FULL);
+  v1::ClientMessage jpeg_only = watching_hello(welcome.watch_token());
+  jpeg_only.mutable_hello()->set_decoders(0, v1::CODEC_MJPEG);
+  EXPECT_EQ(refusal(server, jpeg_only)->code(), v1::Error::NO_COMMON_CODEC);
+}
+
+TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
+  const TemporaryFolder folder;
+  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
+  const std::string key = read_key_file("", key_file);
+  const auto link = [&](const std::string& role) {
+    return make_link_token({"city", role, 1'000'000'000'000}, key);
+  };
+  RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
+  WireClient host(server.port());
+  const std::string watch = host.greet(64, 64, v1::CODEC_H264, link("viewer")).watch_token();
+  EXPECT_EQ(refusal(server, watching_hello(watch))->code(), v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server, watching_hello(watch, link("solo")))->code(), v1::Error::UNAUTHORIZED);
+  WireClient spectator(server.port());
+  EXPECT_TRUE(spectator.greet(watching_hello(watch, link("spectator"))).watching());
+  v1::ClientMessage own = hello_message(64, 64, v1::CODEC_H264);
+  own.mutable_hello()->set_token(link("spectator"));
+  EXPECT_EQ(refusal(server, own)->code(), v1::Error::UNAUTHORIZED);
+  WireClient alone(server.port());
+  EXPECT_EQ(alone.greet(64, 64, v1::CODEC_H264, link("solo")).watch_token(), "");
+}
+
+}  // namespace
+}  // namespace catgs::test
