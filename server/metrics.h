@@ -42,6 +42,8 @@ class Metrics {
   prometheus::Gauge& frames_running;  // being rendered or encoded
   prometheus::Gauge& frames_queued;   // encoded, waiting for their sockets
   prometheus::Gauge& frames_in_flight;
+  prometheus::Gauge& sessions_stepped_down;   // get less than they asked for: size or frame rate
+  prometheus::Gauge& target_bits_per_second;  // of all sessions
   prometheus::Counter& sessions_admitted;
   prometheus::Counter& sessions_refused;
   prometheus::Counter& sessions_resumed;
@@ -62,6 +64,7 @@ class Metrics {
   prometheus::Histogram& render_sub_seconds;
   prometheus::Histogram& encode_seconds;
   prometheus::Histogram& send_seconds;
+  prometheus::Histogram& link_queue_seconds;  // of each live session, four times a second
   prometheus::Histogram& pose_to_frame_seconds;
   prometheus::Histogram& motion_to_photon_seconds;  // on the client's clock
 };

@@ -340,8 +340,16 @@ void SessionRegistry::publish() {
   int in_flight = 0;
   int lost = 0;
   std::size_t spectators = 0;
+  int stepped_down = 0;
+  double target_bits_per_s = 0.0;
   for (const auto& client : clients_) {
     const Session& session = client->session();
+    if (session.state() == Session::State::live && !session.lost()) {
+      stepped_down += session.flow().steps_down() > 0 ? 1 : 0;
+      target_bits_per_s += 1e3 * session.flow().bitrate_kbps();
+      metrics_.link_queue_seconds.Observe(
+          std::chrono::duration<double>(session.flow().queue_delay()).count());
+    }
     queued += client->queued_frames();
     lost += session.lost() ? 1 : 0;
     spectators += client->spectators().size();
@@ -379,6 +387,8 @@ void SessionRegistry::publish() {
   metrics_.sessions.Set(admitted_);
   metrics_.sessions_lost.Set(lost);
   metrics_.spectators.Set(static_cast<double>(spectators));
+  metrics_.sessions_stepped_down.Set(stepped_down);
+  metrics_.target_bits_per_second.Set(target_bits_per_s);
   metrics_.sessions_waiting.Set(static_cast<double>(queue_.size()));
   metrics_.frames_running.Set(scheduler_.running());
   metrics_.frames_queued.Set(static_cast<double>(queued));
