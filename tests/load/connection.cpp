@@ -108,6 +108,7 @@ void Connection::say_hello() {
   hello.mutable_settings()->set_max_fps(static_cast<std::uint32_t>(settings_.fps));
   hello.mutable_settings()->set_max_bitrate_kbps(
       static_cast<std::uint32_t>(settings_.max_bitrate_kbps));
+  hello.mutable_settings()->set_fixed_quality(settings_.fixed_quality);
   if (!state_.resume_token.empty()) {
     hello.mutable_resume()->set_token(state_.resume_token);
     if (state_.last_pose) *hello.mutable_resume()->mutable_pose() = *state_.last_pose;

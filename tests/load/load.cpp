@@ -170,6 +170,7 @@ class Run {
         parse_size("--size", group.sizes[static_cast<std::size_t>(number) % group.sizes.size()]);
     settings.fps = group.fps;
     settings.max_bitrate_kbps = group.max_bitrate_kbps;
+    settings.fixed_quality = group.fixed_quality;
     settings.fov_y_rad = group.fov_y_deg * std::numbers::pi_v<float> / 180.0f;
     // Multiples of the golden ratio spread any number of sessions evenly over a trace.
     const double golden = number * std::numbers::phi;

@@ -63,6 +63,8 @@ void add_client_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--max-bitrate-kbps", group.max_bitrate_kbps, "0: the server's default")
       ->check(CLI::Range(0, 200'000))
       ->capture_default_str();
+  app.add_flag("--fixed-quality", group.fixed_quality,
+               "Ask the server not to adapt bitrate, size and rate to the link");
   app.add_option("--fov-deg", group.fov_y_deg, "Vertical field of view")->capture_default_str();
   app.add_option("--link", options.link,
                  "Each session's line: rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,"

@@ -26,6 +26,7 @@ struct GroupOptions {
   int fps = 60;
   int pose_hz = 0;  // of a script; 0: display rate, as browsers do: 60, or fps where that is more
   int max_bitrate_kbps = 0;
+  bool fixed_quality = false;  // the server keeps bitrate, size and rate, whatever the link does
   float fov_y_deg = 60.0f;
 
   // How well they behave.

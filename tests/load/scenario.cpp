@@ -134,6 +134,7 @@ GroupOptions read_group(TableReader& reader, const std::filesystem::path& folder
   reader.take("fps", group.fps, 1, 240);
   reader.take("pose-hz", group.pose_hz, 0, 1000);
   reader.take("max-bitrate-kbps", group.max_bitrate_kbps, 0, 200'000);
+  reader.take("fixed-quality", group.fixed_quality);
   double fov_deg = group.fov_y_deg;
   reader.take("fov-deg", fov_deg);
   group.fov_y_deg = static_cast<float>(fov_deg);

@@ -31,6 +31,7 @@ struct SessionSettings {
   glm::ivec2 size_px{0};
   int fps = 60;
   int max_bitrate_kbps = 0;  // 0: the server's default
+  bool fixed_quality = false;
   float fov_y_rad = 1.0f;
   MakeTrajectory make_trajectory;
   double offset = 0.0;  // where in the trajectory to begin, share of its length
