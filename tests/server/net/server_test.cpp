@@ -9,9 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "render_core/error.h"
 #include "render_core/scene/save_scene.h"
@@ -266,33 +263,6 @@ TEST(Server, TellsClientsWhenItStops) {
   client.receive_message(v1::ServerMessage::kDrain);
   EXPECT_EQ(client.receive_until_closed().close_code, 1001);
   server.join();
-}
-
-TEST(ServerProgram, EndsCleanlyOnSigterm) {
-  int ports[2];
-  ASSERT_EQ(::pipe(ports), 0);
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::dup2(ports[1], STDERR_FILENO);
-    ::execl(CATGS_SERVER_PROGRAM, "catgs-server", "--scene", "synth:city:2000", "--port", "0",
-            "--admin-bind", "off", "--drain-wait", "1", static_cast<char*>(nullptr));
-    ::_exit(127);
-  }
-  ::close(ports[1]);
-  std::string log;
-  char buffer[512];
-  for (ssize_t n; log.find("Ctrl-C") == std::string::npos &&
-                  (n = ::read(ports[0], buffer, sizeof buffer)) > 0;)
-    log.append(buffer, static_cast<std::size_t>(n));
-  EXPECT_THAT(log, HasSubstr("http://127.0.0.1:"));
-  EXPECT_THAT(log, HasSubstr("renderer: CPU"));
-  EXPECT_EQ(::kill(child, SIGTERM), 0);
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  EXPECT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
-  ::close(ports[0]);
 }
 
 }  // namespace
