@@ -18,6 +18,9 @@ constexpr double least_pixels_per_s = 160.0 * 90.0 * 5.0;
 constexpr microseconds least_target = 10ms;
 constexpr microseconds most_target = 33ms;
 
+// However slow a decoder is: what it does not tell is not learnt.
+constexpr double least_paced_fps = 2.0;
+
 constexpr double unused_share = 0.5;
 constexpr auto link_state_holds = 100ms;
 constexpr double most_horizon_us = 100'000.0;
@@ -49,6 +52,7 @@ void FlowControl::set_wish(const FlowWish& wish) {
     network_ = RateController(network_limits(wish));
   else
     network_.set_limits(network_limits(wish));
+  if (wish.fixed_quality) credit_.set_link_rate(std::nullopt);
   wish_ = wish;
   frame_size_px_ = wish.size_px;
   apply_interval();
@@ -151,7 +155,8 @@ int FlowControl::bitrate_kbps() const {
 microseconds FlowControl::frame_interval() const {
   if (wish_.fixed_quality) return interval_of(wish_.fps);
   const double pixels = static_cast<double>(frame_size_px_.x) * frame_size_px_.y;
-  return interval_of(std::min(wish_.fps * rung().fps_share, decoder_.rate() / pixels));
+  const double decoded_fps = std::max(least_paced_fps, decoder_.rate() / pixels);
+  return interval_of(std::min(wish_.fps * rung().fps_share, decoded_fps));
 }
 
 microseconds FlowControl::pose_to_photon() const {

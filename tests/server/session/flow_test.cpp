@@ -96,6 +96,16 @@ TEST(Flow, PacesAndShrinksForASlowDecoder) {
   EXPECT_LE(simulation.streams_opened(), 6) << "no flapping";
 }
 
+TEST(Flow, ADecoderThatHardlyWorksStillShowsSomething) {
+  FlowScenario scenario;
+  scenario.client.decode_s_per_megapixel = 0.4;  // 2.7 frames of 1280x720 a second
+  FlowSimulation simulation(scenario);
+  simulation.run(60s);
+  EXPECT_EQ(simulation.frames().back().ticket.size_px, glm::ivec2(640, 360));
+  EXPECT_GE(simulation.presented(30s, 60s), 8 * 30);
+  EXPECT_LT(simulation.oldest_shown(30s, 60s), 500ms);
+}
+
 TEST(Flow, WaitsForAPhoneThatSleeps) {
   FlowScenario scenario;
   scenario.client.sleeps = {{5s, 15s}};
