@@ -25,6 +25,7 @@ Welcome for_spectators(Welcome welcome) {
 }
 
 }  // namespace
+
 Client::Client(SessionRegistry& registry, std::string session_id, std::string peer_address)
     : registry_(registry),
       peer_address_(std::move(peer_address)),

@@ -187,8 +187,8 @@ void SessionRegistry::remove(const Client& client) {
 void SessionRegistry::admit_waiting(TimePoint now) {
   while (!queue_.empty()) {
     const std::string id = queue_.front();
-    find(id)->session().ask_again(
-        now);  // leaves the queue, admitted or refused, or hears its place
+    // It leaves the queue, admitted or refused, or hears that it still has to wait.
+    find(id)->session().ask_again(now);
     if (!queue_.empty() && queue_.front() == id) break;
   }
   queue_told_ = now;
