@@ -15,9 +15,10 @@ constexpr std::uint32_t window_size = 2048;
 // Every splat of a window has an entry in it, but for the one that began before.
 constexpr std::uint32_t most_splats = window_size + 1;
 
+template <class Tile>
 struct Window {
   std::uint32_t begin, end;  // list entries
-  std::uint32_t tile[window_size];
+  Tile tile[window_size];
   std::uint32_t slot[window_size];
 
   /// Writes a row's entries from `at` on, those before `last` and in the window, and returns where
@@ -27,7 +28,7 @@ struct Window {
     const std::uint32_t stop = min(last, end);
     for (int column = columns.x; column <= columns.y; ++column, ++at) {
       if (at < begin || at >= stop) continue;
-      tile[at - begin] = first_tile + static_cast<std::uint32_t>(column);
+      tile[at - begin] = static_cast<Tile>(first_tile + static_cast<std::uint32_t>(column));
       slot[at - begin] = splat;
     }
     return at;
@@ -58,14 +59,17 @@ __device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t 
 constexpr float emit_slack_px = 0.5f * static_cast<float>(listing_slack_px);
 
 /// Where a splat's entries end.
-__device__ std::uint32_t entries_end(const EmitParams& p, std::uint32_t slot, std::uint32_t at) {
+template <class Tile>
+__device__ std::uint32_t entries_end(const EmitParams<Tile>& p, std::uint32_t slot,
+                                     std::uint32_t at) {
   return at + p.tile_count[slot];
 }
 
 /// All lanes write one splat; rows in order, so that the list is the same as a lone lane's.
-template <class Outline>
-__device__ void emit_together(const EmitParams& p, Window& window, const TileFootprint<Outline>& f,
-                              std::uint32_t slot, std::uint32_t at) {
+template <class Tile, class Outline>
+__device__ void emit_together(const EmitParams<Tile>& p, Window<Tile>& window,
+                              const TileFootprint<Outline>& f, std::uint32_t slot,
+                              std::uint32_t at) {
   const std::uint32_t last = entries_end(p, slot, at);
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   for (int top = f.first_row; top <= f.last_row && at < window.end; top += warp_size) {
@@ -84,7 +88,8 @@ __device__ void emit_together(const EmitParams& p, Window& window, const TileFoo
   }
 }
 
-__device__ void emit_large(const EmitParams& p, Window& window, std::uint32_t slot,
+template <class Tile>
+__device__ void emit_large(const EmitParams<Tile>& p, Window<Tile>& window, std::uint32_t slot,
                            std::uint32_t at) {
   const SplatRecord& r = p.records[slot];
   if (p.path != nullptr) {
@@ -97,8 +102,9 @@ __device__ void emit_large(const EmitParams& p, Window& window, std::uint32_t sl
   }
 }
 
-__global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams p) {
-  __shared__ Window window;
+template <class Tile>
+__global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile> p) {
+  __shared__ Window<Tile> window;
   __shared__ std::uint32_t splats[2];  // in depth order, those with entries in the window
   __shared__ std::uint32_t large[most_splats];
   __shared__ std::uint32_t large_count;
@@ -115,7 +121,7 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams p) {
       splats[thread / warp_size] = thread < warp_size ? max(beyond, 1u) - 1 : beyond;
   }
   for (std::uint32_t j = thread; j < window_size; j += block_size) {
-    window.tile[j] = p.shape.tiles();  // padding, for what nobody writes
+    window.tile[j] = static_cast<Tile>(p.shape.tiles());  // padding, for what nobody writes
     window.slot[j] = 0;
   }
   if (thread == 0) {
@@ -159,7 +165,8 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams p) {
 /// Four entries a thread.
 constexpr std::uint32_t range_step = 4;
 
-__global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams p) {
+template <class Tile>
+__global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams<Tile> p) {
   const std::uint32_t first = (blockIdx.x * block_size + threadIdx.x) * range_step;
   if (first >= p.shape.list_bound) return;
   const std::uint32_t tiles = p.shape.tiles();  // padding, and what is beyond the ends
@@ -180,16 +187,23 @@ __global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams p
 
 }  // namespace
 
-void launch_emit(const EmitParams& params, cudaStream_t stream) {
+template <class Tile>
+void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream) {
   emit_kernel<<<blocks_for(params.shape.list_bound, window_size), block_size, 0, stream>>>(params);
   check_launch("emit");
 }
 
-void launch_ranges(const RangesParams& params, cudaStream_t stream) {
+template <class Tile>
+void launch_ranges(const RangesParams<Tile>& params, cudaStream_t stream) {
   check(cudaMemsetAsync(params.range, 0, params.shape.tiles() * sizeof(uint2), stream), "ranges");
   constexpr std::uint32_t per_block = block_size * range_step;
   ranges_kernel<<<blocks_for(params.shape.list_bound, per_block), block_size, 0, stream>>>(params);
   check_launch("ranges");
 }
+
+template void launch_emit(const EmitParams<std::uint16_t>&, cudaStream_t);
+template void launch_emit(const EmitParams<std::uint32_t>&, cudaStream_t);
+template void launch_ranges(const RangesParams<std::uint16_t>&, cudaStream_t);
+template void launch_ranges(const RangesParams<std::uint32_t>&, cudaStream_t);
 
 }  // namespace catgs::cuda

@@ -5,7 +5,11 @@
 
 namespace catgs::cuda {
 
+// Tile: std::uint16_t or std::uint32_t, what holds shape.tiles(). The narrow one saves a quarter of
+// what sorting moves.
+
 /// Writes the tile list entries of all visible splats in depth order, and padding up to the bound.
+template <class Tile>
 struct EmitParams {
   FrameShape shape;
   const FrameCounts* counts;
@@ -15,17 +19,20 @@ struct EmitParams {
   const std::uint32_t* tile_count;  // [visible_bound], by slot
   const TileSpans* spans;           // [visible_bound], by slot
   const SplatPath* path;            // [visible_bound], by slot; null: splats stay where they are
-  std::uint32_t* tile;              // [list_bound], tile index; shape.tiles() in the padding
+  Tile* tile;                       // [list_bound], tile index; shape.tiles() in the padding
   std::uint32_t* slot;              // [list_bound]
 };
-void launch_emit(const EmitParams& params, cudaStream_t stream);
+template <class Tile>
+void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream);
 
 /// range[t] = {first, one past last} list entry of tile t; {0, 0} where it has none.
+template <class Tile>
 struct RangesParams {
   FrameShape shape;
-  const std::uint32_t* tile;  // [list_bound], sorted
-  uint2* range;               // [tiles]
+  const Tile* tile;  // [list_bound], sorted
+  uint2* range;      // [tiles]
 };
-void launch_ranges(const RangesParams& params, cudaStream_t stream);
+template <class Tile>
+void launch_ranges(const RangesParams<Tile>& params, cudaStream_t stream);
 
 }  // namespace catgs::cuda

@@ -196,14 +196,11 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   place_tiles(plan);
   times_.end(Stage::bin, stream_.get());
   const bool reorders = settings_.order == BlendOrder::fresh;
-  odd_sub_frame_ = !odd_sub_frame_;
   LastReach last = last_reach();
   last.same_grid = true;
   split(reorders ? m.runs.get() : nullptr, last);
   if (reorders)
-    launch_reorder({shape_, m.range.get(), m.combed.get(), m.runs.get(), m.counts.get(),
-                    m.depth[0].get(), lists_, processors_},
-                   stream);
+    launch_reorder({m.runs.get(), m.counts.get(), m.depth[0].get(), lists_, processors_}, stream);
   times_.end(Stage::sort, stream_.get());
   blend(request);
   deliver();
@@ -300,15 +297,28 @@ void CudaView::list_tiles(const FrameCameras& cameras, const ListCuller& culler,
   times_.end_depth_sort(stream);
   scan_tile_counts(shape_, m.counts.get(), order.current, m.tile_count.get(), m.first.get(),
                    scratch, stream);
-  launch_emit({shape_, m.counts.get(), m.records.get(), order.current, m.first.get(),
-               m.tile_count.get(), m.spans.get(), path, m.tile[0].get(), m.slot[0].get()},
-              stream);
-  times_.end(Stage::bin, stream_.get());
+  // The padding's key, shape_.tiles(), is the largest.
+  if (shape_.tiles() <= std::numeric_limits<std::uint16_t>::max()) {
+    sort_lists<std::uint16_t>(order.current, path, scratch);
+  } else {
+    sort_lists<std::uint32_t>(order.current, path, scratch);
+  }
+}
 
-  PingPong<std::uint32_t> tile{m.tile[0].get(), m.tile[1].get()};
+/// Emits the list entries of splats in this order, and sorts them by tile.
+template <class Tile>
+void CudaView::sort_lists(const std::uint32_t* order, const SplatPath* path, SortScratch scratch) {
+  FrameMemory& m = memory_;
+  const cudaStream_t stream = stream_.get();
+  PingPong<Tile> tile{reinterpret_cast<Tile*>(m.tile[0].get()),
+                      reinterpret_cast<Tile*>(m.tile[1].get())};
   PingPong<std::uint32_t> slot{m.slot[0].get(), m.slot[1].get()};
+  launch_emit<Tile>({shape_, m.counts.get(), m.records.get(), order, m.first.get(),
+                     m.tile_count.get(), m.spans.get(), path, tile.current, slot.current},
+                    stream);
+  times_.end(Stage::bin, stream);
   sort_by_tile(shape_, tile, slot, scratch, stream);
-  launch_ranges({shape_, tile.current, m.range.get()}, stream);
+  launch_ranges<Tile>({shape_, tile.current, m.range.get()}, stream);
   lists_ = slot.current;
 }
 
@@ -320,13 +330,12 @@ std::uint32_t CudaView::slice_length() const {
 }
 
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
-void CudaView::split(uint2* runs, const LastReach& last) {
+void CudaView::split(ReorderRun* runs, const LastReach& last) {
   FrameMemory& m = memory_;
   launch_split(
       {shape_, m.range.get(), last, m.reach[1 - last_reach_].get(),
        turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(), m.queue.get(),
-       runs, runs != nullptr ? m.combed.get() : nullptr, odd_sub_frame_ ? reorder_run / 2 : 0,
-       m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
+       runs, m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
       stream_.get());
 }
 

@@ -5,6 +5,7 @@
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_memory.cuh"
 #include "render_core/cuda/frame_room.h"
+#include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/stage_times.h"
@@ -39,8 +40,10 @@ class CudaView final : public View {
   void draw_vanilla(const FrameRequest& request);
   void list_tiles(const FrameCameras& cameras, const ListCuller& culler, bool sweeps,
                   float min_depth);
+  template <class Tile>
+  void sort_lists(const std::uint32_t* order, const SplatPath* path, SortScratch scratch);
   ColourArrays want_colours(const math::CameraModel<float>& camera);
-  void split(uint2* runs, const LastReach& last);
+  void split(ReorderRun* runs, const LastReach& last);
   void place_tiles(const FramePlan& plan);
   [[nodiscard]] LastReach last_reach() const;
   void remember_reach(const Homography<double>& list_from_frame);
@@ -64,7 +67,6 @@ class CudaView final : public View {
   // What sub-frames take over.
   FrameGroups groups_;
   std::uint32_t* lists_ = nullptr;  // [list_bound], slots by tile
-  bool odd_sub_frame_ = false;
   SceneDepths depths_;
   bool turned_ = false;  // the frame's tiles are runs of pixels
   bool colours_known_ = false;

@@ -26,7 +26,6 @@ void FrameMemory::reserve(const FrameShape& shape, const SceneArrays& scene,
     path.reserve(shape.visible_bound);
     if (settings.order == BlendOrder::fresh) {
       runs.reserve(run_bound(shape));
-      combed.reserve(shape.tile_bound);
     }
   }
   tile_count.reserve(shape.visible_bound);
@@ -72,11 +71,10 @@ std::size_t FrameMemory::bytes() const {
          cull_before.bytes() + visible.bytes() + tasks.bytes() + queue.bytes() +
          tile_slices.bytes() + spans.bytes() + path.bytes() + runs.bytes() + consumed.bytes() +
          slice_transmittance.bytes() + slice_pixels.bytes() + reach[0].bytes() + reach[1].bytes() +
-         pixels.bytes() + pixel_count.bytes() + combed.bytes() + records.bytes() +
-         tile_count.bytes() + first.bytes() + depth[0].bytes() + depth[1].bytes() +
-         order[0].bytes() + order[1].bytes() + tile[0].bytes() + tile[1].bytes() + slot[0].bytes() +
-         slot[1].bytes() + range.bytes() + counts.bytes() + scratch.bytes() + rgb.bytes() +
-         i420.bytes();
+         pixels.bytes() + pixel_count.bytes() + records.bytes() + tile_count.bytes() +
+         first.bytes() + depth[0].bytes() + depth[1].bytes() + order[0].bytes() + order[1].bytes() +
+         tile[0].bytes() + tile[1].bytes() + slot[0].bytes() + slot[1].bytes() + range.bytes() +
+         counts.bytes() + scratch.bytes() + rgb.bytes() + i420.bytes();
 }
 
 }  // namespace catgs::cuda

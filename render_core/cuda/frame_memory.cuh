@@ -4,6 +4,7 @@
 #include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/reorder.cuh"
 #include "render_core/cuda/tiles.cuh"
 #include "render_core/renderer.h"
 
@@ -27,8 +28,9 @@ struct FrameMemory {
   DeviceBuffer<std::uint32_t> queue, consumed;
   DeviceBuffer<std::uint32_t> reach[2];  // of this frame and the last
   DeviceBuffer<PixelPlace> pixels;
-  DeviceBuffer<std::uint32_t> pixel_count, combed;
-  DeviceBuffer<uint2> tile_slices, runs;
+  DeviceBuffer<std::uint32_t> pixel_count;
+  DeviceBuffer<uint2> tile_slices;
+  DeviceBuffer<ReorderRun> runs;
   DeviceBuffer<float> slice_transmittance;
   DeviceBuffer<float4> slice_pixels;
   DeviceBuffer<FrameCounts> counts;

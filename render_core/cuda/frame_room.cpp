@@ -2,19 +2,25 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace catgs::cuda {
 namespace {
 
-constexpr std::uint32_t patience = 600;  // key frames
+constexpr int patience = 600;  // key frames
+
+// Padding is sorted, but room for slices costs nothing while it is not used.
+constexpr int sorted_span = 16;
+constexpr int slices_span = 600;
 
 }  // namespace
 
-Room::Room(std::uint64_t first_guess, std::uint64_t limit)
+Room::Room(std::uint64_t first_guess, std::uint64_t limit, int span)
     : ceiling_(static_cast<std::uint32_t>(
           std::min<std::uint64_t>(limit, std::numeric_limits<std::uint32_t>::max()))),
       limit_(ceiling_),
-      size_(static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guess, limit_))) {}
+      size_(static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guess, limit_))),
+      span_(span) {}
 
 std::uint32_t Room::with_margin(std::uint32_t needed) const {
   return static_cast<std::uint32_t>(
@@ -22,26 +28,28 @@ std::uint32_t Room::with_margin(std::uint32_t needed) const {
 }
 
 bool Room::outgrown_by(std::uint32_t needed) {
-  const bool grows = needed > size_ && size_ < limit_;
-  if (grows) size_ = with_margin(needed);
+  const bool lacked = needed > size_ && size_ < limit_;
+  // Before the margin is used up: a frame that lacks room is drawn twice.
+  if (needed > size_ - size_ / 16) size_ = std::max(size_, with_margin(needed));
   most_ = std::max(most_, needed);
-  if (++frames_ == patience) {
-    if (most_ <= size_ / 2) size_ = std::min(size_, with_margin(most_));
-    limit_ = ceiling_;
-    frames_ = most_ = 0;
+  if (++frames_ == span_) {
+    size_ = std::min(size_, with_margin(std::max(most_, most_before_)));
+    most_before_ = std::exchange(most_, 0);
+    frames_ = 0;
   }
-  return grows;
+  if (limited_for_ > 0 && --limited_for_ == 0) limit_ = ceiling_;
+  return lacked;
 }
 
 void Room::shrink_to(double part) {
   size_ = limit_ = static_cast<std::uint32_t>(part * size_);
-  frames_ = most_ = 0;
+  limited_for_ = patience;
 }
 
 FrameRoom::FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits)
-    : visible_(gaussians / 4 + 1, std::max(gaussians, 1u)),
-      lists_(gaussians + 65536ull, std::max<std::uint64_t>(list_limit, 1)),
-      slices_(4096, splits ? std::numeric_limits<std::uint32_t>::max() : 0) {}
+    : visible_(gaussians / 4 + 1, std::max(gaussians, 1u), sorted_span),
+      lists_(gaussians + 65536ull, std::max<std::uint64_t>(list_limit, 1), sorted_span),
+      slices_(4096, splits ? std::numeric_limits<std::uint32_t>::max() : 0, slices_span) {}
 
 FrameSizes FrameRoom::sizes() const { return {visible_.size(), lists_.size(), slices_.size()}; }
 

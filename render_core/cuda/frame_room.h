@@ -4,11 +4,12 @@
 
 namespace catgs::cuda {
 
-/// Room for one kind of things, whose need is known only after a frame: what frames needed before,
-/// and a margin. Room that is far too wide for long comes down.
+/// Room for one kind of things, whose need is known only after a frame: what frames needed in the
+/// last one or two spans of key frames, and a margin.
 class Room {
  public:
-  Room(std::uint64_t first_guess, std::uint64_t limit);
+  /// `span`: key frames, 1 or more.
+  Room(std::uint64_t first_guess, std::uint64_t limit, int span);
 
   [[nodiscard]] std::uint32_t size() const { return size_; }
   /// After a key frame: whether it needed more than there is and can be; then the room has grown.
@@ -20,8 +21,10 @@ class Room {
   [[nodiscard]] std::uint32_t with_margin(std::uint32_t needed) const;
 
   std::uint32_t ceiling_, limit_, size_;
-  std::uint32_t frames_ = 0;  // key frames since the room was last looked over
-  std::uint32_t most_ = 0;    // needed in these
+  int span_;
+  int frames_ = 0;                            // of the running span
+  std::uint32_t most_ = 0, most_before_ = 0;  // needed in it and in the one before
+  int limited_for_ = 0;                       // key frames
 };
 
 /// Numbers of things that a frame needs, or has room for.
@@ -32,8 +35,8 @@ struct FrameSizes {
 };
 
 /// How much room the frames of a View get. The host does not wait for counts within a frame: it
-/// allots by what frames needed before (not much more, since the padding up to a bound is sorted
-/// too), and draws a frame again that needed more.
+/// allots by what the last frames needed (not much more, since the padding up to a bound is sorted
+/// too), and draws a frame again that needed more. Memory, once allocated, stays.
 class FrameRoom {
  public:
   /// `list_limit`: most entries of all tile lists. `splits`: long tiles are cut into slices.

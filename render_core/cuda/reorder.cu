@@ -8,19 +8,21 @@ namespace {
 constexpr int warps = 4;
 constexpr int block_size = warps * warp_size;
 
-// A warp sorts a window of 256 entries, eight a lane, writes the nearer half and slides by it.
+// A warp sorts a window of 256 entries, eight a lane, writes the first half and slides by it.
 constexpr int per_lane = 8;
 constexpr int window = per_lane * warp_size;
 constexpr int step = window / 2;
 
-// A key holds the depth and, below it, the place in the window, which makes the sort stable.
+// A key holds the depth and, below it, the place in the window.
 constexpr int place_bits = 8;
 static_assert(window == 1 << place_bits);
 static_assert(depth_bits + place_bits <= 32);
 constexpr std::uint32_t behind_all = ~0u;
 
+using Keys = std::uint32_t[per_lane];
+
 /// Ascending bitonic sort of the warp's keys; key j of lane l is number per_lane l + j.
-__device__ void sort_window(std::uint32_t (&key)[per_lane]) {
+__device__ void sort_window(Keys& key) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
 #pragma unroll
   for (int size = 2; size <= window; size *= 2) {
@@ -44,37 +46,89 @@ __device__ void sort_window(std::uint32_t (&key)[per_lane]) {
   }
 }
 
-/// Slots first…last - 1 of the list, by one warp. `held` is the warp's scratch.
-__device__ void reorder(const ReorderParams& p, std::uint32_t first, std::uint32_t last,
-                        std::uint32_t (&held)[window]) {
+/// A run of the list as a pass over it sees it: from its front, or from its back with depths that
+/// count the other way.
+template <bool forwards>
+struct Pass {
+  const std::uint32_t* depth_key;
+  std::uint32_t* run;
+  int count;
+
+  __device__ std::uint32_t& slot(int i) const { return run[forwards ? i : count - 1 - i]; }
+  __device__ std::uint32_t depth(std::uint32_t slot) const {
+    constexpr std::uint32_t most = (1u << depth_bits) - 1u;
+    const std::uint32_t depth = depth_key[slot] >> depth_bits_below;
+    return forwards ? depth : most - depth;
+  }
+  /// Whether slots of the same depth stand in the wrong order.
+  __device__ static bool swapped(std::uint32_t a, std::uint32_t b) {
+    return forwards ? b < a : a < b;
+  }
+};
+
+/// Sorted by depth, neighbours of the same depth are brought into the order of their slots, that of
+/// key frames: how they stood before says nothing. Two rounds of odd-even transposition, which is
+/// enough for three of the same depth; more are rare.
+template <bool forwards>
+__device__ void order_ties(const Keys& key, Keys& slot) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  const auto load = [&](int place, std::uint32_t at) { held[place] = at < last ? p.slot[at] : 0; };
-  for (int j = 0; j < per_lane; ++j)
-    load(j * warp_size + lane, first + static_cast<std::uint32_t>(j * warp_size + lane));
-  for (;; first += step) {
+  const auto depth = [](std::uint32_t k) { return k >> place_bits; };
+  const auto order = [&](std::uint32_t depth_a, std::uint32_t depth_b, std::uint32_t& a,
+                         std::uint32_t& b) {
+    if (depth_a != depth_b || !Pass<forwards>::swapped(a, b)) return;
+    const std::uint32_t first = b;
+    b = a;
+    a = first;
+  };
+  const std::uint32_t depth_after = depth(__shfl_down_sync(~0u, key[0], 1));
+  const std::uint32_t depth_before = depth(__shfl_up_sync(~0u, key[per_lane - 1], 1));
+#pragma unroll
+  for (int j = 0; j < per_lane; j += 2)
+    order(depth(key[j]), depth(key[j + 1]), slot[j], slot[j + 1]);
+  std::uint32_t after = __shfl_down_sync(~0u, slot[0], 1);
+  std::uint32_t before = __shfl_up_sync(~0u, slot[per_lane - 1], 1);
+#pragma unroll
+  for (int j = 1; j + 1 < per_lane; j += 2)
+    order(depth(key[j]), depth(key[j + 1]), slot[j], slot[j + 1]);
+  if (lane + 1 < warp_size) order(depth(key[per_lane - 1]), depth_after, slot[per_lane - 1], after);
+  if (lane > 0) order(depth_before, depth(key[0]), before, slot[0]);
+}
+
+/// One pass over a run, by one warp. What belongs towards the end is carried there, however far;
+/// what belongs towards the beginning comes as far as a step. Returns whether that was too little
+/// for some entry. `held` is the warp's scratch.
+template <bool forwards>
+__device__ bool slide(const Pass<forwards>& pass, std::uint32_t (&held)[window]) {
+  const int lane = static_cast<int>(threadIdx.x) % warp_size;
+  const auto load = [&](int place, int at) { held[place] = at < pass.count ? pass.slot(at) : 0; };
+  for (int j = 0; j < per_lane; ++j) load(j * warp_size + lane, j * warp_size + lane);
+  bool too_far = false;
+  std::uint32_t last_depth = 0;
+  for (int first = 0;; first += step) {
     __syncwarp();
-    const int present = static_cast<int>(min(last - first, static_cast<std::uint32_t>(window)));
-    std::uint32_t key[per_lane];
+    const int present = min(pass.count - first, window);
+    Keys key, slot;
 #pragma unroll
     for (int j = 0; j < per_lane; ++j) {
       const int place = per_lane * lane + j;
       key[j] = behind_all;
       if (place < present)
-        key[j] = p.depth_key[held[place]] >> depth_bits_below << place_bits |
-                 static_cast<std::uint32_t>(place);
+        key[j] = pass.depth(held[place]) << place_bits | static_cast<std::uint32_t>(place);
     }
     sort_window(key);
-    std::uint32_t slot[per_lane];
+    too_far |= __shfl_sync(~0u, key[0], 0) >> place_bits < last_depth;
+    last_depth = __shfl_sync(~0u, key[per_lane - 1], step / per_lane - 1) >> place_bits;
 #pragma unroll
-    for (int j = 0; j < per_lane; ++j) slot[j] = held[key[j] & ((1u << place_bits) - 1u)];
+    for (int j = 0; j < per_lane; ++j) slot[j] = held[key[j] & (window - 1)];
+    order_ties<forwards>(key, slot);
     __syncwarp();
 #pragma unroll
     for (int j = 0; j < per_lane; ++j) held[per_lane * lane + j] = slot[j];
     __syncwarp();
-    const bool ends = present <= step || first + window >= last;
+    const bool ends = first + window >= pass.count;
     for (int place = lane; place < (ends ? present : step); place += warp_size)
-      p.slot[first + static_cast<std::uint32_t>(place)] = held[place];
-    if (ends) return;
+      pass.slot(first + place) = held[place];
+    if (ends) return too_far;
     __syncwarp();
     std::uint32_t kept[step / warp_size];
 #pragma unroll
@@ -83,82 +137,57 @@ __device__ void reorder(const ReorderParams& p, std::uint32_t first, std::uint32
 #pragma unroll
     for (int j = 0; j < step / warp_size; ++j) {
       held[j * warp_size + lane] = kept[j];
-      load(step + j * warp_size + lane,
-           first + static_cast<std::uint32_t>(window + j * warp_size + lane));
+      load(step + j * warp_size + lane, first + window + j * warp_size + lane);
     }
   }
 }
 
-// The comb: a block takes so many entries of a tile at a time, in as many interleaved windows.
-// Their number is odd, so that a warp's entries lie in different banks of shared memory.
-constexpr int comb_warps = 15;
-constexpr int comb_block = comb_warps * warp_size;
-constexpr int combed_at_once = comb_warps * window;
-constexpr unsigned comb_blocks_per_tile = 4;
-
-/// Sorts entries first, first + stride, … of `slots`, a window of them, by one warp.
-__device__ void comb(const ReorderParams& p, std::uint32_t* slots, int first, int stride,
-                     int count) {
-  const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  const int present = (count - first + stride - 1) / stride;
-  std::uint32_t key[per_lane], slot[per_lane];
-#pragma unroll
-  for (int j = 0; j < per_lane; ++j) {
-    const int place = j * warp_size + lane;
-    key[j] = behind_all;
-    if (place < present)
-      key[j] = p.depth_key[slots[first + place * stride]] >> depth_bits_below << place_bits |
-               static_cast<std::uint32_t>(place);
-  }
-  sort_window(key);
-#pragma unroll
-  for (int j = 0; j < per_lane; ++j) {
-    if (per_lane * lane + j >= present) continue;
-    slot[j] = slots[first + static_cast<int>(key[j] & ((1u << place_bits) - 1u)) * stride];
-  }
+/// Entries first…last - 1 of the lists, in a pass or two.
+__device__ void reorder(const ReorderParams& p, std::uint32_t first, std::uint32_t last,
+                        std::uint32_t (&held)[window]) {
+  std::uint32_t* run = p.slot + first;
+  const int count = static_cast<int>(last - first);
+  const bool too_far = slide<true>({p.depth_key, run, count}, held);
   __syncwarp();
-#pragma unroll
-  for (int j = 0; j < per_lane; ++j)
-    if (per_lane * lane + j < present) slots[first + (per_lane * lane + j) * stride] = slot[j];
-}
-
-__global__ void __launch_bounds__(comb_block) comb_kernel(const ReorderParams p) {
-  __shared__ std::uint32_t slots[combed_at_once];
-  const int thread = static_cast<int>(threadIdx.x), warp = thread / warp_size;
-  const std::uint32_t combed = p.combed[blockIdx.x];
-  for (std::uint32_t begin = blockIdx.y * combed_at_once; begin + window < combed;
-       begin += comb_blocks_per_tile * combed_at_once) {
-    std::uint32_t* list = &p.slot[p.range[blockIdx.x].x + begin];
-    const int count = static_cast<int>(min(combed - begin, std::uint32_t{combed_at_once}));
-    for (int i = thread; i < count; i += comb_block) slots[i] = list[i];
-    __syncthreads();
-    const int stride = (count + window - 1) / window | 1;
-    if (warp < stride) comb(p, slots, warp, stride, count);
-    __syncthreads();
-    for (int i = thread; i < count; i += comb_block) list[i] = slots[i];
-    __syncthreads();
-  }
+  if (too_far) slide<false>({p.depth_key, run, count}, held);
+  __syncwarp();
 }
 
 __global__ void __launch_bounds__(block_size) reorder_kernel(const ReorderParams p) {
   __shared__ std::uint32_t held[warps][window];
-  const std::uint32_t warp = threadIdx.x / warp_size;
-  const std::uint32_t runs = p.counts->runs;
+  const std::uint32_t warp = threadIdx.x / warp_size, runs = p.counts->runs;
+  for (std::uint32_t r = blockIdx.x * warps + warp; r < runs; r += gridDim.x * warps)
+    reorder(p, p.runs[r].first, p.runs[r].last, held[warp]);
+}
+
+// Entries on either side of where two runs meet that are stitched: few windows, for nothing else is
+// left to do then that could hide their latency.
+constexpr std::uint32_t stitched = window;
+static_assert(2 * stitched <= reorder_run);
+
+/// Where two runs of a tile meet in the wrong order.
+__global__ void __launch_bounds__(block_size) stitch_kernel(const ReorderParams p) {
+  __shared__ std::uint32_t held[warps][window];
+  const std::uint32_t warp = threadIdx.x / warp_size, runs = p.counts->runs;
   for (std::uint32_t r = blockIdx.x * warps + warp; r < runs; r += gridDim.x * warps) {
-    const uint2 run = p.runs[r];
-    reorder(p, run.x, run.y, held[warp]);
-    __syncwarp();
+    const ReorderRun run = p.runs[r];
+    if (!run.continues) continue;
+    const auto depth = [&](std::uint32_t at) {
+      return p.depth_key[p.slot[at]] >> depth_bits_below;
+    };
+    if (depth(run.first - 1) <= depth(run.first)) continue;
+    reorder(p, run.first - stitched, min(run.first + stitched, run.last), held[warp]);
   }
 }
 
 }  // namespace
 
 void launch_reorder(const ReorderParams& params, cudaStream_t stream) {
-  comb_kernel<<<dim3(params.shape.tiles(), comb_blocks_per_tile), comb_block, 0, stream>>>(params);
-  check_launch("comb");
   constexpr int blocks_per_processor = 16;
   reorder_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
   check_launch("reorder");
+  stitch_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
+  check_launch("stitch");
 }
 
 }  // namespace catgs::cuda

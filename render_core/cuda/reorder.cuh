@@ -4,18 +4,22 @@
 
 namespace catgs::cuda {
 
-/// Brings the tile lists that a sub-frame takes over from its key frame nearer to its own depth
-/// order, in place. Of most entries the order changes little from frame to frame: a turn moves the
-/// depths in a tile by one and the same share. They move within a window of neighbours that slides
-/// along a run of the list; what one lacks, the next frame adds, whose runs begin elsewhere. Large
-/// Gaussians with centres elsewhere may jump over hundreds of these: before, each tile is combed
-/// (Shell's sort with one stride), which takes every entry near to its place. Only what the tiles
-/// are expected to look at is in the runs, and somewhat more is combed.
+/// List entries that one warp takes; the last run of a tile may be shorter.
+constexpr std::uint32_t reorder_run = 1024;
+
+struct ReorderRun {
+  std::uint32_t first, last;  // one past the last; both within one tile's list
+  bool continues;             // the run before it
+};
+
+/// Brings the tile lists that a sub-frame takes over from its key frame into its own depth order,
+/// in place. A turn of the camera moves the depths in a tile by one and the same share, so that
+/// most entries move within a window of neighbours, which slides along a run of the list. Large
+/// Gaussians, whose centres lie elsewhere, may jump over hundreds: backwards the window carries
+/// them, forwards it does so in a second pass from the back, over those runs that need one. Then
+/// runs are stitched together where they meet in the wrong order.
 struct ReorderParams {
-  FrameShape shape;
-  const uint2* range;           // [tiles]
-  const std::uint32_t* combed;  // [tiles], entries of each list that are combed
-  const uint2* runs;  // [counts->runs], first and one past the last entry, each within a tile
+  const ReorderRun* runs;  // [counts->runs]
   const FrameCounts* counts;
   const std::uint32_t* depth_key;  // [visible_bound], of this frame
   std::uint32_t* slot;             // [list_bound]

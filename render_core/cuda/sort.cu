@@ -47,8 +47,9 @@ int tile_bits(const FrameShape& shape) { return static_cast<int>(std::bit_width(
 }  // namespace
 
 std::size_t sort_scratch_bytes(const FrameShape& shape) {
-  std::size_t depth = 0, scan = 0, tile = 0;
+  std::size_t depth = 0, scan = 0, narrow = 0, wide = 0;
   cub::DoubleBuffer<std::uint32_t> keys, values;
+  cub::DoubleBuffer<std::uint16_t> narrow_keys;
   check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound,
                                         depth_bits_below, depth_end_bit),
         "depth sort size");
@@ -56,10 +57,13 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
                                        static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
                                        shape.visible_bound),
         "tile count scan size");
-  check(cub::DeviceRadixSort::SortPairs(nullptr, tile, keys, values, shape.list_bound, 0,
+  check(cub::DeviceRadixSort::SortPairs(nullptr, wide, keys, values, shape.list_bound, 0,
                                         tile_bits(shape)),
         "tile sort size");
-  return std::max({depth, scan, tile});
+  check(cub::DeviceRadixSort::SortPairs(nullptr, narrow, narrow_keys, values, shape.list_bound, 0,
+                                        std::min(tile_bits(shape), 16)),
+        "tile sort size");
+  return std::max({depth, scan, narrow, wide});
 }
 
 void sort_by_depth(const FrameShape& shape, PingPong<std::uint32_t>& depth,
@@ -86,9 +90,10 @@ void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::u
   check_launch("tile count total");
 }
 
-void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
-                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream) {
-  cub::DoubleBuffer<std::uint32_t> keys(tile.current, tile.other);
+template <class Tile>
+void sort_by_tile(const FrameShape& shape, PingPong<Tile>& tile, PingPong<std::uint32_t>& slot,
+                  SortScratch scratch, cudaStream_t stream) {
+  cub::DoubleBuffer<Tile> keys(tile.current, tile.other);
   cub::DoubleBuffer<std::uint32_t> values(slot.current, slot.other);
   check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
                                         shape.list_bound, 0, tile_bits(shape), stream),
@@ -96,6 +101,11 @@ void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
   tile = {keys.Current(), keys.Alternate()};
   slot = {values.Current(), values.Alternate()};
 }
+
+template void sort_by_tile(const FrameShape&, PingPong<std::uint16_t>&, PingPong<std::uint32_t>&,
+                           SortScratch, cudaStream_t);
+template void sort_by_tile(const FrameShape&, PingPong<std::uint32_t>&, PingPong<std::uint32_t>&,
+                           SortScratch, cudaStream_t);
 
 std::size_t sum_scratch_bytes(std::uint32_t count) {
   std::size_t bytes = 0;

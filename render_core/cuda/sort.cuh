@@ -15,10 +15,12 @@ constexpr int depth_bits = 24;
 /// Key of what is not there, behind all that is.
 constexpr std::uint32_t no_depth_key = (1u << (depth_bits + depth_bits_below)) - 1u;
 
-/// Key of a view depth; the lowest, where it is not beyond the near plane.
+/// Key of a view depth; the lowest, where it is not beyond the near plane. What is of the same
+/// depth for one near plane is so for every other: they begin at a step.
 __device__ inline std::uint32_t depth_key(float depth, float near_z) {
   if (!(depth > near_z)) return 0;
-  return min(__float_as_uint(depth) - __float_as_uint(near_z),
+  constexpr std::uint32_t below = (1u << depth_bits_below) - 1u;
+  return min(__float_as_uint(depth) - (__float_as_uint(near_z) & ~below),
              no_depth_key - (1u << depth_bits_below));  // before it in the bits that are sorted
 }
 
@@ -51,9 +53,10 @@ void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::u
                       cudaStream_t stream);
 
 /// Sorts list entries by tile, stable, so that each tile keeps its front-to-back order. Keys beyond
-/// the count must be shape.tiles() or more.
-void sort_by_tile(const FrameShape& shape, PingPong<std::uint32_t>& tile,
-                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
+/// the count must be shape.tiles() or more. Tile: std::uint16_t or std::uint32_t.
+template <class Tile>
+void sort_by_tile(const FrameShape& shape, PingPong<Tile>& tile, PingPong<std::uint32_t>& slot,
+                  SortScratch scratch, cudaStream_t stream);
 
 /// For the original's way: sums[i] = tile_count[0] + … + tile_count[i], and list entries by 64-bit
 /// (tile | depth) keys.

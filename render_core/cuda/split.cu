@@ -103,26 +103,23 @@ __device__ std::uint32_t queued_in(int queue_class, const Cut& cut) {
   return cut.reserve + (cut.slices > c ? cut.slices - c : 0);
 }
 
-__device__ void write_runs(const SplitParams& p, const Cut& cut, std::uint32_t at) {
-  if (p.runs == nullptr) return;
-  for (std::uint32_t begin = 0; begin < cut.expected; ++at) {
-    const std::uint32_t end =
-        min(begin + reorder_run - (begin == 0 ? p.run_shift : 0), cut.listed());
-    p.runs[at] = make_uint2(cut.range.x + begin, cut.range.x + end);
-    begin = end;
-  }
+/// Entries that the reorder stage brings into order: somewhat more than will be looked at, for what
+/// comes from behind may belong in front.
+__device__ std::uint32_t ordered_of(const SplitParams& p, const Cut& cut) {
+  if (p.runs == nullptr || cut.expected == 0) return 0;
+  constexpr std::uint32_t step = 128;
+  return min(cut.listed(), (cut.expected + cut.expected / 8 + step - 1) / step * step);
 }
 
 __device__ std::uint32_t runs_of(const SplitParams& p, const Cut& cut) {
-  return p.runs == nullptr || cut.expected == 0
-             ? 0
-             : (cut.expected + p.run_shift + reorder_run - 1) / reorder_run;
+  return (ordered_of(p, cut) + reorder_run - 1) / reorder_run;
 }
 
-/// What comes from behind may belong in front.
-__device__ std::uint32_t combed_of(const Cut& cut) {
-  constexpr std::uint32_t at_least = 512;
-  return cut.expected == 0 ? 0 : min(cut.listed(), cut.expected + cut.expected / 2 + at_least);
+__device__ void write_runs(const SplitParams& p, const Cut& cut, std::uint32_t at) {
+  const std::uint32_t ordered = ordered_of(p, cut);
+  for (std::uint32_t begin = 0; begin < ordered; begin += reorder_run, ++at) {
+    p.runs[at] = {cut.range.x + begin, cut.range.x + min(begin + reorder_run, ordered), begin > 0};
+  }
 }
 
 /// `first`: the tile's first slice, if it has any; `place`: its first in each class of the queue.
@@ -207,7 +204,6 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) place[c] += queued[c];
   p.reach[t] = cut.seen ? 0 : cut.reach;
-  if (p.combed != nullptr) p.combed[t] = combed_of(cut);
   p.tile_slices[t] = make_uint2(first, cut.stored());
   write_tasks(p, t, cut, first, place);
 }

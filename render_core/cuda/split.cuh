@@ -1,6 +1,7 @@
 #pragma once
 
 #include "render_core/cuda/blend.cuh"
+#include "render_core/cuda/reorder.cuh"
 #include "render_core/math/homography-inl.h"
 
 namespace catgs::cuda {
@@ -36,9 +37,7 @@ struct SplitParams {
   uint2* tile_slices;                // [tiles], first slice and how many; none: one task
   std::uint32_t* queue;              // [queue_bound(shape)], see FrameCounts
   // For the reorder stage; null: it does not follow.
-  uint2* runs;                 // [run_bound]
-  std::uint32_t* combed;       // [tiles], entries of each list that are combed
-  std::uint32_t run_shift;     // how much shorter a tile's first run is
+  ReorderRun* runs;            // [run_bound]
   float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
   FrameCounts* counts;         // what split makes is set, and list_max
   std::uint32_t slice_length;  // l; 0: not known, the mean list is taken
@@ -61,10 +60,9 @@ inline std::uint32_t queue_bound(const FrameShape& shape) {
 /// Slices that are worth their pixels: what the paper's rule can ask for, and as much again.
 inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tile_bound; }
 
-/// List entries that one warp of the reorder stage takes; the last run of a tile may be shorter.
-constexpr std::uint32_t reorder_run = 512;
+/// Room for the runs of the reorder stage.
 inline std::uint32_t run_bound(const FrameShape& shape) {
-  return 2 * shape.tile_bound + shape.list_bound / reorder_run;
+  return shape.tile_bound + shape.list_bound / reorder_run;
 }
 
 /// Folds the slices of split tiles front to back:

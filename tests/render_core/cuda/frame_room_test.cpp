@@ -5,6 +5,7 @@
 namespace catgs::cuda {
 namespace {
 
+constexpr int span = 16;
 constexpr int patience = 600;
 
 void draw(Room& room, int frames, std::uint32_t needed) {
@@ -12,7 +13,7 @@ void draw(Room& room, int frames, std::uint32_t needed) {
 }
 
 TEST(Room, GrowsOnceWithAMarginThatTheNextNeedFits) {
-  Room room(1000, 1'000'000);
+  Room room(1000, 1'000'000, span);
   EXPECT_FALSE(room.outgrown_by(1000));
   EXPECT_TRUE(room.outgrown_by(10'000));
   EXPECT_GT(room.size(), 11'000u);
@@ -21,47 +22,48 @@ TEST(Room, GrowsOnceWithAMarginThatTheNextNeedFits) {
 }
 
 TEST(Room, StopsAtItsLimit) {
-  Room room(1000, 5000);
+  Room room(1000, 5000, span);
   EXPECT_TRUE(room.outgrown_by(4'000'000'000u));
   EXPECT_EQ(room.size(), 5000u);
   EXPECT_FALSE(room.outgrown_by(4'000'000'000u));
-  EXPECT_EQ(Room(1000, 10).size(), 10u);
+  EXPECT_EQ(Room(1000, 10, span).size(), 10u);
 }
 
-TEST(Room, ComesDownWhenHalfOfItWasNotNeededForLong) {
-  Room room(1'000'000, 2'000'000);
-  draw(room, patience - 1, 100'000);
+TEST(Room, ComesDownToWhatTheLastSpansNeeded) {
+  Room room(1'000'000, 2'000'000, span);
+  draw(room, 1, 900'000);
+  draw(room, 2 * span - 2, 100'000);
   EXPECT_EQ(room.size(), 1'000'000u);
-  draw(room, 1, 100'000);
+  draw(room, 1 + span, 100'000);
   EXPECT_LT(room.size(), 200'000u);
   EXPECT_GE(room.size(), 100'000u);
-  draw(room, 3 * patience, 100'000);
+  draw(room, 3 * span, 100'000);
   EXPECT_GE(room.size(), 100'000u);
 }
 
 TEST(Room, StaysWhileNowAndThenMoreIsNeeded) {
-  Room room(1'000'000, 2'000'000);
+  Room room(1'000'000, 2'000'000, span);
   for (int i = 0; i < 10; ++i) {
-    draw(room, patience / 2, 10);
-    draw(room, 1, 600'000);
+    draw(room, span - 1, 10);
+    draw(room, 1, 900'000);
   }
   EXPECT_EQ(room.size(), 1'000'000u);
 }
 
 TEST(Room, NeverGrowsByComingDown) {
   for (const std::uint32_t size : {0u, 1u, 4096u, 9000u}) {
-    Room room(size, 1'000'000);
-    draw(room, 2 * patience, size / 3);
+    Room room(size, 1'000'000, span);
+    draw(room, 4 * span, size / 3);
     EXPECT_LE(room.size(), size);
   }
 }
 
 TEST(Room, ForgetsAfterAWhileThatItWasTold) {
-  Room room(1'000'000, 2'000'000);
+  Room room(1'000'000, 2'000'000, span);
   room.shrink_to(0.75);
   EXPECT_EQ(room.size(), 750'000u);
   EXPECT_FALSE(room.outgrown_by(1'500'000));
-  draw(room, patience - 1, 1'500'000);
+  draw(room, patience - 1, 700'000);
   EXPECT_TRUE(room.outgrown_by(1'500'000));
   EXPECT_GE(room.size(), 1'500'000u);
 }
