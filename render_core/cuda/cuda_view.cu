@@ -4,15 +4,12 @@
 #include <limits>
 #include <utility>
 
-#include "render_core/cuda/bin.cuh"
 #include "render_core/cuda/blend.cuh"
 #include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/cuda_view.cuh"
-#include "render_core/cuda/cull.cuh"
 #include "render_core/cuda/pixel_runs.cuh"
 #include "render_core/cuda/project.cuh"
 #include "render_core/cuda/reorder.cuh"
-#include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/split.cuh"
 
 namespace catgs::cuda {
@@ -41,6 +38,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       device_(device),
       settings_(settings),
       room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
+      builder_(scene_->arrays(), processors_of(device)),
       processors_(processors_of(device)),
       blend_warps_(blend_warps(processors_)),
       groups_(settings.speculation) {
@@ -49,7 +47,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
   if (settings.pipeline == Pipeline::vanilla) return;
   const glm::ivec2 one_tile(tile_size_px);
   set_shape(one_tile, image_grid(one_tile));
-  memory_.reserve(shape_, scene_->arrays(), settings_);
+  reserve_all();
   shape_ = {};
 }
 
@@ -67,6 +65,11 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
       draw_vanilla(request);
     } else if (plan.kind == FrameKind::sub) {
       draw_sub(request, plan);
+      if (memory_.host_counts.get()->unlisted != 0) {
+        groups_.forget();
+        plan = groups_.plan(request.camera, request.forecast, depths_);
+        draw_key(request, plan);
+      }
     } else {
       draw_key(request, plan);
     }
@@ -108,6 +111,21 @@ void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
   shape_.visible_bound = room.visible;
   shape_.list_bound = room.list_entries;
   shape_.slice_bound = std::min(room.slices, most_slices(shape_));
+  lists_.shape = shape_;
+}
+
+/// For the frame's shape, and where lists need memory, for somewhat longer ones, so that they do
+/// not need it again and again. Throws CudaError.
+void CudaView::reserve_all() {
+  FrameShape roomy = shape_;
+  if (!lists_.has_room(shape_)) {
+    const FrameSizes most = room_.limits();
+    roomy.visible_bound = std::min(most.visible, shape_.visible_bound + shape_.visible_bound / 4);
+    roomy.list_bound = std::min(most.list_entries, shape_.list_bound + shape_.list_bound / 4);
+  }
+  lists_.reserve(roomy, scene_->arrays());
+  builder_.reserve(roomy, speculates(settings_));
+  memory_.reserve(roomy, scene_->arrays(), settings_);
 }
 
 /// Sets the frame's shape and makes room for it; where the device has too little memory, without
@@ -118,11 +136,13 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
     set_shape(size_px, grid);
     try {
       const std::size_t known = memory_.reach[last_reach_].bytes();
-      memory_.reserve(shape_, scene_->arrays(), settings_);
+      reserve_all();
       if (memory_.reach[last_reach_].bytes() != known) reach_known_ = false;
       return;
     } catch (const CudaError& error) {
       memory_ = {};
+      builder_.release();
+      lists_ = {};
       reach_known_ = false;
       colours_known_ = false;
       const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
@@ -141,22 +161,12 @@ bool CudaView::needs_more_room() {
 }
 
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
-  const bool sweeps = plan.window > 0;
-  FrameCameras cameras{make_camera_pair(request.camera), {}, request.camera.near_z};
-  cameras.now.single.near_z = plan.list_near_z;
-  cameras.end = sweeps ? make_camera_pair(plan.window_end).single : cameras.now.single;
-  cameras.growth = math::convert<float>(plan.growth);
-  cameras.trail_shift_px = make_float2(static_cast<float>(plan.trail_shift_px.x),
-                                       static_cast<float>(plan.trail_shift_px.y));
-  const ListCuller culler(request.camera, plan);
-  const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
+  const ListRequest listed(request.camera, plan, settings_.speculation);
   turned_ = false;
   for (;;) {
     make_room(request.camera.size_px, plan.grid);
-    const cudaStream_t stream = stream_.get();
-    times_.begin(stream);
-    check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
-    list_tiles(cameras, culler, sweeps, min_depth);
+    times_.begin(stream_.get());
+    list_tiles(listed);
     split(nullptr, last_reach());
     times_.end(Stage::sort, stream_.get());
     blend(request);
@@ -167,13 +177,27 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   remember_reach({});
 }
 
-void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
-  FrameMemory& m = memory_;
+/// Stages project, bin and most of sort of a key frame.
+void CudaView::list_tiles(const ListRequest& request) {
   const cudaStream_t stream = stream_.get();
+  builder_.cull(request, lists_, stream);
+  const ColourArrays colours = want_colours(request.cameras.now.single);
+  builder_.project(request, lists_, colours, stream);
+  times_.end(Stage::project, stream);
+  builder_.sort_by_depth(lists_, stream);
+  times_.end_depth_sort(stream);
+  builder_.emit(request, lists_, stream);
+  times_.end(Stage::bin, stream);
+  builder_.sort_by_tile(lists_, stream);
+}
+
+void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
+  const cudaStream_t stream = stream_.get();
+  FrameCounts* counts = lists_.counts.get();
   times_.begin(stream);
   constexpr std::size_t kept = offsetof(FrameCounts, nearness);
-  check(cudaMemsetAsync(reinterpret_cast<std::byte*>(m.counts.get()) + kept, 0,
-                        sizeof(FrameCounts) - kept, stream),
+  check(cudaMemsetAsync(reinterpret_cast<std::byte*>(counts) + kept, 0, sizeof(FrameCounts) - kept,
+                        stream),
         "counts");
   const CameraPair now = make_camera_pair(request.camera);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
@@ -182,26 +206,28 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
                   {now, now.single, request.camera.near_z},
                   picture_of(shape_),
                   min_depth,
-                  m.counts.get(),
-                  m.visible.get(),
+                  counts,
+                  lists_.visible.get(),
                   colours,
-                  m.records.get(),
-                  m.depth[0].get(),
+                  builder_.records(),
+                  builder_.depth_keys(),
                   nullptr,
                   nullptr,
                   nullptr,
                   nullptr},
                  Listing::none, stream);
-  times_.end(Stage::project, stream_.get());
+  times_.end(Stage::project, stream);
   place_tiles(plan);
-  times_.end(Stage::bin, stream_.get());
+  times_.end(Stage::bin, stream);
   const bool reorders = settings_.order == BlendOrder::fresh;
   LastReach last = last_reach();
   last.same_grid = true;
-  split(reorders ? m.runs.get() : nullptr, last);
+  split(reorders ? memory_.runs.get() : nullptr, last);
   if (reorders)
-    launch_reorder({m.runs.get(), m.counts.get(), m.depth[0].get(), lists_, processors_}, stream);
-  times_.end(Stage::sort, stream_.get());
+    launch_reorder(
+        {memory_.runs.get(), counts, builder_.depth_keys(), lists_.slot.get(), processors_},
+        stream);
+  times_.end(Stage::sort, stream);
   blend(request);
   deliver();
   remember_reach(plan.list_from_frame);
@@ -248,9 +274,9 @@ ColourArrays CudaView::want_colours(const math::CameraModel<float>& camera) {
   const math::Vec3<float>& at = camera.position;
   launch_want_colours({scene_->arrays(),
                        {at.x, at.y, at.z},
-                       m.counts.get(),
-                       m.clusters.get(),
-                       m.cull_mask.get(),
+                       lists_.counts.get(),
+                       lists_.clusters.get(),
+                       lists_.cull_mask.get(),
                        colours},
                       stream_.get());
   return colours;
@@ -262,64 +288,16 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   shape_.list_bound = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
   memory_.reserve_image(shape_, settings_);
+  lists_.counts.reserve(1);
   const cudaStream_t stream = stream_.get();
   times_.begin(stream);
-  check(cudaMemsetAsync(memory_.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
+  FrameCounts* counts = lists_.counts.get();
+  check(cudaMemsetAsync(counts, 0, sizeof(FrameCounts), stream), "counts");
   vanilla_.draw(
       {&scene_->arrays(), make_camera_pair(request.camera), shape_, make_float3(b.x, b.y, b.z),
-       memory_.rgb.get(), memory_.counts.get(), settings_.count_pairs},
+       memory_.rgb.get(), counts, settings_.count_pairs},
       [this](Stage stage) { times_.end(stage, stream_.get()); }, stream);
   deliver();
-}
-
-/// Stages project, bin and most of sort of a key frame.
-void CudaView::list_tiles(const FrameCameras& cameras, const ListCuller& culler, bool sweeps,
-                          float min_depth) {
-  FrameMemory& m = memory_;
-  const cudaStream_t stream = stream_.get();
-  const SceneArrays& scene = scene_->arrays();
-  const SortScratch scratch{m.scratch.get(), m.scratch.bytes()};
-  SplatPath* path = sweeps ? m.path.get() : nullptr;
-  launch_cull({scene, culler, cameras, sweeps, shape_, m.clusters.get(), m.cull_mask.get(),
-               m.cull_seen.get(), m.cull_before.get(), m.visible.get(), m.counts.get(), scratch,
-               processors_},
-              stream);
-  const ColourArrays colours = want_colours(cameras.now.single);
-  launch_project(
-      {scene, cameras, shape_, min_depth, m.counts.get(), m.visible.get(), colours, m.records.get(),
-       m.depth[0].get(), m.tile_count.get(), m.spans.get(), path, m.order[0].get()},
-      sweeps ? Listing::trails : Listing::ellipses, stream);
-  times_.end(Stage::project, stream_.get());
-
-  PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
-  PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
-  sort_by_depth(shape_, depth, order, scratch, stream);
-  times_.end_depth_sort(stream);
-  scan_tile_counts(shape_, m.counts.get(), order.current, m.tile_count.get(), m.first.get(),
-                   scratch, stream);
-  // The padding's key, shape_.tiles(), is the largest.
-  if (shape_.tiles() <= std::numeric_limits<std::uint16_t>::max()) {
-    sort_lists<std::uint16_t>(order.current, path, scratch);
-  } else {
-    sort_lists<std::uint32_t>(order.current, path, scratch);
-  }
-}
-
-/// Emits the list entries of splats in this order, and sorts them by tile.
-template <class Tile>
-void CudaView::sort_lists(const std::uint32_t* order, const SplatPath* path, SortScratch scratch) {
-  FrameMemory& m = memory_;
-  const cudaStream_t stream = stream_.get();
-  PingPong<Tile> tile{reinterpret_cast<Tile*>(m.tile[0].get()),
-                      reinterpret_cast<Tile*>(m.tile[1].get())};
-  PingPong<std::uint32_t> slot{m.slot[0].get(), m.slot[1].get()};
-  launch_emit<Tile>({shape_, m.counts.get(), m.records.get(), order, m.first.get(),
-                     m.tile_count.get(), m.spans.get(), path, tile.current, slot.current},
-                    stream);
-  times_.end(Stage::bin, stream);
-  sort_by_tile(shape_, tile, slot, scratch, stream);
-  launch_ranges<Tile>({shape_, tile.current, m.range.get()}, stream);
-  lists_ = slot.current;
 }
 
 /// The paper's l, of the last frame; 0: not known.
@@ -332,11 +310,11 @@ std::uint32_t CudaView::slice_length() const {
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
 void CudaView::split(ReorderRun* runs, const LastReach& last) {
   FrameMemory& m = memory_;
-  launch_split(
-      {shape_, m.range.get(), last, m.reach[1 - last_reach_].get(),
-       turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(), m.queue.get(),
-       runs, m.slice_transmittance.get(), m.counts.get(), slice_length(), settings_.split_tasks},
-      stream_.get());
+  launch_split({shape_, lists_.range.get(), last, m.reach[1 - last_reach_].get(),
+                turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(),
+                m.queue.get(), runs, m.slice_transmittance.get(), lists_.counts.get(),
+                slice_length(), settings_.split_tasks},
+               stream_.get());
 }
 
 void CudaView::blend(const FrameRequest& request) {
@@ -347,11 +325,11 @@ void CudaView::blend(const FrameRequest& request) {
   const PixelPlace* pixels = turned_ ? m.pixels.get() : nullptr;
   const std::uint32_t* pixel_count = turned_ ? m.pixel_count.get() : nullptr;
   std::uint32_t* reach = m.reach[1 - last_reach_].get();
-  launch_blend(
-      {shape_, m.records.get(), lists_, m.tasks.get(), m.queue.get(), background, m.rgb.get(),
-       pixels, pixel_count, m.slice_pixels.get(), m.consumed.get(), m.slice_transmittance.get(),
-       reach, m.counts.get(), settings_.count_pairs, blend_warps_},
-      stream);
+  launch_blend({shape_, builder_.records(), lists_.slot.get(), m.tasks.get(), m.queue.get(),
+                background, m.rgb.get(), pixels, pixel_count, m.slice_pixels.get(),
+                m.consumed.get(), m.slice_transmittance.get(), reach, lists_.counts.get(),
+                settings_.count_pairs, blend_warps_},
+               stream);
   launch_composite({shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(),
                     m.consumed.get(), pixels, pixel_count, background, m.rgb.get(), reach},
                    stream);
@@ -375,16 +353,20 @@ void CudaView::deliver() {
                           cudaMemcpyDeviceToHost, stream),
           "image copy");
   }
-  check(cudaMemcpyAsync(m.host_counts.get(), m.counts.get(), sizeof(FrameCounts),
+  check(cudaMemcpyAsync(m.host_counts.get(), lists_.counts.get(), sizeof(FrameCounts),
                         cudaMemcpyDeviceToHost, stream),
         "counts");
   times_.end(Stage::convert, stream_.get());
   check(cudaStreamSynchronize(stream), "frame");
 }
 
+std::size_t CudaView::memory_bytes() const {
+  return lists_.bytes() + builder_.bytes() + memory_.bytes() + vanilla_.bytes();
+}
+
 std::vector<std::uint32_t> CudaView::tile_loads() const {
   const bool vanilla = settings_.pipeline == Pipeline::vanilla;
-  const uint2* ranges = vanilla ? vanilla_.ranges() : memory_.range.get();
+  const uint2* ranges = vanilla ? vanilla_.ranges() : lists_.range.get();
   if (ranges == nullptr) return {};
   std::vector<uint2> copy(shape_.tiles());
   check(cudaSetDevice(device_), "device");

@@ -5,14 +5,13 @@
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_memory.cuh"
 #include "render_core/cuda/frame_room.h"
-#include "render_core/cuda/sort.cuh"
+#include "render_core/cuda/list_builder.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/stage_times.h"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/motion/list_culler.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/clusters.h"
 
@@ -26,22 +25,18 @@ class CudaView final : public View {
 
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override;
   [[nodiscard]] std::vector<std::uint32_t> tile_loads() const override;
-  [[nodiscard]] std::size_t memory_bytes() const override {
-    return memory_.bytes() + vanilla_.bytes();
-  }
+  [[nodiscard]] std::size_t memory_bytes() const override;
 
  private:
   void set_shape(glm::ivec2 size_px, const TileGrid& grid);
   void make_room(glm::ivec2 size_px, const TileGrid& grid);
+  void reserve_all();
   bool needs_more_room();
   void forget_frames();
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   void draw_sub(const FrameRequest& request, const FramePlan& plan);
   void draw_vanilla(const FrameRequest& request);
-  void list_tiles(const FrameCameras& cameras, const ListCuller& culler, bool sweeps,
-                  float min_depth);
-  template <class Tile>
-  void sort_lists(const std::uint32_t* order, const SplatPath* path, SortScratch scratch);
+  void list_tiles(const ListRequest& request);
   ColourArrays want_colours(const math::CameraModel<float>& camera);
   void split(ReorderRun* runs, const LastReach& last);
   void place_tiles(const FramePlan& plan);
@@ -59,6 +54,7 @@ class CudaView final : public View {
   StageTimes times_;
   FrameShape shape_;
   FrameRoom room_;
+  ListBuilder builder_;
   FrameMemory memory_;
   VanillaPipeline vanilla_;
   int processors_;
@@ -66,7 +62,7 @@ class CudaView final : public View {
 
   // What sub-frames take over.
   FrameGroups groups_;
-  std::uint32_t* lists_ = nullptr;  // [list_bound], slots by tile
+  TileLists lists_;
   SceneDepths depths_;
   bool turned_ = false;  // the frame's tiles are runs of pixels
   bool colours_known_ = false;

@@ -30,7 +30,9 @@ __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
     const std::uint32_t i = p.clusters[rank] * block_size + threadIdx.x;
     bool visible = false;
     if (i < p.scene.count) {
-      visible = make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i)).in_view;
+      const Splat splat =
+          make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i));
+      visible = splat.in_view || splat.watched;
     }
     const unsigned word = __ballot_sync(~0u, visible);
     if (threadIdx.x % warp_size == 0) p.mask[rank * warps + threadIdx.x / warp_size] = word;

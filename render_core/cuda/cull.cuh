@@ -7,9 +7,10 @@
 
 namespace catgs::cuda {
 
-/// Finds the Gaussians in view (now, or with `sweeps` at some time of the window), in the order of
-/// the scene's clusters: the frustum cache of a key frame. Clusters are tested first, so that the
-/// cost of the rest follows what is in sight, not the size of the scene.
+/// Finds the Gaussians in view (now, or with `sweeps` at some time of the window, and those that
+/// are watched), in the order of the scene's clusters: the frustum cache of a key frame. Clusters
+/// are tested first, so that the cost of the rest follows what is in sight, not the size of the
+/// scene.
 struct CullParams {
   SceneArrays scene;
   ListCuller culler;

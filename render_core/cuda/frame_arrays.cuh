@@ -40,6 +40,7 @@ struct FrameCounts {
   std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
   std::uint32_t sampled = 0;   // counted Gaussians of which inverse_depths is the sum
   unsigned long long inverse_depths = 0;     // in units of 1 / (near_z * inverse_depth_scale)
+  std::uint32_t unlisted = 0;                // 1: a watched Gaussian came into view
   std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
   std::uint32_t runs = 0;                    // of the reorder stage
@@ -49,6 +50,11 @@ struct FrameCounts {
   unsigned long long expected_entries = 0;  // list entries that tiles are expected to look at
   unsigned long long blended_pairs = 0;     // only when counted
 };
+
+// In an array of visible Gaussians: this one is in no list. A turn may bring it into view (giants
+// far to the side, which come before the near plane with footprints all over the picture), but
+// seldom does; a sub-frame that finds one in view is drawn again as a key frame.
+constexpr std::uint32_t watched_bit = std::uint32_t{1} << 31;
 
 /// The picture, the grid of tile lists (see TileGrid) and the bounds of the frame's buffers.
 struct FrameShape {

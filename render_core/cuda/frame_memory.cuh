@@ -5,25 +5,17 @@
 #include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/reorder.cuh"
-#include "render_core/cuda/tiles.cuh"
 #include "render_core/renderer.h"
 
 namespace catgs::cuda {
 
-/// Whether sub-frames of a View find their tiles by launch_pixel_runs().
+/// Whether a View has sub-frames, and whether these find their tiles by launch_pixel_runs().
+bool speculates(const ViewSettings& settings);
 bool turns_tiles(const ViewSettings& settings);
 
-/// All device memory of a View, sized by a FrameShape. Buffers grow between frames.
+/// Device memory of what a View draws, sized by a FrameShape. Buffers grow between frames.
 struct FrameMemory {
-  DeviceBuffer<std::uint32_t> clusters, cull_mask, cull_seen, cull_before, visible;
   ColourCache colours;
-  DeviceBuffer<SplatRecord> records;
-  DeviceBuffer<TileSpans> spans;
-  DeviceBuffer<SplatPath> path;
-  DeviceBuffer<std::uint32_t> tile_count, first;
-  DeviceBuffer<std::uint32_t> depth[2], order[2];
-  DeviceBuffer<std::uint32_t> tile[2], slot[2];
-  DeviceBuffer<uint2> range;
   DeviceBuffer<BlendTask> tasks;
   DeviceBuffer<std::uint32_t> queue, consumed;
   DeviceBuffer<std::uint32_t> reach[2];  // of this frame and the last
@@ -33,8 +25,6 @@ struct FrameMemory {
   DeviceBuffer<ReorderRun> runs;
   DeviceBuffer<float> slice_transmittance;
   DeviceBuffer<float4> slice_pixels;
-  DeviceBuffer<FrameCounts> counts;
-  DeviceBuffer<std::byte> scratch;
   DeviceBuffer<float> rgb;
   DeviceBuffer<std::uint8_t> i420;
   PinnedBuffer<FrameCounts> host_counts;
@@ -42,7 +32,7 @@ struct FrameMemory {
 
   /// Makes room; throws CudaError.
   void reserve(const FrameShape& shape, const SceneArrays& scene, const ViewSettings& settings);
-  /// The same for the image and the counts alone.
+  /// The same for the image alone.
   void reserve_image(const FrameShape& shape, const ViewSettings& settings);
   [[nodiscard]] std::size_t bytes() const;
 };

@@ -10,7 +10,7 @@ namespace {
 constexpr int patience = 600;  // key frames
 
 // Padding is sorted, but room for slices costs nothing while it is not used.
-constexpr int sorted_span = 16;
+constexpr int sorted_span = 240;
 constexpr int slices_span = 600;
 
 }  // namespace
@@ -52,6 +52,8 @@ FrameRoom::FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool spl
       slices_(4096, splits ? std::numeric_limits<std::uint32_t>::max() : 0, slices_span) {}
 
 FrameSizes FrameRoom::sizes() const { return {visible_.size(), lists_.size(), slices_.size()}; }
+
+FrameSizes FrameRoom::limits() const { return {visible_.limit(), lists_.limit(), slices_.limit()}; }
 
 bool FrameRoom::outgrown_by(const FrameSizes& needed) {
   slices_.outgrown_by(needed.slices);  // without them the frame was slower, not wrong

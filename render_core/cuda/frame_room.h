@@ -12,6 +12,7 @@ class Room {
   Room(std::uint64_t first_guess, std::uint64_t limit, int span);
 
   [[nodiscard]] std::uint32_t size() const { return size_; }
+  [[nodiscard]] std::uint32_t limit() const { return limit_; }
   /// After a key frame: whether it needed more than there is and can be; then the room has grown.
   bool outgrown_by(std::uint32_t needed);
   /// A part of what there is now, and for some hundred key frames no more than that.
@@ -43,6 +44,8 @@ class FrameRoom {
   FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits);
 
   [[nodiscard]] FrameSizes sizes() const;
+  /// What sizes() will never exceed, for now.
+  [[nodiscard]] FrameSizes limits() const;
   /// After a key frame: whether it lacked room and should be drawn again.
   bool outgrown_by(const FrameSizes& needed);
   /// The device has no memory for this much: gives up slices, which only make frames faster, then a

@@ -45,7 +45,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
     p.depth_key[v] = no_depth_key;
     return;
   }
-  const std::uint32_t i = p.visible[v];
+  const std::uint32_t i = p.visible[v] & ~watched_bit;
   const Centre centre = load_centre(p.scene, i);
   const bool shades = wants_shading(p.colours, i);
   ShCoefficients sh{};
@@ -68,7 +68,10 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const bool counted = listed && splat.depth > fmaxf(p.min_depth, p.camera.near_z);
   raise(&p.counts->nearness, counted ? ~__float_as_uint(splat.depth) : 0u);
   if (blockIdx.x % sampled_blocks == 0) add_inverse_depth(p, counted, splat.depth);
+  if (listing == Listing::none && splat.in_view && (p.visible[v] & watched_bit) != 0)
+    p.counts->unlisted = 1;
   if constexpr (listing != Listing::none) {
+    if (splat.watched) p.visible[v] = i | watched_bit;
     TileSpans spans{};
     std::uint32_t tiles = 0;
     if constexpr (listing == Listing::trails) {

@@ -8,10 +8,11 @@ namespace {
 constexpr int warps = 4;
 constexpr int block_size = warps * warp_size;
 
-// A warp sorts a window of 256 entries, eight a lane, writes the first half and slides by it.
+// A warp sorts a window of 256 entries, eight a lane, writes the first three quarters and slides by
+// them.
 constexpr int per_lane = 8;
 constexpr int window = per_lane * warp_size;
-constexpr int step = window / 2;
+constexpr int step = window / 4 * 3, carried = window - step;
 
 // A key holds the depth and, below it, the place in the window.
 constexpr int place_bits = 8;
@@ -95,12 +96,15 @@ __device__ void order_ties(const Keys& key, Keys& slot) {
 }
 
 /// One pass over a run, by one warp. What belongs towards the end is carried there, however far;
-/// what belongs towards the beginning comes as far as a step. Returns whether that was too little
-/// for some entry. `held` is the warp's scratch.
+/// what belongs towards the beginning comes as far as windows overlap. Returns whether that was too
+/// little for some entry. `held` is the warp's scratch.
 template <bool forwards>
 __device__ bool slide(const Pass<forwards>& pass, std::uint32_t (&held)[window]) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  const auto load = [&](int place, int at) { held[place] = at < pass.count ? pass.slot(at) : 0; };
+  // Past the first-level cache: another warp may have written the neighbouring entries.
+  const auto load = [&](int place, int at) {
+    held[place] = at < pass.count ? __ldcg(&pass.slot(at)) : 0;
+  };
   for (int j = 0; j < per_lane; ++j) load(j * warp_size + lane, j * warp_size + lane);
   bool too_far = false;
   std::uint32_t last_depth = 0;
@@ -130,15 +134,15 @@ __device__ bool slide(const Pass<forwards>& pass, std::uint32_t (&held)[window])
       pass.slot(first + place) = held[place];
     if (ends) return too_far;
     __syncwarp();
-    std::uint32_t kept[step / warp_size];
+    std::uint32_t kept[carried / warp_size];
 #pragma unroll
-    for (int j = 0; j < step / warp_size; ++j) kept[j] = held[step + j * warp_size + lane];
+    for (int j = 0; j < carried / warp_size; ++j) kept[j] = held[step + j * warp_size + lane];
     __syncwarp();
 #pragma unroll
-    for (int j = 0; j < step / warp_size; ++j) {
-      held[j * warp_size + lane] = kept[j];
-      load(step + j * warp_size + lane, first + window + j * warp_size + lane);
-    }
+    for (int j = 0; j < carried / warp_size; ++j) held[j * warp_size + lane] = kept[j];
+#pragma unroll
+    for (int j = 0; j < step / warp_size; ++j)
+      load(carried + j * warp_size + lane, first + window + j * warp_size + lane);
   }
 }
 
@@ -153,30 +157,35 @@ __device__ void reorder(const ReorderParams& p, std::uint32_t first, std::uint32
   __syncwarp();
 }
 
-__global__ void __launch_bounds__(block_size) reorder_kernel(const ReorderParams p) {
-  __shared__ std::uint32_t held[warps][window];
-  const std::uint32_t warp = threadIdx.x / warp_size, runs = p.counts->runs;
-  for (std::uint32_t r = blockIdx.x * warps + warp; r < runs; r += gridDim.x * warps)
-    reorder(p, p.runs[r].first, p.runs[r].last, held[warp]);
-}
-
-// Entries on either side of where two runs meet that are stitched: few windows, for nothing else is
-// left to do then that could hide their latency.
+// Entries on either side of where two runs meet that are stitched.
 constexpr std::uint32_t stitched = window;
 static_assert(2 * stitched <= reorder_run);
 
-/// Where two runs of a tile meet in the wrong order.
-__global__ void __launch_bounds__(block_size) stitch_kernel(const ReorderParams p) {
+/// To be called when one of the two runs that meet at `run` is in order; the later of the two calls
+/// puts their neighbouring ends in order.
+__device__ void meet(const ReorderParams& p, ReorderRun& run, std::uint32_t (&held)[window]) {
+  const int lane = static_cast<int>(threadIdx.x) % warp_size;
+  std::uint32_t met = 0;
+  __threadfence();  // what this warp wrote, before the other one may see that it did
+  __syncwarp();
+  if (lane == 0) met = atomicAdd(&run.met, 1u);
+  if (__shfl_sync(~0u, met, 0) == 0) return;
+  __threadfence();
+  const auto depth = [&](std::uint32_t at) {
+    return p.depth_key[__ldcg(&p.slot[at])] >> depth_bits_below;
+  };
+  if (depth(run.first - 1) <= depth(run.first)) return;
+  reorder(p, run.first - stitched, min(run.first + stitched, run.last), held);
+}
+
+__global__ void __launch_bounds__(block_size) reorder_kernel(const ReorderParams p) {
   __shared__ std::uint32_t held[warps][window];
   const std::uint32_t warp = threadIdx.x / warp_size, runs = p.counts->runs;
   for (std::uint32_t r = blockIdx.x * warps + warp; r < runs; r += gridDim.x * warps) {
-    const ReorderRun run = p.runs[r];
-    if (!run.continues) continue;
-    const auto depth = [&](std::uint32_t at) {
-      return p.depth_key[p.slot[at]] >> depth_bits_below;
-    };
-    if (depth(run.first - 1) <= depth(run.first)) continue;
-    reorder(p, run.first - stitched, min(run.first + stitched, run.last), held[warp]);
+    ReorderRun& run = p.runs[r];
+    reorder(p, run.first, run.last, held[warp]);
+    if (run.continues != 0) meet(p, run, held[warp]);
+    if (run.follows != 0) meet(p, p.runs[r + 1], held[warp]);
   }
 }
 
@@ -186,8 +195,6 @@ void launch_reorder(const ReorderParams& params, cudaStream_t stream) {
   constexpr int blocks_per_processor = 16;
   reorder_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
   check_launch("reorder");
-  stitch_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
-  check_launch("stitch");
 }
 
 }  // namespace catgs::cuda

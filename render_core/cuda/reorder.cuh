@@ -9,17 +9,19 @@ constexpr std::uint32_t reorder_run = 1024;
 
 struct ReorderRun {
   std::uint32_t first, last;  // one past the last; both within one tile's list
-  bool continues;             // the run before it
+  std::uint16_t continues;    // whether it follows another run of its tile, the one before it
+  std::uint16_t follows;      // whether another follows
+  std::uint32_t met;  // how many of the two runs that meet at `first` are in order; 0 at first
 };
 
 /// Brings the tile lists that a sub-frame takes over from its key frame into its own depth order,
 /// in place. A turn of the camera moves the depths in a tile by one and the same share, so that
 /// most entries move within a window of neighbours, which slides along a run of the list. Large
 /// Gaussians, whose centres lie elsewhere, may jump over hundreds: backwards the window carries
-/// them, forwards it does so in a second pass from the back, over those runs that need one. Then
-/// runs are stitched together where they meet in the wrong order.
+/// them, forwards it does so in a second pass from the back, over those runs that need one. Where
+/// two runs of a tile meet in the wrong order, whoever is ready last stitches them together.
 struct ReorderParams {
-  const ReorderRun* runs;  // [counts->runs]
+  ReorderRun* runs;  // [counts->runs]
   const FrameCounts* counts;
   const std::uint32_t* depth_key;  // [visible_bound], of this frame
   std::uint32_t* slot;             // [list_bound]

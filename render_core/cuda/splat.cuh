@@ -39,10 +39,8 @@ struct Splat {
   float depth = 0.0f;
   SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, 0.0f, {}};
   bool in_view = false;  // its box, or that of its path, meets what lists cover
+  bool watched = false;  // it may come into view by a turn
 };
-
-/// Growth of an outline that covers all tiles.
-constexpr float everywhere_px = 1e6f;
 
 /// Whether a Gaussian that is behind the near plane at both ends of the window may come into the
 /// picture by a turn. `reach`: of its ellipse.
@@ -68,10 +66,7 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const float end_depth = sweeps ? math::view_depth(camera.end, mean) : out.depth;
   if (reach < 0.0f) return out;
   if (fmaxf(out.depth, end_depth) <= now.near_z) {
-    if (sweeps && turns_in(scene, camera, i, mean, reach)) {
-      out.in_view = true;
-      out.path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, centre.log2_opacity, everywhere_px, {}};
-    }
+    out.watched = sweeps && turns_in(scene, camera, i, mean, reach);
     return out;
   }
 

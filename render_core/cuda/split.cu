@@ -118,7 +118,9 @@ __device__ std::uint32_t runs_of(const SplitParams& p, const Cut& cut) {
 __device__ void write_runs(const SplitParams& p, const Cut& cut, std::uint32_t at) {
   const std::uint32_t ordered = ordered_of(p, cut);
   for (std::uint32_t begin = 0; begin < ordered; begin += reorder_run, ++at) {
-    p.runs[at] = {cut.range.x + begin, cut.range.x + min(begin + reorder_run, ordered), begin > 0};
+    const std::uint32_t end = begin + reorder_run;
+    p.runs[at] = {cut.range.x + begin, cut.range.x + min(end, ordered), begin > 0, end < ordered,
+                  0};
   }
 }
 

@@ -121,6 +121,32 @@ TEST_P(CatgsView, WithoutForecastIsTheExactPipeline) {
   }
 }
 
+// Beside the camera and behind its near plane, until a turn that nobody forecast brings it before
+// that plane: then its footprint covers the picture.
+TEST_P(CatgsView, AGiantThatATurnBringsInIsDrawn) {
+  const GaussianCloud without = random_cloud(300, 0, 5);
+  GaussianCloud with = without;
+  with.resize(without.size() + 1, 0);
+  with.mean.back() = {60.0f, 0.0f, -0.05f};
+  with.rotation.back() = glm::quat(1, 0, 0, 0);
+  with.scale.back() = glm::vec3(25.0f);
+  with.opacity.back() = 0.5f;
+  with.sh.back() = glm::vec3(1.0f);
+  const auto renderer = renderer_of(std::make_shared<const GaussianCloud>(with));
+  const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
+  const auto exact = renderer->make_view({});
+  FrameRequest request;
+  request.camera = make_camera({}, {160, 120}, 150.0f);
+  request.camera.near_z = 0.2f;
+  request.forecast = Forecast{Pose{}, 4};
+  EXPECT_EQ(render_in(*view, request).stats.window, 4);
+  request.camera.world_from_camera.orientation = glm::quat(glm::vec3(0.0f, 0.0052f, 0.0f));
+  const Rendered expected = render_in(*exact, request);
+  EXPECT_GE(psnr_db(render_in(*view, request).rgb, expected.rgb), GetParam().exact_db);
+  const auto lacking = renderer_of(std::make_shared<const GaussianCloud>(without));
+  EXPECT_LT(psnr_db(render_in(*lacking->make_view({}), request).rgb, expected.rgb), 40.0);
+}
+
 // Strong harmonics, seen by a camera that turns, steps aside and comes back: colours are kept, but
 // none for too long. The two Views differ in nothing else. Measured: 72 dB and more.
 TEST_P(CatgsView, ColoursAreKeptWhileTheirDirectionHolds) {

@@ -5,7 +5,7 @@
 namespace catgs::cuda {
 namespace {
 
-constexpr int span = 16;
+constexpr int span = 240;
 constexpr int patience = 600;
 
 void draw(Room& room, int frames, std::uint32_t needed) {
