@@ -50,11 +50,14 @@ void make_small(Socket& socket) {
 /// One direction of one connection: two coroutines with the bytes under way between them.
 class Pipe {
  public:
-  Pipe(tcp::socket& from, tcp::socket& to, LinkShaper shaper, std::int64_t begin_us)
+  /// `tap` may be empty.
+  Pipe(tcp::socket& from, tcp::socket& to, LinkShaper shaper, std::int64_t begin_us,
+       LinkProxy::Tap tap)
       : from_(from),
         to_(to),
         shaper_(std::move(shaper)),
         begin_us_(begin_us),
+        tap_(std::move(tap)),
         filled_(from.get_executor()),
         drained_(from.get_executor()) {}
 
@@ -92,6 +95,7 @@ class Pipe {
           co_await from_.async_read_some(asio::buffer(buffer.data(), std::min(room, buffer.size())),
                                          asio::redirect_error(use_awaitable, error));
       if (error) break;
+      if (tap_) tap_({buffer.data(), count});
       push({buffer.data(), count});
     }
     ended_ = true;
@@ -140,6 +144,7 @@ class Pipe {
   tcp::socket& to_;
   LinkShaper shaper_;
   std::int64_t begin_us_;
+  LinkProxy::Tap tap_;
   asio::steady_timer filled_;   // cancelled when there is something to deliver, or never will be
   asio::steady_timer drained_;  // cancelled when something was delivered
   std::deque<Segment> in_flight_;
@@ -152,17 +157,19 @@ class Pipe {
 
 struct LinkProxy::State {
   State(const asio::any_io_executor& executor, std::string server_host, std::string server_port,
-        LinkSettings settings, std::uint64_t first_seed, std::int64_t begin)
+        LinkSettings settings, std::uint64_t first_seed, std::int64_t begin,
+        std::uint16_t listen_port)
       : acceptor(executor),
         host(std::move(server_host)),
         port(std::move(server_port)),
         link(std::move(settings)),
         seed(first_seed),
         begin_us(begin) {
-    const tcp::endpoint any_port(asio::ip::address_v4::loopback(), 0);
-    acceptor.open(any_port.protocol());
+    const tcp::endpoint here(asio::ip::address_v4::loopback(), listen_port);
+    acceptor.open(here.protocol());
+    acceptor.set_option(asio::socket_base::reuse_address(true));
     make_small(acceptor);  // its connections inherit it
-    acceptor.bind(any_port);
+    acceptor.bind(here);
     acceptor.listen();
   }
 
@@ -181,8 +188,9 @@ struct LinkProxy::State {
     tcp::socket& server = connection->server;
     co_await state->connect(server);
     const std::uint64_t seed = state->seed + 2 * state->accepted++;
-    Pipe down(server, client, {state->link, state->link.down, seed}, state->begin_us);
-    Pipe up(client, server, {state->link, state->link.up, seed + 1}, state->begin_us);
+    Pipe down(server, client, {state->link, state->link.down, seed}, state->begin_us, {});
+    Pipe up(client, server, {state->link, state->link.up, seed + 1}, state->begin_us,
+            state->make_tap ? state->make_tap() : LinkProxy::Tap());
     co_await (down.run() && up.run());
   }
 
@@ -210,13 +218,19 @@ struct LinkProxy::State {
   std::uint64_t seed;
   std::int64_t begin_us;
   std::uint64_t accepted = 0;
+  std::function<LinkProxy::Tap()> make_tap;
   std::list<Connection> connections;
 };
 
 LinkProxy::LinkProxy(const asio::any_io_executor& executor, std::string host, std::string port,
-                     LinkSettings link, std::uint64_t seed, std::int64_t begin_us)
+                     LinkSettings link, std::uint64_t seed, std::int64_t begin_us,
+                     std::uint16_t listen_port)
     : state_(std::make_shared<State>(executor, std::move(host), std::move(port), std::move(link),
-                                     seed, begin_us)) {}
+                                     seed, begin_us, listen_port)) {}
+
+void LinkProxy::read_along(std::function<Tap()> make_tap) {
+  state_->make_tap = std::move(make_tap);
+}
 
 LinkProxy::~LinkProxy() { close(); }
 

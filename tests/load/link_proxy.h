@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include <boost/asio/any_io_executor.hpp>
@@ -23,8 +26,14 @@ class LinkProxy {
   /// Rates count from `begin_us` (see now_us()). Throws boost::system::system_error when nothing
   /// can be listened on.
   LinkProxy(const boost::asio::any_io_executor& executor, std::string host, std::string port,
-            LinkSettings link, std::uint64_t seed, std::int64_t begin_us);
+            LinkSettings link, std::uint64_t seed, std::int64_t begin_us,
+            std::uint16_t listen_port = 0);
   ~LinkProxy();
+
+  /// Takes what clients send, in the order in which they do.
+  using Tap = std::function<void(std::span<const std::byte>)>;
+  /// Every connection from now on gets a tap of its own.
+  void read_along(std::function<Tap()> make_tap);
 
   /// Where clients connect to: 127.0.0.1 and this port.
   [[nodiscard]] std::string port() const;

@@ -200,7 +200,7 @@ class Run {
     action.action();
     if (!action.recovers) co_return;
     for (const GroupReport& group : report_.groups) {
-      for (const auto& session : group.sessions) session->stats.interrupted(now_us());
+      for (const auto& session : group.sessions) session->stats.may_recover(now_us());
     }
   }
 

@@ -11,6 +11,7 @@
 
 #include "render_core/error.h"
 #include "render_core/motion/trajectory.h"
+#include "tests/load/record.h"
 #include "tests/load/report.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
@@ -214,6 +215,32 @@ TEST(Load, ALinkDelaysButLosesNothing) {
     EXPECT_GE(report->stats.pose_to_frame.percentile_ms(0.0), 40.0)
         << "no frame answers before a round trip";
   }
+}
+
+TEST(Record, SavesThePosesThatPassBy) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  options.groups[0].sessions = 1;
+  options.duration_s = 2.0;
+  RunReport run;
+  std::jthread load;
+  RecordOptions record;
+  record.url = url_of(server);
+  record.listen = 0;
+  record.duration_s = 3.0;
+  record.on_listening = [&](std::uint16_t port) {
+    load = std::jthread([&run, options, port]() mutable {
+      options.url = "ws://127.0.0.1:" + std::to_string(port);
+      run = run_load(options);
+    });
+  };
+  const Trajectory poses = record_poses(record);
+  load.join();
+  expect_clean(run);
+  EXPECT_EQ(poses.size(), run.groups[0].sessions[0]->stats.poses_sent);
+  EXPECT_EQ(poses.at(0).time_us, 0);
+  record.url = "wss://127.0.0.1:1";
+  EXPECT_THROW(record_poses(record), InputError);
 }
 
 TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {

@@ -13,6 +13,7 @@
 #include "render_core/error.h"
 #include "render_core/tools/json_report.h"
 #include "tests/load/html_report.h"
+#include "tests/load/record.h"
 #include "tests/load/report.h"
 #include "tests/load/run_scenario.h"
 #include "tests/load/units.h"
@@ -31,6 +32,7 @@ struct ProgramOptions {
   std::string duration, ramp = "0s", link, decode_time = "0s", reconnect_every = "0s";
   bool insecure = false;
   std::string json, html;
+  std::vector<std::string> without;
   std::vector<std::string> requirements;
 };
 
@@ -82,6 +84,7 @@ void add_client_options(CLI::App& app, ProgramOptions& options) {
 
 void add_options(CLI::App& app, ProgramOptions& options) {
   auto* file = app.add_option("--scenario", options.file, "TOML file with a whole run");
+  app.add_option("--without", options.without, "Groups of the scenario to leave out")->needs(file);
   app.add_option("--url", options.url, "ws://HOST:PORT or wss://HOST:PORT");
   app.add_option("--server", options.server,
                  "Without --url a scenario starts this command itself (default: the catgs-server "
@@ -111,6 +114,16 @@ void add_options(CLI::App& app, ProgramOptions& options) {
       "--decode --require 'errors==0' --require 'pose_to_frame_p95_ms<100'");
 }
 
+/// A group of clients, and what the scenario requires of them.
+void leave_out(const std::string& name, Scenario& scenario) {
+  const auto removed = std::erase_if(scenario.load.groups,
+                                     [&](const GroupOptions& group) { return group.name == name; });
+  if (removed == 0) throw InputError("--without", name, "there are no such clients");
+  if (scenario.load.groups.empty()) throw InputError("--without", name, "leaves no clients");
+  std::erase_if(scenario.requirements,
+                [&](const std::string& text) { return text.starts_with(name + "."); });
+}
+
 /// The scenario of the file, or the one that the flags describe.
 Scenario scenario_of(const ProgramOptions& options) {
   Scenario scenario = options.scenario;
@@ -124,6 +137,7 @@ Scenario scenario_of(const ProgramOptions& options) {
     scenario.load.groups = {group};
   } else {
     scenario = read_scenario(options.file);
+    for (const std::string& name : options.without) leave_out(name, scenario);
     if (!options.scenario.check_scene.empty()) {
       scenario.check_scene = options.scenario.check_scene;
     }
@@ -170,6 +184,41 @@ nlohmann::ordered_json settings_json(const Scenario& scenario) {
   return json;
 }
 
+struct RecordFlags {
+  RecordOptions options;
+  std::string out, duration;
+};
+
+void add_record_command(CLI::App& app, RecordFlags& flags) {
+  CLI::App* record = app.add_subcommand(
+      "record",
+      "Stands between a browser and the server and saves the browser's poses as a TUM file. Open "
+      "http://127.0.0.1:8081/ instead of the server's page, move, and stop with Ctrl-C");
+  record->add_option("--url", flags.options.url, "The server: ws://HOST:PORT")->required();
+  record->add_option("--listen", flags.options.listen, "Port on this machine for the browser")
+      ->capture_default_str();
+  record->add_option("--duration", flags.duration, "Stop after this time (default: Ctrl-C)");
+  record->add_option("--out", flags.out, "TUM file to write")->required();
+}
+
+int run_record(RecordFlags& flags) {
+  if (!flags.duration.empty()) {
+    flags.options.duration_s = parse_duration_s("--duration", flags.duration);
+  }
+  flags.options.on_listening = [](std::uint16_t port) {
+    fmt::print(stderr, "open http://127.0.0.1:{}/ and move; Ctrl-C ends the recording\n", port);
+  };
+  const Trajectory poses = record_poses(flags.options);
+  if (poses.empty()) {
+    throw InputError("--out", flags.out, "no browser has sent a pose",
+                     "open the page through the recording port");
+  }
+  write_tum(flags.out, poses);
+  fmt::print("{}: {} poses over {:.1f} s\n", flags.out, poses.size(),
+             1e-6 * static_cast<double>(poses.back().time_us));
+  return 0;
+}
+
 void write_file(const std::string& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary);
   file << text;
@@ -207,10 +256,12 @@ int run(int argc, char** argv) {
   });
   ProgramOptions options;
   add_options(app, options);
+  RecordFlags record;
+  add_record_command(app, record);
   spdlog::set_level(spdlog::level::warn);  // loading a scene tells a server's operator, not us
   try {
     app.parse(argc, argv);
-    return run_checked(options);
+    return app.got_subcommand("record") ? run_record(record) : run_checked(options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : exit_bad_input;
   } catch (const InputError& error) {

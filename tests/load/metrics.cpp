@@ -8,6 +8,7 @@
 
 #include "render_core/error.h"
 #include "render_core/metrics/image_quality.h"
+#include "tests/load/options.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {
@@ -193,14 +194,11 @@ double window_metric(const RunReport& report, std::string_view name) {
 }
 
 Metrics collect_metrics(const RunReport& report, const HoldBounds& bounds) {
-  if (report.groups.size() == 1) {
-    return collect_metrics(report.groups.front().sessions, report.groups.front().nominal_fps,
-                           bounds);
-  }
   Metrics all;
   for (const GroupReport& group : report.groups) {
+    const std::string prefix = group.name == unnamed_group ? "" : group.name + ".";
     for (auto& [name, value] : collect_metrics(group.sessions, group.nominal_fps, bounds)) {
-      all.emplace_back(fmt::format("{}.{}", group.name, name), value);
+      all.emplace_back(prefix + name, value);
     }
   }
   return all;

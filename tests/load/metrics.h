@@ -25,8 +25,8 @@ struct HoldBounds {
 bool holds(const SessionReport& session, double nominal_fps, const HoldBounds& bounds);
 
 /// Every named result: what --require may bound and what JSON and table show. Durations are over
-/// the frames, poses or ticks of all sessions; rates are per session. With several groups each has
-/// its own, GROUP.METRIC.
+/// the frames, poses or ticks of all sessions; rates are per session. Those of a group with a name
+/// are called GROUP.METRIC.
 Metrics collect_metrics(const RunReport& report, const HoldBounds& bounds);
 Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
                         const HoldBounds& bounds);

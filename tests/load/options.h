@@ -9,9 +9,11 @@
 
 namespace catgs::load {
 
+inline constexpr const char* unnamed_group = "all";
+
 /// Clients that are alike. Times are seconds since the run began.
 struct GroupOptions {
-  std::string name = "all";
+  std::string name = unnamed_group;
   int sessions = 1;
   double start_s = 0.0;
   double ramp_s = 0.0;  // spreads the starts

@@ -10,7 +10,7 @@
 namespace catgs::load {
 
 /// What a scrape of /metrics said. Series are named by their family, without "catgs_", and the
-/// values of their labels: catgs_frame_stage_seconds{stage="wait"} is "frame_stage_wait".
+/// values of their labels: catgs_frame_stage_seconds{stage="send"} is "frame_stage_send".
 struct PrometheusSnapshot {
   struct Histogram {
     std::map<double, double> cumulative;  // by upper bound, seconds

@@ -37,7 +37,7 @@ class ServerProcess {
   void stop();
 
   /// "server.cpu_percent", "server.rss_growth_mb", "machine.others_cpu_percent", and the change of
-  /// everything under /metrics: "server.frame_stage_wait_p99_ms", "server.frames_sent_total". NaN
+  /// everything under /metrics: "server.frame_stage_send_p99_ms", "server.frames_sent_total". NaN
   /// before end_measuring().
   [[nodiscard]] Metrics metrics() const;
   [[nodiscard]] const std::vector<UsageSample>& usage() const { return usage_; }

@@ -31,8 +31,10 @@ class SessionStats {
   /// The session is admitted: its measured time begins (again, after a reconnection: the first
   /// call counts).
   void started(std::int64_t now_us);
-  /// The connection is gone, or the server was away until now: the next frame ends a recovery.
+  /// The connection is gone: the next frame ends a recovery.
   void interrupted(std::int64_t now_us);
+  /// Whatever kept frames away is over now: a recovery begins here.
+  void may_recover(std::int64_t now_us) { interrupted_us_ = started_ ? now_us : -1; }
   void pose_sent(std::uint64_t pose_id, std::int64_t now_us);
   void frame_received(const ReceivedFrame& frame, std::int64_t now_us);
   void frame_decoded(std::int64_t duration_us) { decode.add(duration_us); }
