@@ -180,10 +180,6 @@ class Run {
     settings.acknowledge = group.acknowledge;
     settings.flood_hz = group.flood_hz;
     settings.reconnect_every_us = microseconds(group.reconnect_every_s);
-    if (group.stall_for_s > 0.0) {
-      settings.stall_from_us = begin_us_ + microseconds(group.stall_at_s);
-      settings.stall_to_us = settings.stall_from_us + microseconds(group.stall_for_s);
-    }
     // At most four a session: they are kept in memory until the end.
     settings.pictures = static_cast<std::size_t>(
         group.decode ? std::min(4, (options_.pictures + sessions_ - 1) / sessions_) : 0);
@@ -192,6 +188,12 @@ class Run {
         begin_us_ + microseconds(group.start_s + group.ramp_s * number / group.sessions);
     settings.stop_us =
         begin_us_ + microseconds(group.end_s > 0.0 ? group.end_s : options_.duration_s);
+    if (group.stall_for_s > 0.0) {
+      settings.stall_from_us = begin_us_ + microseconds(group.stall_at_s);
+      // Whoever stalls for ever still ends with the run.
+      settings.stall_to_us =
+          std::min(settings.stop_us, settings.stall_from_us + microseconds(group.stall_for_s));
+    }
     return settings;
   }
 

@@ -191,6 +191,19 @@ TEST(Load, AStalledClientGoesOnWhereItStopped) {
   expect_clean(run_load(options));
 }
 
+TEST(Load, AStallWithoutAnEndEndsWithTheRun) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  options.duration_s = 2.0;
+  options.groups[0].stall_at_s = 1.0;
+  options.groups[0].stall_for_s = 7 * 24 * 3600.0;
+  const RunReport run = run_load(options);  // or the test's time limit ends it
+  for (const auto& report : run.groups[0].sessions) {
+    EXPECT_TRUE(report->stats.connected);
+    EXPECT_EQ(report->stats.decode_errors, 0u);
+  }
+}
+
 TEST(Load, AFloodingClientIsTurnedAwayAndDisturbsNobody) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
