@@ -38,8 +38,8 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       device_(device),
       settings_(settings),
       room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
-      builder_(scene_->arrays(), processors_of(device)),
       processors_(processors_of(device)),
+      builder_(scene_->arrays(), processors_),
       blend_warps_(blend_warps(processors_)),
       groups_(settings.speculation) {
   // What does not depend on the image is most of a View: a device that cannot hold it should say so
@@ -47,7 +47,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
   if (settings.pipeline == Pipeline::vanilla) return;
   const glm::ivec2 one_tile(tile_size_px);
   set_shape(one_tile, image_grid(one_tile));
-  reserve_all();
+  reserve_all(Headroom::none);
   shape_ = {};
 }
 
@@ -66,8 +66,9 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
     } else if (plan.kind == FrameKind::sub) {
       draw_sub(request, plan);
       if (memory_.host_counts.get()->unlisted != 0) {
+        // Without a window: where one comes after the other, no frame after this is drawn in vain.
         groups_.forget();
-        plan = groups_.plan(request.camera, request.forecast, depths_);
+        plan = groups_.plan(request.camera, std::nullopt, depths_);
         draw_key(request, plan);
       }
     } else {
@@ -114,11 +115,11 @@ void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
   lists_.shape = shape_;
 }
 
-/// For the frame's shape, and where lists need memory, for somewhat longer ones, so that they do
-/// not need it again and again. Throws CudaError.
-void CudaView::reserve_all() {
+/// For the frame's shape, and with `headroom`, where lists need memory, for somewhat longer ones,
+/// so that they do not need it again and again. Throws CudaError.
+void CudaView::reserve_all(Headroom headroom) {
   FrameShape roomy = shape_;
-  if (!lists_.has_room(shape_)) {
+  if (headroom == Headroom::some && !lists_.has_room(shape_)) {
     const FrameSizes most = room_.limits();
     roomy.visible_bound = std::min(most.visible, shape_.visible_bound + shape_.visible_bound / 4);
     roomy.list_bound = std::min(most.list_entries, shape_.list_bound + shape_.list_bound / 4);
@@ -129,14 +130,15 @@ void CudaView::reserve_all() {
 }
 
 /// Sets the frame's shape and makes room for it; where the device has too little memory, without
-/// slices, and for the nearest part of the lists.
+/// headroom, then without slices, and for the nearest part of the lists.
 void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   const FrameRoom wanted = room_;
+  Headroom headroom = Headroom::some;
   for (;;) {
     set_shape(size_px, grid);
     try {
       const std::size_t known = memory_.reach[last_reach_].bytes();
-      reserve_all();
+      reserve_all(headroom);
       if (memory_.reach[last_reach_].bytes() != known) reach_known_ = false;
       return;
     } catch (const CudaError& error) {
@@ -146,7 +148,8 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
       reach_known_ = false;
       colours_known_ = false;
       const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
-      if (short_of_memory && room_.retreat()) continue;
+      const bool had_headroom = std::exchange(headroom, Headroom::none) == Headroom::some;
+      if (short_of_memory && (had_headroom || room_.retreat())) continue;
       room_ = wanted;
       throw;
     }

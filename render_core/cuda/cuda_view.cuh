@@ -30,7 +30,8 @@ class CudaView final : public View {
  private:
   void set_shape(glm::ivec2 size_px, const TileGrid& grid);
   void make_room(glm::ivec2 size_px, const TileGrid& grid);
-  void reserve_all();
+  enum class Headroom { none, some };
+  void reserve_all(Headroom headroom);
   bool needs_more_room();
   void forget_frames();
   void draw_key(const FrameRequest& request, const FramePlan& plan);
@@ -54,10 +55,10 @@ class CudaView final : public View {
   StageTimes times_;
   FrameShape shape_;
   FrameRoom room_;
-  ListBuilder builder_;
   FrameMemory memory_;
   VanillaPipeline vanilla_;
   int processors_;
+  ListBuilder builder_;
   int blend_warps_;
 
   // What sub-frames take over.

@@ -5,6 +5,7 @@
 #include <cuda_fp16.h>
 
 #include "render_core/math/ellipse-inl.h"
+#include "render_core/scene/format_limits.h"
 
 namespace catgs::cuda {
 
@@ -55,6 +56,7 @@ struct FrameCounts {
 // far to the side, which come before the near plane with footprints all over the picture), but
 // seldom does; a sub-frame that finds one in view is drawn again as a key frame.
 constexpr std::uint32_t watched_bit = std::uint32_t{1} << 31;
+static_assert(max_gaussians <= watched_bit);
 
 /// The picture, the grid of tile lists (see TileGrid) and the bounds of the frame's buffers.
 struct FrameShape {

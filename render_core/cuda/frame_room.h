@@ -13,7 +13,7 @@ class Room {
 
   [[nodiscard]] std::uint32_t size() const { return size_; }
   [[nodiscard]] std::uint32_t limit() const { return limit_; }
-  /// After a key frame: whether it needed more than there is and can be; then the room has grown.
+  /// After a key frame: whether it lacked room that there can be; then there is.
   bool outgrown_by(std::uint32_t needed);
   /// A part of what there is now, and for some hundred key frames no more than that.
   void shrink_to(double part);
@@ -44,7 +44,7 @@ class FrameRoom {
   FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits);
 
   [[nodiscard]] FrameSizes sizes() const;
-  /// What sizes() will never exceed, for now.
+  /// What sizes() may become.
   [[nodiscard]] FrameSizes limits() const;
   /// After a key frame: whether it lacked room and should be drawn again.
   bool outgrown_by(const FrameSizes& needed);

@@ -18,8 +18,8 @@ struct ListRequest {
   float min_depth;  // as in ProjectParams
 };
 
-/// The stages that make tile lists, in their order, and the memory that they need meanwhile. Each
-/// only launches; all throw CudaError.
+/// The stages that make tile lists, in their order, and their memory. Each only launches; all throw
+/// CudaError.
 class ListBuilder {
  public:
   ListBuilder(const SceneArrays& scene, int processors) : scene_(scene), processors_(processors) {}

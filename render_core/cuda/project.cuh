@@ -13,7 +13,7 @@ struct ProjectParams {
   FrameCameras camera;
   FrameShape shape;
   float min_depth;            // of splats that counts->displacement, ->nearness speak of
-  FrameCounts* counts;        // displacement and nearness are raised
+  FrameCounts* counts;        // displacement, nearness, unlisted, depths
   std::uint32_t* visible;     // [visible_bound], scene indices; key frames set watched_bit
   ColourArrays colours;       // what was shaded in earlier frames; all null: nothing
   SplatRecord* records;       // [visible_bound]

@@ -68,8 +68,8 @@ struct Pass {
 };
 
 /// Sorted by depth, neighbours of the same depth are brought into the order of their slots, that of
-/// key frames: how they stood before says nothing. Two rounds of odd-even transposition, which is
-/// enough for three of the same depth; more are rare.
+/// key frames: how they stood before says nothing. Two rounds of odd-even transposition do that
+/// for two of the same depth, and nearly for three; more are rare.
 template <bool forwards>
 __device__ void order_ties(const Keys& key, Keys& slot) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
@@ -171,6 +171,7 @@ __device__ void meet(const ReorderParams& p, ReorderRun& run, std::uint32_t (&he
   if (lane == 0) met = atomicAdd(&run.met, 1u);
   if (__shfl_sync(~0u, met, 0) == 0) return;
   __threadfence();
+  __syncwarp();
   const auto depth = [&](std::uint32_t at) {
     return p.depth_key[__ldcg(&p.slot[at])] >> depth_bits_below;
   };

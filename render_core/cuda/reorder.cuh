@@ -14,12 +14,12 @@ struct ReorderRun {
   std::uint32_t met;  // how many of the two runs that meet at `first` are in order; 0 at first
 };
 
-/// Brings the tile lists that a sub-frame takes over from its key frame into its own depth order,
-/// in place. A turn of the camera moves the depths in a tile by one and the same share, so that
-/// most entries move within a window of neighbours, which slides along a run of the list. Large
-/// Gaussians, whose centres lie elsewhere, may jump over hundreds: backwards the window carries
-/// them, forwards it does so in a second pass from the back, over those runs that need one. Where
-/// two runs of a tile meet in the wrong order, whoever is ready last stitches them together.
+/// Brings the tile lists that a sub-frame takes over from its key frame nearer to its own depth
+/// order, in place. A turn of the camera moves the depths in a tile by one and the same share, so
+/// that most entries move within a window of neighbours, which slides along a run of the list.
+/// Large Gaussians, whose centres lie elsewhere, may jump over hundreds: backwards the window
+/// carries them, forwards it does so in a second pass from the back, over those runs that need one.
+/// Where two runs of a tile meet in the wrong order, whoever is ready last stitches them together.
 struct ReorderParams {
   ReorderRun* runs;  // [counts->runs]
   const FrameCounts* counts;

@@ -13,7 +13,8 @@ namespace catgs::cuda {
 /// tile. Made by a ListBuilder.
 struct TileLists {
   FrameShape shape;
-  DeviceBuffer<std::uint32_t> clusters, cull_mask, visible;
+  DeviceBuffer<std::uint32_t> clusters, cull_mask;
+  DeviceBuffer<std::uint32_t> visible;  // scene indices; see watched_bit
   DeviceBuffer<uint2> range;
   DeviceBuffer<std::uint32_t> slot;  // front to back within a tile
   DeviceBuffer<FrameCounts> counts;  // and of the frame that was drawn from them last

@@ -105,7 +105,7 @@ class FrameGroups {
   FramePlan plan(const Camera& now, const std::optional<Forecast>& forecast,
                  const SceneDepths& depths);
 
-  /// The caches are gone (a failed frame): the next frame is a key frame.
+  /// The group ends, its caches gone or not enough: the next frame is a key frame.
   void forget() { group_.window = 0; }
 
  private:
