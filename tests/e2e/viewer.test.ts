@@ -197,7 +197,9 @@ describe('a visit', () => {
         `pose age p50 ${age.p50.toFixed(0)} ms, p95 ${age.p95.toFixed(0)} ms; ` +
         `stages ${JSON.stringify(stats.stages_ms, rounded)} ms`,
     );
-    expect([stats.width_px, stats.height_px]).toEqual([640, 360]);
+    // Where other tests keep the machine busy, the ladder may have gone down a rung or two.
+    const rungs = [1, 3 / 4, 1 / 2].map((scale) => [640 * scale, 360 * scale]);
+    expect(rungs).toContainEqual([stats.width_px, stats.height_px]);
     expect(motion.p50).toBeGreaterThan(0);
     expect(motion.p95).toBeGreaterThanOrEqual(motion.p50);
     expect(age.p95).toBeGreaterThan(0);
