@@ -5,7 +5,8 @@
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
 # DIR is a finished build (default: build/run, else build/release, else build/cuda). The archive
-# holds bin/ (start the programs from here), lib/ and the web client, if it was built. Most of lib/
+# holds bin/ (start the programs from here), lib/ and the web client, if it was built, and in share/doc
+# the licences of all that is not ours: read NOTICES.md there before you pass it on. Most of lib/
 # comes with libavcodec, which is linked against every codec that the distribution has. The other
 # machine needs the same processor family, a glibc at least as new, and libstdc++; for CUDA its own
 # driver.
@@ -62,6 +63,14 @@ LD_LIBRARY_PATH=$home/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} exec "$home/libex
 WRAPPER
   chmod +x "$root/bin/$program"
 done
+# What the libraries' licences ask for: their texts, and the versions whose sources belong to them.
+mkdir -p "$root/share/doc/licenses"
+cp -- "$SOURCE_DIR/deploy/NOTICES.md" "$root/share/doc/"
+while read -r package; do
+  dpkg-query -W -f '${Package} ${Version} (source: ${source:Package} ${source:Version})\n' "$package" | head -n 1 >>"$root/share/doc/PACKAGES"
+  mkdir "$root/share/doc/licenses/$package"
+  cp -L -- "/usr/share/doc/$package/copyright" "$root/share/doc/licenses/$package/"
+done < <("$SOURCE_DIR/deploy/runtime_packages.sh" "$build"/bin/*)
 if [[ -f $build/web_client/dist/index.html ]]; then
   mkdir -p "$root/share/catgs"  # where the server looks, seen from its program
   cp -r -- "$build/web_client/dist" "$root/share/catgs/web"

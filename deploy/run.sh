@@ -54,7 +54,7 @@ parse_arguments() {
         usage
         exit 0
         ;;
-      --open | -*=*) server_options+=("$1") ;;  # --open is the server's only one without a value
+      --open | --admin-open | -*=*) server_options+=("$1") ;;  # the server's only ones without a value
       -*)
         server_options+=("$1")
         if (($# > 1)) && [[ $2 != -* || $2 == -[0-9]* ]]; then

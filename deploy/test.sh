@@ -12,7 +12,8 @@ Installs what build and tests need, builds, and runs the tests.
 
   --quick      unit, integration and lint tests only (minutes, once built)
   (default)    and the load and browser tests
-  --full       and the sanitizer builds, clang-tidy, and a start from nothing in a fresh Debian
+  --full       and the sanitizer builds, clang-tidy, a start from nothing in a fresh Debian, images
+               and a fleet of containers
   --log FILE   the full log (default build/release/test.log)
   -h, --help   this text
 
@@ -31,7 +32,7 @@ parse_arguments() {
       --quick) selection=(--label-regex '^(unit|integration|lint)$') ;;
       --full)
         selection=(--build-config Full)
-        test_packages+=(clang-tidy-14 debootstrap)
+        test_packages+=(clang-tidy-14 debootstrap "${deploy_test_packages[@]}")
         ;;
       --log)
         (($# > 1)) || fail "$EXIT_USAGE" "--log needs a value. See --help."

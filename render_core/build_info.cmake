@@ -5,6 +5,9 @@ execute_process(COMMAND git describe --always --dirty --abbrev=12 --exclude=*
                 OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 if(NOT result EQUAL 0)
   set(commit unknown)
+  if(DEFINED ENV{CATGS_COMMIT})  # sources without their repository, in an image's build
+    set(commit $ENV{CATGS_COMMIT})
+  endif()
 endif()
 file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
 #include "render_core/build_info.h"

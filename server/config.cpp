@@ -207,6 +207,8 @@ std::vector<Setting> make_settings() {
       integer("drain-deadline", "SECONDS", "Time for clients to go to another server after that",
               &C::drain_deadline_s, 0, 3600),
       flag("open", "Serve other machines without a token", &C::open),
+      flag("admin-open", "--admin-bind may be another than a loopback address: a private network",
+           &C::admin_open),
       text("token-file", "FILE", "Access tokens, one per line; read again when it changes",
            &C::token_file),
       text("token-key-file", "FILE", "Key of the expiring links made by 'catgs-server token'",
@@ -347,9 +349,9 @@ void validate(const ServerConfig& config) {
                      "give --token-file or --token-key-file, or --open if everybody may");
   if (config.admin_bind == "off") return;
   const Endpoint admin = parse_endpoint(config.admin_bind);
-  if (!config.open && !is_loopback(admin.address))
+  if (!config.open && !config.admin_open && !is_loopback(admin.address))
     throw InputError("--admin-bind " + config.admin_bind, {}, "metrics have no token",
-                     "bind a loopback address, or give --open if everybody may read them");
+                     "bind a loopback address, or give --admin-open if that network is private");
   // One listener would take both, whatever the addresses, and answer metrics with the page's 404.
   if (admin.port == config.port && config.port != 0)
     throw InputError(fmt::format("--port {}, --admin-bind {}", config.port, config.admin_bind), {},

@@ -38,6 +38,7 @@ struct ServerConfig {
   int drain_wait_s = 4;
   int drain_deadline_s = 10;
   bool open = false;
+  bool admin_open = false;
   std::string token_file;
   std::string token_key_file;
   std::string resume_key_file;  // empty: that of tokens, else a random key

@@ -1,6 +1,11 @@
 #include "server/metrics.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include <prometheus/text_serializer.h>
+
+#include "server/process_metrics.h"
 
 namespace catgs {
 namespace {
@@ -14,8 +19,17 @@ using prometheus::Registry;
 const Histogram::BucketBoundaries latency_buckets_s = {
     0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.1, 0.15, 0.25, 0.5, 1.0, 2.0};
 
-Gauge& gauge(Registry& registry, const char* name, const char* help) {
-  return prometheus::BuildGauge().Name(name).Help(help).Register(registry).Add({});
+Gauge& gauge(Registry& registry, const char* name, const char* help,
+             const prometheus::Labels& labels = {}) {
+  return prometheus::BuildGauge().Name(name).Help(help).Register(registry).Add(labels);
+}
+
+Gauge& budget(Registry& registry, const char* resource) {
+  return gauge(
+      registry, "catgs_budget_used_ratio",
+      "Share of processors and GPUs that the sessions take at --min-fps, as measured; at 1 "
+      "admission ends",
+      {{"resource", resource}});
 }
 
 Counter& counter(Registry& registry, const char* name, const char* help,
@@ -57,6 +71,11 @@ Metrics::Metrics()
       sessions_waiting(
           gauge(registry_, "catgs_sessions_waiting", "Clients in the queue for a place")),
       spectators(gauge(registry_, "catgs_spectators", "Clients that watch others' sessions")),
+      seats(gauge(registry_, "catgs_seats",
+                  "Sessions that there is room for, by --max-sessions and by what the present ones "
+                  "take; taken ones included, 0 when draining")),
+      cpu_budget_used(budget(registry_, "cpu")),
+      gpu_budget_used(budget(registry_, "gpu")),
       frames_running(gauge(registry_, "catgs_frames_running", "Frames being rendered or encoded")),
       frames_queued(
           gauge(registry_, "catgs_frames_queued", "Encoded frames waiting for their sockets")),
@@ -106,7 +125,9 @@ Metrics::Metrics()
                                        "Age of a frame's pose when the client showed it")) {}
 
 std::string Metrics::scrape() const {
-  return prometheus::TextSerializer().Serialize(registry_.Collect());
+  auto families = registry_.Collect();
+  std::ranges::move(process_metrics(), std::back_inserter(families));
+  return prometheus::TextSerializer().Serialize(families);
 }
 
 void Metrics::set_views(int device, int views) {

@@ -20,7 +20,7 @@ class Metrics {
  public:
   Metrics();
 
-  /// The text format of a scrape.
+  /// The text format of a scrape: ours, and the process's as every exporter names them.
   [[nodiscard]] std::string scrape() const;
 
   /// Views that live on a CUDA device, as of now.
@@ -39,6 +39,9 @@ class Metrics {
   prometheus::Gauge& sessions_lost;     // admitted, waiting for their clients to come back
   prometheus::Gauge& sessions_waiting;  // for a place
   prometheus::Gauge& spectators;
+  prometheus::Gauge& seats;            // sessions that there is room for, taken ones included
+  prometheus::Gauge& cpu_budget_used;  // at --min-fps for everybody; 1: admission ends
+  prometheus::Gauge& gpu_budget_used;
   prometheus::Gauge& frames_running;  // being rendered or encoded
   prometheus::Gauge& frames_queued;   // encoded, waiting for their sockets
   prometheus::Gauge& frames_in_flight;

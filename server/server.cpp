@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -92,6 +93,9 @@ struct Server::State {
         drain_timer(io) {}
 
   NetOptions net_options();
+  /// /healthz and /readyz, on both ports: probes of the admin port need neither TLS nor a host
+  /// name.
+  [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
   HttpResponse list_scenes(const std::string& token);
   HttpResponse respond_admin(const HttpRequest& request);
@@ -141,10 +145,15 @@ NetOptions Server::State::net_options() {
   return options;
 }
 
-HttpResponse Server::State::respond(const HttpRequest& request) {
+std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& request) const {
   if (request.path == "/healthz") return text_response(200, "ok\n");
   if (request.path == "/readyz")
     return ready ? text_response(200, "ready\n") : text_response(503, "not ready\n");
+  return std::nullopt;
+}
+
+HttpResponse Server::State::respond(const HttpRequest& request) {
+  if (auto answer = respond_to_probe(request)) return *std::move(answer);
   if (request.path == "/api/scenes") return list_scenes(bearer_token(request.authorization));
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   return client.respond(request);
@@ -168,6 +177,7 @@ HttpResponse Server::State::list_scenes(const std::string& token) {
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {
+  if (auto answer = respond_to_probe(request)) return *std::move(answer);
   for (const auto& [device, views] : devices->views()) metrics.set_views(device, views);
   if (request.path == "/metrics")
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");

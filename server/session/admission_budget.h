@@ -30,6 +30,17 @@ class AdmissionBudget {
   [[nodiscard]] bool has_room(std::span<const SessionDemand> present,
                               const SessionDemand& newcomer) const;
 
+  /// Of processors and GPUs, what the sessions take at the rate that everybody shall keep; 1: all.
+  struct Load {
+    double cpus = 0;
+    double gpus = 0;
+  };
+  /// Zero while nothing is measured.
+  [[nodiscard]] Load load(std::span<const SessionDemand> sessions) const;
+
+  /// How many sessions like the present ones there is room for, at most `max_sessions`.
+  [[nodiscard]] int seats(std::span<const SessionDemand> present, int max_sessions) const;
+
  private:
   const Capacity capacity_;
   const int min_fps_;

@@ -40,6 +40,8 @@ std::string_view state_name(const Session& session) {
   return "closed";
 }
 
+double megapixels(glm::ivec2 size_px) { return 1e-6 * size_px.x * size_px.y; }
+
 nlohmann::json times_json(const SessionUsage& usage) {
   auto times = nlohmann::json::object();
   for (std::size_t i = 0; i < session_time_count; ++i)
@@ -233,17 +235,18 @@ std::variant<Admission, ErrorMessage> SessionRegistry::choose(const Hello& hello
 bool SessionRegistry::has_place_for(const Client& client, const Hello& hello) const {
   if (draining_ || (!queue_.empty() && queue_.front() != client.session().id())) return false;
   if (static_cast<int>(admitted_) >= options_.max_sessions) return false;
-  const auto demand = [](glm::ivec2 size_px, int fps) {
-    return SessionDemand{std::nullopt, 1e-6 * size_px.x * size_px.y, fps};
-  };
-  std::vector<SessionDemand> present;
-  for (const auto& c : clients_) {
-    if (!c->admitted_at()) continue;
-    present.push_back(demand(c->session().config().size_px, c->session().config().fps));
-    present.back().frame_cost = c->usage().frame_cost();
-  }
   const FlowWish wish = wish_within(options_.policy, hello.settings, hello.viewport_px);
-  return budget_.has_room(present, demand(wish.size_px, wish.fps));
+  return budget_.has_room(demands(), {std::nullopt, megapixels(wish.size_px), wish.fps});
+}
+
+std::vector<SessionDemand> SessionRegistry::demands() const {
+  std::vector<SessionDemand> demands;
+  for (const auto& client : clients_) {
+    if (!client->admitted_at()) continue;
+    const StreamConfig& config = client->session().config();
+    demands.push_back({client->usage().frame_cost(), megapixels(config.size_px), config.fps});
+  }
+  return demands;
 }
 
 AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello) {
@@ -393,6 +396,11 @@ void SessionRegistry::publish() {
   metrics_.frames_running.Set(scheduler_.running());
   metrics_.frames_queued.Set(static_cast<double>(queued));
   metrics_.frames_in_flight.Set(in_flight);
+  const auto demanded = demands();
+  const auto load = budget_.load(demanded);
+  metrics_.seats.Set(draining_ ? 0 : budget_.seats(demanded, options_.max_sessions));
+  metrics_.cpu_budget_used.Set(load.cpus);
+  metrics_.gpu_budget_used.Set(load.gpus);
   const std::lock_guard lock(published_mutex_);
   published_ = sessions.dump();
 }

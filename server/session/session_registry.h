@@ -75,6 +75,8 @@ class SessionRegistry {
   std::variant<Admission, ErrorMessage> choose(const Hello& hello) const;
   AdmissionAnswer admit(const Client& client, const Hello& hello);
   [[nodiscard]] bool has_place_for(const Client& client, const Hello& hello) const;
+  /// Of the admitted sessions, as measured.
+  [[nodiscard]] std::vector<SessionDemand> demands() const;
   /// Shares the processor time since the last call out among the sessions.
   void charge_cpu(TimePoint now);
   void remove(const Client& client);

@@ -112,7 +112,7 @@ TEST_F(ConfigTest, RefusesAnOpenAdminDoorEvenWithTokens) {
   config.admin_bind = "0.0.0.0:9090";
   EXPECT_THAT([&] { validate(config); },
               ThrowsMessage<InputError>(AllOf(HasSubstr("--admin-bind 0.0.0.0:9090"),
-                                              HasSubstr("no token"), HasSubstr("--open"))));
+                                              HasSubstr("no token"), HasSubstr("--admin-open"))));
   for (const char* closed : {"off", "127.0.0.1:9090", "[::1]:9090", "localhost:9090"}) {
     config.admin_bind = closed;
     EXPECT_NO_THROW(validate(config)) << closed;
@@ -121,6 +121,11 @@ TEST_F(ConfigTest, RefusesAnOpenAdminDoorEvenWithTokens) {
   EXPECT_THROW(validate(config), InputError);
   config.open = true;
   EXPECT_NO_THROW(validate(config));
+  config.open = false;
+  config.admin_open = true;
+  EXPECT_NO_THROW(validate(config));
+  config.token_file.clear();
+  EXPECT_THROW(validate(config), InputError) << "it opens the metrics, not the page";
 }
 
 TEST_F(ConfigTest, PageAndMetricsNeedPortsOfTheirOwn) {

@@ -232,8 +232,10 @@ TEST(Server, ServesPagesAndNothingElse) {
     EXPECT_GE(reply.status, 400) << target;
     EXPECT_THAT(reply.body, Not(HasSubstr("secret"))) << target;
   }
-  EXPECT_EQ(http_get(server.port(), "/healthz").status, 200);
-  EXPECT_EQ(http_get(server.port(), "/readyz").status, 200);
+  for (const int port : {server.port(), server.admin_port()}) {
+    EXPECT_EQ(http_get(port, "/healthz").status, 200);
+    EXPECT_EQ(http_get(port, "/readyz").status, 200);
+  }
   EXPECT_THAT(http_get(server.port(), "/api/scenes").body, HasSubstr("\"id\":\"city\""));
   EXPECT_EQ(http_get(server.port(), "/metrics").status, 404);
   EXPECT_THAT(http_get(server.admin_port(), "/metrics").body, HasSubstr("catgs_sessions 0"));

@@ -60,6 +60,19 @@ TEST(AdmissionBudget, TheScarcerOfProcessorsAndGpusDecides) {
 TEST(AdmissionBudget, CanBeSwitchedOff) {
   const AdmissionBudget budget({.cpus = 1}, 0);
   EXPECT_TRUE(budget.has_room(std::vector{session(100.0)}, unknown()));
+  EXPECT_EQ(budget.seats(std::vector{session(100.0)}, 16), 16);
+}
+
+TEST(AdmissionBudget, TellsHowMuchIsTakenAndHowManyFit) {
+  const AdmissionBudget budget({.cpus = 2, .gpus = 1}, 10);
+  const std::vector present{session(0.04, 0.01), session(0.04, 0.01)};
+  EXPECT_NEAR(budget.load(present).cpus, 0.4, 1e-9);
+  EXPECT_NEAR(budget.load(present).gpus, 0.2, 1e-9);
+  EXPECT_EQ(budget.seats(present, 16), 5);
+  EXPECT_EQ(budget.seats(present, 4), 4);
+  EXPECT_EQ(budget.seats({}, 16), 16);
+  EXPECT_EQ(budget.seats(std::vector{unknown()}, 16), 16) << "nothing is measured yet";
+  EXPECT_EQ(budget.seats(std::vector{session(9.0)}, 16), 1) << "the first is always admitted";
 }
 
 }  // namespace

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# usage: runtime_packages.sh PROGRAM...
+# Names the Debian packages with the shared libraries that the programs load, one per line: what an
+# image or a machine needs to run, but not to build, them.
+set -euo pipefail
+
+for program in "$@"; do
+  absent=$(ldd "$program" | grep 'not found' || true)
+  [[ -z $absent ]] || {
+    printf '%s lacks libraries here:\n%s\n' "$program" "$absent" >&2
+    exit 1
+  }
+  ldd "$program" | awk '$2 == "=>" && $3 ~ /^\// { print $3 }'
+done | sort -u | while read -r library; do
+  # Packages name their files by the path before /lib became a link to /usr/lib, or after.
+  real=$(readlink -f -- "$library")
+  dpkg-query -S "$library" "$real" "${real#/usr}" 2>/dev/null | sed -n '1s/[:,].*//p'
+done | sort -u

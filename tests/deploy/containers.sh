@@ -1,0 +1,107 @@
+# shellcheck shell=bash
+# Containers without a Docker engine, for the tests beside this file: podman and buildah with a
+# storage of their own, and a Debian base made by debootstrap under the name that the Dockerfile
+# asks for. Sourced, never run.
+
+readonly EXIT_SKIPPED=77
+source_dir=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.." && pwd)
+readonly source_dir
+readonly base_image=docker.io/library/debian:bookworm-slim
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/catgs-containers
+work=""
+
+skip() {
+  echo "SKIPPED: $1"
+  exit "$EXIT_SKIPPED"
+}
+
+say() { printf '%s  %s\n' "$(date +%T)" "$*"; }
+
+die() {
+  say "FAILED: $*"
+  exit 1
+}
+
+now_ms() { printf '%d' $((${EPOCHREALTIME/[.,]/} / 1000)); }
+
+# require_tools NAME...: skips the whole test where one is missing.
+require_tools() {
+  local tool
+  ((EUID == 0)) || skip "needs root"
+  for tool in "$@"; do
+    command -v "$tool" >/dev/null || skip "$tool is not installed (deploy/test.sh --full installs it)"
+  done
+}
+
+# Storage, networks and limits of our own: nothing of the machine's containers is seen or touched.
+# The storage is a cache, kept for the next run.
+set_up_containers() {
+  work=$(mktemp -d)
+  mkdir -p "$cache/storage" "$work/networks"
+  printf '[storage]\ndriver = "overlay"\ngraphroot = "%s"\nrunroot = "%s"\n' \
+    "$cache/storage" "$work/run" >"$work/storage.conf"
+  cat >"$work/containers.conf" <<CONF
+[containers]
+default_ulimits = ["nofile=20000:20000", "nproc=20000:20000"]
+[engine]
+cgroup_manager = "cgroupfs"
+runtime = "runc"
+events_logger = "file"
+[network]
+network_backend = "netavark"
+network_config_dir = "$work/networks"
+CONF
+  export CONTAINERS_STORAGE_CONF=$work/storage.conf CONTAINERS_CONF=$work/containers.conf
+}
+
+remove_containers() {
+  podman pod rm --all --force --time 2 >/dev/null 2>&1 || true
+  podman rm --all --force --time 2 >/dev/null 2>&1 || true
+  podman network prune --force >/dev/null 2>&1 || true
+  [[ -z $work ]] || rm -rf -- "$work"
+}
+
+# The stand-in for Debian's own image, which no registry is asked for.
+ensure_base_image() {
+  buildah inspect --type image "$base_image" >/dev/null 2>&1 && return
+  say "debootstrap: $base_image"
+  mkdir -p "$cache/debootstrap"
+  debootstrap --variant=minbase "--cache-dir=$cache/debootstrap" bookworm "$work/root" \
+    >"$work/debootstrap.log" 2>&1 || die "$(tail -n 5 "$work/debootstrap.log")"
+  rm -rf "$work/root/var/cache/apt/archives/"*.deb "$work/root/var/lib/apt/lists/"*
+  tar -C "$work/root" -c . | podman import - "$base_image" >/dev/null
+  rm -rf -- "$work/root"
+}
+
+# build_server_image TAG [BUILD_OPTION...]
+build_server_image() {
+  local tag=$1 build_base=$base_image container
+  shift
+  local -a options=()
+  if [[ -r ${NODE_EXTRA_CA_CERTS:-} ]]; then  # this machine's way to the npm registry
+    build_base=localhost/catgs-build-base
+    container=$(buildah from "$base_image")
+    buildah config --env NODE_EXTRA_CA_CERTS=/run/extra_ca.crt "$container"
+    buildah commit --quiet --rm "$container" "$build_base" >/dev/null
+    options=(--volume "$NODE_EXTRA_CA_CERTS:/run/extra_ca.crt:ro" --build-arg "BUILD_BASE=$build_base")
+  fi
+  buildah bud --isolation chroot --layers --format docker --file "$source_dir/docker/Dockerfile" \
+    --build-arg "REVISION=$(git -C "$source_dir" describe --always --dirty --abbrev=12 --exclude='*')" \
+    --tag "$tag" "${options[@]}" "$@" "$source_dir"
+}
+
+# build_stand_in TAG PACKAGE COMMAND...: Debian's package under the name of an image of a registry.
+build_stand_in() {
+  local tag=$1 package=$2
+  shift 2
+  buildah inspect --type image "$tag" >/dev/null 2>&1 && return
+  say "stand-in for $tag: Debian's $package"
+  local entrypoint
+  printf -v entrypoint '"%s",' "$@"
+  buildah bud --isolation chroot --format docker --tag "$tag" - >"$work/stand_in.log" 2>&1 <<DOCKERFILE ||
+FROM $base_image
+RUN apt-get update && apt-get install -y --no-install-recommends $package && rm -rf /var/lib/apt/lists/*
+ENTRYPOINT [${entrypoint%,}]
+DOCKERFILE
+    die "$(tail -n 5 "$work/stand_in.log")"
+}
