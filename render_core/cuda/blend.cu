@@ -1,5 +1,6 @@
-#include "render_core/cuda/blend.cuh"
+#include "render_core/cuda/blend_round.cuh"
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/part_pixels.cuh"
 #include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/math/constants.h"
@@ -7,46 +8,100 @@
 namespace catgs::cuda {
 namespace {
 
-constexpr int warps_per_block = 4;
+constexpr int warps_per_block = 2;
 constexpr int block_size = warps_per_block * warp_size;
+// As many as leave a thread the 128 registers that a round takes.
+constexpr int blocks_per_processor = 8;
 
-// A half-warp takes the upper, the other the lower half of a part (8x4 px), each with its own list
-// of splats: most splats that reach a part miss half of it. Two pixels a lane share what does not
-// depend on the pixel.
-constexpr int halves = 2;
-constexpr int half_lanes = warp_size / halves;
-constexpr int half_height_px = part_size_px / halves;
-constexpr int pixels_per_lane = part_size_px * half_height_px / half_lanes;
-constexpr int half_pixels = half_lanes * pixels_per_lane;
-constexpr int rows_per_pass = half_height_px / pixels_per_lane;
-constexpr int parts_across = tile_size_px / part_size_px;
+/// Splats of a group: so many a lane, since the work on one hides the latencies of the other.
+constexpr unsigned lane_splats = 2;
+constexpr unsigned group_splats = lane_splats * warp_size;
 
-/// Pixel centres from the corner of a part.
-struct Box {
-  float low_x, low_y, high_x, high_y;
+/// What a warp shares.
+struct __align__(16) WarpScratch {
+  StagedHalf staged[halves];  // splats that wait for the halves of its part
+  Box box[halves];            // of parts that are no squares
+  // A lane's own.
+  PixelPlaces places[halves][warp_size];
+  float4 fetched[2][lane_splats][2][warp_size];  // records of this group, and of the next
 };
 
-/// Splats staged for the two halves of a part, front to back. Coordinates are from the part's
-/// corner: small numbers keep the exponent exact to 1e-4.
-struct StagedSplats {
-  float4 u_xx_xy_v[halves][warp_size];
-  float4 yy_opacity_red_green[halves][warp_size];
-  float blue[halves][warp_size];
-  Box box[halves];  // of parts that are no squares
+/// Splats of a list in groups. Two loads are in flight while a group is blended: the next group's
+/// records, and the slots of the one after it.
+class Groups {
+ public:
+  __device__ Groups(const BlendParams& p, const BlendTask& task, WarpScratch& scratch)
+      : records_(p.records),
+        slots_(p.slot),
+        next_(task.first),
+        last_(task.last),
+        mine_(&scratch.fetched[0][0][0][threadIdx.x % warp_size]) {
+    load_slots(next_);
+    fetch();
+  }
+
+  __device__ bool more() const { return next_ < last_; }
+  /// One past the entries that were taken.
+  __device__ std::uint32_t taken() const { return min(next_, last_); }
+
+  /// Brings the next group here.
+  __device__ void take() {
+    next_ += group_splats;
+    buffer_ ^= 1u;
+    fetch();
+    asm volatile("cp.async.wait_group 1;" ::: "memory");
+  }
+  /// The lane's i-th splat of the group; those of the first come before those of the second.
+  __device__ SplatRecord splat(unsigned i) const {
+    const float4* words = &mine_[(buffer_ ^ 1u) * buffer_words + i * splat_words];
+    const float4 a = words[0], b = words[warp_size];
+    return {{a.x, a.y}, {a.z, a.w, b.x}, b.y, reinterpret_cast<const PackedColour&>(b.z)};
+  }
+
+ private:
+  static constexpr std::uint32_t no_slot = ~0u;
+
+  __device__ void load_slots(std::uint32_t first) {
+#pragma unroll
+    for (unsigned i = 0; i < lane_splats; ++i) {
+      const std::uint32_t at = first + i * warp_size + threadIdx.x % warp_size;
+      slot_[i] = at < last_ ? __ldg(&slots_[at]) : no_slot;
+    }
+  }
+
+  /// Begins to load the records of the group at next_, and loads the slots of the one after it.
+  __device__ void fetch() {
+#pragma unroll
+    for (unsigned i = 0; i < lane_splats; ++i) {
+      float4* to = &mine_[buffer_ * buffer_words + i * splat_words];
+      if (slot_[i] != no_slot) {
+        asm volatile(
+            "cp.async.ca.shared.global [%0], [%1], 16;"
+            "cp.async.ca.shared.global [%0 + %2], [%1 + 16], 16;" ::"r"(
+                static_cast<std::uint32_t>(__cvta_generic_to_shared(to))),
+            "l"(&records_[slot_[i]]), "n"(warp_size * sizeof(float4))
+            : "memory");
+      } else {
+        to[0] = make_float4(0.0f, 0.0f, 1.0f, 0.0f);
+        to[warp_size] = make_float4(1.0f, never, 0.0f, 0.0f);
+      }
+    }
+    asm volatile("cp.async.commit_group;" ::: "memory");
+    load_slots(next_ + group_splats);
+  }
+
+  // Of fetched, in its elements.
+  static constexpr unsigned splat_words = 2 * warp_size, buffer_words = lane_splats * splat_words;
+
+  const SplatRecord* records_;
+  const std::uint32_t* slots_;
+  std::uint32_t next_, last_;        // list entries
+  std::uint32_t slot_[lane_splats];  // of the group that is fetched next
+  unsigned buffer_ = 0;              // that it goes to
+  float4* mine_;                     // the lane's column of fetched
 };
 
-/// A SplatRecord in two registers of four words.
-struct Loaded {
-  float4 shape;  // centre x, y (px), whitening xx, xy
-  float4 rest;   // whitening yy, log2 opacity, red and green as half2, blue as half
-};
-
-__device__ Loaded load(const SplatRecord* records, std::uint32_t slot) {
-  const float4* words = reinterpret_cast<const float4*>(&records[slot]);
-  return {__ldg(&words[0]), __ldg(&words[1])};
-}
-
-/// Whether a splat centred at shape.x, shape.y reaches the box with alpha_min: the minimum of a
+/// Whether a splat centred at `centre` reaches the box with alpha_min: the minimum of a
 /// convex quadratic over a box lies on the line through the box point nearest in x, on that nearest
 /// in y, or at the centre.
 struct BoxTest {
@@ -66,43 +121,66 @@ struct BoxTest {
   }
 };
 
-__device__ BoxTest make_box_test(const float4& shape, const float4& rest) {
-  const math::Whitening<float> w{shape.z, shape.w, rest.x};
-  return {w, make_float2(shape.x, shape.y), math::reach_of(rest.y) + 1e-3f,
+/// `centre` is relative to the origin of the boxes.
+__device__ BoxTest make_box_test(const SplatRecord& splat, float2 centre) {
+  const math::Whitening<float>& w = splat.whitening;
+  return {w, centre, math::reach_of(splat.log2_opacity) + 1e-3f,
           __fdividef(-w.xx * w.xy, w.xy * w.xy + w.yy * w.yy), __fdividef(-w.xy, w.xx)};
 }
 
-/// Stages the warp's splats, one a lane, for the halves that they reach; the shorter list is filled
-/// up with nothing. Returns the length of the longer.
+/// Splats that wait in a half part's ring.
+struct Waiting {
+  unsigned first = 0;  // of the ring, where a round begins
+  unsigned count = 0;
+};
+
+/// Stages a group for the halves that its splats reach and that are not finished.
 template <class Pixels>
-__device__ int stage(StagedSplats& staged, const Pixels& pixels, const Loaded& splat) {
-  const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  const auto field = math::exponent_field<float>({splat.shape.z, splat.shape.w, splat.rest.x},
-                                                 {splat.shape.x, splat.shape.y}, splat.rest.y);
-  const float2 red_green = __half22float2(reinterpret_cast<const __half2&>(splat.rest.z));
-  const float blue = __low2float(reinterpret_cast<const __half2&>(splat.rest.w));
-  const BoxTest test = make_box_test(splat.shape, splat.rest);
-  bool hit[halves];
+__device__ void stage(WarpScratch& scratch, const Pixels& pixels, const Groups& groups,
+                      const bool (&live)[halves], Waiting (&waiting)[halves]) {
+  const unsigned lanes_before = (1u << threadIdx.x % warp_size) - 1u;
+  StagedSplat splat[lane_splats];
+  unsigned hits[lane_splats][halves];  // lanes
 #pragma unroll
-  for (int half = 0; half < halves; ++half) hit[half] = test.reaches(pixels.box(staged, half));
-  int count[halves];
+  for (unsigned i = 0; i < lane_splats; ++i) {
+    const SplatRecord record = groups.splat(i);
+    const float2 centre =
+        make_float2(record.centre_px.x - pixels.origin_x(), record.centre_px.y - pixels.origin_y());
+    const BoxTest test = make_box_test(record, centre);
+    splat[i] = staged_splat(
+        math::exponent_field<float>(record.whitening, {centre.x, centre.y}, record.log2_opacity),
+        reinterpret_cast<const uint2&>(record.colour));
+#pragma unroll
+    for (int half = 0; half < halves; ++half)
+      hits[i][half] =
+          __ballot_sync(~0u, test.reaches(Pixels::box(scratch.box, half)) && live[half]);
+  }
+  __syncwarp();  // the last round has been read
 #pragma unroll
   for (int half = 0; half < halves; ++half) {
-    const unsigned lanes = __ballot_sync(~0u, hit[half]);
-    count[half] = __popc(lanes);
-    if (hit[half]) {
-      const int at = __popc(lanes & ((1u << lane) - 1u));
-      staged.u_xx_xy_v[half][at] = make_float4(field.u, field.xx, field.xy, field.v);
-      staged.yy_opacity_red_green[half][at] =
-          make_float4(field.yy, field.log2_opacity, red_green.x, red_green.y);
-      staged.blue[half][at] = blue;
+#pragma unroll
+    for (unsigned i = 0; i < lane_splats; ++i) {
+      const unsigned lanes = hits[i][half];
+      const unsigned place =
+          waiting[half].first + waiting[half].count + __popc(lanes & lanes_before);
+      scratch.staged[half].put_if((lanes & (lanes_before + 1u)) != 0, StagedHalf::wrapped(place),
+                                  splat[i]);
+      waiting[half].count += __popc(lanes);
     }
   }
-  const int shorter = count[0] < count[1] ? 0 : 1;
-  if (lane >= count[shorter] && lane < count[1 - shorter])
-    staged.yy_opacity_red_green[shorter][lane] = make_float4(0.0f, never, 0.0f, 0.0f);
   __syncwarp();
-  return count[1 - shorter];
+}
+
+/// Fills the halves' rounds up with nothing.
+__device__ void fill_up(WarpScratch& scratch, const Waiting (&waiting)[halves]) {
+  const unsigned place = threadIdx.x % warp_size;
+#pragma unroll
+  for (int half = 0; half < halves; ++half) {
+    if (place >= waiting[half].count)
+      *reinterpret_cast<uint2*>(scratch.staged[half].at(
+          StagedHalf::wrapped(waiting[half].first + place), 0)) = split_pair(least_exponent, 0.0f);
+  }
+  __syncwarp();
 }
 
 /// The largest transmittance that earlier slices of the task's tile leave in this part, as far as
@@ -120,108 +198,6 @@ __device__ float transmittance_before(const BlendParams& p, std::uint32_t slice,
     product *= __shfl_xor_sync(~0u, product, step);
   return product;
 }
-
-/// The pixels of a lane in a square part of a tile: one column, rows_per_pass apart.
-class SquarePixels {
- public:
-  static constexpr int most_parts = parts_per_tile;
-
-  __device__ SquarePixels(const BlendParams& p, StagedSplats&, std::uint32_t tile, int part) {
-    const int lane = static_cast<int>(threadIdx.x) % warp_size;
-    column_ = lane % part_size_px;
-    row_ = lane / half_lanes * half_height_px + lane % half_lanes / part_size_px;
-    in_tile_ = (part / parts_across * part_size_px + row_) * tile_size_px +
-               part % parts_across * part_size_px + column_;
-    const int tiles_x = p.shape.tiles_x;
-    x_px_ = p.shape.shown_x_px + static_cast<int>(tile) % tiles_x * tile_size_px +
-            in_tile_ % tile_size_px;
-    y_px_ = p.shape.shown_y_px + static_cast<int>(tile) / tiles_x * tile_size_px +
-            in_tile_ / tile_size_px;
-  }
-
-  __device__ static bool empty() { return false; }
-  /// Of the part, px in the picture.
-  __device__ float corner_x() const { return static_cast<float>(x_px_ - column_); }
-  __device__ float corner_y() const { return static_cast<float>(y_px_ - row_); }
-  /// Centres, from the corner.
-  __device__ float x(int) const { return static_cast<float>(column_) + 0.5f; }
-  __device__ float y(int i) const { return static_cast<float>(row_ + i * rows_per_pass) + 0.5f; }
-  __device__ static Box box(const StagedSplats&, int half) {
-    const float top = 0.5f + static_cast<float>(half * half_height_px);
-    return {0.5f, top, part_size_px - 0.5f, top + (half_height_px - 1.0f)};
-  }
-  __device__ int2 place(int i) const { return make_int2(x_px_, y_px_ + i * rows_per_pass); }
-  __device__ int in_tile(int i) const { return in_tile_ + i * rows_per_pass * tile_size_px; }
-  __device__ bool inside(const FrameShape& shape, int i) const {
-    return in_picture(shape, x_px_, y_px_ + i * rows_per_pass);
-  }
-
- private:
-  int column_, row_;  // in the part
-  int in_tile_;
-  int x_px_, y_px_;
-};
-
-/// The pixels of a lane in a part of a tile's run: half of the part a half-warp, and of that every
-/// half_lanes-th a lane.
-class RunPixels {
- public:
-  static constexpr int most_parts = most_run_parts;
-
-  __device__ RunPixels(const BlendParams& p, StagedSplats& staged, std::uint32_t tile, int part) {
-    const int lane = static_cast<int>(threadIdx.x) % warp_size;
-    const int count = static_cast<int>(p.pixel_count[tile]);
-    empty_ = part * part_pixels >= count;
-    if (empty_) return;
-    const int half = lane / half_lanes;
-    const int begin = part * part_pixels + half * half_pixels;
-    const int last = min(begin + half_pixels, count);
-    in_tile_ = begin + lane % half_lanes;
-    const PixelPlace* run = p.pixels + static_cast<std::size_t>(tile) * run_bound_px(p.shape);
-    int low_x = 0xffff, low_y = 0xffff, high_x = 0, high_y = 0;
-#pragma unroll
-    for (int i = 0; i < pixels_per_lane; ++i) {
-      inside_[i] = in_tile(i) < last;
-      place_[i] = run[min(in_tile(i), last - 1)];
-      low_x = min(low_x, int{place_[i].x});
-      low_y = min(low_y, int{place_[i].y});
-      high_x = max(high_x, int{place_[i].x});
-      high_y = max(high_y, int{place_[i].y});
-    }
-#pragma unroll
-    for (int step = half_lanes / 2; step > 0; step /= 2) {
-      low_x = min(low_x, __shfl_xor_sync(~0u, low_x, step));
-      low_y = min(low_y, __shfl_xor_sync(~0u, low_y, step));
-      high_x = max(high_x, __shfl_xor_sync(~0u, high_x, step));
-      high_y = max(high_y, __shfl_xor_sync(~0u, high_y, step));
-    }
-    corner_x_ = min(low_x, __shfl_xor_sync(~0u, low_x, half_lanes));
-    corner_y_ = min(low_y, __shfl_xor_sync(~0u, low_y, half_lanes));
-    if (lane % half_lanes == 0)
-      staged.box[half] = {static_cast<float>(low_x - corner_x_) + 0.5f,
-                          static_cast<float>(low_y - corner_y_) + 0.5f,
-                          static_cast<float>(high_x - corner_x_) + 0.5f,
-                          static_cast<float>(high_y - corner_y_) + 0.5f};
-    __syncwarp();
-  }
-
-  __device__ bool empty() const { return empty_; }
-  __device__ float corner_x() const { return static_cast<float>(corner_x_); }
-  __device__ float corner_y() const { return static_cast<float>(corner_y_); }
-  __device__ float x(int i) const { return static_cast<float>(place_[i].x - corner_x_) + 0.5f; }
-  __device__ float y(int i) const { return static_cast<float>(place_[i].y - corner_y_) + 0.5f; }
-  __device__ static Box box(const StagedSplats& staged, int half) { return staged.box[half]; }
-  __device__ int2 place(int i) const { return make_int2(place_[i].x, place_[i].y); }
-  __device__ int in_tile(int i) const { return in_tile_ + i * half_lanes; }
-  __device__ bool inside(const FrameShape&, int i) const { return inside_[i]; }
-
- private:
-  bool empty_;
-  int in_tile_;
-  int corner_x_, corner_y_;  // of the part, px in the picture
-  PixelPlace place_[pixels_per_lane];
-  bool inside_[pixels_per_lane];
-};
 
 __device__ BlendTask load_task(const BlendParams& p, std::uint32_t task) {
   const uint4 words = __ldg(reinterpret_cast<const uint4*>(&p.tasks[task]));
@@ -248,51 +224,52 @@ __device__ void store(const BlendParams& p, const BlendTask& task, std::uint32_t
   }
 }
 
-/// Blends the staged splats into the lane's pixels; returns how many pairs were blended when
-/// counting.
-template <bool count_pairs, class Pixels>
-__device__ unsigned blend_staged(const StagedSplats& staged, int count, const Pixels& pixels,
-                                 States& states) {
-  const int half = static_cast<int>(threadIdx.x) % warp_size / half_lanes;
-  unsigned pairs = 0;
-#pragma unroll 2
-  for (int j = 0; j < count; ++j) {
-    const float4 a = staged.u_xx_xy_v[half][j];
-    const float4 b = staged.yy_opacity_red_green[half][j];
-    const math::ExponentField<float> field{a.x, a.y, a.z, a.w, b.x, b.y};
-    const math::Vec3<float> colour{b.z, b.w, staged.blue[half][j]};
+/// As math::PixelState has it.
+__device__ float finished_by_sign(float transmittance) {
+  return is_live(transmittance) ? transmittance : -transmittance;
+}
+
+/// Brings the pixels of the halves to their lanes.
+__device__ void gather_states(WarpScratch& scratch, const HalfPixels (&half_pixels_of)[halves],
+                              States& states) {
+  const int lane = static_cast<int>(threadIdx.x) % warp_size;
+  __syncwarp();
+  const int holds = lane % round_lanes - 2;       // red and green, or blue
+  float4* pixels = &scratch.fetched[0][0][0][0];  // no group is fetched any more
+  if (holds >= 0) {
 #pragma unroll
-    for (int i = 0; i < pixels_per_lane; ++i) {
-      const float exponent = math::exponent_at(field, pixels.x(i), pixels.y(i));
-      const float before = states[i].transmittance;
-      math::blend<float>(states[i], exponent, colour);
-      if (count_pairs) pairs += states[i].transmittance > 0.0f && states[i].transmittance != before;
+    for (int half = 0; half < halves; ++half) {
+#pragma unroll
+      for (int b = 0; b < half_blocks; ++b) {
+#pragma unroll
+        for (int row = 0; row < 2; ++row) {
+          const BlockPixels& from = half_pixels_of[half].block[b];
+          const int pixel =
+              half * half_pixels + b * block_pixels + row * (block_pixels / 2) + lane / round_lanes;
+          reinterpret_cast<float2*>(&pixels[pixel])[holds] = make_float2(
+              from.colour[2 * row],
+              holds == 0 ? from.colour[2 * row + 1] : finished_by_sign(from.transmittance[row]));
+        }
+      }
     }
   }
-  return pairs;
+  __syncwarp();
+#pragma unroll
+  for (int i = 0; i < pixels_per_lane; ++i) {
+    const float4 pixel =
+        pixels[lane / half_lanes * half_pixels + i * half_lanes + lane % half_lanes];
+    states[i] = {{pixel.x, pixel.y, pixel.z}, pixel.w};
+  }
 }
 
 template <bool count_pairs, class Pixels>
-__device__ void blend_part(const BlendParams& p, StagedSplats& staged, std::uint32_t task_index,
+__device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint32_t task_index,
                            int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const BlendTask task = load_task(p, task_index);
   const std::uint32_t slice = task_index - p.shape.tiles();  // where its pixels are, if it is one
-  const Pixels pixels(p, staged, task.tile, part);
+  const Pixels pixels(p, scratch.box, task.tile, part);
   if (pixels.empty()) return;
-  States states;
-  bool live = false;
-#pragma unroll
-  for (int i = 0; i < pixels_per_lane; ++i) {
-    states[i] = math::empty_pixel<float>();
-    const bool inside = pixels.inside(p.shape, i);
-    if (!inside) states[i].transmittance = -0.0f;
-    live |= inside;
-  }
-  live = __any_sync(~0u, live);
-
-  const std::uint32_t last = task.last;
-  std::uint32_t first = task.first;
   unsigned long long pairs = 0;
   const auto behind_finished = [&] {
     // Half of it, so that rounding cannot make the composite want what was not blended.
@@ -300,33 +277,40 @@ __device__ void blend_part(const BlendParams& p, StagedSplats& staged, std::uint
                                  0.5f * static_cast<float>(transmittance_min);
   };
   if (behind_finished()) return;  // nobody will ask for this part of the slice
-  // Two loads are in flight while a group is blended: the next group's records, and the slots of
-  // the one after it.
-  const Loaded nothing{make_float4(0.0f, 0.0f, 1.0f, 0.0f), make_float4(1.0f, never, 0.0f, 0.0f)};
-  Loaded next = nothing;
-  if (first + lane < last) next = load(p.records, p.slot[first + lane]);
-  std::uint32_t next_slot = first + warp_size + lane < last ? p.slot[first + warp_size + lane] : 0;
-  for (int group = 0; live && first < last; ++group) {
-    Loaded splat = next;
-    next = nothing;
-    if (first + warp_size + lane < last) next = load(p.records, next_slot);
-    if (first + 2 * warp_size + lane < last) next_slot = p.slot[first + 2 * warp_size + lane];
-    splat.shape.x -= pixels.corner_x();
-    splat.shape.y -= pixels.corner_y();
-    const int count = stage(staged, pixels, splat);
-    pairs += blend_staged<count_pairs>(staged, count, pixels, states);
-    __syncwarp();
-    first += warp_size;
-    bool lane_live = false;
+  Groups groups(p, task, scratch);
+  PixelPlaces(&places)[halves][warp_size] = scratch.places;
+  HalfPixels half[halves] = {take_half(pixels, p.shape, 0, places[0][lane]),
+                             take_half(pixels, p.shape, 1, places[1][lane])};
+  bool live[halves] = {half[0].live(), half[1].live()};
+  Waiting waiting[halves];
+  for (int group = 0; live[0] || live[1]; ++group) {
+    const bool more = groups.more();
+    if (more) {
+      groups.take();
+      stage(scratch, pixels, groups, live, waiting);
+    } else {
+      fill_up(scratch, waiting);
+    }
+    const unsigned enough = more ? round_splats : 1;
 #pragma unroll
-    for (int i = 0; i < pixels_per_lane; ++i) lane_live |= states[i].transmittance > 0.0f;
-    live = __any_sync(~0u, lane_live);
-    if (group % 4 == 3 && behind_finished()) break;
+    for (int h = 0; h < halves; ++h) {
+      while (live[h] && waiting[h].count >= enough) {
+        pairs +=
+            blend_round<count_pairs>(half[h], places[h][lane], scratch.staged[h], waiting[h].first);
+        waiting[h].first = StagedHalf::wrapped(waiting[h].first + round_splats);
+        waiting[h].count -= min(waiting[h].count, unsigned{round_splats});
+        live[h] = half[h].live();
+      }
+    }
+    if (!more || (group % 2 == 1 && behind_finished())) break;
   }
+  asm volatile("cp.async.wait_all;" ::: "memory");
   if (count_pairs) atomicAdd(&p.counts->blended_pairs, pairs);
+  States states;
+  gather_states(scratch, half, states);
   store(p, task, slice, pixels, states);
 
-  const std::uint32_t consumed = min(first, last);
+  const std::uint32_t consumed = groups.taken();
   float largest = 0.0f;  // of pixels that are not finished: nothing behind shows in those that are
 #pragma unroll
   for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, states[i].transmittance);
@@ -344,17 +328,16 @@ __device__ void blend_part(const BlendParams& p, StagedSplats& staged, std::uint
 
 /// Warps take parts from a queue: no warp waits for the longest part of its tile or block.
 template <bool count_pairs, class Pixels>
-__global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) {
-  __shared__ StagedSplats staged[warps_per_block];
+__global__ void __launch_bounds__(block_size, blocks_per_processor)
+    blend_kernel(const BlendParams p) {
+  __shared__ WarpScratch scratch[warps_per_block];
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const int warp = static_cast<int>(threadIdx.x) / warp_size;
-  // Lists are filled up by opacity alone, so that the rest must be numbers.
-#pragma unroll
-  for (int half = 0; half < halves; ++half) {
-    staged[warp].u_xx_xy_v[half][lane] = make_float4(0.0f, 0.0f, 0.0f, 0.0f);
-    staged[warp].blue[half][lane] = 0.0f;
-  }
-  __syncwarp();
+  // Rounds are filled up by opacity alone, so that the rest must be numbers.
+  std::uint32_t* words = reinterpret_cast<std::uint32_t*>(scratch);
+  for (unsigned i = threadIdx.x; i < sizeof(scratch) / sizeof(*words); i += block_size)
+    words[i] = 0;
+  __syncthreads();
   for (;;) {
     std::uint32_t work = 0;
     if (lane == 0) work = atomicAdd(&p.counts->next_part, 1u);
@@ -368,7 +351,7 @@ __global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) 
     }
     if (queue_class == queue_classes) return;
     const std::uint32_t task = p.queue[queue_class * p.shape.tiles() + place];
-    blend_part<count_pairs, Pixels>(p, staged[warp], task,
+    blend_part<count_pairs, Pixels>(p, scratch[warp], task,
                                     static_cast<int>(work % Pixels::most_parts));
     __syncwarp();
   }

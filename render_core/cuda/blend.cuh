@@ -15,7 +15,7 @@ struct BlendTask {
 static_assert(sizeof(BlendTask) == 16);
 
 /// A warp blends one of the 8x8 px parts of a tile: small enough that most splats of a tile miss
-/// most parts, large enough that two pixels a lane share what does not depend on the pixel.
+/// most parts, large enough that loading and testing a splat serves many pixels.
 constexpr int part_size_px = 8;
 constexpr int parts_per_tile = (tile_size_px / part_size_px) * (tile_size_px / part_size_px);
 

@@ -64,8 +64,7 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
     if (settings_.pipeline == Pipeline::vanilla) {
       draw_vanilla(request);
     } else if (plan.kind == FrameKind::sub) {
-      draw_sub(request, plan);
-      if (memory_.host_counts.get()->unlisted != 0) {
+      if (!draw_sub(request, plan)) {
         // Without a window: where one comes after the other, no frame after this is drawn in vain.
         groups_.forget();
         plan = groups_.plan(request.camera, std::nullopt, depths_);
@@ -194,7 +193,8 @@ void CudaView::list_tiles(const ListRequest& request) {
   builder_.sort_by_tile(lists_, stream);
 }
 
-void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
+/// False: a watched Gaussian came into view, and nothing was drawn.
+bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   const cudaStream_t stream = stream_.get();
   FrameCounts* counts = lists_.counts.get();
   times_.begin(stream);
@@ -233,7 +233,9 @@ void CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   times_.end(Stage::sort, stream);
   blend(request);
   deliver();
+  if (memory_.host_counts.get()->unlisted != 0) return false;
   remember_reach(plan.list_from_frame);
+  return true;
 }
 
 /// Says which pixels of a sub-frame belong to each tile of its key frame.
@@ -303,11 +305,12 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   deliver();
 }
 
-/// The paper's l, of the last frame; 0: not known.
+/// From the paper's l, the mean list of the last frame; 0: not known.
 std::uint32_t CudaView::slice_length() const {
-  if (!reach_known_) return 0;
-  const std::uint64_t mean = memory_.host_counts.get()->expected_entries / shape_.tiles();
-  return std::max(shortest_slice, static_cast<std::uint32_t>(mean));
+  const std::uint64_t expected = memory_.host_counts.get()->expected_entries;
+  if (!reach_known_ || expected == 0) return 0;
+  const std::uint64_t mean = expected / shape_.tiles();
+  return std::max(shortest_slice, static_cast<std::uint32_t>(slice_means * mean));
 }
 
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
@@ -333,9 +336,10 @@ void CudaView::blend(const FrameRequest& request) {
                 m.consumed.get(), m.slice_transmittance.get(), reach, lists_.counts.get(),
                 settings_.count_pairs, blend_warps_},
                stream);
-  launch_composite({shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(),
-                    m.consumed.get(), pixels, pixel_count, background, m.rgb.get(), reach},
-                   stream);
+  launch_composite(
+      {shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(), m.consumed.get(), pixels,
+       pixel_count, lists_.counts.get(), background, m.rgb.get(), reach},
+      stream);
   times_.end(Stage::blend, stream_.get());
 }
 

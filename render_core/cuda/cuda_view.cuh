@@ -35,7 +35,7 @@ class CudaView final : public View {
   bool needs_more_room();
   void forget_frames();
   void draw_key(const FrameRequest& request, const FramePlan& plan);
-  void draw_sub(const FrameRequest& request, const FramePlan& plan);
+  [[nodiscard]] bool draw_sub(const FrameRequest& request, const FramePlan& plan);
   void draw_vanilla(const FrameRequest& request);
   void list_tiles(const ListRequest& request);
   ColourArrays want_colours(const math::CameraModel<float>& camera);

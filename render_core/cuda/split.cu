@@ -61,7 +61,8 @@ __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
   const std::uint32_t length =
       p.slice_length > 0
           ? p.slice_length
-          : max(shortest_slice, min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles());
+          : max(shortest_slice,
+                slice_means * (min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles()));
   const std::uint32_t reach = cut.reach;
   if (reach < cut.listed()) cut.expected = min(cut.listed(), reach + reach / 4 + 2 * warp_size);
   if (cut.expected > 2 * length)
@@ -170,6 +171,7 @@ __device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places&
 }
 
 __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p) {
+  if (p.counts->unlisted != 0) return;  // no tasks, no runs: the frame will be drawn again
   using Scan = cub::BlockScan<Places, split_block>;
   __shared__ Scan::TempStorage scratch;
   __shared__ std::uint32_t queued[queue_classes];  // by the block, then before the block
@@ -250,6 +252,7 @@ __device__ std::uint32_t fold(const CompositeParams& p, uint2 slices, int in_til
 }
 
 __global__ void __launch_bounds__(composite_block) composite_kernel(const CompositeParams p) {
+  if (p.counts->unlisted != 0) return;
   using Reduce = cub::BlockReduce<std::uint32_t, composite_block>;
   __shared__ Reduce::TempStorage scratch;
   const std::uint32_t tile = blockIdx.x;
