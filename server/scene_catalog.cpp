@@ -15,6 +15,7 @@
 #include "render_core/scene/scene.h"
 #include "render_core/scene/synth.h"
 #include "render_core/thread_pool.h"
+#include "server/tours.h"
 
 namespace catgs {
 namespace {
@@ -120,6 +121,8 @@ std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& c
     Scene scene = load(spec, config, core.pool->threads());
     auto entry = std::make_shared<SceneEntry>();
     entry->facts = facts_of(scene, unique_id(scene.name, entries));
+    entry->surface = std::make_shared<const SurfacePoints>(scene.cloud);
+    if (!is_synthetic(spec)) entry->tours = read_tours(spec);
     auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
     entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
     entry->renderer = std::move(made.renderer);

@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -73,6 +74,15 @@ SessionTokens session_tokens(const ServerConfig& config) {
   return SessionTokens(random_key());
 }
 
+/// The id in "/api/scenes/ID<what>".
+std::optional<std::string_view> scene_of(std::string_view path, std::string_view what) {
+  constexpr std::string_view folder = "/api/scenes/";
+  if (!path.starts_with(folder) || !path.ends_with(what) ||
+      path.size() <= folder.size() + what.size())
+    return std::nullopt;
+  return path.substr(folder.size(), path.size() - folder.size() - what.size());
+}
+
 /// The token of "Authorization: Bearer TOKEN"; empty: none.
 std::string bearer_token(std::string_view authorization) {
   constexpr std::string_view scheme = "Bearer ";
@@ -98,6 +108,7 @@ struct Server::State {
   [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
   HttpResponse list_scenes(const std::string& token);
+  HttpResponse scene_tours(std::string_view scene_id, const std::string& token);
   HttpResponse respond_admin(const HttpRequest& request);
   void print_banner() const;
   void wait_for_signal();
@@ -155,6 +166,8 @@ std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& r
 HttpResponse Server::State::respond(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
   if (request.path == "/api/scenes") return list_scenes(bearer_token(request.authorization));
+  if (const auto id = scene_of(request.path, "/tours"))
+    return scene_tours(*id, bearer_token(request.authorization));
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   return client.respond(request);
 }
@@ -174,6 +187,15 @@ HttpResponse Server::State::list_scenes(const std::string& token) {
   if (list.empty())
     return text_response(401, "401: " + refusal + "\nSend it as Authorization: Bearer TOKEN\n");
   return text_response(200, nlohmann::json{{"scenes", list}}.dump(), "application/json");
+}
+
+HttpResponse Server::State::scene_tours(std::string_view scene_id, const std::string& token) {
+  if (const auto refused = access.refusal(token, scene_id, unix_now_s(), Use::list))
+    return text_response(401, "401: " + *refused + "\nSend it as Authorization: Bearer TOKEN\n");
+  const auto found = std::ranges::find_if(
+      scenes, [&](const auto& scene) { return scene->facts.scene_id == scene_id; });
+  if (found == scenes.end()) return text_response(404, "404: there is no such scene here\n");
+  return text_response(200, (*found)->tours, "application/json");
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {

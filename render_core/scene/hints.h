@@ -20,7 +20,7 @@ namespace catgs {
 ///   "near":       world units
 ///   "limits":     {"min": [x, y, z], "max": [x, y, z]}
 ///   "focus":      [x, y, z]
-///   "tours":      read by the server
+///   "tours":      for pages, see web_client/README.md
 struct Sidecar {
   struct StartPose {
     glm::vec3 position{0.0f};

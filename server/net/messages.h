@@ -70,11 +70,16 @@ struct Pause {
   bool paused = false;
 };
 struct Bye {};
+struct Pick {
+  std::uint32_t id = 0;
+  glm::vec3 origin{0.0f};
+  glm::vec3 direction{0.0f, 0.0f, 1.0f};  // unit
+};
 /// A message of a newer wire version, ignored by rule.
 struct UnknownMessage {};
 
 using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
-                                   SelectScene, RequestIdr, Pause, Bye>;
+                                   SelectScene, RequestIdr, Pause, Bye, Pick>;
 
 struct SceneFacts {
   std::string scene_id;
@@ -157,7 +162,13 @@ struct QueuePlace {
   std::chrono::seconds estimate{};  // of the whole wait
 };
 
+/// Answers a Pick.
+struct Picked {
+  std::uint32_t id = 0;
+  std::optional<float> distance;  // nothing is there otherwise
+};
+
 using ServerMessage =
-    std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain>;
+    std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain, Picked>;
 
 }  // namespace catgs

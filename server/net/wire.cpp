@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
 #include "proto/catgs.pb.h"
 
@@ -48,12 +49,16 @@ const std::string& checked_length(std::string_view field, const std::string& tex
   return text;
 }
 
+glm::vec3 parse(std::string_view field, const v1::Vec3& v) {
+  const auto in_range = [&](char axis, float value) {
+    return checked(fmt::format("{}.{}", field, axis), value, -max_coordinate, max_coordinate);
+  };
+  return {in_range('x', v.x()), in_range('y', v.y()), in_range('z', v.z())};
+}
+
 Pose parse(const v1::Pose& message) {
   Pose pose;
-  const auto& p = message.position();
-  pose.position = {checked("pose.position.x", p.x(), -max_coordinate, max_coordinate),
-                   checked("pose.position.y", p.y(), -max_coordinate, max_coordinate),
-                   checked("pose.position.z", p.z(), -max_coordinate, max_coordinate)};
+  pose.position = parse("pose.position", message.position());
   const auto& q = message.orientation();
   const glm::quat orientation(q.w(), q.x(), q.y(), q.z());
   const float norm = glm::length(orientation);
@@ -135,6 +140,16 @@ Ack parse(const v1::Ack& message) {
   return ack;
 }
 
+Pick parse(const v1::Pick& message) {
+  Pick pick;
+  pick.id = message.id();
+  pick.origin = parse("pick.origin", message.origin());
+  const glm::vec3 direction = parse("pick.direction", message.direction());
+  const float length = checked("pick.direction length", glm::length(direction), 1e-6f, 2e9f);
+  pick.direction = direction / length;
+  return pick;
+}
+
 ClientMessage parse(const v1::ClientMessage& message) {
   switch (message.body_case()) {
     case v1::ClientMessage::kHello:
@@ -156,6 +171,8 @@ ClientMessage parse(const v1::ClientMessage& message) {
       return Pause{message.pause().paused()};
     case v1::ClientMessage::kBye:
       return Bye{};
+    case v1::ClientMessage::kPick:
+      return parse(message.pick());
     case v1::ClientMessage::BODY_NOT_SET:
       break;
   }
@@ -253,6 +270,13 @@ void fill(const ErrorMessage& error, v1::ServerMessage& out) {
 
 void fill(const Drain& drain, v1::ServerMessage& out) {
   out.mutable_drain()->set_deadline_ms(drain.deadline_ms);
+}
+
+void fill(const Picked& picked, v1::ServerMessage& out) {
+  auto& message = *out.mutable_picked();
+  message.set_id(picked.id);
+  message.set_hit(picked.distance.has_value());
+  message.set_distance(picked.distance.value_or(0.0f));
 }
 
 std::uint32_t elapsed_us(TimePoint from, TimePoint to) {

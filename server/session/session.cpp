@@ -21,11 +21,6 @@ constexpr auto speak_at_least_every = 750ms;
 constexpr auto min_idr_request_interval = 250ms;
 constexpr int max_failures_in_a_row = 3;
 
-/// Knows nothing yet of the motion through the scene.
-MotionPredictor predictor_for(const SceneEntry& scene) {
-  return MotionPredictor({.lever = forecast_lever(scene.facts.near_z)});
-}
-
 }  // namespace
 
 FlowWish wish_within(const SessionPolicy& policy, const Settings& settings,
@@ -45,6 +40,7 @@ Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host,
       created_(now),
       last_said_(now),
       last_activity_(now),
+      picks_(4.0, 4.0, now),
       second_start_(now) {}
 
 void Session::on_message(const ClientMessage& message, TimePoint now) {
@@ -102,10 +98,6 @@ void Session::greet(const Hello& hello, TimePoint now) {
   request_stream();
 }
 
-void Session::on_queue_moved(const QueuePlace& place, TimePoint now) {
-  if (state_ == State::queued) say(place, now);
-}
-
 void Session::ask_again(TimePoint now) {
   if (state_ == State::queued) greet(waiting_hello_, now);
 }
@@ -121,7 +113,7 @@ void Session::on_queued(const ClientMessage& message) {
 void Session::enter_scene(std::shared_ptr<const SceneEntry> scene) {
   admission_.scene = std::move(scene);
   pose_.reset();
-  predictor_ = predictor_for(*admission_.scene);
+  forecast_ = CameraForecast(admission_.scene->facts.near_z);
   welcome_due_ = true;
 }
 
@@ -166,12 +158,17 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   }
   pose_ = sample;
   pose_received_ = now;
-  predictor_.add({sample.client_time_us, sample.world_from_camera});
+  forecast_.add({sample.client_time_us, sample.world_from_camera});
   // What is drawn now is seen as much later as pictures have come after their poses lately.
   aimed_ahead_us_ = flow_.pose_to_photon().count();
   aim_ = sample;
-  if (const auto ahead = predictor_.at(sample.client_time_us + aimed_ahead_us_))
+  if (const auto ahead = forecast_.at(sample.client_time_us + aimed_ahead_us_))
     aim_.world_from_camera = *ahead;
+}
+
+void Session::on(const Pick& pick, TimePoint now) {
+  note_activity(now);
+  if (picks_.take(now)) say(admission_.scene->seen_along(pick), now);
 }
 
 void Session::on(const Ack& ack, TimePoint now) {
@@ -324,8 +321,8 @@ FrameOrder Session::start_frame(TimePoint now) {
       make_camera(pose, config_.size_px, focal_from_fov_y(pose_->fov_y_rad, config_.size_px.y),
                   admission_.scene->facts.near_z);
   if (!still)
-    order.request.forecast = predictor_.forecast(pose_->client_time_us + aimed_ahead_us_, real_fps,
-                                                 SpeculationSettings{}.initial_window);
+    order.request.forecast = forecast_.forecast(pose_->client_time_us + aimed_ahead_us_, real_fps,
+                                                SpeculationSettings{}.initial_window);
   return order;
 }
 

@@ -9,14 +9,16 @@
 #include <variant>
 #include <vector>
 
-#include "render_core/motion/predictor.h"
+#include "render_core/scene/surface_points.h"
 #include "server/net/connection.h"
 #include "server/net/messages.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/next_frame_cost.h"
 #include "server/schedule/scheduler.h"
 #include "server/session/admission_queue.h"
+#include "server/session/camera_forecast.h"
 #include "server/session/flow_control.h"
+#include "server/session/rate_limit.h"
 
 namespace catgs {
 
@@ -25,6 +27,12 @@ struct SceneEntry {
   SceneFacts facts;
   std::shared_ptr<Renderer> renderer;
   std::string renderer_text;  // description and reason, for people
+  std::shared_ptr<const SurfacePoints> surface{};
+  std::string tours = "{}";  // for pages; see tours.h
+
+  [[nodiscard]] Picked seen_along(const Pick& ray) const {
+    return {ray.id, surface ? surface->distance_along(ray.origin, ray.direction) : std::nullopt};
+  }
 };
 
 /// An encoder that the start-up probe found usable.
@@ -120,7 +128,9 @@ class Session {
   /// Closes the connection of a server that goes away.
   void end(std::string_view reason);
   /// While queued: it moved up, or a second has passed.
-  void on_queue_moved(const QueuePlace& place, TimePoint now);
+  void on_queue_moved(const QueuePlace& place, TimePoint now) {
+    if (state_ == State::queued) say(place, now);
+  }
   /// While queued: there may be a place now.
   void ask_again(TimePoint now);
   void on_disconnected() { state_ = State::closed; }
@@ -152,13 +162,17 @@ class Session {
   void on(const UnknownMessage&, TimePoint) {}
   void on(const Hello& hello, TimePoint now);
   void on(const PoseSample& sample, TimePoint now);
-  void on(const PosePath&, TimePoint now) { note_activity(now); }
+  void on(const PosePath& path, TimePoint now) {
+    note_activity(now);
+    forecast_.follow(path);
+  }
   void on(const Ack& ack, TimePoint now);
   void on(const Settings& settings, TimePoint now);
   void on(const SelectScene& select, TimePoint now);
   void on(const RequestIdr&, TimePoint now);
   void on(const Pause& pause, TimePoint now);
   void on(const Bye&, TimePoint);
+  void on(const Pick& pick, TimePoint now);
 
   void greet(const Hello& hello, TimePoint now);
   void on_queued(const ClientMessage& message);
@@ -196,8 +210,8 @@ class Session {
   NextFrameCost cost_;
   std::optional<PoseSample> pose_;  // newest
   TimePoint pose_received_{};
-  MotionPredictor predictor_;  // on the client's clock
-  PoseSample aim_;             // `pose_`, where the camera will be when the next picture is seen
+  CameraForecast forecast_;  // on the client's clock
+  PoseSample aim_;           // `pose_`, where the camera will be when the next picture is seen
   std::int64_t aimed_ahead_us_ = 0;
   TimePoint last_motion_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
@@ -219,6 +233,7 @@ class Session {
   TimePoint last_activity_;
   TimePoint last_idr_request_{};
   bool idr_request_waits_ = false;
+  RateLimit picks_;
   bool idle_warned_ = false;
 
   // Since the last Stats message.

@@ -1,5 +1,5 @@
 // The client against the real server: what a visitor does, and what happens when things go wrong.
-import { writeFileSync } from 'node:fs';
+import { cpSync, mkdtempSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
@@ -13,6 +13,7 @@ import {
   new_page,
   type WatchedPage,
 } from './support/browser';
+import { web_dist } from './support/fake_server';
 import { psnr_db, settled_picture } from './support/pictures';
 import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
 import { scratch_folder } from './support/scenes';
@@ -94,7 +95,7 @@ describe('a visit', () => {
     expect(psnr_db(first, await settled_picture(page))).toBeLessThan(38);
     await page.keyboard.press('KeyI');
     const panel = page.locator('#stats-panel');
-    await panel.getByText(/264/).waitFor();
+    await panel.getByText(/libx264/).waitFor();
     await panel.getByText(/CPU|CUDA/).waitFor();
     expect(await panel.innerText()).toMatch(/640 × 360/);
     await keep_screenshot(page, 'visit');
@@ -206,6 +207,17 @@ describe('a visit', () => {
   });
 });
 
+/** A copy of the client whose worker begins with this. */
+function client_with(prelude: string): string {
+  const copy = mkdtempSync(path.join(folder, 'client-'));
+  cpSync(web_dist, copy, { recursive: true });
+  const assets = path.join(copy, 'assets');
+  const worker = readdirSync(assets).find((name) => name.startsWith('worker-'))!;
+  const file = path.join(assets, worker);
+  writeFileSync(file, `${prelude}\n${readFileSync(file, 'utf8')}`);
+  return copy;
+}
+
 describe('trouble', () => {
   it('a server that crashed and came back is found again, without a reload, at the same place', async () => {
     const first = await start_server(scene);
@@ -263,6 +275,45 @@ describe('trouble', () => {
     await page.keyboard.press('KeyI');
     await page.locator('#stats-panel').getByText(/jpeg/).waitFor();
     await plain.stop();
+  });
+
+  it.each([
+    ['the hardware', "configuration.hardwareAcceleration !== 'prefer-software'", 'prefer-software'],
+    ['any', 'true', 'jpeg'],
+  ])('%s video decoder that fails is replaced, and remembered', async (_which, fails, rung) => {
+    const faulty = await start_server(scene, ['--client-dir', client_with(`
+      self.VideoDecoder = class extends VideoDecoder {
+        configure(configuration) {
+          this.fails = ${fails};
+          super.configure(configuration);
+        }
+        decode(chunk) {
+          if (this.fails) throw new DOMException('injected', 'EncodingError');
+          super.decode(chunk);
+        }
+      };`)]);
+    const watched = await new_page(browser);
+    open_pages.push(watched);
+    const { page } = watched;
+    const warnings: string[] = [];
+    page.on('console', (message) => warnings.push(message.text()));
+    const decoder_failures = (): number =>
+      warnings.filter((text) => text.includes('video decoder failed')).length;
+    await page.goto(faulty.url);
+    await settle(page);
+    expect(decoder_failures()).toBeGreaterThanOrEqual(2);
+    expect(await page.evaluate(() => localStorage.getItem('catgs.decoder'))).toContain(rung);
+    if (rung === 'jpeg') await page.getByText('pictures come as JPEG').waitFor();
+    warnings.length = 0;
+    await page.reload();
+    await settle(page);
+    expect(decoder_failures()).toBe(0);
+    await page.keyboard.press('KeyI');
+    await page
+      .locator('#stats-panel')
+      .getByText(rung === 'jpeg' ? /jpeg/ : /libx264/)
+      .waitFor();
+    await faulty.stop();
   });
 
   it('an unknown scene is said, and the ones there are', async () => {

@@ -1,11 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import {
-  CameraController,
-  no_axes,
-  type Axes,
-  type CameraMode,
-  type SceneSetup,
-} from '#client/camera/camera_controller';
+import { CameraController, type CameraMode, type SceneSetup } from '#client/camera/camera_controller';
+import { no_axes, type Axes } from '#client/camera/movement';
 import { same_view } from '#client/camera/same_view';
 import {
   axis_angle,

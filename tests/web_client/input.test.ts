@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { no_axes } from '#client/camera/camera_controller';
+import { no_axes } from '#client/camera/movement';
 import { HeldKeys } from '#client/input/keyboard';
 import { Pointers, wheel_gesture, type PointerSample } from '#client/input/pointers';
 

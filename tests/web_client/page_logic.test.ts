@@ -183,9 +183,10 @@ describe('wording', () => {
   });
 
   it('explains JPEG by what is missing', () => {
-    expect(jpeg_reason(true, true)).toBeUndefined();
-    expect(jpeg_reason(false, false)).toContain('https://');
-    expect(jpeg_reason(false, true)).toContain('WebCodecs');
+    expect(jpeg_reason(true, true, 'prefer-hardware')).toBeUndefined();
+    expect(jpeg_reason(false, false, 'prefer-hardware')).toContain('https://');
+    expect(jpeg_reason(false, true, 'prefer-hardware')).toContain('WebCodecs');
+    expect(jpeg_reason(true, true, 'jpeg')).toContain('tried again');
   });
 
   it('names what an old browser lacks', () => {

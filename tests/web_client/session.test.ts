@@ -42,6 +42,7 @@ beforeEach(() => {
         session.send_ack({ frameId: 99n });
       },
       stats: () => undefined,
+      picked: () => undefined,
       notice: (message) => notices.push(message),
     },
     {

@@ -219,5 +219,39 @@ TEST(Wire, IgnoresWhatIsNewAndRefusesWhatIsBroken) {
   EXPECT_TRUE(std::holds_alternative<wire::ParseError>(wire::parse_client_message(huge)));
 }
 
+v1::ClientMessage good_pick() {
+  v1::ClientMessage message;
+  message.mutable_pick()->set_id(7);
+  message.mutable_pick()->mutable_origin()->set_x(1.0f);
+  message.mutable_pick()->mutable_direction()->set_z(-4.0f);
+  return message;
+}
+
+TEST(Wire, ReadsAndChecksPicks) {
+  const std::string text = good_pick().SerializeAsString();
+  const auto* data = reinterpret_cast<const std::byte*>(text.data());
+  const auto pick = parsed<Pick>({data, data + text.size()});
+  EXPECT_EQ(pick.id, 7u);
+  EXPECT_EQ(pick.origin.x, 1.0f);
+  EXPECT_EQ(pick.direction.z, -1.0f);
+  auto message = good_pick();
+  message.mutable_pick()->mutable_direction()->set_z(0.0f);
+  EXPECT_THAT(complaint(message), HasSubstr("pick.direction length"));
+  message = good_pick();
+  message.mutable_pick()->mutable_origin()->set_y(std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THAT(complaint(message), HasSubstr("pick.origin.y"));
+}
+
+TEST(Wire, AnswersPicks) {
+  EXPECT_EQ(hex(wire::serialize(Picked{7, 2.0f})),
+            "01"
+            "42090807"
+            "1001"
+            "1d00000040");
+  EXPECT_EQ(hex(wire::serialize(Picked{7, std::nullopt})),
+            "01"
+            "42020807");
+}
+
 }  // namespace
 }  // namespace catgs

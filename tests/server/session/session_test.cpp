@@ -306,5 +306,29 @@ TEST_F(SessionTest, AnotherSceneWelcomesAgain) {
   EXPECT_FALSE(session.next_frame()) << "a pose of the old scene shows nothing of the new one";
 }
 
+TEST_F(SessionTest, SaysWhatARayMeetsButNotEndlessly) {
+  GaussianCloud cloud;
+  cloud.resize(1, 0);
+  cloud.mean[0] = {0.0f, 0.0f, 3.0f};
+  cloud.scale[0] = glm::vec3(0.5f);
+  cloud.opacity[0] = 0.9f;
+  auto scene = std::make_shared<SceneEntry>();
+  scene->surface = std::make_shared<const SurfacePoints>(cloud);
+  host.admission = Admission{scene, {EncoderKind::x264, Codec::h264, "libx264"}};
+  greet();
+  session.on_message(Pick{5, glm::vec3(0.0f), {0.0f, 0.0f, 1.0f}}, now);
+  const auto* picked = std::get_if<Picked>(&host.said.back());
+  ASSERT_TRUE(picked);
+  EXPECT_EQ(picked->id, 5u);
+  EXPECT_EQ(picked->distance, 3.0f);
+  session.on_message(Pick{6, glm::vec3(0.0f), {0.0f, 0.0f, -1.0f}}, now);
+  EXPECT_FALSE(std::get<Picked>(host.said.back()).distance);
+  for (std::uint32_t id = 7; id < 100; ++id) session.on_message(Pick{id, {}, {}}, now);
+  EXPECT_LE(host.count<Picked>(), 4);
+  now += 1s;
+  session.on_message(Pick{100, {}, {0.0f, 0.0f, 1.0f}}, now);
+  EXPECT_EQ(std::get<Picked>(host.said.back()).id, 100u);
+}
+
 }  // namespace
 }  // namespace catgs

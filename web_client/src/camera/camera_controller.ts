@@ -1,11 +1,16 @@
 // The viewer's own camera: what gestures and held keys do to a pose. Pure: no DOM, no clock.
+import type { Eye } from '../present/warp';
+import { glide, glide_time_s, type Flight } from './flight';
+import { is_held, no_axes, type Axes, type Gesture } from './movement';
 import {
   add,
   axis_angle,
+  conjugate,
   cross,
   dot,
   forward,
   length,
+  look_at,
   multiply,
   normalize,
   right,
@@ -17,7 +22,8 @@ import {
   type Vec3,
 } from './vector';
 
-export type CameraMode = 'orbit' | 'fly';
+export const camera_modes = ['orbit', 'fly', 'walk'] as const;
+export type CameraMode = (typeof camera_modes)[number];
 
 export interface Pose {
   readonly position: Vec3;
@@ -32,38 +38,15 @@ export interface SceneSetup {
   readonly limits_min: Vec3;
   readonly limits_max: Vec3;
   readonly near_z: number;
+  readonly start_fov_y_rad?: number;
 }
-
-/** One movement of pointer or wheel. Distances are fractions of the view's height, y down. */
-export type Gesture =
-  | { kind: 'look'; dx: number; dy: number } // the scene follows the pointer
-  | { kind: 'pan'; dx: number; dy: number } // the scene follows the pointer
-  | { kind: 'dolly'; steps: number }; // > 0: towards the scene; 1 = one notch of a wheel
-
-/** Held keys, each -1…1. */
-export interface Axes {
-  readonly right: number;
-  readonly up: number;
-  readonly forward: number;
-  readonly turn_right: number;
-  readonly turn_up: number;
-  readonly fast: boolean;
-}
-
-export const no_axes: Axes = {
-  right: 0,
-  up: 0,
-  forward: 0,
-  turn_right: 0,
-  turn_up: 0,
-  fast: false,
-};
 
 const steepest_rad = (88 * Math.PI) / 180; // at 90 degrees "up" has no direction in the image
 const orbit_rad_per_height = Math.PI;
 const turn_rad_per_s = 1.2;
 const dolly_per_step = 0.12; // share of the distance to the focus
 const fast_factor = 4;
+const speed_share = { orbit: 0.6, fly: 0.6, walk: 0.25 } as const; // of the scene's scale, a second
 const level_time_s = 0.25;
 const rest_threshold = 1e-4;
 const fov_range_rad = [0.1, 2.8] as const; // the wire's
@@ -74,10 +57,11 @@ interface Pending {
   yaw: number; // rad about up; > 0 turns left
   pitch: number; // rad about the camera's x axis; > 0 looks up
   pan: Vec3; // world units along camera axes
+  climb: number; // world units along up
   dolly: number; // steps
 }
 
-const nothing_pending = (): Pending => ({ yaw: 0, pitch: 0, pan: [0, 0, 0], dolly: 0 });
+const nothing_pending = (): Pending => ({ yaw: 0, pitch: 0, pan: [0, 0, 0], climb: 0, dolly: 0 });
 
 export class CameraController {
   private pose_: Pose = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
@@ -91,12 +75,31 @@ export class CameraController {
   private nearest_ = 0.1;
   private scene_: SceneSetup | undefined;
   private pending_ = nothing_pending();
+  private flight_: { way: Flight; time_s: number; ended: (arrived: boolean) => void } | undefined;
 
   /** Time constant of the glide after a gesture; 0 for people who asked for reduced motion. */
   smoothing_s = 0.05;
 
   get pose(): Pose {
     return this.pose_;
+  }
+
+  get eye(): Eye {
+    return { ...this.pose_, fov_y_rad: this.fov_y_rad_ };
+  }
+
+  /** The scene's scale to a visitor, world units. */
+  get reach(): number {
+    return this.reach_;
+  }
+
+  get up(): Vec3 {
+    return this.up_;
+  }
+
+  /** Of what the visitor looks at; Infinity where nobody knows. */
+  get sight_distance(): number {
+    return this.mode_ === 'orbit' ? this.distance() : Infinity;
   }
 
   get mode(): CameraMode {
@@ -116,6 +119,7 @@ export class CameraController {
     this.up_ = normalize(scene.up, [0, -1, 0]);
     const start = scene.start_pose;
     this.pose_ = { position: start.position, orientation: unit(start.orientation) };
+    this.fov_y_rad = scene.start_fov_y_rad ?? this.fov_y_rad_;
     this.focus_ = scene.focus;
     this.nearest_ = Math.max(scene.near_z, 1e-3) * 1.5;
     const to_focus = length(sub(scene.focus, start.position));
@@ -130,19 +134,51 @@ export class CameraController {
 
   /** Back to the start. */
   reset(): void {
+    this.end_flight(false);
     if (this.scene_) this.load(this.scene_);
-    this.fov_y_rad_ = default_fov_y_rad;
+    this.fov_y_rad_ = this.scene_?.start_fov_y_rad ?? default_fov_y_rad;
+  }
+
+  /** Another start, kept for reset(). The camera stays where it is. */
+  start_at(eye: Eye): void {
+    if (!this.scene_) return;
+    this.scene_ = { ...this.scene_, start_pose: eye, start_fov_y_rad: eye.fov_y_rad };
+  }
+
+  /** Moves along a way; any other movement ends it. `ended` hears whether the camera arrived. */
+  fly(way: Flight, ended: (arrived: boolean) => void = () => undefined): void {
+    this.end_flight(false);
+    this.pending_ = nothing_pending();
+    this.flight_ = { way, time_s: 0, ended };
+  }
+
+  stop_flight(): void {
+    this.end_flight(false);
+  }
+
+  get in_flight(): boolean {
+    return this.flight_ !== undefined;
+  }
+
+  /** Turns to a point of the scene and comes nearer; walking, goes there. */
+  focus_on(point: Vec3, at_once = false): void {
+    const to = this.mode_ === 'walk' ? this.before(point) : this.facing(point);
+    const ended = (arrived: boolean): void => {
+      if (arrived) this.focus_ = point;
+    };
+    this.fly(glide(this.eye, to, at_once ? 0 : glide_time_s(this.eye, to, this.reach_)), ended);
   }
 
   /** Puts the camera somewhere; limits are the caller's business. */
   jump(pose: Pose): void {
+    this.end_flight(false);
     this.pose_ = { position: pose.position, orientation: unit(pose.orientation) };
     this.pending_ = nothing_pending();
     this.focus_ = this.ahead(this.distance());
   }
 
   set_mode(mode: CameraMode): void {
-    if (mode === 'orbit' && this.mode_ === 'fly') this.focus_ = this.ahead(this.distance());
+    if (mode === 'orbit' && this.mode_ !== 'orbit') this.focus_ = this.ahead(this.distance());
     this.mode_ = mode;
   }
 
@@ -157,11 +193,12 @@ export class CameraController {
   }
 
   gesture(gesture: Gesture): void {
+    this.end_flight(false);
     const pending = this.pending_;
     switch (gesture.kind) {
       case 'look': {
         // Flying, the scene stays under the pointer; orbiting, a full height is half a turn.
-        const rad = this.mode_ === 'fly' ? this.fov_y_rad_ : -orbit_rad_per_height;
+        const rad = this.mode_ === 'orbit' ? -orbit_rad_per_height : this.fov_y_rad_;
         pending.yaw += gesture.dx * rad;
         pending.pitch += gesture.dy * rad;
         break;
@@ -179,45 +216,111 @@ export class CameraController {
 
   /** No movement is left to make. */
   get at_rest(): boolean {
-    const { yaw, pitch, pan, dolly } = this.pending_;
-    return yaw === 0 && pitch === 0 && dolly === 0 && length(pan) === 0;
+    const { yaw, pitch, pan, climb, dolly } = this.pending_;
+    const still = yaw === 0 && pitch === 0 && dolly === 0 && climb === 0 && length(pan) === 0;
+    return still && !this.flight_;
   }
 
   /** Moves by `dt_s`. Returns whether the camera moved. */
   step(dt_s: number, axes: Axes = no_axes): boolean {
     const before = this.pose_;
+    if (this.flight_ && !is_held(axes)) return this.follow_flight(dt_s);
+    this.end_flight(false);
     this.hold(dt_s, axes);
     const share = this.smoothing_s > 0 ? 1 - Math.exp(-dt_s / this.smoothing_s) : 1;
     const due = this.take(share);
     this.turn(due.yaw, due.pitch);
     if (due.yaw !== 0 || due.pitch !== 0) this.level(1 - Math.exp(-dt_s / level_time_s));
-    this.translate(rotate(this.pose_.orientation, due.pan));
+    this.translate(add(this.grounded(rotate(this.pose_.orientation, due.pan)), scale(this.up_, due.climb)));
     this.dolly(due.dolly);
     return before !== this.pose_;
   }
 
+  private follow_flight(dt_s: number): boolean {
+    const flight = this.flight_;
+    if (!flight) return false;
+    flight.time_s = Math.min(flight.time_s + dt_s, flight.way.duration_s);
+    const { fov_y_rad, ...pose } = flight.way.at(flight.time_s);
+    this.pose_ = pose;
+    this.fov_y_rad = fov_y_rad;
+    if (flight.time_s >= flight.way.duration_s) this.end_flight(true);
+    return true;
+  }
+
+  private end_flight(arrived: boolean): void {
+    const flight = this.flight_;
+    if (!flight) return;
+    this.flight_ = undefined;
+    this.focus_ = this.ahead(this.distance());
+    flight.ended(arrived);
+  }
+
+  /** Nearer to the point by a third, looking at it. */
+  private facing(point: Vec3): Eye {
+    const away = sub(this.pose_.position, point);
+    const distance = Math.max(length(away), 1e-9);
+    const nearer = Math.min(distance, Math.max(distance * 0.67, this.nearest_ * 4));
+    const position = this.within(add(point, scale(away, nearer / distance)));
+    return {
+      position,
+      orientation: look_at(position, point, this.up_),
+      fov_y_rad: this.fov_y_rad_,
+    };
+  }
+
+  /** On foot: a step before the point, at the height of now, turned towards it. */
+  private before(point: Vec3): Eye {
+    const way = this.on_ground(sub(point, this.pose_.position));
+    const distance = Math.max(length(way), 1e-9);
+    const gone = Math.max(0, distance - 0.1 * this.reach_);
+    const position = this.within(add(this.pose_.position, scale(way, gone / distance)));
+    const level = look_at(position, add(position, way), this.up_);
+    return { position, orientation: level, fov_y_rad: this.fov_y_rad_ };
+  }
+
+  private within(position: Vec3): Vec3 {
+    return min(max(position, this.min_), this.max_);
+  }
+
+  private on_ground(v: Vec3): Vec3 {
+    return sub(v, scale(this.up_, dot(v, this.up_)));
+  }
+
+  /** Walking keeps its height. */
+  private grounded(v: Vec3): Vec3 {
+    return this.mode_ === 'walk' ? this.on_ground(v) : v;
+  }
+
+  /** Where "forward" leads, unit. */
+  private ahead_direction(): Vec3 {
+    const view = rotate(this.pose_.orientation, forward);
+    return this.mode_ === 'walk' ? normalize(this.on_ground(view), view) : view;
+  }
+
   private hold(dt_s: number, axes: Axes): void {
-    const speed = this.reach_ * 0.6 * (axes.fast ? fast_factor : 1) * dt_s;
+    const speed = this.reach_ * speed_share[this.mode_] * (axes.fast ? fast_factor : 1) * dt_s;
     const pending = this.pending_;
     // Orbiting, turning right means to walk around the focus to the right: the view turns left.
-    const turn = turn_rad_per_s * dt_s * (this.mode_ === 'fly' ? 1 : -1);
+    const turn = turn_rad_per_s * dt_s * (this.mode_ === 'orbit' ? -1 : 1);
     pending.yaw -= axes.turn_right * turn;
     pending.pitch += axes.turn_up * turn;
-    const world_up_in_camera = rotate(conjugate(this.pose_.orientation), this.up_);
-    pending.pan = add(pending.pan, [axes.right * speed, 0, axes.forward * speed]);
-    pending.pan = add(pending.pan, scale(world_up_in_camera, axes.up * speed));
+    const ahead = rotate(conjugate(this.pose_.orientation), this.ahead_direction());
+    pending.pan = add(pending.pan, scale(right, axes.right * speed));
+    pending.pan = add(pending.pan, scale(ahead, axes.forward * speed));
+    pending.climb += axes.up * speed;
   }
 
   /** Takes `share` of what is pending, or all of it once it is too little to be seen. */
   private take(share: number): Pending {
     const all = this.pending_;
     const rest =
-      Math.abs(all.yaw) + Math.abs(all.pitch) + Math.abs(all.dolly) + length(all.pan) / this.reach_;
+      Math.abs(all.yaw) + Math.abs(all.pitch) + Math.abs(all.dolly) + (length(all.pan) + Math.abs(all.climb)) / this.reach_;
     const s = rest < rest_threshold ? 1 : share;
     const taken = {
       yaw: all.yaw * s,
       pitch: all.pitch * s,
       pan: scale(all.pan, s),
+      climb: all.climb * s,
       dolly: all.dolly * s,
     };
     this.pending_ =
@@ -227,6 +330,7 @@ export class CameraController {
             yaw: all.yaw - taken.yaw,
             pitch: all.pitch - taken.pitch,
             pan: sub(all.pan, taken.pan),
+            climb: all.climb - taken.climb,
             dolly: all.dolly - taken.dolly,
           };
     return taken;
@@ -246,7 +350,7 @@ export class CameraController {
 
   private apply_turn(turn: Quat): void {
     const orientation = multiply(turn, this.pose_.orientation);
-    if (this.mode_ === 'fly') {
+    if (this.mode_ !== 'orbit') {
       this.pose_ = { position: this.pose_.position, orientation };
       return;
     }
@@ -269,7 +373,7 @@ export class CameraController {
   /** Moves camera and focus together, as far as the limits allow. */
   private translate(by: Vec3): void {
     if (by[0] === 0 && by[1] === 0 && by[2] === 0) return;
-    const position = min(max(add(this.pose_.position, by), this.min_), this.max_);
+    const position = this.within(add(this.pose_.position, by));
     const moved = sub(position, this.pose_.position);
     if (length(moved) === 0) return;
     this.focus_ = add(this.focus_, moved);
@@ -278,8 +382,8 @@ export class CameraController {
 
   private dolly(steps: number): void {
     if (steps === 0) return;
-    if (this.mode_ === 'fly') {
-      this.translate(scale(rotate(this.pose_.orientation, forward), steps * this.reach_ * 0.08));
+    if (this.mode_ !== 'orbit') {
+      this.translate(scale(this.ahead_direction(), steps * this.reach_ * 0.08));
       return;
     }
     const offset = sub(this.pose_.position, this.focus_);
@@ -315,5 +419,3 @@ function min(a: Vec3, b: Vec3): Vec3 {
 function max(a: Vec3, b: Vec3): Vec3 {
   return [Math.max(a[0], b[0]), Math.max(a[1], b[1]), Math.max(a[2], b[2])];
 }
-
-const conjugate = (q: Quat): Quat => [-q[0], -q[1], -q[2], q[3]];

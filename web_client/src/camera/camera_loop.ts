@@ -1,6 +1,8 @@
 import type { Clock } from '../session/clock';
+import type { Inertia } from '../input/inertia';
 import type { CameraSample } from '../session/messages';
-import type { Axes, CameraController } from './camera_controller';
+import type { CameraController } from './camera_controller';
+import { is_held, type Axes } from './movement';
 
 const longest_step_s = 0.1; // a page that was held up does not leap
 
@@ -18,6 +20,7 @@ export class CameraLoop {
   constructor(
     private readonly camera_: CameraController,
     private readonly axes_: () => Axes,
+    private readonly inertia_: Inertia,
     private readonly clock_: Clock,
     private readonly send_: (sample: CameraSample) => void,
   ) {}
@@ -59,8 +62,8 @@ export class CameraLoop {
     this.send_({
       pose_id: this.pose_id_,
       time_us: this.clock_.now_us(),
-      pose: this.camera_.pose,
-      fov_y_rad: this.camera_.fov_y_rad,
+      eye: { ...this.camera_.pose, fov_y_rad: this.camera_.fov_y_rad },
+      distance: this.camera_.sight_distance,
     });
     return this.pose_id_;
   }
@@ -70,15 +73,12 @@ export class CameraLoop {
     const dt_s = Math.min((now_us - this.last_us_) / 1e6, longest_step_s);
     this.last_us_ = now_us;
     const axes = this.axes_();
+    if (is_held(axes)) this.inertia_.stop();
+    const glide = this.inertia_.step(dt_s);
+    if (glide) this.camera_.gesture(glide);
     const moved = this.camera_.step(dt_s, axes);
     if (moved || this.changed_) this.sample();
-    const held =
-      axes.right !== 0 ||
-      axes.up !== 0 ||
-      axes.forward !== 0 ||
-      axes.turn_right !== 0 ||
-      axes.turn_up !== 0;
-    this.running_ = held || moved || !this.camera_.at_rest;
+    this.running_ = is_held(axes) || moved || !this.camera_.at_rest || this.inertia_.active;
     if (this.running_) requestAnimationFrame(() => this.tick());
   }
 }

@@ -53,3 +53,44 @@ export function rotate(q: Quat, v: Vec3): Vec3 {
   const t = scale(cross(u, v), 2);
   return add(add(v, scale(t, q[3])), cross(u, t));
 }
+
+export const conjugate = (q: Quat): Quat => [-q[0], -q[1], -q[2], q[3]];
+
+/** Constant angular rate from `a` (share 0) to `b` (share 1), the short way round. */
+export function slerp(a: Quat, b: Quat, share: number): Quat {
+  const cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  const sign = cosine < 0 ? -1 : 1;
+  const angle = Math.acos(Math.min(1, Math.abs(cosine)));
+  const near = angle < 1e-4;
+  const from = near ? 1 - share : Math.sin((1 - share) * angle) / Math.sin(angle);
+  const to = sign * (near ? share : Math.sin(share * angle) / Math.sin(angle));
+  return unit([
+    from * a[0] + to * b[0],
+    from * a[1] + to * b[1],
+    from * a[2] + to * b[2],
+    from * a[3] + to * b[3],
+  ]);
+}
+
+/** The rotation whose camera axes are these unit vectors, at right angles to each other. */
+function from_axes(x: Vec3, y: Vec3, z: Vec3): Quat {
+  const trace = x[0] + y[1] + z[2];
+  if (trace > 0) {
+    return unit([y[2] - z[1], z[0] - x[2], x[1] - y[0], trace + 1]);
+  }
+  if (x[0] >= y[1] && x[0] >= z[2]) {
+    return unit([1 + x[0] - y[1] - z[2], x[1] + y[0], z[0] + x[2], y[2] - z[1]]);
+  }
+  if (y[1] >= z[2]) {
+    return unit([x[1] + y[0], 1 + y[1] - x[0] - z[2], y[2] + z[1], z[0] - x[2]]);
+  }
+  return unit([z[0] + x[2], y[2] + z[1], 1 + z[2] - x[0] - y[1], x[1] - y[0]]);
+}
+
+/** Of a camera at `from` that has `to` in the middle of its picture and `up` upright in it. */
+export function look_at(from: Vec3, to: Vec3, up: Vec3): Quat {
+  const view = normalize(sub(to, from), forward);
+  const aside = Math.abs(view[0]) < 0.7 ? right : forward;
+  const x = normalize(cross(view, up), normalize(cross(view, aside), right));
+  return from_axes(x, cross(view, x), view);
+}

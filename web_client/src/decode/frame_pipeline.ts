@@ -15,7 +15,7 @@ export interface PipelineEnvironment {
   /** Calls back before the next refresh of the display. */
   on_refresh: (draw: () => void) => void;
   /** One at a time; the picture is free when the promise resolves. */
-  draw: (picture: Picture) => Promise<void>;
+  draw: (picture: Picture, header: FrameHeader) => Promise<void>;
 }
 
 export interface PipelineListener {
@@ -163,7 +163,7 @@ export class FramePipeline {
     const { frame, picture } = newest;
     const streams_ended = this.streams_ended_;
     try {
-      await this.env_.draw(picture);
+      await this.env_.draw(picture, frame.header);
     } finally {
       picture.close();
     }

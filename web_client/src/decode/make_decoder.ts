@@ -1,28 +1,43 @@
 import { Codec, type StreamConfig } from '../wire/wire';
 import { JpegDecoder } from './jpeg_decoder';
+import { rungs_from, type DecoderRung } from './ladder';
 import type { Decoder, DecoderEvents } from './picture';
-import { decoder_config, has_webcodecs, supported_accelerations, WebCodecsDecoder } from './video_decoder';
+import { decoder_config, has_webcodecs, is_supported, WebCodecsDecoder } from './video_decoder';
 
-const failures_per_kind = 2; // one may be a broken frame; two are a broken decoder
+export const failures_per_rung = 2; // one may be a broken frame; two are a broken decoder
 
-/** What this browser can decode here, best first. */
-export function available_codecs(): Codec[] {
-  return has_webcodecs() ? [Codec.H264, Codec.MJPEG] : [Codec.MJPEG];
+/** What this browser can decode here from `first_rung` down, best first. */
+export function available_codecs(first_rung: DecoderRung): Codec[] {
+  return has_webcodecs() && first_rung !== 'jpeg' ? [Codec.H264, Codec.MJPEG] : [Codec.MJPEG];
+}
+
+export interface MadeDecoder {
+  readonly decoder: Decoder;
+  readonly rung: DecoderRung;
 }
 
 /**
- * The best decoder left after `failures` real failures: hardware first, software when hardware has
- * proved unable. Undefined when none is left.
+ * The best decoder from `first_rung` down that is left after `failures` real failures: hardware
+ * first, software when hardware has proved unable. Undefined when none is left.
  */
 export async function make_decoder(
   config: StreamConfig,
+  first_rung: DecoderRung,
   failures: number,
   now_us: () => number,
   events: DecoderEvents,
-): Promise<Decoder | undefined> {
-  if (config.codec === Codec.MJPEG) return new JpegDecoder(now_us, events);
+): Promise<MadeDecoder | undefined> {
+  if (config.codec === Codec.MJPEG) {
+    return { decoder: new JpegDecoder(now_us, events), rung: 'jpeg' };
+  }
   if (config.codec !== Codec.H264 || !has_webcodecs()) return undefined;
-  const kinds = await supported_accelerations(config);
-  const kind = kinds[Math.floor(failures / failures_per_kind)];
-  return kind && new WebCodecsDecoder(decoder_config(config, kind), now_us, events);
+  const rungs = await Promise.all(
+    rungs_from(first_rung).map(async (rung) => {
+      if (rung === 'jpeg') return [];
+      return (await is_supported(decoder_config(config, rung))) ? [rung] : [];
+    }),
+  );
+  const rung = rungs.flat()[Math.floor(failures / failures_per_rung)];
+  if (!rung) return undefined;
+  return { decoder: new WebCodecsDecoder(decoder_config(config, rung), now_us, events), rung };
 }

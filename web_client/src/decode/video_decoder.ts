@@ -1,13 +1,6 @@
 import type { StreamConfig } from '../wire/wire';
 import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
 
-/** Kinds of decoder in the order of our liking. */
-const acceleration_ladder: readonly HardwareAcceleration[] = [
-  'prefer-hardware',
-  'no-preference',
-  'prefer-software',
-];
-
 export function has_webcodecs(): boolean {
   return typeof VideoDecoder !== 'undefined' && typeof EncodedVideoChunk !== 'undefined';
 }
@@ -26,19 +19,8 @@ export function decoder_config(
   };
 }
 
-/** The steps of the ladder that this browser offers for the stream. */
-export async function supported_accelerations(
-  config: StreamConfig,
-): Promise<HardwareAcceleration[]> {
-  const offers = await Promise.all(
-    acceleration_ladder.map(async (acceleration) => {
-      const { supported } = await VideoDecoder.isConfigSupported(
-        decoder_config(config, acceleration),
-      );
-      return supported ? [acceleration] : [];
-    }),
-  );
-  return offers.flat();
+export async function is_supported(config: VideoDecoderConfig): Promise<boolean> {
+  return (await VideoDecoder.isConfigSupported(config)).supported === true;
 }
 
 /** H.264 by WebCodecs. One frame in, one picture out; the frame id travels as the timestamp. */

@@ -1,4 +1,4 @@
-import { no_axes, type Axes } from '../camera/camera_controller';
+import { no_axes, type Axes } from '../camera/movement';
 
 // By position on the keyboard (KeyboardEvent.code), so that WASD is a cross on every layout.
 const movement: Readonly<Record<string, Partial<Axes>>> = {

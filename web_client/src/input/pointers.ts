@@ -1,4 +1,4 @@
-import type { Gesture } from '../camera/camera_controller';
+import type { Gesture } from '../camera/movement';
 
 /** The part of PointerEvent that matters here. Pixels of the view, y down. */
 export interface PointerSample {
@@ -29,12 +29,17 @@ const wheel_px_per_page = 400; // deltaMode 2: pages
 export class Pointers {
   private readonly held_ = new Map<number, Held>();
 
+  get count(): number {
+    return this.held_.size;
+  }
+
   down(p: PointerSample): void {
     if (this.held_.size < 2) this.held_.set(p.id, { x: p.x, y: p.y });
   }
 
-  up(id: number): void {
-    this.held_.delete(id);
+  /** Returns whether this was the last one. */
+  up(id: number): boolean {
+    return this.held_.delete(id) && this.held_.size === 0;
   }
 
   move(p: PointerSample, view_height_px: number): Gesture[] {
@@ -61,6 +66,33 @@ export class Pointers {
   private two_fingers(): { spread: number } | undefined {
     const [a, b] = [...this.held_.values()];
     return a && b ? { spread: Math.hypot(a.x - b.x, a.y - b.y) } : undefined;
+  }
+}
+
+const tap_slack_px = 10; // fingers and hands tremble
+const double_tap_ms = 350;
+const double_tap_px = 30;
+
+/** Tells double taps and double clicks from drags. Times in ms, places in px. */
+export class DoubleTap {
+  private down_: { x: number; y: number } | undefined;
+  private last_: { time_ms: number; x: number; y: number } | undefined;
+
+  down(x: number, y: number, is_only: boolean): void {
+    this.down_ = is_only ? { x, y } : undefined;
+  }
+
+  /** Returns whether this was the second tap. */
+  up(time_ms: number, x: number, y: number): boolean {
+    const { down_: down, last_: last } = this;
+    this.down_ = this.last_ = undefined;
+    if (!down || Math.hypot(x - down.x, y - down.y) > tap_slack_px) return false;
+    const is_second =
+      last !== undefined &&
+      time_ms - last.time_ms <= double_tap_ms &&
+      Math.hypot(x - last.x, y - last.y) <= double_tap_px;
+    if (!is_second) this.last_ = { time_ms, x, y };
+    return is_second;
   }
 }
 

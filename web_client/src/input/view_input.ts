@@ -1,41 +1,62 @@
 // Binds pointers, wheel and keyboard of the view to gestures and held keys.
-import type { Gesture } from '../camera/camera_controller';
+import type { Gesture } from '../camera/movement';
+import type { Inertia } from './inertia';
 import { HeldKeys } from './keyboard';
-import { Pointers, wheel_gesture, type PointerSample } from './pointers';
+import { DoubleTap, Pointers, wheel_gesture, type PointerSample } from './pointers';
 
 export interface ViewInputListener {
   gesture(gesture: Gesture): void;
   keys_changed(): void;
+  /** A double click or double tap; a share of the view's width and height, y down. */
+  pointed_at(x: number, y: number): void;
 }
 
-export function bind_view_input(view: HTMLElement, listener: ViewInputListener): HeldKeys {
+export function bind_view_input(
+  view: HTMLElement,
+  inertia: Inertia,
+  listener: ViewInputListener,
+): HeldKeys {
   const keys = new HeldKeys();
-  bind_pointers(view, listener);
+  bind_pointers(view, inertia, listener);
   bind_keys(keys, listener);
   bind_focus(view);
   return keys;
 }
 
-function bind_pointers(view: HTMLElement, listener: ViewInputListener): void {
+function bind_pointers(view: HTMLElement, inertia: Inertia, listener: ViewInputListener): void {
   const pointers = new Pointers();
+  const taps = new DoubleTap();
   view.addEventListener('pointerdown', (event) => {
     if (event.button === 1) event.preventDefault(); // no scrolling by the middle button
     view.setPointerCapture(event.pointerId);
+    inertia.stop();
     pointers.down(sample_of(event));
+    taps.down(event.clientX, event.clientY, pointers.count === 1 && event.button === 0);
   });
   view.addEventListener('pointermove', (event) => {
     for (const gesture of pointers.move(sample_of(event), view.clientHeight)) {
+      inertia.moved(gesture, event.timeStamp);
       listener.gesture(gesture);
     }
   });
   for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
-    view.addEventListener(end, (event) => pointers.up(event.pointerId));
+    view.addEventListener(end, (event) => {
+      const lifted = pointers.up(event.pointerId);
+      if (end === 'pointerup' && taps.up(event.timeStamp, event.clientX, event.clientY)) {
+        const { left, top, width, height } = view.getBoundingClientRect();
+        listener.pointed_at((event.clientX - left) / width, (event.clientY - top) / height);
+      }
+      if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
+        listener.keys_changed();
+      }
+    });
   }
   view.addEventListener('contextmenu', (event) => event.preventDefault());
   view.addEventListener(
     'wheel',
     (event) => {
       event.preventDefault();
+      inertia.stop();
       listener.gesture(wheel_gesture(event.deltaY, event.deltaMode, event.ctrlKey));
     },
     { passive: false },

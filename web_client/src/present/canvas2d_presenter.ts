@@ -5,6 +5,7 @@ import { size_of, type Pixels, type Presenter } from './presenter';
 /** Without a GPU this takes the browser 11 ms of CPU a frame (640x360), WebGL in software 19. */
 export class Canvas2dPresenter implements Presenter {
   readonly description = '2D canvas (no hardware WebGL2)';
+  readonly can_warp = false;
   private yuv_ = new Uint8Array(0);
   private image_: ImageData | undefined;
 
@@ -21,6 +22,10 @@ export class Canvas2dPresenter implements Presenter {
     }
     if (is_limited_709(picture)) await this.draw_yuv(picture, width, height);
     else this.context_.drawImage(picture, 0, 0, width, height);
+  }
+
+  redraw(): void {
+    throw new Error('a 2D canvas cannot warp');
   }
 
   read(): Pixels {

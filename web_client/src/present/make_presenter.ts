@@ -2,10 +2,15 @@ import { Canvas2dPresenter } from './canvas2d_presenter';
 import type { Presenter } from './presenter';
 import { WebGl2Presenter } from './webgl2_presenter';
 
-/** WebGL2 where a GPU does it, a 2D canvas everywhere else. Throws when the browser has neither. */
-export function make_presenter(canvas: OffscreenCanvas): Presenter {
+export type PresenterChoice = 'auto' | 'webgl2' | '2d';
+
+/**
+ * WebGL2 where a GPU does it, a 2D canvas everywhere else, unless one of them was `wanted`. Throws
+ * when the browser has neither.
+ */
+export function make_presenter(canvas: OffscreenCanvas, wanted: PresenterChoice): Presenter {
   const attributes: WebGLContextAttributes = { alpha: false, antialias: false, depth: false };
-  if (has_hardware_webgl2()) {
+  if (wanted === 'webgl2' || (wanted === 'auto' && has_hardware_webgl2())) {
     const gl = canvas.getContext('webgl2', attributes);
     if (gl) return new WebGl2Presenter(canvas, gl);
   }

@@ -1,25 +1,35 @@
 import type { Picture } from '../decode/picture';
-import { size_of, type Pixels, type Presenter } from './presenter';
+import { size_of, type Pixels, type Placing, type Presenter } from './presenter';
+import type { Matrix3 } from './warp';
 
-// One triangle that covers the view; texture row 0 is the picture's top.
+// One triangle that covers the view; places are -1…1, y down. The perspective division is done per
+// pixel: interpolated homogeneous places stay exact.
 const vertex_source = `#version 300 es
-out vec2 uv;
+uniform mat3 picture_from_view;
+out highp vec3 place;
 void main() {
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0;
-  uv = vec2(corner.x, 1.0 - corner.y);
-  gl_Position = vec4(corner * 2.0 - 1.0, 0.0, 1.0);
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
+  place = picture_from_view * vec3(corner.x, -corner.y, 1.0);
+  gl_Position = vec4(corner, 0.0, 1.0);
 }`;
 
 const fragment_source = `#version 300 es
 precision mediump float;
 uniform sampler2D picture;
-in vec2 uv;
+in highp vec3 place;
 out vec4 colour;
-void main() { colour = vec4(texture(picture, uv).rgb, 1.0); }`;
+void main() {
+  highp vec2 uv = 0.5 + 0.5 * place.xy / max(place.z, 1e-6);
+  colour = vec4(texture(picture, uv).rgb, 1.0);
+}`;
+
+const unmoved: Matrix3 = new Float32Array([1, 0, 0, 0, 1, 0, 0, 0, 1]);
 
 /** The upload of a VideoFrame converts its YUV to RGB by the colour space of its bitstream. */
 export class WebGl2Presenter implements Presenter {
   readonly description = 'WebGL2';
+  readonly can_warp = true;
+  private matrix_place_: WebGLUniformLocation | null = null;
 
   constructor(
     private readonly canvas_: OffscreenCanvas,
@@ -31,17 +41,23 @@ export class WebGl2Presenter implements Presenter {
     canvas_.addEventListener('webglcontextrestored', () => this.set_up());
   }
 
-  draw(picture: Picture): Promise<void> {
+  draw(picture: Picture, placing?: Placing): Promise<void> {
     const gl = this.gl_;
-    const [width, height] = size_of(picture);
-    if (this.canvas_.width !== width || this.canvas_.height !== height) {
-      this.canvas_.width = width;
-      this.canvas_.height = height;
-      gl.viewport(0, 0, width, height);
-    }
+    const [width_px, height_px] = size_of(picture);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    this.redraw(placing ?? { matrix: unmoved, width_px, height_px });
     return Promise.resolve();
+  }
+
+  redraw({ matrix, width_px, height_px }: Placing): void {
+    const gl = this.gl_;
+    if (this.canvas_.width !== width_px || this.canvas_.height !== height_px) {
+      this.canvas_.width = width_px;
+      this.canvas_.height = height_px;
+      gl.viewport(0, 0, width_px, height_px);
+    }
+    gl.uniformMatrix3fv(this.matrix_place_, false, matrix);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
   read(): Pixels {
@@ -78,6 +94,8 @@ export class WebGl2Presenter implements Presenter {
       throw new Error(`presenter shader: ${gl.getProgramInfoLog(program) ?? ''}`);
     }
     gl.useProgram(program);
+    this.matrix_place_ = gl.getUniformLocation(program, 'picture_from_view');
+    gl.uniformMatrix3fv(this.matrix_place_, false, unmoved);
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
       gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);

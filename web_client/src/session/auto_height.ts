@@ -1,4 +1,3 @@
-const target_frame_ms = 1000 / 24;
 const steps_px = [240, 300, 360, 450, 540, 630, 720, 900, 1080, 1440, 2160] as const;
 const first_px = 720;
 const patience = 3; // looks in a row that must agree before the size changes
@@ -13,6 +12,8 @@ export class AutoHeight {
   private height_px_ = first_px;
   private votes_ = 0;
 
+  constructor(private readonly target_frame_ms_ = 1000 / 24) {}
+
   /** The height to ask for in a view of this height. */
   height_px(view_height_px: number): number {
     return Math.min(this.height_px_, view_height_px);
@@ -25,7 +26,7 @@ export class AutoHeight {
     if (Math.abs(this.votes_) < patience) return false;
     this.votes_ = 0;
     const now_px = this.height_px(view_height_px);
-    const next_px = vote < 0 ? fitting(now_px, frame_ms) : step_above(now_px);
+    const next_px = vote < 0 ? this.fitting(now_px, frame_ms) : step_above(now_px);
     const changed = next_px !== this.height_px_;
     this.height_px_ = next_px;
     return changed;
@@ -34,17 +35,17 @@ export class AutoHeight {
   /** -1: too slow, 1: there is room to grow, 0: as it should be. */
   private vote(frame_ms: number, view_height_px: number): number {
     const now_px = this.height_px(view_height_px);
-    if (frame_ms > target_frame_ms * 1.2) return now_px > steps_px[0] ? -1 : 0;
+    if (frame_ms > this.target_frame_ms_ * 1.2) return now_px > steps_px[0] ? -1 : 0;
     const grown_ms = frame_ms * (step_above(now_px) / now_px) ** 2;
     const can_grow = now_px < view_height_px && now_px < steps_px[steps_px.length - 1]!;
-    return can_grow && grown_ms < target_frame_ms * growth_margin ? 1 : 0;
+    return can_grow && grown_ms < this.target_frame_ms_ * growth_margin ? 1 : 0;
   }
-}
 
-/** The largest step whose time, which grows with the pixels, is in budget. */
-function fitting(height_px: number, frame_ms: number): number {
-  const wanted_px = height_px * Math.sqrt(target_frame_ms / frame_ms);
-  return [...steps_px].reverse().find((step) => step <= wanted_px) ?? steps_px[0];
+  /** The largest step whose time, which grows with the pixels, is in budget. */
+  private fitting(height_px: number, frame_ms: number): number {
+    const wanted_px = height_px * Math.sqrt(this.target_frame_ms_ / frame_ms);
+    return [...steps_px].reverse().find((step) => step <= wanted_px) ?? steps_px[0];
+  }
 }
 
 function step_above(height_px: number): number {

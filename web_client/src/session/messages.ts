@@ -1,5 +1,11 @@
 // What page and worker say to each other. Structured clones: plain data only.
 import type { Pose } from '../camera/camera_controller';
+import type { Vec3 } from '../camera/vector';
+import type { DecoderRung } from '../decode/ladder';
+import type { PresenterChoice } from '../present/make_presenter';
+import type { ShownView } from '../present/display';
+import type { Eye } from '../present/warp';
+import type { WarpMode } from '../present/warp_policy';
 import type { StatsSnapshot } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
 import type { SessionState } from './state';
@@ -18,12 +24,27 @@ export interface Quality {
 export interface CameraSample {
   readonly pose_id: number;
   readonly time_us: number;
-  readonly pose: Pose;
-  readonly fov_y_rad: number;
+  readonly eye: Eye;
+  /** Of what the visitor looks at, along the view axis; Infinity: unknown. World units. */
+  readonly distance: number;
+}
+
+/** Where the camera of a tour will be. */
+export interface PathSample {
+  readonly time_us: number;
+  readonly eye: Eye;
+}
+
+export interface Ray {
+  readonly origin: Vec3;
+  readonly direction: Vec3;
 }
 
 export interface Snapshot {
+  /** Of the newest picture. */
   readonly header: FrameHeader;
+  /** What the canvas shows: that picture, warped to where the camera was when it was drawn. */
+  readonly view: ShownView;
   readonly width_px: number;
   readonly height_px: number;
   readonly rgba: Uint8ClampedArray<ArrayBuffer>;
@@ -39,9 +60,14 @@ export type ToWorker =
       scene_id: string;
       view: View;
       quality: Quality;
+      rung: DecoderRung;
+      presenter: PresenterChoice;
     }
   | { kind: 'camera'; sample: CameraSample }
   | { kind: 'view'; view: View; quality: Quality }
+  | { kind: 'warp'; mode: WarpMode }
+  | { kind: 'path'; samples: readonly PathSample[] }
+  | { kind: 'pick'; id: number; ray: Ray }
   | { kind: 'hidden'; hidden: boolean }
   | { kind: 'retry' }
   | { kind: 'token'; token: string }
@@ -53,7 +79,11 @@ export type FromWorker =
   | { kind: 'state'; state: SessionState }
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
-  | { kind: 'presenter'; description: string }
+  | { kind: 'presenter'; description: string; warps: boolean }
+  /** `rung` has proved to be where decoding works here. */
+  | { kind: 'rung'; rung: DecoderRung }
+  /** The answer to a pick; undefined: nothing is there. */
+  | { kind: 'picked'; id: number; distance: number | undefined }
   | { kind: 'notice'; message: string }
   /** The decoders are at their end: the stream is asked for as JPEG pictures. */
   | { kind: 'fallback'; message: string }

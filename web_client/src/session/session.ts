@@ -10,6 +10,8 @@ import {
   type ClientBody,
   type FrameHeader,
   type HelloInit,
+  type Picked,
+  type PickInit,
   type PoseInit,
   type ServerBody,
   type SettingsInit,
@@ -34,6 +36,7 @@ export interface SessionListener {
   /** The frames so far belong to a connection that goes: acknowledge them now or never. */
   stream_ended(): void;
   stats(stats: Stats): void;
+  picked(picked: Picked): void;
   /** The server said something for people that does not end the session. */
   notice(message: string): void;
 }
@@ -110,6 +113,15 @@ export class Session {
   send_settings(settings: SettingsInit): void {
     this.greeting_ = { ...this.greeting_, settings };
     this.send({ case: 'settings', value: settings });
+  }
+
+  /** Where the camera will go: forecasts may follow it. */
+  send_path(samples: PoseInit[]): void {
+    this.send({ case: 'path', value: { samples } });
+  }
+
+  send_pick(pick: PickInit): void {
+    this.send({ case: 'pick', value: pick });
   }
 
   request_idr(): void {
@@ -258,6 +270,9 @@ export class Session {
         break;
       case 'stats':
         if (link === this.link_) this.listener_.stats(body.value);
+        break;
+      case 'picked':
+        if (link === this.link_) this.listener_.picked(body.value);
         break;
       case 'error':
         this.refused(link, body.value);

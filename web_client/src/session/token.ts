@@ -24,12 +24,3 @@ export function take_token(
 export function remember_token(token: string, storage: Storage | undefined): void {
   storage?.setItem(storage_key, token);
 }
-
-/** Browsers with blocked site data throw on mere access. */
-export function session_storage(): Storage | undefined {
-  try {
-    return sessionStorage;
-  } catch {
-    return undefined;
-  }
-}

@@ -1,11 +1,26 @@
 // The worker: everything between socket and canvas, so that a busy page delays no picture.
-import type { Pose } from '../camera/camera_controller';
+import type { Vec3 } from '../camera/vector';
 import { FramePipeline } from '../decode/frame_pipeline';
-import { available_codecs, make_decoder } from '../decode/make_decoder';
+import type { DecoderRung } from '../decode/ladder';
+import {
+  available_codecs,
+  failures_per_rung,
+  make_decoder,
+  type MadeDecoder,
+} from '../decode/make_decoder';
+import type { DecoderEvents } from '../decode/picture';
+import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
+import { widened_fov, type Eye } from '../present/warp';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import { Codec, type FrameHeader, type PoseInit, type SettingsInit } from '../wire/wire';
+import {
+  Codec,
+  type FrameHeader,
+  type PoseInit,
+  type SettingsInit,
+  type StreamConfig,
+} from '../wire/wire';
 import { browser_timers, clock_from } from './clock';
 import type { CameraSample, FromWorker, Quality, ToWorker, View } from './messages';
 import { Session } from './session';
@@ -41,15 +56,29 @@ scope.onmessage = ({ data }) => {
 class Client {
   private readonly clock_;
   private readonly presenter_;
+  private readonly display_: Display;
   private readonly pipeline_: FramePipeline;
   private readonly session_: Session;
   private readonly metrics_ = new Metrics();
   private shown_: FrameHeader | undefined;
+  private view_: View;
+  private quality_: Quality;
+  private camera_: CameraSample | undefined;
+  private first_rung_: DecoderRung = 'prefer-hardware'; // of the stream that runs
+  private rung_: DecoderRung; // where the next decoder begins on the ladder
 
   constructor(start: Start) {
     this.clock_ = clock_from(start.page_origin_ms);
-    this.presenter_ = make_presenter(start.canvas);
-    scope.postMessage({ kind: 'presenter', description: this.presenter_.description });
+    this.view_ = start.view;
+    this.quality_ = start.quality;
+    this.rung_ = start.rung;
+    this.presenter_ = make_presenter(start.canvas, start.presenter);
+    this.display_ = new Display(this.presenter_, {
+      now_us: () => this.clock_.now_us(),
+      on_refresh: (draw) => scope.requestAnimationFrame(draw),
+      overscan_changed: () => this.send_sizes(),
+    });
+    this.tell_presenter();
     this.pipeline_ = this.make_pipeline();
     this.session_ = this.make_session(start);
     this.session_.start();
@@ -59,11 +88,29 @@ class Client {
     switch (message.kind) {
       case 'camera':
         this.metrics_.pose_sent(BigInt(message.sample.pose_id), message.sample.time_us);
-        this.session_.send_pose(pose_message(message.sample));
+        this.camera_ = message.sample;
+        this.display_.camera = message.sample;
+        this.send_camera();
         break;
       case 'view':
-        this.session_.set_viewport(...viewport(message.view));
-        this.session_.send_settings(settings(message.view, message.quality));
+        this.view_ = message.view;
+        this.quality_ = message.quality;
+        this.send_sizes();
+        break;
+      case 'warp':
+        this.display_.mode = message.mode;
+        break;
+      case 'path':
+        this.session_.send_path(
+          message.samples.map(({ time_us, eye }) => pose_message(0, time_us, this.widened(eye))),
+        );
+        break;
+      case 'pick':
+        this.session_.send_pick({
+          id: message.id,
+          origin: wire_vector(message.ray.origin),
+          direction: wire_vector(message.ray.direction),
+        });
         break;
       case 'hidden':
         this.session_.set_paused(message.hidden);
@@ -97,9 +144,10 @@ class Client {
       {
         now_us,
         make_decoder: (config, failures, events) =>
-          make_decoder(config, failures, now_us, events),
+          this.make_decoder(config, failures, events),
         on_refresh: (draw) => scope.requestAnimationFrame(draw),
-        draw: (picture) => this.presenter_.draw(picture),
+        draw: (picture, { renderPose, fovYRad, widthPx, heightPx }) =>
+          this.display_.draw(picture, eye_of(renderPose, fovYRad), widthPx, heightPx),
       },
       {
         ack: (ack) => this.session_.send_ack(ack),
@@ -109,8 +157,8 @@ class Client {
           scope.postMessage({
             kind: 'presented',
             pose_id: Number(frame.header.poseId),
-            pose: plain_pose(frame.header.renderPose),
-            fov_y_rad: frame.header.fovYRad,
+            pose: eye_of(frame.header.renderPose, 0),
+            fov_y_rad: widened_fov(frame.header.fovYRad, 1 / this.display_.overscan),
           });
         },
         dropped: () => this.metrics_.dropped(),
@@ -143,6 +191,8 @@ class Client {
         },
         stream_ended: () => this.pipeline_.end_stream(),
         stats: (stats) => this.metrics_.server_said(stats),
+        picked: ({ id, hit, distance }) =>
+          scope.postMessage({ kind: 'picked', id, distance: hit ? distance : undefined }),
         notice: (message) => scope.postMessage({ kind: 'notice', message }),
       },
       {
@@ -150,27 +200,73 @@ class Client {
         viewportWidthPx,
         viewportHeightPx,
         devicePixelRatio,
-        decoders: available_codecs(),
+        decoders: available_codecs(start.rung),
         token: start.token,
-        settings: settings(start.view, start.quality),
+        settings: settings(start.view, start.quality, this.display_.overscan),
       },
     );
   }
 
+  private send_camera(): void {
+    const { camera_: camera } = this;
+    if (!camera) return;
+    this.session_.send_pose(
+      pose_message(camera.pose_id, camera.time_us, this.widened(camera.eye)),
+    );
+  }
+
+  /** Sizes and fields of view go together. */
+  private send_sizes(): void {
+    this.session_.set_viewport(...viewport(this.view_));
+    this.session_.send_settings(settings(this.view_, this.quality_, this.display_.overscan));
+    this.tell_presenter();
+  }
+
+  private widened(eye: Eye): Eye {
+    return { ...eye, fov_y_rad: widened_fov(eye.fov_y_rad, this.display_.overscan) };
+  }
+
+  private tell_presenter(): void {
+    scope.postMessage({
+      kind: 'presenter',
+      description: `${this.presenter_.description}, warp ${this.display_.warp_state}`,
+      warps: this.display_.warps,
+    });
+  }
+
+  /** What failed is not tried again: the next stream begins with what worked. */
+  private async make_decoder(
+    config: StreamConfig,
+    failures: number,
+    events: DecoderEvents,
+  ): Promise<MadeDecoder['decoder'] | undefined> {
+    if (failures === 0) this.first_rung_ = this.rung_;
+    const now_us = (): number => this.clock_.now_us();
+    const made = await make_decoder(config, this.first_rung_, failures, now_us, events);
+    if (made && failures >= failures_per_rung && made.rung !== this.rung_) this.settle_on(made.rung);
+    return made?.decoder;
+  }
+
+  private settle_on(rung: DecoderRung): void {
+    this.rung_ = rung;
+    scope.postMessage({ kind: 'rung', rung });
+  }
+
   private fall_back(message: string): void {
     scope.postMessage({ kind: 'fallback', message });
+    this.settle_on('jpeg');
     this.session_.greet_anew({ decoders: [Codec.MJPEG] });
   }
 
   private post_snapshot(request: number): void {
-    if (!this.shown_) {
+    const picture = this.display_.read();
+    if (!this.shown_ || !picture) {
       scope.postMessage({ kind: 'snapshot', request, snapshot: undefined });
       return;
     }
-    const pixels = this.presenter_.read();
     scope.postMessage(
-      { kind: 'snapshot', request, snapshot: { header: this.shown_, ...pixels } },
-      [pixels.rgba.buffer],
+      { kind: 'snapshot', request, snapshot: { header: this.shown_, ...picture } },
+      [picture.rgba.buffer],
     );
   }
 }
@@ -179,9 +275,9 @@ function viewport(view: View): [width_px: number, height_px: number, ratio: numb
   return [view.width_px, view.height_px, view.device_pixel_ratio];
 }
 
-/** The frame size: the chosen height or the view's, in the view's shape. */
-function settings(view: View, quality: Quality): SettingsInit {
-  const height_px = quality.height_px > 0 ? quality.height_px : view.height_px;
+/** The frame size: the chosen height or the view's, in the view's shape, with overscan. */
+function settings(view: View, quality: Quality, overscan: number): SettingsInit {
+  const height_px = (quality.height_px > 0 ? quality.height_px : view.height_px) * overscan;
   return {
     widthPx: frame_side((height_px * view.width_px) / view.height_px),
     heightPx: frame_side(height_px),
@@ -192,25 +288,27 @@ function settings(view: View, quality: Quality): SettingsInit {
 /** Within the limits of the wire, and even: 4:2:0 video has no odd sides. */
 const frame_side = (px: number): number => Math.min(8192, Math.max(16, Math.round(px / 2) * 2));
 
-function pose_message({ pose_id, time_us, pose, fov_y_rad }: CameraSample): PoseInit {
-  const [px, py, pz] = pose.position;
-  const [x, y, z, w] = pose.orientation;
+function pose_message(pose_id: number, time_us: number, eye: Eye): PoseInit {
+  const [x, y, z, w] = eye.orientation;
   return {
     poseId: BigInt(pose_id),
     clientTimeUs: BigInt(Math.round(time_us)),
     worldFromCamera: {
-      position: { x: px, y: py, z: pz },
+      position: wire_vector(eye.position),
       orientation: { x, y, z, w },
     },
-    fovYRad: fov_y_rad,
+    fovYRad: eye.fov_y_rad,
   };
 }
 
-function plain_pose(pose: FrameHeader['renderPose']): Pose {
+const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
+
+function eye_of(pose: FrameHeader['renderPose'], fov_y_rad: number): Eye {
   const p = pose?.position;
   const q = pose?.orientation;
   return {
     position: [p?.x ?? 0, p?.y ?? 0, p?.z ?? 0],
     orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
+    fov_y_rad,
   };
 }

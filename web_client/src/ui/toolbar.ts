@@ -1,4 +1,6 @@
 import type { CameraMode } from '../camera/camera_controller';
+import type { WarpMode } from '../present/warp_policy';
+import type { PictureSize } from '../session/quality';
 import { is_typing } from '../input/view_input';
 import { by_id } from './dom';
 
@@ -7,12 +9,13 @@ export interface ToolbarListener {
   reset(): void;
   flip_up(): void;
   stats_shown(shown: boolean): void;
-  /** `height`: of the picture; 0 = the view's, 'auto' = what the server can keep up with. */
-  quality(height: number | 'auto', max_fps: number): void;
+  share_shown(): void;
+  quality(size: PictureSize, max_fps: number): void;
+  warp(mode: WarpMode): void;
   fov_y_deg(value: number): void;
 }
 
-const panels = ['quality', 'stats', 'help'] as const;
+const panels = ['quality', 'stats', 'share', 'help'] as const;
 type Panel = (typeof panels)[number];
 
 // Here one panel leaves little of the picture to see.
@@ -52,7 +55,7 @@ export class Toolbar {
   }
 
   show_mode(mode: CameraMode): void {
-    by_id('mode-label', HTMLElement).textContent = mode === 'fly' ? 'Fly' : 'Orbit';
+    by_id('mode-label', HTMLElement).textContent = mode_names[mode];
     by_id('button-mode', HTMLButtonElement)
       .querySelector('use')
       ?.setAttribute('href', `#icon-${mode}`);
@@ -67,12 +70,11 @@ export class Toolbar {
     const size = by_id('quality-size', HTMLSelectElement);
     const fps = by_id('quality-fps', HTMLSelectElement);
     const changed = (): void =>
-      this.listener_.quality(
-        size.value === 'auto' ? 'auto' : Number(size.value),
-        Number(fps.value),
-      );
+      this.listener_.quality(picture_size(size.value), Number(fps.value));
     size.addEventListener('change', changed);
     fps.addEventListener('change', changed);
+    const warp = by_id('view-warp', HTMLSelectElement);
+    warp.addEventListener('change', () => this.listener_.warp(warp.value as WarpMode));
     this.fov_.addEventListener('input', () => {
       this.listener_.fov_y_deg(this.fov_.valueAsNumber);
     });
@@ -122,8 +124,14 @@ export class Toolbar {
     element_of(panel).hidden = !shown;
     by_id(`button-${panel}`, HTMLButtonElement).setAttribute('aria-expanded', String(shown));
     if (panel === 'stats') this.listener_.stats_shown(shown);
+    if (panel === 'share' && shown) this.listener_.share_shown();
   }
 }
+
+const mode_names = { orbit: 'Orbit', fly: 'Fly', walk: 'Walk' } as const;
+
+const picture_size = (value: string): PictureSize =>
+  value === 'auto' || value === 'sharp' || value === 'smooth' ? value : Number(value);
 
 const element_of = (panel: Panel): HTMLElement => by_id(`${panel}-panel`, HTMLElement);
 

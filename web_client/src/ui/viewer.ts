@@ -1,20 +1,35 @@
 // The page: puts camera, input, worker and controls together.
 import { Settling, type Automation } from '../automation';
-import { CameraController, type Pose, type SceneSetup } from '../camera/camera_controller';
+import {
+  camera_modes,
+  CameraController,
+  type Pose,
+  type SceneSetup,
+} from '../camera/camera_controller';
+import { is_held, sum_of, type Axes } from '../camera/movement';
+import { ray_through } from '../camera/ray';
+import { add, scale } from '../camera/vector';
 import { same_angle_rad, same_view } from '../camera/same_view';
 import { CameraLoop } from '../camera/camera_loop';
+import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
+import { Gamepads, type GamepadAction } from '../input/gamepad';
+import { Inertia } from '../input/inertia';
+import type { HeldKeys } from '../input/keyboard';
 import { bind_view_input } from '../input/view_input';
-import { AutoHeight } from '../session/auto_height';
+import type { PresenterChoice } from '../present/make_presenter';
+import { local_storage, session_storage } from '../session/browser_storage';
 import { WorkerClient } from '../session/client';
 import { browser_timers, clock_from } from '../session/clock';
-import type { FromWorker, Quality, View } from '../session/messages';
+import type { FromWorker, Ray, View } from '../session/messages';
+import { QualityChoice } from '../session/quality';
 import type { SessionState } from '../session/state';
 import { list_scenes } from '../session/scenes';
-import { remember_token, session_storage, take_token } from '../session/token';
+import { remember_token, take_token } from '../session/token';
 import { Error_Code, type SceneFacts, type StreamConfig, type Welcome } from '../wire/wire';
 import type { CardView } from './card';
 import { by_id } from './dom';
+import { Guide } from './guide';
 import { Notice } from './notice';
 import { SceneTitle } from './scene_title';
 import { StatsPanel, type Facts } from './stats_panel';
@@ -38,8 +53,12 @@ export class Viewer {
   private readonly title_ = new SceneTitle();
   private readonly stats_panel_ = new StatsPanel();
   private readonly toolbar_: Toolbar;
+  private readonly guide_: Guide;
+  private warps_ = false;
   private readonly view_ = by_id('view', HTMLElement);
-  private readonly auto_height_ = new AutoHeight();
+  private readonly quality_ = new QualityChoice();
+  private readonly inertia_ = new Inertia();
+  private readonly rung_ = remembered_rung(local_storage(), navigator.userAgent, Date.now());
   private state_: SessionState = { phase: 'connecting', attempt: 0 };
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
   private scene_ids_: readonly string[] = [];
@@ -48,8 +67,9 @@ export class Viewer {
   private near_z_ = 0;
   private scene_id_: string | undefined;
   private shown_: Extract<FromWorker, { kind: 'presented' }> | undefined;
-  private chosen_height_px_: number | 'auto' = 'auto';
-  private max_fps_ = 0;
+  private picks_ = 0;
+  private pick_ray_: Ray | undefined;
+  private readonly reduced_motion_ = matchMedia('(prefers-reduced-motion: reduce)').matches;
   private stats_timer_: ReturnType<typeof setInterval> | undefined;
 
   constructor(private readonly card_: CardView) {
@@ -60,23 +80,31 @@ export class Viewer {
       (delay_ms, action) => browser_timers.after(delay_ms, action),
     );
     this.worker_ = new WorkerClient((message) => this.heard(message));
-    const keys = bind_view_input(this.view_, {
-      gesture: (gesture) => {
-        this.camera_.gesture(gesture);
-        this.loop_.wake();
+    const keys = this.bind_input();
+    const pads = new Gamepads({
+      moved: () => {
+        if (is_held(pads.axes())) this.taken_over();
       },
-      keys_changed: () => this.loop_.wake(),
+      action: (action) => this.act(action),
     });
-    this.loop_ = new CameraLoop(this.camera_, () => keys.axes(), clock, (sample) =>
-      this.worker_.post({ kind: 'camera', sample }),
-    );
+    const axes = (): Axes => sum_of(keys.axes(), pads.axes());
+    this.loop_ = new CameraLoop(this.camera_, axes, this.inertia_, clock, (sample) => {
+      this.worker_.post({ kind: 'camera', sample });
+      if (this.warps_) this.guide_.seen_from(sample.eye);
+    });
     this.toolbar_ = this.make_toolbar();
+    this.guide_ = this.make_guide();
+    // In another page's frame: nothing but the picture, and the tour where there is one.
+    document.body.classList.toggle('bare', new URLSearchParams(location.search).get('ui') === '0');
     this.toolbar_.show_fov(this.camera_.fov_y_rad * degrees);
-    if (matchMedia('(prefers-reduced-motion: reduce)').matches) this.camera_.smoothing_s = 0;
+    if (this.reduced_motion_) {
+      this.camera_.smoothing_s = 0;
+      this.inertia_.enabled = false;
+    }
     this.start_worker();
     this.watch_page();
     window.catgs = this.automation();
-    const jpeg = jpeg_reason(has_webcodecs(), isSecureContext);
+    const jpeg = jpeg_reason(has_webcodecs(), isSecureContext, this.rung_);
     if (jpeg) this.notice_.show(jpeg);
   }
 
@@ -110,7 +138,9 @@ export class Viewer {
         token: this.token_,
         scene_id: new URLSearchParams(location.search).get('scene') ?? '',
         view: this.view(),
-        quality: this.quality(),
+        quality: this.quality_.in_view(this.view().height_px),
+        rung: this.rung_,
+        presenter: presenter_choice(),
       },
       [canvas],
     );
@@ -136,11 +166,76 @@ export class Viewer {
     setInterval(() => void this.look_at_height(), auto_interval_ms);
   }
 
+  private bind_input(): HeldKeys {
+    return bind_view_input(this.view_, this.inertia_, {
+      gesture: (gesture) => {
+        this.guide_.player.pause();
+        this.camera_.gesture(gesture);
+        this.loop_.wake();
+      },
+      keys_changed: () => this.taken_over(),
+      pointed_at: (x, y) => this.point_at(x, y),
+    });
+  }
+
+  private taken_over(): void {
+    this.guide_.player.pause();
+    this.loop_.wake();
+  }
+
+  /** Asks the server what is there; the camera turns to it when the answer comes. */
+  private point_at(x: number, y: number): void {
+    const ray = ray_through(this.camera_.eye, x, y, this.view_.clientWidth / this.view_.clientHeight);
+    this.picks_ += 1;
+    this.pick_ray_ = ray;
+    this.worker_.post({ kind: 'pick', id: this.picks_, ray });
+  }
+
+  private picked({ id, distance }: Extract<FromWorker, { kind: 'picked' }>): void {
+    const ray = this.pick_ray_;
+    if (id !== this.picks_ || distance === undefined || !ray) return;
+    this.camera_.focus_on(add(ray.origin, scale(ray.direction, distance)), this.reduced_motion_);
+    this.loop_.wake();
+  }
+
+  private next_mode(): void {
+    const { mode } = this.camera_;
+    this.camera_.set_mode(camera_modes[(camera_modes.indexOf(mode) + 1) % camera_modes.length]!);
+    this.toolbar_.show_mode(this.camera_.mode);
+  }
+
+  private act(action: GamepadAction): void {
+    switch (action) {
+      case 'mode':
+        this.next_mode();
+        break;
+      case 'reset':
+        this.camera_.reset();
+        this.camera_moved();
+        break;
+      default:
+        this.guide_.act(action);
+    }
+  }
+
+  private make_guide(): Guide {
+    return new Guide({
+      camera: this.camera_,
+      loop: this.loop_,
+      worker: this.worker_,
+      clock: this.clock_,
+      view: this.view_,
+      reduced_motion: this.reduced_motion_,
+      camera_moved: () => this.camera_moved(),
+      mode_changed: () => this.toolbar_.show_mode(this.camera_.mode),
+      notice: (message) => this.notice_.show(message),
+    });
+  }
+
   private make_toolbar(): Toolbar {
     return new Toolbar({
       toggle_mode: () => {
-        this.camera_.set_mode(this.camera_.mode === 'orbit' ? 'fly' : 'orbit');
-        this.toolbar_.show_mode(this.camera_.mode);
+        this.next_mode();
       },
       reset: () => {
         this.camera_.reset();
@@ -150,6 +245,7 @@ export class Viewer {
         this.camera_.flip_up();
         this.camera_moved();
       },
+      share_shown: () => this.guide_.share_shown(),
       stats_shown: (shown) => {
         clearInterval(this.stats_timer_);
         if (!shown) return;
@@ -158,11 +254,11 @@ export class Viewer {
         show();
         this.stats_timer_ = setInterval(show, stats_interval_ms);
       },
-      quality: (height_px, max_fps) => {
-        this.chosen_height_px_ = height_px;
-        this.max_fps_ = max_fps;
+      quality: (size, max_fps) => {
+        this.quality_.choose(size, max_fps);
         this.post_view();
       },
+      warp: (mode) => this.worker_.post({ kind: 'warp', mode }),
       fov_y_deg: (value) => {
         this.camera_.fov_y_rad = value / degrees;
         this.camera_moved();
@@ -195,6 +291,13 @@ export class Viewer {
         break;
       case 'presenter':
         this.show_facts({ presenter: message.description });
+        this.warps_ = message.warps;
+        break;
+      case 'rung':
+        remember_rung(message.rung, local_storage(), navigator.userAgent, Date.now());
+        break;
+      case 'picked':
+        this.picked(message);
         break;
       case 'notice':
         this.notice_.show(message.message, true);
@@ -234,6 +337,7 @@ export class Viewer {
     this.title_.show(scene, welcome.sceneIds);
     this.camera_.load(scene_setup(scene));
     this.loop_.enable();
+    void this.guide_.enter(scene.sceneId, this.token_);
   }
 
   private configured(config: StreamConfig): void {
@@ -244,6 +348,9 @@ export class Viewer {
     const is_first = this.shown_ === undefined;
     this.shown_ = message;
     this.settling_.presented();
+    if (!this.warps_ || is_first) {
+      this.guide_.seen_from({ ...message.pose, fov_y_rad: message.fov_y_rad });
+    }
     if (is_first) this.show_state();
   }
 
@@ -267,14 +374,15 @@ export class Viewer {
   }
 
   private async look_at_height(): Promise<void> {
-    if (this.chosen_height_px_ !== 'auto' || this.state_.phase !== 'live') return;
+    if (!this.quality_.is_automatic || this.state_.phase !== 'live') return;
     const { stages_ms } = await this.worker_.stats();
     const frame_ms = stages_ms.render + stages_ms.encode;
-    if (this.auto_height_.look(frame_ms, this.view().height_px)) this.post_view();
+    if (this.quality_.look(frame_ms, this.view().height_px)) this.post_view();
   }
 
   private post_view(): void {
-    this.worker_.post({ kind: 'view', view: this.view(), quality: this.quality() });
+    const quality = this.quality_.in_view(this.view().height_px);
+    this.worker_.post({ kind: 'view', view: this.view(), quality });
   }
 
   private view(): View {
@@ -284,14 +392,6 @@ export class Viewer {
       height_px: Math.max(16, Math.round(this.view_.clientHeight * ratio)),
       device_pixel_ratio: ratio,
     };
-  }
-
-  private quality(): Quality {
-    const height_px =
-      this.chosen_height_px_ === 'auto'
-        ? this.auto_height_.height_px(this.view().height_px)
-        : this.chosen_height_px_;
-    return { height_px, max_fps: this.max_fps_ };
   }
 
   private automation(): Automation {
@@ -330,4 +430,10 @@ function scene_setup(scene: SceneFacts): SceneSetup {
     limits_max: vec(scene.limitsMax),
     near_z: scene.nearZ,
   };
+}
+
+/** `?presenter=webgl2` and `?presenter=2d` override the choice by what the GPU can do. */
+function presenter_choice(): PresenterChoice {
+  const wanted = new URLSearchParams(location.search).get('presenter');
+  return wanted === 'webgl2' || wanted === '2d' ? wanted : 'auto';
 }

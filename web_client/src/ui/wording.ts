@@ -1,4 +1,5 @@
 // What the page says in each situation: what happened and what to do. Pure.
+import type { DecoderRung } from '../decode/ladder';
 import type { SessionState } from '../session/state';
 import { Error_Code } from '../wire/wire';
 
@@ -124,8 +125,16 @@ export function unsupported_card(
 }
 
 /** Why pictures come as JPEG although the server may have video; undefined when they do not. */
-export function jpeg_reason(has_webcodecs: boolean, is_secure: boolean): string | undefined {
-  if (has_webcodecs) return undefined;
+export function jpeg_reason(
+  has_webcodecs: boolean,
+  is_secure: boolean,
+  rung: DecoderRung,
+): string | undefined {
+  if (has_webcodecs) {
+    return rung === 'jpeg'
+      ? 'Video could not be decoded here lately: pictures come as JPEG, which needs more bandwidth. Video is tried again in a week, or after the site data of this page is cleared.'
+      : undefined;
+  }
   return is_secure
     ? 'This browser has no video decoder for pages (WebCodecs): pictures come as JPEG, which needs more bandwidth. A current Chrome, Edge, Firefox or Safari gets video.'
     : 'Pictures come as JPEG: browsers offer their video decoder (WebCodecs) on https:// and localhost only. Serve this page with TLS to get video, which needs far less bandwidth.';

@@ -7,6 +7,7 @@ import {
   type AckSchema,
   type FrameHeader,
   type HelloSchema,
+  type PickSchema,
   type PoseSampleSchema,
   type ServerMessage,
   type SettingsSchema,
@@ -30,6 +31,7 @@ export type ClientBody = NonNullable<MessageInitShape<typeof ClientMessageSchema
 
 // What a message is made from: fields left out are the wire's zeros.
 export type HelloInit = MessageInitShape<typeof HelloSchema>;
+export type PickInit = MessageInitShape<typeof PickSchema>;
 export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
 export type AckInit = MessageInitShape<typeof AckSchema>;
 export type SettingsInit = MessageInitShape<typeof SettingsSchema>;

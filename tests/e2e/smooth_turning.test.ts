@@ -1,0 +1,152 @@
+// Frames as they are really shown while the camera turns, over a slow link: are things where they
+// belong? The canvas is compared with what catgs-render draws for the camera of that moment.
+import { mkdirSync } from 'node:fs';
+import path from 'node:path';
+import { afterAll, beforeAll, expect, it } from 'vitest';
+import type { Browser, Page } from 'playwright-core';
+import type { Pose } from '#client/camera/camera_controller';
+import { choose_full_size, launch_browser, new_page } from './support/browser';
+import { start_delay_proxy, type DelayProxy } from './support/delay_proxy';
+import { read_png, type Picture } from './support/pictures';
+import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
+import { block_shifts, median } from './support/registration';
+import { scratch_folder, write_tum } from './support/scenes';
+
+const { folder, remove } = scratch_folder();
+const scene = path.join(folder, 'city.ply');
+const delay_each_way_ms = 40;
+const deg_per_s = 60;
+
+let browser: Browser;
+let server: RunningServer;
+let proxy: DelayProxy;
+
+beforeAll(async () => {
+  catgs_render('synth', 'city', scene, '--gaussians', '60000');
+  browser = await launch_browser();
+  server = await start_server(scene);
+  proxy = await start_delay_proxy(server.port, delay_each_way_ms);
+});
+
+afterAll(async () => {
+  await browser.close();
+  await proxy.close();
+  await stop_servers();
+  remove();
+});
+
+interface Capture {
+  readonly picture: Picture;
+  readonly drawn: Pose; // the camera as which the canvas was drawn
+  readonly now: Pose; // where the camera was when the canvas was read
+  readonly fov_y_rad: number;
+  readonly uncovered: number;
+}
+
+async function open(warp: 'on' | 'off'): Promise<Page> {
+  const { page } = await new_page(browser, { viewport: { width: 480, height: 270 } });
+  await page.goto(`http://127.0.0.1:${proxy.port}/?presenter=webgl2`);
+  await page.evaluate(() => window.catgs!.settled());
+  await choose_full_size(page);
+  await page.getByRole('button', { name: 'Quality and view' }).click();
+  await page.getByLabel('Smooth turning').selectOption(warp);
+  await page.keyboard.press('Escape');
+  for (let i = 0; i < 3; ++i) await page.keyboard.press('KeyM'); // through all modes, back to orbit
+  await page.keyboard.press('KeyM'); // fly: turning on the spot
+  await page.mouse.move(240, 135);
+  await page.mouse.wheel(0, -600);
+  await page.evaluate(() => window.catgs!.settled());
+  return page;
+}
+
+/** Turns to and fro, and reads the canvas now and then in the middle of a sweep. */
+async function captures_while_turning(page: Page, count: number): Promise<Capture[]> {
+  const raw = await page.evaluate(
+    async ([rate, wanted]) => {
+      const catgs = window.catgs!;
+      const start = catgs.pose();
+      const sweep_rad = 1.4;
+      const turned = (angle: number): Pose => {
+        const [x, y, z, w] = start.orientation;
+        // About the world's up, which is -y.
+        const [s, c] = [-Math.sin(angle / 2), Math.cos(angle / 2)];
+        return {
+          position: start.position,
+          orientation: [c * x + s * z, c * y + s * w, c * z - s * x, c * w - s * y],
+        };
+      };
+      const found = [];
+      const begin = performance.now();
+      let captured_sweep = 2; // the first ones warm up
+      while (found.length < wanted) {
+        await new Promise(requestAnimationFrame);
+        const way = ((performance.now() - begin) / 1000) * ((rate * Math.PI) / 180);
+        const sweep = Math.floor(way / sweep_rad);
+        const along = way - sweep * sweep_rad;
+        catgs.setPose(turned((sweep % 2 === 0 ? along : sweep_rad - along) - sweep_rad / 2));
+        if (sweep > captured_sweep && along > 0.65 * sweep_rad) {
+          captured_sweep = sweep;
+          const shot = await catgs.snapshot();
+          let text = '';
+          for (let i = 0; i < shot.rgba.length; i += 8192) {
+            text += String.fromCharCode(...shot.rgba.subarray(i, i + 8192));
+          }
+          found.push({ ...shot, header: undefined, rgba: btoa(text), now: catgs.pose() });
+        }
+      }
+      return found;
+    },
+    [deg_per_s, count] as const,
+  );
+  return raw.map(({ width_px, height_px, rgba, view, now }) => ({
+    picture: { width: width_px, height: height_px, rgba: Buffer.from(rgba, 'base64') },
+    drawn: view,
+    now,
+    fov_y_rad: view.fov_y_rad,
+    uncovered: view.uncovered,
+  }));
+}
+
+/** Median shift of blocks between a capture and what belongs there. */
+async function error_px(page: Page, name: string, shot: Capture, at: Pose): Promise<number> {
+  const out = path.join(folder, name);
+  mkdirSync(out, { recursive: true });
+  const trace = path.join(out, 'pose.tum');
+  write_tum(trace, [at]);
+  catgs_render(
+    ...['frames', scene, '--trace', trace, '--out', path.join(out, 'images')],
+    ...['--size', `${shot.picture.width}x${shot.picture.height}`],
+    ...['--fov-deg', String((shot.fov_y_rad * 180) / Math.PI)],
+  );
+  const truth = await read_png(page, path.join(out, 'images', 'frame_000000.png'));
+  const shifts = block_shifts(shot.picture, truth);
+  return shifts.length >= 5 ? median(shifts.map(({ dx, dy }) => Math.hypot(dx, dy))) : NaN;
+}
+
+it('things stay where they are while the camera turns over a slow link', async () => {
+  const page = await open('on');
+  const captures = await captures_while_turning(page, 6);
+  const errors: number[] = [];
+  for (const [i, shot] of captures.entries()) {
+    errors.push(await error_px(page, `warp-${i}`, shot, shot.drawn));
+  }
+  const uncovered = captures.map((shot) => shot.uncovered);
+  await page.context().close();
+
+  const plain = await open('off');
+  const unwarped = await captures_while_turning(plain, 3);
+  const without: number[] = [];
+  for (const [i, shot] of unwarped.entries()) {
+    without.push(await error_px(plain, `plain-${i}`, shot, shot.now));
+  }
+  const list = (values: number[], digits: number): string =>
+    values.map((v) => v.toFixed(digits)).join(' ');
+  console.log(
+    `at ${deg_per_s} deg/s and ${2 * delay_each_way_ms} ms: registration ${list(errors, 2)} px, ` +
+      `uncovered ${list(uncovered.map((v) => 100 * v), 2)} %; ` +
+      `without warp ${list(without, 1)} px (nan: beyond the search)`,
+  );
+  expect(errors.every(Number.isFinite)).toBe(true);
+  expect(median(errors)).toBeLessThanOrEqual(1);
+  expect(median(uncovered)).toBeLessThanOrEqual(0.01);
+});

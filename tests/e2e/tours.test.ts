@@ -1,0 +1,348 @@
+// Tours, links and frames against the real server, and the inputs that lead through a scene.
+import { copyFileSync, readFileSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import type { AddressInfo } from 'node:net';
+import path from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
+import type { Pose } from '#client/camera/camera_controller';
+import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
+import { scratch_folder } from './support/scenes';
+
+const settings_file = fileURLToPath(new URL('../support/supersplat_settings.json', import.meta.url));
+const { folder, remove } = scratch_folder();
+const scene = path.join(folder, 'city.ply');
+
+const patience = { timeout: 60_000, interval: 100 };
+
+let browser: Browser;
+let server: RunningServer;
+const open_pages: WatchedPage[] = [];
+
+interface Sidecar {
+  focus: [number, number, number];
+  start_pose: { position: [number, number, number]; orientation: number[] };
+  tours?: unknown;
+}
+
+/** Two stops between the start and the middle of the city, each with a hotspot ahead of it. */
+function write_tour(): void {
+  const file = path.join(folder, 'city.json');
+  const sidecar = JSON.parse(readFileSync(file, 'utf8')) as Sidecar;
+  const { focus, start_pose } = sidecar;
+  const between = (share: number): number[] =>
+    start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
+  const stop = (title: string, caption: string, share: number) => ({
+    ...{ title, caption, stay_s: 0.5, fov_deg: 60 },
+    ...{ position: between(share), look_at: focus, marker: between(share + 0.3) },
+  });
+  sidecar.tours = [
+    {
+      title: 'A walk through the city',
+      stops: [
+        stop('From afar', 'The whole city, as a bird sees it.\nGo nearer by the arrow.', 0.1),
+        stop('The square', 'Markets are held here since the town got its charter.', 0.4),
+      ],
+    },
+  ];
+  writeFileSync(file, JSON.stringify(sidecar));
+}
+
+beforeAll(async () => {
+  catgs_render('synth', 'city', scene, '--gaussians', '100000');
+  write_tour();
+  copyFileSync(settings_file, path.join(folder, 'settings.json'));
+  browser = await launch_browser();
+  // However busy this machine is, a second visitor is let in.
+  server = await start_server(scene, ['--min-fps', '0']);
+});
+
+afterEach(async () => {
+  for (const { page } of open_pages.splice(0)) await page.context().close();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await stop_servers();
+  remove();
+});
+
+const desktop = { viewport: { width: 1280, height: 720 } };
+
+async function open(options: BrowserContextOptions = desktop, url = server.url): Promise<WatchedPage> {
+  const watched = await new_page(browser, options);
+  open_pages.push(watched);
+  await watched.page.goto(url);
+  await settle(watched.page);
+  return watched;
+}
+
+const settle = (page: Page): Promise<void> => page.evaluate(() => window.catgs!.settled());
+const pose_of = (page: Page): Promise<Pose> => page.evaluate(() => window.catgs!.pose());
+
+const distance = (a: Pose, b: Pose): number =>
+  Math.hypot(...a.position.map((v, i) => v - b.position[i]!));
+
+function turned(a: Pose, b: Pose): number {
+  const dot = a.orientation.reduce((sum, v, i) => sum + v * b.orientation[i]!, 0);
+  return 2 * Math.acos(Math.min(1, Math.abs(dot)));
+}
+
+describe('a tour', () => {
+  it('leads from stop to stop, by buttons, keys and hotspots', async () => {
+    const { page, errors } = await open(desktop);
+    await page.getByText('A walk through the city').first().waitFor();
+    const start = await pose_of(page);
+    await page.getByRole('button', { name: 'Next stop' }).click();
+    await page.getByText('as a bird sees it').waitFor();
+    await expect.poll(async () => distance(start, await pose_of(page)), patience).toBeGreaterThan(0);
+    await settle(page);
+    const afar = await pose_of(page);
+    await page.keyboard.press('PageDown');
+    await page.getByText('2 of 2').waitFor();
+    await settle(page);
+    const square = await pose_of(page);
+    expect(distance(afar, square)).toBeGreaterThan(0.1);
+    await page.keyboard.press('PageUp');
+    await page.getByText('1 of 2').waitFor();
+    await settle(page);
+    expect(distance(afar, await pose_of(page))).toBeLessThan(1e-3);
+    await page.locator('.hotspot', { hasText: 'The square' }).click();
+    await page.getByText('Markets are held').waitFor();
+    await settle(page);
+    expect(distance(square, await pose_of(page))).toBeLessThan(1e-3);
+    expect(errors).toEqual([]);
+  });
+
+  it('plays by itself, until the visitor takes over', async () => {
+    const { page } = await open();
+    await page.getByRole('button', { name: 'Play the tour' }).click();
+    await page.getByText('1 of 2').waitFor();
+    await page.getByText('2 of 2').waitFor();
+    await page.getByText('1 of 2').waitFor();
+    await page.mouse.move(320, 180);
+    await page.mouse.wheel(0, -100);
+    await page.getByRole('button', { name: 'Play the tour' }).waitFor();
+  });
+
+  it("is imported from the SuperSplat viewer's settings, films and all", async () => {
+    const { page } = await open();
+    const start = await pose_of(page);
+    // Its first camera is where a visit begins; that viewer has x and y the other way round.
+    start.position.forEach((v, i) => expect(v).toBeCloseTo([-2, -1.5, -4][i]!, 4));
+    const choice = page.getByLabel('Choose a tour');
+    expect(await choice.locator('option').allInnerTexts()).toEqual([
+      'A walk through the city',
+      'Tour 2',
+      'cameraAnim',
+    ]);
+    await choice.selectOption('Tour 2');
+    await page.getByRole('button', { name: 'Next stop' }).click();
+    await page.getByText('It squeaks.').waitFor();
+    await choice.selectOption('cameraAnim');
+    const before = await pose_of(page);
+    await page.getByRole('button', { name: 'Play the tour' }).click();
+    await expect
+      .poll(async () => distance(before, await pose_of(page)), patience)
+      .toBeGreaterThan(0.5);
+    await page.getByRole('button', { name: 'Pause the tour' }).click();
+    const paused = await pose_of(page);
+    await settle(page);
+    expect(distance(paused, await pose_of(page))).toBeLessThan(0.2);
+  });
+
+  it.each([
+    ['desktop', { viewport: { width: 1280, height: 720 } }],
+    ['desktop-dark', { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' }],
+    ['phone', { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true }],
+    [
+      'phone-dark',
+      { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
+    ],
+  ] as const)('looks right: %s', async (name, options) => {
+    const { page } = await open(options);
+    await page.getByRole('button', { name: 'Next stop' }).click();
+    await page.getByText('1 of 2').waitFor();
+    await settle(page);
+    await keep_screenshot(page, `tour-${name}`);
+    const outside = await page.evaluate(() =>
+      [...document.querySelectorAll('#tour, #toolbar, #scene-title')].filter((element) => {
+        const { left, right, top, bottom } = element.getBoundingClientRect();
+        return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+      }).length,
+    );
+    expect(outside).toBe(0);
+    const [tour, bar] = await page.evaluate(() =>
+      ['tour', 'toolbar'].map((id) => document.getElementById(id)!.getBoundingClientRect().toJSON() as DOMRect),
+    );
+    const apart = tour!.right <= bar!.left || tour!.bottom <= bar!.top;
+    expect(apart).toBe(true);
+    await page.getByRole('button', { name: 'Share' }).click();
+    await keep_screenshot(page, `share-${name}`);
+  });
+});
+
+describe('sharing', () => {
+  it('a link leads to the same view and stop, and carries no token', async () => {
+    const { page } = await open(undefined, `${server.url}#token=not-needed-here`);
+    await page.getByRole('button', { name: 'Next stop' }).click();
+    await page.getByText('1 of 2').waitFor();
+    await settle(page);
+    await page.keyboard.press('KeyM');
+    await page.getByRole('button', { name: 'Share' }).click();
+    const link = await page.getByLabel('Link to this view').inputValue();
+    expect(link).not.toContain('token');
+    const { page: friend } = await open(undefined, link);
+    await friend.getByText('Fly', { exact: true }).waitFor();
+    const [mine, theirs] = [await pose_of(page), await pose_of(friend)];
+    expect(distance(mine, theirs)).toBeLessThan(0.01);
+    expect(turned(mine, theirs)).toBeLessThan(0.001);
+  });
+
+  it('saves the picture', async () => {
+    const { page, errors } = await open();
+    await page.getByRole('button', { name: 'Share' }).click();
+    const download = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Save picture' }).click();
+    const file = await download;
+    expect(file.suggestedFilename()).toBe('city.png');
+    const bytes = readFileSync(await file.path());
+    expect(bytes.subarray(1, 4).toString()).toBe('PNG');
+    expect(errors).toEqual([]);
+  });
+
+  it('another page drives it in a frame, if the server lets it', async () => {
+    const host = createServer((_request, response) => {
+      response.setHeader('content-type', 'text/html');
+      response.end(`<!doctype html><title>host</title><iframe width="600" height="340"></iframe>`);
+    });
+    await new Promise<void>((resolve) => host.listen(0, '127.0.0.1', resolve));
+    const origin = `http://127.0.0.1:${(host.address() as AddressInfo).port}`;
+    const open_frame = async (address: string): Promise<WatchedPage> => {
+      const watched = await new_page(browser);
+      open_pages.push(watched);
+      await watched.page.goto(origin);
+      await watched.page.evaluate((src) => {
+        const heard: unknown[] = [];
+        Object.assign(window, { heard });
+        window.addEventListener('message', ({ data }) => heard.push(data));
+        document.querySelector('iframe')!.src = src;
+      }, address);
+      return watched;
+    };
+    const embeddable = await start_server(scene, ['--embed-origin', origin]);
+    const { page } = await open_frame(`${embeddable.url}?ui=0`);
+    const frame = page.frameLocator('iframe');
+    await frame.getByRole('heading', { name: 'A walk through the city' }).waitFor();
+    expect(await frame.locator('#toolbar').isHidden()).toBe(true);
+    const say = (message: object): Promise<void> =>
+      page.evaluate((text) => {
+        document.querySelector('iframe')!.contentWindow!.postMessage(text, '*');
+      }, message);
+    const heard = (): Promise<{ catgs: string; stop?: number; stops?: string[] }[]> =>
+      page.evaluate(() => (window as unknown as { heard: [] }).heard);
+    await say({ catgs: 'hello' });
+    await expect
+      .poll(async () => (await heard())[0], patience)
+      .toMatchObject({ catgs: 'ready', scene: 'city', stops: ['From afar', 'The square'] });
+    await say({ catgs: 'stop', stop: 1 });
+    await frame.getByText('Markets are held').waitFor();
+    await expect.poll(async () => (await heard()).some((m) => m.stop === 1), patience).toBe(true);
+    await keep_screenshot(page, 'embedded');
+
+    const { page: refused } = await open_frame(`${server.url}?ui=0`);
+    await refused.waitForTimeout(1000);
+    expect(await refused.frameLocator('iframe').locator('#view').count()).toBe(0);
+    host.close();
+  });
+});
+
+describe('ways to move', () => {
+  it('a double click turns the view to the place, and goes nearer', async () => {
+    const { page } = await open(undefined, `${server.url}#stop=1`);
+    await settle(page);
+    const before = await pose_of(page);
+    await page.mouse.dblclick(400, 220);
+    await expect.poll(async () => turned(before, await pose_of(page)), patience).toBeGreaterThan(0.02);
+    await settle(page);
+    const after = await pose_of(page);
+    expect(distance(before, after)).toBeGreaterThan(0.1);
+  });
+
+  it('on foot the height stays', async () => {
+    const { page } = await open(undefined, `${server.url}#stop=1`);
+    await page.keyboard.press('KeyM');
+    await page.keyboard.press('KeyM');
+    await page.getByText('Walk', { exact: true }).waitFor();
+    const before = await pose_of(page);
+    await page.keyboard.down('KeyW');
+    await expect.poll(async () => distance(before, await pose_of(page)), patience).toBeGreaterThan(0.5);
+    await page.keyboard.up('KeyW');
+    expect((await pose_of(page)).position[1]).toBeCloseTo(before.position[1], 6);
+  });
+
+  it('a gamepad moves, looks, and presses the buttons of the tour', async () => {
+    const watched = await new_page(browser);
+    open_pages.push(watched);
+    const { page, errors } = watched;
+    await page.addInitScript(() => {
+      const pad = {
+        connected: true,
+        mapping: 'standard',
+        axes: [0, 0, 0, 0],
+        buttons: Array.from({ length: 16 }, () => ({ value: 0, pressed: false })),
+      };
+      Object.assign(window, { pad });
+      navigator.getGamepads = () => [pad as unknown as Gamepad];
+    });
+    await page.goto(server.url);
+    await settle(page);
+    await page.evaluate(() => window.dispatchEvent(new Event('gamepadconnected')));
+    const set = (axes: number[], button = -1): Promise<void> =>
+      page.evaluate(
+        ([values, pressed]) => {
+          const { pad } = window as unknown as {
+            pad: { axes: number[]; buttons: { value: number; pressed: boolean }[] };
+          };
+          pad.axes = values;
+          pad.buttons.forEach((one, i) => (one.pressed = i === pressed));
+        },
+        [axes, button] as const,
+      );
+    const before = await pose_of(page);
+    await set([0, -1, 0, 0]);
+    await expect.poll(async () => distance(before, await pose_of(page)), patience).toBeGreaterThan(0.2);
+    await set([0, 0, 1, 0]);
+    await expect.poll(async () => turned(before, await pose_of(page)), patience).toBeGreaterThan(0.2);
+    await set([0, 0, 0, 0], 0);
+    await page.getByText('1 of 2').waitFor();
+    expect(errors).toEqual([]);
+  });
+
+  it('a flick of the pointer goes on for a moment, and not with reduced motion', async () => {
+    for (const reducedMotion of ['no-preference', 'reduce'] as const) {
+      const { page } = await open({ viewport: { width: 640, height: 360 }, reducedMotion });
+      const lifted = await page.evaluate(async () => {
+        const view = document.getElementById('view')!;
+        const send = (type: string, clientX: number): void => {
+          const init = { pointerId: 1, pointerType: 'mouse', clientX, clientY: 180, buttons: 1 };
+          view.dispatchEvent(new PointerEvent(type, { ...init, bubbles: true }));
+        };
+        view.setPointerCapture = () => undefined;
+        send('pointerdown', 100);
+        for (let x = 110; x <= 200; x += 10) {
+          await new Promise((resolve) => setTimeout(resolve, 8));
+          send('pointermove', x);
+        }
+        send('pointerup', 200);
+        return window.catgs!.pose();
+      });
+      await settle(page);
+      const glided = turned(lifted, await pose_of(page));
+      if (reducedMotion === 'reduce') expect(glided).toBeLessThan(0.3);
+      else expect(glided).toBeGreaterThan(0.5);
+    }
+  });
+});

@@ -1,0 +1,96 @@
+import { create } from '@bufbuild/protobuf';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { remember_rung, remembered_rung } from '#client/decode/decoder_memory';
+import { available_codecs, make_decoder } from '#client/decode/make_decoder';
+import type { DecoderRung } from '#client/decode/ladder';
+import type { DecoderEvents } from '#client/decode/picture';
+import { Codec, StreamConfigSchema } from '#client/wire/wire';
+
+const week_ms = 7 * 24 * 3600 * 1000;
+
+function fake_storage(): Storage {
+  const values = new Map<string, string>();
+  return {
+    getItem: (key: string) => values.get(key) ?? null,
+    setItem: (key: string, value: string) => void values.set(key, value),
+  } as Storage;
+}
+
+describe('what is remembered of decoders', () => {
+  it('is where decoding worked, for this browser and a week', () => {
+    const storage = fake_storage();
+    expect(remembered_rung(storage, 'Browser/1', 0)).toBe('prefer-hardware');
+    remember_rung('prefer-software', storage, 'Browser/1', 0);
+    expect(remembered_rung(storage, 'Browser/1', week_ms - 1)).toBe('prefer-software');
+    expect(remembered_rung(storage, 'Browser/1', week_ms)).toBe('prefer-hardware');
+    expect(remembered_rung(storage, 'Browser/2', 0)).toBe('prefer-hardware');
+  });
+
+  it('is nothing where it makes no sense, or storage is blocked', () => {
+    const warned = vi.spyOn(console, 'warn').mockImplementation(() => undefined);
+    const storage = fake_storage();
+    storage.setItem('catgs.decoder', '{ broken');
+    expect(remembered_rung(storage, 'a', 0)).toBe('prefer-hardware');
+    expect(warned).toHaveBeenCalled();
+    storage.setItem('catgs.decoder', '{"rung":"magic","agent":"a","until_ms":9}');
+    expect(remembered_rung(storage, 'a', 0)).toBe('prefer-hardware');
+    expect(remembered_rung(undefined, 'a', 0)).toBe('prefer-hardware');
+    remember_rung('jpeg', undefined, 'a', 0);
+    warned.mockRestore();
+  });
+});
+
+describe('the ladder', () => {
+  const events: DecoderEvents = {
+    decoded: () => undefined,
+    skipped: () => undefined,
+    failed: () => undefined,
+  };
+  let supported: string[];
+
+  beforeEach(() => {
+    supported = ['prefer-hardware', 'no-preference', 'prefer-software'];
+    vi.stubGlobal('EncodedVideoChunk', () => undefined);
+    vi.stubGlobal(
+      'VideoDecoder',
+      class {
+        static isConfigSupported({ hardwareAcceleration }: VideoDecoderConfig) {
+          return Promise.resolve({ supported: supported.includes(hardwareAcceleration ?? '') });
+        }
+        configure(): void {
+          // accepts everything
+        }
+      },
+    );
+  });
+
+  afterEach(() => {
+    vi.unstubAllGlobals();
+  });
+
+  const video = create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.42C01F' });
+  const rung_after = async (first: DecoderRung, failures: number): Promise<string | undefined> =>
+    (await make_decoder(video, first, failures, () => 0, events))?.rung;
+
+  it('goes down a rung after two real failures, and begins where it ended', async () => {
+    expect(await rung_after('prefer-hardware', 1)).toBe('prefer-hardware');
+    expect(await rung_after('prefer-hardware', 2)).toBe('no-preference');
+    expect(await rung_after('prefer-hardware', 4)).toBe('prefer-software');
+    expect(await rung_after('prefer-hardware', 6)).toBeUndefined();
+    expect(await rung_after('prefer-software', 0)).toBe('prefer-software');
+    expect(await rung_after('prefer-software', 2)).toBeUndefined();
+  });
+
+  it('leaves out what the browser does not offer', async () => {
+    supported = ['no-preference', 'prefer-software'];
+    expect(await rung_after('prefer-hardware', 0)).toBe('no-preference');
+    expect(await rung_after('prefer-hardware', 2)).toBe('prefer-software');
+  });
+
+  it('asks for JPEG alone at its end, and without WebCodecs', () => {
+    expect(available_codecs('prefer-hardware')).toEqual([Codec.H264, Codec.MJPEG]);
+    expect(available_codecs('jpeg')).toEqual([Codec.MJPEG]);
+    vi.unstubAllGlobals();
+    expect(available_codecs('prefer-hardware')).toEqual([Codec.MJPEG]);
+  });
+});

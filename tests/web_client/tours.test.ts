@@ -1,0 +1,385 @@
+import { describe, expect, it } from 'vitest';
+import { angle_between, type Flight } from '#client/camera/flight';
+import { identity, look_at, rotate, type Vec3 } from '#client/camera/vector';
+import type { Eye } from '#client/present/warp';
+import type { PathSample } from '#client/session/messages';
+import { film_flight, type Film } from '#client/tour/camera_spline';
+import { read_document } from '#client/tour/load';
+import { TourPlayer, type TourState } from '#client/tour/player';
+import { embed_code, read_shared, share_address } from '#client/tour/share';
+import { read_supersplat } from '#client/tour/supersplat';
+import { read_tours, stay_of, write_tours, type Tour } from '#client/tour/tour';
+import settings from '../support/supersplat_settings.json';
+import { FakeTime } from './fakes';
+
+const up: Vec3 = [0, -1, 0];
+
+function expect_vec(actual: readonly number[], expected: readonly number[], digits = 5): void {
+  expect(actual).toHaveLength(expected.length);
+  actual.forEach((v, i) => expect(v).toBeCloseTo(expected[i]!, digits));
+}
+
+describe('tours of a sidecar', () => {
+  const written = [
+    {
+      title: 'Ground floor',
+      autoplay: true,
+      stops: [
+        { title: 'Hall', position: [0, 0, 0], look_at: [0, 0, 4], fov_deg: 50, stay_s: 2 },
+        {
+          title: 'Stairs',
+          caption: 'Built in 1904.',
+          position: [1, 2, 3],
+          orientation: [0, 0.6, 0, 0.8],
+          marker: [1, 2, 9],
+        },
+      ],
+    },
+  ];
+
+  it('are read, with what was left out filled in', () => {
+    const [tour] = read_tours(written, up, 1.2);
+    expect(tour).toMatchObject({ title: 'Ground floor', starts_itself: true, way: undefined });
+    const [hall, stairs] = tour!.stops;
+    expect_vec(rotate(hall!.eye.orientation, [0, 0, 1]), [0, 0, 1]);
+    expect(hall!.eye.fov_y_rad).toBeCloseTo((50 * Math.PI) / 180, 6);
+    expect(hall!.marker).toBeUndefined();
+    expect(stay_of(hall!)).toBe(2);
+    expect(stairs).toMatchObject({ caption: 'Built in 1904.', marker: [1, 2, 9] });
+    expect(stairs!.eye.fov_y_rad).toBe(1.2);
+    expect(stay_of(stairs!)).toBeGreaterThan(3);
+  });
+
+  it('come back as they were written', () => {
+    const tours = read_tours(written, up, 1.2);
+    const again = read_tours(write_tours(tours), up, 0.5);
+    expect(again).toHaveLength(1);
+    again[0]!.stops.forEach((stop, i) => {
+      const before = tours[0]!.stops[i]!;
+      expect(stop).toMatchObject({ title: before.title, caption: before.caption });
+      expect_vec(stop.eye.position, before.eye.position);
+      expect(angle_between(stop.eye.orientation, before.eye.orientation)).toBeLessThan(1e-3);
+      expect(stop.eye.fov_y_rad).toBeCloseTo(before.eye.fov_y_rad, 5);
+    });
+  });
+
+  it.each([
+    [{}, 'tours: is not a list'],
+    [[{ title: 'x' }], "tours[0]: 'stops' is missing"],
+    [[{ stops: [{ position: [1, 2] }] }], 'tours[0].stops[0].position: is not 3 numbers'],
+    [[{ stops: [{ position: [1, 2, 'x'], orientation: [0, 0, 0, 1] }] }], 'position[2]: is not a number'],
+    [[{ stops: [{ position: [0, 0, 0] }] }], "'orientation' is missing"],
+    [[{ stops: [], title: 7 }], 'tours[0].title: is not a text'],
+    [Array(33).fill({ stops: [] }), 'has 33 entries, at most 32'],
+  ])('say what is wrong with %j', (document, complaint) => {
+    expect(() => read_tours(document, up, 1)).toThrow(complaint);
+  });
+
+  it('that cannot be read do not hide the others', () => {
+    const { tours, start, problems } = read_document({ tours: {}, settings }, up, 1, 16 / 9);
+    expect(problems).toEqual(['tours: is not a list']);
+    expect(tours.length).toBeGreaterThan(0);
+    expect(start).toBeDefined();
+    expect(read_document({}, up, 1, 1)).toEqual({ tours: [], start: undefined, problems: [] });
+  });
+});
+
+describe("the SuperSplat viewer's settings.json", () => {
+  it('becomes a tour of its annotations, a film for each track, and a start', () => {
+    const { tours, start } = read_supersplat(settings, 1);
+    expect(tours.map(({ title, stops, way }) => [title, stops.length, way !== undefined])).toEqual([
+      ['', 2, false],
+      ['cameraAnim', 0, true],
+    ]);
+    // That viewer has the scene upside down: x and y change their signs.
+    expect_vec(start!.position, [-2, -1.5, -4]);
+    const view = rotate(start!.orientation, [0, 0, 1]);
+    const to_target = [2, 1.5 - 1, 4].map((v) => v / Math.hypot(2, 0.5, 4));
+    expect_vec(view, to_target);
+    expect(rotate(start!.orientation, [0, 1, 0])[1]).toBeGreaterThan(0.9);
+    const [door] = tours[0]!.stops;
+    expect(door).toMatchObject({ title: 'The door', caption: 'It squeaks.' });
+    expect_vec(door!.marker!, [-0.5, -1.2, 3]);
+  });
+
+  it('has fields of view of the longer side', () => {
+    const wide = read_supersplat(settings, 2).start!.fov_y_rad;
+    const tall = read_supersplat(settings, 0.5).start!.fov_y_rad;
+    expect(tall).toBeCloseTo((75 * Math.PI) / 180, 6);
+    expect(Math.tan(wide / 2)).toBeCloseTo(Math.tan(tall / 2) / 2, 6);
+  });
+
+  it('leads along its track and around', () => {
+    const { way } = read_supersplat(settings, 1).tours[1]!;
+    expect(way!.repeats).toBe(true);
+    expect_vec(way!.at(0).position, [-2, -1.5, -4]);
+    expect_vec(way!.at(2).position, [2, -1.5, -4]);
+    const end = way!.at(way!.duration_s - 1e-4);
+    expect_vec(end.position, [-2, -1.5, -4], 2);
+  });
+
+  it.each([
+    [{ version: 1 }, 'version 1 is not read here'],
+    [{ version: 2, cameras: [{}] }, "settings.json.cameras[0]: 'initial' is missing"],
+    [{ version: 2, annotations: 5 }, 'annotations: is not a list'],
+    [
+      {
+        version: 2,
+        animTracks: [
+          {
+            name: 'x',
+            duration: 1,
+            frameRate: 30,
+            keyframes: { times: [0, 0], values: { position: [], target: [], fov: [] } },
+          },
+        ],
+      },
+      'times: are not increasing',
+    ],
+  ])('is refused with its place where it is wrong: %j', (document, complaint) => {
+    expect(() => read_supersplat(document, 1)).toThrow(complaint);
+  });
+});
+
+describe('a film of the camera', () => {
+  const film = (change: Partial<Film> = {}): Film => ({
+    times_s: [0, 1, 3],
+    shots: ([0, 2, 4] as const).map((x) => ({
+      position: [x, 0, 0] as Vec3,
+      target: [x, 0, 5] as Vec3,
+      fov_y_rad: 1,
+    })),
+    duration_s: 4,
+    smoothness: 1,
+    steps: false,
+    loop: 'none',
+    ...change,
+  });
+  const x_at = (change: Partial<Film>, time_s: number): number =>
+    film_flight(film(change), up).at(time_s).position[0];
+
+  it('passes its shots at their times, without a jump in speed', () => {
+    for (const [time_s, x] of [[0, 0], [1, 2], [3, 4], [4, 4]] as const) {
+      expect(x_at({}, time_s)).toBeCloseTo(x, 6);
+    }
+    const h = 1e-4;
+    const before = (x_at({}, 1) - x_at({}, 1 - h)) / h;
+    const after = (x_at({}, 1 + h) - x_at({}, 1)) / h;
+    expect(before).toBeCloseTo(after, 2);
+    expect(before).toBeCloseTo(4 / 3, 2);
+  });
+
+  it('rests at its shots without smoothness, and jumps in steps', () => {
+    const h = 1e-3;
+    expect((x_at({ smoothness: 0 }, 1 + h) - 2) / h).toBeLessThan(0.02);
+    expect(x_at({ steps: true }, 2.9)).toBe(2);
+  });
+
+  it('goes back in a ping-pong, and around when it repeats', () => {
+    expect(film_flight(film({ loop: 'pingpong' }), up).duration_s).toBe(8);
+    expect(x_at({ loop: 'pingpong' }, 7)).toBeCloseTo(2, 6);
+    const around = film({ loop: 'repeat', duration_s: 3 });
+    expect(film_flight(around, up).duration_s).toBe(4); // a second for the way back
+    expect(film_flight(around, up).at(4 - 1e-6).position[0]).toBeCloseTo(0, 3);
+  });
+
+  it('of one shot stays there', () => {
+    const one = film({ times_s: [0], shots: [film().shots[1]!], loop: 'repeat' });
+    expect(film_flight(one, up).at(2).position).toEqual([2, 0, 0]);
+  });
+});
+
+describe('the player', () => {
+  const stop = (x: number, caption = ''): Tour['stops'][number] => ({
+    title: `at ${x}`,
+    caption,
+    eye: { position: [x, 0, 0], orientation: identity, fov_y_rad: 1 },
+    marker: undefined,
+    stay_s: 2,
+  });
+  const tour: Tour = {
+    title: 'a tour',
+    stops: [stop(1), stop(2), stop(3)],
+    way: undefined,
+    starts_itself: false,
+  };
+
+  /** A camera that flies when it is told to, by hand. */
+  function guided(reduced_motion = false) {
+    const time = new FakeTime();
+    let eye: Eye = { position: [0, 0, 0], orientation: identity, fov_y_rad: 1 };
+    let flight: { way: Flight; ended: (arrived: boolean) => void } | undefined;
+    const paths: (readonly PathSample[])[] = [];
+    let state: TourState | undefined;
+    const stop_flight = (): void => {
+      const stopped = flight;
+      flight = undefined;
+      stopped?.ended(false);
+    };
+    const player = new TourPlayer(
+      {
+        camera: {
+          get eye() {
+            return eye;
+          },
+          reach: 1,
+          fly: (way, ended) => {
+            stop_flight();
+            flight = { way, ended };
+          },
+          stop_flight,
+        },
+        timers: time,
+        now_us: () => time.now_us(),
+        announce: (path) => paths.push(path),
+        reduced_motion,
+      },
+      (now) => (state = now),
+    );
+    return {
+      player,
+      time,
+      paths,
+      stop_flight,
+      state: () => state!,
+      flying: () => flight?.way,
+      arrive: () => {
+        const arrived = flight!;
+        time.advance(arrived.way.duration_s * 1000);
+        eye = arrived.way.at(arrived.way.duration_s);
+        flight = undefined;
+        arrived.ended(true);
+        return eye.position[0];
+      },
+    };
+  }
+
+  it('goes from stop to stop and around', () => {
+    const { player, arrive, state } = guided();
+    player.load([tour]);
+    expect(state().stop_index).toBeUndefined();
+    player.next();
+    expect(arrive()).toBe(1);
+    player.previous();
+    expect(arrive()).toBe(3);
+    expect(state()).toMatchObject({ stop_index: 2, playing: false });
+    player.next();
+    expect(arrive()).toBe(1);
+  });
+
+  it('plays: stays at each stop as long as it says, then goes on', () => {
+    const { player, time, arrive, flying, state } = guided();
+    player.load([tour]);
+    player.play();
+    expect(arrive()).toBe(1);
+    time.advance(1900);
+    expect(flying()).toBeUndefined();
+    time.advance(200);
+    expect(arrive()).toBe(2);
+    player.pause();
+    time.advance(60_000);
+    expect(flying()).toBeUndefined();
+    expect(state()).toMatchObject({ stop_index: 1, playing: false });
+  });
+
+  it('ends when the visitor takes over', () => {
+    const { player, time, paths, stop_flight, flying, state } = guided();
+    player.load([tour]);
+    player.play();
+    stop_flight();
+    expect(state().playing).toBe(false);
+    expect(paths[paths.length - 1]).toEqual([]);
+    time.advance(60_000);
+    expect(flying()).toBeUndefined();
+  });
+
+  it('tells where the camera will be, and that it stays there', () => {
+    const { player, paths, flying } = guided();
+    player.load([tour]);
+    player.go_to(2);
+    const [path] = paths;
+    expect(path!.length).toBeLessThanOrEqual(256);
+    const { duration_s } = flying()!;
+    expect(path![0]).toMatchObject({ time_us: 0, eye: { position: [0, 0, 0] } });
+    const [arrival, held] = path!.slice(-2);
+    expect(arrival!.time_us).toBeCloseTo(duration_s * 1e6, 3);
+    expect_vec(arrival!.eye.position, [3, 0, 0]);
+    expect(held!.eye).toEqual(arrival!.eye);
+    expect(held!.time_us).toBeGreaterThan(arrival!.time_us);
+  });
+
+  it('begins by itself where the tour says so, but not for reduced motion', () => {
+    const by_itself = guided();
+    by_itself.player.load([{ ...tour, starts_itself: true }]);
+    expect(by_itself.state().playing).toBe(true);
+    const reduced = guided(true);
+    reduced.player.load([{ ...tour, starts_itself: true }]);
+    expect(reduced.state().playing).toBe(false);
+    reduced.player.next();
+    expect(reduced.flying()!.duration_s).toBe(0);
+  });
+
+  it('shows a film: glides to its begin, and announces it piece by piece', () => {
+    const { player, time, paths, arrive, state } = guided();
+    const way = { duration_s: 30, repeats: false, at: (s: number): Eye => ({ ...stop(s).eye }) };
+    player.load([tour, { title: 'film', stops: [], way, starts_itself: true }]);
+    expect(state()).toMatchObject({ tour_index: 1, playing: true });
+    arrive();
+    const first = paths[paths.length - 1]!;
+    expect(first[first.length - 1]!.eye.position[0]).toBeCloseTo(4, 5);
+    time.advance(2000);
+    const second = paths[paths.length - 1]!;
+    expect(second[0]!.eye.position[0]).toBeCloseTo(2, 5);
+    arrive();
+    expect(state().playing).toBe(false);
+    const count = paths.length;
+    time.advance(60_000);
+    expect(paths).toHaveLength(count);
+  });
+});
+
+describe('a shared link', () => {
+  const eye: Eye = {
+    position: [1.25, -2, 300.5],
+    orientation: look_at([0, 0, 0], [1, 1, 1], up),
+    fov_y_rad: 1,
+  };
+
+  it('leads back to the view, without a token or a query of others', () => {
+    const address = share_address('https://host/x/?author&presenter=2d#token=s3cret', 'city', {
+      eye,
+      mode: 'walk',
+      tour_index: 1,
+      stop_index: 3,
+    });
+    expect(address).not.toContain('s3cret');
+    expect(address).not.toContain('author');
+    expect(address).toMatch(/^https:\/\/host\/x\/\?scene=city#at=1\.25,-2,300\.5,/);
+    const shared = read_shared(address);
+    expect(shared).toMatchObject({ mode: 'walk', tour_index: 1, stop_index: 3 });
+    expect_vec(shared.eye!.position, eye.position);
+    expect(angle_between(shared.eye!.orientation, eye.orientation)).toBeLessThan(1e-3);
+    expect(shared.eye!.fov_y_rad).toBeCloseTo(1, 4);
+  });
+
+  it.each(['', '1,2,3', '1,2,3,0,0,0,9,60', '1,2,x,0,0,0,1,60', '1,2,3,0,0,0,1,999', ',,,,,,,'])(
+    'with nonsense "%s" leads nowhere',
+    (at) => {
+      expect(read_shared(`https://host/#at=${at}`).eye).toBeUndefined();
+    },
+  );
+
+  it('knows modes and stops that there are', () => {
+    expect(read_shared('https://host/#mode=swim&stop=0&tour=-1')).toEqual({
+      eye: undefined,
+      mode: undefined,
+      tour_index: undefined,
+      stop_index: undefined,
+    });
+  });
+
+  it('becomes a frame for other pages', () => {
+    const code = embed_code('https://host/?scene=a&x=%22#stop=2');
+    expect(code).toContain('src="https://host/?scene=a&amp;x=%22&amp;ui=0#stop=2"');
+  });
+});

@@ -1,0 +1,147 @@
+import { describe, expect, it } from 'vitest';
+import { axis_angle, identity, multiply, type Vec3 } from '#client/camera/vector';
+import { place_of } from '#client/camera/ray';
+import { reach, uncovered_share, warp_matrix, warped, widened_fov, type Eye } from '#client/present/warp';
+import { WarpPolicy } from '#client/present/warp_policy';
+
+const aspect = 16 / 9;
+const up: Vec3 = [0, -1, 0];
+
+const eye = (change: Partial<Eye> = {}): Eye => ({
+  position: [0, 0, 0],
+  orientation: identity,
+  fov_y_rad: 1,
+  ...change,
+});
+
+/** Where a point of the scene is in the image of an eye, -1…1. */
+function seen(point: Vec3, by: Eye): readonly [number, number] {
+  const [x, y] = place_of(point, by, aspect)!;
+  return [2 * x - 1, 2 * y - 1];
+}
+
+function expect_same_place(point: Vec3, picture: Eye, view: Eye, distance: number): void {
+  const [x, y] = seen(point, view);
+  const at = warped(warp_matrix(picture, view, aspect, distance), x, y)!;
+  const [px, py] = seen(point, picture);
+  expect(at[0]).toBeCloseTo(px, 5);
+  expect(at[1]).toBeCloseTo(py, 5);
+}
+
+describe('a warped picture', () => {
+  const turn = multiply(axis_angle(up, 0.1), axis_angle([1, 0, 0], -0.05));
+
+  it('shows far things where they are, whatever turn, roll and field of view', () => {
+    const picture = eye({ fov_y_rad: widened_fov(1, 1.26) });
+    const view = eye({ orientation: multiply(turn, axis_angle([0, 0, 1], 0.2)), fov_y_rad: 1.1 });
+    for (const point of [[0, 0, 9], [3, -2, 9], [-4, 1, 8]] as Vec3[]) {
+      expect_same_place(point, picture, view, Infinity);
+    }
+  });
+
+  it('shows what an orbiting camera looks at where it is', () => {
+    const picture = eye({ position: [0, 0, -5] });
+    const view = eye({ position: [0.6, 0.2, -5.1], orientation: turn });
+    // On the plane through the focus, five ahead of the view.
+    const middle: Vec3 = [0, 0, 5];
+    const on_plane = (x: number, y: number): Vec3 => {
+      const rotated = [x, y, middle[2]] as Vec3;
+      return add_rotated(view, rotated);
+    };
+    for (const [x, y] of [[0, 0], [1, 0.5], [-2, -1]] as const) {
+      expect_same_place(on_plane(x, y), picture, view, 5);
+    }
+  });
+
+  it('is the picture itself where nothing has moved', () => {
+    const m = warp_matrix(eye(), eye(), aspect, Infinity);
+    expect([...m]).toEqual([1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    expect(reach(m)).toBeCloseTo(1, 6);
+    expect(uncovered_share(m)).toBe(0);
+  });
+
+  it('tells how far the view goes beyond it', () => {
+    const view = eye({ orientation: axis_angle(up, 0.1) });
+    const plain = warp_matrix(eye(), view, aspect, Infinity);
+    expect(reach(plain)).toBeGreaterThan(1.05);
+    expect(uncovered_share(plain)).toBeGreaterThan(0.03);
+    const wide = warp_matrix(eye({ fov_y_rad: widened_fov(1, 1.26) }), view, aspect, Infinity);
+    expect(reach(wide)).toBeLessThan(1);
+    expect(uncovered_share(wide)).toBe(0);
+    const behind = warp_matrix(eye(), eye({ orientation: axis_angle(up, 3) }), aspect, Infinity);
+    expect(reach(behind)).toBe(4);
+    expect(uncovered_share(behind)).toBe(1);
+  });
+});
+
+function add_rotated(by: Eye, inside: Vec3): Vec3 {
+  // place_of() undoes this: camera axes to the world.
+  const [x, y, z] = inside;
+  const column = (axis: Vec3, s: number): Vec3 => {
+    const q = by.orientation;
+    const t = [
+      2 * (q[1] * axis[2] - q[2] * axis[1]),
+      2 * (q[2] * axis[0] - q[0] * axis[2]),
+      2 * (q[0] * axis[1] - q[1] * axis[0]),
+    ] as const;
+    return [
+      s * (axis[0] + q[3] * t[0] + q[1] * t[2] - q[2] * t[1]),
+      s * (axis[1] + q[3] * t[1] + q[2] * t[0] - q[0] * t[2]),
+      s * (axis[2] + q[3] * t[2] + q[0] * t[1] - q[1] * t[0]),
+    ];
+  };
+  const [a, b, c] = [column([1, 0, 0], x), column([0, 1, 0], y), column([0, 0, 1], z)];
+  return by.position.map((v, i) => v + a[i]! + b[i]! + c[i]!) as unknown as Vec3;
+}
+
+describe('the policy of warping', () => {
+  let now_us = 0;
+  /** A second of motion at 60 Hz. */
+  const move = (policy: WarpPolicy, reach: number, draw_us = 500, seconds = 1): boolean => {
+    let changed = false;
+    for (let i = 0; i < 60 * seconds; ++i) {
+      now_us += 16_667;
+      changed = policy.drawn(reach, draw_us, now_us) || changed;
+    }
+    return changed;
+  };
+
+  it('asks for as much overscan as the motion needs, and no more', () => {
+    const policy = new WarpPolicy(true);
+    expect(policy.overscan).toBe(1);
+    expect(move(policy, 1.002)).toBe(false);
+    expect(policy.overscan).toBe(1);
+    expect(move(policy, 1.12, 500, 3)).toBe(true);
+    expect(policy.overscan).toBe(1.16);
+    expect(move(policy, 1.01, 500, 8)).toBe(false);
+    expect(move(policy, 1.01, 500, 8)).toBe(true);
+    expect(policy.overscan).toBe(1.08);
+    move(policy, 3, 500, 3);
+    expect(policy.overscan).toBe(1.4);
+  });
+
+  it('is off where drawing takes too long, unless somebody wants it', () => {
+    const policy = new WarpPolicy(true);
+    move(policy, 1.12);
+    expect(move(policy, 1.12, 15_000, 3)).toBe(true);
+    expect(policy.active).toBe(false);
+    expect(policy.overscan).toBe(1);
+    expect(policy.state).toMatch(/too slow/);
+    policy.mode = 'on';
+    expect(policy.active).toBe(true);
+    expect(policy.overscan).toBe(1.16);
+    move(policy, 1.0, 15_000, 30);
+    expect(policy.active).toBe(true);
+    expect(policy.overscan).toBe(1.16);
+    policy.mode = 'off';
+    expect(policy.active).toBe(false);
+    expect(move(policy, 1.3, 500, 3)).toBe(false);
+  });
+
+  it('is off without WebGL2', () => {
+    const policy = new WarpPolicy(false);
+    policy.mode = 'on';
+    expect(policy.active).toBe(false);
+    expect(policy.overscan).toBe(1);
+  });
+});

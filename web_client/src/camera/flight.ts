@@ -1,0 +1,45 @@
+// Ways of the camera that are known beforehand. Pure.
+import { length, scale, add, slerp, sub, type Quat } from './vector';
+import type { Eye } from '../present/warp';
+
+export interface Flight {
+  readonly duration_s: number;
+  /** `time_s` in 0…duration. */
+  at(time_s: number): Eye;
+}
+
+/** 0…1, at rest at both ends, without a jerk. */
+export function eased(share: number): number {
+  const s = Math.min(1, Math.max(0, share));
+  return s * s * s * (s * (6 * s - 15) + 10);
+}
+
+export function glide(from: Eye, to: Eye, duration_s: number): Flight {
+  return {
+    duration_s,
+    at: (time_s) => {
+      const share = duration_s > 0 ? eased(time_s / duration_s) : 1;
+      return {
+        position: add(from.position, scale(sub(to.position, from.position), share)),
+        orientation: slerp(from.orientation, to.orientation, share),
+        fov_y_rad: from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share,
+      };
+    },
+  };
+}
+
+const comfortable_rad_per_s = 0.7;
+const comfortable_reach_per_s = 0.5;
+const time_range_s = [0.6, 6] as const;
+
+/** How long a comfortable glide takes; `reach`: the scale of the scene to a visitor. */
+export function glide_time_s(from: Eye, to: Eye, reach: number): number {
+  const turn_s = angle_between(from.orientation, to.orientation) / comfortable_rad_per_s;
+  const way_s = length(sub(to.position, from.position)) / (reach * comfortable_reach_per_s);
+  return Math.min(time_range_s[1], Math.max(time_range_s[0], turn_s, way_s));
+}
+
+export function angle_between(a: Quat, b: Quat): number {
+  const cosine = Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+  return 2 * Math.acos(Math.min(1, cosine));
+}

@@ -1,0 +1,42 @@
+// Which decoders have really failed in this browser, so that the next visit does not try them again.
+import { decoder_ladder, type DecoderRung } from './ladder';
+
+const storage_key = 'catgs.decoder';
+const keep_ms = 7 * 24 * 3600 * 1000; // drivers get better
+
+interface Remembered {
+  readonly rung: DecoderRung;
+  readonly agent: string;
+  readonly until_ms: number;
+}
+
+/** Where to begin on the ladder: at its top, unless a decoder of this very browser failed lately. */
+export function remembered_rung(
+  storage: Storage | undefined,
+  agent: string,
+  now_ms: number,
+): DecoderRung {
+  try {
+    const text = storage?.getItem(storage_key);
+    const memory = text ? (JSON.parse(text) as Partial<Remembered>) : {};
+    const known = decoder_ladder.find((rung) => rung === memory.rung);
+    if (known && memory.agent === agent && (memory.until_ms ?? 0) > now_ms) return known;
+  } catch (error) {
+    console.warn('what was remembered of decoders cannot be read', error);
+  }
+  return decoder_ladder[0];
+}
+
+export function remember_rung(
+  rung: DecoderRung,
+  storage: Storage | undefined,
+  agent: string,
+  now_ms: number,
+): void {
+  const memory: Remembered = { rung, agent, until_ms: now_ms + keep_ms };
+  try {
+    storage?.setItem(storage_key, JSON.stringify(memory));
+  } catch (error) {
+    console.warn('the choice of decoder cannot be remembered', error); // storage is full
+  }
+}

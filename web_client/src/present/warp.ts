@@ -1,0 +1,81 @@
+// Shows a picture as a camera sees it that has moved on since it was rendered. Pure.
+import { conjugate, multiply, rotate, scale, sub, type Quat, type Vec3 } from '../camera/vector';
+
+/** A pinhole camera; axes x right, y down, z forward. */
+export interface Eye {
+  readonly position: Vec3;
+  readonly orientation: Quat;
+  readonly fov_y_rad: number;
+}
+
+/** Column-major, for homogeneous coordinates (x, y, 1); x and y are -1…1 across an image, y down. */
+export type Matrix3 = Float32Array;
+
+/**
+ * From places in the view to places in the picture. What lies `distance` ahead of the view (on a
+ * plane at a right angle to its axis) comes out exactly; with Infinity, the far field: then only
+ * rotation counts. `aspect`: width by height of both.
+ */
+export function warp_matrix(picture: Eye, view: Eye, aspect: number, distance: number): Matrix3 {
+  const to_picture = conjugate(picture.orientation);
+  const turn = multiply(to_picture, view.orientation);
+  const shift = scale(rotate(to_picture, sub(view.position, picture.position)), 1 / distance);
+  const from_tan = Math.tan(view.fov_y_rad / 2);
+  const to_tan = Math.tan(picture.fov_y_rad / 2);
+  const column = (axis: Vec3, length: number, add: Vec3): number[] => {
+    const [x, y, z] = rotate(turn, axis);
+    return [
+      ((x * length + add[0]) / to_tan) * (1 / aspect),
+      (y * length + add[1]) / to_tan,
+      z * length + add[2],
+    ];
+  };
+  const none: Vec3 = [0, 0, 0];
+  return new Float32Array([
+    ...column([1, 0, 0], from_tan * aspect, none),
+    ...column([0, 1, 0], from_tan, none),
+    ...column([0, 0, 1], 1, shift),
+  ]);
+}
+
+/** Where a place in the view lies in the picture; undefined: behind it. */
+export function warped(m: Matrix3, x: number, y: number): readonly [number, number] | undefined {
+  const w = m[2]! * x + m[5]! * y + m[8]!;
+  if (w <= 1e-6) return undefined;
+  return [(m[0]! * x + m[3]! * y + m[6]!) / w, (m[1]! * x + m[4]! * y + m[7]!) / w];
+}
+
+const probes = [-1, -0.5, 0, 0.5, 1];
+const farthest = 4;
+
+/** How far the view reaches beyond the middle of the picture: 1 is its border; at most 4. */
+export function reach(m: Matrix3): number {
+  let most = 0;
+  for (const [x, y] of [
+    ...probes.map((v) => [v, -1] as const),
+    ...probes.map((v) => [v, 1] as const),
+    ...probes.map((v) => [-1, v] as const),
+    ...probes.map((v) => [1, v] as const),
+  ]) {
+    const at = warped(m, x, y);
+    most = Math.max(most, at ? Math.max(Math.abs(at[0]), Math.abs(at[1])) : farthest);
+  }
+  return Math.min(most, farthest);
+}
+
+/** Share of the view for which the picture has nothing, on a grid. */
+export function uncovered_share(m: Matrix3, columns = 64, rows = 36): number {
+  let uncovered = 0;
+  for (let row = 0; row < rows; ++row) {
+    for (let column = 0; column < columns; ++column) {
+      const at = warped(m, (2 * column + 1) / columns - 1, (2 * row + 1) / rows - 1);
+      if (!at || Math.abs(at[0]) > 1 || Math.abs(at[1]) > 1) uncovered += 1;
+    }
+  }
+  return uncovered / (columns * rows);
+}
+
+/** Field of view whose image plane is `factor` times as large; within the wire's limits. */
+export function widened_fov(fov_y_rad: number, factor: number): number {
+  return Math.min(2.8, Math.max(0.1, 2 * Math.atan(Math.tan(fov_y_rad / 2) * factor)));
+}

@@ -1,0 +1,222 @@
+// Leads a visitor through a tour. It knows no page and no clock: tests drive it with fakes.
+import { glide, glide_time_s, type Flight } from '../camera/flight';
+import type { Eye } from '../present/warp';
+import type { Timers } from '../session/clock';
+import type { PathSample } from '../session/messages';
+import { stay_of, type Stop, type Tour } from './tour';
+
+export interface Guided {
+  readonly eye: Eye;
+  readonly reach: number;
+  fly(way: Flight, ended: (arrived: boolean) => void): void;
+  stop_flight(): void;
+}
+
+export interface TourEnvironment {
+  readonly camera: Guided;
+  readonly timers: Timers;
+  now_us(): number;
+  /** The server may forecast by it. */
+  announce(path: readonly PathSample[]): void;
+  /** Jumps instead of gliding, and does not begin by itself. */
+  readonly reduced_motion: boolean;
+}
+
+export interface TourState {
+  readonly tour: Tour | undefined;
+  readonly tour_index: number;
+  /** The stop that is shown or gone to; undefined: none yet, or a film. */
+  readonly stop: Stop | undefined;
+  readonly stop_index: number | undefined;
+  readonly playing: boolean;
+}
+
+const announced_samples = 64;
+const announced_s = 4; // of a film at a time: the wire takes 256 samples
+const announce_again_s = 2;
+const held_us = 1_000_000; // at the end of a flight the camera stays
+
+export class TourPlayer {
+  private tours_: readonly Tour[] = [];
+  private tour_index_ = 0;
+  private stop_index_: number | undefined;
+  private playing_ = false;
+  private cancel_ = (): void => undefined;
+  private cancel_announcing_ = (): void => undefined;
+  private journey_ = 0; // what ends an older one says nothing of this one
+
+  constructor(
+    private readonly env_: TourEnvironment,
+    private readonly changed_: (state: TourState) => void,
+  ) {}
+
+  load(tours: readonly Tour[]): void {
+    this.pause();
+    this.tours_ = tours;
+    this.tour_index_ = 0;
+    this.stop_index_ = undefined;
+    const first = tours.findIndex(({ starts_itself }) => starts_itself);
+    if (first >= 0 && !this.env_.reduced_motion) {
+      this.tour_index_ = first;
+      this.play();
+    }
+    this.tell();
+  }
+
+  get tours(): readonly Tour[] {
+    return this.tours_;
+  }
+
+  get state(): TourState {
+    const tour = this.tours_[this.tour_index_];
+    return {
+      tour,
+      tour_index: this.tour_index_,
+      stop: this.stop_index_ === undefined ? undefined : tour?.stops[this.stop_index_],
+      stop_index: this.stop_index_,
+      playing: this.playing_,
+    };
+  }
+
+  choose(tour_index: number): void {
+    if (!this.tours_[tour_index] || tour_index === this.tour_index_) return;
+    this.pause();
+    this.tour_index_ = tour_index;
+    this.stop_index_ = undefined;
+    this.tell();
+  }
+
+  go_to(stop_index: number, at_once = this.env_.reduced_motion): void {
+    this.playing_ = false;
+    this.travel(stop_index, at_once);
+  }
+
+  next(): void {
+    this.go_by(1);
+  }
+
+  previous(): void {
+    this.go_by(-1);
+  }
+
+  toggle(): void {
+    if (this.playing_) this.pause();
+    else this.play();
+  }
+
+  play(): void {
+    const { tour } = this.state;
+    if (!tour) return;
+    this.playing_ = true;
+    if (tour.way) this.run_film(tour.way, tour.way.repeats);
+    else this.travel(this.stop_index_ === undefined ? 0 : (this.stop_index_ + 1) % tour.stops.length);
+  }
+
+  /** Also where the visitor takes over. */
+  pause(): void {
+    this.cancel_();
+    if (!this.playing_) return;
+    this.playing_ = false;
+    this.env_.camera.stop_flight();
+    this.tell();
+  }
+
+  /** No stop is shown any more. */
+  leave(): void {
+    this.pause();
+    this.stop_index_ = undefined;
+    this.tell();
+  }
+
+  private go_by(step: number): void {
+    const count = this.state.tour?.stops.length ?? 0;
+    if (count === 0) return;
+    const from = this.stop_index_ ?? (step > 0 ? -1 : 0);
+    this.go_to((from + step + count) % count);
+  }
+
+  private travel(stop_index: number, at_once = this.env_.reduced_motion): void {
+    const stop = this.state.tour?.stops[stop_index];
+    if (!stop) return;
+    const { camera } = this.env_;
+    const from = camera.eye;
+    this.stop_index_ = stop_index;
+    const duration_s = at_once ? 0 : glide_time_s(from, stop.eye, camera.reach);
+    const way = glide(from, stop.eye, duration_s);
+    const journey = this.set_out();
+    camera.fly(way, (arrived) => {
+      if (journey === this.journey_) this.ended(arrived, stop);
+    });
+    this.announce(way, 0, duration_s);
+    this.tell();
+  }
+
+  private ended(arrived: boolean, stop: Stop): void {
+    this.cancel_announcing_();
+    if (!arrived) {
+      this.env_.announce([]);
+      this.stopped();
+      return;
+    }
+    if (!this.playing_) return;
+    this.cancel_ = this.env_.timers.after(stay_of(stop) * 1000, () => this.play());
+  }
+
+  private run_film(way: Flight, repeats: boolean): void {
+    const { camera } = this.env_;
+    this.stop_index_ = undefined;
+    const journey = this.set_out();
+    const film = (): void => {
+      const begin_us = this.env_.now_us();
+      camera.fly(way, (arrived) => {
+        if (journey !== this.journey_) return;
+        this.cancel_announcing_();
+        if (arrived && repeats && this.playing_) film();
+        else this.stopped();
+      });
+      const announce = (): void => {
+        const time_s = (this.env_.now_us() - begin_us) / 1e6;
+        this.announce(way, time_s, Math.min(announced_s, way.duration_s - time_s));
+        this.cancel_announcing_ = this.env_.timers.after(announce_again_s * 1000, announce);
+      };
+      announce();
+    };
+    const to_start = way.at(0);
+    const glide_s = this.env_.reduced_motion ? 0 : glide_time_s(camera.eye, to_start, camera.reach);
+    camera.fly(glide(camera.eye, to_start, glide_s), (arrived) => {
+      if (journey !== this.journey_) return;
+      if (arrived && this.playing_) film();
+      else this.stopped();
+    });
+    this.tell();
+  }
+
+  private set_out(): number {
+    this.cancel_();
+    this.cancel_announcing_();
+    this.journey_ += 1;
+    return this.journey_;
+  }
+
+  private stopped(): void {
+    this.playing_ = false;
+    this.tell();
+  }
+
+  /** Tells the part of a way from `from_s` on, which the camera is at now. */
+  private announce(way: Flight, from_s: number, length_s: number): void {
+    if (!(length_s > 0)) return;
+    const now_us = this.env_.now_us();
+    const samples = Array.from({ length: announced_samples + 1 }, (_, i): PathSample => {
+      const offset_s = (length_s * i) / announced_samples;
+      return { time_us: now_us + offset_s * 1e6, eye: way.at(from_s + offset_s) };
+    });
+    const last = samples[announced_samples]!;
+    const stays = from_s + length_s >= way.duration_s - 1e-6;
+    this.env_.announce(stays ? [...samples, { ...last, time_us: last.time_us + held_us }] : samples);
+  }
+
+  private tell(): void {
+    this.changed_(this.state);
+  }
+}

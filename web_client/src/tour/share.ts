@@ -1,0 +1,75 @@
+// Links that lead back to a view: the fragment of the address, which no server ever sees. Pure.
+import { camera_modes, type CameraMode } from '../camera/camera_controller';
+import { unit } from '../camera/vector';
+import type { Eye } from '../present/warp';
+
+export interface SharedView {
+  readonly eye: Eye | undefined;
+  readonly mode: CameraMode | undefined;
+  readonly tour_index: number | undefined;
+  readonly stop_index: number | undefined;
+}
+
+/** `page_url` with the scene and the view. It carries no token: links are for others. */
+export function share_address(page_url: string, scene_id: string, view: SharedView): string {
+  const url = new URL(page_url);
+  const parameters = new URLSearchParams();
+  if (scene_id) parameters.set('scene', scene_id);
+  url.search = parameters.toString();
+  const fragment = new URLSearchParams();
+  if (view.eye) {
+    const { position, orientation, fov_y_rad } = view.eye;
+    const numbers = [...position, ...orientation, (fov_y_rad * 180) / Math.PI];
+    fragment.set('at', numbers.map((v) => String(Number(v.toPrecision(6)))).join(','));
+  }
+  if (view.mode) fragment.set('mode', view.mode);
+  if (view.tour_index) fragment.set('tour', String(view.tour_index + 1));
+  if (view.stop_index !== undefined) fragment.set('stop', String(view.stop_index + 1));
+  url.hash = fragment.toString().replaceAll('%2C', ',');
+  return url.href;
+}
+
+/** What share_address() put there; undefined where it says nothing, or nonsense. */
+export function read_shared(page_url: string): SharedView {
+  const fragment = new URLSearchParams(new URL(page_url).hash.slice(1));
+  const ordinal = (key: string): number | undefined => {
+    const text = fragment.get(key) ?? '';
+    return /^[1-9]\d{0,3}$/.test(text) ? Number(text) - 1 : undefined;
+  };
+  const mode = camera_modes.find((name) => name === fragment.get('mode'));
+  return {
+    eye: read_eye(fragment.get('at') ?? ''),
+    mode,
+    tour_index: ordinal('tour'),
+    stop_index: ordinal('stop'),
+  };
+}
+
+function read_eye(text: string): Eye | undefined {
+  const parts = text.split(',');
+  const numbers = parts.map(Number);
+  const [px, py, pz, x, y, z, w, fov_deg] = numbers as [
+    number, number, number, number, number, number, number, number,
+  ];
+  const good =
+    parts.length === 8 &&
+    parts.every((part) => part.trim() !== '') &&
+    numbers.every((v) => Number.isFinite(v) && Math.abs(v) < 1e9) &&
+    Math.abs(Math.hypot(x, y, z, w) - 1) < 0.01 &&
+    fov_deg >= 5 &&
+    fov_deg <= 160;
+  if (!good) return undefined;
+  return {
+    position: [px, py, pz],
+    orientation: unit([x, y, z, w]),
+    fov_y_rad: (fov_deg * Math.PI) / 180,
+  };
+}
+
+/** For pages of others; the server names those that may show it (--embed-origin). */
+export function embed_code(address: string): string {
+  const url = new URL(address);
+  url.searchParams.set('ui', '0');
+  const source = url.href.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
+  return `<iframe src="${source}" width="960" height="540" style="border:0" allow="fullscreen; gamepad" title="3D tour"></iframe>`;
+}

@@ -1,0 +1,88 @@
+// Tours through a scene: stops to go to, or a way to be led along. Pure.
+import type { Flight } from '../camera/flight';
+import { look_at, unit, type Vec3 } from '../camera/vector';
+import type { Eye } from '../present/warp';
+import { JsonPlace } from './json_place';
+
+export interface Stop {
+  readonly title: string;
+  readonly caption: string;
+  readonly eye: Eye;
+  /** Where its hotspot is drawn; undefined: nowhere. */
+  readonly marker: Vec3 | undefined;
+  /** How long autoplay stays; undefined: as long as its caption takes to read. */
+  readonly stay_s: number | undefined;
+}
+
+export interface Tour {
+  readonly title: string;
+  readonly stops: readonly Stop[];
+  /** Instead of stops: a film of the camera. */
+  readonly way: (Flight & { readonly repeats: boolean }) | undefined;
+  /** Begins when the scene is first seen. */
+  readonly starts_itself: boolean;
+}
+
+const most_tours = 32;
+const most_stops = 256;
+
+/** How long somebody needs to look around and to read. */
+export function stay_of(stop: Stop): number {
+  return stop.stay_s ?? 3 + 0.06 * (stop.caption.length + stop.title.length);
+}
+
+/**
+ * `tours` of a sidecar (README.md), or why it is none. `up`: of the scene; `fov_y_rad`: of stops
+ * that say nothing.
+ */
+export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
+  return new JsonPlace('tours', document).elements(most_tours).map((tour) => ({
+    title: tour.find('title')?.text() ?? '',
+    stops: tour
+      .at('stops')
+      .elements(most_stops)
+      .map((stop) => read_stop(stop, up, fov_y_rad)),
+    way: undefined,
+    starts_itself: tour.find('autoplay')?.truth() ?? false,
+  }));
+}
+
+function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
+  const position = stop.at('position').vec3();
+  const target = stop.find('look_at')?.vec3();
+  const orientation = target
+    ? look_at(position, target, up)
+    : unit(stop.at('orientation').numbers(4) as [number, number, number, number]);
+  const fov_deg = stop.find('fov_deg')?.number(5, 160);
+  return {
+    title: stop.find('title')?.text() ?? '',
+    caption: stop.find('caption')?.text() ?? '',
+    eye: {
+      position,
+      orientation,
+      fov_y_rad: fov_deg === undefined ? fov_y_rad : (fov_deg * Math.PI) / 180,
+    },
+    marker: stop.find('marker')?.vec3(),
+    stay_s: stop.find('stay_s')?.number(0, 3600),
+  };
+}
+
+/** What read_tours() reads; numbers are shortened to what anybody can see. */
+export function write_tours(tours: readonly Tour[]): unknown[] {
+  const short = (v: number): number => Number(v.toPrecision(7));
+  return tours
+    .filter(({ way }) => way === undefined)
+    .map(({ title, stops, starts_itself }) => ({
+      title,
+      ...(starts_itself && { autoplay: true }),
+      stops: stops.map((stop) => ({
+        title: stop.title,
+        ...(stop.caption && { caption: stop.caption }),
+        position: stop.eye.position.map(short),
+        orientation: stop.eye.orientation.map(short),
+        fov_deg: short((stop.eye.fov_y_rad * 180) / Math.PI),
+        ...(stop.marker && { marker: stop.marker.map(short) }),
+        ...(stop.stay_s !== undefined && { stay_s: stop.stay_s }),
+      })),
+    }));
+}

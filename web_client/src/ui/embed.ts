@@ -1,0 +1,92 @@
+// Lets the page that shows this one in a frame drive it. Which pages may is the server's decision
+// (--embed-origin): browsers refuse to load this page in anybody else's frame, so the parent window
+// is one of them.
+import { JsonPlace } from '../tour/json_place';
+import type { Eye } from '../present/warp';
+import { unit } from '../camera/vector';
+
+export interface EmbedTarget {
+  eye(): Eye;
+  set_eye(eye: Eye): void;
+  go_to(stop_index: number): void;
+  next(): void;
+  previous(): void;
+  play(): void;
+  pause(): void;
+  reset(): void;
+}
+
+/** Said to the parent, once it has said hello. */
+export type EmbedNews =
+  | { readonly catgs: 'ready'; readonly scene: string; readonly stops: readonly string[] }
+  | { readonly catgs: 'stop'; readonly stop: number | null; readonly playing: boolean }
+  | { readonly catgs: 'pose'; readonly position: readonly number[]; readonly orientation: readonly number[]; readonly fov_deg: number };
+
+export class EmbedApi {
+  private origin_: string | undefined; // of the parent, once it spoke
+  private ready_: EmbedNews | undefined;
+
+  constructor(
+    private readonly target_: EmbedTarget,
+    private readonly window_: Window = window,
+  ) {
+    if (window_.parent === window_) return;
+    window_.addEventListener('message', (event) => {
+      if (event.source !== window_.parent) return;
+      try {
+        this.heard(new JsonPlace('message', event.data), event.origin);
+      } catch (error) {
+        console.warn('a message of the page around this one was not understood', error);
+      }
+    });
+  }
+
+  /** `ready` is repeated to a parent that says hello later. */
+  say(news: EmbedNews): void {
+    if (news.catgs === 'ready') this.ready_ = news;
+    if (this.origin_ !== undefined) this.window_.parent.postMessage(news, this.origin_);
+  }
+
+  private heard(message: JsonPlace, origin: string): void {
+    const command = message.find('catgs')?.text();
+    if (command === undefined) return; // meant for something else
+    this.origin_ = origin;
+    switch (command) {
+      case 'hello':
+        if (this.ready_) this.say(this.ready_);
+        break;
+      case 'stop':
+        this.target_.go_to(message.at('stop').number(0, 255));
+        break;
+      case 'pose':
+        this.set_pose(message);
+        break;
+      case 'get_pose':
+        this.tell_pose();
+        break;
+      case 'next':
+      case 'previous':
+      case 'play':
+      case 'pause':
+      case 'reset':
+        this.target_[command]();
+        break;
+      default:
+        message.at('catgs').fail(`'${command}' is no command`);
+    }
+  }
+
+  private set_pose(message: JsonPlace): void {
+    const fov_deg = message.find('fov_deg')?.number(5, 160);
+    this.target_.set_eye({
+      position: message.at('position').vec3(),
+      orientation: unit(message.at('orientation').numbers(4) as [number, number, number, number]),
+      fov_y_rad: fov_deg === undefined ? this.target_.eye().fov_y_rad : (fov_deg * Math.PI) / 180,
+    });
+  }
+
+  private tell_pose(): void {
+    const { position, orientation, fov_y_rad } = this.target_.eye();
+    this.say({ catgs: 'pose', position, orientation, fov_deg: (fov_y_rad * 180) / Math.PI });
+  }
+}

@@ -1,0 +1,65 @@
+import type { Snapshot } from '../session/messages';
+import { embed_code } from '../tour/share';
+import { by_id } from './dom';
+
+export interface ShareSource {
+  address(): string;
+  snapshot(): Promise<Snapshot | undefined>;
+  /** For file names. */
+  name(): string;
+}
+
+/** Link, code for other pages, picture. */
+export class SharePanel {
+  private readonly link_ = by_id('share-link', HTMLInputElement);
+  private readonly done_ = by_id('share-done', HTMLOutputElement);
+
+  constructor(private readonly source_: ShareSource) {
+    const click = (id: string, action: () => Promise<void>): void =>
+      by_id(id, HTMLButtonElement).addEventListener('click', () => void action());
+    click('share-copy', () => this.hand_over(source_.address(), 'The link is in the clipboard.'));
+    click('share-embed', () =>
+      this.hand_over(embed_code(source_.address()), 'The code is in the clipboard.'),
+    );
+    click('share-picture', () => this.save_picture());
+    this.link_.addEventListener('focus', () => this.link_.select());
+  }
+
+  shown(): void {
+    this.link_.value = this.source_.address();
+    this.done_.textContent = '';
+  }
+
+  /** Pages without a secure context have no clipboard: there the text is shown to be copied. */
+  private async hand_over(text: string, done: string): Promise<void> {
+    this.link_.value = text;
+    const clipboard = navigator.clipboard as Clipboard | undefined;
+    try {
+      if (!clipboard) throw new Error('no clipboard');
+      await clipboard.writeText(text);
+      this.done_.textContent = done;
+    } catch {
+      this.link_.select();
+      this.done_.textContent = 'Copy it from the field above.';
+    }
+  }
+
+  private async save_picture(): Promise<void> {
+    const snapshot = await this.source_.snapshot();
+    if (!snapshot) return;
+    const { width_px, height_px, rgba } = snapshot;
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = [width_px, height_px];
+    canvas.getContext('2d')?.putImageData(new ImageData(rgba, width_px, height_px), 0, 0);
+    const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
+    if (blob) save_file(blob, `${this.source_.name()}.png`);
+  }
+}
+
+export function save_file(blob: Blob, name: string): void {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
