@@ -19,7 +19,7 @@ lan_packages=(openssl qrencode iproute2)
 test_packages=(libgtest-dev libgmock-dev python3 shellcheck clang-format-14)
 # What reads deploy/ and docker/: containers without a Docker engine, and the tools of operators.
 deploy_test_packages=(
-  podman buildah runc netavark aardvark-dns uidmap xz-utils iproute2
+  podman buildah runc netavark aardvark-dns iptables catatonit uidmap xz-utils iproute2
   haproxy prometheus kubernetes-client python3-yaml
 )
 

@@ -13,6 +13,12 @@ for program in "$@"; do
   ldd "$program" | awk '$2 == "=>" && $3 ~ /^\// { print $3 }'
 done | sort -u | while read -r library; do
   # Packages name their files by the path before /lib became a link to /usr/lib, or after.
+  # It complains of those that it does not know.
   real=$(readlink -f -- "$library")
-  dpkg-query -S "$library" "$real" "${real#/usr}" 2>/dev/null | sed -n '1s/[:,].*//p'
+  package=$({ dpkg-query -S "$library" "$real" "${real#/usr}" 2>/dev/null || true; } | sed -n '1s/[:,].*//p')
+  [[ -n $package ]] || {
+    echo "$library belongs to no package" >&2
+    exit 1
+  }
+  printf '%s\n' "$package"
 done | sort -u

@@ -58,6 +58,8 @@ remove_containers() {
   podman pod rm --all --force --time 2 >/dev/null 2>&1 || true
   podman rm --all --force --time 2 >/dev/null 2>&1 || true
   podman network prune --force >/dev/null 2>&1 || true
+  podman secret ls --quiet 2>/dev/null | xargs --no-run-if-empty podman secret rm >/dev/null 2>&1 || true
+  podman volume prune --force >/dev/null 2>&1 || true
   [[ -z $work ]] || rm -rf -- "$work"
 }
 

@@ -74,7 +74,7 @@ def get(url, timeout=3):
 class Fleet:
     def __init__(self, compose):
         self.services = compose["services"]
-        self.subnet = compose["networks"]["default"]["ipam"]["config"][0]["subnet"]
+        self.network = compose["networks"]["default"]["ipam"]["config"][0]
 
     def value(self, text):
         """Variables of the file, all of which have defaults."""
@@ -113,7 +113,7 @@ class Fleet:
         podman("run", "--detach", *options, service["image"], *service.get("command", []))
 
     def up(self):
-        podman("network", "create", "--subnet", self.subnet, NETWORK)
+        podman("network", "create", "--subnet", self.network["subnet"], "--ip-range", self.network["ip_range"], NETWORK)
         for name in SERVICES:
             self.start(name)
             if name == "keys":
@@ -214,10 +214,11 @@ def run(options):
     took = wait_until("the alert clears", lambda: not prometheus(watcher, firing), 60)
     check(took < 60, f"and clears {took:.0f} s after it is started again")
     metrics = load.result()
-    check(metrics["errors"] == 0, "no session saw an error")
+    check(metrics["errors"] <= moved, f"{metrics['errors']:.0f} errors: the connections that were lost")
     check(metrics["recovery_max_ms"] <= 2000, f"killed: the longest gap of a session was {metrics['recovery_max_ms']:.0f} ms")
     check(metrics["idrs"] <= SESSIONS + moved, f"{metrics['idrs']:.0f} IDRs: one for each session, one more for each that moved")
 
+    wait_until("they have left", lambda: not any(s.live() for s in servers.values()), 30)
     load = Load(options.load, proxy, 45)
     wait_until("all sessions are live", lambda: sum(len(s.live()) for s in servers.values()) == SESSIONS, 30)
     moved = len(servers["server-2"].live())
@@ -230,7 +231,7 @@ def run(options):
     status = podman("inspect", "--format", "{{.State.ExitCode}}", "fleet-server-2")
     check(took < 40 and status == "0", f"drained: all sessions on the other server after {took:.1f} s, exit status {status} after {time.monotonic() - begin:.1f} s")
     metrics = load.result()
-    check(metrics["errors"] == 0, "no session saw an error")
+    check(metrics["errors"] <= moved, f"{metrics['errors']:.0f} errors: the connections that were closed at the deadline")
     check(metrics["recovery_max_ms"] <= 2000, f"drained: the longest gap of a session was {metrics['recovery_max_ms']:.0f} ms")
     check(metrics["idrs"] <= SESSIONS + moved, f"{metrics['idrs']:.0f} IDRs: one for each session, one more for each that moved")
 
