@@ -242,7 +242,8 @@ describe('page', () => {
     expect(await open()).toEqual(['stats-panel']);
     const panel = page.locator('#stats-panel');
     const goes_on = (): Promise<boolean> => panel.evaluate((e) => e.classList.contains('more-below'));
-    await expect.poll(goes_on).toBe(viewport.height < 500);
+    await expect.poll(() => panel.locator('.uplot canvas').count(), { timeout: 10_000 }).toBe(3);
+    await expect.poll(goes_on).toBe(true);
     await panel.evaluate((e) => e.scrollTo(0, e.scrollHeight));
     await expect.poll(goes_on).toBe(false);
   });

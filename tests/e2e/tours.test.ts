@@ -1,5 +1,5 @@
 // Tours, links and frames against the real server, and the inputs that lead through a scene.
-import { copyFileSync, readFileSync, writeFileSync } from 'node:fs';
+import { copyFileSync, readFileSync, unlinkSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import path from 'node:path';
@@ -181,6 +181,54 @@ describe('a tour', () => {
     expect(apart).toBe(true);
     await page.getByRole('button', { name: 'Share' }).click();
     await keep_screenshot(page, `share-${name}`);
+  });
+});
+
+describe('an author', () => {
+  it('makes a tour, saves it, and others follow it', async () => {
+    const bare = path.join(folder, 'mine.ply');
+    copyFileSync(scene, bare);
+    const before = readFileSync(path.join(folder, 'settings.json'));
+    unlinkSync(path.join(folder, 'settings.json'));
+    const workshop = await start_server(bare);
+    const { page, errors } = await open(desktop, `${workshop.url}?author`);
+    await page.getByRole('button', { name: 'Make a tour' }).click();
+    const start = await pose_of(page);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByLabel('Title of stop 1').fill('Where I began');
+    await page.getByLabel('Caption of stop 1').fill('It was here.');
+    await page.mouse.move(500, 300);
+    await page.mouse.wheel(0, -300);
+    await settle(page);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByLabel('Title of stop 2').fill('Nearer');
+    await page.getByLabel('Title of the tour', { exact: true }).fill('My tour');
+    await page.getByRole('button', { name: 'Up' }).last().click();
+    await keep_screenshot(page, 'author');
+    await page.getByRole('button', { name: 'Begin visits here' }).click();
+    await page.getByRole('button', { name: 'Show' }).last().click();
+    await settle(page);
+    expect(distance(start, await pose_of(page))).toBeLessThan(1e-3);
+    const download = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Save the sidecar file' }).click();
+    const file = await download;
+    expect(file.suggestedFilename()).toBe('mine.json');
+    copyFileSync(await file.path(), path.join(folder, 'mine.json'));
+    expect(errors).toEqual([]);
+    await workshop.stop();
+
+    const museum = await start_server(bare);
+    const { page: visitor } = await open(desktop, museum.url);
+    await visitor.getByText('My tour').first().waitFor();
+    expect(distance(start, await pose_of(visitor))).toBeGreaterThan(0.1);
+    await visitor.getByRole('button', { name: 'Next stop' }).click();
+    await visitor.getByRole('heading', { name: 'Nearer' }).waitFor();
+    await visitor.getByRole('button', { name: 'Next stop' }).click();
+    await visitor.getByText('It was here.').waitFor();
+    await settle(visitor);
+    expect(distance(start, await pose_of(visitor))).toBeLessThan(1e-3);
+    await museum.stop();
+    writeFileSync(path.join(folder, 'settings.json'), before);
   });
 });
 

@@ -98,6 +98,15 @@ describe('a visit', () => {
     await panel.getByText(/libx264/).waitFor();
     await panel.getByText(/CPU|CUDA/).waitFor();
     expect(await panel.innerText()).toMatch(/640 × 360/);
+    await expect.poll(() => panel.locator('.uplot canvas').count(), patience).toBe(3);
+    const download = page.waitForEvent('download');
+    await panel.getByRole('button', { name: 'Save as JSON' }).click();
+    const saved = JSON.parse(readFileSync(await (await download).path(), 'utf8')) as {
+      renderer: string;
+      samples: { time_s: number; stats: StatsSnapshot }[];
+    };
+    expect(saved.renderer).toMatch(/CPU|CUDA/);
+    expect(saved.samples[0]!.stats.frames_shown).toBeGreaterThan(20);
     await keep_screenshot(page, 'visit');
     expect(errors).toEqual([]);
   });

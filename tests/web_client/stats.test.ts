@@ -1,6 +1,7 @@
 import { create } from '@bufbuild/protobuf';
 import { describe, expect, it } from 'vitest';
 import type { Frame } from '#client/decode/picture';
+import { StatsHistory } from '#client/stats/history';
 import { Metrics } from '#client/stats/metrics';
 import { PoseAge } from '#client/stats/pose_age';
 import { percentile, TimeWindow } from '#client/stats/window';
@@ -68,6 +69,20 @@ describe('pose age', () => {
   });
 });
 
+describe('the history', () => {
+  it('is what plots show and a file keeps, of the last two minutes', () => {
+    const history = new StatsHistory();
+    const empty = new Metrics().snapshot(0);
+    for (let i = 0; i < 600; ++i) history.add({ ...empty, fps_shown: i }, 1000 + 250 * i);
+    expect(history.samples).toHaveLength(480);
+    expect(history.samples[479]!.time_s).toBeCloseTo(599 * 0.25, 6);
+    expect(history.column((s) => s.fps_shown).slice(-2)).toEqual([598, 599]);
+    expect(history.column((s) => s.motion_to_photon_ms.p50)[0]).toBeNull();
+    const file = JSON.parse(history.to_json({ renderer: 'CPU' }, '2026-01-01')) as object;
+    expect(file).toMatchObject({ made: '2026-01-01', renderer: 'CPU' });
+  });
+});
+
 describe('metrics', () => {
   const frame = (pose_id: bigint, pose_time_us: number, received_us: number): Frame => ({
     header: create(FrameHeaderSchema, {
@@ -77,6 +92,8 @@ describe('metrics', () => {
       widthPx: 640,
       heightPx: 360,
       renderUs: 12_000,
+      window: 4,
+      speculated: pose_id % 2n === 0n,
     }),
     bytes: 1000,
     received_us,
@@ -94,7 +111,9 @@ describe('metrics', () => {
     expect(stats.fps_shown).toBe(20);
     expect(stats.bitrate_kbps).toBe(160);
     expect(stats.motion_to_photon_ms).toEqual({ p50: 45, p95: 45 });
-    expect(stats.stages_ms).toMatchObject({ render: 12, decode: 2, present: 8 });
+    // 45 ms from pose to picture; 23 of them neither the server nor this browser had it.
+    expect(stats.stages_ms).toMatchObject({ render: 12, network: 23, decode: 2, present: 8 });
+    expect(stats).toMatchObject({ window: 4, sub_share: 0.5 });
     expect([stats.width_px, stats.height_px]).toEqual([640, 360]);
   });
 

@@ -59,6 +59,10 @@ export async function start_fake_server(
       response.end(JSON.stringify({ scenes: scene_ids.map((id) => ({ id })) }));
       return;
     }
+    if (name.startsWith('/api/scenes/')) {
+      response.end('{}');
+      return;
+    }
     const file = path.join(web_dist, name === '/' ? 'index.html' : name);
     readFile(file).then(
       (body) => {

@@ -102,6 +102,10 @@ export class CameraController {
     return this.mode_ === 'orbit' ? this.distance() : Infinity;
   }
 
+  get scene(): SceneSetup | undefined {
+    return this.scene_;
+  }
+
   get mode(): CameraMode {
     return this.mode_;
   }

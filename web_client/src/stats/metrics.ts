@@ -22,9 +22,13 @@ export interface StatsSnapshot {
     readonly render: number;
     readonly encode: number;
     readonly send: number;
+    readonly network: number; // there and back, of the first picture of each pose
     readonly decode: number;
     readonly present: number;
   };
+  /** Sub-frames promised by key frames, in the mean over frames; share of frames that are sub-frames. */
+  readonly window: number;
+  readonly sub_share: number;
   readonly width_px: number;
   readonly height_px: number;
   readonly frames_shown: number; // since the page was opened
@@ -47,9 +51,12 @@ export class Metrics {
     render: new TimeWindow(rate_span_us),
     encode: new TimeWindow(rate_span_us),
     send: new TimeWindow(rate_span_us),
+    network: new TimeWindow(latency_span_us),
     decode: new TimeWindow(rate_span_us),
     present: new TimeWindow(rate_span_us),
   };
+  private readonly windows_ = new TimeWindow(rate_span_us);
+  private readonly subs_ = new TimeWindow(rate_span_us);
   private last_pose_id_ = -1n;
   private frames_shown_ = 0;
   private frames_dropped_ = 0;
@@ -78,6 +85,10 @@ export class Metrics {
     if (header.poseId > 0n && header.poseId !== this.last_pose_id_) {
       this.motion_us_.push(now_us, now_us - pose_time_us);
       this.pose_age_.shown(header.poseId, pose_time_us, now_us);
+      const server_us = header.waitUs + header.renderUs + header.encodeUs + header.sendWaitUs;
+      this.stages_us_.network.push(now_us, frame.received_us - pose_time_us - server_us);
+      this.windows_.push(now_us, header.window);
+      this.subs_.push(now_us, header.speculated ? 1 : 0);
     }
     this.last_pose_id_ = header.poseId;
     const stages = this.stages_us_;
@@ -99,10 +110,11 @@ export class Metrics {
 
   snapshot(now_us: number): StatsSnapshot {
     const per_second = 1e6 / rate_span_us;
-    const mean_ms = (window: TimeWindow): number => {
+    const mean = (window: TimeWindow): number => {
       const values = window.values(now_us);
-      return sum(values) / values.length / 1000;
+      return sum(values) / values.length;
     };
+    const mean_ms = (window: TimeWindow): number => mean(window) / 1000;
     const percentiles_ms = (values: readonly number[]): Percentiles => ({
       p50: percentile(values, 0.5) / 1000,
       p95: percentile(values, 0.95) / 1000,
@@ -118,9 +130,12 @@ export class Metrics {
         render: mean_ms(stages.render),
         encode: mean_ms(stages.encode),
         send: mean_ms(stages.send),
+        network: mean_ms(stages.network),
         decode: mean_ms(stages.decode),
         present: mean_ms(stages.present),
       },
+      window: mean(this.windows_),
+      sub_share: mean(this.subs_),
       width_px: this.size_px_[0],
       height_px: this.size_px_[1],
       frames_shown: this.frames_shown_,

@@ -2,14 +2,17 @@
 import type { CameraController } from '../camera/camera_controller';
 import type { CameraLoop } from '../camera/camera_loop';
 import type { GamepadAction } from '../input/gamepad';
+import type { Vec3 } from '../camera/vector';
 import type { Eye } from '../present/warp';
 import type { WorkerClient } from '../session/client';
 import { browser_timers, type Clock } from '../session/clock';
 import { fetch_tours, read_document } from '../tour/load';
 import { TourPlayer, type TourState } from '../tour/player';
 import { read_shared, share_address } from '../tour/share';
+import { AuthorPanel } from './author_panel';
 import { EmbedApi } from './embed';
 import { SharePanel } from './share_panel';
+import { text } from './text';
 import { TourView } from './tour_view';
 
 export interface GuideParts {
@@ -19,6 +22,8 @@ export interface GuideParts {
   readonly clock: Clock;
   readonly view: HTMLElement;
   readonly reduced_motion: boolean;
+  /** What is in the middle of the view. */
+  place_ahead(): Promise<Vec3 | undefined>;
   /** The camera was put somewhere else. */
   camera_moved(): void;
   mode_changed(): void;
@@ -30,6 +35,7 @@ export class Guide {
   readonly tour_view = new TourView();
   private readonly share_: SharePanel;
   private readonly embed_: EmbedApi;
+  private readonly author_: AuthorPanel | undefined;
   private scene_id_ = '';
   private loads_ = 0;
 
@@ -76,7 +82,29 @@ export class Guide {
         parts_.camera_moved();
       },
     });
+    this.author_ = new URLSearchParams(location.search).has('author')
+      ? this.make_author()
+      : undefined;
     window.addEventListener('hashchange', () => this.apply_shared());
+  }
+
+  private make_author(): AuthorPanel {
+    const { camera } = this.parts_;
+    return new AuthorPanel({
+      eye: () => camera.eye,
+      scene: () => camera.scene,
+      scene_id: () => this.scene_id_ || 'scene',
+      place_ahead: () => this.parts_.place_ahead(),
+      changed: (tours) => {
+        this.tour_view.show_tours(tours);
+        this.player.load(tours.map((tour) => ({ ...tour, starts_itself: false })));
+      },
+      go_to: (stop_index) => {
+        this.player.choose(0);
+        this.player.go_to(stop_index);
+      },
+      start_at: (eye) => camera.start_at(eye),
+    });
   }
 
   share_shown(): void {
@@ -99,12 +127,13 @@ export class Guide {
       camera.fov_y_rad,
       aspect,
     );
-    for (const problem of problems) this.parts_.notice(`A tour cannot be read: ${problem}`);
+    for (const problem of problems) this.parts_.notice(text.tour.unreadable(problem));
     if (start) {
       camera.start_at(start);
       if (!shared.eye) this.put(start);
     }
     this.tour_view.show_tours(tours);
+    this.author_?.load(tours);
     // A link to a view or a stop is not led away from there.
     const is_sent_somewhere = shared.eye !== undefined || shared.stop_index !== undefined;
     this.player.load(

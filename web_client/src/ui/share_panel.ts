@@ -1,6 +1,7 @@
 import type { Snapshot } from '../session/messages';
 import { embed_code } from '../tour/share';
 import { by_id } from './dom';
+import { text as words } from './text';
 
 export interface ShareSource {
   address(): string;
@@ -17,9 +18,9 @@ export class SharePanel {
   constructor(private readonly source_: ShareSource) {
     const click = (id: string, action: () => Promise<void>): void =>
       by_id(id, HTMLButtonElement).addEventListener('click', () => void action());
-    click('share-copy', () => this.hand_over(source_.address(), 'The link is in the clipboard.'));
+    click('share-copy', () => this.hand_over(source_.address(), words.share.link_copied));
     click('share-embed', () =>
-      this.hand_over(embed_code(source_.address()), 'The code is in the clipboard.'),
+      this.hand_over(embed_code(source_.address()), words.share.code_copied),
     );
     click('share-picture', () => this.save_picture());
     this.link_.addEventListener('focus', () => this.link_.select());
@@ -40,7 +41,7 @@ export class SharePanel {
       this.done_.textContent = done;
     } catch {
       this.link_.select();
-      this.done_.textContent = 'Copy it from the field above.';
+      this.done_.textContent = words.share.copy_yourself;
     }
   }
 

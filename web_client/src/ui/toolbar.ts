@@ -3,6 +3,7 @@ import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
 import { is_typing } from '../input/view_input';
 import { by_id } from './dom';
+import { text } from './text';
 
 export interface ToolbarListener {
   toggle_mode(): void;
@@ -15,7 +16,7 @@ export interface ToolbarListener {
   fov_y_deg(value: number): void;
 }
 
-const panels = ['quality', 'stats', 'share', 'help'] as const;
+const panels = ['quality', 'stats', 'share', 'author', 'help'] as const;
 type Panel = (typeof panels)[number];
 
 // Here one panel leaves little of the picture to see.
@@ -55,7 +56,7 @@ export class Toolbar {
   }
 
   show_mode(mode: CameraMode): void {
-    by_id('mode-label', HTMLElement).textContent = mode_names[mode];
+    by_id('mode-label', HTMLElement).textContent = text.modes[mode];
     by_id('button-mode', HTMLButtonElement)
       .querySelector('use')
       ?.setAttribute('href', `#icon-${mode}`);
@@ -127,8 +128,6 @@ export class Toolbar {
     if (panel === 'share' && shown) this.listener_.share_shown();
   }
 }
-
-const mode_names = { orbit: 'Orbit', fly: 'Fly', walk: 'Walk' } as const;
 
 const picture_size = (value: string): PictureSize =>
   value === 'auto' || value === 'sharp' || value === 'smooth' ? value : Number(value);

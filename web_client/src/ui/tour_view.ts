@@ -4,6 +4,7 @@ import type { TourPlayer, TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import { is_typing } from '../input/view_input';
 import { by_id } from './dom';
+import { text } from './text';
 
 /** Caption and buttons of the tour, its keys, and the hotspots in the picture. */
 export class TourView {
@@ -47,7 +48,7 @@ export class TourView {
     this.card_.hidden = tours.length === 0;
     this.choice_.hidden = tours.length < 2;
     this.choice_.replaceChildren(
-      ...tours.map(({ title }, i) => new Option(title || `Tour ${i + 1}`, String(i))),
+      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered(i + 1), String(i))),
     );
     this.tour_ = undefined;
   }
@@ -58,14 +59,14 @@ export class TourView {
     const count = tour?.stops.length ?? 0;
     this.choice_.value = String(state.tour_index);
     const name = tour?.title ?? '';
-    by_id('tour-title', HTMLElement).textContent = stop ? stop.title : name || 'Tour';
+    by_id('tour-title', HTMLElement).textContent = stop ? stop.title : name || text.tour.untitled;
     by_id('tour-text', HTMLElement).textContent = stop?.caption ?? '';
     by_id('tour-place', HTMLElement).textContent =
-      count === 0 ? '' : stop_index === undefined ? `${count} stops` : `${stop_index + 1} of ${count}`;
+      count === 0 ? '' : stop_index === undefined ? text.tour.stops(count) : text.tour.place(stop_index + 1, count);
     for (const id of ['tour-previous', 'tour-next']) {
       by_id(id, HTMLButtonElement).hidden = count < 2;
     }
-    const label = playing ? 'Pause the tour' : 'Play the tour';
+    const label = playing ? text.tour.pause : text.tour.play;
     this.play_.setAttribute('aria-label', label);
     this.play_.title = `${label} (Space)`;
     this.play_.setAttribute('aria-pressed', String(playing));
@@ -102,7 +103,7 @@ export class TourView {
       number.setAttribute('aria-hidden', 'true');
       const name = document.createElement('span');
       name.className = 'hotspot-name';
-      name.textContent = stop.title || `Stop ${i + 1}`;
+      name.textContent = stop.title || text.tour.stop_numbered(i + 1);
       button.append(number, name);
       button.addEventListener('click', () => this.player_?.go_to(i));
       return [{ stop, button }];

@@ -8,7 +8,7 @@ import {
 } from '../camera/camera_controller';
 import { is_held, sum_of, type Axes } from '../camera/movement';
 import { ray_through } from '../camera/ray';
-import { add, scale } from '../camera/vector';
+import type { Vec3 } from '../camera/vector';
 import { same_angle_rad, same_view } from '../camera/same_view';
 import { CameraLoop } from '../camera/camera_loop';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
@@ -21,7 +21,8 @@ import type { PresenterChoice } from '../present/make_presenter';
 import { local_storage, session_storage } from '../session/browser_storage';
 import { WorkerClient } from '../session/client';
 import { browser_timers, clock_from } from '../session/clock';
-import type { FromWorker, Ray, View } from '../session/messages';
+import type { FromWorker, View } from '../session/messages';
+import { Picks } from '../session/picks';
 import { QualityChoice } from '../session/quality';
 import type { SessionState } from '../session/state';
 import { list_scenes } from '../session/scenes';
@@ -67,8 +68,11 @@ export class Viewer {
   private near_z_ = 0;
   private scene_id_: string | undefined;
   private shown_: Extract<FromWorker, { kind: 'presented' }> | undefined;
-  private picks_ = 0;
-  private pick_ray_: Ray | undefined;
+  private readonly picks_ = new Picks(
+    (id, ray) => this.worker_.post({ kind: 'pick', id, ray }),
+    browser_timers,
+  );
+  private pointed_ = 0;
   private readonly reduced_motion_ = matchMedia('(prefers-reduced-motion: reduce)').matches;
   private stats_timer_: ReturnType<typeof setInterval> | undefined;
 
@@ -174,7 +178,7 @@ export class Viewer {
         this.loop_.wake();
       },
       keys_changed: () => this.taken_over(),
-      pointed_at: (x, y) => this.point_at(x, y),
+      pointed_at: (x, y) => void this.point_at(x, y),
     });
   }
 
@@ -183,19 +187,20 @@ export class Viewer {
     this.loop_.wake();
   }
 
-  /** Asks the server what is there; the camera turns to it when the answer comes. */
-  private point_at(x: number, y: number): void {
-    const ray = ray_through(this.camera_.eye, x, y, this.view_.clientWidth / this.view_.clientHeight);
-    this.picks_ += 1;
-    this.pick_ray_ = ray;
-    this.worker_.post({ kind: 'pick', id: this.picks_, ray });
+  /** The camera turns to what is there, unless it was pointed elsewhere meanwhile. */
+  private async point_at(x: number, y: number): Promise<void> {
+    const { camera_: camera } = this;
+    const pointed = ++this.pointed_;
+    const place = await this.place_at(x, y);
+    if (!place || pointed !== this.pointed_) return;
+    camera.focus_on(place, this.reduced_motion_);
+    this.loop_.wake();
   }
 
-  private picked({ id, distance }: Extract<FromWorker, { kind: 'picked' }>): void {
-    const ray = this.pick_ray_;
-    if (id !== this.picks_ || distance === undefined || !ray) return;
-    this.camera_.focus_on(add(ray.origin, scale(ray.direction, distance)), this.reduced_motion_);
-    this.loop_.wake();
+  /** Of the scene, at shares of the view's width and height. */
+  private place_at(x: number, y: number): Promise<Vec3 | undefined> {
+    const aspect = this.view_.clientWidth / Math.max(1, this.view_.clientHeight);
+    return this.picks_.at(ray_through(this.camera_.eye, x, y, aspect));
   }
 
   private next_mode(): void {
@@ -226,6 +231,7 @@ export class Viewer {
       clock: this.clock_,
       view: this.view_,
       reduced_motion: this.reduced_motion_,
+      place_ahead: () => this.place_at(0.5, 0.5),
       camera_moved: () => this.camera_moved(),
       mode_changed: () => this.toolbar_.show_mode(this.camera_.mode),
       notice: (message) => this.notice_.show(message),
@@ -297,7 +303,7 @@ export class Viewer {
         remember_rung(message.rung, local_storage(), navigator.userAgent, Date.now());
         break;
       case 'picked':
-        this.picked(message);
+        this.picks_.answered(message.id, message.distance);
         break;
       case 'notice':
         this.notice_.show(message.message, true);

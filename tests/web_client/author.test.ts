@@ -1,0 +1,98 @@
+import { describe, expect, it } from 'vitest';
+import type { SceneSetup } from '#client/camera/camera_controller';
+import { identity } from '#client/camera/vector';
+import { Picks } from '#client/session/picks';
+import { TourDraft } from '#client/tour/draft';
+import { read_tours, type Stop, type Tour } from '#client/tour/tour';
+import { FakeTime } from './fakes';
+
+const stop = (title: string): Stop => ({
+  title,
+  caption: `about ${title}`,
+  eye: { position: [1, 2, 3], orientation: identity, fov_y_rad: 1 },
+  marker: [0, 0, 9],
+  stay_s: undefined,
+});
+
+const titles = (draft: TourDraft): string[] => draft.stops.map(({ title }) => title);
+
+describe('a draft of a tour', () => {
+  const scene: SceneSetup = {
+    up: [0, -1, 0],
+    start_pose: { position: [0, 0, -5], orientation: identity },
+    focus: [0, 0, 0],
+    limits_min: [-1, -1, -1],
+    limits_max: [1, 1, 1],
+    near_z: 0.1,
+  };
+
+  it('grows, is put in order, and shrinks', () => {
+    const draft = new TourDraft();
+    draft.load([]);
+    for (const name of ['a', 'b', 'c']) draft.add(stop(name));
+    draft.move(2, -1);
+    expect(titles(draft)).toEqual(['a', 'c', 'b']);
+    draft.move(0, -1);
+    draft.move(2, 1);
+    expect(titles(draft)).toEqual(['a', 'c', 'b']);
+    draft.change(1, { title: 'C' });
+    draft.remove(0);
+    expect(titles(draft)).toEqual(['C', 'b']);
+    expect(draft.stops[0]!.caption).toBe('about c');
+  });
+
+  it('keeps the other tours, and is none without stops', () => {
+    const film: Tour = {
+      title: 'film',
+      stops: [],
+      way: { duration_s: 1, repeats: false, at: () => stop('x').eye },
+      starts_itself: false,
+    };
+    const second: Tour = { title: 'second', stops: [stop('s')], way: undefined, starts_itself: false };
+    const draft = new TourDraft();
+    draft.load([film, { ...second, title: 'first' }, second]);
+    expect(draft.title).toBe('first');
+    expect(draft.tours.map(({ title }) => title)).toEqual(['first', 'film', 'second']);
+    draft.remove(0);
+    expect(draft.tours.map(({ title }) => title)).toEqual(['film', 'second']);
+  });
+
+  it('becomes a whole sidecar, which reads back', () => {
+    const draft = new TourDraft();
+    draft.load([]);
+    draft.title = 'Mine';
+    draft.add(stop('a'));
+    expect(draft.sidecar(scene)).toMatchObject({
+      up: [0, -1, 0],
+      start_pose: { position: [0, 0, -5] },
+      near: 0.1,
+      limits: { min: [-1, -1, -1] },
+      focus: [0, 0, 0],
+    });
+    draft.start = { ...stop('a').eye, position: [7, 7, 7] };
+    const sidecar = draft.sidecar({ ...scene, limits_min: [0, 0, 0], limits_max: [0, 0, 0] });
+    expect(sidecar).not.toHaveProperty('limits');
+    expect(sidecar).toMatchObject({ start_pose: { position: [7, 7, 7] } });
+    const { tours } = JSON.parse(JSON.stringify(sidecar)) as { tours: unknown };
+    const [tour] = read_tours(tours, [0, -1, 0], 1);
+    expect(tour).toMatchObject({ title: 'Mine' });
+    expect(tour!.stops[0]).toMatchObject({ title: 'a', caption: 'about a', marker: [0, 0, 9] });
+  });
+});
+
+describe('asking what is seen', () => {
+  it('hands each answer to who asked, and none after a while', async () => {
+    const time = new FakeTime();
+    const asked: number[] = [];
+    const picks = new Picks((id) => asked.push(id), time);
+    const ray = { origin: [1, 0, 0], direction: [0, 0, 1] } as const;
+    const [first, second, third] = [picks.at(ray), picks.at(ray), picks.at(ray)];
+    picks.answered(asked[1]!, 4);
+    picks.answered(asked[0]!, undefined);
+    picks.answered(99, 1);
+    expect(await second).toEqual([1, 0, 4]);
+    expect(await first).toBeUndefined();
+    time.advance(2000);
+    expect(await third).toBeUndefined();
+  });
+});

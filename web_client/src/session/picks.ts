@@ -1,0 +1,35 @@
+import { add, scale, type Vec3 } from '../camera/vector';
+import type { Timers } from './clock';
+import type { Ray } from './messages';
+
+const patience_ms = 2000; // the server does not answer more than a few a second
+
+/** Asks the server what is seen along rays, and hands the answers to who asked. */
+export class Picks {
+  private asked_ = 0;
+  private readonly waiting_ = new Map<number, (distance: number | undefined) => void>();
+
+  constructor(
+    private readonly ask_: (id: number, ray: Ray) => void,
+    private readonly timers_: Timers,
+  ) {}
+
+  /** The place; undefined where nothing is, and without an answer. */
+  async at(ray: Ray): Promise<Vec3 | undefined> {
+    const id = ++this.asked_;
+    const distance = await new Promise<number | undefined>((resolve) => {
+      const cancel = this.timers_.after(patience_ms, () => this.answered(id, undefined));
+      this.waiting_.set(id, (answer) => {
+        cancel();
+        resolve(answer);
+      });
+      this.ask_(id, ray);
+    });
+    return distance === undefined ? undefined : add(ray.origin, scale(ray.direction, distance));
+  }
+
+  answered(id: number, distance: number | undefined): void {
+    this.waiting_.get(id)?.(distance);
+    this.waiting_.delete(id);
+  }
+}

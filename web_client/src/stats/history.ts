@@ -1,0 +1,36 @@
+import type { StatsSnapshot } from './metrics';
+
+export interface Sample {
+  readonly time_s: number; // since the first one
+  readonly stats: StatsSnapshot;
+}
+
+const capacity = 480; // two minutes of four a second
+
+/** The statistics of the last minutes, for plots and for a file. */
+export class StatsHistory {
+  private samples_: Sample[] = [];
+  private first_ms_: number | undefined;
+
+  add(stats: StatsSnapshot, now_ms: number): void {
+    this.first_ms_ ??= now_ms;
+    this.samples_.push({ time_s: (now_ms - this.first_ms_) / 1000, stats });
+    if (this.samples_.length > capacity) this.samples_.shift();
+  }
+
+  get samples(): readonly Sample[] {
+    return this.samples_;
+  }
+
+  /** One value of each sample; null, which JSON and plots know, where nothing was measured. */
+  column(value: (stats: StatsSnapshot) => number): (number | null)[] {
+    return this.samples_.map(({ stats }) => finite_or_null(value(stats)));
+  }
+
+  /** A file for others: what was measured, and by whom. */
+  to_json(facts: object, made: string): string {
+    return JSON.stringify({ made, ...facts, samples: this.samples_ }, undefined, 1);
+  }
+}
+
+const finite_or_null = (value: number): number | null => (Number.isFinite(value) ? value : null);
