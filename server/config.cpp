@@ -161,6 +161,16 @@ std::vector<Setting> make_settings() {
   return {
       list("scene", "PATH", "Scene files or folders, or synth:KIND:COUNT[:SEED] (city, garden)",
            &C::scenes),
+      list("scene-folder", "DIR",
+           "Folders of scenes that are loaded when somebody asks for them; new ones are found",
+           &C::scene_folders),
+      integer(
+          "scene-memory", "MB",
+          "Of --scene-folder, the least recently used go when all scenes take more than this on "
+          "a device; 0: they stay",
+          &C::scene_memory_mb, 0, 10'000'000),
+      integer("scene-residency", "SECONDS", "They stay at least so long", &C::scene_residency_s, 1,
+              86'400),
       text("bind", "ADDRESS", "Address to listen on; 0.0.0.0 or :: is every interface", &C::bind),
       integer("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
       admin_bind(),
@@ -332,12 +342,15 @@ void apply_flag(const Setting& setting, const std::vector<std::string>& values,
 }
 
 void validate(const ServerConfig& config) {
-  if (config.scenes.empty())
+  if (config.scenes.empty() && config.scene_folders.empty())
     throw InputError("--scene", {}, "no scene is given",
                      "give a file, or try --scene synth:city:300000");
   check({.kind = config.renderer,
          .pool = {},
          .devices = std::make_shared<DeviceSet>(config.devices)});
+  if (config.scene_memory_mb > 0 && config.scene_folders.empty())
+    throw InputError("--scene-memory", {}, "is about --scene-folder, which is not given",
+                     "scenes of --scene stay in memory");
   if (config.lod >= 0 && config.gaussian_budget > 0)
     throw InputError("--lod, --budget", {}, "both are given", "give one of them");
   if (config.tls_cert.empty() != config.tls_key.empty())

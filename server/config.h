@@ -16,6 +16,9 @@ namespace catgs {
 /// variable CATGS_<NAME>, TOML file, default.
 struct ServerConfig {
   std::vector<std::string> scenes;  // paths, or synth:KIND:COUNT[:SEED]
+  std::vector<std::string> scene_folders;
+  int scene_memory_mb = 0;     // 0: no bound
+  int scene_residency_s = 60;  // at least
   std::string bind = "127.0.0.1";
   int port = 8080;
   std::string admin_bind = "127.0.0.1:9090";  // address:port or "off"

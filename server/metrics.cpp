@@ -76,6 +76,8 @@ Metrics::Metrics()
                   "take; taken ones included, 0 when draining")),
       cpu_budget_used(budget(registry_, "cpu")),
       gpu_budget_used(budget(registry_, "gpu")),
+      scenes_in_memory(gauge(registry_, "catgs_scenes_in_memory", "Scenes in memory")),
+      scene_bytes(gauge(registry_, "catgs_scene_bytes", "Memory of these scenes on each device")),
       frames_running(gauge(registry_, "catgs_frames_running", "Frames being rendered or encoded")),
       frames_queued(
           gauge(registry_, "catgs_frames_queued", "Encoded frames waiting for their sockets")),
@@ -91,6 +93,12 @@ Metrics::Metrics()
                                "Sessions refused or closed for an error")),
       sessions_resumed(
           counter(registry_, "catgs_sessions_resumed_total", "Sessions whose client came back")),
+      scenes_loaded(counter(registry_, "catgs_scenes_loaded_total",
+                            "Scenes loaded because somebody asked for them")),
+      scene_loads_failed(
+          counter(registry_, "catgs_scene_loads_failed_total", "Scenes that could not be loaded")),
+      scenes_released(counter(registry_, "catgs_scenes_released_total",
+                              "Scenes that left memory for others, or because their file changed")),
       frames_rendered(counter(registry_, "catgs_frames_rendered_total", "Frames rendered")),
       frames_refined(counter(registry_, "catgs_frames_refined_total",
                              "Frames that sharpened a still picture, not rendered again")),

@@ -42,6 +42,8 @@ class Metrics {
   prometheus::Gauge& seats;            // sessions that there is room for, taken ones included
   prometheus::Gauge& cpu_budget_used;  // at --min-fps for everybody; 1: admission ends
   prometheus::Gauge& gpu_budget_used;
+  prometheus::Gauge& scenes_in_memory;
+  prometheus::Gauge& scene_bytes;     // of those, on each device
   prometheus::Gauge& frames_running;  // being rendered or encoded
   prometheus::Gauge& frames_queued;   // encoded, waiting for their sockets
   prometheus::Gauge& frames_in_flight;
@@ -50,6 +52,9 @@ class Metrics {
   prometheus::Counter& sessions_admitted;
   prometheus::Counter& sessions_refused;
   prometheus::Counter& sessions_resumed;
+  prometheus::Counter& scenes_loaded;  // when somebody asked for them
+  prometheus::Counter& scene_loads_failed;
+  prometheus::Counter& scenes_released;
   prometheus::Counter& frames_rendered;
   prometheus::Counter& frames_refined;
   prometheus::Counter& frames_sent;

@@ -57,10 +57,8 @@ bool has_levels(const std::string& spec) {
   return locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
 }
 
-Scene load(const std::string& spec, const ServerConfig& config, int threads) {
+Scene load(const std::string& spec, const ServerConfig& config, LoadOptions options) {
   if (is_synthetic(spec)) return synthesize(spec);
-  LoadOptions options;
-  options.threads = threads;
   if (has_levels(spec)) {
     if (config.lod >= 0) options.lod = config.lod;
     if (config.gaussian_budget > 0)
@@ -79,19 +77,6 @@ std::string shortened(const std::string& text, std::size_t max_bytes) {
   return text.substr(0, max_bytes);
 }
 
-/// Scene ids are names that people can read in a link; a second scene of a name gets a number.
-std::string unique_id(const std::string& name,
-                      const std::vector<std::shared_ptr<const SceneEntry>>& taken) {
-  constexpr std::size_t max_bytes = 100;  // with its number within the wire's 128
-  const std::string base = name.empty() ? "scene" : shortened(name, max_bytes);
-  std::string id = base;
-  for (int n = 2;
-       std::ranges::any_of(taken, [&](const auto& entry) { return entry->facts.scene_id == id; });
-       ++n)
-    id = fmt::format("{}-{}", base, n);
-  return id;
-}
-
 SceneFacts facts_of(const Scene& scene, std::string id) {
   SceneFacts facts;
   facts.scene_id = std::move(id);
@@ -108,27 +93,52 @@ SceneFacts facts_of(const Scene& scene, std::string id) {
 
 }  // namespace
 
+std::string unique_id(const std::string& name,
+                      const std::function<bool(const std::string&)>& taken) {
+  constexpr std::size_t max_bytes = 100;  // with its number within the wire's 128
+  const std::string base = name.empty() ? "scene" : shortened(name, max_bytes);
+  std::string id = base;
+  for (int n = 2; taken(id); ++n) id = fmt::format("{}-{}", base, n);
+  return id;
+}
+
+std::shared_ptr<const SceneEntry> load_scene(
+    const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
+    const ServerConfig& config, const RendererOptions& core, int threads,
+    const std::function<void(double)>& progress) {
+  spdlog::info("loading {}", spec);
+  LoadOptions options;
+  options.threads = threads;
+  options.progress = progress;
+  Scene scene = load(spec, config, std::move(options));
+  auto entry = std::make_shared<SceneEntry>();
+  entry->facts = facts_of(scene, id_of(scene.name));
+  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud);
+  if (!is_synthetic(spec)) entry->tours = read_tours(spec);
+  auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
+  entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
+  entry->renderer = std::move(made.renderer);
+  spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}",
+               entry->facts.scene_id, entry->facts.gaussians, scene.format,
+               static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
+  return entry;
+}
+
 std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& config,
                                                            const RendererOptions& core) {
-  if ((config.lod >= 0 || config.gaussian_budget > 0) &&
+  if ((config.lod >= 0 || config.gaussian_budget > 0) && config.scene_folders.empty() &&
       std::ranges::none_of(config.scenes, has_levels))
     throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
                      "no scene has levels of detail to choose from",
                      "levels and budgets are for streamed SOG folders");
   std::vector<std::shared_ptr<const SceneEntry>> entries;
   for (const auto& spec : config.scenes) {
-    spdlog::info("loading {}", spec);
-    Scene scene = load(spec, config, core.pool->threads());
-    auto entry = std::make_shared<SceneEntry>();
-    entry->facts = facts_of(scene, unique_id(scene.name, entries));
-    entry->surface = std::make_shared<const SurfacePoints>(scene.cloud);
-    if (!is_synthetic(spec)) entry->tours = read_tours(spec);
-    auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
-    entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
-    entry->renderer = std::move(made.renderer);
-    spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}",
-                 entry->facts.scene_id, entry->facts.gaussians, scene.format,
-                 static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
+    const auto taken = [&](const std::string& id) {
+      return std::ranges::any_of(entries,
+                                 [&](const auto& entry) { return entry->facts.scene_id == id; });
+    };
+    const auto id_of = [&](const std::string& name) { return unique_id(name, taken); };
+    auto entry = load_scene(spec, id_of, config, core, core.pool->threads());
     // The banner tells that of the first.
     if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)
       spdlog::info("scene {}: renderer {}", entry->facts.scene_id, entry->renderer_text);

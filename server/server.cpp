@@ -25,6 +25,7 @@
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
 #include "server/scene_catalog.h"
+#include "server/scene_library.h"
 #include "server/schedule/pool_executor.h"
 #include "server/session/session_registry.h"
 #include "server/signed_token.h"
@@ -128,7 +129,7 @@ struct Server::State {
   boost::asio::io_context io{1};  // outlives the pool, whose tasks post to it
   std::shared_ptr<ThreadPool> pool;
   std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
-  std::vector<std::shared_ptr<const SceneEntry>> scenes;
+  std::unique_ptr<SceneLibrary> scenes;
   std::vector<EncoderChoice> encoders;
   boost::asio::signal_set stop_signals;
   boost::asio::steady_timer drain_timer;
@@ -176,13 +177,14 @@ HttpResponse Server::State::respond(const HttpRequest& request) {
 HttpResponse Server::State::list_scenes(const std::string& token) {
   auto list = nlohmann::json::array();
   std::string refusal;
-  for (const auto& scene : scenes) {
-    const SceneFacts& facts = scene->facts;
-    if (const auto refused = access.refusal(token, facts.scene_id, unix_now_s(), Use::list))
+  for (const auto listing = scenes->listing(); const auto& scene : *listing) {
+    if (const auto refused = access.refusal(token, scene.id, unix_now_s(), Use::list))
       refusal = *refused;
     else
-      list.push_back(
-          {{"id", facts.scene_id}, {"title", facts.title}, {"gaussians", facts.gaussians}});
+      list.push_back({{"id", scene.id},
+                      {"title", scene.title},
+                      {"gaussians", scene.gaussians},
+                      {"loaded", scene.loaded}});
   }
   if (list.empty())
     return text_response(401, "401: " + refusal + "\nSend it as Authorization: Bearer TOKEN\n");
@@ -192,10 +194,10 @@ HttpResponse Server::State::list_scenes(const std::string& token) {
 HttpResponse Server::State::scene_tours(std::string_view scene_id, const std::string& token) {
   if (const auto refused = access.refusal(token, scene_id, unix_now_s(), Use::list))
     return text_response(401, "401: " + *refused + "\nSend it as Authorization: Bearer TOKEN\n");
-  const auto found = std::ranges::find_if(
-      scenes, [&](const auto& scene) { return scene->facts.scene_id == scene_id; });
-  if (found == scenes.end()) return text_response(404, "404: there is no such scene here\n");
-  return text_response(200, (*found)->tours, "application/json");
+  const auto listing = scenes->listing();
+  const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
+  if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
+  return text_response(200, found->tours, "application/json");
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {
@@ -210,7 +212,9 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
 
 Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(config)) {
   State& s = *state_;
-  s.scenes = load_scenes(s.config, {s.config.renderer, s.pool, s.config.simd, s.devices});
+  s.scenes = std::make_unique<SceneLibrary>(
+      s.config, RendererOptions{s.config.renderer, s.pool, s.config.simd, s.devices}, s.io,
+      s.metrics);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token, const std::string& scene_id, Use use) {
     return s.access.refusal(token, scene_id, unix_now_s(), use);
@@ -218,7 +222,7 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
   RegistryOptions options = registry_options(s.config);
   options.gpus = static_cast<int>(s.devices->views().size());
   s.registry = std::make_unique<SessionRegistry>(
-      s.io, std::move(options), std::make_shared<PoolExecutor>(s.pool), s.scenes, s.encoders,
+      s.io, std::move(options), std::make_shared<PoolExecutor>(s.pool), *s.scenes, s.encoders,
       std::move(authorize), session_tokens(s.config), s.metrics);
 }
 
@@ -251,7 +255,7 @@ void Server::State::print_banner() const {
   const std::string host = config.bind == "0.0.0.0" || config.bind == "::" ? "localhost"
                            : config.bind.find(':') != std::string::npos    ? "[" + config.bind + "]"
                                                                            : config.bind;
-  spdlog::info("renderer: {}", scenes.front()->renderer_text);
+  spdlog::info("renderer: {}", scenes->renderer_text());
   spdlog::info("encoder: {}", encoders.front().text);
   if (net.admin_port() != 0)
     spdlog::info("metrics: http://{}/metrics",

@@ -80,7 +80,7 @@ std::unique_ptr<ByteSource> FolderFiles::open(const std::string& name) const {
   return std::make_unique<FileSource>(path_of(name));
 }
 
-ZipFiles::ZipFiles(const ByteSource& file) : name_(file.name()) {
+ZipFiles::ZipFiles(const ByteSource& file, std::string_view only) : name_(file.name()) {
   ArchiveInput input{file};
   const std::unique_ptr<archive, decltype(&archive_read_free)> zip(archive_read_new(),
                                                                    &archive_read_free);
@@ -104,6 +104,7 @@ ZipFiles::ZipFiles(const ByteSource& file) : name_(file.name()) {
     check(result);
     const char* entry_name = archive_entry_pathname(entry);
     const std::string name = entry_name ? entry_name : "";
+    if (!only.empty() && name != only) continue;
     std::vector<std::byte> bytes = unpack_entry(zip.get(), room, file, name);
     room -= bytes.size();
     entries_[name] = std::move(bytes);

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "render_core/scene/byte_source.h"
@@ -38,8 +39,8 @@ class FolderFiles final : public FileSet {
 /// its size: scene archives hold images, which hardly compress.
 class ZipFiles final : public FileSet {
  public:
-  /// Throws InputError.
-  explicit ZipFiles(const ByteSource& archive);
+  /// `only`: the one entry to unpack; empty: all. Throws InputError.
+  explicit ZipFiles(const ByteSource& archive, std::string_view only = {});
   [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override;
 
  private:

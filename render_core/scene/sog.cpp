@@ -221,7 +221,7 @@ struct Decoder {
 
 }  // namespace
 
-SogMeta read_sog_meta(const FileSet& files, const std::string& name) {
+SogMeta parse_sog_meta(const FileSet& files, const std::string& name) {
   const auto file = files.open(name);
   const nlohmann::json document = read_json(*file, max_meta_bytes);
   const JsonField meta(file->name(), document);
@@ -248,6 +248,11 @@ SogMeta read_sog_meta(const FileSet& files, const std::string& name) {
     sog.labels = image_name(meta, "shN", 1, 2);
   }
   require_count(*file, "count", sog.count);
+  return sog;
+}
+
+SogMeta read_sog_meta(const FileSet& files, const std::string& name) {
+  SogMeta sog = parse_sog_meta(files, name);
   check_image_sizes(files, sog, name);
   if (!sog.centroids.empty()) check_palette(files, sog);
   return sog;

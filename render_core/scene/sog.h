@@ -35,8 +35,11 @@ struct SogMeta {
   std::string means_low, means_high, quats, scales, sh0_image, centroids, labels;
 };
 
-/// Reads and checks `name` (…/meta.json) and the sizes of the images. Throws InputError naming the
+/// Reads and checks `name` (…/meta.json) alone: no image is opened. Throws InputError naming the
 /// field.
+SogMeta parse_sog_meta(const FileSet& files, const std::string& name);
+
+/// The same, and the sizes of the images; only they tell the SH degree of version 1.
 SogMeta read_sog_meta(const FileSet& files, const std::string& name);
 
 /// Gaussians [begin, begin + count) of a SOG that go to `destination` in the cloud.

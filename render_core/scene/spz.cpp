@@ -265,6 +265,16 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context) {
 
 }  // namespace
 
+namespace {
+
+bool is_gzip(const ByteSource& file) {
+  std::array<std::byte, 2> start;
+  file.read(0, start);
+  return load_as<std::uint16_t>(start.data()) == 0x8b1f;
+}
+
+}  // namespace
+
 bool is_spz(const ByteSource& file) {
   if (file.size() < 4) return false;
   std::array<std::byte, 4> start;
@@ -273,11 +283,18 @@ bool is_spz(const ByteSource& file) {
          load_as<std::uint16_t>(start.data()) == 0x8b1f;
 }
 
+SpzSize read_spz_size(const ByteSource& file) {
+  std::array<std::byte, plain_header_bytes> start;
+  if (is_gzip(file))
+    open_gzip(file)->read(std::span(start).first(gzip_header_bytes));
+  else
+    file.read(0, start);
+  const Header header = parse_header(file, start);
+  return {header.count, header.sh_degree};
+}
+
 SpzFile read_spz(const ByteSource& file, const LoadContext& context) {
-  std::array<std::byte, 2> start;
-  file.read(0, start);
-  return load_as<std::uint16_t>(start.data()) == 0x8b1f ? read_gzip(file, context)
-                                                        : read_plain(file, context);
+  return is_gzip(file) ? read_gzip(file, context) : read_plain(file, context);
 }
 
 }  // namespace catgs

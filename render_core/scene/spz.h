@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <iosfwd>
 #include <string>
 
@@ -22,6 +23,13 @@ struct SpzFile {
 
 /// Whether the file begins like an .spz: gzip or the plain header of version 4.
 bool is_spz(const ByteSource& file);
+
+/// What the header says; the SH degree is that of the file. Throws InputError.
+struct SpzSize {
+  std::uint64_t count = 0;
+  int sh_degree = 0;
+};
+SpzSize read_spz_size(const ByteSource& file);
 
 /// Throws InputError.
 SpzFile read_spz(const ByteSource& file, const LoadContext& context);

@@ -207,6 +207,14 @@ std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t b
   return choose(tree, wanted);
 }
 
+std::size_t count_streamed_sog(const FolderFiles& folder, std::optional<int> level,
+                               std::optional<std::size_t> budget) {
+  const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
+  const std::size_t environment =
+      tree.environment.empty() ? 0 : open_part(folder, tree.environment).meta.count;
+  return choose(folder, tree, level, budget, environment).count + environment;
+}
+
 StreamedSog read_streamed_sog(const FolderFiles& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context) {
   const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));

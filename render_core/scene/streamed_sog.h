@@ -46,6 +46,11 @@ LodChoice choose_level(const LodTree& tree, int level);
 /// nodes as still fit, cheapest first. Empty when not even the coarsest level fits.
 std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t budget);
 
+/// Gaussians that `level` or `budget` (see read_streamed_sog) choose, the environment among them.
+/// Reads lod-meta.json and the environment's meta data only. Throws InputError.
+std::size_t count_streamed_sog(const FolderFiles& folder, std::optional<int> level,
+                               std::optional<std::size_t> budget);
+
 struct StreamedSog {
   std::string detail;   // what was loaded, for people: "level 2 of 0…6"
   GaussianCloud cloud;  // not sanitized

@@ -156,10 +156,11 @@ struct Drain {
   std::uint32_t deadline_ms = 0;
 };
 
-/// Where a client stands that waits for a place.
+/// Where a client stands that waits for a place, or for its scene.
 struct QueuePlace {
   int position = 1;                 // 1: next
   std::chrono::seconds estimate{};  // of the whole wait
+  bool for_scene = false;           // there is a place; the scene is being loaded
 };
 
 /// Answers a Pick.

@@ -236,6 +236,7 @@ void fill(const QueuePlace& place, v1::ServerMessage& out) {
   auto& message = *out.mutable_queue();
   message.set_position(static_cast<std::uint32_t>(place.position));
   message.set_estimate_s(static_cast<std::uint32_t>(place.estimate.count()));
+  message.set_for_scene(place.for_scene);
 }
 
 void fill(const StreamConfig& config, v1::ServerMessage& out) {

@@ -136,22 +136,16 @@ void Client::resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admis
   session_.on_resumed(hello, std::move(admission), now);
 }
 
-std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> Client::find_scene(
-    const std::string& scene_id) {
-  auto scene = registry_.find_scene(scene_id);
-  if (const auto refusal =
-          registry_.authorize_(token_, scene ? scene->facts.scene_id : scene_id, Use::own_session))
+SceneAnswer Client::find_scene(const std::string& scene_id) {
+  if (const auto refusal = registry_.authorize_(token_, scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
-  if (scene) return scene;
-  return ErrorMessage{ErrorCode::unknown_scene, "there is no scene \"" + scene_id + "\" here",
-                      false};
+  return registry_.find_scene(scene_id, Clock::now());
 }
 
 std::vector<std::string> Client::scene_ids() {
   std::vector<std::string> ids;
-  for (const auto& scene : registry_.scenes_)
-    if (!registry_.authorize_(token_, scene->facts.scene_id, Use::own_session))
-      ids.push_back(scene->facts.scene_id);
+  for (auto& id : registry_.scenes_.scene_ids())
+    if (!registry_.authorize_(token_, id, Use::own_session)) ids.push_back(std::move(id));
   return ids;
 }
 

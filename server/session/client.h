@@ -34,8 +34,7 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
 
   // SessionHost
   AdmissionAnswer admit(const Hello& hello) override;
-  std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
-      const std::string& scene_id) override;
+  SceneAnswer find_scene(const std::string& scene_id) override;
   std::vector<std::string> scene_ids() override;
   std::uint32_t session_count() override;
   void sign(Welcome& welcome) override;

@@ -16,8 +16,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Ticks come every 250 ms, and a client hears something at least once a second.
-constexpr auto speak_at_least_every = 750ms;
 constexpr auto min_idr_request_interval = 250ms;
 constexpr int max_failures_in_a_row = 3;
 
@@ -83,10 +81,16 @@ void Session::greet(const Hello& hello, TimePoint now) {
   auto answer = host_.admit(hello);
   if (const auto* error = std::get_if<ErrorMessage>(&answer))
     return fail(error->code, error->message);
+  awaited_scene_.reset();
   if (const auto* place = std::get_if<QueuePlace>(&answer)) {
     waiting_hello_ = hello;
     state_ = State::queued;
     return on_queue_moved(*place, now);
+  }
+  if (const auto* awaited = std::get_if<SceneAwaited>(&answer)) {
+    waiting_hello_ = hello;
+    state_ = State::queued;
+    return await_scene(hello.scene_id, *awaited, now);
   }
   note_activity(now);
   admission_.encoder = std::get<Admission>(answer).encoder;
@@ -98,23 +102,11 @@ void Session::greet(const Hello& hello, TimePoint now) {
   request_stream();
 }
 
-void Session::ask_again(TimePoint now) {
-  if (state_ == State::queued) greet(waiting_hello_, now);
-}
-
 void Session::on_queued(const ClientMessage& message) {
   if (const auto* settings = std::get_if<Settings>(&message)) waiting_hello_.settings = *settings;
   if (const auto* pause = std::get_if<Pause>(&message)) paused_ = pause->paused;
   if (std::holds_alternative<Hello>(message)) on_bad_message("a second hello");
   if (const auto* bye = std::get_if<Bye>(&message)) on(*bye, {});
-}
-
-/// A pose in the scene before means nothing in this one.
-void Session::enter_scene(std::shared_ptr<const SceneEntry> scene) {
-  admission_.scene = std::move(scene);
-  pose_.reset();
-  forecast_ = CameraForecast(admission_.scene->facts.near_z);
-  welcome_due_ = true;
 }
 
 void Session::on_lost(TimePoint now) {
@@ -181,14 +173,6 @@ void Session::on(const Ack& ack, TimePoint now) {
 void Session::on(const Settings& settings, TimePoint now) {
   note_activity(now);
   settings_ = settings;
-  request_stream();
-}
-
-void Session::on(const SelectScene& select, TimePoint now) {
-  note_activity(now);
-  auto found = host_.find_scene(select.scene_id);
-  if (const auto* error = std::get_if<ErrorMessage>(&found)) return say(*error, now);
-  enter_scene(std::get<std::shared_ptr<const SceneEntry>>(std::move(found)));
   request_stream();
 }
 
@@ -382,6 +366,8 @@ void Session::say(const ServerMessage& message, TimePoint now) {
 void Session::on_tick(TimePoint now) {
   if (state_ == State::awaiting_hello && now - created_ >= policy_.hello_timeout)
     return fail(ErrorCode::bad_message, "no hello within the time limit");
+  if (awaited_scene_ && !lost_at_ && state_ != State::closed && state_ != State::opening)
+    ask_for_scene(now);
   if (state_ == State::closed || state_ == State::queued) return;
   if (lost_at_) {
     if (now - *lost_at_ >= policy_.resume_grace) state_ = State::closed;

@@ -19,6 +19,7 @@
 #include "server/session/camera_forecast.h"
 #include "server/session/flow_control.h"
 #include "server/session/rate_limit.h"
+#include "server/session/scene_source.h"
 
 namespace catgs {
 
@@ -49,7 +50,10 @@ struct Admission {
 };
 
 /// What a hello comes to.
-using AdmissionAnswer = std::variant<Admission, QueuePlace, ErrorMessage>;
+using AdmissionAnswer = std::variant<Admission, QueuePlace, SceneAwaited, ErrorMessage>;
+
+/// Ticks come every 250 ms, and a client hears something at least once a second.
+inline constexpr std::chrono::milliseconds speak_at_least_every{750};
 
 struct SessionPolicy {
   std::chrono::milliseconds hello_timeout{5000};
@@ -73,8 +77,7 @@ class SessionHost {
  public:
   virtual ~SessionHost() = default;
   virtual AdmissionAnswer admit(const Hello& hello) = 0;
-  virtual std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
-      const std::string& scene_id) = 0;
+  virtual SceneAnswer find_scene(const std::string& scene_id) = 0;
   virtual std::vector<std::string> scene_ids() = 0;
   virtual std::uint32_t session_count() = 0;
   /// Fills in the welcome's tokens.
@@ -131,7 +134,7 @@ class Session {
   void on_queue_moved(const QueuePlace& place, TimePoint now) {
     if (state_ == State::queued) say(place, now);
   }
-  /// While queued: there may be a place now.
+  /// While queued for a place: there may be one now.
   void ask_again(TimePoint now);
   void on_disconnected() { state_ = State::closed; }
   /// The connection is gone without a farewell. After the grace the session closes.
@@ -139,6 +142,8 @@ class Session {
   /// The client is back, perhaps with other wishes. It gets a welcome, then an IDR. Only while
   /// resumable().
   void on_resumed(const Hello& hello, Admission admission, TimePoint now);
+  /// It waits for its scene and not for a place.
+  [[nodiscard]] bool awaits_scene() const { return awaited_scene_.has_value(); }
   [[nodiscard]] bool resumable() const { return state_ == State::opening || state_ == State::live; }
 
   /// When the next frame may start; none: there is nothing to show or no credit.
@@ -176,6 +181,10 @@ class Session {
 
   void greet(const Hello& hello, TimePoint now);
   void on_queued(const ClientMessage& message);
+  /// A scene is being loaded: notes which one, and tells the client how long that may take.
+  void await_scene(const std::string& scene_id, const SceneAwaited& awaited, TimePoint now);
+  void ask_for_scene(TimePoint now);
+  void select(const std::string& scene_id, TimePoint now);
   void enter_scene(std::shared_ptr<const SceneEntry> scene);
   /// Somebody is there: the time to release starts anew, and so does its warning.
   void note_activity(TimePoint now);
@@ -197,6 +206,9 @@ class Session {
   const TimePoint created_;
 
   Hello waiting_hello_;  // while queued
+  /// Not in memory yet: that of the waiting hello, or the one that a live client has selected.
+  std::optional<std::string> awaited_scene_;
+  TimePoint told_of_scene_{};
   Admission admission_;
   glm::ivec2 viewport_px_{0};
   Settings settings_;

@@ -59,14 +59,13 @@ std::int64_t unix_now_s() {
 }
 
 SessionRegistry::SessionRegistry(boost::asio::io_context& io, RegistryOptions options,
-                                 std::shared_ptr<FrameExecutor> executor,
-                                 std::vector<std::shared_ptr<const SceneEntry>> scenes,
+                                 std::shared_ptr<FrameExecutor> executor, SceneSource& scenes,
                                  std::vector<EncoderChoice> encoders, Authorize authorize,
                                  SessionTokens tokens, Metrics& metrics)
     : io_(io),
       options_(std::move(options)),
       executor_(std::move(executor)),
-      scenes_(std::move(scenes)),
+      scenes_(scenes),
       encoders_(std::move(encoders)),
       authorize_(std::move(authorize)),
       tokens_(std::move(tokens)),
@@ -122,13 +121,17 @@ void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_pt
   if (resumed && hello.version >= wire::version) {
     if (hello.scene_id.empty()) hello.scene_id = resumed->scene_id;
     if (const auto known = find(resumed->session_id)) {
-      auto choice = choose(hello);
-      if (auto* admission = std::get_if<Admission>(&choice);
-          admission && known->session().resumable()) {
-        metrics_.sessions_resumed.Increment();
-        newcomer->detach();
-        remove(*newcomer);
-        return known->resume(peer, hello, std::move(*admission), now);
+      // Its own scene is in memory; who wants another one begins anew, and may have to wait.
+      const auto choice = choose(hello);
+      if (const auto* chosen = std::get_if<Choice>(&choice);
+          chosen && known->session().resumable()) {
+        auto scene = find_scene(chosen->scene_id, now);
+        if (auto* entry = std::get_if<std::shared_ptr<const SceneEntry>>(&scene)) {
+          metrics_.sessions_resumed.Increment();
+          newcomer->detach();
+          remove(*newcomer);
+          return known->resume(peer, hello, {std::move(*entry), chosen->encoder}, now);
+        }
       }
     } else {
       // It comes from another server of the fleet, or comes late: its id goes on.
@@ -195,7 +198,7 @@ void SessionRegistry::admit_waiting(TimePoint now) {
   }
   queue_told_ = now;
   for (const auto& client : clients_)
-    if (client->session().state() == Session::State::queued)
+    if (client->session().state() == Session::State::queued && !client->session().awaits_scene())
       if (const auto position = queue_.join(client->session().id()); position > 1)
         client->session().on_queue_moved(
             {*position, queue_.estimate(*position, static_cast<int>(admitted_))}, now);
@@ -207,25 +210,24 @@ std::shared_ptr<Client> SessionRegistry::find(std::string_view session_id) const
   return it == clients_.end() ? nullptr : *it;
 }
 
-std::shared_ptr<const SceneEntry> SessionRegistry::find_scene(const std::string& scene_id) const {
-  if (scene_id.empty()) return scenes_.front();
-  const auto it = std::ranges::find_if(
-      scenes_, [&](const auto& scene) { return scene->facts.scene_id == scene_id; });
-  return it == scenes_.end() ? nullptr : *it;
+SceneAnswer SessionRegistry::find_scene(const std::string& scene_id, TimePoint now) {
+  if (scenes_.has(scene_id)) return scenes_.want(scene_id, now);
+  return ErrorMessage{ErrorCode::unknown_scene,
+                      fmt::format("there is no scene \"{}\" here", scene_id), false};
 }
 
-std::variant<Admission, ErrorMessage> SessionRegistry::choose(const Hello& hello) const {
-  const auto scene = find_scene(hello.scene_id);
+std::variant<SessionRegistry::Choice, ErrorMessage> SessionRegistry::choose(
+    const Hello& hello) const {
+  const std::string wanted = hello.scene_id.empty() ? scenes_.default_scene() : hello.scene_id;
   // The token first: a refusal does not depend on what is here.
-  const std::string& wanted_scene = scene ? scene->facts.scene_id : hello.scene_id;
-  if (const auto refusal = authorize_(hello.token, wanted_scene, Use::own_session))
+  if (const auto refusal = authorize_(hello.token, wanted, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, true};
-  if (!scene)
+  if (!scenes_.has(wanted))
     return ErrorMessage{ErrorCode::unknown_scene,
-                        fmt::format("there is no scene \"{}\" here", hello.scene_id), true};
+                        fmt::format("there is no scene \"{}\" here", wanted), true};
   for (const Codec codec : hello.decoders)
     for (const auto& encoder : encoders_)
-      if (encoder.codec == codec) return Admission{scene, encoder};
+      if (encoder.codec == codec) return Choice{wanted, encoder};
   std::string offered;
   for (const auto& encoder : encoders_) offered += (offered.empty() ? "" : "; ") + encoder.text;
   return ErrorMessage{ErrorCode::no_common_codec,
@@ -268,9 +270,14 @@ AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello)
   }
   if (has_place_for(client, hello)) {
     queue_.leave(id);
+    auto& [scene_id, encoder] = std::get<Choice>(choice);
+    // Who waits for a scene holds no place: it may come to nothing.
+    auto scene = find_scene(scene_id, Clock::now());
+    if (const auto* awaited = std::get_if<SceneAwaited>(&scene)) return *awaited;
+    if (auto* error = std::get_if<ErrorMessage>(&scene)) return std::move(*error);
     ++admitted_;
     metrics_.sessions_admitted.Increment();
-    return std::get<Admission>(std::move(choice));
+    return Admission{std::get<0>(std::move(scene)), std::move(encoder)};
   }
   if (const auto position = queue_.join(id))
     return QueuePlace{*position, queue_.estimate(*position, static_cast<int>(admitted_))};
@@ -310,6 +317,7 @@ void SessionRegistry::give_frames() {
 void SessionRegistry::tick() {
   if (stopped_) return;
   const TimePoint now = Clock::now();
+  scenes_.on_tick(now);
   std::vector<std::shared_ptr<Client>> gone;
   for (const auto& client : clients_) {
     client->on_tick(now);

@@ -41,11 +41,9 @@ std::int64_t unix_now_s();
 /// lock.
 class SessionRegistry {
  public:
-  /// `scenes` and `encoders` are not empty; the first scene is the default, encoders are best
-  /// first.
+  /// `scenes` outlives the registry; `encoders` are not empty, and best first.
   SessionRegistry(boost::asio::io_context& io, RegistryOptions options,
-                  std::shared_ptr<FrameExecutor> executor,
-                  std::vector<std::shared_ptr<const SceneEntry>> scenes,
+                  std::shared_ptr<FrameExecutor> executor, SceneSource& scenes,
                   std::vector<EncoderChoice> encoders, Authorize authorize, SessionTokens tokens,
                   Metrics& metrics);
 
@@ -71,8 +69,12 @@ class SessionRegistry {
                 TimePoint now);
   /// Lets a newcomer look on at the session of its watch token, or says why not.
   void watch(const std::shared_ptr<Peer>& peer, Client& newcomer, const Hello& hello);
-  /// Scene and encoder for a hello, whether there is a place or not.
-  std::variant<Admission, ErrorMessage> choose(const Hello& hello) const;
+  /// What a hello asks for and may have, whether there is a place or not.
+  struct Choice {
+    std::string scene_id;
+    EncoderChoice encoder;
+  };
+  std::variant<Choice, ErrorMessage> choose(const Hello& hello) const;
   AdmissionAnswer admit(const Client& client, const Hello& hello);
   [[nodiscard]] bool has_place_for(const Client& client, const Hello& hello) const;
   /// Of the admitted sessions, as measured.
@@ -83,7 +85,7 @@ class SessionRegistry {
   /// Those next in the queue ask again; the others hear where they stand.
   void admit_waiting(TimePoint now);
   [[nodiscard]] std::shared_ptr<Client> find(std::string_view session_id) const;
-  std::shared_ptr<const SceneEntry> find_scene(const std::string& scene_id) const;
+  SceneAnswer find_scene(const std::string& scene_id, TimePoint now);
   /// Starts frames while a slot is free and a session is ready; sets the timer for the next one.
   void give_frames();
   void tick();
@@ -92,7 +94,7 @@ class SessionRegistry {
   boost::asio::io_context& io_;
   const RegistryOptions options_;
   const std::shared_ptr<FrameExecutor> executor_;
-  const std::vector<std::shared_ptr<const SceneEntry>> scenes_;
+  SceneSource& scenes_;
   const std::vector<EncoderChoice> encoders_;
   const Authorize authorize_;
   const SessionTokens tokens_;

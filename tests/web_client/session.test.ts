@@ -2,6 +2,7 @@ import { beforeEach, describe, expect, it } from 'vitest';
 import { backoff_ms } from '#client/session/backoff';
 import { greeting_ms, Session, silence_ms } from '#client/session/session';
 import type { SessionState } from '#client/session/state';
+import { card_for } from '#client/ui/wording';
 import { Codec, Error_Code } from '#client/wire/wire';
 import { fake_network, FakeTime, type FakeSocket } from './fakes';
 
@@ -98,7 +99,13 @@ describe('greeting', () => {
     session.start();
     socket(0).events.opened();
     socket(0).say({ case: 'queue', value: { position: 3, estimateS: 40 } });
-    expect(last_state()).toEqual({ phase: 'queued', position: 3, estimate_s: 40 });
+    const waiting: SessionState = { phase: 'queued', position: 3, estimate_s: 40, for_scene: false };
+    expect(last_state()).toEqual(waiting);
+    socket(0).say({ case: 'queue', value: { position: 1, estimateS: 9, forScene: true } });
+    const loading: SessionState = { phase: 'queued', position: 1, estimate_s: 9, for_scene: true };
+    expect(last_state()).toEqual(loading);
+    expect(card_for(loading, false)?.title).toBe('Loading the scene');
+    expect(card_for(waiting, false)?.title).toContain('Number 3');
   });
 
   it('gives up a server that accepts and says nothing', () => {

@@ -20,8 +20,9 @@ struct FakeHost final : SessionHost {
   std::optional<CloseCode> closed;
 
   AdmissionAnswer admit(const Hello&) override { return admission; }
-  std::variant<std::shared_ptr<const SceneEntry>, ErrorMessage> find_scene(
-      const std::string& id) override {
+  bool scene_awaited = false;
+  SceneAnswer find_scene(const std::string& id) override {
+    if (scene_awaited) return SceneAwaited{5s};
     auto scene = std::make_shared<SceneEntry>();
     scene->facts.scene_id = id;
     return scene;
@@ -60,13 +61,16 @@ class SessionTest : public testing::Test {
   }
 
   void greet(Settings settings = {}) {
+    say_hello(settings);
+    open_stream();
+  }
+  void say_hello(Settings settings = {}) {
     Hello hello;
     hello.version = 1;
     hello.viewport_px = {640, 361};
     hello.decoders = {Codec::h264};
     hello.settings = settings;
     session.on_message(hello, now);
-    open_stream();
   }
   void open_stream() {
     session.on_stream_opened({true, "", Codec::h264, "avc1.42C01F", "libx264"}, now);

@@ -330,5 +330,65 @@ TEST_F(SessionTest, SaysWhatARayMeetsButNotEndlessly) {
   EXPECT_EQ(std::get<Picked>(host.said.back()).id, 100u);
 }
 
+TEST_F(SessionTest, AHelloWaitsForItsSceneAndIsTold) {
+  const AdmissionAnswer admission = std::exchange(host.admission, SceneAwaited{5s});
+  say_hello();
+  EXPECT_TRUE(host.opened.empty());
+  ASSERT_EQ(host.count<QueuePlace>(), 1);
+  EXPECT_TRUE(std::get<QueuePlace>(host.said.back()).for_scene);
+  EXPECT_EQ(std::get<QueuePlace>(host.said.back()).estimate, 5s);
+  for (int tick = 0; tick < 8; ++tick) session.on_tick(now += 250ms);
+  EXPECT_EQ(host.count<QueuePlace>(), 3) << "about once a second";
+  host.admission = admission;
+  session.on_tick(now += 250ms);
+  ASSERT_EQ(host.opened.size(), 1u);
+  open_stream();
+  EXPECT_EQ(host.count<Welcome>(), 1);
+  for (int tick = 0; tick < 8; ++tick) session.on_tick(now += 250ms);
+  EXPECT_EQ(host.count<QueuePlace>(), 3);
+  EXPECT_EQ(host.opened.size(), 1u);
+}
+
+TEST_F(SessionTest, AHelloWhoseSceneFailsIsRefused) {
+  host.admission = SceneAwaited{5s};
+  say_hello();
+  host.admission = ErrorMessage{ErrorCode::unknown_scene, "it could not be loaded", false};
+  session.on_tick(now += 250ms);
+  EXPECT_EQ(host.last_error().code, ErrorCode::unknown_scene);
+  EXPECT_EQ(session.state(), Session::State::closed);
+}
+
+TEST_F(SessionTest, TheOldSceneIsShownWhileTheNextOneIsLoaded) {
+  greet();
+  pose(1, 0.0f);
+  run_frame();
+  ack(1);
+  host.scene_awaited = true;
+  session.on_message(SelectScene{"b"}, now);
+  EXPECT_TRUE(std::get<QueuePlace>(host.said.back()).for_scene);
+  pose(2, 1.0f);
+  now += 1s;
+  EXPECT_TRUE(frame_is_due());
+  session.on_tick(now += 250ms);
+  EXPECT_EQ(host.opened.size(), 1u);
+  host.scene_awaited = false;
+  session.on_tick(now += 250ms);
+  ASSERT_EQ(host.opened.size(), 2u);
+  open_stream();
+  EXPECT_EQ(std::get<Welcome>(host.said.back()).scene.scene_id, "b");
+}
+
+TEST_F(SessionTest, WhoLooksAtAnotherSceneMeanwhileWaitsNoMore) {
+  greet();
+  host.scene_awaited = true;
+  session.on_message(SelectScene{"b"}, now);
+  host.scene_awaited = false;
+  session.on_message(SelectScene{"c"}, now);
+  open_stream();
+  for (int tick = 0; tick < 4; ++tick) session.on_tick(now += 250ms);
+  EXPECT_EQ(host.opened.size(), 2u);
+  EXPECT_EQ(session.scene()->facts.scene_id, "c");
+}
+
 }  // namespace
 }  // namespace catgs

@@ -27,6 +27,15 @@ struct FakeConnection final : Connection {
   [[nodiscard]] std::size_t queued_frames() const override { return 0; }
 };
 
+/// No test here is about scenes.
+struct NoScenes final : SceneSource {
+  [[nodiscard]] std::string default_scene() const override { return {}; }
+  [[nodiscard]] std::vector<std::string> scene_ids() const override { return {}; }
+  [[nodiscard]] bool has(const std::string&) const override { return false; }
+  SceneAnswer want(const std::string&, TimePoint) override { return SceneAwaited{}; }
+  void on_tick(TimePoint) override {}
+};
+
 class SpectatorHubTest : public testing::Test {
  protected:
   std::shared_ptr<FakeConnection> join() {
@@ -45,10 +54,11 @@ class SpectatorHubTest : public testing::Test {
   TimePoint now = TimePoint{} + 1h;
   boost::asio::io_context io;
   Metrics metrics;
+  NoScenes scenes;
   SessionRegistry registry{io,
                            {},
                            std::make_shared<PoolExecutor>(std::make_shared<ThreadPool>(1)),
-                           {std::make_shared<SceneEntry>()},
+                           scenes,
                            {EncoderChoice{}},
                            [](const auto&, const auto&, Use) { return std::nullopt; },
                            SessionTokens("a key"),

@@ -264,8 +264,13 @@ export class Session {
         break;
       case 'queue':
         if (link === this.link_) {
-          const { position, estimateS } = body.value;
-          this.listener_.state({ phase: 'queued', position, estimate_s: estimateS });
+          const { position, estimateS, forScene } = body.value;
+          this.listener_.state({
+            phase: 'queued',
+            position,
+            estimate_s: estimateS,
+            for_scene: forScene,
+          });
         }
         break;
       case 'stats':

@@ -3,7 +3,7 @@ import type { Error_Code } from '../wire/wire';
 /** Where the session stands, for the page to show. */
 export type SessionState =
   | { phase: 'connecting'; attempt: number }
-  | { phase: 'queued'; position: number; estimate_s: number }
+  | { phase: 'queued'; position: number; estimate_s: number; for_scene: boolean }
   | { phase: 'live' }
   /** A new attempt follows by itself. */
   | { phase: 'waiting'; cause: WaitCause; retry_in_ms: number; message: string }

@@ -29,6 +29,12 @@ export function card_for(
     case 'connecting':
       return { title: has_picture ? 'Reconnecting' : 'Connecting', text: '', busy: true };
     case 'queued':
+      if (state.for_scene)
+        return {
+          title: 'Loading the scene',
+          text: `It is not in the server's memory yet. That takes about ${duration(state.estimate_s)}.`,
+          busy: true,
+        };
       return {
         title: `Number ${state.position} in the queue`,
         text: `The server is full. Your turn comes in about ${duration(state.estimate_s)}; leave this page open.`,

@@ -1,0 +1,308 @@
+#include "server/scene_library.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/error.h"
+#include "render_core/scene/json_field.h"
+#include "render_core/thread_pool.h"
+#include "server/scene_catalog.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto scan_interval = 30s;
+constexpr auto retry_after_failure = 30s;
+
+std::vector<std::filesystem::path> paths(const std::vector<std::string>& names) {
+  return {names.begin(), names.end()};
+}
+
+LoadOptions size_options(const ServerConfig& config) {
+  LoadOptions options;
+  if (config.lod >= 0) options.lod = config.lod;
+  if (config.gaussian_budget > 0)
+    options.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
+  return options;
+}
+
+ResidencyLimits residency_limits(const ServerConfig& config) {
+  constexpr std::uint64_t megabyte = 1'000'000;
+  return {static_cast<std::uint64_t>(config.scene_memory_mb) * megabyte,
+          std::chrono::seconds(config.scene_residency_s)};
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
+}
+
+}  // namespace
+
+SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
+                           boost::asio::io_context& io, Metrics& metrics)
+    : config_(config),
+      core_(std::move(core)),
+      io_(io),
+      metrics_(metrics),
+      folders_(paths(config.scene_folders), size_options(config)),
+      residency_(residency_limits(config)) {
+  for (auto& entry : load_scenes(config_, core_)) pin(std::move(entry));
+  if (!config_.scene_folders.empty()) open_folders();
+  publish();
+}
+
+/// A server that is up can show something: without another scene, their first one is loaded.
+void SceneLibrary::open_folders() {
+  merge(folders_.scan());
+  next_scan_ = Clock::now() + scan_interval;
+  spdlog::info("{} scenes in folders, loaded when somebody asks for them", ids_.size());
+  if (!default_scene_.empty()) return;
+  if (shelf_.empty())
+    throw InputError("--scene-folder " + config_.scene_folders.front(), {}, "holds no scene",
+                     "put one there, or give --scene");
+  const auto& [id, book] = *shelf_.begin();
+  const TimePoint now = Clock::now();
+  const auto wish = residency_.want(id, book.found.size.bytes(), now, in_use());
+  if (wish != SceneResidency::Wish::awaited)
+    throw InputError("--scene-memory", {}, refusal(wish, id, book).message);
+  residency_.next(now, in_use());
+  Loaded loaded = load(id, book.found);
+  if (!loaded.entry) throw InputError("--scene-folder", {}, loaded.error);
+  default_scene_ = id;
+  on_loaded(id, std::move(loaded), now, Clock::now());
+}
+
+SceneLibrary::~SceneLibrary() {
+  stopping_ = true;
+  loader_.join();
+}
+
+void SceneLibrary::pin(std::shared_ptr<const SceneEntry> entry) {
+  const std::string& id = entry->facts.scene_id;
+  if (default_scene_.empty()) default_scene_ = id;
+  residency_.pin(id, entry->renderer->scene_bytes());
+  Book& book = shelf_[id];
+  book.found.name = entry->facts.title;
+  book.found.size.gaussians = entry->facts.gaussians;
+  book.pinned = true;
+  book.entry = std::move(entry);
+}
+
+std::vector<std::string> SceneLibrary::scene_ids() const {
+  std::vector<std::string> ids;
+  for (const auto& [id, book] : shelf_)
+    if (!gone(book)) ids.push_back(id);
+  // The one that newcomers get is the first that they see.
+  if (const auto it = std::ranges::find(ids, default_scene_); it != ids.end())
+    std::rotate(ids.begin(), it, it + 1);
+  return ids;
+}
+
+bool SceneLibrary::gone(const Book& book) const {
+  return !book.pinned && !ids_.contains(book.found.path);
+}
+
+/// The shelf is the only owner of what nobody uses. Sessions come to a scene on this thread alone,
+/// so that a scene found unused stays so; that others end meanwhile does no harm.
+bool SceneLibrary::in_use(const Book& book) {
+  return book.entry && (book.entry.use_count() > 1 || book.entry->renderer.use_count() > 1);
+}
+
+SceneResidency::InUse SceneLibrary::in_use() const {
+  return [this](const std::string& id) {
+    const auto it = shelf_.find(id);
+    return it != shelf_.end() && in_use(it->second);
+  };
+}
+
+SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
+  Book& book = shelf_.at(id);
+  if (book.entry) {
+    residency_.note_use(id, now);
+    return book.entry;
+  }
+  if (now < book.retry_at)
+    return ErrorMessage{ErrorCode::unknown_scene,
+                        fmt::format("the scene \"{}\" could not be loaded", id), false};
+  const auto wish = residency_.want(id, book.found.size.bytes(), now, in_use());
+  if (wish != SceneResidency::Wish::awaited) return refusal(wish, id, book);
+  start_next(now);
+  return SceneAwaited{estimate(book.found.size.bytes())};
+}
+
+ErrorMessage SceneLibrary::refusal(SceneResidency::Wish wish, const std::string& id,
+                                   const Book& book) const {
+  if (wish == SceneResidency::Wish::too_large)
+    return {ErrorCode::unknown_scene,
+            fmt::format("the scene \"{}\" takes {}, more than this server has for scenes", id,
+                        megabytes(book.found.size.bytes())),
+            false};
+  if (wish == SceneResidency::Wish::no_room)
+    return {
+        ErrorCode::server_full,
+        fmt::format("there is no memory for \"{}\" while others look at other scenes: try again "
+                    "in a minute",
+                    id),
+        false};
+  return {ErrorCode::server_full, "other scenes are being loaded: try again in a minute", false};
+}
+
+void SceneLibrary::on_tick(TimePoint now) {
+  std::vector<std::string> outdated;
+  for (const auto& [id, book] : shelf_) {
+    if (!book.entry || book.pinned) continue;
+    if (in_use(book))
+      residency_.note_use(id, now);
+    else if (book.outdated)
+      outdated.push_back(id);
+  }
+  for (const std::string& id : outdated) release(id);
+  start_next(now);
+  if (!config_.scene_folders.empty() && now >= next_scan_) start_scan(now);
+}
+
+void SceneLibrary::start_next(TimePoint now) {
+  const auto step = residency_.next(now, in_use());
+  if (!step) return;
+  for (const std::string& id : step->release) release(id);
+  boost::asio::post(loader_, [this, id = step->load, found = shelf_.at(step->load).found, now] {
+    auto loaded = std::make_shared<Loaded>(load(id, found));
+    boost::asio::post(
+        io_, [this, id, loaded, now] { on_loaded(id, std::move(*loaded), now, Clock::now()); });
+  });
+}
+
+/// Freeing a scene may have to wait for its device: that is the loader's business too, and the next
+/// scene finds the memory free.
+void SceneLibrary::release(const std::string& id) {
+  Book& book = shelf_.at(id);
+  spdlog::info("scene {} released", id);
+  metrics_.scenes_released.Increment();
+  residency_.drop(id);
+  auto entry = std::exchange(book.entry, nullptr);
+  book.outdated = false;
+  if (gone(book)) shelf_.erase(id);
+  publish();
+  boost::asio::post(loader_, [entry = std::move(entry)]() mutable { entry.reset(); });
+}
+
+SceneLibrary::Loaded SceneLibrary::load(const std::string& id, const FoundScene& found) const {
+  try {
+    // Half of the processors go on with what visitors look at meanwhile.
+    const int threads = std::max(1, core_.pool->threads() / 2);
+    return {load_scene(
+                found.path.string(), [&](const auto&) { return id; }, config_, core_, threads,
+                [this](double) {
+                  if (stopping_) throw std::runtime_error("the server stops");
+                }),
+            {}};
+  } catch (const std::exception& error) {
+    return {nullptr, error.what()};
+  }
+}
+
+void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint started,
+                             TimePoint now) {
+  const auto it = shelf_.find(id);
+  if (!loaded.entry || it == shelf_.end()) {
+    spdlog::error("scene {} is not loaded: {}", id, loaded.error);
+    metrics_.scene_loads_failed.Increment();
+    residency_.failed(id);
+    if (it != shelf_.end()) it->second.retry_at = now + retry_after_failure;
+    return start_next(now);
+  }
+  const std::uint64_t bytes = loaded.entry->renderer->scene_bytes();
+  const double seconds = std::chrono::duration<double>(now - started).count();
+  bytes_per_second_ =
+      std::max(1e6, static_cast<double>(it->second.found.size.bytes()) / std::max(seconds, 0.1));
+  metrics_.scenes_loaded.Increment();
+  residency_.loaded(id, bytes, now);
+  it->second.entry = std::move(loaded.entry);
+  publish();
+  start_next(now);
+}
+
+void SceneLibrary::start_scan(TimePoint now) {
+  next_scan_ = now + scan_interval;
+  if (std::exchange(scanning_, true)) return;
+  boost::asio::post(loader_, [this] {
+    auto found = std::make_shared<std::optional<std::vector<FoundScene>>>();
+    try {
+      *found = folders_.scan();
+    } catch (const std::exception& error) {  // a mount that is away: what was there stays offered
+      spdlog::warn("{}", error.what());
+    }
+    boost::asio::post(io_, [this, found] {
+      scanning_ = false;
+      if (*found) merge(**std::move(found));
+    });
+  });
+}
+
+void SceneLibrary::merge(std::vector<FoundScene> found) {
+  std::map<std::filesystem::path, std::string> ids;
+  for (FoundScene& scene : found) {
+    const auto known = ids_.find(scene.path);
+    const std::string id = known != ids_.end() ? known->second : new_id(to_utf8(scene.name));
+    ids[scene.path] = id;
+    ids_[scene.path] = id;  // taken, for new_id()
+    Book& book = shelf_[id];
+    if (book.found.changed != scene.changed) {
+      book.outdated = book.entry != nullptr;
+      book.retry_at = {};
+    }
+    book.found = std::move(scene);
+  }
+  for (const auto& [path, id] : ids_) {
+    if (ids.contains(path)) continue;
+    Book& book = shelf_.at(id);
+    book.outdated = true;  // released when it is in nobody's use
+    if (!book.entry && !residency_.awaited(id)) shelf_.erase(id);
+  }
+  ids_ = std::move(ids);
+  if (!default_scene_.empty() && !shelf_.contains(default_scene_) && !shelf_.empty())
+    default_scene_ = shelf_.begin()->first;
+  publish();
+}
+
+std::string SceneLibrary::new_id(const std::string& name) const {
+  return unique_id(name, [this](const std::string& id) { return shelf_.contains(id); });
+}
+
+std::chrono::seconds SceneLibrary::estimate(std::uint64_t bytes) const {
+  const auto seconds = static_cast<double>(bytes) / bytes_per_second_;
+  return std::chrono::seconds(1 + static_cast<std::int64_t>(seconds));
+}
+
+void SceneLibrary::publish() {
+  auto listing = std::make_shared<std::vector<Listing>>();
+  for (const std::string& id : scene_ids()) {
+    const Book& book = shelf_.at(id);
+    listing->push_back({id, to_utf8(book.found.name), book.found.size.gaussians});
+    if (!book.entry) continue;
+    listing->back().loaded = true;
+    listing->back().tours = book.entry->tours;
+  }
+  metrics_.scenes_in_memory.Set(static_cast<double>(residency_.count()));
+  metrics_.scene_bytes.Set(static_cast<double>(residency_.bytes()));
+  const std::lock_guard lock(published_mutex_);
+  published_ = std::move(listing);
+}
+
+std::string SceneLibrary::renderer_text() const {
+  return shelf_.at(default_scene_).entry->renderer_text;
+}
+
+std::shared_ptr<const std::vector<SceneLibrary::Listing>> SceneLibrary::listing() const {
+  const std::lock_guard lock(published_mutex_);
+  return published_;
+}
+
+}  // namespace catgs

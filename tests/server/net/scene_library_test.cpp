@@ -1,0 +1,168 @@
+#include <filesystem>
+#include <functional>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/scene/save_scene.h"
+#include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/server_client.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+/// A server with the demo city in memory and scenes in a folder, one of which fits beside it.
+class SceneLibraryTest : public FolderTest {
+ protected:
+  SceneLibraryTest() {
+    // 236 bytes each as decoded: 1.2 MB.
+    save_scene(random_cloud(5000, 3, 1), folder_ / "attic.ply");
+    save_scene(random_cloud(5000, 3, 2), folder_ / "barn.ply");
+  }
+  void start() {
+    server_ = std::make_unique<RunningServer>([&](ServerConfig& config) {
+      config.scene_folders = {folder_.path()};
+      config.scene_memory_mb = 2;
+      config.scene_residency_s = 1;
+    });
+  }
+  static v1::ClientMessage hello(const std::string& scene) {
+    auto message = hello_message(64, 64, v1::CODEC_H264);
+    message.mutable_hello()->set_scene_id(scene);
+    return message;
+  }
+  std::unique_ptr<WireClient> connect() { return std::make_unique<WireClient>(server_->port()); }
+  /// Sends the hello; a scene that has to be loaded is waited for.
+  v1::Welcome visit(WireClient& client, const std::string& scene) {
+    client.send(hello(scene));
+    return client.receive_message(v1::ServerMessage::kWelcome).welcome();
+  }
+  v1::Error refusal(const std::string& scene) {
+    const auto client = connect();
+    client->send(hello(scene));
+    std::optional<v1::Error> error;
+    client->receive_until_closed(&error);
+    return error.value_or(v1::Error());
+  }
+  nlohmann::json listing() {
+    return nlohmann::json::parse(http_get(server_->port(), "/api/scenes").body).at("scenes");
+  }
+  bool loaded(const std::string& id) {
+    for (const auto& scene : listing())
+      if (scene.at("id") == id) return scene.at("loaded");
+    return false;
+  }
+  std::string metrics() { return http_get(server_->admin_port(), "/metrics").body; }
+  static void eventually(const std::function<bool()>& holds, const std::string& what) {
+    for (int i = 0; i < 2000 && !holds(); ++i) std::this_thread::sleep_for(10ms);
+    EXPECT_TRUE(holds()) << what;
+  }
+
+  std::unique_ptr<RunningServer> server_;
+};
+
+TEST_F(SceneLibraryTest, LoadsAnExhibitWhenSomebodyAsksForIt) {
+  start();
+  const auto scenes = listing();
+  ASSERT_EQ(scenes.size(), 3u) << scenes;
+  EXPECT_EQ(
+      scenes[0],
+      (nlohmann::json{{"id", "city"}, {"title", "city"}, {"gaussians", 2000}, {"loaded", true}}));
+  EXPECT_EQ(scenes[1].at("gaussians"), 5000) << "from the header alone";
+  EXPECT_FALSE(loaded("attic"));
+  const auto client = connect();
+  client->send(hello("attic"));
+  EXPECT_TRUE(client->receive_message(v1::ServerMessage::kQueue).queue().for_scene());
+  const auto welcome = client->receive_message(v1::ServerMessage::kWelcome).welcome();
+  EXPECT_EQ(welcome.scene().scene_id(), "attic");
+  EXPECT_EQ(welcome.scene().gaussians(), 5000u);
+  EXPECT_EQ(welcome.scene_ids_size(), 3);
+  client->send_pose(1);
+  EXPECT_TRUE(client->receive_frame().header.idr());
+  EXPECT_TRUE(loaded("attic"));
+  EXPECT_FALSE(loaded("barn"));
+  EXPECT_THAT(metrics(), HasSubstr("catgs_scenes_loaded_total 1"));
+  EXPECT_THAT(metrics(), HasSubstr("catgs_scenes_in_memory 2"));
+}
+
+TEST_F(SceneLibraryTest, MakesRoomOnlyWhenNobodyLooksAnyMore) {
+  start();
+  const auto first = connect();
+  visit(*first, "attic");
+  // Long enough that only its use keeps it.
+  std::this_thread::sleep_for(1500ms);
+  const v1::Error error = refusal("barn");
+  EXPECT_EQ(error.code(), v1::Error::SERVER_FULL);
+  EXPECT_THAT(error.message(), HasSubstr("no memory for \"barn\""));
+  EXPECT_TRUE(loaded("attic"));
+  first->close(1001);
+  const auto second = connect();
+  eventually([&] { return metrics().find("catgs_sessions 0") != std::string::npos; },
+             "the first has left");
+  EXPECT_EQ(visit(*second, "barn").scene().scene_id(), "barn");
+  EXPECT_FALSE(loaded("attic"));
+  EXPECT_THAT(metrics(), HasSubstr("catgs_scenes_released_total 1"));
+  EXPECT_TRUE(loaded("city")) << "what --scene names stays";
+}
+
+TEST_F(SceneLibraryTest, AVisitorGoesFromSceneToScene) {
+  start();
+  const auto client = connect();
+  EXPECT_EQ(visit(*client, "city").scene().scene_id(), "city");
+  v1::ClientMessage select;
+  select.mutable_select_scene()->set_scene_id("attic");
+  client->send(select);
+  EXPECT_EQ(client->receive_message(v1::ServerMessage::kWelcome).welcome().scene().scene_id(),
+            "attic");
+  client->send_pose(1);
+  EXPECT_TRUE(client->receive_frame().header.idr());
+}
+
+TEST_F(SceneLibraryTest, RefusesWhatIsTooLargeOrBroken) {
+  save_scene(random_cloud(9000, 3), folder_ / "palace.ply");
+  // The header is as it should be; all Gaussians are not numbers.
+  std::string broken = ply_bytes(random_cloud(50, 0));
+  const auto data = broken.find("end_header\n") + 11;
+  std::fill(broken.begin() + static_cast<std::ptrdiff_t>(data), broken.end(), '\xff');
+  write("ruin.ply", broken);
+  start();
+  v1::Error error = refusal("palace");
+  EXPECT_EQ(error.code(), v1::Error::UNKNOWN_SCENE);
+  EXPECT_THAT(error.message(), HasSubstr("takes 2.1 MB, more than this server has"));
+  error = refusal("ruin");
+  EXPECT_EQ(error.code(), v1::Error::UNKNOWN_SCENE);
+  EXPECT_THAT(error.message(), HasSubstr("could not be loaded"));
+  EXPECT_THAT(metrics(), HasSubstr("catgs_scene_loads_failed_total 1"));
+  const auto client = connect();
+  EXPECT_EQ(visit(*client, "attic").scene().scene_id(), "attic") << "the others go on";
+}
+
+TEST_F(SceneLibraryTest, ServesAFolderAlone) {
+  server_ = std::make_unique<RunningServer>([&](ServerConfig& config) {
+    config.scenes.clear();
+    config.scene_folders = {folder_.path()};
+  });
+  EXPECT_TRUE(loaded("attic")) << "a server that is up can show something";
+  const auto client = connect();
+  EXPECT_EQ(client->greet().scene().scene_id(), "attic");
+}
+
+TEST_F(SceneLibraryTest, AServerStopsWhileItLoads) {
+  save_scene(random_cloud(200'000, 3), folder_ / "large.ply");
+  server_ = std::make_unique<RunningServer>(
+      [&](ServerConfig& config) { config.scene_folders = {folder_.path()}; });
+  const auto client = connect();
+  client->send(hello("large"));
+  client->receive_message(v1::ServerMessage::kQueue);
+  server_->stop();
+  client->receive_until_closed();
+  server_->join();
+}
+
+}  // namespace
+}  // namespace catgs::test
