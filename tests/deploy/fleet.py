@@ -141,6 +141,10 @@ def prometheus(address, query):
     return json.loads(get(url))["data"]["result"]
 
 
+def ids(servers, *names):
+    return sorted(s["id"] for name in names or servers for s in servers[name].live())
+
+
 def stranger(address, forged):
     """A websocket with a made-up X-Forwarded-For that says something that is no message."""
     with socket.create_connection((address, 8080), timeout=5) as peer:
@@ -202,10 +206,12 @@ def run(options):
         check("101" in status and seen and "6.6.6.6" not in logs, f"a forged X-Forwarded-For {where} is ignored (the log says {sorted(set(seen))})")
 
     moved = len(servers["server-1"].live())
+    before = ids(servers)
     say(f"kill -9 of server-1 with {moved} sessions")
     podman("kill", "--signal", "KILL", "fleet-server-1")
     took = wait_until("all sessions are back", lambda: len(servers["server-2"].live()) == SESSIONS, 20)
     check(took <= 2.0, f"killed: all sessions are live on the other server after {took:.2f} s")
+    check(ids(servers, "server-2") == before, "each under its id: its resume token holds on the other server, and brings its pose")
     firing = 'count(ALERTS{alertname="CatgsServerDown", alertstate="firing"})'
     took = wait_until("the alert fires", lambda: prometheus(watcher, firing), 60)
     check(took < 60, f"CatgsServerDown fires {took:.0f} s after that")

@@ -7,6 +7,7 @@
   operations.py kubernetes              renders base and overlays (kubectl kustomize), asserts on them
   operations.py compose                 the compose file: what every service has to have
   operations.py metrics --server FILE   alerts and dashboard name only metrics that FILE serves
+  operations.py settings --server FILE  FILE knows every setting that files here give it
 
 Exit status: 0 good, 1 findings (one per line), 77 a tool is not installed.
 """
@@ -294,8 +295,31 @@ def check_metrics(options):
     return findings
 
 
+def check_settings(options):
+    """Configurations are read by the program itself, with files where theirs would be."""
+    findings = []
+    shown = subprocess.run([options.server, "--scene", "synth:city:1000", "--print-config"], capture_output=True, text=True, check=True)
+    known = set(re.findall(r"^(\S+) = ", shown.stdout, re.M))
+    with tempfile.TemporaryDirectory() as folder:
+        stand_in = pathlib.Path(folder, "file")
+        stand_in.write_text("a-secret-of-more-than-sixteen-bytes\n")
+        for file in sorted(DEPLOY.rglob("catgs.toml")):
+            config = pathlib.Path(folder, "catgs.toml")
+            config.write_text(re.sub(r'"/(secrets|tls|run/credentials)/[^"]*"', f'"{stand_in}"', file.read_text()))
+            findings += run(options.server, "--config", config, "--print-config")
+    for file in (DOCKER / "compose.yaml", DOCKER / "Dockerfile", *DEPLOY.rglob("*.yaml")):
+        # In compose, CATGS_SCENES and the like are variables of the file and stand in ${}.
+        text = re.sub(r"\$\{[^}]*\}|#.*", "", file.read_text())
+        for name in set(re.findall(r"\bCATGS_[A-Z_]+\b", text)) - {"CATGS_COMMIT"}:
+            if name[6:].lower().replace("_", "-") not in known:
+                findings.append(f"{file}: the server has no setting for {name}")
+    named = re.findall(r"^\| `--([a-z-]+)`", (DEPLOY / "README.md").read_text(), re.M)
+    findings += [f"deploy/README.md: there is no --{name}" for name in named if name not in known]
+    return findings if named else ["deploy/README.md: no settings are explained"]
+
+
 CHECKS = {"prometheus": check_prometheus, "haproxy": check_haproxy, "systemd": check_systemd,
-          "kubernetes": check_kubernetes, "compose": check_compose, "metrics": check_metrics}
+          "kubernetes": check_kubernetes, "compose": check_compose, "metrics": check_metrics, "settings": check_settings}
 
 
 def main():
