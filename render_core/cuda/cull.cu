@@ -17,11 +17,11 @@ constexpr int block_size = cluster_size;
 constexpr int warps = block_size / warp_size;
 constexpr int blocks_per_processor = 8;
 
-struct InSight {
-  const Cluster* clusters;
-  ListCuller culler;
-  __device__ bool operator()(std::uint32_t c) const { return !culler.outside(clusters[c]); }
-};
+// Apart from their selection, whose few blocks would test one cluster after another.
+__global__ void __launch_bounds__(block_size) sight_kernel(const CullParams p) {
+  const std::uint32_t c = blockIdx.x * block_size + threadIdx.x;
+  if (c < p.scene.cluster_count) p.seen[c] = p.culler.outside(p.scene.clusters[c]) ? 0 : 1;
+}
 
 template <bool sweeps>
 __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
@@ -65,11 +65,12 @@ __global__ void __launch_bounds__(block_size) compact_kernel(const CullParams p)
   }
 }
 
-cudaError_t select_clusters(void* scratch, std::size_t& bytes, const InSight& in_sight,
+cudaError_t select_clusters(void* scratch, std::size_t& bytes, const std::uint32_t* in_sight,
                             std::uint32_t* clusters, std::uint32_t* selected, std::uint32_t count,
                             cudaStream_t stream) {
-  return cub::DeviceSelect::If(scratch, bytes, thrust::make_counting_iterator(std::uint32_t{0}),
-                               clusters, selected, count, in_sight, stream);
+  return cub::DeviceSelect::Flagged(scratch, bytes,
+                                    thrust::make_counting_iterator(std::uint32_t{0}), in_sight,
+                                    clusters, selected, count, stream);
 }
 
 cudaError_t sum_seen(void* scratch, std::size_t& bytes, const Seen& seen, std::uint32_t* before,
@@ -85,9 +86,8 @@ cudaError_t sum_seen(void* scratch, std::size_t& bytes, const Seen& seen, std::u
 std::uint32_t cull_words(std::uint32_t cluster_count) { return cluster_count * warps; }
 
 std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
-  const ListCuller any(make_camera(Pose{}, {1, 1}, 1.0f), {});
   std::size_t select = 0, sum = 0;
-  check(select_clusters(nullptr, select, {nullptr, any}, nullptr, nullptr, cluster_count, nullptr),
+  check(select_clusters(nullptr, select, nullptr, nullptr, nullptr, cluster_count, nullptr),
         "cull scratch size");
   check(sum_seen(nullptr, sum, {nullptr, nullptr}, nullptr, cluster_count, nullptr),
         "cull scratch size");
@@ -97,9 +97,11 @@ std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
 void launch_cull(const CullParams& p, cudaStream_t stream) {
   const std::uint32_t count = p.scene.cluster_count;
   if (count == 0) return;
+  sight_kernel<<<blocks_for(count, block_size), block_size, 0, stream>>>(p);
+  check_launch("clusters in sight");
   std::size_t bytes = p.scratch.bytes;
-  check(select_clusters(p.scratch.memory, bytes, {p.scene.clusters, p.culler}, p.clusters,
-                        &p.counts->clusters, count, stream),
+  check(select_clusters(p.scratch.memory, bytes, p.seen, p.clusters, &p.counts->clusters, count,
+                        stream),
         "cull clusters");
   const std::uint32_t blocks =
       std::min(count, static_cast<std::uint32_t>(p.processors * blocks_per_processor));

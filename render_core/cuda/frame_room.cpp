@@ -13,6 +13,9 @@ constexpr int patience = 600;  // key frames
 constexpr int sorted_span = 240;
 constexpr int slices_span = 600;
 
+// What a large scene starts with: its first frame says how much of it is in view.
+constexpr std::uint64_t first_visible = 1u << 18, first_entries = 1u << 20;
+
 }  // namespace
 
 Room::Room(std::uint64_t first_guess, std::uint64_t limit, int span)
@@ -47,8 +50,10 @@ void Room::shrink_to(double part) {
 }
 
 FrameRoom::FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits)
-    : visible_(gaussians / 4 + 1, std::max(gaussians, 1u), sorted_span),
-      lists_(gaussians + 65536ull, std::max<std::uint64_t>(list_limit, 1), sorted_span),
+    : visible_(std::min<std::uint64_t>(gaussians / 4 + 1, first_visible), std::max(gaussians, 1u),
+               sorted_span),
+      lists_(std::min<std::uint64_t>(gaussians + 65536ull, first_entries),
+             std::max<std::uint64_t>(list_limit, 1), sorted_span),
       slices_(4096, splits ? std::numeric_limits<std::uint32_t>::max() : 0, slices_span) {}
 
 FrameSizes FrameRoom::sizes() const { return {visible_.size(), lists_.size(), slices_.size()}; }
