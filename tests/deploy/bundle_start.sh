@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# usage: bundle_start.sh BUILD_DIR
-# Packs BUILD_DIR by deploy/bundle.sh, unpacks it in a Debian 12 that has nothing but its base system, in namespaces without a
-# network, and starts it there: the page, /healthz, a picture. Its notices are looked at too.
+# usage: bundle_start.sh BUILD_DIR [debian | ubuntu]
+# Packs BUILD_DIR by deploy/bundle.sh, unpacks it in a Debian 12 (or Ubuntu 24.04) that has nothing but its base system,
+# in namespaces without a network, and starts it there: the page, /readyz, a picture. Its notices are looked at too.
 # Needs root and debootstrap, otherwise it says so and exits 77.
 set -euo pipefail
 # shellcheck source=tests/deploy/containers.sh
@@ -38,14 +38,22 @@ if [[ ${1:-} == --inside ]]; then
 fi
 
 build=$1
+system=${2:-debian}
 require_tools debootstrap xz unshare ip
 unshare --mount --pid --net --fork true 2>/dev/null || skip "namespaces are not allowed here"
 work=$(mktemp -d)
 trap 'rm -rf --one-file-system "$work"' EXIT
 "$source_dir/deploy/bundle.sh" --build "$build" --out "$work/bundle.tar.xz"
-mkdir -p "$cache/debootstrap"
-say "debootstrap"
-debootstrap --variant=minbase "--cache-dir=$cache/debootstrap" bookworm "$work/root" >"$work/log" 2>&1 || die "$(tail -n 5 "$work/log")"
+mkdir -p "$cache/$system"
+options=(--variant=minbase "--cache-dir=$cache/$system")
+target=(bookworm "$work/root")
+if [[ $system == ubuntu ]]; then
+  # Debian's debootstrap may not know the name noble, and has no keys of Ubuntu's: see fresh_start.sh.
+  target=(noble "$work/root" "" gutsy)
+  [[ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ]] || options+=(--no-check-gpg)
+fi
+say "debootstrap $system"
+debootstrap "${options[@]}" "${target[@]}" >"$work/log" 2>&1 || die "$(tail -n 5 "$work/log")"
 tar -C "$work/root" -xJf "$work/bundle.tar.xz"
 notices=$work/root/catgs/share/doc
 grep -q GPL "$notices/NOTICES.md" || die "no notices"

@@ -82,9 +82,12 @@ build_server_image() {
   local -a options=()
   if [[ -r ${NODE_EXTRA_CA_CERTS:-} ]]; then  # this machine's way to the npm registry
     build_base=localhost/catgs-build-base
-    container=$(buildah from "$base_image")
-    buildah config --env NODE_EXTRA_CA_CERTS=/run/extra_ca.crt "$container"
-    buildah commit --quiet --rm "$container" "$build_base" >/dev/null
+    # Made once: another image, even of the same content, would begin all layers anew.
+    if ! buildah inspect --type image "$build_base" >/dev/null 2>&1; then
+      container=$(buildah from "$base_image")
+      buildah config --env NODE_EXTRA_CA_CERTS=/run/extra_ca.crt "$container"
+      buildah commit --quiet --rm "$container" "$build_base" >/dev/null
+    fi
     options=(--volume "$NODE_EXTRA_CA_CERTS:/run/extra_ca.crt:ro" --build-arg "BUILD_BASE=$build_base")
   fi
   buildah bud --isolation chroot --layers --format docker --file "$source_dir/docker/Dockerfile" \
