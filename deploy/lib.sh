@@ -18,10 +18,12 @@ build_packages=(
 lan_packages=(openssl qrencode iproute2)
 test_packages=(libgtest-dev libgmock-dev python3 shellcheck clang-format-14)
 # What reads deploy/ and docker/: containers without a Docker engine, and the tools of operators.
+# runc and kubectl often come from elsewhere, and those conflict with the packages.
 deploy_test_packages=(
-  podman buildah runc netavark aardvark-dns iptables catatonit uidmap xz-utils iproute2
-  haproxy prometheus kubernetes-client python3-yaml
+  podman buildah netavark aardvark-dns iptables catatonit uidmap xz-utils iproute2
+  haproxy prometheus python3-yaml
 )
+command -v runc >/dev/null || deploy_test_packages+=(runc)
 
 # ---- messages ---------------------------------------------------------------------------------
 
@@ -161,6 +163,7 @@ detect_distribution() {
   distribution="${id:-unknown} ${version:-}"
   case "$distribution" in
     "debian 12")
+      command -v kubectl >/dev/null || deploy_test_packages+=(kubernetes-client)  # not in Ubuntu
       # Not the default 1.74, whose Asio coroutines break under clang.
       build_packages+=(libboost1.81-dev)
       test_packages+=(chromium)

@@ -25,6 +25,7 @@ USAGE
 readonly build_dir=$SOURCE_DIR/build/release
 log=$build_dir/test.log
 selection=()
+full=0
 
 parse_arguments() {
   while (($# > 0)); do
@@ -32,7 +33,7 @@ parse_arguments() {
       --quick) selection=(--label-regex '^(unit|integration|lint)$') ;;
       --full)
         selection=(--build-config Full)
-        test_packages+=(clang-tidy-14 debootstrap "${deploy_test_packages[@]}")
+        full=1
         ;;
       --log)
         (($# > 1)) || fail "$EXIT_USAGE" "--log needs a value. See --help."
@@ -58,6 +59,9 @@ run_tests() {
 main() {
   parse_arguments "$@"
   detect_distribution
+  if ((full)); then
+    test_packages+=(clang-tidy-14 debootstrap "${deploy_test_packages[@]}")
+  fi
   steps_begin 4 "$log"
   ensure_packages "${build_packages[@]}" "${test_packages[@]}"
   # Where nvcc is, the CUDA core must compile: for the GPU that is there, else for one generation.

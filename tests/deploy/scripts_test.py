@@ -109,6 +109,20 @@ class Scripts(Machine):
         self.assertIn("libboost1.83-dev", result.stderr)
         self.assertIn("libgtest-dev", result.stderr)
 
+    def test_the_full_tests_get_what_they_deploy_with(self):
+        self.stand_in("id", "echo 1000")
+        self.stand_in("sudo", "exit 1")
+        self.stand_in("dpkg-query", "exit 1")
+        for name in ("runc", "kubectl"):
+            self.stand_in(name, "exit 0")
+        options = ["--log", str(self.folder / "log")]
+        result = self.run_script(TEST, "--full", *options)
+        self.assertEqual(result.returncode, 3, result.stdout + result.stderr)
+        self.assertRegex(result.stderr, r"\bbuildah\b.*\bhaproxy\b")
+        # They are there already, perhaps by packages that exclude Debian's.
+        self.assertNotRegex(result.stderr, r"\brunc\b|\bkubernetes-client\b")
+        self.assertNotIn("buildah", self.run_script(TEST, *options).stderr)
+
     def test_packages_are_listed_before_they_are_installed_and_none_is_removed(self):
         self.stand_in("id", "echo 0")
         self.stand_in("dpkg-query", 'shift 2; for p; do [[ $p == cmake ]] || echo "installed $p"; done')
