@@ -15,6 +15,7 @@
 #include "render_core/scene/scene.h"
 #include "render_core/scene/synth.h"
 #include "render_core/thread_pool.h"
+#include "server/poster.h"
 #include "server/tours.h"
 
 namespace catgs {
@@ -118,6 +119,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
+  entry->poster = make_poster(*entry->renderer, entry->facts);
   spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}",
                entry->facts.scene_id, entry->facts.gaussians, scene.format,
                static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);

@@ -289,6 +289,7 @@ void SceneLibrary::publish() {
     if (!book.entry) continue;
     listing->back().loaded = true;
     listing->back().tours = book.entry->tours;
+    listing->back().poster = book.entry->poster;
   }
   metrics_.scenes_in_memory.Set(static_cast<double>(residency_.count()));
   metrics_.scene_bytes.Set(static_cast<double>(residency_.bytes()));

@@ -33,7 +33,8 @@ class SceneLibrary final : public SceneSource {
     std::string title;
     std::uint64_t gaussians = 0;
     bool loaded = false;
-    std::string tours = "{}";  // of a loaded one; see tours.h
+    std::string tours = "{}";                     // of a loaded one; see tours.h
+    std::shared_ptr<const std::string> poster{};  // of a loaded one; a JPEG file
   };
 
   /// Loads what --scene names, and where it names nothing, the first scene of the folders: a server

@@ -1,6 +1,7 @@
 #include "server/server.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -75,6 +76,10 @@ SessionTokens session_tokens(const ServerConfig& config) {
   return SessionTokens(random_key());
 }
 
+/// What there is to read of a scene, and where: "/api/scenes/ID<name>".
+enum class ScenePart { tours, poster };
+constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
+
 /// The id in "/api/scenes/ID<what>".
 std::optional<std::string_view> scene_of(std::string_view path, std::string_view what) {
   constexpr std::string_view folder = "/api/scenes/";
@@ -109,7 +114,7 @@ struct Server::State {
   [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
   HttpResponse list_scenes(const std::string& token);
-  HttpResponse scene_tours(std::string_view scene_id, const std::string& token);
+  HttpResponse part_of_scene(std::string_view scene_id, ScenePart part, const std::string& token);
   HttpResponse respond_admin(const HttpRequest& request);
   void print_banner() const;
   void wait_for_signal();
@@ -167,8 +172,9 @@ std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& r
 HttpResponse Server::State::respond(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
   if (request.path == "/api/scenes") return list_scenes(bearer_token(request.authorization));
-  if (const auto id = scene_of(request.path, "/tours"))
-    return scene_tours(*id, bearer_token(request.authorization));
+  for (const ScenePart part : {ScenePart::tours, ScenePart::poster})
+    if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
+      return part_of_scene(*id, part, bearer_token(request.authorization));
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   return client.respond(request);
 }
@@ -191,13 +197,21 @@ HttpResponse Server::State::list_scenes(const std::string& token) {
   return text_response(200, nlohmann::json{{"scenes", list}}.dump(), "application/json");
 }
 
-HttpResponse Server::State::scene_tours(std::string_view scene_id, const std::string& token) {
+HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart part,
+                                          const std::string& token) {
   if (const auto refused = access.refusal(token, scene_id, unix_now_s(), Use::list))
     return text_response(401, "401: " + *refused + "\nSend it as Authorization: Bearer TOKEN\n");
   const auto listing = scenes->listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
-  return text_response(200, found->tours, "application/json");
+  if (part == ScenePart::tours) return text_response(200, found->tours, "application/json");
+  if (!found->poster)
+    return text_response(404, "404: the scene has no poster, or waits for its first visit\n");
+  HttpResponse response;
+  response.content_type = "image/jpeg";
+  response.cache_control = "private, max-age=60";
+  response.body = found->poster;
+  return response;
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {

@@ -29,7 +29,8 @@ struct SceneEntry {
   std::shared_ptr<Renderer> renderer;
   std::string renderer_text;  // description and reason, for people
   std::shared_ptr<const SurfacePoints> surface{};
-  std::string tours = "{}";  // for pages; see tours.h
+  std::string tours = "{}";                     // for pages; see tours.h
+  std::shared_ptr<const std::string> poster{};  // a JPEG file; null: none
 
   [[nodiscard]] Picked seen_along(const Pick& ray) const {
     return {ray.id, surface ? surface->distance_along(ray.origin, ray.direction) : std::nullopt};

@@ -1,4 +1,5 @@
 // The client against the real server: what a visitor does, and what happens when things go wrong.
+import { execFileSync } from 'node:child_process';
 import { cpSync, mkdtempSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
@@ -270,6 +271,70 @@ describe('trouble', () => {
     await settle(invited);
     expect(guarded.log()).not.toContain('a-long-and-secret-token');
     await guarded.stop();
+  });
+
+  it('a certificate of one\'s own is enough for video under another name', async () => {
+    const [cert, key] = ['cert.pem', 'key.pem'].map((name) => path.join(folder, name)) as [string, string];
+    execFileSync(
+      'openssl',
+      [
+        ...['req', '-x509', '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes'],
+        ...['-days', '2', '-subj', '/CN=catgs', '-keyout', key, '-out', cert],
+      ],
+      { stdio: 'ignore' },
+    );
+    const secure = await start_server(scene, [
+      ...['--tls-cert', cert, '--tls-key', key, '--allow-origin', `https://${insecure_host}`],
+    ]);
+    const { page, errors } = await open_viewer(
+      { viewport: { width: 640, height: 360 }, ignoreHTTPSErrors: true },
+      secure.url.replace('127.0.0.1', insecure_host),
+    );
+    await settle(page);
+    expect(page.url()).toMatch(/^https:/);
+    await page.keyboard.press('KeyI');
+    await page.locator('#stats-panel').getByText(/libx264/).waitFor();
+    expect(await page.locator('#notice').isHidden()).toBe(true);
+    expect(errors).toEqual([]);
+    await secure.stop();
+  });
+
+  it('a visitor without a place waits in line, with the scene in view, and gets in', async () => {
+    const small = await start_server(scene, ['--max-sessions', '1']);
+    const { page: first } = await open_viewer(undefined, small.url);
+    await settle(first);
+    const { page: second } = await open_viewer({ viewport: { width: 1280, height: 720 } }, small.url);
+    await second.getByText('Number 1 in the queue').waitFor();
+    await second.locator('#poster').waitFor();
+    await keep_screenshot(second, 'queue');
+    await first.close();
+    await settle(second);
+    expect(await second.locator('#card').isHidden()).toBe(true);
+    await expect.poll(() => second.locator('#poster').isHidden(), patience).toBe(true);
+    await small.stop();
+  });
+
+  it('a hidden page gets no pictures, and the newest one when it is seen again', async () => {
+    const { page } = await open_viewer();
+    await settle(page);
+    const show = (hidden: boolean): Promise<void> =>
+      page.evaluate((value) => {
+        Object.defineProperty(document, 'hidden', { get: () => value, configurable: true });
+        document.dispatchEvent(new Event('visibilitychange'));
+      }, hidden);
+    await show(true);
+    await page.waitForTimeout(500); // what was under way arrives
+    const { frames_shown } = await stats_of(page);
+    await page.evaluate(() => {
+      const { position, orientation } = window.catgs!.pose();
+      window.catgs!.setPose({ position: [position[0] + 1, position[1], position[2]], orientation });
+    });
+    await page.waitForTimeout(1500);
+    expect((await stats_of(page)).frames_shown).toBe(frames_shown);
+    await show(false);
+    await settle(page);
+    const { x } = (await page.evaluate(() => window.catgs!.snapshot())).header.renderPose!.position!;
+    expect(x).toBeCloseTo((await pose_of(page)).position[0], 3);
   });
 
   it('a page that is no secure context gets JPEG pictures and says how to get video', async () => {

@@ -267,5 +267,19 @@ TEST(Server, TellsClientsWhenItStops) {
   server.join();
 }
 
+TEST(Server, HasAPosterAndToursOfEachScene) {
+  RunningServer server;
+  const HttpReply poster = http_get(server.port(), "/api/scenes/city/poster.jpg");
+  EXPECT_EQ(poster.status, 200);
+  EXPECT_THAT(poster.body, testing::StartsWith("\xff\xd8\xff"));
+  EXPECT_GT(poster.body.size(), 2000u);
+  const HttpReply tours = http_get(server.port(), "/api/scenes/city/tours");
+  EXPECT_EQ(tours.status, 200);
+  EXPECT_TRUE(nlohmann::json::parse(tours.body).is_object());
+  for (const char* path : {"/api/scenes/atlantis/tours", "/api/scenes/atlantis/poster.jpg",
+                           "/api/scenes//tours", "/api/scenes/city/secrets"})
+    EXPECT_EQ(http_get(server.port(), path).status, 404) << path;
+}
+
 }  // namespace
 }  // namespace catgs::test

@@ -79,7 +79,7 @@ export type FromWorker =
   | { kind: 'state'; state: SessionState }
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
-  | { kind: 'presenter'; description: string; warps: boolean }
+  | { kind: 'presenter'; description: string; warps: boolean; overscan: number }
   /** `rung` has proved to be where decoding works here. */
   | { kind: 'rung'; rung: DecoderRung }
   /** The answer to a pick; undefined: nothing is there. */

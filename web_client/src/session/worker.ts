@@ -231,6 +231,7 @@ class Client {
       kind: 'presenter',
       description: `${this.presenter_.description}, warp ${this.display_.warp_state}`,
       warps: this.display_.warps,
+      overscan: this.display_.overscan,
     });
   }
 

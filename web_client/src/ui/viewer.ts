@@ -4,7 +4,6 @@ import {
   camera_modes,
   CameraController,
   type Pose,
-  type SceneSetup,
 } from '../camera/camera_controller';
 import { is_held, sum_of, type Axes } from '../camera/movement';
 import { ray_through } from '../camera/ray';
@@ -24,14 +23,16 @@ import { browser_timers, clock_from } from '../session/clock';
 import type { FromWorker, View } from '../session/messages';
 import { Picks } from '../session/picks';
 import { QualityChoice } from '../session/quality';
+import { scene_setup } from '../session/scene_setup';
 import type { SessionState } from '../session/state';
 import { list_scenes } from '../session/scenes';
 import { remember_token, take_token } from '../session/token';
-import { Error_Code, type SceneFacts, type StreamConfig, type Welcome } from '../wire/wire';
+import { Error_Code, type StreamConfig, type Welcome } from '../wire/wire';
 import type { CardView } from './card';
 import { by_id } from './dom';
 import { Guide } from './guide';
 import { Notice } from './notice';
+import { Poster } from './poster';
 import { SceneTitle } from './scene_title';
 import { StatsPanel, type Facts } from './stats_panel';
 import { Toolbar } from './toolbar';
@@ -52,10 +53,12 @@ export class Viewer {
   private readonly settling_: Settling;
   private readonly notice_ = new Notice();
   private readonly title_ = new SceneTitle();
+  private readonly poster_ = new Poster();
   private readonly stats_panel_ = new StatsPanel();
   private readonly toolbar_: Toolbar;
   private readonly guide_: Guide;
   private warps_ = false;
+  private overscan_ = 1;
   private readonly view_ = by_id('view', HTMLElement);
   private readonly quality_ = new QualityChoice();
   private readonly inertia_ = new Inertia();
@@ -133,6 +136,8 @@ export class Viewer {
 
   private start_worker(): void {
     const canvas = by_id('picture', HTMLCanvasElement).transferControlToOffscreen();
+    const scene_id = new URLSearchParams(location.search).get('scene') ?? '';
+    void this.poster_.show(location.href, scene_id, this.token_);
     this.worker_.post(
       {
         kind: 'start',
@@ -140,7 +145,7 @@ export class Viewer {
         url: location.href,
         page_origin_ms: performance.timeOrigin,
         token: this.token_,
-        scene_id: new URLSearchParams(location.search).get('scene') ?? '',
+        scene_id,
         view: this.view(),
         quality: this.quality_.in_view(this.view().height_px),
         rung: this.rung_,
@@ -298,6 +303,9 @@ export class Viewer {
       case 'presenter':
         this.show_facts({ presenter: message.description });
         this.warps_ = message.warps;
+        // The newest picture has another field of view: a sample makes the server draw it anew.
+        if (message.overscan !== this.overscan_) this.loop_.changed();
+        this.overscan_ = message.overscan;
         break;
       case 'rung':
         remember_rung(message.rung, local_storage(), navigator.userAgent, Date.now());
@@ -354,6 +362,7 @@ export class Viewer {
     const is_first = this.shown_ === undefined;
     this.shown_ = message;
     this.settling_.presented();
+    this.poster_.end();
     if (!this.warps_ || is_first) {
       this.guide_.seen_from({ ...message.pose, fov_y_rad: message.fov_y_rad });
     }
@@ -418,24 +427,6 @@ export class Viewer {
       stats: () => this.worker_.stats(),
     };
   }
-}
-
-/** Facts that a server left out are the wire's zeros; the camera needs a usable scene. */
-function scene_setup(scene: SceneFacts): SceneSetup {
-  const vec = (v: { x: number; y: number; z: number } | undefined) =>
-    [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0] as const;
-  const q = scene.startPose?.orientation;
-  return {
-    up: vec(scene.up),
-    start_pose: {
-      position: vec(scene.startPose?.position),
-      orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
-    },
-    focus: vec(scene.focus),
-    limits_min: vec(scene.limitsMin),
-    limits_max: vec(scene.limitsMax),
-    near_z: scene.nearZ,
-  };
 }
 
 /** `?presenter=webgl2` and `?presenter=2d` override the choice by what the GPU can do. */
