@@ -26,6 +26,7 @@ interface Shown {
 }
 
 const no_motion_rad = 1e-6;
+const farthest_reach = 2.5;
 
 export class Display {
   private readonly policy_: WarpPolicy;
@@ -104,8 +105,11 @@ export class Display {
     const { picture_: picture, camera_: camera } = this;
     if (!picture || !camera || !this.policy_.active) return undefined;
     const { overscan } = this.policy_;
+    const matrix = warp_matrix(picture.eye, camera.eye, aspect(picture), camera.distance);
+    // A camera that jumped sees next to nothing of the picture: then it is better as it is.
+    if (reach(matrix) > farthest_reach) return undefined;
     return {
-      matrix: warp_matrix(picture.eye, camera.eye, aspect(picture), camera.distance),
+      matrix,
       width_px: Math.round(picture.width_px / overscan),
       height_px: Math.round(picture.height_px / overscan),
     };

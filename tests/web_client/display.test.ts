@@ -1,0 +1,98 @@
+import { beforeEach, describe, expect, it } from 'vitest';
+import type { Picture } from '#client/decode/picture';
+import { Display } from '#client/present/display';
+import type { Placing, Presenter } from '#client/present/presenter';
+import { axis_angle, identity, type Quat } from '#client/camera/vector';
+import { warped, type Eye } from '#client/present/warp';
+
+const at = (yaw: number): Eye => {
+  const orientation: Quat = yaw === 0 ? identity : axis_angle([0, -1, 0], yaw);
+  return { position: [0, 0, 0], orientation, fov_y_rad: 1 };
+};
+
+let drawn: (Placing | undefined)[];
+let redrawn: Placing[];
+let refresh: (() => void)[];
+let display: Display;
+
+const presenter = (can_warp: boolean): Presenter => ({
+  description: 'fake',
+  can_warp,
+  draw: (_picture, placing) => {
+    drawn.push(placing);
+    return Promise.resolve();
+  },
+  redraw: (placing) => void redrawn.push(placing),
+  read: () => ({ width_px: 640, height_px: 360, rgba: new Uint8ClampedArray(4) }),
+});
+
+const make = (can_warp: boolean): Display =>
+  new Display(presenter(can_warp), {
+    now_us: () => 0,
+    on_refresh: (draw) => refresh.push(draw),
+    overscan_changed: () => undefined,
+  });
+
+function look(yaw: number): void {
+  display.camera = { pose_id: 1, time_us: 0, eye: at(yaw), distance: Infinity };
+}
+
+function next_refresh(): void {
+  for (const draw of refresh.splice(0)) draw();
+}
+
+beforeEach(() => {
+  [drawn, redrawn, refresh] = [[], [], []];
+  display = make(true);
+});
+
+describe('the display', () => {
+  const picture = {} as Picture;
+
+  it('draws each picture as the camera of now sees it, and again when that moves', async () => {
+    look(0.05);
+    await display.draw(picture, at(0), 640, 360);
+    expect(warped(drawn[0]!.matrix, 0, 0)![0]).toBeLessThan(-0.01);
+    expect(display.read()!.view.orientation).toEqual(at(0.05).orientation);
+    look(0.02);
+    look(0.01); // once per refresh is enough
+    expect(refresh).toHaveLength(1);
+    next_refresh();
+    expect(redrawn).toHaveLength(1);
+    expect(display.read()!.view.orientation).toEqual(at(0.01).orientation);
+    look(0.01);
+    next_refresh();
+    expect(redrawn).toHaveLength(2);
+  });
+
+  it('leaves the picture as it is when the camera has jumped', async () => {
+    look(0);
+    await display.draw(picture, at(0), 640, 360);
+    look(1.5);
+    next_refresh();
+    expect(redrawn).toEqual([]);
+    await display.draw(picture, at(0), 640, 360);
+    expect(drawn[1]).toBeUndefined();
+    expect(display.read()!.view.orientation).toEqual(identity);
+  });
+
+  it('shows pictures larger than the view by the overscan', async () => {
+    display.mode = 'on';
+    look(0);
+    await display.draw(picture, { ...at(0), fov_y_rad: 1.1 }, 742, 418);
+    expect(drawn[0]).toMatchObject({ width_px: 640, height_px: 360 });
+  });
+
+  it('does not warp where that is off, or cannot be', async () => {
+    display.mode = 'off';
+    look(0.05);
+    await display.draw(picture, at(0), 640, 360);
+    look(0.06);
+    expect([drawn, redrawn, refresh]).toEqual([[undefined], [], []]);
+    display = make(false);
+    look(0.05);
+    await display.draw(picture, at(0), 640, 360);
+    expect(drawn).toEqual([undefined, undefined]);
+    expect(display.warps).toBe(false);
+  });
+});
