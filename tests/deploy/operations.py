@@ -6,6 +6,7 @@
   operations.py systemd                 the unit and its exposure (systemd-analyze)
   operations.py kubernetes              renders base and overlays (kubectl kustomize), asserts on them
   operations.py compose                 the compose file: what every service has to have
+  operations.py notices                 the notices name every package that the page contains
   operations.py metrics --server FILE   alerts and dashboard name only metrics that FILE serves
   operations.py settings --server FILE  FILE knows every setting that files here give it
 
@@ -254,6 +255,13 @@ def check_compose(_):
     return findings
 
 
+def check_notices(_):
+    packages = json.loads((SOURCE_DIR / "web_client/package-lock.json").read_text())["packages"]
+    in_page = [name.removeprefix("node_modules/") for name, package in packages.items() if name and not package.get("dev")]
+    notices = (DEPLOY / "NOTICES.md").read_text().lower()
+    return [f"deploy/NOTICES.md does not name {name}" for name in in_page if name not in notices]
+
+
 @contextlib.contextmanager
 def running_server(program):
     with socket.socket() as probe:
@@ -319,7 +327,7 @@ def check_settings(options):
 
 
 CHECKS = {"prometheus": check_prometheus, "haproxy": check_haproxy, "systemd": check_systemd,
-          "kubernetes": check_kubernetes, "compose": check_compose, "metrics": check_metrics, "settings": check_settings}
+          "kubernetes": check_kubernetes, "compose": check_compose, "notices": check_notices, "metrics": check_metrics, "settings": check_settings}
 
 
 def main():
