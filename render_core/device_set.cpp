@@ -40,14 +40,30 @@ DeviceSet::Place::~Place() {
   if (!set_) return;
   const std::lock_guard lock(set_->mutex_);
   --set_->views_[device_];
+  if (measurement_ == set_->measurements_) --set_->views_since_[device_];
 }
 
 DeviceSet::Place DeviceSet::take(std::span<const int> devices) {
   const std::lock_guard lock(mutex_);
-  const int device =
-      *std::ranges::min_element(devices, {}, [this](int index) { return views_[index]; });
+  const auto load = [this](int index) {
+    return std::pair(loads_[index] + mean_load_ * views_since_[index], views_[index]);
+  };
+  const int device = *std::ranges::min_element(devices, {}, load);
   ++views_[device];
-  return {shared_from_this(), device};
+  ++views_since_[device];
+  return {shared_from_this(), device, measurements_};
+}
+
+void DeviceSet::set_loads(std::map<int, double> loads) {
+  const std::lock_guard lock(mutex_);
+  double all_loads = 0.0;
+  int all_views = 0;
+  for (const auto& [device, load] : loads) all_loads += load;
+  for (const auto& [device, views] : views_) all_views += views;
+  ++measurements_;
+  loads_ = std::move(loads);
+  views_since_.clear();
+  mean_load_ = all_views > 0 ? all_loads / all_views : 1.0;
 }
 
 void DeviceSet::add(int device) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -31,13 +32,19 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
 
    private:
     friend class DeviceSet;
-    Place(std::shared_ptr<DeviceSet> set, int device) : set_(std::move(set)), device_(device) {}
+    Place(std::shared_ptr<DeviceSet> set, int device, std::uint64_t measurement)
+        : set_(std::move(set)), device_(device), measurement_(measurement) {}
     std::shared_ptr<DeviceSet> set_;  // null: moved from
     int device_;
+    std::uint64_t measurement_;  // the last one before it
   };
-  /// A place on the device with the fewest Views of `devices` (not empty); of several such, on the
-  /// first.
+  /// A place on the least loaded of `devices` (not empty). Views whose load nobody has told count
+  /// as much as the others do on average, so that without set_loads() it is the device with the
+  /// fewest; among equally loaded ones it is that too, then the first.
   [[nodiscard]] Place take(std::span<const int> devices);
+  /// How much the Views of each device were measured to keep it busy lately, in devices: 0.5 is
+  /// half of its time. A device that is not named is idle.
+  void set_loads(std::map<int, double> loads);
 
   /// Has `device` counted by views() from now on, Views or none.
   void add(int device);
@@ -48,6 +55,10 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
   const std::vector<int> wanted_;
   mutable std::mutex mutex_;
   std::map<int, int> views_;
+  std::map<int, double> loads_;
+  std::map<int, int> views_since_;  // live ones that are not in them yet
+  double mean_load_ = 1.0;          // of a View
+  std::uint64_t measurements_ = 0;
 };
 
 /// The value of a flag --device: "all" -> {}, "0,2" -> {0, 2}. Throws std::invalid_argument.

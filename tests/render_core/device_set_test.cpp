@@ -45,6 +45,35 @@ TEST(DeviceSet, RenderersOfSomeDevicesSeeTheViewsOfOthers) {
   EXPECT_EQ(d.device(), 0);
 }
 
+TEST(DeviceSet, PlacesGoWhereTheLeastWorkIsMeasured) {
+  const auto set = std::make_shared<DeviceSet>(std::vector<int>{});
+  const std::vector<int> devices = {0, 1};
+  std::vector<DeviceSet::Place> places;
+  const auto take = [&] {
+    places.push_back(set->take(devices));
+    return places.back().device();
+  };
+  for (int i = 0; i < 4; ++i) (void)take();
+  set->set_loads({{0, 0.75}, {1, 0.25}});  // 0.25 a View in the mean
+  EXPECT_EQ(take(), 1);
+  EXPECT_EQ(take(), 1) << "0.5, with the one that nothing is known of";
+  EXPECT_EQ(take(), 0) << "0.75 each: now the fewest count";
+  set->set_loads({{1, 0.1}});
+  EXPECT_EQ(take(), 0) << "not named: idle";
+  set->set_loads({{0, 0.0}, {1, 0.0}});
+  EXPECT_EQ(take(), 0);
+  EXPECT_EQ(take(), 1) << "nobody works: the fewest, in turn";
+}
+
+TEST(DeviceSet, WhatNobodyMeasuredIsForgottenWithItsView) {
+  const auto set = std::make_shared<DeviceSet>(std::vector<int>{});
+  const std::vector<int> devices = {0, 1};
+  const auto a = set->take(devices);
+  const auto b = set->take(devices);
+  set->set_loads({{0, 0.5}, {1, 0.4}});
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(set->take(devices).device(), 1) << "each has left again";
+}
+
 TEST(DeviceSet, APlaceOutlivesItsSetAndMovesWithItsView) {
   auto set = std::make_shared<DeviceSet>();
   const std::vector<int> devices = {0};
