@@ -5,8 +5,9 @@
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
 # DIR is a finished build (default: build/run, else build/release, else build/cuda). The archive
-# holds bin/ (start the programs from here), lib/ and the web client, if it was built, and in share/doc
-# the licences of all that is not ours: read NOTICES.md there before you pass it on. Most of lib/
+# holds bin/ (start the programs from here), lib/, where they were built the web client, and catgs-load
+# with its scenarios (share/catgs/load), by which deployments are sized, and in share/doc the licences
+# of all that is not ours: read NOTICES.md there before you pass it on. Most of lib/
 # comes with libavcodec, which is linked against every codec that the distribution has. The other
 # machine needs the same processor family, a glibc at least as new, and libstdc++; for CUDA its own
 # driver.
@@ -71,6 +72,10 @@ while read -r package; do
   mkdir "$root/share/doc/licenses/$package"
   cp -L -- "/usr/share/doc/$package/copyright" "$root/share/doc/licenses/$package/"
 done < <("$SOURCE_DIR/deploy/runtime_packages.sh" "$build"/bin/*)
+if [[ -x $root/bin/catgs-load ]]; then
+  mkdir -p "$root/share/catgs/load"
+  cp -r -- "$SOURCE_DIR"/tests/load/{README.md,alternate.py,scenarios} "$root/share/catgs/load/"
+fi
 if [[ -f $build/web_client/dist/index.html ]]; then
   mkdir -p "$root/share/catgs"  # where the server looks, seen from its program
   cp -r -- "$build/web_client/dist" "$root/share/catgs/web"

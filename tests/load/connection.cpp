@@ -257,7 +257,7 @@ void Connection::take_frame(const FrameMessage& frame) {
   ack.set_received_us(now);
   ack.set_pose_age_us(static_cast<std::uint32_t>(
       std::clamp<std::int64_t>(now - header.pose_client_time_us(), 0, UINT32_MAX)));
-  if (settings_.decode || settings_.decode_us > 0) {
+  if (decode_stage_.has_work()) {
     decode_stage_.take(frame, ack);
   } else {
     acknowledge(ack, now);

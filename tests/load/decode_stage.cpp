@@ -28,10 +28,27 @@ DecodeStage::DecodeStage(const SessionSettings& settings, asio::thread_pool& dec
       callbacks_(std::move(callbacks)),
       filled_(executor) {}
 
+bool DecodeStage::has_work() const {
+  if (!settings_.decode) return settings_.decode_us > 0;
+  return !settings_.only_pictures || picture_is_due();
+}
+
+bool DecodeStage::picture_is_due() const {
+  const std::size_t kept = report_.pictures.size();
+  if (kept == settings_.pictures) return false;
+  const double part = (static_cast<double>(kept) + 0.5) / static_cast<double>(settings_.pictures);
+  const auto span_us = static_cast<double>(settings_.stop_us - settings_.start_us);
+  return now_us() >= settings_.start_us + static_cast<std::int64_t>(part * span_us);
+}
+
 void DecodeStage::take(const FrameMessage& frame, const v1::Ack& ack) {
   const bool independent = frame.header.idr() || frame.header.codec() == v1::CODEC_MJPEG;
   const bool full = queue_.size() == max_queued;
   wait_for_idr_ = full || (wait_for_idr_ && !independent);
+  if (wait_for_idr_ && settings_.only_pictures) {
+    callbacks_.acknowledge(ack, now_us());
+    return callbacks_.request_idr();
+  }
   if (wait_for_idr_) {
     ++report_.stats.frames_skipped;
     v1::Ack dropped = ack;
@@ -97,12 +114,8 @@ asio::awaitable<DecodeStage::Decoded> DecodeStage::decode_on_pool(const Item& it
 }
 
 void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
-  const std::size_t kept = report_.pictures.size();
-  if (kept == settings_.pictures) return;
-  // In the middles of equal parts of the session's time.
-  const double part = (static_cast<double>(kept) + 0.5) / static_cast<double>(settings_.pictures);
-  const auto span_us = static_cast<double>(settings_.stop_us - settings_.start_us);
-  if (now_us() < settings_.start_us + static_cast<std::int64_t>(part * span_us)) return;
+  if (!picture_is_due()) return;
+  wait_for_idr_ = wait_for_idr_ || settings_.only_pictures;
   report_.pictures.push_back({.render_pose = from_wire(item.header.render_pose()),
                               .fov_y_rad = item.header.fov_y_rad(),
                               .near_z = scene_.near_z(),

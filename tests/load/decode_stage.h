@@ -18,9 +18,10 @@
 
 namespace catgs::load {
 
-/// Where a session decodes what it received, one frame after the other: really (`decode`), or only
-/// for as long as it would take (`decode_us`). Bounded: what does not fit is dropped, and decoding
-/// goes on with the next IDR.
+/// Where a session decodes what it received, one frame after the other: really (`decode`; with
+/// `only_pictures` from an IDR at the time of a picture until that is kept), or only for as long as
+/// it would take (`decode_us`). Bounded: what does not fit is dropped, and decoding goes on with
+/// the next IDR.
 class DecodeStage {
  public:
   /// What a decoder tells its session.
@@ -32,6 +33,8 @@ class DecodeStage {
               SessionReport& report, Callbacks callbacks,
               const boost::asio::any_io_executor& executor);
 
+  /// The next frame is to be taken. False: nobody needs it decoded.
+  [[nodiscard]] bool has_work() const;
   void take(const FrameMessage& frame, const v1::Ack& ack);
   /// Of the scene that frames show from here on; for the pictures that are kept.
   void set_scene(const v1::SceneFacts& scene) { scene_ = scene; }
@@ -52,6 +55,8 @@ class DecodeStage {
   };
   boost::asio::awaitable<void> decode(Item& item);
   boost::asio::awaitable<Decoded> decode_on_pool(const Item& item);
+  /// In the middles of equal parts of the session's time.
+  [[nodiscard]] bool picture_is_due() const;
   void keep_picture(const Item& item, Decoded& decoded);
 
   const SessionSettings& settings_;

@@ -15,7 +15,7 @@ class DurationHistogram {
   void add(const DurationHistogram& other);
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
-  /// Milliseconds; 0 where nothing was added. `share` in 0…1, nearest rank.
+  /// Milliseconds; NaN where nothing was added. `share` in 0…1, nearest rank.
   [[nodiscard]] double percentile_ms(double share) const;
   [[nodiscard]] double mean_ms() const;
   [[nodiscard]] double max_ms() const { return 1e-3 * static_cast<double>(max_us_); }

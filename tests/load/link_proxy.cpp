@@ -15,6 +15,8 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/redirect_error.hpp>
+#include <boost/asio/ssl/host_name_verification.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
@@ -47,12 +49,17 @@ void make_small(Socket& socket) {
   socket.set_option(asio::socket_base::receive_buffer_size(socket_buffer_bytes));
 }
 
+using TlsStream = asio::ssl::stream<tcp::socket&>;
+
+tcp::socket& socket_of(tcp::socket& socket) { return socket; }
+tcp::socket& socket_of(TlsStream& stream) { return stream.next_layer(); }
+
 /// One direction of one connection: two coroutines with the bytes under way between them.
+template <typename From, typename To>
 class Pipe {
  public:
   /// `tap` may be empty.
-  Pipe(tcp::socket& from, tcp::socket& to, LinkShaper shaper, std::int64_t begin_us,
-       LinkProxy::Tap tap)
+  Pipe(From& from, To& to, LinkShaper shaper, std::int64_t begin_us, LinkProxy::Tap tap)
       : from_(from),
         to_(to),
         shaper_(std::move(shaper)),
@@ -137,11 +144,11 @@ class Pipe {
       drained_.cancel();
     }
     boost::system::error_code ignored;  // the other side may have gone first
-    to_.shutdown(tcp::socket::shutdown_send, ignored);
+    socket_of(to_).shutdown(tcp::socket::shutdown_send, ignored);
   }
 
-  tcp::socket& from_;
-  tcp::socket& to_;
+  From& from_;
+  To& to_;
   LinkShaper shaper_;
   std::int64_t begin_us_;
   LinkProxy::Tap tap_;
@@ -183,14 +190,24 @@ struct LinkProxy::State {
 
   /// Carries one connection to its end; throws where a socket fails, which is such an end too.
   static asio::awaitable<void> carry(std::shared_ptr<State> state, ConnectionPosition connection) {
-    using namespace asio::experimental::awaitable_operators;
-    tcp::socket& client = connection->client;
     tcp::socket& server = connection->server;
     co_await state->connect(server);
-    const std::uint64_t seed = state->seed + 2 * state->accepted++;
-    Pipe down(server, client, {state->link, state->link.down, seed}, state->begin_us, {});
-    Pipe up(client, server, {state->link, state->link.up, seed + 1}, state->begin_us,
-            state->make_tap ? state->make_tap() : LinkProxy::Tap());
+    if (state->tls == nullptr) co_return co_await join(*state, connection->client, server);
+    TlsStream encrypted(server, *state->tls);
+    if (!SSL_set_tlsext_host_name(encrypted.native_handle(), state->host.c_str()))
+      throw std::bad_alloc();
+    encrypted.set_verify_callback(asio::ssl::host_name_verification(state->host));
+    co_await encrypted.async_handshake(asio::ssl::stream_base::client, use_awaitable);
+    co_await join(*state, connection->client, encrypted);
+  }
+
+  template <typename Server>
+  static asio::awaitable<void> join(State& state, tcp::socket& client, Server& server) {
+    using namespace asio::experimental::awaitable_operators;
+    const std::uint64_t seed = state.seed + 2 * state.accepted++;
+    Pipe down(server, client, {state.link, state.link.down, seed}, state.begin_us, {});
+    Pipe up(client, server, {state.link, state.link.up, seed + 1}, state.begin_us,
+            state.make_tap ? state.make_tap() : LinkProxy::Tap());
     co_await (down.run() && up.run());
   }
 
@@ -219,6 +236,7 @@ struct LinkProxy::State {
   std::int64_t begin_us;
   std::uint64_t accepted = 0;
   std::function<LinkProxy::Tap()> make_tap;
+  asio::ssl::context* tls = nullptr;  // to the server; null: plain
   std::list<Connection> connections;
 };
 
@@ -231,6 +249,8 @@ LinkProxy::LinkProxy(const asio::any_io_executor& executor, std::string host, st
 void LinkProxy::read_along(std::function<Tap()> make_tap) {
   state_->make_tap = std::move(make_tap);
 }
+
+void LinkProxy::encrypt(asio::ssl::context& tls) { state_->tls = &tls; }
 
 LinkProxy::~LinkProxy() { close(); }
 

@@ -9,6 +9,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/ssl/context.hpp>
 
 #include "tests/load/link.h"
 
@@ -29,6 +30,10 @@ class LinkProxy {
             LinkSettings link, std::uint64_t seed, std::int64_t begin_us,
             std::uint16_t listen_port = 0);
   ~LinkProxy();
+
+  /// Connections to the server are encrypted from now on, the clients' are not. `tls` has to
+  /// outlive the proxy.
+  void encrypt(boost::asio::ssl::context& tls);
 
   /// Takes what clients send, in the order in which they do.
   using Tap = std::function<void(std::span<const std::byte>)>;

@@ -176,6 +176,7 @@ class Run {
     const double golden = number * std::numbers::phi;
     settings.offset = golden - std::floor(golden);
     settings.decode = group.decode;
+    settings.only_pictures = group.only_pictures;
     settings.decode_us = microseconds(group.decode_time_s);
     settings.acknowledge = group.acknowledge;
     settings.flood_hz = group.flood_hz;

@@ -252,8 +252,54 @@ TEST(Record, SavesThePosesThatPassBy) {
   expect_clean(run);
   EXPECT_EQ(poses.size(), run.groups[0].sessions[0]->stats.poses_sent);
   EXPECT_EQ(poses.at(0).time_us, 0);
-  record.url = "wss://127.0.0.1:1";
-  EXPECT_THROW(record_poses(record), InputError);
+}
+
+TEST(Load, RecordsOverTlsAndTrustsNoUnknownCertificate) {
+  const test::TemporaryFolder folder;
+  test::write_self_signed(folder / "certificate.pem", folder / "key.pem");
+  const RunningServer server([&](ServerConfig& config) {
+    config.tls_cert = folder / "certificate.pem";
+    config.tls_key = folder / "key.pem";
+  });
+  for (const bool insecure : {true, false}) {
+    LoadOptions options = small_load("");
+    options.groups[0].sessions = 1;
+    options.duration_s = 1.5;
+    RunReport run;
+    std::jthread load;
+    RecordOptions record;
+    record.url = "wss://127.0.0.1:" + std::to_string(server.port());
+    record.insecure = insecure;
+    record.listen = 0;
+    record.duration_s = 2.5;
+    record.on_listening = [&](std::uint16_t port) {
+      load = std::jthread([&run, options, port]() mutable {
+        options.url = "ws://127.0.0.1:" + std::to_string(port);
+        run = run_load(options);
+      });
+    };
+    const Trajectory poses = record_poses(record);
+    load.join();
+    const SessionStats& stats = run.groups[0].sessions[0]->stats;
+    EXPECT_EQ(stats.connected, insecure);
+    EXPECT_EQ(poses.size(), insecure ? stats.poses_sent : 0u);
+  }
+}
+
+TEST(Load, DecodesJustThePicturesThatAreKept) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  options.pictures = 6;
+  options.groups[0].only_pictures = true;
+  const RunReport run = run_load(options);
+  for (const auto& report : run.groups[0].sessions) {
+    EXPECT_EQ(report->pictures.size(), 2u);
+    EXPECT_EQ(report->stats.decode_errors, 0u);
+    EXPECT_EQ(report->stats.frames_skipped, 0u) << "what is not decoded is not missed";
+    EXPECT_GE(report->stats.decode.count(), 2u);
+    EXPECT_LT(report->stats.decode.count(), report->stats.frames / 2);
+    EXPECT_LE(report->stats.idrs, 1u + 2 * 4) << "one for each, and what asking takes";
+  }
 }
 
 TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {

@@ -71,7 +71,10 @@ void add_client_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--link", options.link,
                  "Each session's line: rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,"
                  "loss=1%,burst=4,queue=200ms; each part may be left out");
-  app.add_flag("--decode", group.decode, "Decode every frame and check its size");
+  auto* decode = app.add_flag("--decode", group.decode, "Decode every frame and check its size");
+  app.add_flag("--only-pictures", group.only_pictures,
+               "Decode only what is compared with --check-scene, from an IDR of its own on")
+      ->needs(decode);
   app.add_option("--decode-time", options.decode_time, "Play a decoder that takes this long");
   app.add_flag("!--no-acks", group.acknowledge,
                "Never acknowledge a frame: the server must stop sending");
@@ -194,7 +197,9 @@ void add_record_command(CLI::App& app, RecordFlags& flags) {
       "record",
       "Stands between a browser and the server and saves the browser's poses as a TUM file. Open "
       "http://127.0.0.1:8081/ instead of the server's page, move, and stop with Ctrl-C");
-  record->add_option("--url", flags.options.url, "The server: ws://HOST:PORT")->required();
+  record->add_option("--url", flags.options.url, "The server: ws://HOST:PORT or wss://HOST:PORT")
+      ->required();
+  record->add_flag("--insecure", flags.options.insecure, "Accept any TLS certificate");
   record->add_option("--listen", flags.options.listen, "Port on this machine for the browser")
       ->capture_default_str();
   record->add_option("--duration", flags.duration, "Stop after this time (default: Ctrl-C)");

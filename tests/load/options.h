@@ -34,6 +34,7 @@ struct GroupOptions {
   // How well they behave.
   LinkSettings link;
   bool decode = false;
+  bool only_pictures = false;  // decode around the pictures that are kept, not all of the time
   double decode_time_s = 0.0;  // that decoding a frame takes, at least
   bool acknowledge = true;
   int flood_hz = 0;                // messages a second beyond what a client would send

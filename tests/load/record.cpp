@@ -7,6 +7,7 @@
 #include <boost/asio/detached.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <fmt/format.h>
 
@@ -53,11 +54,11 @@ class Recorder {
 
 Trajectory record_poses(const RecordOptions& options) {
   const Url url = parse_url(options.url);
-  if (url.tls) {
-    throw InputError("--url", "", "a wss:// connection cannot be read along",
-                     "record on the server's machine, through ws://127.0.0.1:PORT");
-  }
   boost::asio::io_context io(1);
+  boost::asio::ssl::context tls(boost::asio::ssl::context::tls_client);
+  tls.set_default_verify_paths();
+  tls.set_verify_mode(options.insecure ? boost::asio::ssl::verify_none
+                                       : boost::asio::ssl::verify_peer);
   Recorder recorder;
   std::unique_ptr<LinkProxy> proxy;
   try {
@@ -67,6 +68,7 @@ Trajectory record_poses(const RecordOptions& options) {
     throw InputError("--listen", std::to_string(options.listen), error.code().message(),
                      "choose another port");
   }
+  if (url.tls) proxy->encrypt(tls);
   proxy->read_along([&] { return recorder.tap(); });
   boost::asio::co_spawn(io, proxy->run(), boost::asio::detached);
   boost::asio::signal_set stop(io, SIGINT, SIGTERM);

@@ -142,6 +142,7 @@ GroupOptions read_group(TableReader& reader, const std::filesystem::path& folder
   reader.take("link", link);
   if (!link.empty()) group.link = parse_link(reader.place("link"), link);
   reader.take("decode", group.decode);
+  reader.take("only-pictures", group.only_pictures);
   reader.take_seconds("decode-time", group.decode_time_s);
   reader.take("acks", group.acknowledge);
   reader.take("flood-hz", group.flood_hz, 0, 100'000);

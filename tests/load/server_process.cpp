@@ -164,7 +164,8 @@ void ServerProcess::end_measuring() {
 
 void ServerProcess::sample(const std::stop_token& stop) {
   const std::string pid = std::to_string(pid_);
-  const double cores = std::max(1u, std::thread::hardware_concurrency());
+  // All of the machine: the generator may be held to some of them.
+  const auto cores = static_cast<double>(std::max(1L, ::sysconf(_SC_NPROCESSORS_ONLN)));
   const auto begin = std::chrono::steady_clock::now();
   double at_s = 0.0, server_s = process_cpu_s(pid), own_s = process_cpu_s("self"),
          machine_s = machine_cpu_s();

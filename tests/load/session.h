@@ -37,6 +37,7 @@ struct SessionSettings {
   double offset = 0.0;  // where in the trajectory to begin, share of its length
 
   bool decode = false;
+  bool only_pictures = false;           // decode around the pictures that are kept
   std::int64_t decode_us = 0;           // that decoding a frame takes, at least
   bool acknowledge = true;              // false plays a client that has stopped reading its screen
   int flood_hz = 0;                     // messages a second beyond what a client would send

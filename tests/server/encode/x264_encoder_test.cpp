@@ -112,8 +112,13 @@ TEST(X264Encoder, EveryFrameIsOneAccessUnitAndIdrsComeOnlyOnDemand) {
   }
 }
 
-TEST(X264Encoder, DecodesToWhatWentIn) {
-  const auto encoder = make_encoder(EncoderKind::x264, settings_of(small_px));
+class X264Slices : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(X264Encoder, X264Slices, testing::Values(1, 3));
+
+TEST_P(X264Slices, DecodeToWhatWentIn) {
+  EncoderSettings settings = settings_of(small_px);
+  settings.threads = GetParam();
+  const auto encoder = make_encoder(EncoderKind::x264, settings);
   Decoder decoder(Codec::h264);
   EncodedFrame out;
   DecodedPicture decoded;
