@@ -30,6 +30,9 @@ struct ServerConfig {
   int lod = -1;             // of streamed SOG scenes; -1: by gaussian_budget
   int gaussian_budget = 0;  // of streamed SOG scenes; 0: no bound
   EncoderKind encoder = EncoderKind::automatic;
+  std::string x264_preset = "auto";  // or one of effort_presets
+  int nvenc_sessions = 0;            // 0: as many as the driver opens
+  std::string nvenc_full = "x264";   // or "queue"
   int fps = 60;
   int bitrate_kbps = 8000;
   int max_sessions = 16;

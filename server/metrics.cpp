@@ -42,8 +42,9 @@ Histogram& stage(Registry& registry, const char* name) {
       .Name("catgs_frame_stage_seconds")
       .Help(
           "Duration of a frame's stages: queue_wait (it could start, others' turns came first), "
-          "hand_off (to the thread that renders), render_key, render_sub, encode, send (encoded to "
-          "handed to the socket)")
+          "hand_off (to the thread that renders), render_key, render_sub, encode_wait (to the "
+          "thread "
+          "that encodes), encode, send (encoded to handed to the socket)")
       .Register(registry)
       .Add({{"stage", name}}, latency_buckets_s);
 }
@@ -64,6 +65,10 @@ Metrics::Metrics()
                  .Name("catgs_device_views")
                  .Help("Streams that render on a CUDA device")
                  .Register(registry_)),
+      encoder_sessions_(prometheus::BuildGauge()
+                            .Name("catgs_encoder_sessions")
+                            .Help("Sessions by their video encoder")
+                            .Register(registry_)),
       connections(gauge(registry_, "catgs_connections", "Open websockets")),
       sessions(gauge(registry_, "catgs_sessions", "Admitted sessions")),
       sessions_lost(
@@ -88,6 +93,13 @@ Metrics::Metrics()
                 "Sessions that get a smaller size or frame rate than they asked for")),
       target_bits_per_second(gauge(registry_, "catgs_target_bits_per_second",
                                    "What the links of all live sessions are held to be good for")),
+      processors_busy(gauge(registry_, "catgs_processors_busy_ratio",
+                            "Share of the processors' time that the server takes")),
+      encoders_refused(
+          counter(registry_, "catgs_encoders_refused_total",
+                  "Video encoders that their driver did not open, for want of sessions")),
+      effort_changes(counter(registry_, "catgs_encoder_effort_changes_total",
+                             "Changes of preset or threads of encoders in software")),
       sessions_admitted(counter(registry_, "catgs_sessions_admitted_total", "Sessions admitted")),
       sessions_refused(counter(registry_, "catgs_sessions_refused_total",
                                "Sessions refused or closed for an error")),
@@ -123,6 +135,7 @@ Metrics::Metrics()
       hand_off_seconds(stage(registry_, "hand_off")),
       render_key_seconds(stage(registry_, "render_key")),
       render_sub_seconds(stage(registry_, "render_sub")),
+      encode_wait_seconds(stage(registry_, "encode_wait")),
       encode_seconds(stage(registry_, "encode")),
       send_seconds(stage(registry_, "send")),
       link_queue_seconds(latency(registry_, "catgs_link_queue_seconds",
@@ -142,8 +155,13 @@ void Metrics::set_views(int device, int views) {
   views_.Add({{"device", std::to_string(device)}}).Set(views);  // the gauge that is there already
 }
 
+void Metrics::set_encoder_sessions(const std::string& encoder, int count) {
+  encoder_sessions_.Add({{"encoder", encoder}}).Set(count);
+}
+
 void Metrics::observe_frame(const FrameTicket& ticket, TimePoint now) {
-  encode_seconds.Observe(seconds(ticket.render_end, ticket.encode_end));
+  encode_wait_seconds.Observe(seconds(ticket.render_end, ticket.encode_start));
+  encode_seconds.Observe(seconds(ticket.encode_start, ticket.encode_end));
   send_seconds.Observe(seconds(ticket.encode_end, now));
   if (ticket.refined) return;  // late on purpose, and nothing is rendered for it
   queue_wait_seconds.Observe(seconds(ticket.ready, ticket.started));

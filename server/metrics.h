@@ -25,6 +25,8 @@ class Metrics {
 
   /// Views that live on a CUDA device, as of now.
   void set_views(int device, int views);
+  /// Sessions that have an encoder of this name, as of now.
+  void set_encoder_sessions(const std::string& encoder, int count);
 
   /// Stage durations of a frame that was handed to the socket at `now`.
   void observe_frame(const FrameTicket& ticket, TimePoint now);
@@ -32,6 +34,7 @@ class Metrics {
  private:
   prometheus::Registry registry_;
   prometheus::Family<prometheus::Gauge>& views_;
+  prometheus::Family<prometheus::Gauge>& encoder_sessions_;
 
  public:
   prometheus::Gauge& connections;
@@ -49,6 +52,9 @@ class Metrics {
   prometheus::Gauge& frames_in_flight;
   prometheus::Gauge& sessions_stepped_down;   // get less than they asked for: size or frame rate
   prometheus::Gauge& target_bits_per_second;  // of all sessions
+  prometheus::Gauge& processors_busy;         // share of their time, lately
+  prometheus::Counter& encoders_refused;      // by a driver, when they were opened
+  prometheus::Counter& effort_changes;        // of software encoders
   prometheus::Counter& sessions_admitted;
   prometheus::Counter& sessions_refused;
   prometheus::Counter& sessions_resumed;
@@ -70,6 +76,7 @@ class Metrics {
   prometheus::Histogram& hand_off_seconds;
   prometheus::Histogram& render_key_seconds;
   prometheus::Histogram& render_sub_seconds;
+  prometheus::Histogram& encode_wait_seconds;
   prometheus::Histogram& encode_seconds;
   prometheus::Histogram& send_seconds;
   prometheus::Histogram& link_queue_seconds;  // of each live session, four times a second

@@ -25,6 +25,7 @@
 #include "server/metrics.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
+#include "server/prompt_thread.h"
 #include "server/scene_catalog.h"
 #include "server/scene_library.h"
 #include "server/schedule/pool_executor.h"
@@ -39,6 +40,8 @@ using namespace std::chrono_literals;
 constexpr auto quick_stop_deadline = 1000ms;
 constexpr auto farewell_time = 500ms;  // for close frames, after the deadline
 constexpr auto drain_poll = 20ms;
+// Two or three frames at a time keep a GPU busy; more only take turns on it.
+constexpr int render_threads_per_gpu = 3;
 
 constexpr std::string_view no_client_page =
     "CaT-GS server: the browser client was not built with this server.\n"
@@ -65,6 +68,10 @@ RegistryOptions registry_options(const ServerConfig& config) {
   options.max_queue = config.max_queue;
   options.max_spectators = config.max_spectators;
   options.min_fps = config.min_fps;
+  options.encoders = {config.nvenc_sessions, config.nvenc_full == "queue"};
+  for (int i = 0; i < static_cast<int>(std::size(effort_presets)); ++i)
+    if (effort_presets[static_cast<std::size_t>(i)].name == config.x264_preset)
+      options.presets = {i, i};
   return options;
 }
 
@@ -234,10 +241,14 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
     return s.access.refusal(token, scene_id, unix_now_s(), use);
   };
   RegistryOptions options = registry_options(s.config);
-  options.gpus = static_cast<int>(s.devices->views().size());
-  s.registry = std::make_unique<SessionRegistry>(
-      s.io, std::move(options), std::make_shared<PoolExecutor>(s.pool), *s.scenes, s.encoders,
-      std::move(authorize), session_tokens(s.config), s.metrics);
+  const auto gpus = static_cast<int>(s.devices->views().size());
+  if (gpus > 0) options.devices = s.devices;
+  options.cpus = s.pool->threads();
+  auto executor = std::make_shared<PoolExecutor>(PoolExecutor::Pools{
+      s.pool, gpus > 0 ? std::make_shared<ThreadPool>(render_threads_per_gpu * gpus) : s.pool});
+  s.registry = std::make_unique<SessionRegistry>(s.io, std::move(options), std::move(executor),
+                                                 *s.scenes, s.encoders, std::move(authorize),
+                                                 session_tokens(s.config), s.metrics);
 }
 
 Server::~Server() {
@@ -252,6 +263,7 @@ void Server::run() {
   s.stop_signals.add(SIGTERM);
   s.wait_for_signal();
   s.net.start();
+  run_promptly();  // others have been started
   s.ready = true;
   s.print_banner();
   s.io.run();

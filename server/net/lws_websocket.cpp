@@ -45,7 +45,7 @@ void LwsWaker::wake(std::shared_ptr<LwsWebsocket> connection) {
   const std::lock_guard lock(mutex_);
   if (!context_) return;
   pending_.push_back(std::move(connection));
-  lws_cancel_service(context_);
+  if (pending_.size() == 1) lws_cancel_service(context_);  // else it is on its way
 }
 
 void LwsWaker::wake() {

@@ -48,6 +48,7 @@ struct Hello {
   std::string token;
   std::string resume_token;
   std::optional<PoseSample> resume_pose;
+  PosePath resume_path;  // empty: there was none
   std::string watch_token;
   Settings settings;
 };

@@ -17,6 +17,7 @@
 #include "server/net/lws_http.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/wire.h"
+#include "server/prompt_thread.h"
 #include "server/required_file.h"
 
 namespace catgs {
@@ -314,6 +315,7 @@ NetServer::~NetServer() { stop(); }
 void NetServer::start() {
   State& s = *state_;
   s.thread = std::thread([&s] {
+    run_promptly();
     while (!s.stopping.load() && lws_service(s.context, 0) >= 0) {
     }
     s.service.waker->detach();

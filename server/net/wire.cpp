@@ -120,6 +120,7 @@ Hello parse(const v1::Hello& message) {
   hello.token = checked_length("hello.token", message.token(), 512);
   hello.resume_token = checked_length("hello.resume.token", message.resume().token(), 512);
   if (message.resume().has_pose()) hello.resume_pose = parse(message.resume().pose());
+  hello.resume_path = parse(message.resume().path());
   hello.watch_token = checked_length("hello.watch", message.watch(), 512);
   hello.settings = parse(message.settings());
   return hello;

@@ -33,6 +33,7 @@ struct FrameTicket {
   TimePoint started{};  // handed to the executor
   TimePoint render_start{};
   TimePoint render_end{};
+  TimePoint encode_start{};
   TimePoint encode_end{};
 };
 

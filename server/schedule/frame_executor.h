@@ -16,12 +16,13 @@ struct StreamSettings {
   std::shared_ptr<Renderer> renderer;  // of the scene that is shown
   EncoderKind encoder = EncoderKind::x264;
   EncoderSettings encoding;
+  std::shared_ptr<const void> seat{};  // let go of once the encoder has ended
 };
 
 /// One client's share of a device: its View (caches, image) and its Encoder. Owned by the session,
 /// used by one job at a time.
 struct Stream {
-  StreamSettings settings;
+  StreamSettings settings;  // the seat in it outlives the encoder
   std::unique_ptr<View> view;
   std::unique_ptr<Encoder> encoder;
   FrameView picture;  // borrowed from `view`: the last one rendered
@@ -33,7 +34,8 @@ struct StreamOpened {
   Codec codec = Codec::h264;
   std::string codec_string;
   std::string encoder_name;
-  std::optional<int> device{};  // see View::device()
+  std::optional<int> device{};       // see View::device()
+  bool encoder_unavailable = false;  // not ok for want of the encoder alone
 };
 
 struct FrameJob {
@@ -52,7 +54,7 @@ struct FrameResult {
   FrameStats stats;
 };
 
-/// A device that renders and encodes: the CPU's thread pool, or a GPU with its render thread and
+/// What renders and encodes: the CPU's thread pool, or GPUs with a few render threads and a pool of
 /// encoders. `done` is called once per call, on a thread of the executor. Until then the stream
 /// belongs to the executor, which keeps no reference to it afterwards.
 class FrameExecutor {

@@ -6,18 +6,26 @@
 namespace catgs {
 namespace {
 
-StreamOpened open_now(Stream& stream, StreamSettings settings) {
+StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFactory& encoders) {
   StreamOpened opened;
   try {
     if (!stream.view || stream.settings.renderer != settings.renderer) {
       stream.view.reset();  // its memory first: two views of a large scene may not fit
       stream.view = settings.renderer->make_view({Pipeline::catgs, PixelFormat::i420});
     }
-    if (!stream.encoder || stream.settings.encoder != settings.encoder ||
-        stream.settings.encoding != settings.encoding)
-      stream.encoder = make_encoder(settings.encoder, settings.encoding);
   } catch (const std::exception& error) {
     opened.message = error.what();
+    return opened;
+  }
+  try {
+    if (!stream.encoder || stream.settings.encoder != settings.encoder ||
+        stream.settings.encoding != settings.encoding) {
+      stream.encoder.reset();  // first: a driver may open no second one
+      stream.encoder = encoders(settings.encoder, settings.encoding);
+    }
+  } catch (const std::exception& error) {
+    opened.message = error.what();
+    opened.encoder_unavailable = true;
     return opened;
   }
   stream.picture = {};
@@ -30,54 +38,67 @@ StreamOpened open_now(Stream& stream, StreamSettings settings) {
   return opened;
 }
 
-FrameResult run_now(FrameJob& job) {
-  FrameResult result;
+/// False: it failed, and `result` says why.
+bool render_now(FrameJob& job, FrameResult& result) {
   FrameTicket& ticket = result.frame.ticket;
   ticket = job.ticket;
-  Stream& stream = *job.stream;
   ticket.render_start = Clock::now();
   if (!ticket.refined) {
+    Stream& stream = *job.stream;
     const RenderStatus rendered = stream.view->render(job.request, stream.picture);
     if (!rendered.ok()) {
       result.message = rendered.message;
-      return result;
+      return false;
     }
     result.stats = stream.picture.stats;
     ticket.speculated = result.stats.kind == FrameKind::sub;
     ticket.window = static_cast<std::uint32_t>(result.stats.window);
   }
   ticket.render_end = Clock::now();
+  return true;
+}
+
+void encode_now(FrameJob& job, FrameResult& result) {
+  Stream& stream = *job.stream;
+  FrameTicket& ticket = result.frame.ticket;
   EncodedFrame encoded;
+  ticket.encode_start = Clock::now();
   stream.encoder->set_rate(job.bitrate_kbps, job.real_fps);
   const EncodeStatus status = stream.encoder->encode(stream.picture, job.force_idr, encoded);
   ticket.encode_end = Clock::now();
   if (!status.ok) {
     result.message = status.message;
-    return result;
+    return;
   }
   ticket.codec = stream.encoder->codec();
   ticket.idr = encoded.idr;
   result.frame.bitstream = std::move(encoded.bytes);
   result.ok = true;
-  return result;
 }
 
 }  // namespace
 
 // A worker lets go of the stream before it reports: the stream may hold the last reference to this
 // very pool, which none of its own threads can join. For the same reason the executor, which holds
-// the pool, outlasts the streams that are closing.
+// the pools, outlasts the streams that are closing.
+
+PoolExecutor::PoolExecutor(Pools pools, EncoderFactory encoders)
+    : pools_(std::move(pools)), encoders_(std::move(encoders)) {}
 
 PoolExecutor::~PoolExecutor() {
   std::unique_lock lock(mutex_);
   closed_.wait(lock, [this] { return closing_ == 0; });
 }
 
+int PoolExecutor::slots() const {
+  return pools_.encode->threads() + (pools_.render == pools_.encode ? 0 : pools_.render->threads());
+}
+
 void PoolExecutor::open(std::shared_ptr<Stream> stream, StreamSettings settings,
                         std::function<void(StreamOpened)> done) {
-  pool_->submit([stream = std::move(stream), settings = std::move(settings),
-                 done = std::move(done)]() mutable {
-    StreamOpened opened = open_now(*stream, std::move(settings));
+  pools_.encode->submit([encoders = encoders_, stream = std::move(stream),
+                         settings = std::move(settings), done = std::move(done)]() mutable {
+    StreamOpened opened = open_now(*stream, std::move(settings), encoders);
     stream.reset();
     done(std::move(opened));
   });
@@ -88,7 +109,7 @@ void PoolExecutor::close(std::shared_ptr<Stream> stream) {
     const std::lock_guard lock(mutex_);
     ++closing_;
   }
-  pool_->submit([this, stream = std::move(stream)]() mutable {
+  pools_.encode->submit([this, stream = std::move(stream)]() mutable {
     stream.reset();
     const std::lock_guard lock(mutex_);
     --closing_;
@@ -97,10 +118,26 @@ void PoolExecutor::close(std::shared_ptr<Stream> stream) {
 }
 
 void PoolExecutor::submit(FrameJob job, std::function<void(FrameResult)> done) {
-  pool_->submit([job = std::move(job), done = std::move(done)]() mutable {
-    FrameResult result = run_now(job);
-    job.stream.reset();
-    done(std::move(result));
+  struct Work {
+    FrameJob job;
+    FrameResult result;
+    std::function<void(FrameResult)> done;
+
+    void report() {
+      job.stream.reset();
+      done(std::move(result));
+    }
+  };
+  auto work = std::make_shared<Work>(Work{std::move(job), {}, std::move(done)});
+  ThreadPool* const encode = pools_.encode == pools_.render ? nullptr : pools_.encode.get();
+  pools_.render->submit([encode, work = std::move(work)]() mutable {
+    const bool rendered = render_now(work->job, work->result);
+    const auto finish = [rendered](Work& w) {
+      if (rendered) encode_now(w.job, w.result);
+      w.report();
+    };
+    if (!encode || !rendered) return finish(*work);
+    encode->submit([work = std::move(work), finish]() { finish(*work); });
   });
 }
 

@@ -117,6 +117,7 @@ void Client::refuse(Peer& from, ErrorCode code, std::string_view why) {
 
 AdmissionAnswer Client::admit(const Hello& hello) {
   token_ = hello.token;
+  decoders_ = hello.decoders;
   auto answer = registry_.admit(*this, hello);
   if (const auto* admission = std::get_if<Admission>(&answer)) {
     admitted_at_ = Clock::now();
@@ -130,6 +131,7 @@ AdmissionAnswer Client::admit(const Hello& hello) {
 void Client::resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,
                     TimePoint now) {
   token_ = hello.token;
+  decoders_ = hello.decoders;
   attach(peer);
   const LogSession about(session_.id());
   spdlog::info("{} is back", peer_address_);
@@ -211,10 +213,22 @@ double Client::device_seconds(const FrameStats& stats) const {
 }
 
 void Client::open_stream(StreamSettings settings) {
+  settings.seat = encoder_.seat;
   executor_->open(stream_, std::move(settings),
                   on_session_thread<StreamOpened>([](Client& client, const StreamOpened& opened) {
                     client.session_.on_stream_opened(opened, Clock::now());
                   }));
+}
+
+std::optional<EncoderChoice> Client::other_encoder() {
+  const std::string refused = encoder_.encoder.text;
+  auto other = registry_.encoders_.replace(encoder_, decoders_, Clock::now());
+  registry_.metrics_.encoders_refused.Increment();
+  const LogSession about(session_.id());
+  spdlog::warn("{} opens no more: {}", refused, other ? other->encoder.text : "nothing is left");
+  if (!other) return std::nullopt;
+  encoder_ = *std::move(other);
+  return encoder_.encoder;
 }
 
 void Client::start_frame(const FrameCandidate& candidate, TimePoint now) {

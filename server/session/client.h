@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "server/session/encoder_allocator.h"
 #include "server/session/peer.h"
 #include "server/session/session.h"
 #include "server/session/session_usage.h"
@@ -42,12 +43,17 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;
   void close(CloseCode code, std::string_view reason) override;
   void open_stream(StreamSettings settings) override;
+  std::optional<EncoderChoice> other_encoder() override;
 
   /// Continues the session of a client that was lost, through `peer`.
   void resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,
               TimePoint now);
   void add_spectator(const std::shared_ptr<Peer>& peer);
   [[nodiscard]] SpectatorHub& spectators() { return spectators_; }
+  [[nodiscard]] const SpectatorHub& spectators() const { return spectators_; }
+  /// Of the streams that it opens from here on.
+  void use_encoder(EncoderAllocator::Grant grant) { encoder_ = std::move(grant); }
+  [[nodiscard]] const EncoderAllocator::Grant& encoder() const { return encoder_; }
   void on_tick(TimePoint now);
   /// Something happened: since when could a frame start?
   void note_readiness(TimePoint now);
@@ -81,6 +87,8 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   const std::shared_ptr<FrameExecutor> executor_;
   std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
   std::string token_;  // of the hello; a link may open one scene only
+  std::vector<Codec> decoders_;
+  EncoderAllocator::Grant encoder_;
   std::optional<TimePoint> admitted_at_;
   Session session_;
   SessionUsage usage_;

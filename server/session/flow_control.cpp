@@ -76,6 +76,8 @@ bool FlowControl::acknowledged(const Ack& ack, TimePoint now) {
 
 void FlowControl::observe_network(const Ack& ack, const CreditWindow::Settled& settled,
                                   TimePoint now) {
+  // Given up before its turn, and nobody says when it came: that tells nothing of the way.
+  if (ack.received_us <= 0 && ack.dropped) return;
   RateController::Sample sample;
   // The way there alone, where the client says when the frame came; the whole round in any case,
   // unless the client gave the frame up before its turn.

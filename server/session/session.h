@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -16,8 +17,12 @@
 #include "server/schedule/next_frame_cost.h"
 #include "server/schedule/scheduler.h"
 #include "server/session/admission_queue.h"
-#include "server/session/camera_forecast.h"
+#include "server/session/camera_track.h"
+#include "server/session/encoder_allocator.h"
+#include "server/session/encoder_effort.h"
 #include "server/session/flow_control.h"
+#include "server/session/frame_pace.h"
+#include "server/session/idr_policy.h"
 #include "server/session/rate_limit.h"
 #include "server/session/scene_source.h"
 
@@ -37,17 +42,11 @@ struct SceneEntry {
   }
 };
 
-/// An encoder that the start-up probe found usable.
-struct EncoderChoice {
-  EncoderKind kind = EncoderKind::x264;
-  Codec codec = Codec::h264;
-  std::string text;  // name and reason, for people
-};
-
 /// What a session got at its admission.
 struct Admission {
   std::shared_ptr<const SceneEntry> scene;
   EncoderChoice encoder;
+  EncoderEffort effort{};  // of libx264
 };
 
 /// What a hello comes to.
@@ -89,6 +88,8 @@ class SessionHost {
   virtual void close(CloseCode code, std::string_view reason) = 0;
   /// Answered by Session::on_stream_opened().
   virtual void open_stream(StreamSettings settings) = 0;
+  /// The encoder of the admission cannot be opened: another one, or nothing.
+  virtual std::optional<EncoderChoice> other_encoder() = 0;
 };
 
 /// Frame of a session that its owner hands to an executor, with a stream of its own.
@@ -125,8 +126,10 @@ class Session {
   void fail(ErrorCode code, std::string_view message);
   /// Asks the client to go on elsewhere; frames go on until it does.
   void drain(std::chrono::milliseconds deadline);
-  /// The next frame shall be an IDR.
-  void want_idr() { idr_due_ = true; }
+  /// One of the next frames shall be an IDR.
+  void want_idr() { idr_.request(); }
+  /// The encoder goes on with this one, from an IDR on.
+  void use_effort(const EncoderEffort& effort);
   /// What a client is told first. Only while live.
   [[nodiscard]] Welcome welcome();
   /// Closes the connection of a server that goes away.
@@ -154,6 +157,10 @@ class Session {
 
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] const std::string& id() const { return id_; }
+  /// Between its frames, as far as they really follow each other.
+  [[nodiscard]] std::chrono::microseconds frame_interval() const {
+    return std::max(flow_.frame_interval(), pace_.real_interval());
+  }
   [[nodiscard]] const FlowControl& flow() const { return flow_; }
   [[nodiscard]] const StreamConfig& config() const { return config_; }
   [[nodiscard]] const SceneEntry* scene() const { return admission_.scene.get(); }
@@ -163,15 +170,18 @@ class Session {
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
   [[nodiscard]] bool paused() const { return paused_; }
   [[nodiscard]] bool lost() const { return lost_at_.has_value(); }
+  [[nodiscard]] const EncoderEffort& effort() const { return admission_.effort; }
+  [[nodiscard]] EncoderKind encoder_kind() const { return admission_.encoder.kind; }
+  /// Its stream is open, and somebody looks.
+  [[nodiscard]] bool streams() const {
+    return state_ == State::live && !lost_at_ && !paused_ && !opening_stream_;
+  }
 
  private:
   void on(const UnknownMessage&, TimePoint) {}
   void on(const Hello& hello, TimePoint now);
   void on(const PoseSample& sample, TimePoint now);
-  void on(const PosePath& path, TimePoint now) {
-    note_activity(now);
-    forecast_.follow(path);
-  }
+  void on(const PosePath& path, TimePoint now);
   void on(const Ack& ack, TimePoint now);
   void on(const Settings& settings, TimePoint now);
   void on(const SelectScene& select, TimePoint now);
@@ -181,6 +191,7 @@ class Session {
   void on(const Pick& pick, TimePoint now);
 
   void greet(const Hello& hello, TimePoint now);
+  void go_on_from(const Hello& hello, TimePoint now);
   void on_queued(const ClientMessage& message);
   /// A scene is being loaded: notes which one, and tells the client how long that may take.
   void await_scene(const std::string& scene_id, const SceneAwaited& awaited, TimePoint now);
@@ -192,10 +203,8 @@ class Session {
   void say(const ServerMessage& message, TimePoint now);
   void say_config(TimePoint now);
   void request_stream();
-  /// Notes that a frame starts; returns the rate that the session really reaches.
-  int measure_rate(TimePoint now);
   void send_statistics(TimePoint now);
-  [[nodiscard]] bool picture_is_stale() const;
+  [[nodiscard]] bool view_has_changed() const;
   [[nodiscard]] FlowWish flow_wish() const;
   /// The stream has another size on the rung that holds now.
   void follow_ladder();
@@ -221,11 +230,10 @@ class Session {
 
   FlowControl flow_;
   NextFrameCost cost_;
-  std::optional<PoseSample> pose_;  // newest
+  FramePace pace_;
+  IdrPolicy idr_;
+  CameraTrack track_;
   TimePoint pose_received_{};
-  CameraForecast forecast_;  // on the client's clock
-  PoseSample aim_;           // `pose_`, where the camera will be when the next picture is seen
-  std::int64_t aimed_ahead_us_ = 0;
   TimePoint last_motion_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
   bool shown_is_passing_ = false;    // it may not stay: a sub-frame, or of a forecast
@@ -233,19 +241,12 @@ class Session {
   bool rendering_ = false;
   std::optional<TimePoint> lost_at_;
   std::uint64_t obsolete_frames_ = 0;  // up to this id they were made for a lost connection
-  bool idr_due_ = false;
   bool paused_ = false;
   int failures_ = 0;  // of rendering or encoding, in a row
-  TimePoint next_start_{};
-  TimePoint last_start_{};
-  TimePoint credit_since_{};  // when an acknowledgement last gave credit that was missing
-  std::chrono::duration<double> mean_interval_{0.05};  // between starts of frames in a row
   std::uint64_t frames_started_ = 0;
 
   TimePoint last_said_{};
   TimePoint last_activity_;
-  TimePoint last_idr_request_{};
-  bool idr_request_waits_ = false;
   RateLimit picks_;
   bool idle_warned_ = false;
 

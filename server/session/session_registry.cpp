@@ -5,7 +5,6 @@
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
 #include "server/net/wire.h"
@@ -23,33 +22,7 @@ std::string random_session_id() {
   return fmt::format("{:08x}", engine());
 }
 
-std::string_view state_name(const Session& session) {
-  if (session.lost()) return "lost";
-  switch (session.state()) {
-    case Session::State::awaiting_hello:
-      return "awaiting_hello";
-    case Session::State::queued:
-      return "queued";
-    case Session::State::opening:
-      return "opening";
-    case Session::State::live:
-      return "live";
-    case Session::State::closed:
-      break;
-  }
-  return "closed";
-}
-
 double megapixels(glm::ivec2 size_px) { return 1e-6 * size_px.x * size_px.y; }
-
-nlohmann::json times_json(const SessionUsage& usage) {
-  auto times = nlohmann::json::object();
-  for (std::size_t i = 0; i < session_time_count; ++i)
-    if (const auto p = usage.times(static_cast<SessionTime>(i)).percentiles())
-      times[std::string(session_time_names[i])] = {
-          {"p50", 1e3 * p->p50}, {"p95", 1e3 * p->p95}, {"p99", 1e3 * p->p99}};
-  return times;
-}
 
 }  // namespace
 
@@ -66,7 +39,7 @@ SessionRegistry::SessionRegistry(boost::asio::io_context& io, RegistryOptions op
       options_(std::move(options)),
       executor_(std::move(executor)),
       scenes_(scenes),
-      encoders_(std::move(encoders)),
+      encoders_(std::move(encoders), options_.encoders),
       authorize_(std::move(authorize)),
       tokens_(std::move(tokens)),
       metrics_(metrics),
@@ -74,8 +47,11 @@ SessionRegistry::SessionRegistry(boost::asio::io_context& io, RegistryOptions op
       pace_timer_(io),
       tick_timer_(io),
       cpu_seconds_charged_(process_cpu_seconds()),
-      budget_({static_cast<double>(executor_->slots()), static_cast<double>(options_.gpus)},
+      charged_(Clock::now()),
+      budget_({static_cast<double>(options_.cpus),
+               static_cast<double>(options_.devices ? options_.devices->views().size() : 0)},
               options_.min_fps),
+      effort_(options_.cpus, options_.presets),
       queue_(options_.max_queue) {
   tick();
 }
@@ -121,18 +97,7 @@ void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_pt
   if (resumed && hello.version >= wire::version) {
     if (hello.scene_id.empty()) hello.scene_id = resumed->scene_id;
     if (const auto known = find(resumed->session_id)) {
-      // Its own scene is in memory; who wants another one begins anew, and may have to wait.
-      const auto choice = choose(hello);
-      if (const auto* chosen = std::get_if<Choice>(&choice);
-          chosen && known->session().resumable()) {
-        auto scene = find_scene(chosen->scene_id, now);
-        if (auto* entry = std::get_if<std::shared_ptr<const SceneEntry>>(&scene)) {
-          metrics_.sessions_resumed.Increment();
-          newcomer->detach();
-          remove(*newcomer);
-          return known->resume(peer, hello, {std::move(*entry), chosen->encoder}, now);
-        }
-      }
+      if (resume(peer, *newcomer, *known, hello, now)) return;
     } else {
       // It comes from another server of the fleet, or comes late: its id goes on.
       newcomer->detach();
@@ -143,6 +108,26 @@ void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_pt
     }
   }
   newcomer->session().on_message(hello, now);
+}
+
+bool SessionRegistry::resume(const std::shared_ptr<Peer>& peer, Client& newcomer, Client& known,
+                             const Hello& hello, TimePoint now) {
+  const auto choice = choose(hello);
+  const auto* scene_id = std::get_if<std::string>(&choice);
+  if (!scene_id || !known.session().resumable()) return false;
+  // Its own scene is in memory; who wants another one begins anew, and may have to wait.
+  auto found = find_scene(*scene_id, now);
+  auto* scene = std::get_if<std::shared_ptr<const SceneEntry>>(&found);
+  if (!scene) return false;
+  auto encoder = encoders_.renew(known.encoder(), hello.decoders, now);
+  if (!encoder) return false;
+  metrics_.sessions_resumed.Increment();
+  newcomer.detach();
+  remove(newcomer);
+  Admission admission{std::move(*scene), encoder->encoder, known.session().effort()};
+  known.use_encoder(*std::move(encoder));
+  known.resume(peer, hello, std::move(admission), now);
+  return true;
 }
 
 void SessionRegistry::watch(const std::shared_ptr<Peer>& peer, Client& newcomer,
@@ -216,8 +201,7 @@ SceneAnswer SessionRegistry::find_scene(const std::string& scene_id, TimePoint n
                       fmt::format("there is no scene \"{}\" here", scene_id), false};
 }
 
-std::variant<SessionRegistry::Choice, ErrorMessage> SessionRegistry::choose(
-    const Hello& hello) const {
+std::variant<std::string, ErrorMessage> SessionRegistry::choose(const Hello& hello) const {
   const std::string wanted = hello.scene_id.empty() ? scenes_.default_scene() : hello.scene_id;
   // The token first: a refusal does not depend on what is here.
   if (const auto refusal = authorize_(hello.token, wanted, Use::own_session))
@@ -225,13 +209,11 @@ std::variant<SessionRegistry::Choice, ErrorMessage> SessionRegistry::choose(
   if (!scenes_.has(wanted))
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("there is no scene \"{}\" here", wanted), true};
-  for (const Codec codec : hello.decoders)
-    for (const auto& encoder : encoders_)
-      if (encoder.codec == codec) return Choice{wanted, encoder};
-  std::string offered;
-  for (const auto& encoder : encoders_) offered += (offered.empty() ? "" : "; ") + encoder.text;
-  return ErrorMessage{ErrorCode::no_common_codec,
-                      "the client decodes nothing that this server encodes: " + offered, true};
+  if (!encoders_.serves(hello.decoders))
+    return ErrorMessage{ErrorCode::no_common_codec,
+                        "the client decodes nothing that this server encodes: " + encoders_.offer(),
+                        true};
+  return wanted;
 }
 
 bool SessionRegistry::has_place_for(const Client& client, const Hello& hello) const {
@@ -251,7 +233,7 @@ std::vector<SessionDemand> SessionRegistry::demands() const {
   return demands;
 }
 
-AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello) {
+AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
   const std::string& id = client.session().id();
   auto choice = choose(hello);
   if (auto* error = std::get_if<ErrorMessage>(&choice)) {
@@ -269,15 +251,24 @@ AdmissionAnswer SessionRegistry::admit(const Client& client, const Hello& hello)
                         true};
   }
   if (has_place_for(client, hello)) {
-    queue_.leave(id);
-    auto& [scene_id, encoder] = std::get<Choice>(choice);
     // Who waits for a scene holds no place: it may come to nothing.
-    auto scene = find_scene(scene_id, Clock::now());
+    auto scene = find_scene(std::get<std::string>(choice), Clock::now());
+    if (!std::holds_alternative<std::shared_ptr<const SceneEntry>>(scene)) queue_.leave(id);
     if (const auto* awaited = std::get_if<SceneAwaited>(&scene)) return *awaited;
     if (auto* error = std::get_if<ErrorMessage>(&scene)) return std::move(*error);
-    ++admitted_;
-    metrics_.sessions_admitted.Increment();
-    return Admission{std::get<0>(std::move(scene)), std::move(encoder)};
+    if (auto encoder = encoders_.grant(hello.decoders, Clock::now())) {
+      queue_.leave(id);
+      ++admitted_;
+      metrics_.sessions_admitted.Increment();
+      const glm::ivec2 size_px =
+          wish_within(options_.policy, hello.settings, hello.viewport_px).size_px;
+      Admission admission{std::get<0>(std::move(scene)), encoder->encoder,
+                          effort_.initial(static_cast<int>(admitted_), size_px)};
+      client.use_encoder(*std::move(encoder));
+      return admission;
+    }
+    if (client.session().state() != Session::State::queued)
+      spdlog::info("{} waits for a video encoder: all are taken", client.peer_address());
   }
   if (const auto position = queue_.join(id))
     return QueuePlace{*position, queue_.estimate(*position, static_cast<int>(admitted_))};
@@ -326,6 +317,8 @@ void SessionRegistry::tick() {
   }
   for (const auto& client : gone) remove(*client);
   charge_cpu(now);
+  report_loads();
+  control_effort(now);
   if (now - queue_told_ >= queue_tell_interval) admit_waiting(now);
   give_frames();
   publish();
@@ -333,89 +326,6 @@ void SessionRegistry::tick() {
   tick_timer_.async_wait([this](const boost::system::error_code& error) {
     if (!error) tick();
   });
-}
-
-void SessionRegistry::charge_cpu(TimePoint now) {
-  const double used = process_cpu_seconds();
-  const double seconds = used - std::exchange(cpu_seconds_charged_, used);
-  std::vector<double> busy_seconds;
-  for (const auto& client : clients_)
-    busy_seconds.push_back(client->usage().take_busy_seconds(now));
-  const auto shares = share_out(seconds, busy_seconds);
-  for (std::size_t i = 0; i < clients_.size(); ++i) clients_[i]->usage().charge_cpu(shares[i]);
-}
-
-void SessionRegistry::publish() {
-  auto sessions = nlohmann::json::array();
-  std::size_t queued = 0;
-  int in_flight = 0;
-  int lost = 0;
-  std::size_t spectators = 0;
-  int stepped_down = 0;
-  double target_bits_per_s = 0.0;
-  for (const auto& client : clients_) {
-    const Session& session = client->session();
-    if (session.state() == Session::State::live && !session.lost()) {
-      stepped_down += session.flow().steps_down() > 0 ? 1 : 0;
-      target_bits_per_s += 1e3 * session.flow().bitrate_kbps();
-      metrics_.link_queue_seconds.Observe(
-          std::chrono::duration<double>(session.flow().queue_delay()).count());
-    }
-    queued += client->queued_frames();
-    lost += session.lost() ? 1 : 0;
-    spectators += client->spectators().size();
-    in_flight += session.flow().credit().in_flight();
-    sessions.push_back({
-        {"id", session.id()},
-        {"state", state_name(session)},
-        {"paused", session.paused()},
-        {"spectators", client->spectators().size()},
-        {"scene", session.scene() ? session.scene()->facts.scene_id : ""},
-        {"width_px", session.config().size_px.x},
-        {"height_px", session.config().size_px.y},
-        {"device", session.device() ? nlohmann::json(*session.device()) : nlohmann::json()},
-        {"encoder", session.config().encoder},
-        {"frames_sent", session.frames_sent()},
-        {"frames_dropped", session.frames_dropped()},
-        {"bytes_sent", session.bytes_sent()},
-        {"frames_in_flight", session.flow().credit().in_flight()},
-        {"credit", session.flow().credit().limit()},
-        {"base_rtt_us", session.flow().credit().base_rtt().count()},
-        {"queue_delay_us", session.flow().queue_delay().count()},
-        {"target_bitrate_kbps", session.flow().bitrate_kbps()},
-        {"steps_down", session.flow().steps_down()},
-        {"tcp_rtt_us", session.flow().link().rtt_us},
-        {"tcp_delivery_kbps", session.flow().link().delivery_bits_per_s / 1000},
-        {"tcp_window_bytes", session.flow().link().window_bytes},
-        {"tcp_unsent_bytes", session.flow().link().unsent_bytes},
-        {"frames_queued", client->queued_frames()},
-        {"cpu_seconds", client->usage().cpu_seconds()},
-        {"gpu_seconds", client->usage().gpu_seconds()},
-        {"times_ms", times_json(client->usage())},
-    });
-  }
-  metrics_.connections.Set(connections_);
-  metrics_.sessions.Set(admitted_);
-  metrics_.sessions_lost.Set(lost);
-  metrics_.spectators.Set(static_cast<double>(spectators));
-  metrics_.sessions_stepped_down.Set(stepped_down);
-  metrics_.target_bits_per_second.Set(target_bits_per_s);
-  metrics_.sessions_waiting.Set(static_cast<double>(queue_.size()));
-  metrics_.frames_running.Set(scheduler_.running());
-  metrics_.frames_queued.Set(static_cast<double>(queued));
-  metrics_.frames_in_flight.Set(in_flight);
-  const auto demanded = demands();
-  const auto load = budget_.load(demanded);
-  metrics_.seats.Set(draining_ ? 0 : budget_.seats(demanded, options_.max_sessions));
-  metrics_.cpu_budget_used.Set(load.cpus);
-  metrics_.gpu_budget_used.Set(load.gpus);
-  const std::lock_guard lock(published_mutex_);
-  published_ = sessions.dump();
-}
-
-std::string SessionRegistry::published_json() const {
-  const std::lock_guard lock(published_mutex_);
-  return published_;
 }
 
 void SessionRegistry::drain(std::chrono::milliseconds deadline) {

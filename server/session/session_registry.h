@@ -11,6 +11,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "render_core/device_set.h"
 #include "server/metrics.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"
@@ -18,6 +19,9 @@
 #include "server/session/admission_queue.h"
 #include "server/session/authorize.h"
 #include "server/session/client.h"
+#include "server/session/encoder_allocator.h"
+#include "server/session/encoder_effort.h"
+#include "server/session/session_report.h"
 #include "server/session/session_tokens.h"
 
 namespace catgs {
@@ -25,8 +29,11 @@ namespace catgs {
 struct RegistryOptions {
   SessionPolicy policy;
   int max_sessions = 16;
-  int min_fps = 10;                   // that admission leaves everybody; 0: it counts sessions only
-  int gpus = 0;                       // that render
+  int min_fps = 10;  // that admission leaves everybody; 0: it counts sessions only
+  std::shared_ptr<DeviceSet> devices;  // GPUs that render; null: none
+  int cpus = 1;                        // that encode
+  EffortControl::Range presets;
+  EncoderAllocator::Policy encoders;
   int max_sessions_per_address = 64;  // a museum behind one address
   int max_queue = 64;                 // clients that wait for a place
   int max_spectators = 16;            // of one session
@@ -69,18 +76,22 @@ class SessionRegistry {
                 TimePoint now);
   /// Lets a newcomer look on at the session of its watch token, or says why not.
   void watch(const std::shared_ptr<Peer>& peer, Client& newcomer, const Hello& hello);
-  /// What a hello asks for and may have, whether there is a place or not.
-  struct Choice {
-    std::string scene_id;
-    EncoderChoice encoder;
-  };
-  std::variant<Choice, ErrorMessage> choose(const Hello& hello) const;
-  AdmissionAnswer admit(const Client& client, const Hello& hello);
+  /// The id of the scene that a hello asks for and may have, if it decodes something, whether there
+  /// is a place or not.
+  std::variant<std::string, ErrorMessage> choose(const Hello& hello) const;
+  /// Continues the session of a resume token. False: it cannot go on.
+  bool resume(const std::shared_ptr<Peer>& peer, Client& newcomer, Client& known,
+              const Hello& hello, TimePoint now);
+  AdmissionAnswer admit(Client& client, const Hello& hello);
   [[nodiscard]] bool has_place_for(const Client& client, const Hello& hello) const;
   /// Of the admitted sessions, as measured.
   [[nodiscard]] std::vector<SessionDemand> demands() const;
   /// Shares the processor time since the last call out among the sessions.
   void charge_cpu(TimePoint now);
+  /// Tells the devices what they were measured to do.
+  void report_loads();
+  /// Gives one session another encoder effort, where what is measured asks for it.
+  void control_effort(TimePoint now);
   void remove(const Client& client);
   /// Those next in the queue ask again; the others hear where they stand.
   void admit_waiting(TimePoint now);
@@ -95,7 +106,7 @@ class SessionRegistry {
   const RegistryOptions options_;
   const std::shared_ptr<FrameExecutor> executor_;
   SceneSource& scenes_;
-  const std::vector<EncoderChoice> encoders_;
+  const EncoderAllocator encoders_;
   const Authorize authorize_;
   const SessionTokens tokens_;
   Metrics& metrics_;
@@ -105,18 +116,21 @@ class SessionRegistry {
   boost::asio::steady_timer pace_timer_;
   boost::asio::steady_timer tick_timer_;
   double cpu_seconds_charged_;
+  TimePoint charged_;
+  double busy_ = 0.0;  // share of the processors' time that this process takes lately
   bool stopped_ = false;
   bool draining_ = false;
   int connections_ = 0;
   std::unordered_map<std::string, int> connections_by_address_;
   std::uint32_t admitted_ = 0;
   const AdmissionBudget budget_;
+  EffortControl effort_;
   AdmissionQueue queue_;
   TimePoint queue_told_{};
   std::vector<FrameCandidate> candidates_;  // scratch of give_frames()
   std::vector<Client*> candidate_clients_;
   mutable std::mutex published_mutex_;
-  std::string published_ = "[]";
+  std::shared_ptr<const std::vector<SessionReport>> published_;
 };
 
 }  // namespace catgs

@@ -9,8 +9,7 @@ namespace catgs {
 /// A pose in the scene before means nothing in this one.
 void Session::enter_scene(std::shared_ptr<const SceneEntry> scene) {
   admission_.scene = std::move(scene);
-  pose_.reset();
-  forecast_ = CameraForecast(admission_.scene->facts.near_z);
+  track_ = CameraTrack(admission_.scene->facts.near_z);
   welcome_due_ = true;
 }
 

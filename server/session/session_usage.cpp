@@ -1,6 +1,7 @@
 #include "server/session/session_usage.h"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <numeric>
 #include <utility>
@@ -10,6 +11,13 @@ namespace {
 
 double seconds_between(TimePoint from, TimePoint to) {
   return std::chrono::duration<double>(to - from).count();
+}
+
+/// A share of time, as it was lately.
+void follow(double& share, double busy_s, double interval_s) {
+  constexpr double span_s = 2.0;
+  if (interval_s > 0)
+    share += (busy_s / interval_s - share) * (1.0 - std::exp(-interval_s / span_s));
 }
 
 }  // namespace
@@ -39,6 +47,10 @@ void SessionUsage::frame_ended(const FrameTicket& ticket, double device_seconds,
   if (const auto since = std::exchange(under_way_since_, std::nullopt))
     busy_seconds_ += seconds_between(*since, now);
   gpu_seconds_ += device_seconds;
+  const double encoding = seconds_between(ticket.encode_start, ticket.encode_end);
+  encoding_seconds_ += encoding;
+  if (encoding > 0)
+    encode_seconds_ += encode_seconds_ == 0 ? encoding : (encoding - encode_seconds_) / 16.0;
   if (ticket.refined) return;
   ++rendered_;
   rendered_gpu_seconds_ += device_seconds;
@@ -50,7 +62,7 @@ void SessionUsage::add(SessionTime time, TimePoint from, TimePoint to) {
 
 void SessionUsage::frame_sent(const FrameTicket& ticket, TimePoint now) {
   add(SessionTime::send, ticket.encode_end, now);
-  add(SessionTime::encode, ticket.render_end, ticket.encode_end);
+  add(SessionTime::encode, ticket.encode_start, ticket.encode_end);
   // A refinement is late on purpose, and nothing is rendered for it.
   if (ticket.refined) return;
   add(SessionTime::queue_wait, ticket.ready, ticket.started);
@@ -68,10 +80,13 @@ double SessionUsage::take_busy_seconds(TimePoint now) {
   return std::exchange(busy_seconds_, 0.0);
 }
 
-void SessionUsage::charge_cpu(double seconds) {
+void SessionUsage::charge_cpu(double seconds, double interval_s) {
   cpu_seconds_ += seconds;
   const int frames = std::exchange(rendered_, 0);
   const double gpu_seconds = std::exchange(rendered_gpu_seconds_, 0.0);
+  const double encoding_seconds = std::exchange(encoding_seconds_, 0.0);
+  follow(gpu_load_, gpu_seconds, interval_s);
+  follow(encoder_load_, encoding_seconds, interval_s);
   if (frames == 0) return;
   constexpr double span_frames = 32;  // that the means reach back over
   frames_measured_ += frames;
@@ -84,6 +99,11 @@ std::optional<SessionUsage::FrameCost> SessionUsage::frame_cost() const {
   constexpr int enough_frames = 8;
   if (frames_measured_ < enough_frames) return std::nullopt;
   return cost_;
+}
+
+std::optional<double> SessionUsage::gpu_load() const {
+  if (!frame_cost()) return std::nullopt;
+  return gpu_load_;
 }
 
 std::vector<double> share_out(double seconds, const std::vector<double>& busy_seconds) {

@@ -56,8 +56,8 @@ class SessionUsage {
 
   /// Time since the last call in which a frame was under way.
   double take_busy_seconds(TimePoint now);
-  /// Processor time of all threads that worked for it since the last call.
-  void charge_cpu(double seconds);
+  /// Processor time of all threads that worked for it since the last call, `interval_s` ago.
+  void charge_cpu(double seconds, double interval_s);
 
   [[nodiscard]] double cpu_seconds() const { return cpu_seconds_; }
   [[nodiscard]] double gpu_seconds() const { return gpu_seconds_; }
@@ -67,6 +67,11 @@ class SessionUsage {
     double gpu_seconds = 0;
   };
   [[nodiscard]] std::optional<FrameCost> frame_cost() const;
+  /// Share of a GPU's time that the session takes lately; nothing until some frames were measured.
+  [[nodiscard]] std::optional<double> gpu_load() const;
+  /// Share of the time lately in which its encoder is at work, and how long a frame takes it.
+  [[nodiscard]] double encoder_load() const { return encoder_load_; }
+  [[nodiscard]] double encode_seconds() const { return encode_seconds_; }
   [[nodiscard]] const RecentTimes& times(SessionTime time) const {
     return times_[static_cast<std::size_t>(time)];
   }
@@ -81,8 +86,12 @@ class SessionUsage {
   // Since the last charge_cpu().
   int rendered_ = 0;
   double rendered_gpu_seconds_ = 0;
+  double encoding_seconds_ = 0;
   int frames_measured_ = 0;
   FrameCost cost_;
+  double gpu_load_ = 0;
+  double encoder_load_ = 0;
+  double encode_seconds_ = 0;  // of a frame, over the last dozen
   std::array<RecentTimes, session_time_count> times_;
 };
 

@@ -47,6 +47,13 @@ T parsed(const std::vector<std::byte>& bytes) {
   return std::get<T>(*message);
 }
 
+template <typename T>
+T parsed(const v1::ClientMessage& message) {
+  const std::string text = message.SerializeAsString();
+  const auto* data = reinterpret_cast<const std::byte*>(text.data());
+  return parsed<T>(std::vector(data, data + text.size()));
+}
+
 /// What parsing says against a message; empty: nothing.
 std::string complaint(const v1::ClientMessage& message) {
   const std::string text = message.SerializeAsString();
@@ -208,8 +215,20 @@ TEST(Wire, PathsAreInTimeOrderAndBounded) {
   EXPECT_THAT(complaint(message), HasSubstr("path.samples"));
 }
 
+TEST(Wire, AResumingHelloCarriesWhatIsLeftOfATour) {
+  v1::ClientMessage message = good_hello();
+  for (int i = 0; i < 2; ++i) {
+    auto& sample = *message.mutable_hello()->mutable_resume()->mutable_path()->add_samples();
+    sample = good_pose().pose();
+    sample.set_client_time_us(i + 1);
+  }
+  EXPECT_EQ(parsed<Hello>(message).resume_path.samples.size(), 2u);
+  message.mutable_hello()->mutable_resume()->mutable_path()->mutable_samples(1)->set_fov_y_rad(9);
+  EXPECT_THAT(complaint(message), HasSubstr("fov"));
+}
+
 TEST(Wire, IgnoresWhatIsNewAndRefusesWhatIsBroken) {
-  EXPECT_NO_THROW(parsed<UnknownMessage>({}));
+  EXPECT_NO_THROW(parsed<UnknownMessage>(v1::ClientMessage()));
   EXPECT_NO_THROW(parsed<UnknownMessage>(unhex("a20600")));  // field 100 of a later version
   for (const char* broken : {"ff", "0a05", "1a02ffff"}) {
     const auto result = wire::parse_client_message(unhex(broken));

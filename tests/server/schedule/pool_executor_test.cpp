@@ -47,6 +47,73 @@ TEST(PoolExecutor, AStreamEndsElsewhereAndBeforeTheExecutor) {
   EXPECT_TRUE(watched.expired());  // joined here: a worker cannot join itself
 }
 
+/// Says which threads it was drawn and encoded on.
+class WatchedView final : public View {
+ public:
+  explicit WatchedView(std::thread::id* on) : on_(on) {}
+  RenderStatus render(const FrameRequest&, FrameView&) noexcept override {
+    *on_ = std::this_thread::get_id();
+    return {};
+  }
+  [[nodiscard]] std::size_t memory_bytes() const override { return 0; }
+
+ private:
+  std::thread::id* on_;
+};
+
+class WatchedEncoder final : public Encoder {
+ public:
+  explicit WatchedEncoder(std::thread::id* on) : on_(on) {}
+  EncodeStatus encode(const FrameView&, bool, EncodedFrame&) noexcept override {
+    *on_ = std::this_thread::get_id();
+    return {};
+  }
+  void set_rate(int, int) noexcept override {}
+  [[nodiscard]] Codec codec() const override { return Codec::h264; }
+  [[nodiscard]] std::string_view name() const override { return "watched"; }
+  [[nodiscard]] std::string codec_string() const override { return ""; }
+
+ private:
+  std::thread::id* on_;
+};
+
+TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
+  PoolExecutor executor({std::make_shared<ThreadPool>(3), std::make_shared<ThreadPool>(2)});
+  EXPECT_EQ(executor.slots(), 5);
+  std::thread::id rendered_on, encoded_on;
+  auto stream = std::make_shared<Stream>();
+  stream->view = std::make_unique<WatchedView>(&rendered_on);
+  stream->encoder = std::make_unique<WatchedEncoder>(&encoded_on);
+  std::promise<FrameResult> done;
+  FrameJob job;
+  job.stream = stream;
+  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
+  const FrameResult result = done.get_future().get();
+  EXPECT_TRUE(result.ok);
+  EXPECT_NE(rendered_on, std::thread::id());
+  EXPECT_NE(encoded_on, std::thread::id());
+  EXPECT_NE(rendered_on, encoded_on);
+  EXPECT_LE(result.frame.ticket.render_end, result.frame.ticket.encode_start);
+  executor.close(std::move(stream));
+}
+
+TEST(PoolExecutor, AnEncoderThatCannotBeOpenedIsTold) {
+  PoolExecutor executor({std::make_shared<ThreadPool>(1), std::make_shared<ThreadPool>(1)},
+                        [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
+                          throw std::runtime_error("no session left");
+                        });
+  std::thread::id rendered_on;
+  auto stream = std::make_shared<Stream>();
+  stream->view = std::make_unique<WatchedView>(&rendered_on);
+  std::promise<StreamOpened> done;
+  executor.open(stream, {}, [&](StreamOpened opened) { done.set_value(std::move(opened)); });
+  const StreamOpened opened = done.get_future().get();
+  EXPECT_FALSE(opened.ok);
+  EXPECT_TRUE(opened.encoder_unavailable);
+  EXPECT_EQ(opened.message, "no session left");
+  executor.close(std::move(stream));
+}
+
 TEST(PoolExecutor, AClientThatNeverOpenedAStreamClosesIt) {
   PoolExecutor executor(std::make_shared<ThreadPool>(2));
   for (int i = 0; i < 100; ++i) executor.close(std::make_shared<Stream>());

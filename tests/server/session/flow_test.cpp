@@ -173,5 +173,29 @@ TEST(Flow, RefinesWithin200Milliseconds) {
   EXPECT_TRUE(simulation.sent(6s, 10s).empty()) << "then there is nothing to send";
 }
 
+TEST(FlowControl, AFrameThatWasGivenUpUnseenTellsNothingOfTheLink) {
+  FlowControl flow;
+  flow.set_wish({{1280, 720}, 60, 20'000, false});
+  TimePoint now = TimePoint{} + 1h;
+  std::uint64_t id = 0;
+  const auto pass = [&](std::chrono::milliseconds delay, bool given_up) {
+    now += 20ms;
+    flow.sent(++id, 20'000, {1280, 720}, now);
+    const TimePoint there = now + delay;
+    Ack ack;
+    ack.frame_id = id;
+    ack.dropped = given_up;
+    if (!given_up)
+      ack.received_us = ack.decoded_us = ack.presented_us =
+          std::chrono::duration_cast<std::chrono::microseconds>(there.time_since_epoch()).count();
+    EXPECT_TRUE(flow.acknowledged(ack, there));
+  };
+  for (int i = 0; i < 20; ++i) pass(10ms, false);
+  for (int i = 0; i < 20; ++i) pass(90ms, false);
+  ASSERT_GT(flow.queue_delay(), 60ms);
+  for (int i = 0; i < 5; ++i) pass(90ms, true);
+  EXPECT_GT(flow.queue_delay(), 60ms) << "the queue is still there";
+}
+
 }  // namespace
 }  // namespace catgs

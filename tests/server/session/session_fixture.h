@@ -18,6 +18,7 @@ struct FakeHost final : SessionHost {
   std::vector<StreamSettings> opened;
   std::vector<std::uint64_t> drop_next;
   std::optional<CloseCode> closed;
+  std::optional<EncoderChoice> other;  // than that of the admission, once
 
   AdmissionAnswer admit(const Hello&) override { return admission; }
   bool scene_awaited = false;
@@ -37,6 +38,7 @@ struct FakeHost final : SessionHost {
   }
   void close(CloseCode code, std::string_view) override { closed = code; }
   void open_stream(StreamSettings settings) override { opened.push_back(std::move(settings)); }
+  std::optional<EncoderChoice> other_encoder() override { return std::exchange(other, {}); }
 
   template <typename T>
   int count() const {

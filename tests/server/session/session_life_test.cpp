@@ -59,6 +59,23 @@ TEST_F(SessionLife, BeginsAtThePoseOfAResumingHello) {
   EXPECT_EQ(run_frame().ticket.pose_id, 7u);
 }
 
+TEST_F(SessionLife, ATourGoesOnOnAnotherServer) {
+  Hello hello = resuming();
+  for (int i = 0; i < 20; ++i) {  // two seconds at one unit a second
+    PoseSample sample{0, i * 100'000, {}, 1.0f};
+    sample.world_from_camera.position.x = 0.1f * static_cast<float>(i);
+    hello.resume_path.samples.push_back(sample);
+  }
+  hello.resume_pose = hello.resume_path.samples[5];
+  session.on_message(hello, now);
+  open_stream();
+  ASSERT_TRUE(frame_is_due());
+  const FrameOrder order = run_frame();
+  EXPECT_TRUE(order.force_idr);
+  ASSERT_TRUE(order.request.forecast) << "known before a second pose has come";
+  EXPECT_GT(order.request.forecast->world_from_camera.position.x, 0.55f);
+}
+
 TEST_F(SessionLife, RendersNothingWhileItsClientIsLost) {
   greet();
   pose(1, 0.0f);

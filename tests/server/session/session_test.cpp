@@ -110,20 +110,6 @@ TEST_F(SessionTest, NeedsCredit) {
   EXPECT_TRUE(frame_is_due());
 }
 
-TEST_F(SessionTest, AsksForAnIdrAfterADrop) {
-  greet();
-  pose(1, 0.0f);
-  host.drop_next = {1};
-  run_frame();
-  pose(2, 1.0f);
-  now += 1s;
-  ASSERT_TRUE(frame_is_due()) << "a dropped frame is not in flight";
-  EXPECT_TRUE(run_frame().force_idr);
-  EXPECT_EQ(session.frames_dropped(), 1u);
-  EXPECT_EQ(session.frames_sent(), 1u) << "what was dropped was not sent";
-  EXPECT_EQ(session.bytes_sent(), 100u);
-}
-
 TEST_F(SessionTest, CountsAFrameOnceItHasLeft) {
   greet();
   pose(1, 0.0f);
@@ -136,31 +122,6 @@ TEST_F(SessionTest, CountsAFrameOnceItHasLeft) {
   session.on_frame_sent(order.ticket, 123);
   EXPECT_EQ(session.frames_sent(), 1u);
   EXPECT_EQ(session.bytes_sent(), 123u);
-}
-
-TEST_F(SessionTest, AnsweringIdrRequestsInQuickSuccessionTakesTurns) {
-  greet();
-  pose(1, 0.0f);
-  ack(run_frame().ticket.frame_id);
-  const auto next_is_idr = [&] {
-    now += 20ms;
-    pose(session.frames_sent() + 1, static_cast<float>(session.frames_sent()));
-    const FrameOrder order = run_frame();
-    ack(order.ticket.frame_id);
-    return order.force_idr;
-  };
-  EXPECT_FALSE(next_is_idr());
-  session.on_message(RequestIdr{}, now);
-  EXPECT_TRUE(next_is_idr());
-  session.on_message(RequestIdr{}, now);
-  session.on_tick(now);
-  EXPECT_FALSE(next_is_idr()) << "an IDR was sent a moment ago";
-  now += 250ms;
-  session.on_tick(now);
-  EXPECT_TRUE(next_is_idr()) << "but the request is not forgotten";
-  now += 250ms;
-  session.on_tick(now);
-  EXPECT_FALSE(next_is_idr()) << "and answered once";
 }
 
 TEST_F(SessionTest, PauseStopsFramesAndBeginsAnewWithAnIdr) {
@@ -277,6 +238,47 @@ TEST_F(SessionTest, WarnsAnewAfterEverySignOfLife) {
     session.on_tick(now);
     EXPECT_FALSE(host.closed);
   }
+}
+
+TEST_F(SessionTest, GoesOnWithAnotherEncoderWhereTheDriverOpensNoMore) {
+  host.other = EncoderChoice{EncoderKind::x264, Codec::h264, "libx264"};
+  host.admission = Admission{std::get<Admission>(host.admission).scene,
+                             {EncoderKind::nvenc, Codec::h264, "h264_nvenc"}};
+  Hello hello;
+  hello.version = 1;
+  hello.viewport_px = {640, 360};
+  session.on_message(hello, now);
+  StreamOpened refused;
+  refused.encoder_unavailable = true;
+  session.on_stream_opened(refused, now);
+  ASSERT_EQ(host.opened.size(), 2u);
+  EXPECT_EQ(host.opened[1].encoder, EncoderKind::x264);
+  open_stream();
+  ASSERT_EQ(host.count<Welcome>(), 1);
+  EXPECT_EQ(std::get<Welcome>(host.said.back()).config.encoder, "libx264");
+
+  session.on_message(Settings{.size_px = {320, 180}}, now);
+  refused.message = "no memory";
+  session.on_stream_opened(refused, now);
+  EXPECT_EQ(host.last_error().code, ErrorCode::internal) << "nothing is left";
+  EXPECT_THAT(host.last_error().message, HasSubstr("no memory"));
+}
+
+TEST_F(SessionTest, AnotherEffortOpensTheEncoderAnewWithAnIdr) {
+  greet();
+  EXPECT_EQ(host.opened[0].encoding.x264_preset, "superfast");
+  pose(1, 0.0f);
+  ack(run_frame().ticket.frame_id);
+  session.use_effort({.preset = 0, .threads = 4});
+  ASSERT_EQ(host.opened.size(), 2u);
+  EXPECT_EQ(host.opened[1].encoding.x264_preset, "ultrafast");
+  EXPECT_EQ(host.opened[1].encoding.threads, 4);
+  EXPECT_EQ(host.opened[1].encoding.size_px, host.opened[0].encoding.size_px);
+  open_stream();
+  EXPECT_EQ(host.count<StreamConfig>(), 1);
+  now += 20ms;
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_TRUE(run_frame().force_idr);
 }
 
 TEST_F(SessionTest, AFewFailedFramesEndItWithTheirCause) {

@@ -52,7 +52,7 @@ TEST_F(SessionUsageTest, KnowsWhatAFrameCosts) {
     frame(10ms, 0.004);
     frame(1ms, 0.0,
           true);  // encoded once more, not rendered: no frame of the motion costs so little
-    usage.charge_cpu(0.015);
+    usage.charge_cpu(0.015, 0.25);
   }
   ASSERT_TRUE(usage.frame_cost());
   EXPECT_NEAR(usage.frame_cost()->cpu_seconds, 0.015, 1e-9);
@@ -61,9 +61,30 @@ TEST_F(SessionUsageTest, KnowsWhatAFrameCosts) {
   EXPECT_NEAR(usage.gpu_seconds(), 0.08, 1e-9);
   for (int i = 0; i < 500; ++i) {
     frame(10ms);
-    usage.charge_cpu(0.045);
+    usage.charge_cpu(0.045, 0.25);
   }
   EXPECT_NEAR(usage.frame_cost()->cpu_seconds, 0.045, 1e-4) << "it follows";
+}
+
+TEST_F(SessionUsageTest, KnowsWhatKeepsAGpuAndAnEncoderBusy) {
+  const auto run = [&](double device_s, std::chrono::milliseconds encoding) {
+    for (int i = 0; i < 80; ++i) {  // 20 s
+      FrameTicket ticket;
+      ticket.encode_start = now;
+      ticket.encode_end = now + encoding;
+      usage.frame_ended(ticket, device_s, now);
+      usage.charge_cpu(0.0, 0.25);
+    }
+  };
+  EXPECT_FALSE(usage.gpu_load()) << "nothing was measured";
+  run(0.05, 10ms);
+  ASSERT_TRUE(usage.gpu_load());
+  EXPECT_NEAR(*usage.gpu_load(), 0.2, 1e-3);
+  EXPECT_NEAR(usage.encoder_load(), 0.04, 1e-3);
+  EXPECT_NEAR(usage.encode_seconds(), 0.01, 1e-4);
+  for (int i = 0; i < 80; ++i) usage.charge_cpu(0.0, 0.25);
+  EXPECT_NEAR(*usage.gpu_load(), 0.0, 1e-3) << "it stands still";
+  EXPECT_NEAR(usage.encode_seconds(), 0.01, 1e-4) << "what the next one will take";
 }
 
 TEST_F(SessionUsageTest, TimesOfRefinementsAreNoLatency) {
@@ -73,6 +94,7 @@ TEST_F(SessionUsageTest, TimesOfRefinementsAreNoLatency) {
   ticket.started = now + 3ms;
   ticket.render_start = now + 4ms;
   ticket.render_end = now + 9ms;
+  ticket.encode_start = now + 9ms;
   ticket.encode_end = now + 11ms;
   usage.frame_sent(ticket, now + 12ms);
   ticket.refined = true;

@@ -1,0 +1,121 @@
+#include "server/session/encoder_effort.h"
+
+#include <algorithm>
+#include <bit>
+#include <functional>
+#include <numeric>
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr double busy_share = 0.9;
+constexpr double calm_share = 0.5;
+constexpr auto busy_for = 1s;
+constexpr double encoding_part = 0.4;  // of what is busy
+constexpr double too_long = 0.8;       // of the time between frames
+constexpr double comfortable = 0.5;
+constexpr auto settle = 1s;  // until a change shows in what is measured
+constexpr auto proof = 30s;
+constexpr auto most_patience = 120s;
+
+constexpr int usual_preset = EncoderEffort{}.preset;
+constexpr int most_threads = 8;
+constexpr int least_rows_per_slice = 8;  // of macroblocks; slices do not predict from each other
+
+double cost_ratio(int from, int to) {
+  return effort_presets[static_cast<std::size_t>(to)].cost /
+         effort_presets[static_cast<std::size_t>(from)].cost;
+}
+
+/// Since when a condition holds, given whether it holds now.
+TimePoint since(TimePoint before, bool holds, TimePoint now) {
+  if (!holds) return {};
+  return before == TimePoint{} ? now : before;
+}
+
+}  // namespace
+
+void apply(const EncoderEffort& effort, EncoderSettings& settings) {
+  settings.x264_preset = effort_presets[static_cast<std::size_t>(effort.preset)].name;
+  settings.threads = effort.threads;
+}
+
+int EffortControl::threads_for(int sessions, glm::ivec2 size_px) const {
+  const int by_rows = size_px.y / 16 / least_rows_per_slice;
+  const int threads = std::clamp(std::min(cpus_ / std::max(1, sessions), by_rows), 1, most_threads);
+  return static_cast<int>(std::bit_floor(static_cast<unsigned>(threads)));
+}
+
+EncoderEffort EffortControl::initial(int sessions, glm::ivec2 size_px) const {
+  return {std::clamp(usual_preset, presets_.lowest, presets_.highest),
+          threads_for(sessions, size_px)};
+}
+
+std::optional<EffortControl::Change> EffortControl::update(double busy, int admitted,
+                                                           std::span<const Session> sessions,
+                                                           TimePoint now) {
+  busy_since_ = since(busy_since_, busy >= busy_share, now);
+  calm_since_ = since(calm_since_, busy <= calm_share, now);
+  if (now - changed_ < settle) return std::nullopt;
+  auto change = with_other_threads(admitted, sessions);
+  if (!change && (change = faster(busy, sessions, now)))
+    patience_ = now - slowed_ < proof ? std::min<std::chrono::seconds>(2 * patience_, most_patience)
+                                      : least_patience;
+  if (!change && calm_since_ != TimePoint{} && now - calm_since_ >= patience_ &&
+      (change = slower(busy, sessions)))
+    slowed_ = now;
+  if (change) changed_ = now;
+  return change;
+}
+
+std::optional<EffortControl::Change> EffortControl::with_other_threads(
+    int admitted, std::span<const Session> sessions) const {
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const Session& session = sessions[i];
+    const int threads = threads_for(admitted, session.size_px);
+    if (threads != session.effort.threads) return Change{i, {session.effort.preset, threads}};
+  }
+  return std::nullopt;
+}
+
+std::optional<EffortControl::Change> EffortControl::faster(double busy,
+                                                           std::span<const Session> sessions,
+                                                           TimePoint now) const {
+  const double encoding =
+      std::transform_reduce(sessions.begin(), sessions.end(), 0.0, std::plus(),
+                            [](const Session& session) { return session.cpus; });
+  const bool all_busy = busy_since_ != TimePoint{} && now - busy_since_ >= busy_for;
+  const bool by_encoding = encoding >= encoding_part * busy * cpus_;
+  std::optional<std::size_t> costliest;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const Session& session = sessions[i];
+    if (session.effort.preset <= presets_.lowest) continue;
+    if (!(all_busy && by_encoding) && session.share_of_interval < too_long) continue;
+    if (!costliest || session.cpus > sessions[*costliest].cpus) costliest = i;
+  }
+  if (!costliest) return std::nullopt;
+  const EncoderEffort& effort = sessions[*costliest].effort;
+  return Change{*costliest, {effort.preset - 1, effort.threads}};
+}
+
+std::optional<EffortControl::Change> EffortControl::slower(
+    double busy, std::span<const Session> sessions) const {
+  std::optional<std::size_t> fastest;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const Session& session = sessions[i];
+    const int preset = session.effort.preset;
+    if (preset >= presets_.highest) continue;
+    const double ratio = cost_ratio(preset, preset + 1);
+    if (busy + session.cpus * (ratio - 1.0) / cpus_ > calm_share ||
+        session.share_of_interval * ratio > comfortable)
+      continue;
+    if (!fastest || preset < sessions[*fastest].effort.preset) fastest = i;
+  }
+  if (!fastest) return std::nullopt;
+  const EncoderEffort& effort = sessions[*fastest].effort;
+  return Change{*fastest, {effort.preset + 1, effort.threads}};
+}
+
+}  // namespace catgs
