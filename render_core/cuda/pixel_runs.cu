@@ -34,6 +34,13 @@ __device__ unsigned along_hilbert(unsigned x, unsigned y) {
 /// The pixels of the picture that may belong to a tile.
 struct Candidates {
   int first_x, first_y, width, count;
+
+  /// Number k, row by row. Exact: k and width are small, and no quotient is near the next integer.
+  __device__ int2 pixel(int k) const {
+    const int row =
+        static_cast<int>(__fdividef(static_cast<float>(k) + 0.5f, static_cast<float>(width)));
+    return make_int2(first_x + k - row * width, first_y + row);
+  }
 };
 
 __device__ Candidates candidates_of(const PixelRunParams& p, int tile_x, int tile_y) {
@@ -68,6 +75,7 @@ __global__ void __launch_bounds__(block_size) pixel_runs_kernel(const PixelRunPa
   const Candidates candidates = candidates_of(p, tile_x, tile_y);
   constexpr int most_rounds = 4;  // of candidates: a turned square in its box, with a margin
   unsigned cell[most_rounds], place[most_rounds];
+  PixelPlace pixel[most_rounds];
   in_cell[thread] = 0;
   __syncthreads();
 #pragma unroll
@@ -75,9 +83,10 @@ __global__ void __launch_bounds__(block_size) pixel_runs_kernel(const PixelRunPa
     cell[round] = tile_pixels;
     const int k = round * block_size + thread;
     if (k >= candidates.count) continue;
-    const auto at = math::apply<float>(
-        p.list_from_frame, {static_cast<float>(candidates.first_x + k % candidates.width) + 0.5f,
-                            static_cast<float>(candidates.first_y + k / candidates.width) + 0.5f});
+    const int2 where = candidates.pixel(k);
+    pixel[round] = {static_cast<std::uint16_t>(where.x), static_cast<std::uint16_t>(where.y)};
+    const auto at = math::apply<float>(p.list_from_frame, {static_cast<float>(where.x) + 0.5f,
+                                                           static_cast<float>(where.y) + 0.5f});
     const int x = static_cast<int>(floorf(at.x)) - left, y = static_cast<int>(floorf(at.y)) - top;
     if (x < 0 || y < 0 || x >= tile_size_px || y >= tile_size_px) continue;
     cell[round] = along_hilbert(static_cast<unsigned>(x), static_cast<unsigned>(y));
@@ -94,11 +103,8 @@ __global__ void __launch_bounds__(block_size) pixel_runs_kernel(const PixelRunPa
 #pragma unroll
   for (int round = 0; round < most_rounds; ++round) {
     if (cell[round] == tile_pixels) continue;
-    const int k = round * block_size + thread;
     const unsigned at = in_cell[cell[round]] + place[round];
-    if (at < bound)
-      run[at] = {static_cast<std::uint16_t>(candidates.first_x + k % candidates.width),
-                 static_cast<std::uint16_t>(candidates.first_y + k / candidates.width)};
+    if (at < bound) run[at] = pixel[round];
   }
   if (thread == 0) p.pixel_count[tile] = min(all, bound);
 }
