@@ -1,6 +1,6 @@
 import type { Clock } from '../session/clock';
 import type { Inertia } from '../input/inertia';
-import type { CameraSample } from '../session/messages';
+import type { CameraSample } from '../present/warp';
 import type { CameraController } from './camera_controller';
 import { is_held, type Axes } from './movement';
 

@@ -1,9 +1,8 @@
 // What the canvas shows: the newest picture, placed as the newest camera of this page sees it, at
 // the rate of the display.
-import type { CameraSample } from '../session/messages';
 import type { Picture } from '../decode/picture';
 import type { Pixels, Placing, Presenter } from './presenter';
-import { reach, uncovered_share, warp_matrix, type Eye } from './warp';
+import { reach, uncovered_share, warp_matrix, type CameraSample, type Eye } from './warp';
 import { WarpPolicy, type WarpMode } from './warp_policy';
 
 export interface DisplayEnvironment {

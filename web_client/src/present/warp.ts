@@ -8,6 +8,15 @@ export interface Eye {
   readonly fov_y_rad: number;
 }
 
+/** The newest local camera. */
+export interface CameraSample {
+  readonly pose_id: number;
+  readonly time_us: number;
+  readonly eye: Eye;
+  /** Of what the visitor looks at, along the view axis; Infinity: unknown. World units. */
+  readonly distance: number;
+}
+
 /** Column-major, for homogeneous coordinates (x, y, 1); x and y are -1…1 across an image, y down. */
 export type Matrix3 = Float32Array;
 

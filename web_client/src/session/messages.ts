@@ -4,7 +4,7 @@ import type { Vec3 } from '../camera/vector';
 import type { DecoderRung } from '../decode/ladder';
 import type { PresenterChoice } from '../present/make_presenter';
 import type { ShownView } from '../present/display';
-import type { Eye } from '../present/warp';
+import type { CameraSample, Eye } from '../present/warp';
 import type { WarpMode } from '../present/warp_policy';
 import type { StatsSnapshot } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
@@ -19,14 +19,6 @@ export interface View {
 export interface Quality {
   readonly height_px: number; // 0: the view's
   readonly max_fps: number; // 0: the server's default
-}
-
-export interface CameraSample {
-  readonly pose_id: number;
-  readonly time_us: number;
-  readonly eye: Eye;
-  /** Of what the visitor looks at, along the view axis; Infinity: unknown. World units. */
-  readonly distance: number;
 }
 
 /** Where the camera of a tour will be. */

@@ -11,7 +11,7 @@ import {
 import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
-import { widened_fov, type Eye } from '../present/warp';
+import { widened_fov, type CameraSample, type Eye } from '../present/warp';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
 import {
@@ -22,7 +22,7 @@ import {
   type StreamConfig,
 } from '../wire/wire';
 import { browser_timers, clock_from } from './clock';
-import type { CameraSample, FromWorker, Quality, ToWorker, View } from './messages';
+import type { FromWorker, Quality, ToWorker, View } from './messages';
 import { Session } from './session';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
