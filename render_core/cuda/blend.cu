@@ -10,7 +10,8 @@ namespace {
 
 constexpr int warps_per_block = 2;
 constexpr int block_size = warps_per_block * warp_size;
-// As many as leave a thread the 128 registers that a round takes.
+// As many as leave a thread the 128 registers that a round takes. Their shared memory, 26 KB each,
+// fits on Hopper; other generations hold fewer at a time.
 constexpr int blocks_per_processor = 8;
 
 /// Splats of a group: so many a lane, since the work on one hides the latencies of the other.
@@ -333,7 +334,7 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
   __shared__ WarpScratch scratch[warps_per_block];
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const int warp = static_cast<int>(threadIdx.x) / warp_size;
-  // Rounds are filled up by opacity alone, so that the rest must be numbers.
+  // Rounds are filled up by one pair of coefficients, so that the rest must be numbers.
   std::uint32_t* words = reinterpret_cast<std::uint32_t*>(scratch);
   for (unsigned i = threadIdx.x; i < sizeof(scratch) / sizeof(*words); i += block_size)
     words[i] = 0;

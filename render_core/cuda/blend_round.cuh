@@ -12,8 +12,9 @@
 ///
 /// A splat's exponent is a polynomial of degree two in the pixel's place, so that the exponents of
 /// 16 pixels and 8 splats are one product of matrices: (1, x, y, x^2, xy, y^2) times coefficients
-/// (as in TC-GS and GEMM-GS). Places count from the middle of the part in halves of a pixel, exact
-/// in the 11 bits of a half; of coefficients, what 11 bits leave is multiplied too.
+/// (as in TC-GS and GEMM-GS). Places count from the middle of the part: up to 22.5 px, which parts
+/// stay far below, fp16 holds their products exactly; of coefficients, what its 11 bits leave is
+/// multiplied too.
 ///
 /// The product leaves a pixel's exponents on four lanes. Each has a quarter of the splats, in
 /// their order, and blends it by itself from transmittance 1; the product of the transmittances
@@ -67,7 +68,7 @@ __device__ inline StagedSplat staged_splat(const math::ExponentField<float>& f, 
 }
 
 /// Splats of a half part in their order, a ring of three rounds. Lanes read splats a quarter apart:
-/// gaps, and an odd distance between the halves of a splat, spread them over all banks.
+/// gaps, and half a row of banks between the halves of a splat, spread them over all banks.
 class StagedHalf {
  public:
   static constexpr unsigned room = 3 * round_splats;

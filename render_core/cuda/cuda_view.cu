@@ -42,8 +42,9 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       builder_(scene_->arrays(), processors_),
       blend_warps_(blend_warps(processors_)),
       groups_(settings.speculation) {
-  // What does not depend on the image is most of a View: a device that cannot hold it should say so
-  // while there is a choice of devices, not in the first frame.
+  // What does not depend on the image is the most of a small scene's View: a device that cannot
+  // hold it should say so while there is a choice of devices. What is in view of a large scene only
+  // the first frame tells.
   if (settings.pipeline == Pipeline::vanilla) return;
   const glm::ivec2 one_tile(tile_size_px);
   set_shape(one_tile, image_grid(one_tile));

@@ -19,12 +19,13 @@ struct CullParams {
   FrameShape shape;
   std::uint32_t* clusters;  // [scene.cluster_count], those in sight; their place here is their rank
   std::uint32_t* mask;      // [cull_words(scene.cluster_count)], by rank, a bit a Gaussian
-  std::uint32_t* seen;      // [scene.cluster_count], by rank: set bits of the cluster
-  std::uint32_t* before;    // [scene.cluster_count], of clusters of lower rank
-  std::uint32_t* visible;   // [visible_bound], scene indices
-  FrameCounts* counts;      // `clusters` is set, and `visible`, which may exceed visible_bound
-  SortScratch scratch;      // at least cull_scratch_bytes(scene.cluster_count)
-  int processors;           // of the device
+  // [scene.cluster_count], first by cluster: whether it is in sight; then by rank: its set bits.
+  std::uint32_t* seen;
+  std::uint32_t* before;   // [scene.cluster_count], of clusters of lower rank
+  std::uint32_t* visible;  // [visible_bound], scene indices
+  FrameCounts* counts;     // `clusters` is set, and `visible`, which may exceed visible_bound
+  SortScratch scratch;     // at least cull_scratch_bytes(scene.cluster_count)
+  int processors;          // of the device
 };
 
 std::uint32_t cull_words(std::uint32_t cluster_count);

@@ -13,7 +13,8 @@ constexpr int patience = 600;  // key frames
 constexpr int sorted_span = 240;
 constexpr int slices_span = 600;
 
-// What a large scene starts with: its first frame says how much of it is in view.
+// What a large scene starts with: drawing its first frame says how much of it is in view, and
+// drawing that again how long its lists are.
 constexpr std::uint64_t first_visible = 1u << 18, first_entries = 1u << 20;
 
 }  // namespace
