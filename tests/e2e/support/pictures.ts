@@ -71,6 +71,26 @@ export function psnr_db(a: Picture, b: Picture): number {
   return 10 * Math.log10(255 ** 2 / mean);
 }
 
+/** Means of 32x18 boxes: what pictures of two sizes, as a busy server sends them, have in common. */
+export function thumbnail({ width, height, rgba }: Picture): Picture {
+  const columns = 32;
+  const rows = 18;
+  const sums = new Float64Array(columns * rows * 4);
+  const counts = new Uint32Array(columns * rows);
+  for (let y = 0; y < height; ++y) {
+    for (let x = 0; x < width; ++x) {
+      const box = Math.floor((y * rows) / height) * columns + Math.floor((x * columns) / width);
+      counts[box]! += 1;
+      for (let c = 0; c < 4; ++c) sums[4 * box + c]! += rgba[4 * (y * width + x) + c]!;
+    }
+  }
+  return {
+    width: columns,
+    height: rows,
+    rgba: Uint8Array.from(sums, (sum, i) => Math.round(sum / counts[i >> 2]!)),
+  };
+}
+
 /** Share of the pixels that are not the black background. */
 export function coverage(picture: Picture): number {
   let covered = 0;
