@@ -40,8 +40,7 @@ CATGS_HD_INLINE T whitened_square(const Whitening<T>& w, const Vec2<T>& d) {
 }
 
 /// A Gaussian's base-2 exponent over the image plane, its linear parts gathered at an origin near
-/// the pixels: log2_opacity - (u + xx x + xy y)^2 - (v + yy y)^2. One multiply-add less per
-/// coordinate than from the centre, and pixels of a column share another.
+/// the pixels, where they are small numbers: log2_opacity - (u + xx x + xy y)^2 - (v + yy y)^2.
 template <class T>
 struct ExponentField {
   T u, xx, xy;
@@ -59,13 +58,6 @@ CATGS_HD_INLINE ExponentField<T> exponent_field(const Whitening<T>& w, const Vec
           -(w.yy * centre_px.y),
           w.yy,
           log2_opacity};
-}
-
-template <class T>
-CATGS_HD_INLINE T exponent_at(const ExponentField<T>& f, T x, T y) {
-  const T u = mul_add(f.xy, y, mul_add(f.xx, x, f.u));
-  const T v = mul_add(f.yy, y, f.v);
-  return mul_add(-u, u, mul_add(-v, v, f.log2_opacity));
 }
 
 /// A Gaussian reaches alpha_min where whitened_square <= reach; negative: nowhere.

@@ -5,16 +5,9 @@ import { available_codecs, make_decoder } from '#client/decode/make_decoder';
 import type { DecoderRung } from '#client/decode/ladder';
 import type { DecoderEvents } from '#client/decode/picture';
 import { Codec, StreamConfigSchema } from '#client/wire/wire';
+import { fake_storage } from './fakes';
 
 const week_ms = 7 * 24 * 3600 * 1000;
-
-function fake_storage(): Storage {
-  const values = new Map<string, string>();
-  return {
-    getItem: (key: string) => values.get(key) ?? null,
-    setItem: (key: string, value: string) => void values.set(key, value),
-  } as Storage;
-}
 
 describe('what is remembered of decoders', () => {
   it('is where decoding worked, for this browser and a week', () => {

@@ -1,4 +1,4 @@
-// A clock that tests move by hand, and a socket whose other end is the test.
+// A clock that tests move by hand, a socket whose other end is the test, and a storage in memory.
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
 import type { Clock, Timers } from '#client/session/clock';
 import type { OpenSocket, SocketEvents } from '#client/transport/socket';
@@ -8,6 +8,14 @@ import {
   ServerMessageSchema,
   type ClientMessage,
 } from '#client/wire/wire';
+
+export function fake_storage(): Storage {
+  const values = new Map<string, string>();
+  return {
+    getItem: (key: string) => values.get(key) ?? null,
+    setItem: (key: string, value: string) => void values.set(key, value),
+  } as Storage;
+}
 
 export class FakeTime implements Clock, Timers {
   private now_ms_ = 0;

@@ -7,15 +7,7 @@ import { take_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
 import { Error_Code } from '#client/wire/wire';
-import { FakeTime } from './fakes';
-
-function fake_storage(): Storage {
-  const values = new Map<string, string>();
-  return {
-    getItem: (key: string) => values.get(key) ?? null,
-    setItem: (key: string, value: string) => void values.set(key, value),
-  } as Storage;
-}
+import { FakeTime, fake_storage } from './fakes';
 
 describe('access token', () => {
   it('moves from the fragment to the tab, and out of the address', () => {
