@@ -28,7 +28,6 @@ class PixelBlocks {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  glm::ivec2 size_px_{0};
   std::vector<PixelBlock> blocks_;
   std::vector<std::uint32_t> starts_;  // [tile], one more
   std::vector<std::uint32_t> tiles_;   // [block], row by row of the image

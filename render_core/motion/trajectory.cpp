@@ -20,6 +20,7 @@ namespace {
 constexpr std::size_t max_line_bytes = 1024;
 constexpr std::size_t max_poses = 10'000'000;  // a day at 115 Hz
 constexpr double max_time_s = 9e9;             // microseconds stay exact in a double
+constexpr double max_coordinate = 1e9;         // as on the wire: a float is exact enough
 constexpr double norm_tolerance = 0.1;         // files carry three digits or more
 constexpr std::string_view tum_format = "timestamp_s tx ty tz qx qy qz qw";
 
@@ -55,6 +56,8 @@ class LineParser {
     if (count < value.size()) fail(fmt::format("{} numbers instead of 8", count));
     if (std::abs(value[0]) > max_time_s) fail("the time stamp is out of range");
     pose.time_us = std::llround(value[0] * 1e6);
+    for (std::size_t axis = 1; axis <= 3; ++axis)
+      if (std::abs(value[axis]) > max_coordinate) fail("the position is out of range");
     pose.world_from_camera.position = glm::vec3(value[1], value[2], value[3]);
     const glm::dquat rotation(value[7], value[4], value[5], value[6]);
     const double norm = glm::length(rotation);

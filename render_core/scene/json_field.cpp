@@ -8,13 +8,43 @@
 
 namespace catgs {
 
+namespace {
+
+/// Documents are copied and printed by recursion: one of a million brackets would end the stack.
+constexpr int max_depth = 256;
+
+void require_shallow(const ByteSource& file, std::string_view text) {
+  int depth = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') ++i;
+      in_string = c != '"';
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '[' || c == '{') {
+      if (++depth > max_depth)
+        throw InputError(file.name(), fmt::format("byte {}", i),
+                         fmt::format("is nested deeper than {}", max_depth));
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+}
+
+}  // namespace
+
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit) {
   const std::vector<std::byte> bytes = file.read_all(limit);
-  const auto* first = reinterpret_cast<const char*>(bytes.data());
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  require_shallow(file, text);
   try {
-    return nlohmann::json::parse(first, first + bytes.size());
+    return nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {
     throw InputError(file.name(), fmt::format("byte {}", error.byte), "is not valid JSON");
+  } catch (const nlohmann::json::out_of_range& error) {
+    throw InputError(file.name(), "", fmt::format("holds a number out of range: {}", error.what()));
   }
 }
 

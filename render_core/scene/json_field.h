@@ -14,7 +14,7 @@
 namespace catgs {
 
 /// Parses a whole file as JSON. Throws InputError with the byte of a syntax error; files over
-/// `limit` bytes are refused.
+/// `limit` bytes, and those nested deeper than 256, are refused.
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit);
 
 /// `bytes` with U+FFFD for what is not UTF-8. File names may hold any bytes, JSON and the wire not.

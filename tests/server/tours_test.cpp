@@ -38,6 +38,15 @@ TEST_F(Tours, LeaveForeignAndBrokenSettingsAlone) {
   EXPECT_TRUE(read()["settings"].is_null());
 }
 
+TEST_F(Tours, RefuseWhatIsNestedWithoutEnd) {
+  const std::string deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  write("museum.settings.json", R"({"animTracks": 1, "a": )" + deep + "}");
+  EXPECT_TRUE(read()["settings"].is_null());
+  write("museum.json", R"({"tours": )" + deep + "}");
+  EXPECT_THAT([&] { read_tours(folder_ / "museum.splat"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("byte 265: is nested deeper than 256")));
+}
+
 TEST_F(Tours, SayWhatIsWrongInASidecar) {
   write("museum.json", R"({"tours": {"title": "Hall"}})");
   EXPECT_THAT([&] { read_tours(folder_ / "museum.splat"); },

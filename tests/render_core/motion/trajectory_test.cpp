@@ -63,6 +63,7 @@ TEST_F(TumFile, ErrorsNameTheLine) {
   EXPECT_THAT(error_of("1 0 0 0 0 0 0 0\n"), HasSubstr("line 1: the quaternion has norm 0"));
   EXPECT_THAT(error_of("1 0 0 0 1 1 1 1\n"), HasSubstr("line 1: the quaternion has norm 2"));
   EXPECT_THAT(error_of(good + "\n" + good), HasSubstr("line 3: the time stamp does not increase"));
+  EXPECT_THAT(error_of("1 0 0 -9e93 0 0 0 1\n"), HasSubstr("line 1: the position is out of range"));
   EXPECT_THAT(error_of("1e300 0 0 0 0 0 0 1\n"),
               HasSubstr("line 1: the time stamp is out of range"));
   EXPECT_THAT(error_of(good + std::string(5000, ' ')), HasSubstr("line 2: longer than 1023 bytes"));

@@ -1,0 +1,43 @@
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "render_core/device_set.h"
+#include "render_core/error.h"
+#include "server/config.h"
+#include "server/net/http.h"
+
+namespace catgs {
+
+void validate(const ServerConfig& config) {
+  if (config.scenes.empty() && config.scene_folders.empty())
+    throw InputError("--scene", {}, "no scene is given",
+                     "give a file, or try --scene synth:city:300000");
+  check({.kind = config.renderer,
+         .pool = {},
+         .devices = std::make_shared<DeviceSet>(config.devices)});
+  if (config.scene_memory_mb > 0 && config.scene_folders.empty())
+    throw InputError("--scene-memory", {}, "is about --scene-folder, which is not given",
+                     "scenes of --scene stay in memory");
+  if (config.lod >= 0 && config.gaussian_budget > 0)
+    throw InputError("--lod, --budget", {}, "both are given", "give one of them");
+  if (config.tls_cert.empty() != config.tls_key.empty())
+    throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
+                     "--tls-cert and --tls-key belong together");
+  const bool guarded = !config.token_file.empty() || !config.token_key_file.empty();
+  if (!is_loopback(config.bind) && !guarded && !config.open)
+    throw InputError("--bind " + config.bind, {}, "other machines could connect without a token",
+                     "give --token-file or --token-key-file, or --open if everybody may");
+  if (config.admin_bind == "off") return;
+  const Endpoint admin = parse_endpoint(config.admin_bind);
+  if (!config.open && !config.admin_open && !is_loopback(admin.address))
+    throw InputError("--admin-bind " + config.admin_bind, {}, "metrics have no token",
+                     "bind a loopback address, or give --admin-open if that network is private");
+  // One listener would take both, whatever the addresses, and answer metrics with the page's 404.
+  if (admin.port == config.port && config.port != 0)
+    throw InputError(fmt::format("--port {}, --admin-bind {}", config.port, config.admin_bind), {},
+                     "page and metrics cannot share a port",
+                     "change one of them, or give --admin-bind off");
+}
+
+}  // namespace catgs

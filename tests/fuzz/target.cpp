@@ -1,0 +1,79 @@
+#include "tests/fuzz/target.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <system_error>
+
+#include <glm/common.hpp>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "render_core/scene/sanitize.h"
+
+namespace catgs::fuzz {
+
+const std::vector<Target>& targets() {
+  static const std::vector<Target> all = {
+      ply(),    compressed_ply(), splat(),   spz(),     sog(),   zip(),
+      webp(),   lod_tree(),       sidecar(), cameras(), tours(), tum(),
+      config(), client_message(), http(),    token()};
+  return all;
+}
+
+const Target& target_called(std::string_view name) {
+  std::string names;
+  for (const Target& target : targets()) {
+    if (target.name == name) return target;
+    names += " " + target.name;
+  }
+  throw std::out_of_range("no target '" + std::string(name) + "'; there are:" + names);
+}
+
+void require(bool promise, const char* what) {
+  if (promise) return;
+  std::fprintf(stderr, "broken promise: %s\n", what);
+  std::abort();
+}
+
+const LoadContext& one_thread() {
+  static ThreadPool pool(1);
+  static const LoadContext context(pool);
+  return context;
+}
+
+void require_sound(GaussianCloud cloud) {
+  require(cloud.sh.size() == cloud.size() * static_cast<std::size_t>(cloud.sh_count()),
+          "one set of coefficients for each Gaussian");
+  sanitize(cloud, one_thread());
+  const auto finite = [](const auto& v) {
+    for (int k = 0; k < v.length(); ++k)
+      if (!std::isfinite(v[k])) return false;
+    return true;
+  };
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    require(finite(cloud.mean[i]) && finite(cloud.scale[i]) && finite(cloud.rotation[i]),
+            "sanitized values are finite");
+    require(cloud.opacity[i] > 0.0f && cloud.opacity[i] < 1.0f, "opacities are in (0, 1)");
+  }
+  for (const glm::vec3& sh : cloud.sh) require(finite(sh), "sanitized colours are finite");
+}
+
+std::string text_of(Bytes input) {
+  return {reinterpret_cast<const char*>(input.data()), input.size()};
+}
+
+Bytes bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+FileInMemory::FileInMemory(Bytes content) : descriptor_(::memfd_create("input", MFD_CLOEXEC)) {
+  if (descriptor_ < 0 ||
+      ::write(descriptor_, content.data(), content.size()) != static_cast<ssize_t>(content.size()))
+    throw std::system_error(errno, std::generic_category(), "memfd");
+}
+
+FileInMemory::~FileInMemory() { ::close(descriptor_); }
+
+std::string FileInMemory::path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+}  // namespace catgs::fuzz

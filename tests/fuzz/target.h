@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render_core/error.h"
+#include "render_core/scene/byte_source.h"
+#include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/load_context.h"
+
+namespace catgs::fuzz {
+
+using Bytes = std::span<const std::byte>;
+
+/// One parser under attack.
+struct Target {
+  std::string name;
+  /// Feeds one input to the parser. Throws InputError when the parser refuses it; ends the process
+  /// by require() when a promise of the parser is broken; anything else that it does is a bug.
+  void (*parse)(Bytes input);
+  /// Inputs that the parser accepts, by file name: where mutation begins.
+  std::map<std::string, std::string> (*seeds)();
+  /// Words of the format, which mutation would hardly find by itself.
+  std::vector<std::string> dictionary;
+  /// Longer inputs hold nothing new for this parser.
+  std::size_t max_bytes = 4096;
+};
+
+/// All of them; a new one is added here and in CMakeLists.txt.
+const std::vector<Target>& targets();
+/// Throws std::out_of_range with the names that there are.
+const Target& target_called(std::string_view name);
+
+Target ply();
+Target compressed_ply();
+Target splat();
+Target spz();
+Target sog();
+Target zip();
+Target webp();
+Target lod_tree();
+Target sidecar();
+Target cameras();
+Target tours();
+Target tum();
+Target config();
+Target client_message();
+Target http();
+Target token();
+
+/// Ends the process with `what` unless `promise` holds: libFuzzer keeps the input.
+void require(bool promise, const char* what);
+
+/// One thread, so that a run is the same each time.
+const LoadContext& one_thread();
+
+/// What every reader of scenes promises, and what sanitize() makes of it.
+void require_sound(GaussianCloud cloud);
+
+std::string text_of(Bytes input);
+Bytes bytes_of(const std::string& text);
+
+/// A file in memory, for parsers that open theirs by name.
+class FileInMemory {
+ public:
+  explicit FileInMemory(Bytes content);
+  ~FileInMemory();
+  FileInMemory(const FileInMemory&) = delete;
+  FileInMemory& operator=(const FileInMemory&) = delete;
+
+  [[nodiscard]] std::string path() const;
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace catgs::fuzz

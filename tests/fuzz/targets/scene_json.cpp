@@ -1,0 +1,164 @@
+#include <cmath>
+
+#include "render_core/scene/hints.h"
+#include "render_core/scene/save_scene.h"
+#include "render_core/scene/streamed_sog.h"
+#include "server/tours.h"
+#include "tests/fuzz/target.h"
+#include "tests/render_core/scene/random_cloud.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::fuzz {
+namespace {
+
+bool is_place(const glm::vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+void require_sound(const Pose& pose) {
+  require(is_place(pose.position), "positions are finite");
+  require(std::abs(glm::length(pose.orientation) - 1.0f) < 1e-3f, "orientations have length 1");
+}
+
+void parse_lod_tree(Bytes input) {
+  const LodTree tree = read_lod_tree(MemorySource("input", input));
+  for (int level = 0; level < tree.levels; ++level) {
+    const LodChoice choice = choose_level(tree, level);
+    require(choice.pieces.size() <= tree.nodes.size(), "at most one piece of a node");
+  }
+  for (const std::size_t budget : {0, 10, 1 << 20})
+    if (const auto choice = choose_within_budget(tree, budget))
+      require(choice->count <= budget, "a budget is kept");
+}
+
+std::map<std::string, std::string> lod_tree_seeds() {
+  return {{"two_levels",
+           R"({"version":1,"lodLevels":2,"environment":null,"filenames":["0_0/meta.json"],"tree":{
+               "bound":{"min":[0,0,0],"max":[1,1,1]},"children":[{"lods":{"0":{"file":0,"offset":0,
+               "count":9},"1":{"file":0,"offset":9,"count":4}}},{"lods":{"1":{"file":0,"offset":13,
+               "count":2}}}]}})"},
+          {"environment",
+           R"({"lodLevels":1,"environment":"env.sog","filenames":["a.sog"],"tree":{"lods":{}}})"}};
+}
+
+void parse_sidecar(Bytes input) {
+  const Sidecar sidecar = read_sidecar(MemorySource("input", input));
+  if (sidecar.up) require(std::abs(glm::length(*sidecar.up) - 1.0f) < 1e-3f, "up has length 1");
+  if (sidecar.near_z) require(*sidecar.near_z > 0.0f, "near is in front of the camera");
+  if (sidecar.limits) require(is_place(sidecar.limits->min), "limits are finite");
+  if (sidecar.start_pose)
+    require_sound(Pose{sidecar.start_pose->position, sidecar.start_pose->orientation});
+}
+
+std::map<std::string, std::string> sidecar_seeds() {
+  return {{"look_at", R"({"up":"+z","near":0.05,"focus":[1,2,3],"start_pose":{"position":[4,5,6],
+                          "look_at":[0,0,0]},"limits":{"min":[0,0,0],"max":[1,1,1]}})"},
+          {"orientation", R"({"up":[0,-1,0],"start_pose":{"position":[4,5,6],"orientation":
+                              [0,0,0,1]},"tours":[]})"}};
+}
+
+/// Both files that trainings leave: whoever reads one looks at the other where it fails.
+void parse_cameras(Bytes input) {
+  const MemorySource file("input", input);
+  std::vector<Pose> poses;
+  try {
+    poses = read_cameras_json(file);
+  } catch (const InputError&) {
+    poses = read_transforms_json(file);
+  }
+  for (const Pose& pose : poses) require_sound(pose);
+}
+
+std::map<std::string, std::string> cameras_seeds() {
+  return {{"cameras", R"([{"id":0,"img_name":"a","width":9,"height":9,"position":[-3,0,0],
+                          "rotation":[[0,0,1],[0,1,0],[-1,0,0]],"fy":9.5,"fx":9.5}])"},
+          {"transforms", R"({"camera_angle_x":0.6,"frames":[{"file_path":"a","transform_matrix":
+                             [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]})"}};
+}
+
+/// The sidecar's tours and the SuperSplat viewer's settings, as pages get them.
+void parse_tours(Bytes input) {
+  static const test::TemporaryFolder folder;
+  static const auto scene = [] {
+    const auto path = folder / "a.splat";
+    save_scene(test::random_cloud(1, 0), path);
+    return path;
+  }();
+  folder.write("a.settings.json", text_of(input));
+  require(read_tours(scene).size() >= std::string(R"({"settings":,"tours":})").size(), "two parts");
+  folder.write("a.json", text_of(input));
+  read_tours(scene);
+}
+
+std::map<std::string, std::string> tours_seeds() {
+  return {
+      {"settings",
+       R"({"version":2,"tours":[],"background":{"color":[0.4,0.4,0.4]},"animTracks":[{"name":"cameraAnim",
+               "duration":5,"frameRate":30,"loopMode":"repeat","interpolation":"spline","keyframes":{
+               "times":[0,60],"values":{"position":[2,1.5,-4,-2,1.5,-4],"target":[0,1,0,0,1,0],"fov":
+               [75,60]}}}],"cameras":[{"initial":{"position":[2,2,-3],"target":[0,1,0],"fov":75}}],
+               "annotations":[{"position":[1,2,3],"title":"A","text":"\u00e9"}]})"},
+      {"tour", R"({"tours":[{"title":"Hall","stops":[{"title":"Door","position":[0,1,2],
+                       "look_at":[0,0,0],"caption":"c","seconds":4}]}]})"}};
+}
+
+const std::vector<std::string> json_words = {"null",
+                                             "true",
+                                             "false",
+                                             "-0",
+                                             "1e400",
+                                             "1e39",
+                                             "[[[[",
+                                             "]]]]",
+                                             "{\"",
+                                             "\":",
+                                             "\\u0000",
+                                             "\\ud800",
+                                             "18446744073709551616",
+                                             "-1",
+                                             "0.1"};
+
+std::vector<std::string> with_json_words(std::vector<std::string> words) {
+  words.insert(words.end(), json_words.begin(), json_words.end());
+  return words;
+}
+
+}  // namespace
+
+Target lod_tree() {
+  return {.name = "lod_tree",
+          .parse = parse_lod_tree,
+          .seeds = lod_tree_seeds,
+          .dictionary = with_json_words(
+              {"\"lodLevels\":", "\"filenames\":", "\"tree\":", "\"children\":", "\"lods\":",
+               "\"file\":", "\"offset\":", "\"count\":", "\"environment\":", "\"version\":"})};
+}
+
+Target sidecar() {
+  return {.name = "sidecar",
+          .parse = parse_sidecar,
+          .seeds = sidecar_seeds,
+          .dictionary =
+              with_json_words({"\"up\":", "\"near\":", "\"focus\":", "\"start_pose\":",
+                               "\"position\":", "\"look_at\":", "\"orientation\":", "\"limits\":",
+                               "\"min\":", "\"max\":", "\"tours\":", "\"-y\"", "\"+z\""})};
+}
+
+Target cameras() {
+  return {.name = "cameras",
+          .parse = parse_cameras,
+          .seeds = cameras_seeds,
+          .dictionary = with_json_words(
+              {"\"position\":", "\"rotation\":", "\"frames\":", "\"transform_matrix\":"})};
+}
+
+Target tours() {
+  return {.name = "tours",
+          .parse = parse_tours,
+          .seeds = tours_seeds,
+          .dictionary = with_json_words(
+              {"\"tours\":", "\"animTracks\":", "\"annotations\":", "\"cameras\":"}),
+          .max_bytes = 65536};
+}
+
+}  // namespace catgs::fuzz
