@@ -104,7 +104,8 @@ trap interrupted INT TERM HUP
 trap stop_groups EXIT
 
 # step TITLE COMMAND...: runs the command with its output in the log. TITLE is printed with the
-# time it took; on a terminal a counter runs meanwhile. A failure shows the end of the log.
+# time it took; on a terminal a counter runs meanwhile, elsewhere a line tells every half minute that
+# it goes on. A failure shows the end of the log.
 step() {
   local title=$1
   shift
@@ -114,9 +115,7 @@ step() {
   printf '\n==== [%d/%d] %s\n' "$step_number" "$step_count" "$title" >>"$step_log"
   start_group "$step_log" "$@"
   local job=${groups[-1]}
-  if [[ -t 1 ]]; then
-    show_running "$job" "$title" "$begin_us"
-  fi
+  show_running "$job" "$title" "$begin_us"
   wait "$job" || status=$?
   unset 'groups[-1]'
   if ((status != 0)); then
@@ -134,16 +133,23 @@ step_done() {
   print_step "$1" "$(format_duration 0)"
 }
 
-# Rewrites one terminal line each second with the time and, when the log ends in one, ninja's count.
+seconds_between_lines=30
+
+# Tells the time and, when the log ends in one, ninja's count: in one line of a terminal that it
+# rewrites twice a second, in a line of its own now and then where that is no terminal.
 show_running() {
-  local job=$1 title=$2 begin_us=$3 progress
+  local job=$1 title=$2 begin_us=$3 progress line next_us
+  next_us=$((begin_us + seconds_between_lines * 1000000))
   while kill -0 "$job" 2>/dev/null; do
+    sleep 0.2
+    [[ -t 1 ]] || (($(now_us) >= next_us)) || continue
+    next_us=$((next_us + seconds_between_lines * 1000000))
     progress=$(tail -c 400 "$step_log" | grep -aoE '^\[[0-9]+/[0-9]+\]' | tail -n 1 || true)
-    printf '\r\033[K[%d/%d] %-62s %s %s' "$step_number" "$step_count" "$title" \
+    printf -v line '[%d/%d] %-62s %s %s' "$step_number" "$step_count" "$title" \
       "$(format_duration $(($(now_us) - begin_us)))" "$progress"
-    sleep 0.5
+    if [[ -t 1 ]]; then printf '\r\033[K%s' "$line"; else printf '%s …\n' "${line% }"; fi
   done
-  printf '\r\033[K'
+  [[ ! -t 1 ]] || printf '\r\033[K'
 }
 
 # ---- system -----------------------------------------------------------------------------------
@@ -315,3 +321,16 @@ run_cmake() {
 build_all() {
   step "$2" ninja -C "$SOURCE_DIR/build/$1" -j "$(build_jobs)"
 }
+
+# lock_build PRESET: one script at a time builds in build/PRESET of this clone; another one says so
+# and waits. unlock_build lets it go on.
+lock_build() {
+  local file=$SOURCE_DIR/build/$1/.lock
+  mkdir -p "${file%/*}"
+  exec {build_lock}>>"$file"
+  flock -n "$build_lock" && return
+  echo "Another script builds in ${file%/*}: waiting for it (Ctrl-C leaves it alone)."
+  flock "$build_lock"
+}
+
+unlock_build() { exec {build_lock}>&-; }

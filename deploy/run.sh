@@ -38,6 +38,43 @@ allow_cuda=1
 log=$build_dir/run.log
 demo_scene=$build_dir/scenes/city.ply
 
+# The server's options, by the table in its source: there before anything is built.
+server_option_names() {
+  tr '\n' ' ' <"$SOURCE_DIR/server/config.cpp" |
+    grep -oE '((list|integer|text|flag|choice<[A-Za-z:]+>)\( *|return \{)"[a-z0-9-]+", ' |
+    sed -E 's/.*"(.*)".*/--\1/'
+  printf -- '--config\n'
+}
+
+# nearest WORD: of the words on standard input the one with the fewest letters to change, if few.
+nearest() {
+  awk -v word="$1" '
+    function least(a, b) { return a < b ? a : b }
+    function distance(a, b,   i, j, d) {
+      for (i = 0; i <= length(a); i++) d[i, 0] = i
+      for (j = 0; j <= length(b); j++) d[0, j] = j
+      for (i = 1; i <= length(a); i++)
+        for (j = 1; j <= length(b); j++)
+          d[i, j] = least(least(d[i - 1, j], d[i, j - 1]) + 1,
+                          d[i - 1, j - 1] + (substr(a, i, 1) != substr(b, j, 1)))
+      return d[length(a), length(b)]
+    }
+    BEGIN { best = length(word) / 3 + 1 }
+    { d = distance(word, $0); if (d < best) { best = d; found = $0 } }
+    END { print found }'
+}
+
+# A mistyped option is told at once; its value once there is a server to ask.
+check_option_name() {
+  local names suggestion
+  names=$(server_option_names)
+  ! grep -qxF -e "$1" <<<"$names" || return 0
+  suggestion=$(printf '%s\n--port\n--lan\n--no-cuda\n--log\n' "$names" | nearest "$1")
+  fail "$EXIT_USAGE" "Unknown option: $1${suggestion:+ (did you mean $suggestion?)}" \
+    "run.sh's own options: ./deploy/run.sh --help. The server's:" \
+    "$(sort <<<"$names" | tr '\n' ' ' | fold -s -w 96 | sed 's/^/    /')"
+}
+
 parse_arguments() {
   while (($# > 0)); do
     case $1 in
@@ -54,8 +91,13 @@ parse_arguments() {
         usage
         exit 0
         ;;
-      --open | --admin-open | -*=*) server_options+=("$1") ;;  # the server's only ones without a value
+      --open | --admin-open) server_options+=("$1") ;;  # the server's only ones without a value
+      -*=*)
+        check_option_name "${1%%=*}"
+        server_options+=("$1")
+        ;;
       -*)
+        check_option_name "$1"
         server_options+=("$1")
         if (($# > 1)) && [[ $2 != -* || $2 == -[0-9]* ]]; then
           server_options+=("$2")
@@ -189,7 +231,7 @@ compose_server_command() {
   server_command+=("${server_options[@]}")
 }
 
-# A mistyped option is told before scenes are made and loaded.
+# A wrong value of an option is told before scenes are made and loaded.
 check_server_options() {
   local message status=0
   message=$("${server_command[@]}" --print-config 2>&1 >/dev/null) || status=$?
@@ -291,6 +333,7 @@ main() {
   if ((lan)); then
     build_packages+=("${lan_packages[@]}")
   fi
+  lock_build run
   steps_begin $((6 + lan)) "$log"
   step "System: $distribution, $(nproc) cores, $cuda_note" check_system
   ensure_packages "${build_packages[@]}"
@@ -307,6 +350,7 @@ main() {
     choose_lan_address
     step "Certificate and token for $lan_address" make_lan_credentials
   fi
+  unlock_build
   start_server
   local server=${groups[-1]}
   step "Start the server" wait_until_serving "$server"

@@ -62,6 +62,7 @@ main() {
   if ((full)); then
     test_packages+=(clang-tidy-14 debootstrap "${deploy_test_packages[@]}")
   fi
+  lock_build release
   steps_begin 4 "$log"
   ensure_packages "${build_packages[@]}" "${test_packages[@]}"
   # Where nvcc is, the CUDA core must compile: for the GPU that is there, else for one generation.

@@ -308,6 +308,11 @@ def check_settings(options):
     findings = []
     shown = subprocess.run([options.server, "--scene", "synth:city:1000", "--print-config"], capture_output=True, text=True, check=True)
     known = set(re.findall(r"^(\S+) = ", shown.stdout, re.M))
+    # run.sh refuses unknown ones before there is a server, by the table in its source.
+    function = re.search(r"^server_option_names\(\) \{.*?^\}", (DEPLOY / "run.sh").read_text(), re.M | re.S)
+    names = subprocess.run(["bash", "-c", f"SOURCE_DIR='{DEPLOY.parent}'; {function[0]}; server_option_names"], capture_output=True, text=True, check=True)
+    listed = {name.removeprefix("--") for name in names.stdout.split()}
+    findings += [f"deploy/run.sh: --{name} is not what catgs-server knows" for name in listed ^ (known | {"config"})]
     with tempfile.TemporaryDirectory() as folder:
         stand_in = pathlib.Path(folder, "file")
         stand_in.write_text("a-secret-of-more-than-sixteen-bytes\n")

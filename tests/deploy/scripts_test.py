@@ -11,6 +11,8 @@ import shutil
 import socket
 import subprocess
 import tempfile
+import threading
+import time
 import unittest
 
 SOURCE_DIR = pathlib.Path(__file__).resolve().parents[2]
@@ -18,10 +20,10 @@ RUN = str(SOURCE_DIR / "deploy/run.sh")
 TEST = str(SOURCE_DIR / "deploy/test.sh")
 LIBRARY = str(SOURCE_DIR / "deploy/lib.sh")
 DEBIAN = 'ID=debian\nVERSION_ID="12"\n'
-# Plays catgs-server: refuses --speed as a check of its options, an empty scene when started,
+# Plays catgs-server: refuses --fps 900 as a check of its options, an empty scene when started,
 # and otherwise says what the real one says, and ends.
 SERVER = """
-if [[ "$*" == *--speed* ]]; then echo "catgs-server: no such option: --speed" >&2; exit 2; fi
+if [[ "$*" == *"--fps 900"* ]]; then echo "catgs-server: --fps: fps: too large" >&2; exit 2; fi
 [[ "$*" != *--print-config* ]] || exit 0
 for scene in "$@"; do
   [[ $scene == *.ply ]] || continue
@@ -170,6 +172,12 @@ class Scripts(Machine):
         self.stand_in("nvidia-smi", 'case $1 in *compute_cap*) echo 7.5 ;; *) echo NVIDIA Old ;; esac')
         self.assertTrue(self.run_library(choose).stdout.startswith("OFF: NVIDIA Old, which is older"))
 
+    def test_long_steps_say_in_a_file_that_they_go_on(self):
+        result = self.run_library(f'seconds_between_lines=1; steps_begin 1 "{self.folder}/log"; '
+                                  'step Build bash -c "echo [3/7] Compiling; sleep 1.6"')
+        self.assertRegex(result.stdout, r"^\[1/1\] Build +1\.\d s \[3/7\] …\n\[1/1\] Build +1\.\d s\n$")
+        self.assertNotIn("\r", result.stdout)
+
     def test_a_failing_step_shows_the_end_of_its_own_output_and_the_log(self):
         log = self.folder / "log"
         result = self.run_library(f'steps_begin 2 "{log}"; step One echo early; '
@@ -191,6 +199,8 @@ class Serving(Machine):
         self.checkout = self.folder / "checkout"
         shutil.copytree(SOURCE_DIR / "deploy", self.checkout / "deploy",
                         ignore=shutil.ignore_patterns("media"))
+        (self.checkout / "server").mkdir()
+        shutil.copy(SOURCE_DIR / "server/config.cpp", self.checkout / "server")
         self.bin = self.checkout / "build/run/bin"
         self.bin.mkdir(parents=True)
         for name, script in (("catgs-server", SERVER), ("catgs-render", 'touch "${@: -1}"')):
@@ -227,13 +237,53 @@ class Serving(Machine):
                 self.assertNotIn(own, call)
             self.assertTrue(pathlib.Path(log).exists())
 
-    def test_a_wrong_server_option_ends_with_its_status_before_a_scene_is_made(self):
-        result = self.serve("--speed", "9", *self.options())
+    def test_a_wrong_value_ends_with_its_status_before_a_scene_is_made(self):
+        result = self.serve("--fps", "900", *self.options())
         self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
-        self.assertIn("catgs-server: no such option: --speed\n", result.stderr)
+        self.assertIn("catgs-server: --fps: fps: too large\n", result.stderr)
         self.assertIn("build/run/bin/catgs-server --help", result.stderr)
         self.assertNotIn("catgs-render", self.calls())
         self.assertEqual(len(self.server_calls()), 1)
+
+    def test_a_mistyped_option_is_told_before_anything_is_built(self):
+        for option, nearest in (("--prot", "--port"), ("--max-sesions=4", "--max-sessions"),
+                                ("--bitrat", "--bitrate")):
+            result = self.serve(option, "9", "--log", str(self.folder / "log"))
+            self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+            self.assertIn(f"Unknown option: {option.split('=')[0]} (did you mean {nearest}?)\n",
+                          result.stderr)
+            self.assertIn("--encoder", result.stderr)
+        result = self.serve("--zzzzzzzz", *self.options())
+        self.assertIn("Unknown option: --zzzzzzzz\n", result.stderr)
+        self.assertEqual(self.calls(), "")
+
+    def test_two_in_one_clone_build_one_after_the_other(self):
+        self.stand_in("ninja", 'echo begin >>"$HOME/order"; sleep 1; echo end >>"$HOME/order"')
+        outputs = []
+        first = threading.Thread(target=lambda: outputs.append(self.serve(*self.options()).stdout))
+        first.start()
+        while not (self.folder / "order").exists():
+            time.sleep(0.05)
+        second = self.serve("--port", self.free_port())
+        first.join()
+        self.assertIn("Another script builds in", second.stdout)
+        self.assertIn("stop      Ctrl-C", second.stdout, second.stderr)
+        self.assertIn("stop      Ctrl-C", outputs[0])
+        self.assertNotIn("Another script", outputs[0])
+        self.assertEqual((self.folder / "order").read_text().split(), ["begin", "end"] * 2)
+
+    def test_a_server_that_runs_keeps_nobody_from_building(self):
+        self.stand_in("serves", SERVER + 'exec sleep 30')
+        (self.folder / "bin/serves").rename(self.bin / "catgs-server")
+        environment = {"PATH": f"{self.folder}/bin:/usr/bin:/bin", "HOME": str(self.folder),
+                       "CATGS_OS_RELEASE": str(self.folder / "os-release")}
+        with subprocess.Popen([str(self.checkout / "deploy/run.sh"), *self.options()],
+                              env=environment, stdout=subprocess.PIPE, text=True) as serving:
+            while "Try" not in serving.stdout.readline():
+                pass
+            lock = self.checkout / "build/run/.lock"
+            self.assertEqual(subprocess.run(["flock", "-n", str(lock), "true"], check=False).returncode, 0)
+            serving.terminate()
 
     def test_a_scene_that_fails_shows_the_error_and_not_the_progress(self):
         result = self.serve(self.scene("empty.ply"), *self.options())
