@@ -140,6 +140,12 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
   switch (reason) {
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
       const Site& site = site_of(wsi);
+      // libwebsockets takes any version of the protocol, and any method.
+      if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
+          request_header(wsi, WSI_TOKEN_VERSION) != "13") {
+        lws_return_http_status(wsi, 400, "open websockets by GET, Sec-WebSocket-Version 13");
+        return -1;
+      }
       const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
       const std::string host = request_header(wsi, WSI_TOKEN_HOST);
       if (site.accept && host_allowed(site, host) &&

@@ -1,0 +1,272 @@
+// HTTP by the byte, and crowds: what strangers may send to the port without a token. Real sockets
+// on loopback, a whole server in this process.
+
+#include <filesystem>
+#include <thread>
+
+#include <boost/system/system_error.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "tests/support/raw_socket.h"
+#include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::AnyOf;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+constexpr std::string_view page_policy =
+    "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; img-src 'self' "
+    "blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Descriptors of this process, which is the server too.
+std::size_t open_descriptors() {
+  std::size_t count = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
+    ++count;
+  return count;
+}
+
+class HttpConformance : public testing::Test {
+ protected:
+  HttpConformance() {
+    // Both ends of a thousand connections; libwebsockets takes what is allowed when it starts.
+    rlimit limit{};
+    ::getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 8192);
+    ::setrlimit(RLIMIT_NOFILE, &limit);
+    folder.write("web/index.html", "<!doctype html>the page");
+    folder.write("secret.txt", "the secret");
+    server.emplace([&](ServerConfig& config) {
+      config.client_dir = (folder / "web").string();
+      config.max_sessions = 64;
+    });
+  }
+
+  std::string host() const { return "Host: 127.0.0.1:" + std::to_string(server->port()) + "\r\n"; }
+  /// Everything that the server answers to `request`, sent as it is.
+  std::string answer(const std::string& request) const {
+    RawSocket socket(server->port());
+    socket.send(request);
+    return socket.receive(300ms);
+  }
+  std::string answer_to_path(const std::string& path) const {
+    return answer("GET " + path + " HTTP/1.1\r\n" + host() + "\r\n");
+  }
+  void expect_alive() const {
+    EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
+    WireClient good(server->port());
+    good.greet();
+    good.send_pose(1);
+    EXPECT_FALSE(good.receive_frame().bitstream.empty());
+  }
+  /// The server notices closed sockets a little later.
+  static bool falls_to(std::size_t descriptors) {
+    for (int looks = 0; looks < 100; ++looks) {
+      if (open_descriptors() <= descriptors) return true;
+      std::this_thread::sleep_for(50ms);
+    }
+    return false;
+  }
+
+  const TemporaryFolder folder;
+  std::optional<RunningServer> server;
+};
+
+TEST_F(HttpConformance, NoPathLeadsOutOfTheClient) {
+  for (const char* path :
+       {"/../secret.txt", "/%2e%2e/secret.txt", "/%2e%2e%2fsecret.txt", "/..%5csecret.txt",
+        "/%252e%252e/secret.txt", "/.%00./secret.txt", "/..;/secret.txt", "//../secret.txt",
+        "/./../secret.txt", "/index.html/../../secret.txt", "/%c0%ae%c0%ae/secret.txt",
+        "http://127.0.0.1/../secret.txt", "file:///etc/passwd", "*",
+        "/api/scenes/../secret.txt/tours",
+        "/api/scenes/%2e%2e%2f%2e%2e%2fetc%2fpasswd/poster.jpg"}) {
+    const std::string reply = answer_to_path(path);
+    EXPECT_THAT(reply, Not(AnyOf(HasSubstr("the secret"), HasSubstr("root:")))) << path;
+    EXPECT_THAT(reply, Not(HasSubstr("HTTP/1.1 200"))) << path;
+  }
+  expect_alive();
+}
+
+TEST_F(HttpConformance, NoRequestWritesHeadersOfTheAnswer) {
+  for (const std::string& request :
+       {"GET /%0d%0aX-Planted:%201 HTTP/1.1\r\n" + host() + "\r\n",
+        "GET /?a=%0d%0aX-Planted:%201 HTTP/1.1\r\n" + host() + "\r\n",
+        "GET / HTTP/1.1\r\n" + host() + "If-None-Match: a%0d%0aX-Planted: 1\r\n\r\n",
+        std::string("GET / HTTP/1.1\r\nHost: evil\rX-Planted: 1\r\n\r\n"),
+        std::string("GET / HTTP/1.1\r\nHost: evil%0d%0aX-Planted: 1\r\n\r\n")}) {
+    const std::string reply = answer(request);
+    const std::string head = reply.substr(0, reply.find("\r\n\r\n"));
+    EXPECT_THAT(head, Not(AnyOf(HasSubstr("X-Planted"), HasSubstr("x-planted")))) << request;
+  }
+  expect_alive();
+}
+
+TEST_F(HttpConformance, EveryAnswerHasTheSecurityHeaders) {
+  for (const auto& [port, target] :
+       std::vector<std::pair<int, std::string>>{{server->port(), "/"},
+                                                {server->port(), "/nowhere"},
+                                                {server->port(), "/healthz"},
+                                                {server->port(), "/api/scenes"},
+                                                {server->port(), "/api/scenes/city/poster.jpg"},
+                                                {server->admin_port(), "/metrics"},
+                                                {server->admin_port(), "/api/sessions"}}) {
+    const HttpReply reply = http_get(port, target);
+    EXPECT_EQ(reply.headers.at("content-security-policy"), page_policy) << target;
+    EXPECT_EQ(reply.headers.at("x-content-type-options"), "nosniff") << target;
+    EXPECT_EQ(reply.headers.at("referrer-policy"), "no-referrer") << target;
+    EXPECT_EQ(reply.headers.at("cross-origin-resource-policy"), "same-origin") << target;
+    EXPECT_FALSE(reply.headers.contains("access-control-allow-origin")) << target;
+  }
+}
+
+TEST_F(HttpConformance, OtherMethodsAreRefused) {
+  for (const char* method : {"POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT",
+                             "PROPFIND", "NONSENSE", "get"}) {
+    const std::string reply =
+        answer(std::string(method) + " /api/sessions HTTP/1.1\r\n" + host() + "\r\n");
+    EXPECT_THAT(reply, Not(HasSubstr(" 200 "))) << method;
+  }
+  expect_alive();
+}
+
+TEST_F(HttpConformance, AHeadHasNoBodyAndPipelinedRequestsAreAnsweredInOrder) {
+  const std::string head = answer("HEAD / HTTP/1.1\r\n" + host() + "\r\n");
+  EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(head, Not(HasSubstr("the page")));
+  const std::string both =
+      answer("GET / HTTP/1.1\r\n" + host() + "\r\nGET /healthz HTTP/1.1\r\n" + host() + "\r\n");
+  EXPECT_LT(both.find("the page"), both.find("ok\n"));
+  EXPECT_NE(both.find("ok\n"), std::string::npos);
+}
+
+/// A proxy in front counts bodies: a request hidden in one must not be answered here.
+TEST_F(HttpConformance, ABodyIsNoSecondRequest) {
+  const std::string hidden = "GET /healthz HTTP/1.1\r\n" + host() + "\r\n";
+  const std::string length = "Content-Length: " + std::to_string(hidden.size()) + "\r\n\r\n";
+  for (const char* method : {"GET", "HEAD"})
+    EXPECT_THAT(answer(std::string(method) + " /nowhere HTTP/1.1\r\n" + host() + length + hidden),
+                Not(HasSubstr("200 OK")))
+        << method;
+  EXPECT_THAT(answer("GET /nowhere HTTP/1.1\r\n" + host() + "Transfer-Encoding: chunked\r\n\r\n" +
+                     "0\r\n\r\n"),
+              Not(HasSubstr("200 OK")));
+  expect_alive();
+}
+
+TEST_F(HttpConformance, HeadersHaveAnEnd) {
+  const std::string start = "GET /healthz HTTP/1.1\r\n" + host();
+  EXPECT_THAT(answer(start + "Cookie: " + std::string(100'000, 'c') + "\r\n\r\n"),
+              Not(HasSubstr("200 OK")));
+  EXPECT_THAT(answer("GET /" + std::string(100'000, 'a') + " HTTP/1.1\r\n" + host() + "\r\n"),
+              Not(HasSubstr("200 OK")));
+  std::string many = start;
+  for (int i = 0; i < 20'000; ++i) many += "X-" + std::to_string(i) + ": 1\r\n";
+  answer(many + "\r\n");
+  for (const std::string& garbage :
+       {std::string(5000, '\0'), std::string(5000, '\xff'), std::string("\r\n\r\n\r\n"),
+        std::string("GET\r\n\r\n"),
+        std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11)})
+    EXPECT_THAT(answer(garbage), Not(HasSubstr("the page")));
+  expect_alive();
+}
+
+/// Slow senders, the silent, and websockets that do not answer pings: all at once, because each
+/// takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30 (server/net/net_server.cpp).
+TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
+  const std::size_t before = open_descriptors();
+  {
+    std::vector<RawSocket> slow;
+    for (int i = 0; i < 20; ++i) slow.emplace_back(server->port());
+    std::vector<RawSocket> silent;
+    for (int i = 0; i < 20; ++i) silent.emplace_back(server->port());
+    RawSocket half_open(server->port());
+    half_open.send(handshake(server->port()));
+    half_open.send(client_frame(ws_fin | ws_binary,
+                                hello_message(64, 64, v1::CODEC_H264).SerializeAsString()));
+    std::string received;
+    EXPECT_TRUE(half_open.receive_until("city", received));
+    const std::string request =
+        "GET /healthz HTTP/1.1\r\nX-Slow: aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa";
+    bool all_closed = false;
+    for (std::size_t second = 0; second < 25 && !all_closed; ++second) {
+      all_closed = true;
+      for (RawSocket& socket : slow)
+        if (!socket.closed_within(1ms)) {
+          all_closed = false;
+          socket.send(request.substr(second, 1));
+        }
+      std::this_thread::sleep_for(1s);
+    }
+    EXPECT_TRUE(all_closed) << "a byte a second keeps a connection";
+    for (RawSocket& socket : silent) EXPECT_TRUE(socket.closed_within(5s));
+    expect_alive();
+    // Its kernel acknowledges what the server sends, but no pong comes.
+    EXPECT_TRUE(half_open.closed_within(45s));
+  }
+  EXPECT_TRUE(falls_to(before + 4));
+}
+
+TEST_F(HttpConformance, AThousandConnectionsLeaveRoomForOneMore) {
+  const std::size_t before = open_descriptors();
+  {
+    std::vector<RawSocket> crowd;
+    for (int i = 0; i < 1000; ++i) {
+      crowd.emplace_back(server->port());
+      if (i % 4 == 1) crowd.back().send("GET / HT");
+      if (i % 4 == 2) crowd.back().send(handshake(server->port()));
+      if (i % 4 == 3) crowd.back().send("GET /healthz HTTP/1.1\r\n" + host() + "\r\n");
+    }
+    EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
+    // All come from one address, which has no place left for websockets.
+    WireClient late(server->port());
+    std::optional<v1::Error> error;
+    late.receive_until_closed(&error);
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+  }
+  EXPECT_TRUE(falls_to(before + 4)) << open_descriptors() << " now, " << before << " before";
+  expect_alive();
+}
+
+TEST_F(HttpConformance, AStormOfReconnectsLeavesNothingBehind) {
+  WireClient good(server->port());
+  good.greet();
+  std::string resume_token;
+  {
+    WireClient first(server->port());
+    resume_token = first.greet().resume_token();
+  }
+  const std::size_t before = open_descriptors();
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t)
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 100; ++i) {
+        RawSocket socket(server->port());
+        const int phase = (i + t) % 5;
+        if (phase == 1) socket.send("GET / HTTP/1.1\r\nUpgr");
+        if (phase >= 2) socket.send(handshake(server->port()));
+        std::string received;
+        if (phase >= 3) socket.receive_until("\r\n\r\n", received);
+        if (phase >= 4)
+          socket.send(client_frame(ws_fin | ws_binary,
+                                   resuming_hello(resume_token, 7).SerializeAsString()));
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_TRUE(falls_to(before + 4)) << open_descriptors() << " now, " << before << " before";
+  good.send_pose(1);
+  EXPECT_FALSE(good.receive_frame().bitstream.empty());
+  WireClient back(server->port());
+  EXPECT_FALSE(back.greet(resuming_hello(resume_token, 9)).session_id().empty());
+}
+
+}  // namespace
+}  // namespace catgs::test
