@@ -21,9 +21,11 @@ constexpr std::string_view link_purpose = "catgs-link-v1";
 constexpr std::size_t min_key_bytes = 16;
 constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
+constexpr std::string_view not_an_author =
+    "this link does not let you save: ask for one of role author";
 
 bool is_role(std::string_view role) {
-  return role == "viewer" || role == "spectator" || role == "solo";
+  return role == "viewer" || role == "author" || role == "spectator" || role == "solo";
 }
 
 /// Why the role forbids it; nothing: it does not.
@@ -31,6 +33,7 @@ std::optional<std::string> forbidden(std::string_view role, Use use) {
   if (use == Use::own_session && role == "spectator")
     return "this link lets you watch others, not move by yourself";
   if (use == Use::watch && role == "solo") return "this link does not let you watch others";
+  if (use == Use::save && role != "author") return std::string(not_an_author);
   return std::nullopt;
 }
 
@@ -43,7 +46,8 @@ std::string read_text(const std::filesystem::path& path, std::string_view flag) 
 
 std::string make_link_token(const LinkGrant& grant, std::string_view key) {
   if (!is_role(grant.role))
-    throw InputError("--role " + grant.role, {}, "is no role", "use viewer, spectator or solo");
+    throw InputError("--role " + grant.role, {}, "is no role",
+                     "use viewer, author, spectator or solo");
   if (grant.scene_id.find('\n') != std::string::npos || grant.scene_id.size() > 128)
     throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
   const std::string payload =
@@ -103,11 +107,16 @@ AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::
 std::optional<std::string> AccessControl::refusal(std::string_view token, std::string_view scene_id,
                                                   std::int64_t now_unix_s, Use use) {
   const std::lock_guard lock(mutex_);
+  if (use == Use::save && key_.empty())
+    return "nobody can save on this server: it was started without --token-key-file, which links "
+           "of "
+           "role author are made with";
   if (token_file_.empty() && key_.empty()) return std::nullopt;
   if (token.empty()) return "this server needs an access token: open the link you were given";
   if (!token_file_.empty()) {
     reload_when_changed();
-    if (is_static_token(token)) return std::nullopt;
+    if (is_static_token(token))
+      return use == Use::save ? std::optional<std::string>(not_an_author) : std::nullopt;
   }
   if (!key_.empty()) {
     if (const auto grant = read_link_token(token, key_)) {

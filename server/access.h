@@ -15,8 +15,8 @@ namespace catgs {
 /// What an expiring link allows.
 struct LinkGrant {
   std::string scene_id;  // empty: every scene
-  /// "viewer": may do everything; "spectator": only watch others' sessions; "solo": neither watch
-  /// nor be watched.
+  /// "viewer": may look at everything; "author": may also save tours; "spectator": only watch
+  /// others' sessions; "solo": neither watch nor be watched.
   std::string role = "viewer";
   std::int64_t expires_unix_s = 0;
 };
@@ -34,7 +34,8 @@ std::string read_key_file(std::string_view flag, const std::filesystem::path& pa
 /// "90s", "30m", "12h", "7d". Throws InputError.
 std::chrono::seconds parse_duration(std::string_view text);
 
-/// Who may see which scene. Without a token file and a key file: everybody, all. Thread-safe.
+/// Who may see which scene. Without a token file and a key file: everybody, all. What is in scenes'
+/// folders is changed by links of role "author" alone. Thread-safe.
 class AccessControl {
  public:
   /// Empty path: this kind of token is not used. Throws InputError when a file cannot be read.

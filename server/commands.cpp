@@ -30,8 +30,10 @@ void add_token_command(CLI::App& app, int& exit_code) {
   auto options = std::make_shared<TokenOptions>();
   command->add_option("--scene", options->grant.scene_id, "Scene id; without it every scene");
   command
-      ->add_option("--role", options->grant.role,
-                   "viewer; spectator: only watches others; solo: neither watches nor is watched")
+      ->add_option(
+          "--role", options->grant.role,
+          "viewer; author: may also save tours; spectator: only watches others; solo: neither "
+          "watches nor is watched")
       ->capture_default_str();
   command->add_option("--expires", options->expires, "Life of the link: 90s, 30m, 12h, 7d")
       ->capture_default_str();

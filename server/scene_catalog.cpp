@@ -115,7 +115,10 @@ std::shared_ptr<const SceneEntry> load_scene(
   auto entry = std::make_shared<SceneEntry>();
   entry->facts = facts_of(scene, id_of(scene.name));
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud);
-  if (!is_synthetic(spec)) entry->tours = read_tours(spec);
+  if (!is_synthetic(spec)) {
+    entry->sidecar = locate_scene(spec).hints.sidecar;
+    entry->tours = read_tours(entry->sidecar);
+  }
   auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);

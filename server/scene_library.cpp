@@ -229,6 +229,19 @@ void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint sta
   start_next(now);
 }
 
+std::shared_ptr<const SceneEntry> SceneLibrary::in_memory(const std::string& id) const {
+  const auto it = shelf_.find(id);
+  return it == shelf_.end() ? nullptr : it->second.entry;
+}
+
+void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntry> entry) {
+  const auto it = shelf_.find(id);
+  if (it == shelf_.end() || !it->second.entry || it->second.entry->renderer != entry->renderer)
+    return;
+  it->second.entry = std::move(entry);
+  publish();
+}
+
 void SceneLibrary::start_scan(TimePoint now) {
   next_scan_ = now + scan_interval;
   if (std::exchange(scanning_, true)) return;

@@ -49,6 +49,12 @@ class SceneLibrary final : public SceneSource {
   SceneAnswer want(const std::string& id, TimePoint now) override;
   void on_tick(TimePoint now) override;
 
+  /// Null where it is not.
+  [[nodiscard]] std::shared_ptr<const SceneEntry> in_memory(const std::string& id) const;
+  /// Shows the scene as `entry` says from now on, to who comes from now on; does nothing when the
+  /// scene has been loaded anew since `entry` was made of it.
+  void revise(const std::string& id, std::shared_ptr<const SceneEntry> entry);
+
   /// Of the default scene.
   [[nodiscard]] std::string renderer_text() const;
   /// Any thread.

@@ -30,6 +30,7 @@
 #include "server/scene_library.h"
 #include "server/schedule/pool_executor.h"
 #include "server/session/session_registry.h"
+#include "server/sidecar_saver.h"
 #include "server/signed_token.h"
 
 namespace catgs {
@@ -83,6 +84,8 @@ SessionTokens session_tokens(const ServerConfig& config) {
   return SessionTokens(random_key());
 }
 
+constexpr std::string_view sidecar_part = "/sidecar";
+
 /// What there is to read of a scene, and where: "/api/scenes/ID<name>".
 enum class ScenePart { tours, poster };
 constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
@@ -122,6 +125,8 @@ struct Server::State {
   HttpResponse respond(const HttpRequest& request);
   HttpResponse list_scenes(const std::string& token);
   HttpResponse part_of_scene(std::string_view scene_id, ScenePart part, const std::string& token);
+  /// Of "PUT /api/scenes/ID/sidecar".
+  std::optional<HttpResponse> refuse_upload(const HttpRequest& request);
   HttpResponse respond_admin(const HttpRequest& request);
   void print_banner() const;
   void wait_for_signal();
@@ -142,6 +147,7 @@ struct Server::State {
   std::shared_ptr<ThreadPool> pool;
   std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
   std::unique_ptr<SceneLibrary> scenes;
+  std::unique_ptr<SidecarSaver> saver;
   std::vector<EncoderChoice> encoders;
   boost::asio::signal_set stop_signals;
   boost::asio::steady_timer drain_timer;
@@ -153,6 +159,10 @@ NetOptions Server::State::net_options() {
   NetOptions options;
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return respond(request); };
+  options.uploads.refusal = [this](const HttpRequest& request) { return refuse_upload(request); };
+  options.uploads.take = [this](const HttpRequest& request, std::string body) {
+    return saver->save(std::string(*scene_of(request.path, sidecar_part)), std::move(body));
+  };
   options.accept = [this](std::shared_ptr<Connection> connection) {
     return registry->accept(std::move(connection));
   };
@@ -211,7 +221,12 @@ HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart p
   const auto listing = scenes->listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
-  if (part == ScenePart::tours) return text_response(200, found->tours, "application/json");
+  if (part == ScenePart::tours) {
+    const bool may_save = !access.refusal(token, scene_id, unix_now_s(), Use::save);
+    return text_response(200,
+                         fmt::format(R"({{"may_save":{},"document":{}}})", may_save, found->tours),
+                         "application/json");
+  }
   if (!found->poster)
     return text_response(404, "404: the scene has no poster, or waits for its first visit\n");
   HttpResponse response;
@@ -219,6 +234,19 @@ HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart p
   response.cache_control = "private, max-age=60";
   response.body = found->poster;
   return response;
+}
+
+std::optional<HttpResponse> Server::State::refuse_upload(const HttpRequest& request) {
+  const auto scene_id = scene_of(request.path, sidecar_part);
+  if (!scene_id) return text_response(405, "405: only the sidecars of scenes are saved here\n");
+  const std::string token = bearer_token(request.authorization);
+  if (const auto refused = access.refusal(token, *scene_id, unix_now_s(), Use::list))
+    return text_response(401, "401: " + *refused + "\nSend it as Authorization: Bearer TOKEN\n");
+  if (const auto refused = access.refusal(token, *scene_id, unix_now_s(), Use::save))
+    return text_response(403, "403: " + *refused + "\n");
+  if (std::ranges::count(*scenes->listing(), *scene_id, &SceneLibrary::Listing::id) == 0)
+    return text_response(404, "404: there is no such scene here\n");
+  return std::nullopt;
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {
@@ -236,6 +264,7 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
   s.scenes = std::make_unique<SceneLibrary>(
       s.config, RendererOptions{s.config.renderer, s.pool, s.config.simd, s.devices}, s.io,
       s.metrics);
+  s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token, const std::string& scene_id, Use use) {
     return s.access.refusal(token, scene_id, unix_now_s(), use);

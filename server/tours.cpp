@@ -1,20 +1,28 @@
 #include "server/tours.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <span>
 #include <system_error>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
 #include "render_core/scene/json_field.h"
-#include "render_core/scene/locate_scene.h"
 
 namespace catgs {
 namespace {
 
 constexpr std::uint64_t max_bytes = 4 << 20;
+// Those of web_client/src/tour/tour.ts, which reads what is sent here.
+constexpr std::size_t max_tours = 32;
+constexpr std::size_t max_stops = 256;
+constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters
 
 bool is_file(const std::filesystem::path& file) {
   std::error_code error;
@@ -47,10 +55,68 @@ nlohmann::json viewer_settings(std::filesystem::path sidecar) {
   return nullptr;
 }
 
+/// Refuses members that nobody reads: a typing error would go unnoticed, and what is nested in them
+/// unchecked.
+void check_members(const JsonField& object, std::initializer_list<std::string_view> known) {
+  static_cast<void>(object.find("title"));  // an object, or it says so
+  for (const auto& [name, value] : object.value().items())
+    if (std::ranges::find(known, name) == known.end())
+      object.fail(fmt::format("unknown field '{}'", name),
+                  fmt::format("known are {}", fmt::join(known, ", ")));
+}
+
+void check_text(const std::optional<JsonField>& field) {
+  if (field && field->text().size() > max_text_bytes)
+    field->fail(fmt::format("has more than {} bytes", max_text_bytes));
+}
+
+void check_number(const std::optional<JsonField>& field, float low, float high) {
+  if (field && !(field->number() >= low && field->number() <= high))
+    field->fail(fmt::format("is not in {}…{}", low, high));
+}
+
+void check_stop(const JsonField& stop) {
+  check_members(stop, {"title", "caption", "position", "look_at", "orientation", "fov_deg",
+                       "marker", "stay_s"});
+  check_text(stop.find("title"));
+  check_text(stop.find("caption"));
+  static_cast<void>(stop.at("position").vec3());
+  if (const auto target = stop.find("look_at"))
+    static_cast<void>(target->vec3());
+  else
+    static_cast<void>(stop.at("orientation").numbers(4));
+  if (const auto marker = stop.find("marker")) static_cast<void>(marker->vec3());
+  check_number(stop.find("fov_deg"), 5.0f, 160.0f);
+  check_number(stop.find("stay_s"), 0.0f, 3600.0f);
+}
+
+void check_tour(const JsonField& tour) {
+  check_members(tour, {"title", "autoplay", "stops"});
+  check_text(tour.find("title"));
+  if (const auto autoplay = tour.find("autoplay"); autoplay && !autoplay->value().is_boolean())
+    autoplay->fail("is not true or false");
+  const auto stops = tour.at("stops").elements();
+  if (stops.size() > max_stops)
+    tour.at("stops").fail(fmt::format("has {} entries, at most {}", stops.size(), max_stops));
+  for (const JsonField& stop : stops) check_stop(stop);
+}
+
 }  // namespace
 
-std::string read_tours(const std::filesystem::path& scene) {
-  const std::filesystem::path sidecar = locate_scene(scene).hints.sidecar;
+Sidecar check_sent_sidecar(std::string_view json) {
+  const MemorySource source("sidecar", std::as_bytes(std::span(json)));
+  const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
+  Sidecar sidecar = read_sidecar(source);
+  if (const auto field = JsonField(source.name(), document).find("tours")) {
+    const auto tours = field->elements();
+    if (tours.size() > max_tours)
+      field->fail(fmt::format("has {} entries, at most {}", tours.size(), max_tours));
+    for (const JsonField& tour : tours) check_tour(tour);
+  }
+  return sidecar;
+}
+
+std::string read_tours(const std::filesystem::path& sidecar) {
   return nlohmann::json{{"tours", sidecar_tours(sidecar)}, {"settings", viewer_settings(sidecar)}}
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
+#include <string_view>
+
+#include "render_core/scene/hints.h"
 
 namespace catgs {
 
@@ -10,7 +14,14 @@ namespace catgs {
 /// a scene: `<scene>.settings.json`, or `settings.json` in its folder. Either is null where there
 /// is none. The page reads them; here they are checked for size and syntax. Throws InputError for a
 /// mistake in the sidecar; a settings file that cannot be used was not written for us: it is
-/// logged.
-std::string read_tours(const std::filesystem::path& scene);
+/// logged. `sidecar`: its path, whether it is there or not.
+std::string read_tours(const std::filesystem::path& sidecar);
+
+/// A sidecar that somebody sent. Stricter than what operators write: every field of its tours is
+/// one that pages know, of the right kind and within its bounds. Throws InputError naming it.
+Sidecar check_sent_sidecar(std::string_view json);
+
+/// What check_sent_sidecar() takes at most; 32 tours of 256 stops with short captions.
+inline constexpr std::size_t max_sent_sidecar_bytes = 1 << 20;
 
 }  // namespace catgs

@@ -125,18 +125,6 @@ void use_cameras(const CameraFile& cameras, SceneHints& hints) {
   hints.source = cameras.source;
 }
 
-void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints) {
-  if (sidecar.near_z) hints.near_z = *sidecar.near_z;
-  if (sidecar.limits) hints.limits = *sidecar.limits;
-  if (sidecar.focus) hints.focus = *sidecar.focus;
-  if (const auto& start = sidecar.start_pose) {
-    hints.start_pose = start->look_at ? look_at(start->position, *start->look_at, hints.up)
-                                      : Pose{start->position, start->orientation};
-    if (start->look_at && !sidecar.focus) hints.focus = *start->look_at;
-  }
-  hints.source = fmt::format("sidecar {}", name);
-}
-
 }  // namespace
 
 Sidecar read_sidecar(const ByteSource& file) {
@@ -159,6 +147,19 @@ Sidecar read_sidecar(const ByteSource& file) {
   if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits);
   if (const auto focus = root.find("focus")) sidecar.focus = focus->vec3();
   return sidecar;
+}
+
+void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints) {
+  if (sidecar.up) hints.up = *sidecar.up;
+  if (sidecar.near_z) hints.near_z = *sidecar.near_z;
+  if (sidecar.limits) hints.limits = *sidecar.limits;
+  if (sidecar.focus) hints.focus = *sidecar.focus;
+  if (const auto& start = sidecar.start_pose) {
+    hints.start_pose = start->look_at ? look_at(start->position, *start->look_at, hints.up)
+                                      : Pose{start->position, start->orientation};
+    if (start->look_at && !sidecar.focus) hints.focus = *start->look_at;
+  }
+  hints.source = fmt::format("sidecar {}", name);
 }
 
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {

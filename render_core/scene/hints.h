@@ -37,6 +37,9 @@ struct Sidecar {
 /// Throws InputError naming the field, also for fields that are not known.
 Sidecar read_sidecar(const ByteSource& file);
 
+/// Puts the sidecar's fields in the place of those hints. `name`: of its file.
+void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints);
+
 /// Where the sidecar of a scene file is: "city.ply" -> "city.json".
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
 

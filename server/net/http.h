@@ -1,14 +1,18 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace catgs {
 
-/// A GET or HEAD request; other methods are answered before a handler sees them.
+/// A GET or HEAD request, or the head of a PUT request; other methods are answered before a handler
+/// sees them.
 struct HttpRequest {
   std::string_view path;  // decoded, starts with '/', no query
   std::string_view if_none_match;
@@ -36,6 +40,16 @@ inline HttpResponse text_response(int status, std::string body,
 
 /// Called on the network thread: answers at once and never waits.
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
+
+/// Takes PUT requests; none are taken where its members are null. Both are called on the network
+/// thread.
+struct HttpUploads {
+  /// By the request's head: the refusal, or nothing. It has come from an allowed origin.
+  std::function<std::optional<HttpResponse>(const HttpRequest&)> refusal;
+  /// With the whole body. The answer may come from any thread; an abandoned one becomes status 503.
+  std::function<std::future<HttpResponse>(const HttpRequest&, std::string body)> take;
+};
+inline constexpr std::size_t max_upload_bytes = 1 << 20;
 
 /// May a page of `origin` ("https://a.example:8443", empty when the client is no browser) open a
 /// websocket here? Yes when it was served by this host (`host` is the Host header) or is listed;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <string_view>
 
@@ -9,6 +10,8 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t chunk_bytes = 64 * 1024;
+constexpr int answer_timeout_s = 30;           // of who takes an upload
+constexpr lws_usec_t answer_poll_us = 10'000;  // authors save now and then
 
 /// Appends response headers to a fixed buffer; remembers whether everything found room.
 class HeaderWriter {
@@ -60,6 +63,50 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
       handler({path, if_none_match, encodings.find("gzip") != std::string::npos, authorization});
   finished = head_only_ || !response_.body || response_.body->empty();
   return write_headers(wsi, policy);
+}
+
+int LwsHttpExchange::begin_upload(lws* wsi, std::optional<HttpResponse> refusal) {
+  path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
+  authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  refusal_ = std::move(refusal);
+  return 0;
+}
+
+/// Of what is refused nothing is kept, but all of it is read: a connection that is closed with
+/// bytes unread takes the refusal with it.
+void LwsHttpExchange::take_body(std::string_view bytes) {
+  if (!refusal_) body_.append(bytes);
+}
+
+int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy,
+                              bool& finished) {
+  if (refusal_) return answer(wsi, *std::move(refusal_), policy, finished);
+  answer_ = uploads.take({path_, {}, false, authorization_}, std::move(body_));
+  lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);
+  lws_set_timer_usecs(wsi, answer_poll_us);
+  return 0;
+}
+
+int LwsHttpExchange::poll_answer(lws* wsi, const std::string& policy, bool& finished) {
+  if (!answer_.valid()) return 0;
+  if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    lws_set_timer_usecs(wsi, answer_poll_us);
+    return 0;
+  }
+  try {
+    return answer(wsi, answer_.get(), policy, finished);
+  } catch (const std::future_error&) {
+    return answer(wsi, text_response(503, "503: the server stops\n"), policy, finished);
+  }
+}
+
+int LwsHttpExchange::answer(lws* wsi, HttpResponse response, const std::string& policy,
+                            bool& finished) {
+  response_ = std::move(response);
+  finished = !response_.body || response_.body->empty();
+  if (write_headers(wsi, policy) != 0) return -1;
+  if (!finished) lws_callback_on_writable(wsi);
+  return 0;
 }
 
 int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy) {

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <future>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <libwebsockets.h>
@@ -16,15 +19,31 @@ class LwsHttpExchange {
   /// Content-Security-Policy. Sets `finished` when there is no body to follow.
   /// The int results below are libwebsockets': nonzero closes the connection.
   int begin(lws* wsi, const HttpHandler& handler, const std::string& policy, bool& finished);
+  /// A PUT request: its body follows, of a length that is known to be small. `refusal`: what it
+  /// will be answered then, whatever it is.
+  int begin_upload(lws* wsi, std::optional<HttpResponse> refusal);
+  void take_body(std::string_view bytes);
+  /// The body is whole: asks `uploads`. Calls of poll_answer() follow, by LWS_CALLBACK_TIMER.
+  int end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy, bool& finished);
+  int poll_answer(lws* wsi, const std::string& policy, bool& finished);
+
   /// Writes the next piece of the body.
   int write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished);
 
  private:
   int write_headers(lws* wsi, const std::string& policy);
+  int answer(lws* wsi, HttpResponse response, const std::string& policy, bool& finished);
 
   HttpResponse response_;
   bool head_only_ = false;
   std::size_t written_ = 0;
+
+  // Of uploads. The request's head is gone when its body has come.
+  std::string path_;
+  std::string authorization_;
+  std::string body_;
+  std::optional<HttpResponse> refusal_;
+  std::future<HttpResponse> answer_;
 };
 
 /// Header of the request, or an empty string.

@@ -2,9 +2,12 @@
 
 #include <array>
 #include <atomic>
+#include <charconv>
 #include <csignal>
+#include <cstdint>
 #include <exception>
 #include <optional>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -31,6 +34,7 @@ constexpr std::uint16_t hang_up_after_s = 30;
 /// What one listening port serves; the vhost's user pointer.
 struct Site {
   HttpHandler http;
+  HttpUploads uploads;
   ConnectionAcceptor accept;  // null: no websockets
   std::vector<std::string> allowed_origins;
   std::string policy;
@@ -86,32 +90,86 @@ bool is_get_or_head(lws* wsi) {
          lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
 }
 
+const std::string upload_length_rule =
+    fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
+
+/// Of the request; 0: it does not say.
+std::uint64_t body_length(lws* wsi) {
+  const std::string text = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
+  std::uint64_t bytes = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bytes);
+  return error == std::errc() && end == text.data() + text.size() ? bytes : 0;
+}
+
+/// Why nothing is taken from this request; nothing: its body may come.
+std::optional<HttpResponse> refuse_upload(lws* wsi, const Site& site) {
+  const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+  if (!host_allowed(site, host)) return refuse_host(host);
+  const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
+  if (!origin_allowed(origin, host, site.allowed_origins)) {
+    spdlog::warn("upload refused: origin {} is not allowed at {} (--allow-origin)", origin, host);
+    return text_response(403, "403: pages of this origin may not save here\n");
+  }
+  const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
+  const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  return site.uploads.refusal({path, {}, false, authorization});
+}
+
 /// An answered request leaves the connection open for the next one.
 int finish_request(lws* wsi, HttpSlot& slot) {
   forget(slot);
   return lws_http_transaction_completed(wsi) ? -1 : 0;
 }
 
+int on_request(lws* wsi, HttpSlot& slot) {
+  const Site& site = site_of(wsi);
+  forget(slot);
+  if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
+    if (const auto bytes = body_length(wsi); bytes < 1 || bytes > max_upload_bytes) {
+      lws_return_http_status(wsi, bytes < 1 ? 411 : 413, upload_length_rule.c_str());
+      return -1;
+    }
+    slot.exchange = new LwsHttpExchange;
+    return slot.exchange->begin_upload(wsi, refuse_upload(wsi, site));
+  }
+  if (!is_get_or_head(wsi)) {
+    lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
+    return -1;
+  }
+  slot.exchange = new LwsHttpExchange;
+  const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+  const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(host); };
+  bool finished = false;
+  if (slot.exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse, site.policy,
+                           finished) != 0)
+    return -1;
+  if (finished) return finish_request(wsi, slot);
+  lws_callback_on_writable(wsi);
+  return 0;
+}
+
+/// The body of an upload is whole, or its answer may have come.
+int go_on_with_upload(lws* wsi, HttpSlot& slot, bool body_is_whole) {
+  const Site& site = site_of(wsi);
+  bool finished = false;
+  const int failed = body_is_whole
+                         ? slot.exchange->end_body(wsi, site.uploads, site.policy, finished)
+                         : slot.exchange->poll_answer(wsi, site.policy, finished);
+  if (failed != 0) return -1;
+  return finished ? finish_request(wsi, slot) : 0;
+}
+
 int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
   switch (reason) {
-    case LWS_CALLBACK_HTTP: {
-      if (!is_get_or_head(wsi)) {
-        lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
-        return -1;
-      }
-      const Site& site = site_of(wsi);
-      forget(*slot);
-      slot->exchange = new LwsHttpExchange;
-      const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-      const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(host); };
-      bool finished = false;
-      if (slot->exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse, site.policy,
-                                finished) != 0)
-        return -1;
-      if (finished) return finish_request(wsi, *slot);
-      lws_callback_on_writable(wsi);
+    case LWS_CALLBACK_HTTP:
+      return on_request(wsi, *slot);
+    case LWS_CALLBACK_HTTP_BODY:
+      if (slot && slot->exchange) slot->exchange->take_body({static_cast<const char*>(in), length});
       return 0;
-    }
+    case LWS_CALLBACK_HTTP_BODY_COMPLETION:
+    case LWS_CALLBACK_TIMER:
+      if (!slot || !slot->exchange) return 0;
+      return go_on_with_upload(wsi, *slot, reason == LWS_CALLBACK_HTTP_BODY_COMPLETION);
     case LWS_CALLBACK_HTTP_WRITEABLE: {
       if (!slot || !slot->exchange) return 0;
       bool finished = false;
@@ -282,12 +340,14 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   }
   State& s = *state_;
   s.site = {std::move(options.http),
+            std::move(options.uploads),
             std::move(options.accept),
             options.allowed_origins,
             content_security_policy(options.embed_origins),
             is_loopback(options.listen.address),
             TrustedProxies(options.trusted_proxies)};
   s.admin_site = {std::move(options.admin_http),
+                  {},
                   nullptr,
                   options.allowed_origins,
                   content_security_policy({}),

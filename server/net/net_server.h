@@ -19,6 +19,7 @@ struct Endpoint {
 struct NetOptions {
   Endpoint listen;
   HttpHandler http;           // pages and /api of the public port
+  HttpUploads uploads;        // to the public port
   ConnectionAcceptor accept;  // websockets of subprotocol catgs.v1, on any path
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;

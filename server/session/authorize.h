@@ -11,6 +11,7 @@ enum class Use {
   list,         // know that it is there
   own_session,  // move through it
   watch,        // look on at somebody's session, or be looked on at
+  save,         // write its sidecar
 };
 
 /// Why a token does not admit to it, for people; nothing: it does.

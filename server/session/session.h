@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,6 +35,7 @@ struct SceneEntry {
   std::shared_ptr<Renderer> renderer;
   std::string renderer_text;  // description and reason, for people
   std::shared_ptr<const SurfacePoints> surface{};
+  std::filesystem::path sidecar{};              // where it is or would be; empty: nowhere
   std::string tours = "{}";                     // for pages; see tours.h
   std::shared_ptr<const std::string> poster{};  // a JPEG file; null: none
 

@@ -16,9 +16,9 @@ namespace catgs::fuzz {
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
-      ply(),    compressed_ply(), splat(),   spz(),     sog(),   zip(),
-      webp(),   lod_tree(),       sidecar(), cameras(), tours(), tum(),
-      config(), client_message(), http(),    token()};
+      ply(),  compressed_ply(), splat(),          spz(),     sog(),   zip(),
+      webp(), lod_tree(),       sidecar(),        cameras(), tours(), sent_sidecar(),
+      tum(),  config(),         client_message(), http(),    token()};
   return all;
 }
 

@@ -46,6 +46,7 @@ Target lod_tree();
 Target sidecar();
 Target cameras();
 Target tours();
+Target sent_sidecar();
 Target tum();
 Target config();
 Target client_message();

@@ -62,8 +62,11 @@ TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
   const auto may = [&](const char* role, Use use) {
     return !access.refusal(make_link_token({"city", role, 1000}, key), "city", 0, use);
   };
-  for (const char* role : {"viewer", "spectator", "solo"})
+  for (const char* role : {"viewer", "author", "spectator", "solo"}) {
     EXPECT_TRUE(may(role, Use::list)) << role;
+    EXPECT_EQ(may(role, Use::save), std::string_view(role) == "author") << role;
+  }
+  EXPECT_TRUE(may("author", Use::own_session));
   EXPECT_TRUE(may("viewer", Use::own_session));
   EXPECT_TRUE(may("viewer", Use::watch));
   EXPECT_FALSE(may("spectator", Use::own_session));
@@ -71,6 +74,21 @@ TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
   EXPECT_TRUE(may("solo", Use::own_session));
   EXPECT_FALSE(may("solo", Use::watch));
   EXPECT_THROW(make_link_token({"city", "emperor", 1000}, key), InputError);
+}
+
+TEST_F(AccessTest, OnlyLinksMakeAuthors) {
+  AccessControl open({}, {});
+  EXPECT_FALSE(open.refusal("", "city", 0));
+  EXPECT_THAT(open.refusal("", "city", 0, Use::save), Optional(HasSubstr("--token-key-file")));
+  AccessControl by_file(folder.write("tokens", "open-sesame\n"),
+                        folder.write("key", std::string(key) + "\n"));
+  EXPECT_FALSE(by_file.refusal("open-sesame", "city", 0));
+  EXPECT_THAT(by_file.refusal("open-sesame", "city", 0, Use::save),
+              Optional(HasSubstr("role author")));
+  const std::string link = make_link_token({"city", "author", 1000}, key);
+  EXPECT_FALSE(by_file.refusal(link, "city", 999, Use::save));
+  EXPECT_TRUE(by_file.refusal(link, "city", 1000, Use::save)) << "expired";
+  EXPECT_TRUE(by_file.refusal(link, "garden", 999, Use::save)) << "another scene";
 }
 
 TEST_F(AccessTest, StaticTokensAreReadAgain) {

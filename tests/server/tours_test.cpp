@@ -1,7 +1,9 @@
 #include "server/tours.h"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "render_core/error.h"
 #include "render_core/scene/save_scene.h"
 #include "tests/render_core/scene/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -15,7 +17,7 @@ using ::testing::ThrowsMessage;
 class Tours : public FolderTest {
  protected:
   void SetUp() override { save_scene(random_cloud(30, 0), folder_ / "museum.splat"); }
-  nlohmann::json read() { return nlohmann::json::parse(read_tours(folder_ / "museum.splat")); }
+  nlohmann::json read() { return nlohmann::json::parse(read_tours(folder_ / "museum.json")); }
 };
 
 TEST_F(Tours, AreEmptyWithoutFiles) {
@@ -43,14 +45,68 @@ TEST_F(Tours, RefuseWhatIsNestedWithoutEnd) {
   write("museum.settings.json", R"({"animTracks": 1, "a": )" + deep + "}");
   EXPECT_TRUE(read()["settings"].is_null());
   write("museum.json", R"({"tours": )" + deep + "}");
-  EXPECT_THAT([&] { read_tours(folder_ / "museum.splat"); },
+  EXPECT_THAT([&] { read_tours(folder_ / "museum.json"); },
               ThrowsMessage<std::runtime_error>(HasSubstr("byte 265: is nested deeper than 256")));
 }
 
 TEST_F(Tours, SayWhatIsWrongInASidecar) {
   write("museum.json", R"({"tours": {"title": "Hall"}})");
-  EXPECT_THAT([&] { read_tours(folder_ / "museum.splat"); },
+  EXPECT_THAT([&] { read_tours(folder_ / "museum.json"); },
               ThrowsMessage<std::runtime_error>(HasSubstr("tours: is not an array")));
+}
+
+constexpr std::string_view stop = R"({"position": [0, 1, 2], "look_at": [0, 1, 3])";
+
+std::string with_stop(const std::string& more) {
+  return fmt::format(R"({{"tours": [{{"title": "Hall", "stops": [{}{}}}]}}]}})", stop, more);
+}
+
+TEST(SentSidecar, OfAWholeTourIsTaken) {
+  const Sidecar sidecar = check_sent_sidecar(
+      R"({"up": "-y", "near": 0.1, "tours": [{"title": "Hall", "autoplay": true, "stops": [
+          {"title": "Door", "caption": "Oak.", "position": [1, 2, 3], "orientation": [0, 0, 0, 1],
+           "fov_deg": 60, "marker": [1, 2, 4], "stay_s": 8}]}]})");
+  EXPECT_FLOAT_EQ(sidecar.near_z.value(), 0.1f);
+  EXPECT_NO_THROW(check_sent_sidecar(with_stop("")));
+  EXPECT_NO_THROW(check_sent_sidecar("{}"));
+}
+
+TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
+  const auto mistake = [](const std::string& json) -> std::string {
+    try {
+      check_sent_sidecar(json);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(mistake("{ broken"), HasSubstr("sidecar: byte "));
+  EXPECT_THAT(mistake("[]"), HasSubstr("is not a JSON object"));
+  EXPECT_THAT(mistake(R"({"near": -1})"), HasSubstr("near: is not positive"));
+  EXPECT_THAT(mistake(R"({"poster": 1})"), HasSubstr("unknown field 'poster'"));
+  EXPECT_THAT(mistake(R"({"tours": {}})"), HasSubstr("tours: is not an array"));
+  EXPECT_THAT(mistake(R"({"tours": [1]})"), HasSubstr("tours[0]: is not an object"));
+  EXPECT_THAT(mistake(R"({"tours": [{"title": "Hall"}]})"), HasSubstr("'stops' is missing"));
+  EXPECT_THAT(mistake(R"({"tours": [{"stops": [], "autoplay": 1}]})"),
+              HasSubstr("tours[0].autoplay"));
+  EXPECT_THAT(mistake(with_stop(R"(, "fov_deg": 400)")), HasSubstr("tours[0].stops[0].fov_deg"));
+  EXPECT_THAT(mistake(with_stop(R"(, "stay_s": -1)")), HasSubstr("stay_s: is not in 0"));
+  EXPECT_THAT(mistake(with_stop(R"(, "marker": [0, 0])")), HasSubstr("marker"));
+  EXPECT_THAT(mistake(with_stop(R"(, "captoin": "x")")), HasSubstr("unknown field 'captoin'"));
+  EXPECT_THAT(mistake(with_stop(R"(, "caption": 7)")), HasSubstr("caption: is not a text"));
+  EXPECT_THAT(mistake(with_stop(fmt::format(R"(, "caption": "{}")", std::string(16'001, 'x')))),
+              HasSubstr("caption: has more than"));
+  EXPECT_THAT(mistake(R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})"),
+              HasSubstr("'orientation' is missing"));
+  std::string many = R"({"tours": [)";
+  for (int i = 0; i < 33; ++i) many += i == 0 ? R"({"stops": []})" : R"(, {"stops": []})";
+  EXPECT_THAT(mistake(many + "]}"), HasSubstr("tours: has 33 entries, at most 32"));
+  std::string stops(stop);
+  stops += "}";
+  for (int i = 0; i < 256; ++i) stops.append(", ").append(stop).append("}");
+  EXPECT_THAT(mistake(fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", stops)),
+              HasSubstr("tours[0].stops: has 257 entries, at most 256"));
+  EXPECT_NE(mistake(std::string(max_sent_sidecar_bytes, ' ') + "{}"), "") << "too large";
 }
 
 }  // namespace

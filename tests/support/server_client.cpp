@@ -79,12 +79,13 @@ RunningServer::~RunningServer() {
 
 void RunningServer::join() { thread_.join(); }
 
-HttpReply http_get(int port, const std::string& target,
+namespace {
+
+HttpReply exchange(int port, http::request<http::string_body> request,
                    const std::map<std::string, std::string>& headers) {
   asio::io_context io;
   beast::tcp_stream stream(io);
   require(run(io, stream, [&](auto done) { stream.async_connect(loopback(port), done); }));
-  http::request<http::empty_body> request(http::verb::get, target, 11);
   request.set(http::field::host, "127.0.0.1:" + std::to_string(port));
   for (const auto& [name, value] : headers) request.set(name, value);
   require(run(io, stream, [&](auto done) { http::async_write(stream, request, done); }));
@@ -100,6 +101,20 @@ HttpReply http_get(int port, const std::string& target,
     reply.headers[name] = std::string(field.value());
   }
   return reply;
+}
+
+}  // namespace
+
+HttpReply http_get(int port, const std::string& target,
+                   const std::map<std::string, std::string>& headers) {
+  return exchange(port, {http::verb::get, target, 11}, headers);
+}
+
+HttpReply http_put(int port, const std::string& target, const std::string& body,
+                   const std::map<std::string, std::string>& headers) {
+  http::request<http::string_body> request(http::verb::put, target, 11, body);
+  request.prepare_payload();
+  return exchange(port, std::move(request), headers);
 }
 
 struct WireClient::State {

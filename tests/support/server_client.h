@@ -42,6 +42,9 @@ struct HttpReply {
 HttpReply http_get(int port, const std::string& target,
                    const std::map<std::string, std::string>& headers = {});
 
+HttpReply http_put(int port, const std::string& target, const std::string& body,
+                   const std::map<std::string, std::string>& headers = {});
+
 struct ReceivedFrame {
   v1::FrameHeader header;
   std::vector<std::byte> bitstream;

@@ -1,8 +1,9 @@
-import { describe, expect, it } from 'vitest';
+import { afterEach, describe, expect, it, vi } from 'vitest';
 import type { SceneSetup } from '#client/camera/camera_controller';
 import { identity } from '#client/camera/vector';
 import { Picks } from '#client/session/picks';
 import { TourDraft } from '#client/tour/draft';
+import { save_sidecar } from '#client/tour/save';
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
 import { FakeTime } from './fakes';
 
@@ -50,8 +51,9 @@ describe('a draft of a tour', () => {
     };
     const second: Tour = { title: 'second', stops: [stop('s')], way: undefined, starts_itself: false };
     const draft = new TourDraft();
-    draft.load([film, { ...second, title: 'first' }, second]);
+    draft.load([film, { ...second, title: 'first', starts_itself: true }, second]);
     expect(draft.title).toBe('first');
+    expect(draft.tours[0]!.starts_itself).toBe(true);
     expect(draft.tours.map(({ title }) => title)).toEqual(['first', 'film', 'second']);
     draft.remove(0);
     expect(draft.tours.map(({ title }) => title)).toEqual(['film', 'second']);
@@ -77,6 +79,38 @@ describe('a draft of a tour', () => {
     const [tour] = read_tours(tours, [0, -1, 0], 1);
     expect(tour).toMatchObject({ title: 'Mine' });
     expect(tour!.stops[0]).toMatchObject({ title: 'a', caption: 'about a', marker: [0, 0, 9] });
+  });
+});
+
+describe('saving to the server', () => {
+  const save = (answer: () => Promise<Response>, sidecar = '{}'): Promise<string | undefined> => {
+    vi.stubGlobal('fetch', answer);
+    return save_sidecar('https://tours.example/?author', 'secret', 'old hall', sidecar, 'no answer');
+  };
+  afterEach(() => {
+    vi.unstubAllGlobals();
+  });
+
+  it('sends it with the token, to the scene', async () => {
+    const fetched = vi.fn(() => Promise.resolve(new Response('saved')));
+    expect(await save(fetched)).toBeUndefined();
+    expect(fetched.mock.calls[0]).toMatchObject([
+      new URL('https://tours.example/api/scenes/old%20hall/sidecar'),
+      { method: 'PUT', headers: { authorization: 'Bearer secret' } },
+    ]);
+  });
+
+  it('says in plain words why it was not saved', async () => {
+    const answered = (status: number, text: string) => (): Promise<Response> =>
+      Promise.resolve(new Response(text, { status }));
+    expect(await save(answered(403, '403: this link does not let you save\n'))).toBe(
+      'this link does not let you save',
+    );
+    expect(await save(answered(502, '<html>Bad gateway</html>'))).toBe('status 502');
+    expect(await save(() => Promise.reject(new TypeError('failed')))).toBe('no answer');
+    const fetched = vi.fn(answered(200, ''));
+    expect(await save(fetched, ' '.repeat(2 ** 20 + 1))).toMatch(/too many/);
+    expect(fetched).not.toHaveBeenCalled();
   });
 });
 

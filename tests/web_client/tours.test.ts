@@ -82,6 +82,16 @@ describe('tours of a sidecar', () => {
     expect(start).toBeDefined();
     expect(read_document({}, up, 1, 1)).toEqual({ tours: [], start: undefined, problems: [] });
   });
+
+  it("take the place of imported stops, so that an author's changes do not stand beside them", () => {
+    const own = [{ title: 'Mine', stops: [{ position: [0, 0, 0], orientation: [0, 0, 0, 1] }] }];
+    const { tours, start } = read_document({ tours: own, settings }, up, 1, 1);
+    expect(tours[0]!.title).toBe('Mine');
+    expect(tours.slice(1).every(({ way }) => way !== undefined)).toBe(true);
+    expect(start).toBeUndefined();
+    const { tours: none } = read_document({ tours: [], settings }, up, 1, 1);
+    expect(none.every(({ way }) => way !== undefined)).toBe(true);
+  });
 });
 
 describe("the SuperSplat viewer's settings.json", () => {

@@ -22,6 +22,14 @@ export function catgs_render(...args: string[]): void {
   execFileSync(program('catgs-render'), args, { stdio: ['ignore', 'ignore', 'pipe'] });
 }
 
+/** What `catgs-server token` prints. */
+export function access_token(role: string, key_file: string): string {
+  const args = ['token', '--role', role, '--key-file', key_file];
+  return execFileSync(program('catgs-server'), args, { stdio: ['ignore', 'pipe', 'ignore'] })
+    .toString()
+    .trim();
+}
+
 export interface RunningServer {
   readonly url: string;
   readonly port: number;

@@ -1,11 +1,10 @@
 #include <cmath>
+#include <filesystem>
 
 #include "render_core/scene/hints.h"
-#include "render_core/scene/save_scene.h"
 #include "render_core/scene/streamed_sog.h"
 #include "server/tours.h"
 #include "tests/fuzz/target.h"
-#include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::fuzz {
@@ -79,15 +78,27 @@ std::map<std::string, std::string> cameras_seeds() {
 /// The sidecar's tours and the SuperSplat viewer's settings, as pages get them.
 void parse_tours(Bytes input) {
   static const test::TemporaryFolder folder;
-  static const auto scene = [] {
-    const auto path = folder / "a.splat";
-    save_scene(test::random_cloud(1, 0), path);
-    return path;
-  }();
+  static const auto sidecar = folder / "a.json";
+  std::filesystem::remove(sidecar);
   folder.write("a.settings.json", text_of(input));
-  require(read_tours(scene).size() >= std::string(R"({"settings":,"tours":})").size(), "two parts");
+  require(read_tours(sidecar).size() >= std::string(R"({"settings":,"tours":})").size(),
+          "two parts");
   folder.write("a.json", text_of(input));
-  read_tours(scene);
+  read_tours(sidecar);
+}
+
+/// What is taken from an author can be written, and read again as any sidecar.
+void parse_sent_sidecar(Bytes input) {
+  check_sent_sidecar(text_of(input));
+  parse_sidecar(input);
+  parse_tours(input);
+}
+
+std::map<std::string, std::string> sent_sidecar_seeds() {
+  return {{"sent", R"({"up":"-y","near":0.1,"tours":[{"title":"Hall","autoplay":true,"stops":[{
+                       "title":"Door","caption":"Oak.","position":[1,2,3],"orientation":[0,0,0,1],
+                       "fov_deg":60,"marker":[1,2,4],"stay_s":8},
+                       {"position":[0,1,2],"look_at":[0,0,0]}]}]})"}};
 }
 
 std::map<std::string, std::string> tours_seeds() {
@@ -158,6 +169,17 @@ Target tours() {
           .seeds = tours_seeds,
           .dictionary = with_json_words(
               {"\"tours\":", "\"animTracks\":", "\"annotations\":", "\"cameras\":"}),
+          .max_bytes = 65536};
+}
+
+Target sent_sidecar() {
+  return {.name = "sent_sidecar",
+          .parse = parse_sent_sidecar,
+          .seeds = sent_sidecar_seeds,
+          .dictionary =
+              with_json_words({"\"tours\":", "\"stops\":", "\"title\":", "\"caption\":",
+                               "\"autoplay\":", "\"fov_deg\":", "\"marker\":", "\"stay_s\":",
+                               "\"position\":", "\"look_at\":", "\"orientation\":", "\"up\":"}),
           .max_bytes = 65536};
 }
 

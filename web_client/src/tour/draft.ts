@@ -6,6 +6,7 @@ import { write_tours, type Stop, type Tour } from './tour';
 export class TourDraft {
   private stops_: readonly Stop[] = [];
   private title_ = '';
+  private starts_itself_ = false;
   private others_: readonly Tour[] = []; // of the scene; kept as they are
   private start_: Eye | undefined;
 
@@ -14,6 +15,7 @@ export class TourDraft {
     const edited = tours.find(({ way }) => way === undefined);
     this.title_ = edited?.title ?? '';
     this.stops_ = edited?.stops ?? [];
+    this.starts_itself_ = edited?.starts_itself ?? false;
     this.others_ = tours.filter((tour) => tour !== edited);
     this.start_ = undefined;
   }
@@ -30,12 +32,21 @@ export class TourDraft {
     this.title_ = title;
   }
 
+  get starts_itself(): boolean {
+    return this.starts_itself_;
+  }
+
+  set starts_itself(starts: boolean) {
+    this.starts_itself_ = starts;
+  }
+
   set start(eye: Eye) {
     this.start_ = eye;
   }
 
   get tours(): readonly Tour[] {
-    const edited = { title: this.title_, stops: this.stops_, way: undefined, starts_itself: false };
+    const { title_: title, stops_: stops, starts_itself_: starts_itself } = this;
+    const edited = { title, stops, way: undefined, starts_itself };
     return this.stops_.length > 0 ? [edited, ...this.others_] : this.others_;
   }
 

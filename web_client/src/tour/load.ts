@@ -10,9 +10,18 @@ export interface SceneTours {
   readonly problems: readonly string[];
 }
 
-/** What /api/scenes/ID/tours says, as far as it makes sense. Pure. */
+export interface TourDocument {
+  readonly tours?: unknown;
+  readonly settings?: unknown;
+}
+
+/**
+ * What /api/scenes/ID/tours says, as far as it makes sense. Pure. Stops come from one place, so that
+ * an author's changes to imported ones do not stand beside the old: the sidecar's, where it has any,
+ * and then visits begin where the sidecar says too.
+ */
 export function read_document(
-  document: { readonly tours?: unknown; readonly settings?: unknown },
+  document: TourDocument,
   up: Vec3,
   fov_y_rad: number,
   aspect: number,
@@ -27,30 +36,32 @@ export function read_document(
       return undefined;
     }
   };
-  const own = attempt(document.tours, () => read_tours(document.tours, up, fov_y_rad)) ?? [];
+  const own = attempt(document.tours, () => read_tours(document.tours, up, fov_y_rad));
   const imported = attempt(document.settings, () => read_supersplat(document.settings, aspect));
   return {
-    tours: [...own, ...(imported?.tours ?? [])].filter(
-      ({ stops, way }) => stops.length > 0 || way !== undefined,
-    ),
-    start: imported?.start,
+    tours: [
+      ...(own ?? []),
+      ...(imported?.tours ?? []).filter(({ way }) => own === undefined || way !== undefined),
+    ].filter(({ stops, way }) => stops.length > 0 || way !== undefined),
+    start: own === undefined ? imported?.start : undefined,
     problems,
   };
 }
 
-/** Nothing where the server has none, or does not tell. */
+/** Nothing where the server has none, or does not tell. `may_save`: it takes this token's sidecar. */
 export async function fetch_tours(
   page_url: string,
   token: string,
   scene_id: string,
-): Promise<{ tours?: unknown; settings?: unknown }> {
+): Promise<{ document: TourDocument; may_save: boolean }> {
+  const nothing = { document: {}, may_save: false };
   try {
     const headers: HeadersInit = token ? { authorization: `Bearer ${token}` } : {};
     const address = new URL(`./api/scenes/${encodeURIComponent(scene_id)}/tours`, page_url);
     const response = await fetch(address, { headers });
-    return response.ok ? ((await response.json()) as object) : {};
+    return response.ok ? { ...nothing, ...((await response.json()) as object) } : nothing;
   } catch (error) {
     console.warn('the tours of the scene could not be read', error);
-    return {};
+    return nothing;
   }
 }

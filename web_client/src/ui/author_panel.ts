@@ -2,6 +2,7 @@ import type { SceneSetup } from '../camera/camera_controller';
 import type { Vec3 } from '../camera/vector';
 import type { Eye } from '../present/warp';
 import { TourDraft } from '../tour/draft';
+import { save_sidecar } from '../tour/save';
 import type { Tour } from '../tour/tour';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
@@ -16,16 +17,25 @@ export interface AuthorTools {
   /** The tours have changed. */
   changed(tours: readonly Tour[]): void;
   go_to(stop_index: number): void;
+  /** Plays what there is so far. */
+  preview(): void;
   /** From now on visits of this page begin there. */
   start_at(eye: Eye): void;
 }
 
-/** Where a tour is made: `?author` in the address. Nothing leaves the page but the saved file. */
+/** Where a tour is made: `?author` in the address. */
 export class AuthorPanel {
   private readonly draft_ = new TourDraft();
   private readonly list_ = by_id('author-stops', HTMLOListElement);
   private readonly title_ = by_id('author-title', HTMLInputElement);
+  private readonly autoplay_ = by_id('author-autoplay', HTMLInputElement);
+  private readonly preview_ = by_id('author-preview', HTMLButtonElement);
+  private readonly save_ = by_id('author-save', HTMLButtonElement);
   private readonly done_ = by_id('author-done', HTMLOutputElement);
+  private token_: string | undefined;
+  private open_ = 0; // the stop of which all is shown
+  private changes_ = 0;
+  private saved_changes_ = 0;
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
@@ -35,18 +45,33 @@ export class AuthorPanel {
     click('author-start', () => {
       this.draft_.start = tools_.eye();
       tools_.start_at(tools_.eye());
+      this.changes_ += 1;
       this.done_.textContent = text.author.start_set;
     });
-    click('author-save', () => this.save());
-    this.title_.addEventListener('change', () => {
+    click('author-preview', () => tools_.preview());
+    click('author-save', () => void this.save());
+    click('author-download', () => this.download());
+    this.title_.addEventListener('input', () => {
       this.draft_.title = this.title_.value;
-      tools_.changed(this.draft_.tours);
+      this.told();
+    });
+    this.autoplay_.addEventListener('change', () => {
+      this.draft_.starts_itself = this.autoplay_.checked;
+      this.told();
+    });
+    window.addEventListener('beforeunload', (event) => {
+      if (this.changes_ > this.saved_changes_) event.preventDefault();
     });
   }
 
-  load(tours: readonly Tour[]): void {
+  /** `token`: the server takes the sidecar from who has it; undefined: from nobody here. */
+  load(tours: readonly Tour[], token: string | undefined): void {
+    this.token_ = token;
+    this.save_.hidden = token === undefined;
     this.draft_.load(tours);
     this.title_.value = this.draft_.title;
+    this.autoplay_.checked = this.draft_.starts_itself;
+    this.changes_ = this.saved_changes_ = 0;
     this.show();
   }
 
@@ -55,27 +80,61 @@ export class AuthorPanel {
     const marker = await this.tools_.place_ahead();
     const title = text.tour.stop_numbered(this.draft_.stops.length + 1);
     this.draft_.add({ title, caption: '', eye, marker, stay_s: undefined });
+    this.open_ = this.draft_.stops.length - 1;
     this.edited();
     this.done_.textContent = marker ? '' : text.author.no_marker;
+    this.list_.lastElementChild?.scrollIntoView({ block: 'nearest' });
     this.list_.lastElementChild?.querySelector('input')?.select();
   }
 
-  private save(): void {
+  private sidecar(): string | undefined {
     const scene = this.tools_.scene();
-    if (!scene) return;
+    return scene && `${JSON.stringify(this.draft_.sidecar(scene), undefined, 2)}\n`;
+  }
+
+  private async save(): Promise<void> {
+    const sidecar = this.sidecar();
+    if (sidecar === undefined || this.token_ === undefined) return;
+    const { changes_: changes } = this;
+    this.save_.disabled = true;
+    this.done_.textContent = text.author.saving;
+    const refused = await save_sidecar(
+      location.href,
+      this.token_,
+      this.tools_.scene_id(),
+      sidecar,
+      text.author.unreachable,
+    );
+    this.save_.disabled = false;
+    if (refused === undefined) this.saved_changes_ = changes;
+    this.done_.textContent = refused === undefined ? text.author.saved : text.author.not_saved(refused);
+  }
+
+  private download(): void {
+    const sidecar = this.sidecar();
+    if (sidecar === undefined) return;
     const name = `${this.tools_.scene_id()}.json`;
-    const sidecar = JSON.stringify(this.draft_.sidecar(scene), undefined, 2);
-    save_file(new Blob([`${sidecar}\n`], { type: 'application/json' }), name);
-    this.done_.textContent = text.author.saved(name);
+    save_file(new Blob([sidecar], { type: 'application/json' }), name);
+    this.saved_changes_ = this.changes_;
+    this.done_.textContent =
+      this.token_ === undefined ? text.author.downloaded(name) : text.author.downloaded_too(name);
   }
 
   private edited(): void {
-    this.tools_.changed(this.draft_.tours);
+    this.told();
     this.show();
+  }
+
+  private told(): void {
+    this.changes_ += 1;
+    this.done_.textContent = '';
+    this.tools_.changed(this.draft_.tours);
   }
 
   private show(): void {
     const count = this.draft_.stops.length;
+    by_id('author-hint', HTMLElement).hidden = count > 0;
+    this.preview_.disabled = count === 0;
     this.list_.replaceChildren(
       ...this.draft_.stops.map((stop, i) => {
         const item = document.createElement('li');
@@ -83,32 +142,36 @@ export class AuthorPanel {
         title.value = stop.title;
         title.maxLength = 200;
         title.setAttribute('aria-label', text.author.title(i + 1));
-        title.addEventListener('change', () => this.change(i, { title: title.value }));
+        title.addEventListener('input', () => this.change(i, { title: title.value }));
         const caption = document.createElement('textarea');
         caption.value = stop.caption;
         caption.rows = 2;
         caption.maxLength = 4000;
         caption.placeholder = text.author.caption_here;
         caption.setAttribute('aria-label', text.author.caption(i + 1));
-        caption.addEventListener('change', () => this.change(i, { caption: caption.value }));
+        caption.addEventListener('input', () => this.change(i, { caption: caption.value }));
         const buttons = document.createElement('div');
-        const button = (name: string, action: () => void, enabled = true): void => {
+        const button = (name: string, action: () => void, sign = name, enabled = true): void => {
           const made = document.createElement('button');
           made.type = 'button';
-          made.textContent = name;
+          made.textContent = sign;
+          if (sign !== name) made.ariaLabel = made.title = name;
           made.disabled = !enabled;
           made.addEventListener('click', action);
           buttons.append(made);
         };
         button(text.author.show, () => this.tools_.go_to(i));
         button(text.author.view_here, () => void this.view_here(i));
-        button(text.author.up, () => this.move(i, -1), i > 0);
-        button(text.author.down, () => this.move(i, 1), i < count - 1);
-        button(text.author.remove, () => {
+        button(text.author.up(i + 1), () => this.move(i, -1), '↑', i > 0);
+        button(text.author.down(i + 1), () => this.move(i, 1), '↓', i < count - 1);
+        const remove = (): void => {
           this.draft_.remove(i);
           this.edited();
-        });
+        };
+        button(text.author.remove(i + 1), remove, '×');
         item.append(title, caption, buttons);
+        item.classList.toggle('open', i === this.open_);
+        item.addEventListener('focusin', () => this.open(i));
         return item;
       }),
     );
@@ -116,7 +179,7 @@ export class AuthorPanel {
 
   private change(index: number, change: { title?: string; caption?: string }): void {
     this.draft_.change(index, change);
-    this.tools_.changed(this.draft_.tours); // the fields stay as they are, with their focus
+    this.told(); // the fields stay as they are, with their focus
   }
 
   private async view_here(index: number): Promise<void> {
@@ -125,8 +188,14 @@ export class AuthorPanel {
     this.edited();
   }
 
+  private open(index: number): void {
+    this.open_ = index;
+    [...this.list_.children].forEach((item, i) => item.classList.toggle('open', i === index));
+  }
+
   private move(index: number, by: number): void {
     this.draft_.move(index, by);
+    this.open_ = index + by;
     this.edited();
   }
 }

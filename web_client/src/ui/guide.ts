@@ -27,6 +27,10 @@ export interface GuideParts {
   /** The camera was put somewhere else. */
   camera_moved(): void;
   mode_changed(): void;
+  /** Opens the panel in which tours are made. */
+  show_author(): void;
+  /** Closes panels where they would hide the picture. */
+  make_room(): void;
   notice(message: string): void;
 }
 
@@ -103,6 +107,12 @@ export class Guide {
         this.player.choose(0);
         this.player.go_to(stop_index);
       },
+      preview: () => {
+        this.parts_.make_room();
+        this.player.choose(0);
+        this.player.leave();
+        this.player.play();
+      },
       start_at: (eye) => camera.start_at(eye),
     });
   }
@@ -117,7 +127,7 @@ export class Guide {
     const load = ++this.loads_;
     const shared = read_shared(location.href);
     if (shared.eye) this.apply_shared();
-    const document = await fetch_tours(location.href, token, scene_id);
+    const { document, may_save } = await fetch_tours(location.href, token, scene_id);
     if (load !== this.loads_) return; // another scene was entered meanwhile
     const { camera, view } = this.parts_;
     const aspect = view.clientWidth / Math.max(1, view.clientHeight);
@@ -133,12 +143,14 @@ export class Guide {
       if (!shared.eye) this.put(start);
     }
     this.tour_view.show_tours(tours);
-    this.author_?.load(tours);
-    // A link to a view or a stop is not led away from there.
-    const is_sent_somewhere = shared.eye !== undefined || shared.stop_index !== undefined;
+    this.author_?.load(tours, may_save ? token : undefined);
+    // A link to a view or a stop is not led away from there, and neither is an author.
+    const stays =
+      shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
     this.player.load(
-      is_sent_somewhere ? tours.map((tour) => ({ ...tour, starts_itself: false })) : tours,
+      stays ? tours.map((tour) => ({ ...tour, starts_itself: false })) : tours,
     );
+    if (load === 1 && this.author_) this.parts_.show_author();
     if (shared.tour_index !== undefined) this.player.choose(shared.tour_index);
     if (shared.stop_index !== undefined && !shared.eye) this.player.go_to(shared.stop_index, true);
     this.embed_.say({

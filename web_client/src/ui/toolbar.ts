@@ -55,6 +55,15 @@ export class Toolbar {
     if (!active) this.close_all();
   }
 
+  open(panel: Panel): void {
+    if (!this.is_open(panel)) this.toggle(panel);
+  }
+
+  /** On a small screen, for the picture. */
+  make_room(): void {
+    if (this.small_screen_.matches) this.close_all();
+  }
+
   show_mode(mode: CameraMode): void {
     by_id('mode-label', HTMLElement).textContent = text.modes[mode];
     by_id('button-mode', HTMLButtonElement)

@@ -239,6 +239,8 @@ export class Viewer {
       place_ahead: () => this.place_at(0.5, 0.5),
       camera_moved: () => this.camera_moved(),
       mode_changed: () => this.toolbar_.show_mode(this.camera_.mode),
+      show_author: () => this.toolbar_.open('author'),
+      make_room: () => this.toolbar_.make_room(),
       notice: (message) => this.notice_.show(message),
     });
   }

@@ -1,0 +1,152 @@
+// Making a tour in the browser, and saving it to the real server.
+import { mkdirSync, readFileSync, rmSync, unlinkSync, writeFileSync } from 'node:fs';
+import path from 'node:path';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
+import type { Pose } from '#client/camera/camera_controller';
+import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { distance, pose_of, settle } from './support/camera';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  stop_servers,
+  type RunningServer,
+} from './support/programs';
+import { scratch_folder } from './support/scenes';
+
+const { folder, remove } = scratch_folder();
+const scene = path.join(folder, 'mine.ply');
+const sidecar = path.join(folder, 'mine.json');
+const key_file = path.join(folder, 'key');
+const desktop = { viewport: { width: 1280, height: 720 } };
+
+let browser: Browser;
+let workshop: RunningServer;
+const open_pages: WatchedPage[] = [];
+
+beforeAll(async () => {
+  catgs_render('synth', 'city', scene, '--gaussians', '100000');
+  unlinkSync(sidecar); // that of a scene that was made
+  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
+  browser = await launch_browser();
+  workshop = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
+});
+
+afterEach(async () => {
+  for (const { page } of open_pages.splice(0)) await page.context().close();
+});
+
+afterAll(async () => {
+  await browser.close();
+  await stop_servers();
+  remove();
+});
+
+/** By a link of the role. */
+async function open_as(
+  role: string,
+  query = '',
+  options: BrowserContextOptions = desktop,
+): Promise<WatchedPage> {
+  const watched = await new_page(browser, options);
+  open_pages.push(watched);
+  await watched.page.goto(`${workshop.url}${query}#token=${access_token(role, key_file)}`);
+  await settle(watched.page);
+  return watched;
+}
+
+describe('an author', () => {
+  /** Two stops, the second one made first in the order; visits begin at it. */
+  async function make_tour(page: Page): Promise<Pose> {
+    await page.getByRole('region', { name: 'Make a tour' }).waitFor();
+    const start = await pose_of(page);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByLabel('Title of stop 1').fill('Where I began');
+    await page.getByLabel('Caption of stop 1').fill('It was here.');
+    await page.mouse.move(500, 300);
+    await page.mouse.wheel(0, -300);
+    await settle(page);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByLabel('Title of stop 2').fill('Nearer');
+    await page.getByLabel('Title of the tour', { exact: true }).fill('My tour');
+    await page.getByRole('button', { name: 'Move stop 2 up' }).click();
+    await page.getByRole('button', { name: 'Begin visits here' }).click();
+    await page.getByLabel('Title of stop 2').focus();
+    await page.getByRole('button', { name: 'Show' }).last().click();
+    await settle(page);
+    expect(distance(start, await pose_of(page))).toBeLessThan(1e-3);
+    return start;
+  }
+
+  it('makes a tour, saves it to the server, and visitors who reload follow it', async () => {
+    const visitor = await open_as('viewer');
+    expect(await visitor.page.locator('#tour').isHidden()).toBe(true);
+    const { page, errors } = await open_as('author', '?author');
+    const start = await make_tour(page);
+    await page.getByRole('button', { name: 'Preview' }).click();
+    await page.getByRole('button', { name: 'Pause the tour' }).waitFor();
+    await page.getByText('1 of 2').waitFor();
+    await page.getByRole('button', { name: 'Pause the tour' }).click();
+    await keep_screenshot(page, 'author');
+    await page.getByRole('button', { name: 'Save to the server' }).click();
+    await page.getByText('Saved. Visitors get it').waitFor();
+    expect(errors).toEqual([]);
+
+    await visitor.page.reload();
+    await settle(visitor.page);
+    await visitor.page.getByText('My tour').first().waitFor();
+    expect(distance(start, await pose_of(visitor.page))).toBeGreaterThan(0.1);
+    await visitor.page.getByRole('button', { name: 'Play the tour' }).click();
+    await visitor.page.getByRole('heading', { name: 'Nearer' }).waitFor();
+    await visitor.page.getByText('It was here.').waitFor();
+    await settle(visitor.page);
+    expect(distance(start, await pose_of(visitor.page))).toBeLessThan(1e-3);
+    expect(visitor.errors).toEqual([]);
+
+    // What the server refuses is said in its words, and the work is not lost.
+    unlinkSync(sidecar);
+    mkdirSync(path.join(sidecar, 'inside'), { recursive: true });
+    await page.getByLabel('Title of stop 2').focus();
+    await page.getByLabel('Caption of stop 2').fill('Changed.');
+    await page.getByRole('button', { name: 'Save to the server' }).click();
+    await page.getByText(/Not saved: mine.json: .*download the file/).waitFor();
+    rmSync(sidecar, { recursive: true });
+    await page.getByRole('button', { name: 'Save to the server' }).click();
+    await page.getByText('Saved. Visitors get it').waitFor();
+    expect(readFileSync(sidecar, 'utf8')).toContain('Changed.');
+  });
+
+  it('whose link is a plain one saves a file, and is told how it gets to visitors', async () => {
+    const { page } = await open_as('viewer', '?author');
+    await page.getByRole('region', { name: 'Make a tour' }).waitFor();
+    expect(await page.getByRole('button', { name: 'Save to the server' }).isHidden()).toBe(true);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    const download = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Download the file' }).click();
+    const file = await download;
+    expect(file.suggestedFilename()).toBe('mine.json');
+    const { tours } = JSON.parse(readFileSync(await file.path(), 'utf8')) as {
+      tours: unknown;
+    };
+    expect(tours).toMatchObject([{ stops: expect.any(Array) as unknown }]);
+    await page.getByText('link of role author').waitFor();
+  });
+
+  it.each([
+    ['phone', { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true }],
+    ['dark', { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' }],
+  ] as const)('has room to see and to write: %s', async (name, options) => {
+    const { page } = await open_as('author', '?author', options);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await settle(page);
+    await keep_screenshot(page, `author-${name}`);
+    const { top, bottom } = await page.evaluate(() =>
+      document.getElementById('author-panel')!.getBoundingClientRect().toJSON() as DOMRect,
+    );
+    const { height } = options.viewport;
+    expect(bottom).toBeLessThanOrEqual(height);
+    if (name === 'phone') expect(top).toBeGreaterThan(0.4 * height);
+  });
+});

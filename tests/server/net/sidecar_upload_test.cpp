@@ -1,0 +1,126 @@
+// Integration: authors save tours. Real sockets on loopback, a whole server in this process.
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/scene/save_scene.h"
+#include "render_core/scene/synth.h"
+#include "server/access.h"
+#include "server/net/http.h"
+#include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::string_view sidecar =
+    R"({"up": "-y", "start_pose": {"position": [1, 2, 3], "look_at": [1, 2, 9]},
+        "tours": [{"title": "Hall", "stops": [{"position": [1, 2, 3], "look_at": [0, 0, 0]}]}]})";
+
+class SidecarUpload : public testing::Test {
+ protected:
+  SidecarUpload()
+      : scene(folder / "hall.ply"), key_file(folder.write("key", std::string(32, 'k'))) {
+    save_scene(synthesize(SynthKind::city, 2000, 1).cloud, scene);
+    server.emplace([&](ServerConfig& config) {
+      config.scenes = {scene.string(), "synth:garden:2000"};
+      config.token_key_file = key_file.string();
+      config.allow_origins = {"https://tours.example"};
+    });
+  }
+
+  [[nodiscard]] std::string token(const std::string& role, const std::string& of = "") const {
+    return make_link_token({of, role, 1'000'000'000'000}, read_key_file("", key_file));
+  }
+  HttpReply put(const std::string& by, std::map<std::string, std::string> headers = {},
+                std::string_view body = sidecar, const std::string& id = "hall") {
+    if (!by.empty()) headers["authorization"] = "Bearer " + by;
+    return http_put(server->port(), "/api/scenes/" + id + "/sidecar", std::string(body), headers);
+  }
+  nlohmann::json tours_as(const std::string& by) {
+    return nlohmann::json::parse(
+        http_get(server->port(), "/api/scenes/hall/tours", {{"authorization", "Bearer " + by}})
+            .body);
+  }
+
+  const TemporaryFolder folder;
+  const std::filesystem::path scene;
+  const std::filesystem::path key_file;
+  std::optional<RunningServer> server;
+};
+
+TEST_F(SidecarUpload, OfAnAuthorIsInForceForWhoComesNext) {
+  WireClient before(server->port());
+  const auto old_start =
+      before.greet(64, 64, v1::CODEC_H264, token("viewer")).scene().start_pose().position();
+  const HttpReply reply = put(token("author"));
+  EXPECT_EQ(reply.status, 200) << reply.body;
+
+  std::ifstream written(folder / "hall.json");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(written), {}), sidecar);
+  EXPECT_EQ(tours_as(token("viewer"))["document"]["tours"][0]["title"], "Hall");
+  WireClient visitor(server->port());
+  const auto start =
+      visitor.greet(64, 64, v1::CODEC_H264, token("viewer")).scene().start_pose().position();
+  EXPECT_FLOAT_EQ(start.z(), 3.0f);
+  EXPECT_NE(old_start.z(), start.z());
+}
+
+TEST_F(SidecarUpload, IsForAuthorsAlone) {
+  for (const char* role : {"viewer", "solo", "spectator"}) {
+    const HttpReply refused = put(token(role));
+    EXPECT_EQ(refused.status, 403) << role;
+    EXPECT_THAT(refused.body, HasSubstr("role author")) << role;
+    EXPECT_EQ(tours_as(token(role))["may_save"], false) << role;
+  }
+  EXPECT_EQ(put("").status, 401);
+  EXPECT_EQ(put("guess").status, 401);
+  EXPECT_EQ(put(token("author", "garden")).status, 401) << "a link for another scene";
+  EXPECT_EQ(tours_as(token("author"))["may_save"], true);
+  EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
+}
+
+TEST_F(SidecarUpload, ComesFromAPageOfThisServer) {
+  const std::string author = token("author");
+  EXPECT_EQ(put(author, {{"origin", "https://evil.example"}}).status, 403);
+  EXPECT_EQ(put(author, {{"host", "evil.example"}, {"origin", "http://evil.example"}}).status, 403)
+      << "a name that was made to resolve to this address";
+  EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
+  EXPECT_EQ(put(author, {{"origin", "https://tours.example"}}).status, 200);
+  const std::string own = "http://127.0.0.1:" + std::to_string(server->port());
+  EXPECT_EQ(put(author, {{"origin", own}}).status, 200);
+}
+
+TEST_F(SidecarUpload, IsCheckedBeforeAnythingIsWritten) {
+  const std::string author = token("author");
+  const HttpReply wrong = put(author, {}, R"({"tours": [{"stops": [{"position": [0, 0]}]}]})");
+  EXPECT_EQ(wrong.status, 400);
+  EXPECT_THAT(wrong.body, HasSubstr("tours[0].stops[0].position"));
+  EXPECT_EQ(put(author, {}, "").status, 411);
+  EXPECT_EQ(put(author, {}, std::string(max_upload_bytes + 1, ' ')).status, 413);
+  EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
+  EXPECT_EQ(put(author, {}, sidecar, "absent").status, 404);
+  EXPECT_EQ(http_put(server->port(), "/index.html", "x", {}).status, 405);
+  EXPECT_EQ(http_get(server->port(), "/healthz").status, 200) << "and goes on serving";
+}
+
+TEST_F(SidecarUpload, SaysWhereNothingCanBeWritten) {
+  const HttpReply made_up = put(token("author"), {}, sidecar, "garden");
+  EXPECT_EQ(made_up.status, 409);
+  EXPECT_THAT(made_up.body, HasSubstr("no file"));
+  // Where the sidecar should be is a folder: as good as a folder that is read-only.
+  std::filesystem::create_directories(folder / "hall.json" / "inside");
+  const HttpReply taken = put(token("author"));
+  EXPECT_EQ(taken.status, 409);
+  EXPECT_THAT(taken.body, HasSubstr("download the file"));
+}
+
+}  // namespace
+}  // namespace catgs::test
