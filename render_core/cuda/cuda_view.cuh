@@ -52,6 +52,7 @@ class CudaView final : public View {
   int device_;
   ViewSettings settings_;
   Stream stream_;
+  Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame, to an encoder
   StageTimes times_;
   FrameShape shape_;
   FrameRoom room_;

@@ -21,7 +21,10 @@ class Stream {
 
 class Event {
  public:
-  Event() { check(cudaEventCreate(&event_), "event"); }
+  /// With cudaEventBlockingSync, who waits for it sleeps.
+  explicit Event(unsigned flags = cudaEventDefault) {
+    check(cudaEventCreateWithFlags(&event_, flags), "event");
+  }
   ~Event() { (void)cudaEventDestroy(event_); }
   Event(const Event&) = delete;
   Event& operator=(const Event&) = delete;

@@ -31,8 +31,7 @@ struct EncoderSettings {
   int fps = 60;           // 1…240, nominal: sizes the one-frame VBV, says the level
   int bitrate_kbps = 8000;  // 100…200000; h264: cap; mjpeg picks its quality to stay near it
   int threads = 1;          // 1…64, encoder-internal; h264: as many slices
-  // "ultrafast" to "medium". Superfast takes 1.6 x the time of ultrafast on a rendered city (7.5
-  // against 4.8 ms at 1280x720 on one core) and looks 4.4 dB better at 2 Mbit/s, 60 fps.
+  // "ultrafast", "ultrafast-subpel", "superfast" … "medium"; see effort_presets for what they cost.
   std::string x264_preset = "superfast";
 
   bool operator==(const EncoderSettings&) const = default;

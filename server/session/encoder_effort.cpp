@@ -14,13 +14,13 @@ constexpr double busy_share = 0.9;
 constexpr double calm_share = 0.5;
 constexpr auto busy_for = 1s;
 constexpr double encoding_part = 0.4;  // of what is busy
-constexpr double too_long = 0.8;       // of the time between frames
+constexpr double too_long = 0.7;       // of the time between frames
+constexpr double roomy_share = 0.75;
 constexpr double comfortable = 0.5;
 constexpr auto settle = 1s;  // until a change shows in what is measured
 constexpr auto proof = 30s;
 constexpr auto most_patience = 120s;
 
-constexpr int usual_preset = EncoderEffort{}.preset;
 constexpr int most_threads = 8;
 constexpr int least_rows_per_slice = 8;  // of macroblocks; slices do not predict from each other
 
@@ -44,30 +44,50 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings) {
 
 int EffortControl::threads_for(int sessions, glm::ivec2 size_px) const {
   const int by_rows = size_px.y / 16 / least_rows_per_slice;
-  const int threads = std::clamp(std::min(cpus_ / std::max(1, sessions), by_rows), 1, most_threads);
+  const int of_each = (cpus_ + sessions - 1) / std::max(1, sessions);
+  const int threads = std::clamp(std::min(of_each, by_rows), 1, most_threads);
   return static_cast<int>(std::bit_floor(static_cast<unsigned>(threads)));
 }
 
 EncoderEffort EffortControl::initial(int sessions, glm::ivec2 size_px) const {
-  return {std::clamp(usual_preset, presets_.lowest, presets_.highest),
-          threads_for(sessions, size_px)};
+  const double cost = cpus_per_pixel_ * size_px.x * size_px.y * (sessions - measured_) / cpus_;
+  int preset = presets_.highest;
+  while (preset > presets_.lowest && busy_ + cost * cost_ratio(0, preset) > roomy_share) --preset;
+  return {preset, threads_for(sessions, size_px)};
 }
 
-std::optional<EffortControl::Change> EffortControl::update(double busy, int admitted,
-                                                           std::span<const Session> sessions,
-                                                           TimePoint now) {
+void EffortControl::note_costs(double busy, std::span<const Session> sessions) {
+  busy_ = busy;
+  measured_ = static_cast<int>(sessions.size());
+  double cpus = 0, pixels = 0;
+  for (const Session& session : sessions) {
+    cpus += session.cpus / cost_ratio(0, session.effort.preset);
+    pixels += static_cast<double>(session.size_px.x) * session.size_px.y;
+  }
+  cpus_per_pixel_ = pixels > 0 ? cpus / pixels : 0;
+}
+
+std::vector<EffortControl::Change> EffortControl::update(double busy, int admitted,
+                                                         std::span<const Session> sessions,
+                                                         TimePoint now) {
+  note_costs(busy, sessions);
   busy_since_ = since(busy_since_, busy >= busy_share, now);
   calm_since_ = since(calm_since_, busy <= calm_share, now);
-  if (now - changed_ < settle) return std::nullopt;
-  auto change = with_other_threads(admitted, sessions);
-  if (!change && (change = faster(busy, sessions, now)))
+  if (now - changed_ < settle) return {};
+  std::vector<Change> changes;
+  if (const auto recut = with_other_threads(admitted, sessions)) {
+    changes = {*recut};
+  } else if (changes = faster(busy, sessions, now); !changes.empty()) {
     patience_ = now - slowed_ < proof ? std::min<std::chrono::seconds>(2 * patience_, most_patience)
                                       : least_patience;
-  if (!change && calm_since_ != TimePoint{} && now - calm_since_ >= patience_ &&
-      (change = slower(busy, sessions)))
-    slowed_ = now;
-  if (change) changed_ = now;
-  return change;
+  } else if (calm_since_ != TimePoint{} && now - calm_since_ >= patience_) {
+    if (const auto better = slower(busy, sessions)) {
+      changes = {*better};
+      slowed_ = now;
+    }
+  }
+  if (!changes.empty()) changed_ = now;
+  return changes;
 }
 
 std::optional<EffortControl::Change> EffortControl::with_other_threads(
@@ -80,24 +100,25 @@ std::optional<EffortControl::Change> EffortControl::with_other_threads(
   return std::nullopt;
 }
 
-std::optional<EffortControl::Change> EffortControl::faster(double busy,
-                                                           std::span<const Session> sessions,
-                                                           TimePoint now) const {
+std::vector<EffortControl::Change> EffortControl::faster(double busy,
+                                                         std::span<const Session> sessions,
+                                                         TimePoint now) const {
   const double encoding =
       std::transform_reduce(sessions.begin(), sessions.end(), 0.0, std::plus(),
                             [](const Session& session) { return session.cpus; });
   const bool all_busy = busy_since_ != TimePoint{} && now - busy_since_ >= busy_for;
   const bool by_encoding = encoding >= encoding_part * busy * cpus_;
-  std::optional<std::size_t> costliest;
+  std::vector<Change> changes;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     const Session& session = sessions[i];
     if (session.effort.preset <= presets_.lowest) continue;
     if (!(all_busy && by_encoding) && session.share_of_interval < too_long) continue;
-    if (!costliest || session.cpus > sessions[*costliest].cpus) costliest = i;
+    changes.push_back({i, {session.effort.preset - 1, session.effort.threads}});
   }
-  if (!costliest) return std::nullopt;
-  const EncoderEffort& effort = sessions[*costliest].effort;
-  return Change{*costliest, {effort.preset - 1, effort.threads}};
+  std::ranges::sort(changes, std::ranges::greater(),
+                    [&](const Change& change) { return sessions[change.session].cpus; });
+  changes.resize(std::min(changes.size(), (sessions.size() + 3) / 4));
+  return changes;
 }
 
 std::optional<EffortControl::Change> EffortControl::slower(

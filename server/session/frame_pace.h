@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "server/pipeline/frame_ticket.h"
 
@@ -12,8 +14,22 @@ namespace catgs {
 /// other. Pure; not thread-safe.
 class FramePace {
  public:
-  /// The next frame starts no earlier.
+  /// The next frame starts no earlier, whatever it shows.
   [[nodiscard]] TimePoint next_start() const { return next_start_; }
+  /// When a frame of the newest pose may start: as the pose arrives that comes nearest to
+  /// next_start(). A frame that started by the clock alone would show a pose that has waited for up
+  /// to the time between two. Poses that come later do not put it off.
+  [[nodiscard]] TimePoint next_start_of_pose() const {
+    return due_since_.value_or(next_start_ + half_pose_interval_);
+  }
+  /// `interval` is that of the nominal rate.
+  void pose_arrived(std::chrono::microseconds interval, TimePoint now) {
+    const Duration since = now - std::exchange(newest_pose_, now);
+    // A longer gap is a pause of the motion; of slower poses each one starts a frame.
+    const Duration half_frame = interval / 2;
+    half_pose_interval_ += (std::min(since / 2, half_frame) - half_pose_interval_) / 8;
+    if (!due_since_ && now >= next_start_ - half_pose_interval_) due_since_ = now;
+  }
   /// An acknowledgement gave credit that was missing.
   void credit_returned(TimePoint now) { credit_since_ = now; }
 
@@ -22,6 +38,7 @@ class FramePace {
   void frame_starts(std::chrono::microseconds interval, TimePoint now) {
     measure(interval, now);
     next_start_ = std::max(next_start_, now - interval) + interval;
+    due_since_.reset();
   }
 
   /// Between starts of frames, the mean over about eight of them; 0: not known.
@@ -35,6 +52,7 @@ class FramePace {
   }
 
  private:
+  using Duration = TimePoint::duration;
   using Seconds = std::chrono::duration<double>;
 
   void measure(std::chrono::microseconds nominal, TimePoint now) {
@@ -51,6 +69,9 @@ class FramePace {
 
   TimePoint next_start_{};
   TimePoint last_start_{};
+  TimePoint newest_pose_{};
+  std::optional<TimePoint> due_since_;
+  Duration half_pose_interval_{};  // the mean over about eight of them
   TimePoint credit_since_{};
   Seconds mean_interval_{0.05};
   bool measured_ = false;

@@ -47,14 +47,15 @@ void SessionRegistry::control_effort(TimePoint now) {
                         usage.encode_seconds() / interval.count(), session.config().size_px});
     sessions.push_back(&session);
   }
-  const auto change = effort_.update(busy_, static_cast<int>(admitted_), encoding, now);
-  if (!change) return;
-  metrics_.effort_changes.Increment();
-  const LogSession about(sessions[change->session]->id());
-  spdlog::debug("libx264 goes on with {}, {} threads: processors {:.0f} % busy",
-                effort_presets[static_cast<std::size_t>(change->effort.preset)].name,
-                change->effort.threads, 100.0 * busy_);
-  sessions[change->session]->use_effort(change->effort);
+  for (const auto& [index, effort] :
+       effort_.update(busy_, static_cast<int>(admitted_), encoding, now)) {
+    metrics_.effort_changes.Increment();
+    const LogSession about(sessions[index]->id());
+    spdlog::debug("libx264 goes on with {}, {} threads: processors {:.0f} % busy",
+                  effort_presets[static_cast<std::size_t>(effort.preset)].name, effort.threads,
+                  100.0 * busy_);
+    sessions[index]->use_effort(effort);
+  }
 }
 
 void SessionRegistry::publish() {

@@ -145,6 +145,7 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   // What is drawn now is seen as much later as pictures have come after their poses lately.
   if (!track_.add(sample, flow_.pose_to_photon())) return;
   pose_received_ = now;
+  pace_.pose_arrived(flow_.frame_interval(), now);
   if (before && same_view(*before, sample, admission_.scene->facts.near_z)) return;
   note_activity(now);
   last_motion_ = now;

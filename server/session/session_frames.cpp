@@ -20,8 +20,13 @@ bool Session::view_has_changed() const {
 
 std::optional<FrameCandidate> Session::next_frame() const {
   if (!streams() || rendering_ || !track_.newest() || !flow_.may_send()) return std::nullopt;
-  FrameCandidate frame{pace_.next_start(), {}, cost_.next(), cost_.key_is_next(), device_};
-  if (!view_has_changed()) {
+  const bool moved = view_has_changed();
+  FrameCandidate frame{moved ? pace_.next_start_of_pose() : pace_.next_start(),
+                       {},
+                       cost_.next(),
+                       cost_.key_is_next(),
+                       device_};
+  if (!moved) {
     // Between two poses of a moving camera a refinement would only be in the next one's way.
     const bool refines = refinements_left_ > 0 || shown_is_passing_;
     const TimePoint still = last_motion_ + policy_.still_after;

@@ -10,7 +10,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr glm::ivec2 full_hd(1920, 1080);
-constexpr int ultrafast = 0, superfast = 1;
+constexpr int ultrafast = 0, superfast = 2;
 
 /// Sessions whose encoders cost what their presets say, on a machine with other work too.
 class EffortControlTest : public testing::Test {
@@ -39,10 +39,11 @@ class EffortControlTest : public testing::Test {
         sessions[i].cpus = cpus(i);
         sessions[i].share_of_interval = cpus(i) / sessions[i].effort.threads;
       }
-      const auto change = control.update(busy(), static_cast<int>(sessions.size()), sessions, now);
-      if (!change) continue;
-      sessions[change->session].effort = change->effort;
-      ++changes;
+      for (const auto& [session, effort] :
+           control.update(busy(), static_cast<int>(sessions.size()), sessions, now)) {
+        sessions[session].effort = effort;
+        ++changes;
+      }
     }
     return changes;
   }
@@ -64,7 +65,8 @@ TEST_F(EffortControlTest, CutsPicturesWhereSessionsAreFewerThanProcessors) {
   EXPECT_EQ(control.initial(2, full_hd).threads, 8);
   EXPECT_EQ(control.initial(3, full_hd).threads, 4);
   EXPECT_EQ(control.initial(8, full_hd).threads, 2);
-  EXPECT_EQ(control.initial(9, full_hd).threads, 1);
+  EXPECT_EQ(control.initial(9, full_hd).threads, 2) << "rounded up";
+  EXPECT_EQ(control.initial(16, full_hd).threads, 1);
   EXPECT_EQ(control.initial(1, {640, 360}).threads, 2) << "slices do not predict from each other";
   EXPECT_EQ(control.initial(1, {160, 90}).threads, 1);
   EXPECT_EQ(control.initial(0, full_hd).threads, 8);
@@ -85,12 +87,11 @@ TEST_F(EffortControlTest, ThreadsFollowTheNumberOfSessionsOneAtATime) {
 }
 
 TEST_F(EffortControlTest, EncodersThatKeepAllBusyGoFasterUntilTheyFit) {
-  add(48, 0.25);  // 21.6 processors at superfast, 12 at ultrafast
+  add(48, 0.25);  // 22.8 processors at superfast, 12 at ultrafast
   EXPECT_EQ(run(1s), 0) << "a second of it may be chance";
   run(60s);
   EXPECT_LE(busy(), 0.9);
-  EXPECT_GT(count(ultrafast), 10);
-  EXPECT_GT(count(superfast), 5) << "no more than needed";
+  EXPECT_GT(busy(), 0.75) << "no more than needed";
   EXPECT_EQ(run(10min), 0) << "it does not flap";
 }
 
@@ -106,8 +107,10 @@ TEST_F(EffortControlTest, HeadroomGivesQualityBack) {
   run(60s);
   sessions.resize(12);  // the others leave
   base_cpus.resize(12);
-  ASSERT_GT(count(ultrafast), 0);
-  EXPECT_EQ(run(5s), 0) << "room has to last";
+  ASSERT_LT(count(superfast), 12);
+  const int before = count(superfast);
+  run(4s);
+  EXPECT_EQ(count(superfast), before) << "room has to last";
   run(60s);
   EXPECT_EQ(count(superfast), 12);
   EXPECT_LE(busy(), 0.5);
@@ -115,21 +118,21 @@ TEST_F(EffortControlTest, HeadroomGivesQualityBack) {
 }
 
 TEST_F(EffortControlTest, NoSlowerThanHalfOfTheTimeBetweenFrames) {
-  add(9, 0.3);  // 0.54 of the interval at superfast
+  add(16, 0.4);  // 0.56 of the interval with the next one
   for (auto& session : sessions) session.effort.preset = ultrafast;
   EXPECT_EQ(run(60s), 0);
 }
 
 TEST_F(EffortControlTest, AnEncoderThatCannotKeepUpGoesFasterThoughOthersRest) {
   add(9, 0.2);
-  base_cpus[3] = 0.9;
+  base_cpus[3] = 1.2;  // in two slices: 0.6 of the interval at ultrafast, 0.84 with the next one
   run(5s);
   EXPECT_EQ(sessions[3].effort.preset, ultrafast);
   EXPECT_EQ(count(superfast), 8);
 }
 
 TEST_F(EffortControlTest, WhatDidNotHoldIsTriedLessAndLess) {
-  add(30, 0.2);
+  add(30, 0.17);
   const auto tries = [&](std::chrono::minutes span) {
     int rises = 0;
     for (const TimePoint end = now + span; now < end;) {
@@ -153,7 +156,20 @@ TEST(EffortControl, AFixedPresetStays) {
   EffortControl::Session session{{ultrafast, 2}, 0.1, 0.05, full_hd};
   TimePoint now = TimePoint{} + 1h;
   for (int i = 0; i < 400; ++i, now += 250ms)
-    EXPECT_FALSE(control.update(0.1, 1, std::span(&session, 1), now));
+    EXPECT_TRUE(control.update(0.1, 1, std::span(&session, 1), now).empty());
+}
+
+TEST_F(EffortControlTest, ANewcomerBeginsWithWhatThereIsRoomFor) {
+  EXPECT_EQ(control.initial(1, full_hd).preset, superfast);
+  other_cpus = 2.0;
+  add(6, 0.6);
+  run(1s);  // 6.84 at superfast, and a seventh takes 1.14
+  EXPECT_EQ(control.initial(7, full_hd).preset, superfast);
+  other_cpus = 4.3;
+  run(1s);
+  EXPECT_EQ(control.initial(7, full_hd).preset, superfast - 1);
+  EXPECT_EQ(control.initial(7, {640, 360}).preset, superfast);
+  EXPECT_EQ(control.initial(9, full_hd).preset, ultrafast) << "two more are about to encode";
 }
 
 TEST(EncoderEffort, BecomesSettings) {
