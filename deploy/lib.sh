@@ -16,12 +16,12 @@ build_packages=(
   libwebp-dev libpng-dev zlib1g-dev libzstd-dev libarchive-dev
 )
 lan_packages=(openssl qrencode iproute2)
-test_packages=(libgtest-dev libgmock-dev python3 shellcheck clang-format-14 clang libclang-rt-dev)
+test_packages=(libgtest-dev libgmock-dev python3 shellcheck clang-format-14 clang libclang-rt-dev haproxy)
 # What reads deploy/ and docker/: containers without a Docker engine, and the tools of operators.
 # runc and kubectl often come from elsewhere, and those conflict with the packages.
 deploy_test_packages=(
   podman buildah netavark aardvark-dns iptables catatonit uidmap xz-utils iproute2
-  haproxy prometheus python3-yaml
+  prometheus python3-yaml
 )
 command -v runc >/dev/null || deploy_test_packages+=(runc)
 

@@ -2,12 +2,14 @@
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 
-const source_dir = fileURLToPath(new URL('../../..', import.meta.url));
+export const source_dir = fileURLToPath(new URL('../../..', import.meta.url));
 
 export const build_dir =
   process.env['CATGS_BUILD_DIR'] ?? path.join(source_dir, 'build', 'release');
 
 export const chromium_path = process.env['CATGS_CHROMIUM'] ?? '/usr/bin/chromium';
+
+export const haproxy_path = process.env['CATGS_HAPROXY'] ?? '/usr/sbin/haproxy';
 
 /** Where screenshots go. */
 export const artefacts =
