@@ -3,16 +3,20 @@
 #include <chrono>
 #include <iterator>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
 
 #include <fmt/chrono.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/formatter.h>
 #include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "server/session/log_session.h"
+#include "server/session/rate_limit.h"
 
 namespace catgs {
 namespace {
@@ -53,19 +57,76 @@ class SessionFlag final : public spdlog::custom_flag_formatter {
   }
 };
 
+/// The message. Clients have a say in it: what would move a terminal's cursor or begin a line of
+/// its own comes out as \\x1b.
+class PrintableMessage final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& out) override {
+    for (const char c : message.payload) {
+      const auto byte = static_cast<unsigned char>(c);
+      if (byte < 0x20 || byte == 0x7f)
+        fmt::format_to(std::back_inserter(out), "\\x{:02x}", byte);
+      else
+        out.push_back(c);
+    }
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableMessage>();
+  }
+};
+
+/// Leaves lines out where there are too many, and says how many: strangers can cause a line with
+/// each connection, and somebody pays for the disk.
+class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit BoundedSink(std::shared_ptr<spdlog::sinks::sink> to) : to_(std::move(to)) {}
+
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (!rate_.take(Clock::now())) {
+      ++left_out_;
+      return;
+    }
+    if (const auto count = std::exchange(left_out_, 0); count > 0) {
+      const std::string text = fmt::format("{} lines were left out: there were too many", count);
+      to_->log(spdlog::details::log_msg(message.logger_name, spdlog::level::warn, text));
+    }
+    to_->log(message);
+  }
+  void flush_() override { to_->flush(); }
+  void set_formatter_(std::unique_ptr<spdlog::formatter> formatter) override {
+    to_->set_formatter(std::move(formatter));
+  }
+
+ private:
+  static constexpr double lines_per_second = 50.0;
+  static constexpr double burst = 500.0;
+
+  const std::shared_ptr<spdlog::sinks::sink> to_;
+  RateLimit rate_{lines_per_second, burst, Clock::now()};
+  std::uint64_t left_out_ = 0;
+};
+
 std::unique_ptr<spdlog::formatter> make_formatter(std::string_view format) {
   if (format == "json") return std::make_unique<JsonFormatter>();
   auto human = std::make_unique<spdlog::pattern_formatter>();
-  human->add_flag<SessionFlag>('*').set_pattern("%H:%M:%S.%e %^%l%$ %*%v");
+  human->add_flag<SessionFlag>('*').add_flag<PrintableMessage>('~').set_pattern(
+      "%H:%M:%S.%e %^%l%$ %*%~");
   return human;
 }
 
 }  // namespace
 
 void set_up_log(std::string_view format, std::string_view level) {
-  auto logger = spdlog::stderr_color_mt("catgs-server");
+  std::shared_ptr<spdlog::sinks::sink> sink =
+      std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
+  const auto least = spdlog::level::from_str(std::string(level));
+  // Who asks for debugging wants to see it all.
+  if (least > spdlog::level::debug) sink = std::make_shared<BoundedSink>(std::move(sink));
+  auto logger = std::make_shared<spdlog::logger>("catgs-server", std::move(sink));
   logger->set_formatter(make_formatter(format));
-  logger->set_level(spdlog::level::from_str(std::string(level)));
+  logger->set_level(least);
   spdlog::set_default_logger(std::move(logger));
 }
 

@@ -6,7 +6,8 @@ namespace catgs {
 
 /// Sets up spdlog's default logger on standard error. `format`: "human" or "json" (one object a
 /// line: time, level, session where a line is about one, message); `level`: debug, info, warn,
-/// error. Nothing secret is ever logged.
+/// error. Nothing secret is ever logged. Unless the level is debug, at most 50 lines a second are
+/// written, and 500 at once; how many were left out is a line, too.
 void set_up_log(std::string_view format, std::string_view level);
 
 }  // namespace catgs

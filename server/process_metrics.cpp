@@ -31,8 +31,9 @@ std::optional<std::uint64_t> stat_field(int number) {
   if (name_end == std::string::npos) return std::nullopt;
   std::istringstream fields(text.substr(name_end + 1));
   std::string field;
-  for (int n = 3; n <= number; ++n) fields >> field;
-  return fields ? std::optional(std::stoull(field)) : std::nullopt;
+  for (int n = 3; n < number; ++n) fields >> field;
+  std::uint64_t value = 0;
+  return fields >> value ? std::optional(value) : std::nullopt;
 }
 
 std::optional<double> boot_time_s() {

@@ -5,12 +5,15 @@
 
 #include <archive.h>
 #include <archive_entry.h>
+#include <fmt/format.h>
 
 #include "render_core/error.h"
 
 namespace catgs {
 
 namespace {
+
+constexpr std::size_t max_entries = 4096;  // a SOG has nine
 
 /// libarchive's callbacks over a ByteSource. They must not throw through C, so a failed read is
 /// kept and thrown afterwards.
@@ -52,10 +55,10 @@ std::string_view why(archive* zip) {
   return message ? message : "cannot be unpacked";
 }
 
+/// `piece`: room for bytes on their way.
 std::vector<std::byte> unpack_entry(archive* zip, std::uint64_t limit, const ByteSource& file,
-                                    const std::string& name) {
+                                    const std::string& name, std::span<std::byte> piece) {
   std::vector<std::byte> bytes;
-  std::vector<std::byte> piece(256 * 1024);
   for (;;) {
     const la_ssize_t got = archive_read_data(zip, piece.data(), piece.size());
     if (got < 0) throw InputError(file.name(), "entry " + name, why(zip), "the archive is damaged");
@@ -97,15 +100,18 @@ ZipFiles::ZipFiles(const ByteSource& file, std::string_view only) : name_(file.n
   };
   check(archive_read_open1(zip.get()));
   std::uint64_t room = 4 * file.size() + (1 << 20);
-  for (;;) {
+  std::vector<std::byte> piece(256 * 1024);
+  for (std::size_t count = 1;; ++count) {
     archive_entry* entry = nullptr;
     const int result = archive_read_next_header(zip.get(), &entry);
     if (result == ARCHIVE_EOF) break;
     check(result);
+    if (count > max_entries)
+      throw InputError(file.name(), "", fmt::format("holds more than {} entries", max_entries));
     const char* entry_name = archive_entry_pathname(entry);
     const std::string name = entry_name ? entry_name : "";
     if (!only.empty() && name != only) continue;
-    std::vector<std::byte> bytes = unpack_entry(zip.get(), room, file, name);
+    std::vector<std::byte> bytes = unpack_entry(zip.get(), room, file, name, piece);
     room -= bytes.size();
     entries_[name] = std::move(bytes);
   }

@@ -128,8 +128,15 @@ struct Decoder {
   std::span<const SogRange> ranges;
   GaussianCloud& cloud;
 
-  [[nodiscard]] SogImage image(const std::string& name) const {
-    return read_sog_image(*files.open(meta.folder + name));
+  /// With `texels` and more. Sizes were checked when the meta data was read, but files of a folder
+  /// may have been replaced since.
+  [[nodiscard]] SogImage image(const std::string& name, std::size_t texels) const {
+    const auto file = files.open(meta.folder + name);
+    SogImage image = read_sog_image(*file);
+    if (std::size_t{image.width} * image.height < texels)
+      throw InputError(file->name(), "size", "the image was replaced while the scene was read",
+                       "load it again");
+    return image;
   }
 
   /// Calls store(texel index, index in the cloud) for every wanted Gaussian.
@@ -147,7 +154,8 @@ struct Decoder {
       for (int k = 0; k < 3; ++k) mean[k] = std::copysign(std::expm1(std::abs(v[k])), v[k]);
       return mean;
     };
-    const SogImage low = image(meta.means_low), high = image(meta.means_high);
+    const SogImage low = image(meta.means_low, meta.count),
+                   high = image(meta.means_high, meta.count);
     for_each([&](std::size_t from, std::size_t to) {
       const std::uint8_t *l = low.texel(from), *h = high.texel(from);
       cloud.mean[to] = mean_of({l[0] | h[0] << 8, l[1] | h[1] << 8, l[2] | h[2] << 8});
@@ -155,7 +163,7 @@ struct Decoder {
   }
 
   void rotations() const {
-    const SogImage quats = image(meta.quats);
+    const SogImage quats = image(meta.quats, meta.count);
     for_each([&](std::size_t from, std::size_t to) {
       const std::uint8_t* texel = quats.texel(from);
       if (texel[3] < first_quat_tag) {  // no rotation stored; sanitize makes it the identity
@@ -179,7 +187,7 @@ struct Decoder {
     auto scale = meta.log_scale;
     for (auto& channel : scale)
       for (float& value : channel) value = std::exp(value);
-    const SogImage scales = image(meta.scales);
+    const SogImage scales = image(meta.scales, meta.count);
     for_each([&](std::size_t from, std::size_t to) {
       const std::uint8_t* texel = scales.texel(from);
       cloud.scale[to] = {scale[0][texel[0]], scale[1][texel[1]], scale[2][texel[2]]};
@@ -187,7 +195,7 @@ struct Decoder {
   }
 
   void colours() const {
-    const SogImage sh0 = image(meta.sh0_image);
+    const SogImage sh0 = image(meta.sh0_image, meta.count);
     const std::size_t stride = cloud.sh_count();
     for_each([&](std::size_t from, std::size_t to) {
       const std::uint8_t* texel = sh0.texel(from);
@@ -201,13 +209,13 @@ struct Decoder {
     const std::size_t coefficients = sh_coefficient_count(meta.sh_degree) - 1;
     std::vector<glm::vec3> palette(meta.palette_size * coefficients);
     {
-      const SogImage centroids = image(meta.centroids);
+      const SogImage centroids = image(meta.centroids, palette.size());
       for (std::size_t i = 0; i < palette.size(); ++i) {  // rows of 64 entries follow each other
         const std::uint8_t* texel = centroids.texel(i);
         palette[i] = {meta.sh_rest[texel[0]], meta.sh_rest[texel[1]], meta.sh_rest[texel[2]]};
       }
     }
-    const SogImage labels = image(meta.labels);
+    const SogImage labels = image(meta.labels, meta.count);
     const std::size_t stride = cloud.sh_count();
     for_each([&](std::size_t from, std::size_t to) {
       const std::uint8_t* texel = labels.texel(from);

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Checks that hold for every source file; each subcommand is one CTest test.
 
-  lint.py rules              layering of includes, file length, marker words, include guards,
-                             links between documents
+  lint.py rules              layering of includes, banned calls, file and function length, marker
+                             words, include guards, links between documents, what the security
+                             page names
   lint.py shell              shellcheck over every script
   lint.py format             clang-format 14, the version whose output .clang-format was tuned for
   lint.py tidy --build DIR   clang-tidy 14 with DIR/compile_commands.json
@@ -23,6 +24,7 @@ from typing import Iterator, NamedTuple
 
 EXIT_SKIPPED = 77
 PRUNED_FOLDERS = re.compile(r"^(\.git|build.*|node_modules|dist|generated|\.cache|__pycache__)$")
+CXX_TEST = re.compile(r"^TEST(?:_F|_P)?\((\w+),\s*(\w+)\)", re.MULTILINE)
 CXX = re.compile(r"\.(h|cpp|cu|cuh)$")
 SOURCE = re.compile(r"\.(h|cpp|cu|cuh|ts|mjs|js|css|html|py|sh|proto|cmake)$|(^|/)CMakeLists\.txt$")
 
@@ -62,14 +64,50 @@ IMPORT_RULES = [
                 "src/wire alone speaks protobuf"),
 ]
 
+class BannedCall(NamedTuple):
+    """What `pattern` finds in files whose path matches `where` must be written otherwise."""
+
+    where: str
+    pattern: str
+    reason: str
+
+
+BANNED_CALLS = [
+    BannedCall(r"\.(h|cpp|cu|cuh)$", r"\b(str(n?cpy|n?cat)|v?sprintf|gets|strtok)\(",
+               "writes beyond its buffer: std::string or fmt"),
+    BannedCall(r"^(server|render_core)/.*\.(h|cpp|cu|cuh)$", r"(?<![\w.>])(ato[ilf]|std::sto\w+|sscanf)\(",
+               "takes half a number for a number: std::from_chars, and look at its end"),
+    BannedCall(r"^(server|render_core)/.*\.(h|cpp|cu|cuh)$", r"(?<![\w.>:])(system|popen)\(",
+               "a shell reads what strangers wrote"),
+    BannedCall(r"\.(h|cpp|cu|cuh)$", r"(?<![\w.>:])(s?rand|localtime|gmtime|asctime|ctime|tmpnam|mktemp|alloca)\(",
+               "shared state, a race for a name, or a stack without an end"),
+    BannedCall(r"^(server|render_core)/", r"std::regex\b", "its recursion ends the stack"),
+    BannedCall(r"\.(h|cpp|cu|cuh)$", r"\busing namespace std;", "names change their meaning"),
+    BannedCall(r"^server/", r"\.detach\(\);.*thread|std::thread\([^;]*\)\.detach\(", "nobody waits for its end"),
+    BannedCall(r"^web_client/src/.*\.ts$",
+               r"\.(inner|outer)HTML\b|insertAdjacentHTML|document\.write|\beval\(|new Function\(",
+               "text of scenes and servers would become a page's code: textContent"),
+    BannedCall(r"^(?!tests/lint/).*\.py$", r"shell=True|os\.system\(|\byaml\.load\(|^import pickle|(?<![\w.])eval\(",
+               "input becomes code"),
+]
+
 MAX_LINES = 450
 # A ratchet: files above the limit may shrink, never grow, and leave this table when they fit.
 LONGER_FILES: dict[str, int] = {}
+
+MAX_FUNCTION_LINES = 70
+# The same for functions: "file: name".
+LONGER_FUNCTIONS = {
+    "server/config.cpp: make_settings": 93,  # a table
+    "tests/render_core/scene/encoders.cpp: encode_sog": 101,
+}
 
 # Spelt in two parts so that this file does not report itself.
 MARKER_WORDS = re.compile(r"\b(" + "|".join(a + b for a, b in
                                            [("TO", "DO"), ("FIX", "ME"), ("XX", "X"), ("HA", "CK")]) + r")\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+TYPE_OR_NAMESPACE = re.compile(
+    r"(inline )?namespace\b|extern\b|(template .*)?(class|struct|enum|union)\b[^(]*\{$|(else|do|if|for|while|switch)\b")
 MARKDOWN_LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)")
 IMPORT = re.compile(r"""(?:\bfrom\s+|\bimport\s+|\bimport\()['"]([^'"]+)['"]""")
 
@@ -91,6 +129,41 @@ def is_shell(root: pathlib.Path, path: str) -> bool:
         return re.match(rb"#!.*\b(ba)?sh\b", file.readline(80)) is not None
 
 
+def functions(lines: list[str]) -> list[tuple[str, int, int]]:
+    """Name, first and last line of C++ functions at namespace and class level, as clang-format writes
+    them: the brace that ends one stands where its first line begins."""
+    found: list[tuple[str, int, int]] = []
+    for indent in ("", "  "):
+        outer = list(found)
+        head, begin = 0, 0
+        for number, line in enumerate(lines, start=1):
+            if begin and line in (indent + "}", indent + "};"):
+                names = re.findall(r"(\w+)\(", " ".join(lines[begin - 1:begin + 4]))
+                if not any(first <= begin <= last for _, first, last in outer):
+                    found.append((names[0] if names else "", begin, number))
+                head, begin = 0, 0
+            elif begin:
+                continue
+            elif re.match(rf"{indent}[^\s#/}}]", line):
+                head = 0 if TYPE_OR_NAMESPACE.match(line.strip()) else number
+            if head and not begin:
+                if line.endswith("{"):
+                    begin = head
+                elif line.endswith((";", ":", "}")):
+                    head = 0
+    return found
+
+
+def function_findings(path: str, lines: list[str]) -> Iterator[str]:
+    for name, begin, end in functions(lines):
+        key = f"{path}: {name}"
+        length, limit = end - begin + 1, LONGER_FUNCTIONS.get(key, MAX_FUNCTION_LINES)
+        if length > limit:
+            yield f"{path}:{begin}: {name} has {length} lines, the limit is {limit}: split it"
+        elif key in LONGER_FUNCTIONS and length <= MAX_FUNCTION_LINES:
+            yield f"{path}:{begin}: {name} fits {MAX_FUNCTION_LINES} lines again: take it out of LONGER_FUNCTIONS"
+
+
 def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
     """Findings of `rules` for one file, as 'file:line: text'."""
     limit = LONGER_FILES.get(path, MAX_LINES)
@@ -103,9 +176,16 @@ def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
         yield f"{path}:1: no #pragma once"
     pattern, rules = (IMPORT, IMPORT_RULES) if path.endswith(".ts") else (INCLUDE, INCLUDE_RULES)
     rules = [rule for rule in rules if re.search(rule.where, path)]
+    banned = [call for call in BANNED_CALLS if re.search(call.where, path)]
+    if CXX.search(path):
+        yield from function_findings(path, lines)
     for number, line in enumerate(lines, start=1):
         if MARKER_WORDS.search(line):
             yield f"{path}:{number}: marker word: do it, or say in prose what is missing"
+        code = line.split("//")[0]
+        for call in banned:
+            if re.search(call.pattern, code):
+                yield f"{path}:{number}: {code.strip()}: {call.reason}"
         target = pattern.search(line)
         for rule in rules if target else []:
             if re.search(rule.forbidden, target.group(1)):
@@ -120,14 +200,35 @@ def link_findings(root: pathlib.Path, path: str, lines: list[str]) -> Iterator[s
                 yield f"{path}:{number}: links to {target}, which does not exist"
 
 
+def security_findings(page: str, lines: list[str], code: dict[str, str]) -> Iterator[str]:
+    """Constants and tests named by the security page that are not there, as 'file:line: text'.
+    `code`: what the sources hold, by path."""
+    tests = set()
+    for text in code.values():
+        tests.update(f"{suite}.{name}" for suite, name in CXX_TEST.findall(text))
+    suites = {test.split(".")[0] for test in tests}
+    for number, line in enumerate(lines, start=1):
+        for path, name in re.findall(r"`([\w/]+\.(?:h|cpp)): (\w+)`", line):
+            if not re.search(rf"\b{name}\b", code.get(path, "")):
+                yield f"{page}:{number}: {path} has no {name}"
+        for test in re.findall(r"`([A-Z]\w*\.(?:\w+|\*))`", line):
+            if test not in tests and not (test.endswith(".*") and test[:-2] in suites):
+                yield f"{page}:{number}: there is no test {test}"
+
+
 def check_rules(root: pathlib.Path) -> int:
     findings = []
+    code: dict[str, str] = {}
     for path in source_files(root):
         is_document = path.endswith(".md")
         if not is_document and not SOURCE.search(path) and not is_shell(root, path):
             continue
         lines = (root / path).read_text("utf-8").splitlines()
         findings += link_findings(root, path, lines) if is_document else rule_findings(path, lines)
+        if CXX.search(path):
+            code[path] = "\n".join(lines)
+    page = "deploy/SECURITY.md"
+    findings += security_findings(page, (root / page).read_text("utf-8").splitlines(), code)
     missing = [f"{path}:1: in LONGER_FILES, but there is no such file"
                for path in LONGER_FILES if not (root / path).is_file()]
     print("\n".join(findings + missing))

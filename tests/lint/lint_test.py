@@ -53,12 +53,37 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("marker word", "server/a.cpp", "// TO" "DO: later")
         self.expect_one("#pragma once", "server/a.h", "int x;")
 
+    def test_functions_have_an_end(self):
+        body = ["int f(int a) {"] + ["  a += 1;"] * lint.MAX_FUNCTION_LINES + ["}"]
+        self.expect_one("f has 72 lines", "server/a.cpp", *body)
+        self.expect_one("g has 73 lines", "server/a.cpp", "class A {", " public:", "  void g(",
+                        "      int a) {", *["    a += 1;"] * lint.MAX_FUNCTION_LINES, "  }", "};")
+        self.assertEqual(self.findings("server/a.cpp", "namespace a {", *body[:60], "}",
+                                       *["int x;"] * 60, "}"), [])
+
+    def test_banned_calls(self):
+        self.expect_one("beyond its buffer", "server/a.cpp", "  strcpy(to, from);")
+        self.expect_one("half a number", "server/net/a.cpp", "  return std::stoi(text);")
+        self.expect_one("a shell", "render_core/a.cpp", '  system("rm x");')
+        self.expect_one("shared state", "tests/a.cpp", "  const int r = rand();")
+        self.expect_one("change their meaning", "server/a.cpp", "using namespace std;")
+        self.expect_one("textContent", "web_client/src/ui/a.ts", "  box.innerHTML = title;")
+        self.expect_one("becomes code", "tests/a.py", "subprocess.run(line, shell=True)")
+        self.assertEqual(self.findings("server/a.cpp", "  io.system(1); // rand()", "  fmt::gmtime(t);"), [])
+
     def test_links(self):
         root = pathlib.Path(__file__).parent
         lines = ["[here](lint.py) [web](https://x.org/y) [part](#a)", "![gone](media/gone.webp)"]
         findings = list(lint.link_findings(root, "README.md", lines))
         self.assertEqual(len(findings), 1, findings)
         self.assertIn("README.md:2: links to media/gone.webp", findings[0])
+
+    def test_the_security_page_names_what_is_there(self):
+        code = {"server/a.h": "constexpr int max_a = 3;", "tests/a.cpp": "TEST_F(A, IsBounded) {"}
+        row = "| a | 3 | `server/a.h: max_a` | refused | `A.IsBounded`, `A.*` |"
+        self.assertEqual(list(lint.security_findings("S.md", [row], code)), [])
+        gone = ["`server/a.h: max_b`", "`server/b.h: max_a`", "`A.IsGone`", "`B.*`"]
+        self.assertEqual(len(list(lint.security_findings("S.md", gone, code))), len(gone))
 
     def test_missing_tool_is_a_skip(self):
         result = subprocess.run([sys.executable, lint.__file__, "shell"], env={"PATH": "/nonexistent"},

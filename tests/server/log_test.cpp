@@ -1,6 +1,9 @@
 #include "server/log.h"
 
+#include <chrono>
+#include <functional>
 #include <sstream>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,19 +15,18 @@
 namespace catgs {
 namespace {
 
+using testing::Contains;
 using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
 
-/// The lines that a line about nobody, one about a session, and one after it make.
-std::vector<std::string> lines(std::string_view format) {
+/// The lines that are written while `log` logs.
+std::vector<std::string> lines_of(std::string_view format, std::string_view level,
+                                  const std::function<void()>& log) {
   const auto before = spdlog::default_logger();
   testing::internal::CaptureStderr();
-  set_up_log(format, "info");
-  spdlog::info("first");
-  {
-    const LogSession about("1f2e3d4c");
-    spdlog::warn("\xff \"quoted\"");
-  }
-  spdlog::info("last");
+  set_up_log(format, level);
+  log();
   spdlog::default_logger()->flush();
   std::istringstream text(testing::internal::GetCapturedStderr());
   spdlog::drop("catgs-server");
@@ -32,6 +34,18 @@ std::vector<std::string> lines(std::string_view format) {
   std::vector<std::string> all;
   for (std::string line; std::getline(text, line);) all.push_back(line);
   return all;
+}
+
+/// Those that a line about nobody, one about a session, and one after it make.
+std::vector<std::string> lines(std::string_view format) {
+  return lines_of(format, "info", [] {
+    spdlog::info("first");
+    {
+      const LogSession about("1f2e3d4c");
+      spdlog::warn("\xff \"quoted\"");
+    }
+    spdlog::info("last");
+  });
 }
 
 TEST(Log, JsonLinesNameTheirSession) {
@@ -51,6 +65,30 @@ TEST(Log, HumanLinesNameTheirSession) {
   EXPECT_THAT(all[0], EndsWith("info first"));
   EXPECT_THAT(all[1], EndsWith("warning session 1f2e3d4c: \xff \"quoted\""));
   EXPECT_THAT(all[2], EndsWith("info last"));
+}
+
+TEST(Log, ClientsWriteNeitherLinesNorColours) {
+  for (const char* format : {"human", "json"}) {
+    const auto all = lines_of(format, "info", [] {
+      spdlog::warn("not known as {}", "evil\n12:00:00 info \x1b[2Jall is well");
+    });
+    ASSERT_EQ(all.size(), 1u) << format;
+    EXPECT_THAT(all[0], Not(HasSubstr("\x1b[2J"))) << format;
+  }
+}
+
+TEST(Log, TellsHowManyLinesItLeftOut) {
+  const auto flood = [] {
+    for (int i = 0; i < 20'000; ++i) spdlog::warn("one of many");
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // room for one more, or two
+    spdlog::info("last");
+  };
+  const auto bounded = lines_of("human", "info", flood);
+  EXPECT_GE(bounded.size(), 502u);
+  EXPECT_LT(bounded.size(), 5000u);
+  EXPECT_THAT(bounded.back(), EndsWith("last"));
+  EXPECT_THAT(bounded, Contains(HasSubstr("lines were left out")));
+  EXPECT_EQ(lines_of("human", "debug", flood).size(), 20'001u);
 }
 
 }  // namespace

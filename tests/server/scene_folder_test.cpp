@@ -69,6 +69,14 @@ TEST_F(SceneFolderTest, LeavesOutWhatCannotBeReadUntilItChanges) {
   EXPECT_THAT(names(), ElementsAre("a", "half"));
 }
 
+TEST_F(SceneFolderTest, OffersNoMoreThanItsLimit) {
+  save_scene(random_cloud(1, 0), folder_ / "0.splat");
+  for (std::size_t i = 1; i <= SceneFolders::max_scenes; ++i)
+    std::filesystem::create_hard_link(folder_ / "0.splat",
+                                      folder_ / (std::to_string(i) + ".splat"));
+  EXPECT_EQ(names().size(), SceneFolders::max_scenes);
+}
+
 TEST_F(SceneFolderTest, NamesAFolderThatIsNotThere) {
   SceneFolders absent({folder_ / "absent"}, {});
   EXPECT_THAT(

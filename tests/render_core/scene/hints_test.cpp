@@ -4,6 +4,8 @@
 
 #include "render_core/scene/first_sight.h"
 #include "render_core/scene/robust_bounds.h"
+#include "render_core/scene/sog.h"
+#include "render_core/scene/streamed_sog.h"
 #include "render_core/scene/voxel_grid.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
@@ -269,6 +271,26 @@ TEST_F(Hints, WrittenSidecarsReadBackTheSame) {
   EXPECT_EQ(after.near_z, before.near_z);
   expect_near(after.focus, before.focus);
   expect_near(after.limits.min, before.limits.min);
+}
+
+using JsonFiles = FolderTest;
+
+TEST_F(JsonFiles, LargerThanTheirLimitAreRefused) {
+  // Files of that size without a byte on the disk.
+  const auto error = [&](std::uint64_t bytes, const std::function<void(const ByteSource&)>& read) {
+    const auto path = write("large.json", "");
+    std::filesystem::resize_file(path, bytes);
+    return input_error([&] { read(FileSource(path)); });
+  };
+  constexpr std::uint64_t mib = 1 << 20;
+  EXPECT_THAT(error(16 * mib + 1, read_sidecar), HasSubstr("at most 16777216 make sense"));
+  EXPECT_THAT(error(256 * mib + 1, read_cameras_json), HasSubstr("at most 268435456"));
+  EXPECT_THAT(error(256 * mib + 1, read_transforms_json), HasSubstr("at most 268435456"));
+  EXPECT_THAT(error(256 * mib + 1, read_lod_tree), HasSubstr("at most 268435456"));
+  EXPECT_THAT(
+      error(4 * mib + 1,
+            [&](const ByteSource&) { parse_sog_meta(FolderFiles(folder_.path()), "large.json"); }),
+      HasSubstr("at most 4194304"));
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include "render_core/scene/sog.h"
 
+#include <atomic>
+#include <memory>
+
 #include <nlohmann/json.hpp>
 
 #include "tests/render_core/scene/encoders.h"
@@ -140,6 +143,42 @@ TEST(Sog, LyingSizesAreRefusedBeforeMemoryIsTaken) {
                 parse(zip(with_meta(files, [](nlohmann::json& m) { m["count"] = 8'000'000; })));
               }),
               HasSubstr("cannot be in"));
+}
+
+TEST(Sog, ArchivesThatGrowAreRefused) {
+  const Files bomb = {{"meta.json", std::string(4 << 20, ' ')}};
+  EXPECT_THAT(input_error([&] { parse(zip(bomb, true)); }),
+              HasSubstr("entry meta.json: unpacks to more than a scene can hold"));
+  Files many;
+  for (int i = 0; i <= 4096; ++i) many[std::to_string(i)] = "";
+  EXPECT_THAT(input_error([&] { parse(zip(many)); }), HasSubstr("more than 4096 entries"));
+}
+
+/// A folder whose images become smaller once their sizes have been looked at.
+class ShrinkingFolder final : public FileSet {
+ public:
+  ShrinkingFolder(Files files, std::string name, std::string then)
+      : files_(std::move(files)), name_(std::move(name)), then_(std::move(then)) {}
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
+    const bool replaced = name == name_ && opened_.exchange(true);
+    return std::make_unique<MemorySource>(name, bytes_of(replaced ? then_ : files_.at(name)));
+  }
+
+ private:
+  const Files files_;
+  const std::string name_, then_;
+  mutable std::atomic<bool> opened_{false};
+};
+
+TEST(Sog, ImagesReplacedWhileTheyAreReadAreRefused) {
+  const Files files = encode_sog(random_cloud(300, 1), 2);
+  const std::string small = encode_webp(std::string(4 * 4, '\0'), 2, 2);
+  for (const auto& [name, content] : files) {
+    if (name == "meta.json") continue;
+    const ShrinkingFolder folder(files, name, small);
+    EXPECT_THAT(input_error([&] { read_sog(folder, "meta.json", two_threads()); }),
+                HasSubstr(name + ": size: the image was replaced"));
+  }
 }
 
 TEST(Sog, DamagedFilesAreRefused) {
