@@ -186,8 +186,13 @@ describe('page', () => {
     const { page } = await new_page(browser);
     await page.goto(`${server.url}?scene=nope`);
     await page.getByText('No such scene').waitFor();
+    await page.getByRole('button', { name: 'Open city' }).waitFor();
+    await keep_screenshot(page, 'fake-no-scene');
     await page.getByRole('link', { name: 'garden' }).click();
     await page.waitForURL(`${server.url}?scene=garden`);
+    await page.goto(`${server.url}?scene=nope`);
+    await page.getByRole('button', { name: 'Open city' }).click();
+    await page.waitForURL(`${server.url}?scene=city`);
     await page.evaluate(() => window.catgs!.settled());
   });
 
@@ -220,6 +225,40 @@ describe('page', () => {
     await page.keyboard.press('Tab');
     await page.keyboard.press('Shift+Tab');
     expect(await framed()).toBe(true);
+  });
+
+  it('loses no key that is pressed before the scene is there', async () => {
+    let admit = (): void => undefined;
+    const admitted = new Promise<void>((resolve) => (admit = resolve));
+    server = await start_fake_server((peer, body) => {
+      if (body.case === 'hello') void admitted.then(() => stream(peer, body));
+      else stream(peer, body);
+    });
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.waitForFunction(() => window.catgs !== undefined);
+    await page.keyboard.press('KeyM');
+    await page.getByText('Fly', { exact: true }).waitFor();
+    await page.keyboard.press('KeyW');
+    admit();
+    await page.evaluate(() => window.catgs!.settled());
+    const { position } = await page.evaluate(() => window.catgs!.pose());
+    expect(position).not.toEqual([0, 0, -5]); // where visits begin
+  });
+
+  it('keeps the last figures at rest, when nothing is measured', async () => {
+    server = await start_fake_server(stream);
+    const { page } = await new_page(browser);
+    await page.goto(server.url);
+    await page.evaluate(() => window.catgs!.settled());
+    await page.keyboard.press('KeyI');
+    const render = page.locator('#stats-panel dt:text-is("Render") + dd');
+    await expect.poll(() => render.innerText(), { timeout: 10_000 }).toBe('20.0 ms');
+    const kept = (): Promise<number> => page.locator('#stats-panel .kept').count();
+    await expect.poll(kept, { timeout: 10_000 }).toBeGreaterThan(5);
+    expect(await render.innerText()).toBe('20.0 ms');
+    await page.keyboard.press('KeyW');
+    await expect.poll(kept, { timeout: 10_000 }).toBeLessThan(5);
   });
 
   it.each([

@@ -24,9 +24,24 @@ describe('keys', () => {
     expect(keys.axes()).toEqual({ ...no_axes, forward: 1, right: 1, fast: true });
     keys.down('KeyS', false);
     expect(keys.axes()).toEqual({ ...no_axes, right: 1 });
+    for (let step = 0; step < 5; ++step) keys.axes();
     keys.up('KeyD', false);
     keys.up('KeyW', false);
     expect(keys.axes()).toEqual({ ...no_axes, forward: -1 });
+  });
+
+  it('move the camera for some steps, however short the tap was and however late the scene', () => {
+    const keys = new HeldKeys();
+    keys.down('KeyW', false);
+    keys.up('KeyW', false);
+    for (let step = 0; step < 5; ++step) expect(keys.axes().forward).toBe(1);
+    expect(keys.axes()).toEqual(no_axes);
+    keys.down('KeyW', false);
+    keys.up('KeyW', false);
+    keys.down('KeyW', false); // and stays down
+    for (let step = 0; step < 20; ++step) expect(keys.axes().forward).toBe(1);
+    keys.up('KeyW', false);
+    expect(keys.axes()).toEqual(no_axes);
   });
 
   it('are released when the page loses the keyboard', () => {

@@ -159,11 +159,18 @@ describe('wording', () => {
 
   it('offers the scenes that there are, and without any says where the name is', () => {
     const state = { phase: 'failed', code: Error_Code.UNKNOWN_SCENE, message: 'no' } as const;
-    expect(card_for(state, false, ['city'])).toMatchObject({
-      text: 'No. Open one of these:',
-      scene_ids: ['city'],
+    expect(card_for(state, false, ['city', 'hall'])).toMatchObject({
+      text: 'No. These are here:',
+      scene_ids: ['city', 'hall'],
+      action: { label: 'Open city', does: 'open', scene_id: 'city' },
     });
+    expect(card_for(state, false, ['city'])?.action?.label).toBe('Open city');
     expect(card_for(state, false)?.text).toContain('?scene=');
+    expect(card_for(state, false)?.action).toMatchObject({ does: 'open', scene_id: '' });
+    expect(scene_address('https://a.example/?scene=x&ui=0', 'hall')).toBe(
+      'https://a.example/?scene=hall&ui=0',
+    );
+    expect(scene_address('https://a.example/?scene=x&ui=0')).toBe('https://a.example/?ui=0');
   });
 
   it('leaves a refused token to the words of the server', () => {

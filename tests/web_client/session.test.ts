@@ -136,6 +136,25 @@ describe('reconnecting', () => {
     expect(last_state()).toEqual({ phase: 'live' });
   });
 
+  it.each([
+    ['what is left of it', 2.5, [2, 3, 30]],
+    ['nothing once it is over', 31, undefined],
+  ])('tells the next server of the path that a tour takes: %s', (_name, after_s, left_s) => {
+    const first = go_live();
+    const path = [0, 1, 2, 3, 30].map((s) => ({ poseId: 0n, clientTimeUs: BigInt(s * 1e6) }));
+    session.send_path(path);
+    const beat = 2000; // ms
+    for (let ms = 0; ms < after_s * 1000; ms += beat) {
+      time.advance(Math.min(beat, after_s * 1000 - ms));
+      first.say({ case: 'heartbeat', value: {} });
+    }
+    first.events.closed(1006, '');
+    session.retry();
+    socket(1).events.opened();
+    const resume = socket(1).sent('hello')[0]!.resume!;
+    expect(resume.path?.samples.map(({ clientTimeUs }) => Number(clientTimeUs) / 1e6)).toEqual(left_s);
+  });
+
   it('follows silence, but not a server that has a heartbeat', () => {
     const first = go_live();
     for (let i = 0; i < 10; ++i) {

@@ -16,22 +16,36 @@ const movement: Readonly<Record<string, Partial<Axes>>> = {
 
 const clamp = (v: number): number => Math.min(1, Math.max(-1, v));
 
+// A tap moves the camera for this many of its steps, however short it was, and also when it came
+// before the scene did.
+const least_steps = 5;
+
+interface Hold {
+  steps: number; // that it has moved the camera
+  released: boolean;
+}
+
 /** Which movement keys are held, as camera axes. */
 export class HeldKeys {
-  private readonly held_ = new Set<string>();
+  private readonly held_ = new Map<string, Hold>();
   private fast_ = false;
 
   /** Returns whether the key is one of ours. */
   down(code: string, shift: boolean): boolean {
     this.fast_ = shift;
     if (!(code in movement)) return false;
-    this.held_.add(code);
+    const hold = this.held_.get(code);
+    if (hold) hold.released = false;
+    else this.held_.set(code, { steps: 0, released: false });
     return true;
   }
 
   up(code: string, shift: boolean): void {
     this.fast_ = shift;
-    this.held_.delete(code);
+    const hold = this.held_.get(code);
+    if (!hold) return;
+    hold.released = true;
+    if (hold.steps >= least_steps) this.held_.delete(code);
   }
 
   /** The page lost the keyboard: key-up events will not come. */
@@ -40,10 +54,13 @@ export class HeldKeys {
     this.fast_ = false;
   }
 
+  /** Once for each step of the camera. */
   axes(): Axes {
     if (this.held_.size === 0) return no_axes;
     const sum = { ...no_axes };
-    for (const code of this.held_) {
+    for (const [code, hold] of this.held_) {
+      hold.steps += 1;
+      if (hold.released && hold.steps >= least_steps) this.held_.delete(code);
       const axes = movement[code] ?? {};
       sum.right += axes.right ?? 0;
       sum.up += axes.up ?? 0;

@@ -12,9 +12,10 @@ export async function list_scenes(page_url: string, token: string): Promise<read
   }
 }
 
-/** The page's address with another scene. */
-export function scene_address(page_url: string, scene_id: string): string {
+/** The page's address with another scene; without one, with the server's first. */
+export function scene_address(page_url: string, scene_id = ''): string {
   const url = new URL(page_url);
-  url.searchParams.set('scene', scene_id);
+  if (scene_id) url.searchParams.set('scene', scene_id);
+  else url.searchParams.delete('scene');
   return url.href;
 }

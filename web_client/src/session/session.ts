@@ -76,6 +76,7 @@ export class Session {
   private cancel_keep_alive_: () => void = () => undefined;
   private resume_token_ = '';
   private last_pose_: PoseInit | undefined;
+  private path_: readonly PoseInit[] = [];
   private paused_ = false;
 
   constructor(
@@ -117,6 +118,7 @@ export class Session {
 
   /** Where the camera will go: forecasts may follow it. */
   send_path(samples: PoseInit[]): void {
+    this.path_ = samples;
     this.send({ case: 'path', value: { samples } });
   }
 
@@ -196,9 +198,18 @@ export class Session {
         resume: {
           token: this.resume_token_,
           ...(this.last_pose_ && { pose: this.last_pose_ }),
+          ...this.path_ahead(),
         },
       }),
     };
+  }
+
+  /** What is left of the path: any server can go on forecasting by it. */
+  private path_ahead(): { path?: { samples: PoseInit[] } } {
+    const now_us = this.env_.clock.now_us();
+    const next = this.path_.findIndex(({ clientTimeUs }) => Number(clientTimeUs ?? 0n) > now_us);
+    if (next < 0) return {};
+    return { path: { samples: this.path_.slice(Math.max(0, next - 1)) } };
   }
 
   /** Ends a link that says nothing for too long. Looks again when the time could be up. */

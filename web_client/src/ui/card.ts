@@ -1,3 +1,4 @@
+import { scene_address } from '../session/scenes';
 import { by_id } from './dom';
 import { show_scene_links } from './scene_links';
 import type { Card } from './wording';
@@ -19,7 +20,9 @@ export class CardView {
 
   constructor(listener: CardListener) {
     this.action_.addEventListener('click', () => {
-      if (this.shown_?.action?.does === 'reload') location.reload();
+      const action = this.shown_?.action;
+      if (action?.does === 'reload') location.reload();
+      else if (action?.does === 'open') location.href = scene_address(location.href, action.scene_id);
       else listener.retry();
     });
     this.form_.addEventListener('submit', (event) => {

@@ -131,8 +131,12 @@ export class StatsPanel {
     const slowest = slowest_stage(stats.stages_ms);
     stats_rows.forEach((row, i) => {
       const value = this.values_[i]!;
-      value.textContent = row.text(stats);
-      value.classList.toggle('slowest', row.stage !== undefined && row.stage === slowest);
+      const measured_now = row.text(stats);
+      // At rest nothing is measured: what was measured last stays to be read, paler.
+      const is_kept = measured_now === nothing && value.textContent !== '';
+      value.classList.toggle('kept', is_kept);
+      if (!is_kept) value.textContent = measured_now;
+      if (slowest) value.classList.toggle('slowest', row.stage === slowest);
     });
     this.charts_?.show(this.history_);
     if (!this.opened_) void this.load_charts();

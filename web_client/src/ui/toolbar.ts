@@ -47,6 +47,7 @@ export class Toolbar {
     by_id('button-full', HTMLButtonElement).hidden = !document.fullscreenEnabled;
     this.bind_quality();
     this.bind_keys();
+    this.set_active(true);
   }
 
   /** Off while there is nothing to control: a card then says why. */

@@ -7,7 +7,12 @@ export interface Card {
   readonly title: string;
   readonly text: string;
   readonly busy?: boolean; // something goes on by itself
-  readonly action?: { readonly label: string; readonly does: 'retry' | 'reload' };
+  readonly action?: {
+    readonly label: string;
+    readonly does: 'retry' | 'reload' | 'open';
+    /** What 'open' opens: this scene; empty: the first one. */
+    readonly scene_id?: string;
+  };
   readonly asks_token?: boolean;
   readonly scene_ids?: readonly string[]; // to choose from
 }
@@ -74,11 +79,14 @@ function failed_card(code: Error_Code, message: string, scene_ids: readonly stri
         title: 'No such scene',
         text:
           sentence(message) +
-          (scene_ids.length > 0
-            ? 'Open one of these:'
+          (scene_ids.length > 1
+            ? 'These are here:'
             : "Check the scene's name in the address (?scene=…)."),
-        scene_ids,
-        action: retry,
+        scene_ids: scene_ids.length > 1 ? scene_ids : [],
+        action:
+          scene_ids[0] === undefined
+            ? { label: 'Open the first scene', does: 'open', scene_id: '' }
+            : { label: `Open ${scene_ids[0]}`, does: 'open', scene_id: scene_ids[0] },
       };
     case Error_Code.UNSUPPORTED_VERSION:
       return {
