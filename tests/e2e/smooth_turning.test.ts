@@ -154,7 +154,7 @@ it('things stay where they are while the camera turns over a slow link', async (
   );
   expect(errors.every(Number.isFinite)).toBe(true);
   expect(median(errors)).toBeLessThanOrEqual(1);
-  // The least overscan of "on" reaches this far; a machine that is busy lags more, and shows it above.
-  const reached = captures.filter(({ lag_deg }) => lag_deg < 4);
+  // The largest overscan reaches this far; a machine that is busier lags more, and shows it above.
+  const reached = captures.filter(({ lag_deg }) => lag_deg < 10);
   expect(Math.max(0, ...reached.map((shot) => shot.uncovered))).toBeLessThanOrEqual(0.01);
 });

@@ -3,7 +3,7 @@ import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
 import type { Placing, Presenter } from '#client/present/presenter';
 import { axis_angle, identity, type Quat } from '#client/camera/vector';
-import { warped, type Eye } from '#client/present/warp';
+import { warped, widened_fov, type Eye } from '#client/present/warp';
 
 const at = (yaw: number): Eye => {
   const orientation: Quat = yaw === 0 ? identity : axis_angle([0, -1, 0], yaw);
@@ -14,6 +14,7 @@ let drawn: (Placing | undefined)[];
 let redrawn: Placing[];
 let refresh: (() => void)[];
 let display: Display;
+let now_us = 0;
 
 const presenter = (can_warp: boolean): Presenter => ({
   description: 'fake',
@@ -26,12 +27,14 @@ const presenter = (can_warp: boolean): Presenter => ({
   read: () => ({ width_px: 640, height_px: 360, rgba: new Uint8ClampedArray(4) }),
 });
 
-const make = (can_warp: boolean): Display =>
-  new Display(presenter(can_warp), {
-    now_us: () => 0,
-    on_refresh: (draw) => refresh.push(draw),
+function make(can_warp: boolean): Display {
+  const environment = {
+    now_us: () => now_us,
+    on_refresh: (draw: () => void) => void refresh.push(draw),
     overscan_changed: () => undefined,
-  });
+  };
+  return new Display(presenter(can_warp), environment, 16 / 9);
+}
 
 function look(yaw: number): void {
   display.camera = { pose_id: 1, time_us: 0, eye: at(yaw), distance: Infinity };
@@ -79,8 +82,30 @@ describe('the display', () => {
   it('shows pictures larger than the view by the overscan', async () => {
     display.mode = 'on';
     look(0);
-    await display.draw(picture, { ...at(0), fov_y_rad: 1.1 }, 742, 418);
+    const { x, y } = display.overscan;
+    expect(x).toBeGreaterThan(y);
+    const wide = { ...at(0), fov_y_rad: widened_fov(1, y) };
+    await display.draw(picture, wide, 640 * x, 360 * y);
     expect(drawn[0]).toMatchObject({ width_px: 640, height_px: 360 });
+    const { matrix } = drawn[0]!;
+    expect(warped(matrix, 1, 1)).toEqual([expect.closeTo(1 / x, 5), expect.closeTo(1 / y, 5)]);
+  });
+
+  it('has asked for enough before a turn shows what is beside the picture', async () => {
+    const rate = 1; // rad/s
+    const lag_s = 0.15;
+    const at_time = (s: number): Eye => at(rate * Math.max(0, s));
+    for (let i = 1; i <= 60; ++i) {
+      const s = i / 60;
+      now_us = s * 1e6;
+      display.camera = { pose_id: i, time_us: now_us, eye: at_time(s), distance: Infinity };
+      const picture_eye = at_time(s - lag_s);
+      const eye = { ...picture_eye, fov_y_rad: widened_fov(1, display.overscan.y) };
+      await display.draw(picture, eye, 640 * display.overscan.x, 360 * display.overscan.y);
+      // Twelve pictures are looked at before anything is asked for.
+      if (i > 20) expect(display.read()!.view.uncovered).toBeLessThanOrEqual(0.01);
+    }
+    expect(display.overscan.x).toBeGreaterThanOrEqual(1.26);
   });
 
   it('does not warp where that is off, or cannot be', async () => {

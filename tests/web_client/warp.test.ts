@@ -1,7 +1,9 @@
 import { describe, expect, it } from 'vitest';
 import { axis_angle, identity, multiply, type Vec3 } from '#client/camera/vector';
+import { angle_between } from '#client/camera/flight';
 import { place_of } from '#client/camera/ray';
 import { reach, uncovered_share, warp_matrix, warped, widened_fov, type Eye } from '#client/present/warp';
+import { TurnForecast } from '#client/present/turn_forecast';
 import { WarpPolicy } from '#client/present/warp_policy';
 
 const aspect = 16 / 9;
@@ -56,20 +58,21 @@ describe('a warped picture', () => {
   it('is the picture itself where nothing has moved', () => {
     const m = warp_matrix(eye(), eye(), aspect, Infinity);
     expect([...m]).toEqual([1, 0, 0, 0, 1, 0, 0, 0, 1]);
-    expect(reach(m)).toBeCloseTo(1, 6);
+    expect(reach(m)).toEqual({ x: 1, y: 1 });
     expect(uncovered_share(m)).toBe(0);
   });
 
   it('tells how far the view goes beyond it', () => {
     const view = eye({ orientation: axis_angle(up, 0.1) });
     const plain = warp_matrix(eye(), view, aspect, Infinity);
-    expect(reach(plain)).toBeGreaterThan(1.05);
+    expect(reach(plain).x).toBeGreaterThan(1.05);
+    expect(reach(plain).y).toBeLessThan(reach(plain).x);
     expect(uncovered_share(plain)).toBeGreaterThan(0.03);
     const wide = warp_matrix(eye({ fov_y_rad: widened_fov(1, 1.26) }), view, aspect, Infinity);
-    expect(reach(wide)).toBeLessThan(1);
+    expect(reach(wide).x).toBeLessThan(1);
     expect(uncovered_share(wide)).toBe(0);
     const behind = warp_matrix(eye(), eye({ orientation: axis_angle(up, 3) }), aspect, Infinity);
-    expect(reach(behind)).toBe(4);
+    expect(reach(behind)).toEqual({ x: 4, y: 4 });
     expect(uncovered_share(behind)).toBe(1);
   });
 });
@@ -94,30 +97,66 @@ function add_rotated(by: Eye, inside: Vec3): Vec3 {
   return by.position.map((v, i) => v + a[i]! + b[i]! + c[i]!) as unknown as Vec3;
 }
 
+describe('the forecast of a turn', () => {
+  const eye_at = (yaw: number): Eye => eye({ orientation: axis_angle(up, yaw) });
+  /** A second at 60 Hz. */
+  function turn(forecast: TurnForecast, rate: number, lag_s: number, from_s: number): number {
+    for (let i = 1; i <= 60; ++i) {
+      const s = from_s + i / 60;
+      const sample = { pose_id: i, time_us: s * 1e6, eye: eye_at(rate * s), distance: Infinity };
+      forecast.moved(sample);
+      forecast.drawn(eye_at(rate * (s - lag_s)).orientation, s * 1e6);
+    }
+    return from_s + 1;
+  }
+  const ahead = (forecast: TurnForecast, rate: number, s: number): number =>
+    angle_between(forecast.eye_later(s * 1e6)!.orientation, eye_at(rate * s).orientation);
+
+  it('is the rate times the lag that pictures were seen to have', () => {
+    const forecast = new TurnForecast();
+    let s = turn(forecast, 1, 0.2, 0);
+    expect(ahead(forecast, 1, s)).toBeCloseTo(0.2, 3);
+    s = turn(forecast, 0.5, 0.2, s);
+    expect(ahead(forecast, 0.5, s)).toBeCloseTo(0.1, 3);
+  });
+
+  it('is ready before a picture has come, and bounded', () => {
+    const forecast = new TurnForecast();
+    expect(forecast.eye_later(0)).toBeUndefined();
+    forecast.moved({ pose_id: 1, time_us: 0, eye: eye_at(0), distance: Infinity });
+    forecast.moved({ pose_id: 2, time_us: 20_000, eye: eye_at(0.02), distance: Infinity });
+    expect(angle_between(forecast.eye_later(20_000)!.orientation, eye_at(0.02).orientation)).toBeCloseTo(0.1, 3);
+    const s = turn(forecast, 4, 3, 1);
+    expect(ahead(forecast, 4, s)).toBeCloseTo(0.5, 3);
+  });
+});
+
 describe('the policy of warping', () => {
   let now_us = 0;
   /** A second of motion at 60 Hz. */
-  const move = (policy: WarpPolicy, reach: number, draw_us = 500, seconds = 1): boolean => {
+  const move = (policy: WarpPolicy, x: number, draw_us = 500, seconds = 1, y = 1): boolean => {
     let changed = false;
     for (let i = 0; i < 60 * seconds; ++i) {
       now_us += 16_667;
-      changed = policy.drawn(reach, draw_us, now_us) || changed;
+      changed = policy.drawn({ x, y }, draw_us, now_us) || changed;
     }
     return changed;
   };
 
   it('asks for as much overscan as the motion needs, and no more', () => {
     const policy = new WarpPolicy(true);
-    expect(policy.overscan).toBe(1);
+    expect(policy.overscan).toEqual({ x: 1, y: 1 });
     expect(move(policy, 1.002)).toBe(false);
-    expect(policy.overscan).toBe(1);
-    expect(move(policy, 1.12, 500, 3)).toBe(true);
-    expect(policy.overscan).toBe(1.16);
+    expect(policy.overscan).toEqual({ x: 1, y: 1 });
+    expect(move(policy, 1.2, 500, 3, 1.05)).toBe(true);
+    expect(policy.overscan).toEqual({ x: 1.26, y: 1.12 });
+    expect(move(policy, 1.01, 500, 8, 1.05)).toBe(false); // the height is still needed
     expect(move(policy, 1.01, 500, 8)).toBe(false);
     expect(move(policy, 1.01, 500, 8)).toBe(true);
-    expect(policy.overscan).toBe(1.08);
-    move(policy, 3, 500, 3);
-    expect(policy.overscan).toBe(1.4);
+    expect(policy.overscan).toEqual({ x: 1.12, y: 1 });
+    move(policy, 3, 500, 3, 3);
+    expect(policy.overscan).toEqual({ x: 1.6, y: 1.26 });
+    expect(1.6 * 1.26).toBeLessThan(2.1); // pixels that a server has to draw, by those of the view
   });
 
   it('is off where drawing takes too long, unless somebody wants it', () => {
@@ -125,14 +164,14 @@ describe('the policy of warping', () => {
     move(policy, 1.12);
     expect(move(policy, 1.12, 15_000, 3)).toBe(true);
     expect(policy.active).toBe(false);
-    expect(policy.overscan).toBe(1);
+    expect(policy.overscan).toEqual({ x: 1, y: 1 });
     expect(policy.state).toMatch(/too slow/);
     policy.mode = 'on';
     expect(policy.active).toBe(true);
-    expect(policy.overscan).toBe(1.16);
+    expect(policy.overscan).toEqual({ x: 1.26, y: 1.12 });
     move(policy, 1.0, 15_000, 30);
     expect(policy.active).toBe(true);
-    expect(policy.overscan).toBe(1.16);
+    expect(policy.overscan).toEqual({ x: 1.26, y: 1.12 });
     policy.mode = 'off';
     expect(policy.active).toBe(false);
     expect(move(policy, 1.3, 500, 3)).toBe(false);
@@ -142,6 +181,6 @@ describe('the policy of warping', () => {
     const policy = new WarpPolicy(false);
     policy.mode = 'on';
     expect(policy.active).toBe(false);
-    expect(policy.overscan).toBe(1);
+    expect(policy.overscan).toEqual({ x: 1, y: 1 });
   });
 });

@@ -2,7 +2,16 @@
 // the rate of the display.
 import type { Picture } from '../decode/picture';
 import type { Pixels, Placing, Presenter } from './presenter';
-import { reach, uncovered_share, warp_matrix, type CameraSample, type Eye } from './warp';
+import { TurnForecast } from './turn_forecast';
+import {
+  reach,
+  uncovered_share,
+  warp_matrix,
+  type CameraSample,
+  type Eye,
+  type Matrix3,
+  type Sides,
+} from './warp';
 import { WarpPolicy, type WarpMode } from './warp_policy';
 
 export interface DisplayEnvironment {
@@ -29,14 +38,17 @@ const farthest_reach = 2.5;
 
 export class Display {
   private readonly policy_: WarpPolicy;
+  private readonly turn_ = new TurnForecast();
   private camera_: CameraSample | undefined;
   private picture_: Shown | undefined;
   private view_: Eye | undefined;
   private redraw_due_ = false;
 
+  /** `aspect`: width by height of the view. */
   constructor(
     private readonly presenter_: Presenter,
     private readonly env_: DisplayEnvironment,
+    public aspect: number,
   ) {
     this.policy_ = new WarpPolicy(presenter_.can_warp);
   }
@@ -56,13 +68,14 @@ export class Display {
   }
 
   /** Sides of the picture by those of the view. */
-  get overscan(): number {
+  get overscan(): Sides {
     return this.policy_.overscan;
   }
 
   /** Where the camera of this page is. */
   set camera(sample: CameraSample) {
     this.camera_ = sample;
+    this.turn_.moved(sample);
     this.redraw_soon();
   }
 
@@ -78,7 +91,7 @@ export class Display {
   read(): (Pixels & { readonly view: ShownView }) | undefined {
     const { picture_: picture, view_: view } = this;
     if (!picture || !view) return undefined;
-    const uncovered = uncovered_share(warp_matrix(picture.eye, view, aspect(picture), this.camera_?.distance ?? Infinity));
+    const uncovered = uncovered_share(this.matrix(picture, view, this.camera_?.distance ?? Infinity));
     return { ...this.presenter_.read(), view: { ...view, uncovered } };
   }
 
@@ -103,26 +116,35 @@ export class Display {
   private placing(): Placing | undefined {
     const { picture_: picture, camera_: camera } = this;
     if (!picture || !camera || !this.policy_.active) return undefined;
-    const { overscan } = this.policy_;
-    const matrix = warp_matrix(picture.eye, camera.eye, aspect(picture), camera.distance);
+    const matrix = this.matrix(picture, camera.eye, camera.distance);
     // A camera that jumped sees next to nothing of the picture: then it is better as it is.
-    if (reach(matrix) > farthest_reach) return undefined;
-    return {
-      matrix,
-      width_px: Math.round(picture.width_px / overscan),
-      height_px: Math.round(picture.height_px / overscan),
-    };
+    const { x, y } = reach(matrix);
+    if (Math.max(x, y) > farthest_reach) return undefined;
+    const height_px = Math.round(picture.height_px / this.policy_.overscan.y);
+    return { matrix, width_px: Math.round(height_px * this.aspect), height_px };
+  }
+
+  private matrix({ eye, width_px, height_px }: Shown, view: Eye, distance: number): Matrix3 {
+    return warp_matrix(eye, view, width_px / height_px, distance, this.aspect);
   }
 
   /** Tells the policy how a view was drawn whose camera moves. */
   private note({ matrix }: Placing, draw_us: number): void {
     const { picture_: picture, view_: view } = this;
     if (!picture || !view) return;
-    const widening = Math.tan(picture.eye.fov_y_rad / 2) / Math.tan(view.fov_y_rad / 2);
-    const needed = reach(matrix) * widening;
-    if (Math.abs(needed - 1) < no_motion_rad) return;
-    if (this.policy_.drawn(needed, draw_us, this.env_.now_us())) this.env_.overscan_changed();
+    const now_us = this.env_.now_us();
+    this.turn_.drawn(picture.eye.orientation, now_us);
+    const tall = Math.tan(picture.eye.fov_y_rad / 2) / Math.tan(view.fov_y_rad / 2);
+    const wide = (tall * picture.width_px) / picture.height_px / this.aspect;
+    const shown = reach(matrix);
+    let needed = { x: shown.x * wide, y: shown.y * tall };
+    if (Math.max(Math.abs(needed.x - 1), Math.abs(needed.y - 1)) < no_motion_rad) return;
+    // What this turn will need: whoever waits for what it needed shows a border first.
+    const later = this.turn_.eye_later(now_us);
+    if (later) {
+      const coming = reach(warp_matrix(view, later, this.aspect, Infinity));
+      needed = { x: Math.max(needed.x, coming.x), y: Math.max(needed.y, coming.y) };
+    }
+    if (this.policy_.drawn(needed, draw_us, now_us)) this.env_.overscan_changed();
   }
 }
-
-const aspect = ({ width_px, height_px }: Shown): number => width_px / height_px;

@@ -23,9 +23,15 @@ export type Matrix3 = Float32Array;
 /**
  * From places in the view to places in the picture. What lies `distance` ahead of the view (on a
  * plane at a right angle to its axis) comes out exactly; with Infinity, the far field: then only
- * rotation counts. `aspect`: width by height of both.
+ * rotation counts. `aspect`: width by height of the picture, and of the view where that differs.
  */
-export function warp_matrix(picture: Eye, view: Eye, aspect: number, distance: number): Matrix3 {
+export function warp_matrix(
+  picture: Eye,
+  view: Eye,
+  aspect: number,
+  distance: number,
+  view_aspect = aspect,
+): Matrix3 {
   const to_picture = conjugate(picture.orientation);
   const turn = multiply(to_picture, view.orientation);
   const shift = scale(rotate(to_picture, sub(view.position, picture.position)), 1 / distance);
@@ -41,7 +47,7 @@ export function warp_matrix(picture: Eye, view: Eye, aspect: number, distance: n
   };
   const none: Vec3 = [0, 0, 0];
   return new Float32Array([
-    ...column([1, 0, 0], from_tan * aspect, none),
+    ...column([1, 0, 0], from_tan * view_aspect, none),
     ...column([0, 1, 0], from_tan, none),
     ...column([0, 0, 1], 1, shift),
   ]);
@@ -57,9 +63,15 @@ export function warped(m: Matrix3, x: number, y: number): readonly [number, numb
 const probes = [-1, -0.5, 0, 0.5, 1];
 const farthest = 4;
 
-/** How far the view reaches beyond the middle of the picture: 1 is its border; at most 4. */
-export function reach(m: Matrix3): number {
-  let most = 0;
+/** Of a picture by those of the view; larger where a turn brings in what is beside the view. */
+export interface Sides {
+  readonly x: number;
+  readonly y: number;
+}
+
+/** How far the view reaches from the middle of the picture: 1 is its border; at most 4. */
+export function reach(m: Matrix3): Sides {
+  let [x_most, y_most] = [0, 0];
   for (const [x, y] of [
     ...probes.map((v) => [v, -1] as const),
     ...probes.map((v) => [v, 1] as const),
@@ -67,9 +79,10 @@ export function reach(m: Matrix3): number {
     ...probes.map((v) => [1, v] as const),
   ]) {
     const at = warped(m, x, y);
-    most = Math.max(most, at ? Math.max(Math.abs(at[0]), Math.abs(at[1])) : farthest);
+    x_most = Math.max(x_most, at ? Math.abs(at[0]) : farthest);
+    y_most = Math.max(y_most, at ? Math.abs(at[1]) : farthest);
   }
-  return Math.min(most, farthest);
+  return { x: Math.min(x_most, farthest), y: Math.min(y_most, farthest) };
 }
 
 /** Share of the view for which the picture has nothing, on a grid. */

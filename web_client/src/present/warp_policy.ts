@@ -1,20 +1,27 @@
 // Whether warping helps, and how much more than the view has to be rendered for it. Pure.
 import { percentile, TimeWindow } from '../stats/window';
+import type { Sides } from './warp';
 
 export type WarpMode = 'auto' | 'on' | 'off';
 
-/** Sides of the picture by those of the view. Each change opens the stream anew: so few. */
-const overscans = [1, 1.08, 1.16, 1.26, 1.4] as const;
-const mode_on_least = 1.16;
-const span_us = 2e6;
-const least_samples = 30;
+// Each change opens the stream anew: so few. Most turns are about the vertical, which needs width, and
+// height for the corners only: twice the view's pixels reach half as far again as by one factor.
+const widths = [1, 1.12, 1.26, 1.42, 1.6] as const;
+const heights = [1, 1.12, 1.26] as const;
+const none: Sides = { x: 1, y: 1 };
+const mode_on_least: Sides = { x: 1.26, y: 1.12 };
+const span_us = 1e6;
+const least_samples = 12;
 const calm_before_less_us = 10e6; // an overscan that was needed lately may be needed again
 const slow_draw_us = 8000; // half a refresh: such drawing makes the picture late
 
+const percent = (factor: number): number => Math.round((factor - 1) * 100);
+
 export class WarpPolicy {
-  private readonly reach_ = new TimeWindow(span_us);
+  private readonly widths_ = new TimeWindow(span_us);
+  private readonly heights_ = new TimeWindow(span_us);
   private readonly draw_us_ = new TimeWindow(span_us);
-  private overscan_ = 1;
+  private overscan_ = none;
   private needed_us_ = -Infinity; // when the present overscan was last needed
   private too_slow_ = false;
   private mode_: WarpMode = 'auto';
@@ -23,7 +30,7 @@ export class WarpPolicy {
 
   set mode(mode: WarpMode) {
     this.mode_ = mode;
-    this.overscan_ = mode === 'on' ? mode_on_least : 1;
+    this.overscan_ = mode === 'on' ? mode_on_least : none;
     this.too_slow_ = false;
   }
 
@@ -31,8 +38,8 @@ export class WarpPolicy {
     return this.can_warp_ && this.mode_ !== 'off' && !(this.too_slow_ && this.mode_ === 'auto');
   }
 
-  get overscan(): number {
-    return this.active ? this.overscan_ : 1;
+  get overscan(): Sides {
+    return this.active ? this.overscan_ : none;
   }
 
   /** For people. */
@@ -40,35 +47,49 @@ export class WarpPolicy {
     if (!this.can_warp_) return 'off: needs WebGL2 by a GPU';
     if (this.mode_ === 'off') return 'off';
     if (!this.active) return 'off: drawing is too slow here';
-    return `on, ${Math.round((this.overscan_ - 1) * 100)} % overscan`;
+    const { x, y } = this.overscan_;
+    return `on, ${percent(x)} × ${percent(y)} % overscan`;
   }
 
   /**
-   * A moving camera was drawn. `reach`: of the view in a picture without overscan (see reach()).
-   * Returns whether another overscan is wanted.
+   * A moving camera was drawn. `needed`: the overscan that covers it (see reach()). Returns whether
+   * another one is wanted.
    */
-  drawn(reach: number, draw_us: number, now_us: number): boolean {
+  drawn(needed: Sides, draw_us: number, now_us: number): boolean {
     if (!this.active) return false;
-    this.reach_.push(now_us, reach);
+    this.widths_.push(now_us, needed.x);
+    this.heights_.push(now_us, needed.y);
     this.draw_us_.push(now_us, draw_us);
-    const reaches = this.reach_.values(now_us);
-    if (reaches.length < least_samples) return false;
+    const [x, y] = [this.widths_.values(now_us), this.heights_.values(now_us)];
+    if (x.length < least_samples) return false;
     if (percentile(this.draw_us_.values(now_us), 0.5) > slow_draw_us && this.mode_ === 'auto') {
       this.too_slow_ = true;
-      return this.overscan_ > 1;
+      return this.overscan_ !== none;
     }
-    return this.choose(percentile(reaches, 0.9), now_us);
+    return this.choose({ x: percentile(x, 0.9), y: percentile(y, 0.9) }, now_us);
   }
 
-  private choose(needed: number, now_us: number): boolean {
-    const largest = overscans[overscans.length - 1]!;
-    const fitting = overscans.find((factor) => factor >= needed - 0.005) ?? largest;
-    const wanted = Math.max(fitting, this.mode_ === 'on' ? mode_on_least : 1);
-    if (wanted >= this.overscan_) this.needed_us_ = now_us;
-    const changes =
-      wanted > this.overscan_ ||
-      (wanted < this.overscan_ && now_us - this.needed_us_ > calm_before_less_us);
-    if (changes) this.overscan_ = wanted;
-    return changes;
+  private choose(needed: Sides, now_us: number): boolean {
+    const least = this.mode_ === 'on' ? mode_on_least : none;
+    const now = this.overscan_;
+    const wanted = {
+      x: Math.max(fitting(widths, needed.x), least.x),
+      y: Math.max(fitting(heights, needed.y), least.y),
+    };
+    // What is too much on one side stays while the other one is needed: turns change their axis.
+    const is_needed = (now.x > 1 && wanted.x >= now.x) || (now.y > 1 && wanted.y >= now.y);
+    if (is_needed) this.needed_us_ = now_us;
+    if (wanted.x > now.x || wanted.y > now.y) {
+      this.overscan_ = { x: Math.max(wanted.x, now.x), y: Math.max(wanted.y, now.y) };
+      this.needed_us_ = now_us;
+      return true;
+    }
+    const is_less = wanted.x < now.x || wanted.y < now.y;
+    if (!is_less || now_us - this.needed_us_ <= calm_before_less_us) return false;
+    this.overscan_ = wanted;
+    return true;
   }
 }
+
+const fitting = (factors: readonly number[], needed: number): number =>
+  factors.find((factor) => factor >= needed - 0.005) ?? factors[factors.length - 1]!;

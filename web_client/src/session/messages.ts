@@ -4,7 +4,7 @@ import type { Vec3 } from '../camera/vector';
 import type { DecoderRung } from '../decode/ladder';
 import type { PresenterChoice } from '../present/make_presenter';
 import type { ShownView } from '../present/display';
-import type { CameraSample, Eye } from '../present/warp';
+import type { CameraSample, Eye, Sides } from '../present/warp';
 import type { WarpMode } from '../present/warp_policy';
 import type { StatsSnapshot } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
@@ -71,7 +71,7 @@ export type FromWorker =
   | { kind: 'state'; state: SessionState }
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
-  | { kind: 'presenter'; description: string; warps: boolean; overscan: number }
+  | { kind: 'presenter'; description: string; warps: boolean; overscan: Sides }
   /** `rung` has proved to be where decoding works here. */
   | { kind: 'rung'; rung: DecoderRung }
   /** The answer to a pick; undefined: nothing is there. */

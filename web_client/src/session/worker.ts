@@ -11,7 +11,7 @@ import {
 import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
-import { widened_fov, type CameraSample, type Eye } from '../present/warp';
+import { widened_fov, type CameraSample, type Eye, type Sides } from '../present/warp';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
 import {
@@ -73,11 +73,12 @@ class Client {
     this.quality_ = start.quality;
     this.rung_ = start.rung;
     this.presenter_ = make_presenter(start.canvas, start.presenter);
-    this.display_ = new Display(this.presenter_, {
+    const environment = {
       now_us: () => this.clock_.now_us(),
-      on_refresh: (draw) => scope.requestAnimationFrame(draw),
+      on_refresh: (draw: () => void) => void scope.requestAnimationFrame(draw),
       overscan_changed: () => this.send_sizes(),
-    });
+    };
+    this.display_ = new Display(this.presenter_, environment, aspect_of(start.view));
     this.tell_presenter();
     this.pipeline_ = this.make_pipeline();
     this.session_ = this.make_session(start);
@@ -94,6 +95,7 @@ class Client {
         break;
       case 'view':
         this.view_ = message.view;
+        this.display_.aspect = aspect_of(message.view);
         this.quality_ = message.quality;
         this.send_sizes();
         break;
@@ -158,7 +160,7 @@ class Client {
             kind: 'presented',
             pose_id: Number(frame.header.poseId),
             pose: eye_of(frame.header.renderPose, 0),
-            fov_y_rad: widened_fov(frame.header.fovYRad, 1 / this.display_.overscan),
+            fov_y_rad: widened_fov(frame.header.fovYRad, 1 / this.display_.overscan.y),
           });
         },
         dropped: () => this.metrics_.dropped(),
@@ -223,7 +225,7 @@ class Client {
   }
 
   private widened(eye: Eye): Eye {
-    return { ...eye, fov_y_rad: widened_fov(eye.fov_y_rad, this.display_.overscan) };
+    return { ...eye, fov_y_rad: widened_fov(eye.fov_y_rad, this.display_.overscan.y) };
   }
 
   private tell_presenter(): void {
@@ -276,12 +278,14 @@ function viewport(view: View): [width_px: number, height_px: number, ratio: numb
   return [view.width_px, view.height_px, view.device_pixel_ratio];
 }
 
+const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
+
 /** The frame size: the chosen height or the view's, in the view's shape, with overscan. */
-function settings(view: View, quality: Quality, overscan: number): SettingsInit {
-  const height_px = (quality.height_px > 0 ? quality.height_px : view.height_px) * overscan;
+function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
+  const height_px = quality.height_px > 0 ? quality.height_px : view.height_px;
   return {
-    widthPx: frame_side((height_px * view.width_px) / view.height_px),
-    heightPx: frame_side(height_px),
+    widthPx: frame_side(height_px * aspect_of(view) * overscan.x),
+    heightPx: frame_side(height_px * overscan.y),
     maxFps: quality.max_fps,
   };
 }

@@ -58,7 +58,7 @@ export class Viewer {
   private readonly toolbar_: Toolbar;
   private readonly guide_: Guide;
   private warps_ = false;
-  private overscan_ = 1;
+  private overscan_ = { x: 1, y: 1 };
   private readonly view_ = by_id('view', HTMLElement);
   private readonly quality_ = new QualityChoice();
   private readonly inertia_ = new Inertia();
@@ -306,7 +306,9 @@ export class Viewer {
         this.show_facts({ presenter: message.description });
         this.warps_ = message.warps;
         // The newest picture has another field of view: a sample makes the server draw it anew.
-        if (message.overscan !== this.overscan_) this.loop_.changed();
+        if (message.overscan.y !== this.overscan_.y || message.overscan.x !== this.overscan_.x) {
+          this.loop_.changed();
+        }
         this.overscan_ = message.overscan;
         break;
       case 'rung':
