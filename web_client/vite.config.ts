@@ -1,4 +1,5 @@
 import { defineConfig, loadEnv } from 'vite';
+import { with_texts } from './page_texts';
 
 /** What is used here of Node.js's http.IncomingMessage. */
 interface Request {
@@ -12,6 +13,7 @@ export default defineConfig(({ mode }) => {
     // The server's Content-Security-Policy allows files of its own only: nothing is inlined, and
     // paths are relative so that the page works below any prefix of a reverse proxy.
     base: './',
+    plugins: [{ name: 'page-texts', transformIndexHtml: { order: 'pre', handler: with_texts } }],
     build: {
       target: 'es2022',
       assetsInlineLimit: 0,

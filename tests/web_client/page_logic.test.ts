@@ -1,4 +1,5 @@
 // The parts of the page that decide something.
+import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { Settling } from '#client/automation';
 import { AutoHeight } from '#client/session/auto_height';
@@ -7,6 +8,7 @@ import { take_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
 import { Error_Code } from '#client/wire/wire';
+import { with_texts } from '../../web_client/page_texts';
 import { FakeTime, fake_storage } from './fakes';
 
 describe('access token', () => {
@@ -191,5 +193,29 @@ describe('wording', () => {
   it('names what an old browser lacks', () => {
     const scope = { Worker: globalThis.Object as never, WebSocket: globalThis.Object as never };
     expect(unsupported_card(scope)?.text).toContain('OffscreenCanvas');
+  });
+});
+
+describe('the texts of the page', () => {
+  const index = readFileSync(new URL('../../web_client/index.html', import.meta.url), 'utf8');
+
+  it('are in one file, and index.html names them', () => {
+    const body = index.slice(index.indexOf('<main'));
+    const attributes = [...body.matchAll(/ (?:aria-label|title|placeholder|alt)="([^"]*)"/g)];
+    const between = [...body.replace(/<kbd[^]*?<\/kbd>/g, '').matchAll(/>([^<]+)</g)];
+    const texts = [...attributes, ...between].map(([, found]) => found!.trim());
+    expect(texts.length).toBeGreaterThan(60);
+    // A sign is no text: the cross of a button, the comma between two keys.
+    const loose = texts.filter((found) => /[a-z]{2}/i.test(found.replace(/\{\{[\w.]+\}\}|&#\d+;/g, '')));
+    expect(loose).toEqual([]);
+  });
+
+  it('come into the page when it is built', () => {
+    expect(with_texts('<p title="{{page.start_key}}">{{modes.orbit}}</p>')).toBe(
+      '<p title="Back to the start (R)">Orbit</p>',
+    );
+    expect(with_texts(index)).not.toContain('{{');
+    expect(() => with_texts('{{page.absent}}')).toThrow('src/text.ts has no text page.absent');
+    expect(() => with_texts('{{share}}')).toThrow('no text share');
   });
 });

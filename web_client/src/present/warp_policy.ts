@@ -1,5 +1,6 @@
 // Whether warping helps, and how much more than the view has to be rendered for it. Pure.
 import { percentile, TimeWindow } from '../stats/window';
+import { text } from '../text';
 import type { Sides } from './warp';
 
 export type WarpMode = 'auto' | 'on' | 'off';
@@ -44,11 +45,11 @@ export class WarpPolicy {
 
   /** For people. */
   get state(): string {
-    if (!this.can_warp_) return 'off: needs WebGL2 by a GPU';
-    if (this.mode_ === 'off') return 'off';
-    if (!this.active) return 'off: drawing is too slow here';
+    if (!this.can_warp_) return text.warp.no_gpu;
+    if (this.mode_ === 'off') return text.warp.off;
+    if (!this.active) return text.warp.too_slow;
     const { x, y } = this.overscan_;
-    return `on, ${percent(x)} × ${percent(y)} % overscan`;
+    return text.warp.on(percent(x), percent(y));
   }
 
   /**

@@ -6,7 +6,7 @@ import { save_sidecar } from '../tour/save';
 import type { Tour } from '../tour/tour';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
-import { text } from './text';
+import { text } from '../text';
 
 export interface AuthorTools {
   eye(): Eye;

@@ -12,7 +12,7 @@ import { read_shared, share_address } from '../tour/share';
 import { AuthorPanel } from './author_panel';
 import { EmbedApi } from './embed';
 import { SharePanel } from './share_panel';
-import { text } from './text';
+import { text } from '../text';
 import { TourView } from './tour_view';
 
 export interface GuideParts {

@@ -1,7 +1,7 @@
 import type { Snapshot } from '../session/messages';
 import { embed_code } from '../tour/share';
 import { by_id } from './dom';
-import { text as words } from './text';
+import { text as words } from '../text';
 
 export interface ShareSource {
   address(): string;

@@ -3,7 +3,7 @@ import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 import type { StatsHistory } from '../stats/history';
 import type { StatsSnapshot } from '../stats/metrics';
-import { text } from './text';
+import { text } from '../text';
 
 type Stage = keyof StatsSnapshot['stages_ms'];
 

@@ -3,7 +3,7 @@ import type { StatsSnapshot } from '../stats/metrics';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
 import type { StatsCharts } from './stats_charts';
-import { text } from './text';
+import { text } from '../text';
 
 /** What the server said of itself, and how this page shows pictures. */
 export interface Facts {

@@ -3,7 +3,7 @@ import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
 import { is_typing } from '../input/view_input';
 import { by_id } from './dom';
-import { text } from './text';
+import { text } from '../text';
 
 export interface ToolbarListener {
   toggle_mode(): void;

@@ -4,7 +4,7 @@ import type { TourPlayer, TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import { is_typing } from '../input/view_input';
 import { by_id } from './dom';
-import { text } from './text';
+import { text } from '../text';
 
 /** Caption and buttons of the tour, its keys, and the hotspots in the picture. */
 export class TourView {

@@ -27,6 +27,7 @@ import { scene_setup } from '../session/scene_setup';
 import type { SessionState } from '../session/state';
 import { list_scenes } from '../session/scenes';
 import { remember_token, take_token } from '../session/token';
+import { text } from '../text';
 import { Error_Code, type StreamConfig, type Welcome } from '../wire/wire';
 import type { CardView } from './card';
 import { by_id } from './dom';
@@ -321,9 +322,7 @@ export class Viewer {
         this.notice_.show(message.message, true);
         break;
       case 'fallback':
-        this.notice_.show(
-          `Video cannot be decoded here (${message.message}): pictures come as JPEG.`,
-        );
+        this.notice_.show(text.jpeg.failed_now(message.message));
         break;
       case 'broken':
         this.break_off(message.message);
