@@ -10,7 +10,7 @@
 namespace catgs {
 namespace {
 
-constexpr glm::ivec2 size_px{960, 540};
+constexpr glm::ivec2 size_px = poster_size_px;
 constexpr float fov_y_rad = 1.0471976f;  // that of a page's first view: 60 degrees
 // MJPEG keeps to bitrate / fps a frame: 100 kB.
 constexpr int fps = 10;

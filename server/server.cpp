@@ -22,6 +22,7 @@
 #include "render_core/error.h"
 #include "render_core/thread_pool.h"
 #include "server/access.h"
+#include "server/link_preview.h"
 #include "server/metrics.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
@@ -123,6 +124,7 @@ struct Server::State {
   /// name.
   [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
+  std::string preview(const HttpRequest& request);
   HttpResponse list_scenes(const std::string& token);
   HttpResponse part_of_scene(std::string_view scene_id, ScenePart part, const std::string& token);
   /// Of "PUT /api/scenes/ID/sidecar".
@@ -193,7 +195,27 @@ HttpResponse Server::State::respond(const HttpRequest& request) {
     if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
       return part_of_scene(*id, part, bearer_token(request.authorization));
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
+  if (!client.empty() && (request.path == "/" || request.path == "/index.html"))
+    return client.respond_with_head(request, preview(request));
   return client.respond(request);
+}
+
+/// For who sees the scene without a token: programs that make previews have none, and a preview
+/// must not tell more than the page.
+std::string Server::State::preview(const HttpRequest& request) {
+  constexpr std::string_view name = "scene=";
+  const auto argument = std::ranges::find_if(
+      request.arguments, [&](const std::string& text) { return text.starts_with(name); });
+  const auto listing = scenes->listing();
+  const auto scene =
+      argument == request.arguments.end()
+          ? listing->begin()
+          : std::ranges::find(*listing, std::string_view(*argument).substr(name.size()),
+                              &SceneLibrary::Listing::id);
+  if (scene == listing->end() || access.refusal("", scene->id, unix_now_s(), Use::own_session))
+    return {};
+  return preview_elements(
+      {request.site, scene->id, scene->title, scene->gaussians, scene->poster != nullptr});
 }
 
 /// What the token may see. Like hello, this never tells a stranger what is here.

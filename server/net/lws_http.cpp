@@ -41,6 +41,19 @@ class HeaderWriter {
   bool ok_ = true;
 };
 
+std::vector<std::string> query_arguments(lws* wsi) {
+  constexpr int most = 16;
+  std::vector<std::string> arguments;
+  std::array<char, 512> text{};
+  for (int i = 0; i < most; ++i) {
+    const int length = lws_hdr_copy_fragment(wsi, text.data(), static_cast<int>(text.size()),
+                                             WSI_TOKEN_HTTP_URI_ARGS, i);
+    if (length < 0) break;
+    arguments.emplace_back(text.data(), static_cast<std::size_t>(length));
+  }
+  return arguments;
+}
+
 }  // namespace
 
 std::string request_header(lws* wsi, lws_token_indexes token) {
@@ -52,15 +65,26 @@ std::string request_header(lws* wsi, lws_token_indexes token) {
   return value;
 }
 
-int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& policy,
-                           bool& finished) {
+std::string custom_header(lws* wsi, std::string_view name_with_colon) {
+  const int name_length = static_cast<int>(name_with_colon.size());
+  const int length = lws_hdr_custom_length(wsi, name_with_colon.data(), name_length);
+  if (length <= 0) return {};
+  std::string value(static_cast<std::size_t>(length) + 1, '\0');
+  const int copied =
+      lws_hdr_custom_copy(wsi, value.data(), length + 1, name_with_colon.data(), name_length);
+  value.resize(static_cast<std::size_t>(std::max(copied, 0)));
+  return value;
+}
+
+int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site,
+                           const std::string& policy, bool& finished) {
   head_only_ = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
   const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  response_ =
-      handler({path, if_none_match, encodings.find("gzip") != std::string::npos, authorization});
+  response_ = handler({path, if_none_match, encodings.find("gzip") != std::string::npos,
+                       authorization, site, query_arguments(wsi)});
   finished = head_only_ || !response_.body || response_.body->empty();
   return write_headers(wsi, policy);
 }

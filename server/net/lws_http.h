@@ -15,10 +15,11 @@ namespace catgs {
 /// One HTTP request of libwebsockets being answered. Network thread only.
 class LwsHttpExchange {
  public:
-  /// Reads the request, asks `handler` and writes the response's headers. `policy` is the
-  /// Content-Security-Policy. Sets `finished` when there is no body to follow.
-  /// The int results below are libwebsockets': nonzero closes the connection.
-  int begin(lws* wsi, const HttpHandler& handler, const std::string& policy, bool& finished);
+  /// Reads the request, asks `handler` and writes the response's headers. `site`:
+  /// HttpRequest::site; `policy`: the Content-Security-Policy. Sets `finished` when there is no
+  /// body to follow. The int results below are libwebsockets': nonzero closes the connection.
+  int begin(lws* wsi, const HttpHandler& handler, const std::string& site,
+            const std::string& policy, bool& finished);
   /// A PUT request: its body follows, of a length that is known to be small. `refusal`: what it
   /// will be answered then, whatever it is.
   int begin_upload(lws* wsi, std::optional<HttpResponse> refusal);
@@ -45,6 +46,10 @@ class LwsHttpExchange {
   std::optional<HttpResponse> refusal_;
   std::future<HttpResponse> answer_;
 };
+
+/// Header of the request that libwebsockets has no token for ("x-forwarded-proto:"), or an empty
+/// string.
+std::string custom_header(lws* wsi, std::string_view name_with_colon);
 
 /// Header of the request, or an empty string.
 std::string request_header(lws* wsi, lws_token_indexes token);

@@ -90,6 +90,15 @@ bool is_get_or_head(lws* wsi) {
          lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
 }
 
+/// How the client came here. A proxy says whether it was by TLS.
+std::string site_address(lws* wsi, const Site& site, const std::string& host) {
+  if (host.empty()) return {};
+  bool tls = lws_is_ssl(wsi) != 0;
+  if (site.proxies.is_proxy(peer_address_of(wsi)))
+    tls |= custom_header(wsi, "x-forwarded-proto:") == "https";
+  return (tls ? "https://" : "http://") + host;
+}
+
 const std::string upload_length_rule =
     fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
 
@@ -140,8 +149,8 @@ int on_request(lws* wsi, HttpSlot& slot) {
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
   const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(host); };
   bool finished = false;
-  if (slot.exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse, site.policy,
-                           finished) != 0)
+  if (slot.exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse,
+                           site_address(wsi, site, host), site.policy, finished) != 0)
     return -1;
   if (finished) return finish_request(wsi, slot);
   lws_callback_on_writable(wsi);

@@ -117,7 +117,23 @@ StaticFiles::StaticFiles(const std::filesystem::path& folder) {
 HttpResponse StaticFiles::respond(const HttpRequest& request) const {
   const auto it = files_.find(request.path == "/" ? std::string_view("/index.html") : request.path);
   if (it == files_.end()) return text_response(404, "404: there is no such page here\n");
-  const File& file = it->second;
+  return respond_with(it->second, request);
+}
+
+HttpResponse StaticFiles::respond_with_head(const HttpRequest& request,
+                                            std::string_view head) const {
+  const File& index = files_.at("/index.html");
+  std::string body = *index.body;
+  const auto end = body.find("</head>");
+  if (end == std::string::npos) return respond_with(index, request);
+  body.insert(end, head);
+  File page{index.content_type, index.cache_control, etag_of(body), nullptr, nullptr};
+  if (request.accepts_gzip) page.gzip_body = gzip(body);
+  page.body = std::make_shared<const std::string>(std::move(body));
+  return respond_with(page, request);
+}
+
+HttpResponse StaticFiles::respond_with(const File& file, const HttpRequest& request) {
   HttpResponse response;
   response.content_type = file.content_type;
   response.cache_control = file.cache_control;

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "server/net/http.h"
 
@@ -23,6 +24,10 @@ class StaticFiles {
   /// the others are revalidated by their ETag.
   [[nodiscard]] HttpResponse respond(const HttpRequest& request) const;
 
+  /// "/" and "/index.html", with `head` added to the end of the page's <head>.
+  [[nodiscard]] HttpResponse respond_with_head(const HttpRequest& request,
+                                               std::string_view head) const;
+
   [[nodiscard]] bool empty() const { return files_.empty(); }
 
  private:
@@ -33,6 +38,8 @@ class StaticFiles {
     std::shared_ptr<const std::string> body;
     std::shared_ptr<const std::string> gzip_body;  // null: not worth it
   };
+  static HttpResponse respond_with(const File& file, const HttpRequest& request);
+
   std::map<std::string, File, std::less<>> files_;  // by request path, "/assets/x.js"
 };
 

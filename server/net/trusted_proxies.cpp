@@ -60,6 +60,11 @@ bool TrustedProxies::trusts(const ip::address& address) const {
   });
 }
 
+bool TrustedProxies::is_proxy(const std::string& peer) const {
+  const auto address = parse_address(peer);
+  return address && trusts(*address);
+}
+
 std::string TrustedProxies::client_address(const std::string& peer,
                                            std::string_view forwarded_for) const {
   auto client = parse_address(peer);

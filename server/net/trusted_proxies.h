@@ -18,6 +18,9 @@ class TrustedProxies {
   /// "10.0.0.0/8", "2001:db8::/32", or single addresses. Throws std::invalid_argument.
   explicit TrustedProxies(const std::vector<std::string>& networks);
 
+  /// Whether what connections from `peer` say of their clients is believed.
+  [[nodiscard]] bool is_proxy(const std::string& peer) const;
+
   /// Whom a connection from `peer` belongs to. Each proxy has appended the address that it was
   /// called from: from the right, the first one that is no trusted proxy's is the client's. What
   /// stands left of it the client may have made up. An entry that is no address ends the search.

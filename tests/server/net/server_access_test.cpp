@@ -138,6 +138,37 @@ TEST(ServerAccess, AdmitsByTokenAndNeverSaysIt) {
   EXPECT_THAT(http_get(server.admin_port(), "/api/sessions").body, Not(HasSubstr("sesame")));
 }
 
+TEST(ServerAccess, PreviewsTellWhatStrangersMaySee) {
+  const TemporaryFolder folder;
+  folder.write("web/index.html", "<!doctype html><head></head>");
+  const auto web = [&](ServerConfig& config) {
+    config.client_dir = (folder / "web").string();
+    config.scenes = {"synth:city:2000", "synth:garden:2000"};
+    config.trusted_proxies = {"127.0.0.0/8"};
+  };
+  RunningServer open(web);
+  const std::string own = "http://127.0.0.1:" + std::to_string(open.port());
+  const HttpReply first = http_get(open.port(), "/");
+  EXPECT_THAT(first.body,
+              AllOf(HasSubstr("og:title\" content=\"city\""),
+                    HasSubstr(own + "/api/scenes/city/poster.jpg"), testing::EndsWith("</head>")));
+  EXPECT_EQ(http_get(open.port(), "/", {{"if-none-match", first.headers.at("etag")}}).status, 304);
+  EXPECT_EQ(http_get(open.port(), "/api/scenes/city/poster.jpg").status, 200) << "it is there";
+  const HttpReply garden = http_get(open.port(), "/?ui=0&scene=garden",
+                                    {{"host", "localhost"}, {"x-forwarded-proto", "https"}});
+  EXPECT_THAT(garden.body, HasSubstr("https://localhost/api/scenes/garden/poster.jpg"));
+  EXPECT_THAT(http_get(open.port(), "/?scene=atlantis").body, Not(HasSubstr("og:")));
+
+  RunningServer guarded([&](ServerConfig& config) {
+    web(config);
+    config.token_file = folder.write("tokens", "open-sesame-1\n").string();
+  });
+  for (const char* page : {"/", "/index.html", "/?scene=city"})
+    EXPECT_THAT(http_get(guarded.port(), page).body,
+                AllOf(Not(HasSubstr("og:")), Not(HasSubstr("city"))));
+  EXPECT_EQ(http_get(guarded.port(), "/api/scenes/city/poster.jpg").status, 401);
+}
+
 TEST(ServerAccess, ServesTlsWithTheGivenCertificate) {
   const TemporaryFolder folder;
   const auto certificate = folder / "certificate.pem";

@@ -1,0 +1,65 @@
+#include "server/link_preview.h"
+
+#include <fmt/format.h>
+
+#include "server/poster.h"
+
+namespace catgs {
+namespace {
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+/// As a part of a path: all but letters, digits and "-._~" by their bytes.
+std::string url_part(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                       std::string_view("-._~").find(c) != std::string_view::npos;
+    out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string preview_elements(const LinkPreview& preview) {
+  std::string out;
+  const auto add = [&](std::string_view kind, std::string_view name, std::string_view content) {
+    out += fmt::format("<meta {}=\"{}\" content=\"{}\" />\n", kind, name, escaped(content));
+  };
+  add("property", "og:type", "website");
+  add("property", "og:title", preview.title);
+  add("property", "og:description",
+      fmt::format("Walk through this 3D capture of {} Gaussians in your browser.",
+                  preview.gaussians));
+  if (!preview.has_poster || preview.site.empty()) return out;
+  add("property", "og:image",
+      fmt::format("{}/api/scenes/{}/poster.jpg", preview.site, url_part(preview.scene_id)));
+  add("property", "og:image:width", std::to_string(poster_size_px.x));
+  add("property", "og:image:height", std::to_string(poster_size_px.y));
+  add("name", "twitter:card", "summary_large_image");
+  return out;
+}
+
+}  // namespace catgs
