@@ -396,7 +396,7 @@ describe('trouble', () => {
   it('an unknown scene is said, and the ones there are', async () => {
     const { page } = await open_viewer(undefined, `${server.url}?scene=atlantis`);
     await page.getByText('No such scene').waitFor();
-    await page.getByRole('link', { name: 'city' }).click();
+    await page.getByRole('button', { name: 'Open city' }).click();
     await settle(page);
   });
 });

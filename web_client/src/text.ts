@@ -102,7 +102,7 @@ export const text = {
     unauthorized: 'Access token needed',
     unknown_scene: {
       title: 'No such scene',
-      others: 'These are here:',
+      others: 'Open one of these:',
       check: "Check the scene's name in the address (?scene=…).",
     },
     version: {

@@ -81,11 +81,10 @@ function failed_card(code: Error_Code, message: string, scene_ids: readonly stri
 function unknown_scene_card(message: string, scene_ids: readonly string[]): Card {
   const { title, others, check } = cards.unknown_scene;
   const [first] = scene_ids;
-  const is_choice = scene_ids.length > 1;
+  if (scene_ids.length > 1) return { title, text: sentence(message) + others, scene_ids };
   return {
     title,
-    text: sentence(message) + (is_choice ? others : check),
-    scene_ids: is_choice ? scene_ids : [],
+    text: sentence(message) + check,
     action: {
       label: first === undefined ? actions.open_first : actions.open(first),
       does: 'open',

@@ -1,0 +1,241 @@
+// Each control by each input device, against a server that follows a script.
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Browser, CDPSession, Page } from 'playwright-core';
+import type { Pose } from '#client/camera/camera_controller';
+import { rotate, sub, conjugate, type Vec3 } from '#client/camera/vector';
+import { launch_browser, new_page, type WatchedPage } from './support/browser';
+import { pose_of, settle } from './support/camera';
+import { start_fake_server, type FakeServer } from './support/fake_server';
+import { painted_jpeg, stream_of } from './support/painted';
+
+let browser: Browser;
+let server: FakeServer;
+let watched: WatchedPage;
+
+beforeAll(async () => {
+  browser = await launch_browser();
+  server = await start_fake_server(stream_of(await painted_jpeg(browser)));
+});
+
+afterEach(async () => {
+  expect(watched.errors).toEqual([]);
+  await watched.page.context().close();
+});
+
+afterAll(async () => {
+  await server.close();
+  await browser.close();
+});
+
+async function open(touch = false): Promise<Page> {
+  const viewport = { width: 640, height: 360 };
+  watched = await new_page(browser, touch ? { viewport, hasTouch: true, isMobile: true } : { viewport });
+  await watched.page.goto(server.url);
+  await settle(watched.page);
+  return watched.page;
+}
+
+interface Change {
+  /** In the axes of the camera before: x right, y down, z forward. */
+  readonly moved: Vec3;
+  /** Where the camera's axis went, in the same axes. */
+  readonly axis: Vec3;
+}
+
+async function change_by(page: Page, action: () => Promise<void>): Promise<Change> {
+  const before = await pose_of(page);
+  await action();
+  await settle(page);
+  const after: Pose = await pose_of(page);
+  const into = conjugate(before.orientation);
+  return {
+    moved: rotate(into, sub(after.position, before.position)),
+    axis: rotate(into, rotate(after.orientation, [0, 0, 1])),
+  };
+}
+
+type Axis = 'right' | 'left' | 'down' | 'up' | 'forward' | 'back';
+const along: Readonly<Record<Axis, readonly [index: number, sign: number]>> = {
+  right: [0, 1], left: [0, -1], down: [1, 1], up: [1, -1], forward: [2, 1], back: [2, -1],
+};
+
+function expect_most(v: Vec3, axis: Axis): void {
+  const [index, sign] = along[axis];
+  expect(v[index]! * sign).toBeGreaterThan(1e-4);
+  expect(Math.abs(v[index]!)).toBe(Math.max(...v.map(Math.abs)));
+}
+
+describe('keys', () => {
+  it('move and turn the camera, each its way', async () => {
+    const page = await open();
+    await page.keyboard.press('KeyM'); // fly
+    const moves = { KeyW: 'forward', KeyS: 'back', KeyA: 'left', KeyD: 'right', KeyE: 'up', KeyQ: 'down' } as const;
+    for (const [key, axis] of Object.entries(moves)) {
+      expect_most((await change_by(page, () => page.keyboard.press(key))).moved, axis);
+    }
+    const turns = { ArrowLeft: 'left', ArrowRight: 'right', ArrowUp: 'up', ArrowDown: 'down' } as const;
+    for (const [key, axis] of Object.entries(turns)) {
+      const { axis: [x, y], moved } = await change_by(page, () => page.keyboard.press(key));
+      expect_most([x, y, 0], axis);
+      expect(Math.hypot(...moved)).toBeLessThan(1e-6);
+    }
+  });
+
+  it('press every button of the page', async () => {
+    const page = await open();
+    const panel = async (key: string, id: string): Promise<void> => {
+      await page.keyboard.press(key);
+      expect(await page.locator(id).isVisible()).toBe(true);
+      await page.keyboard.press('Escape');
+      expect(await page.locator(id).isHidden()).toBe(true);
+    };
+    await panel('KeyI', '#stats-panel');
+    await panel('KeyH', '#help-panel');
+    for (const mode of ['Fly', 'Walk', 'Orbit']) {
+      await page.keyboard.press('KeyM');
+      await page.getByText(mode, { exact: true }).waitFor();
+    }
+    const start = await pose_of(page);
+    const { axis } = await change_by(page, () => page.keyboard.press('KeyU'));
+    expect(axis[2]).toBeCloseTo(1, 6); // upside down, and looking the same way
+    expect(await pose_of(page)).not.toEqual(start);
+    await page.keyboard.press('KeyU');
+    await page.keyboard.press('ArrowLeft');
+    await settle(page);
+    await page.keyboard.press('KeyR');
+    await settle(page);
+    (await pose_of(page)).position.forEach((v, i) => expect(v).toBeCloseTo(start.position[i]!, 5));
+    await page.keyboard.press('KeyF');
+    await page.waitForFunction(() => document.fullscreenElement !== null);
+    await page.keyboard.press('KeyF');
+    await page.waitForFunction(() => document.fullscreenElement === null);
+  });
+
+  it('reach every control by Tab, and each says what it is', async () => {
+    const page = await open();
+    const names = new Set<string>();
+    for (let i = 0; i < 24; ++i) {
+      await page.keyboard.press('Tab');
+      names.add(
+        await page.evaluate(() => {
+          const { activeElement: at } = document;
+          return at?.getAttribute('aria-label') ?? at?.textContent.trim() ?? '';
+        }),
+      );
+    }
+    for (const name of ['Orbit', 'Back to the start', 'Quality and view', 'Statistics', 'Share', 'Controls']) {
+      expect(names).toContain(name);
+    }
+  });
+});
+
+describe('the mouse', () => {
+  it('looks, pans, zooms and presses buttons', async () => {
+    const page = await open();
+    const drag = (button: 'left' | 'right' | 'middle') => async (): Promise<void> => {
+      await page.mouse.move(320, 180);
+      await page.mouse.down({ button });
+      await page.mouse.move(400, 180, { steps: 5 });
+      await page.mouse.up({ button });
+    };
+    const orbited = await change_by(page, drag('left'));
+    expect(Math.abs(orbited.axis[0])).toBeGreaterThan(0.1);
+    for (const button of ['right', 'middle'] as const) {
+      expect_most((await change_by(page, drag(button))).moved, 'left'); // the scene follows the hand
+    }
+    expect_most((await change_by(page, () => page.mouse.wheel(0, -200))).moved, 'forward');
+    expect_most((await change_by(page, () => page.mouse.wheel(0, 200))).moved, 'back');
+    for (const [button, id] of [
+      ['Quality and view', '#quality-panel'],
+      ['Statistics', '#stats-panel'],
+      ['Share', '#share-panel'],
+    ] as const) {
+      await page.locator('#toolbar').getByRole('button', { name: button }).click();
+      expect(await page.locator(id).isVisible()).toBe(true);
+      await page.keyboard.press('Escape');
+    }
+    await page.getByRole('button', { name: 'Orbit' }).click();
+    await page.getByText('Fly', { exact: true }).waitFor();
+    await page.getByRole('button', { name: 'Back to the start' }).click();
+    await page.getByRole('button', { name: 'Full screen' }).click();
+    await page.waitForFunction(() => document.fullscreenElement !== null);
+  });
+});
+
+describe('fingers', () => {
+  const swipe = async (touch: CDPSession, at: (t: number) => { x: number; y: number }[]): Promise<void> => {
+    await touch.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: at(0) });
+    for (const t of [0.25, 0.5, 0.75, 1]) {
+      await touch.send('Input.dispatchTouchEvent', { type: 'touchMove', touchPoints: at(t) });
+    }
+    await touch.send('Input.dispatchTouchEvent', { type: 'touchEnd', touchPoints: [] });
+  };
+
+  it('look with one, pan and pinch with two, and tap buttons', async () => {
+    const page = await open(true);
+    const touch = await page.context().newCDPSession(page);
+    const one = await change_by(page, () => swipe(touch, (t) => [{ x: 200 + 80 * t, y: 150 }]));
+    expect(Math.abs(one.axis[0])).toBeGreaterThan(0.1);
+    const pair = (x: number, apart: number): { x: number; y: number }[] => [
+      { x: x - apart, y: 150 },
+      { x: x + apart, y: 150 },
+    ];
+    expect_most((await change_by(page, () => swipe(touch, (t) => pair(250 + 80 * t, 50)))).moved, 'left');
+    expect_most((await change_by(page, () => swipe(touch, (t) => pair(300, 40 + 60 * t)))).moved, 'forward');
+    expect_most((await change_by(page, () => swipe(touch, (t) => pair(300, 100 - 60 * t)))).moved, 'back');
+    await page.getByRole('button', { name: 'Quality and view' }).tap();
+    expect(await page.locator('#quality-panel').isVisible()).toBe(true);
+    await page.getByLabel('Field of view').fill('90');
+    await page.locator('#view-fov-value', { hasText: '90°' }).waitFor();
+  });
+
+  it('point at a place by a double tap', async () => {
+    const page = await open(true);
+    const tap = (): Promise<void> => page.touchscreen.tap(200, 120);
+    await tap();
+    await tap();
+    await expect
+      .poll(() => server.peers.flatMap(({ heard }) => heard).some((body) => body.case === 'pick'))
+      .toBe(true);
+  });
+});
+
+describe('a gamepad', () => {
+  it('moves by its sticks and triggers, looks, and presses its buttons', async () => {
+    const page = await open();
+    await page.evaluate(() => {
+      const button = (): { value: number; pressed: boolean } => ({ value: 0, pressed: false });
+      const pad = { connected: true, mapping: 'standard', axes: [0, 0, 0, 0], buttons: Array.from({ length: 17 }, button) };
+      Object.assign(window, { pad });
+      navigator.getGamepads = () => [pad as unknown as Gamepad];
+      window.dispatchEvent(new Event('gamepadconnected'));
+    });
+    const set = (axes: number[], pressed = -1): Promise<void> =>
+      page.evaluate(
+        ([values, index]) => {
+          const { pad } = window as unknown as {
+            pad: { axes: number[]; buttons: { value: number; pressed: boolean }[] };
+          };
+          pad.axes = values;
+          pad.buttons.forEach((one, i) => {
+            one.pressed = i === index;
+            one.value = one.pressed ? 1 : 0;
+          });
+        },
+        [axes, pressed] as const,
+      );
+    await page.keyboard.press('KeyM'); // fly
+    const push = (axes: number[], button = -1) => async (): Promise<void> => {
+      const before = JSON.stringify(await pose_of(page));
+      await set(axes, button);
+      await expect.poll(async () => JSON.stringify(await pose_of(page)), { timeout: 10_000 }).not.toBe(before);
+      await set([0, 0, 0, 0]);
+    };
+    expect_most((await change_by(page, push([0, -1, 0, 0]))).moved, 'forward');
+    expect_most((await change_by(page, push([1, 0, 0, 0]))).moved, 'right');
+    const { axis: [x, y] } = await change_by(page, push([0, 0, 1, 0]));
+    expect_most([x, y, 0], 'right');
+    expect_most((await change_by(page, push([0, 0, 0, 0], 7))).moved, 'up');
+    expect_most((await change_by(page, push([0, 0, 0, 0], 6))).moved, 'down');
+  });
+});

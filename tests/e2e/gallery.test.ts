@@ -1,0 +1,150 @@
+// Every state of the page as a picture, for people to look at: desktop, phone, light and dark. What a
+// machine can tell is asked: all is inside the window, and nothing lies on the buttons.
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
+import { Error_Code } from '#client/wire/wire';
+import { keep_screenshot, launch_browser, new_page } from './support/browser';
+import { settle } from './support/camera';
+import { start_fake_server, type FakeServer, type Peer } from './support/fake_server';
+import { painted_jpeg, stream_of } from './support/painted';
+
+type Script = (peer: Peer, body: Peer['heard'][number]) => void;
+
+let browser: Browser;
+let stream: Script;
+
+beforeAll(async () => {
+  browser = await launch_browser();
+  stream = stream_of(await painted_jpeg(browser));
+});
+
+afterAll(() => browser.close());
+
+const at_hello =
+  (say: Parameters<Peer['say']>[0]): Script =>
+  (peer, body) => {
+    if (body.case === 'hello') peer.say(say);
+  };
+const refused = (code: Error_Code, message: string): Script =>
+  at_hello({ case: 'error', value: { code, message, fatal: true } });
+
+interface State {
+  readonly script?: Script; // a stream
+  readonly query?: string;
+  readonly reach: (page: Page, server: FakeServer) => Promise<void>;
+}
+
+const title =
+  (text: string) =>
+  (page: Page): Promise<void> =>
+    page.getByRole('heading', { name: text }).waitFor();
+
+const panel =
+  (button: string) =>
+  async (page: Page): Promise<void> => {
+    await settle(page);
+    await page.locator('#toolbar').getByRole('button', { name: button }).click();
+  };
+
+const states: Readonly<Record<string, State>> = {
+  connecting: { script: () => undefined, reach: title('Connecting') },
+  queue: {
+    script: at_hello({ case: 'queue', value: { position: 2, estimateS: 45 } }),
+    reach: title('Number 2 in the queue'),
+  },
+  'scene-loading': {
+    script: at_hello({ case: 'queue', value: { position: 1, estimateS: 20, forScene: true } }),
+    reach: title('Loading the scene'),
+  },
+  token: {
+    script: refused(Error_Code.UNAUTHORIZED, 'this server needs an access token: open the link you were given'),
+    reach: title('Access token needed'),
+  },
+  'no-scene': {
+    script: refused(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here'),
+    query: '?scene=nope',
+    reach: async (page) => {
+      await page.getByRole('link', { name: 'garden' }).waitFor();
+    },
+  },
+  busy: { script: refused(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'), reach: title('The server is busy') },
+  idle: { script: refused(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'), reach: title('Paused') },
+  'old-page': {
+    script: refused(Error_Code.UNSUPPORTED_VERSION, 'this server speaks version 2'),
+    reach: title('do not fit together'),
+  },
+  view: { reach: settle },
+  lost: {
+    reach: async (page, server) => {
+      await settle(page);
+      await server.close();
+      await page.getByRole('button', { name: 'Try now' }).waitFor();
+    },
+  },
+  quality: { reach: panel('Quality and view') },
+  share: { reach: panel('Share') },
+  help: { reach: panel('Controls') },
+  author: {
+    query: '?author',
+    reach: async (page) => {
+      await page.getByRole('button', { name: 'Add a stop here' }).waitFor();
+    },
+  },
+  statistics: {
+    reach: async (page) => {
+      await panel('Statistics')(page);
+      await expect.poll(() => page.locator('.uplot canvas').count(), { timeout: 20_000 }).toBe(3);
+    },
+  },
+  notice: {
+    script: (peer, body) => {
+      stream(peer, body);
+      const message = 'nothing has moved for 9 minutes: your place goes to others in a minute';
+      if (body.case === 'hello') peer.say({ case: 'error', value: { code: Error_Code.IDLE_TIMEOUT, message, fatal: false } });
+    },
+    reach: async (page) => {
+      await settle(page);
+      await page.locator('#notice').waitFor();
+    },
+  },
+};
+
+/** Of what is shown above the picture: what leaves the window, and what lies on the toolbar. */
+const misplaced = (page: Page): Promise<string[]> =>
+  page.evaluate(() => {
+    const bar = document.getElementById('toolbar')!.getBoundingClientRect();
+    return [...document.querySelectorAll<HTMLElement>('.glass')].flatMap((element) => {
+      const { left, right, top, bottom, width } = element.getBoundingClientRect();
+      if (width === 0) return []; // hidden
+      const outside = left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+      const on_bar =
+        element.id !== 'toolbar' && left < bar.right && right > bar.left && bottom > bar.top && top < bar.bottom;
+      return [...(outside ? [`${element.id} leaves the window`] : []), ...(on_bar ? [`${element.id} lies on the toolbar`] : [])];
+    });
+  });
+
+const windows: Readonly<Record<string, BrowserContextOptions>> = {
+  desktop: { viewport: { width: 1280, height: 720 } },
+  'desktop-dark': { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' },
+  phone: { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true },
+  'phone-dark': { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
+};
+
+describe.each(Object.entries(windows))('%s', (name, options) => {
+  it('shows each state whole', async () => {
+    const wrong: string[] = [];
+    for (const [state, { script = stream, query = '', reach }] of Object.entries(states)) {
+      const server = await start_fake_server(script);
+      const { page, errors } = await new_page(browser, options);
+      await page.goto(server.url + query);
+      await reach(page, server);
+      await keep_screenshot(page, `state-${state}-${name}`);
+      wrong.push(...(await misplaced(page)).map((what) => `${state}: ${what}`));
+      const unexpected = state === 'lost' ? [] : errors;
+      wrong.push(...unexpected.map((error) => `${state}: ${error}`));
+      await page.context().close();
+      if (state !== 'lost') await server.close();
+    }
+    expect(wrong).toEqual([]);
+  });
+});
