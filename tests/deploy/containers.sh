@@ -95,6 +95,18 @@ build_server_image() {
     --tag "$tag" "${options[@]}" "$@" "$source_dir"
 }
 
+# set_up_server_image TOOL...: how tests of systems that the server's image is a part of begin. The image is that
+# of images.sh, built where there is none.
+set_up_server_image() {
+  require_tools podman buildah debootstrap runc "$@"
+  /usr/bin/python3 -c 'import yaml' 2>/dev/null || skip "python3-yaml is not installed"
+  trap remove_containers EXIT
+  set_up_containers
+  ensure_base_image
+  buildah inspect --type image localhost/catgs-server:cpu >/dev/null 2>&1 ||
+    build_server_image localhost/catgs-server:cpu >"$work/build.log" 2>&1 || die "$(tail -n 20 "$work/build.log")"
+}
+
 # build_stand_in TAG PACKAGE COMMAND...: Debian's package under the name of an image of a registry.
 build_stand_in() {
   local tag=$1 package=$2

@@ -7,13 +7,7 @@ set -euo pipefail
 # shellcheck source=tests/deploy/containers.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/containers.sh"
 
-require_tools podman buildah debootstrap runc haproxy
-/usr/bin/python3 -c 'import yaml' 2>/dev/null || skip "python3-yaml is not installed"
-trap remove_containers EXIT
-set_up_containers
-ensure_base_image
-buildah inspect --type image localhost/catgs-server:cpu >/dev/null 2>&1 ||
-  build_server_image localhost/catgs-server:cpu >"$work/build.log" 2>&1 || die "$(tail -n 20 "$work/build.log")"
+set_up_server_image haproxy
 build_stand_in docker.io/library/haproxy:3.0 haproxy haproxy -W -db -f /usr/local/etc/haproxy/haproxy.cfg
 build_stand_in docker.io/prom/prometheus:v2.53.3 prometheus \
   prometheus --config.file=/etc/prometheus/prometheus.yml --storage.tsdb.path=/prometheus

@@ -9,13 +9,7 @@ set -euo pipefail
 source "$(dirname -- "${BASH_SOURCE[0]}")/containers.sh"
 
 load=$1
-require_tools podman buildah debootstrap runc kubectl
-/usr/bin/python3 -c 'import yaml' 2>/dev/null || skip "python3-yaml is not installed"
-trap remove_containers EXIT
-set_up_containers
-ensure_base_image
-buildah inspect --type image localhost/catgs-server:cpu >/dev/null 2>&1 ||
-  build_server_image localhost/catgs-server:cpu >"$work/build.log" 2>&1 || die "$(tail -n 20 "$work/build.log")"
+set_up_server_image kubectl
 
 /usr/bin/python3 -B - "$source_dir/deploy/kubernetes" "$work" <<'PYTHON'
 import base64, pathlib, subprocess, sys
