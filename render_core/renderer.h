@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -67,6 +68,10 @@ struct FrameStats {
   float nearest_depth = 0;       // world units
   float mean_inverse_depth = 0;  // 1 / world units
   std::array<float, stage_count> stage_ms{};
+
+  [[nodiscard]] float total_ms() const {
+    return std::accumulate(stage_ms.begin(), stage_ms.end(), 0.0f);
+  }
 };
 
 struct FrameRequest {

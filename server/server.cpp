@@ -42,8 +42,8 @@ using namespace std::chrono_literals;
 constexpr auto quick_stop_deadline = 1000ms;
 constexpr auto farewell_time = 500ms;  // for close frames, after the deadline
 constexpr auto drain_poll = 20ms;
-// Two or three frames at a time keep a GPU busy; more only take turns on it.
-constexpr int render_threads_per_gpu = 3;
+// Their frames overlap what one of them leaves of a GPU idle: copies, waking up, short kernels.
+constexpr int render_threads_per_gpu = 6;
 
 constexpr std::string_view no_client_page =
     "CaT-GS server: the browser client was not built with this server.\n"

@@ -51,6 +51,7 @@ RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noex
     frame = {settings_.format, MemorySpace::host, request.camera.size_px, image_.planes(), stats};
   } catch (const std::bad_alloc&) {
     groups_.forget();
+    costs_.forget();
     reach_.forget();
     return {RenderStatus::Code::out_of_memory,
             "CPU core: no memory for " + std::to_string(clusters_.size()) + " clusters in view"};
@@ -79,6 +80,7 @@ FrameStats CpuView::draw(const FrameRequest& request) {
   stats.blended_pairs = blend(request);
   clock.end(Stage::blend);
   summarise(stats);
+  if (settings_.speculation.cost_aware) costs_.note(plan.kind, plan.window, stats.total_ms());
   return stats;
 }
 
@@ -90,7 +92,7 @@ FramePlan CpuView::plan(const FrameRequest& request) {
   plan.grid = image_grid(camera.size_px);
   plan.list_near_z = camera.near_z;
   if (settings_.pipeline != Pipeline::catgs) return plan;
-  plan = groups_.plan(camera, request.forecast, depths_in_view_);
+  plan = groups_.plan(camera, costs_.pays() ? request.forecast : std::nullopt, depths_in_view_);
   widen_for_blocks(plan, settings_.speculation.grid);
   return plan;
 }

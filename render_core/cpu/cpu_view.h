@@ -13,6 +13,7 @@
 #include "render_core/cpu/tile_reach.h"
 #include "render_core/host_image.h"
 #include "render_core/motion/frame_groups.h"
+#include "render_core/motion/speculation_costs.h"
 #include "render_core/renderer.h"
 #include "render_core/thread_pool.h"
 
@@ -56,6 +57,7 @@ class CpuView final : public View {
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
   FrameGroups groups_;
+  SpeculationCosts costs_;
   SceneDepths depths_in_view_;  // of the last frame
   TileGrid grid_;               // of the lists
   HostImage image_;

@@ -61,7 +61,7 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
     plan.grid = image_grid(request.camera.size_px);
     plan.list_near_z = request.camera.near_z;
     if (settings_.pipeline == Pipeline::catgs)
-      plan = groups_.plan(request.camera, request.forecast, depths_);
+      plan = groups_.plan(request.camera, costs_.pays() ? request.forecast : std::nullopt, depths_);
     if (settings_.pipeline == Pipeline::vanilla) {
       draw_vanilla(request);
     } else if (plan.kind == FrameKind::sub) {
@@ -75,6 +75,8 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
       draw_key(request, plan);
     }
     frame = finished(plan, request.camera.near_z);
+    if (settings_.speculation.cost_aware)
+      costs_.note(plan.kind, plan.window, frame.stats.total_ms());
     return {};
   } catch (const CudaError& error) {
     forget_frames();
@@ -88,6 +90,7 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
 /// After a failure: buffers that could not grow are gone, and with them what frames shared.
 void CudaView::forget_frames() {
   groups_.forget();
+  costs_.forget();
   shape_ = {};
   reach_known_ = false;
   colours_known_ = false;

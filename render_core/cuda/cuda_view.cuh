@@ -12,6 +12,7 @@
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/motion/frame_groups.h"
+#include "render_core/motion/speculation_costs.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/clusters.h"
 
@@ -64,6 +65,7 @@ class CudaView final : public View {
 
   // What sub-frames take over.
   FrameGroups groups_;
+  SpeculationCosts costs_;
   TileLists lists_;
   SceneDepths depths_;
   bool turned_ = false;  // the frame's tiles are runs of pixels

@@ -63,8 +63,12 @@ FrameSizes FrameRoom::limits() const { return {visible_.limit(), lists_.limit(),
 
 bool FrameRoom::outgrown_by(const FrameSizes& needed) {
   slices_.outgrown_by(needed.slices);  // without them the frame was slower, not wrong
+  const std::uint32_t had = visible_.size();
   const bool more_visible = visible_.outgrown_by(needed.visible);
-  const bool longer_lists = lists_.outgrown_by(needed.list_entries);
+  // Of splats that found no room no entries were counted: as many as of the others.
+  const double counted = std::min(1.0, static_cast<double>(had) / std::max(needed.visible, 1u));
+  const bool longer_lists = lists_.outgrown_by(static_cast<std::uint32_t>(
+      std::min<double>(needed.list_entries / counted, std::numeric_limits<std::uint32_t>::max())));
   return more_visible || longer_lists;
 }
 

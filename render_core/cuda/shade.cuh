@@ -79,8 +79,11 @@ __device__ inline math::Vec3<float> shade(const ShCoefficients& sh, int degree,
           math::colour_from_sh_sum(sum[2])};
 }
 
+/// Colours brighter than a half holds stay finite: infinity times no weight would be no number.
 __device__ inline PackedColour pack(const math::Vec3<float>& colour) {
-  return {__floats2half2_rn(colour.x, colour.y), __float2half_rn(colour.z), __float2half_rn(0.0f)};
+  constexpr float most = 65504.0f;
+  return {__floats2half2_rn(fminf(colour.x, most), fminf(colour.y, most)),
+          __float2half_rn(fminf(colour.z, most)), __float2half_rn(0.0f)};
 }
 
 }  // namespace catgs::cuda

@@ -36,6 +36,9 @@ struct SpeculationSettings {
   // farther off, the lists miss some at the edges of tiles. Worst 16x16 blocks of sub-frames
   // against exact, recorded head motion in a captured room: 2 px 51 dB, 3 px 35 dB, 4 px 20 dB.
   float max_deviation_px = 3.0f;
+  // Views stop speculating for a while where groups cost more than frames without a window; see
+  // SpeculationCosts. Off, which frames are key frames does not depend on time.
+  bool cost_aware = false;
 };
 
 /// Bounds what one forecast may promise, whatever the settings.

@@ -103,6 +103,7 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
     json["max_deviation_px"] = speculation.max_deviation_px;
     json["grid"] = grid_name(speculation.grid);
     json["guard_px"] = speculation.guard_px;
+    json["cost_aware"] = speculation.cost_aware;
     json["order"] = settings.order == BlendOrder::fresh ? "fresh" : "key";
     json["colour_cache"] = settings.colour_cache;
     json["constant_velocity"] = options.pipeline.constant_velocity;

@@ -126,6 +126,7 @@ Json settings_json(const PaperCase& scene) {
           {"max_deviation_px", speculation.max_deviation_px},
           {"grid", grid_name(speculation.grid)},
           {"guard_px", speculation.guard_px},
+          {"cost_aware", speculation.cost_aware},
           {"order", setup.view.order == BlendOrder::fresh ? "fresh" : "key"},
           {"warmup", scene.options().warmup},
           {"every", scene.options().every}};

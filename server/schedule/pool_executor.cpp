@@ -6,12 +6,19 @@
 namespace catgs {
 namespace {
 
+/// Pictures for an encoder, made from lists that frames share where that pays.
+ViewSettings view_settings() {
+  ViewSettings settings{Pipeline::catgs, PixelFormat::i420};
+  settings.speculation.cost_aware = true;
+  return settings;
+}
+
 StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFactory& encoders) {
   StreamOpened opened;
   try {
     if (!stream.view || stream.settings.renderer != settings.renderer) {
       stream.view.reset();  // its memory first: two views of a large scene may not fit
-      stream.view = settings.renderer->make_view({Pipeline::catgs, PixelFormat::i420});
+      stream.view = settings.renderer->make_view(view_settings());
     }
   } catch (const std::exception& error) {
     opened.message = error.what();

@@ -10,12 +10,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double busy_share = 0.9;
+// Processors that are threads of one core slow each other down long before all are busy.
+constexpr double busy_share = 0.8;
 constexpr double calm_share = 0.5;
 constexpr auto busy_for = 1s;
 constexpr double encoding_part = 0.4;  // of what is busy
 constexpr double too_long = 0.7;       // of the time between frames
-constexpr double roomy_share = 0.75;
+constexpr double roomy_share = 0.6;
 constexpr double comfortable = 0.5;
 constexpr auto settle = 1s;  // until a change shows in what is measured
 constexpr auto proof = 30s;

@@ -41,9 +41,9 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings);
 /// time, since each opens a stream anew, with an IDR.
 /// - Threads: where sessions are fewer than processors, pictures are cut into as many slices, which
 ///   shortens the wait for each; rounded up, as frames of different sessions rarely coincide.
-/// - A newcomer begins with the best preset that leaves a quarter of the processors free, if it
+/// - A newcomer begins with the best preset that leaves 40 % of the processors free, if it
 ///   costs what the others do.
-/// - The faster preset where processors were busy (90 %) for a second and encoding is a good part
+/// - The faster preset where processors were busy (80 %) for a second and encoding is a good part
 /// of
 ///   that, for the quarter of the sessions whose encoders cost the most; or where an encoder by
 ///   itself takes most of the time between frames. Where rendering holds frames up, a worse picture
@@ -62,7 +62,7 @@ class EffortControl {
   struct Session {
     EncoderEffort effort;
     double cpus = 0;               // that its encoder keeps busy
-    double share_of_interval = 0;  // encoding a frame, over the time between frames
+    double share_of_interval = 0;  // encoding a frame, over the nominal time between frames
     glm::ivec2 size_px{0};
   };
   struct Change {

@@ -90,8 +90,8 @@ TEST_F(EffortControlTest, EncodersThatKeepAllBusyGoFasterUntilTheyFit) {
   add(48, 0.25);  // 22.8 processors at superfast, 12 at ultrafast
   EXPECT_EQ(run(1s), 0) << "a second of it may be chance";
   run(60s);
-  EXPECT_LE(busy(), 0.9);
-  EXPECT_GT(busy(), 0.75) << "no more than needed";
+  EXPECT_LE(busy(), 0.8);
+  EXPECT_GT(busy(), 0.6) << "no more than needed";
   EXPECT_EQ(run(10min), 0) << "it does not flap";
 }
 
@@ -162,10 +162,10 @@ TEST(EffortControl, AFixedPresetStays) {
 TEST_F(EffortControlTest, ANewcomerBeginsWithWhatThereIsRoomFor) {
   EXPECT_EQ(control.initial(1, full_hd).preset, superfast);
   other_cpus = 2.0;
-  add(6, 0.6);
-  run(1s);  // 6.84 at superfast, and a seventh takes 1.14
+  add(6, 0.4);
+  run(1s);  // 4.56 at superfast, and a seventh takes 0.76
   EXPECT_EQ(control.initial(7, full_hd).preset, superfast);
-  other_cpus = 4.3;
+  other_cpus = 4.4;
   run(1s);
   EXPECT_EQ(control.initial(7, full_hd).preset, superfast - 1);
   EXPECT_EQ(control.initial(7, {640, 360}).preset, superfast);
