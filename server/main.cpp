@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "render_core/build_info.h"
+#include "render_core/command_line.h"
 #include "render_core/error.h"
 #include "server/commands.h"
 #include "server/config.h"
@@ -99,7 +100,7 @@ int run(int argc, char** argv) {
   add_selftest_command(app, exit_code);
   add_token_command(app, exit_code);
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
     return app.get_subcommands().empty() ? serve(line) : exit_code;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_ok : exit_usage;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "render_core/build_info.h"
+#include "render_core/command_line.h"
 #include "render_core/error.h"
 #include "render_core/tools/commands.h"
 
@@ -34,7 +35,7 @@ int run(int argc, char** argv) {
   add_trace_command(app);
 
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : exit_bad_input;

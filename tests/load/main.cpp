@@ -10,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/build_info.h"
+#include "render_core/command_line.h"
 #include "render_core/error.h"
 #include "render_core/tools/json_report.h"
 #include "tests/load/html_report.h"
@@ -265,7 +266,7 @@ int run(int argc, char** argv) {
   add_record_command(app, record);
   spdlog::set_level(spdlog::level::warn);  // loading a scene tells a server's operator, not us
   try {
-    app.parse(argc, argv);
+    parse_command_line(app, argc, argv);
     return app.got_subcommand("record") ? run_record(record) : run_checked(options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : exit_bad_input;
