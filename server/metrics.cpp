@@ -163,7 +163,7 @@ void Metrics::observe_frame(const FrameTicket& ticket, TimePoint now) {
   encode_wait_seconds.Observe(seconds(ticket.render_end, ticket.encode_start));
   encode_seconds.Observe(seconds(ticket.encode_start, ticket.encode_end));
   send_seconds.Observe(seconds(ticket.encode_end, now));
-  if (ticket.refined) return;  // late on purpose, and nothing is rendered for it
+  if (ticket.still) return;  // late on purpose, of another size perhaps
   queue_wait_seconds.Observe(seconds(ticket.ready, ticket.started));
   hand_off_seconds.Observe(seconds(ticket.started, ticket.render_start));
   (ticket.speculated ? render_sub_seconds : render_key_seconds)

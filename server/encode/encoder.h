@@ -42,6 +42,7 @@ struct EncoderSettings {
 struct EncodedFrame {
   std::vector<std::byte> bytes;
   bool idr = false;
+  bool sharp = false;  // coded so finely that to encode the same picture again would show nothing
 };
 
 struct EncodeStatus {

@@ -80,6 +80,7 @@ class LibavJpegEncoder final : public Encoder {
         std::as_bytes(std::span(packet_->data, static_cast<std::size_t>(packet_->size)));
     out.bytes.assign(bytes.begin(), bytes.end());
     out.idr = true;
+    out.sharp = qscale <= JpegRateControl::sharp_qscale;
     av_packet_unref(packet_.get());
     rate_.update(qscale, out.bytes.size());
     return {};

@@ -10,6 +10,7 @@ namespace catgs {
 class JpegRateControl {
  public:
   static constexpr int finest_qscale = 2;
+  static constexpr int sharp_qscale = 4;  // finer ones can hardly be told apart
   static constexpr int coarsest_qscale = 31;
 
   /// `pixels` of a frame; set the budget before the first qscale().

@@ -31,8 +31,9 @@ struct PosePath {
 };
 
 struct Settings {
-  glm::ivec2 size_px{0};  // 0: the viewport's
-  int max_fps = 0;        // 0: the server's default
+  glm::ivec2 size_px{0};        // 0: the viewport's
+  glm::ivec2 still_size_px{0};  // when the camera rests; 0: size_px
+  int max_fps = 0;              // 0: the server's default
   int max_bitrate_kbps = 0;
   bool fixed_quality = false;
 
@@ -101,6 +102,8 @@ struct StreamConfig {
   int fps = 0;
   int bitrate_kbps = 0;
   std::string encoder;
+
+  bool operator==(const StreamConfig&) const = default;
 };
 
 struct Welcome {

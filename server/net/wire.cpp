@@ -18,6 +18,8 @@ namespace {
 constexpr float max_coordinate = 1.0e9f;
 /// Beyond it differences of times might overflow, and a browser's numbers are no longer exact.
 constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
+// What is told of how old a picture is: a clock that jumped would spoil every mean.
+constexpr std::uint32_t max_pose_age_us = 10'000'000;
 constexpr int max_path_samples = 256;
 constexpr int max_decoders = 8;
 
@@ -89,12 +91,21 @@ PosePath parse(const v1::PosePath& message) {
   return path;
 }
 
+glm::ivec2 checked_size(const std::string& name, std::uint32_t width, std::uint32_t height) {
+  const std::string width_field = name + "width_px";
+  const std::string height_field = name + "height_px";
+  const glm::ivec2 size_px{checked_or_zero(width_field, width, 16, 8192),
+                           checked_or_zero(height_field, height, 16, 8192)};
+  if ((size_px.x == 0) != (size_px.y == 0))
+    throw Invalid(width_field + " and " + height_field + " must be given together");
+  return size_px;
+}
+
 Settings parse(const v1::Settings& message) {
   Settings settings;
-  settings.size_px = {checked_or_zero("settings.width_px", message.width_px(), 16, 8192),
-                      checked_or_zero("settings.height_px", message.height_px(), 16, 8192)};
-  if ((settings.size_px.x == 0) != (settings.size_px.y == 0))
-    throw Invalid("settings: width_px and height_px must be given together");
+  settings.size_px = checked_size("settings.", message.width_px(), message.height_px());
+  settings.still_size_px =
+      checked_size("settings.still_", message.still_width_px(), message.still_height_px());
   settings.max_fps = checked_or_zero("settings.max_fps", message.max_fps(), 1, 240);
   settings.max_bitrate_kbps =
       checked_or_zero("settings.max_bitrate_kbps", message.max_bitrate_kbps(), 100, 200'000);
@@ -136,7 +147,7 @@ Ack parse(const v1::Ack& message) {
   ack.decoded_us = time("ack.decoded_us", message.decoded_us());
   ack.presented_us = time("ack.presented_us", message.presented_us());
   ack.dropped = message.dropped();
-  ack.pose_age_us = message.pose_age_us();
+  ack.pose_age_us = std::min(message.pose_age_us(), max_pose_age_us);
   ack.decoder_queue = message.decoder_queue();
   return ack;
 }
@@ -302,6 +313,7 @@ v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   header.set_encode_us(elapsed_us(ticket.render_end, ticket.encode_end));
   header.set_send_wait_us(elapsed_us(ticket.encode_end, now));
   header.set_speculated(ticket.speculated);
+  header.set_still(ticket.still);
   header.set_window(ticket.window);
   return header;
 }

@@ -23,7 +23,8 @@ struct FrameTicket {
 
   Codec codec = Codec::h264;
   bool idr = false;
-  bool refined = false;  // the picture of the frame before, encoded once more
+  bool still = false;    // the camera rests: late on purpose, perhaps of another size
+  bool refined = false;  // a still that is encoded once more: nothing is rendered
   glm::ivec2 size_px{0};
   bool speculated = false;   // a sub-frame
   std::uint32_t window = 0;  // W of its key frame

@@ -8,6 +8,7 @@
 #include "render_core/renderer.h"
 #include "server/encode/encoder.h"
 #include "server/pipeline/frame_ticket.h"
+#include "server/schedule/stream_encoders.h"
 
 namespace catgs {
 
@@ -15,16 +16,16 @@ namespace catgs {
 struct StreamSettings {
   std::shared_ptr<Renderer> renderer;  // of the scene that is shown
   EncoderKind encoder = EncoderKind::x264;
-  EncoderSettings encoding;
-  std::shared_ptr<const void> seat{};  // let go of once the encoder has ended
+  EncoderSettings encoding;            // of the first frames
+  std::shared_ptr<const void> seat{};  // let go of once the encoders have ended
 };
 
-/// One client's share of a device: its View (caches, image) and its Encoder. Owned by the session,
+/// One client's share of a device: its View (caches, image) and its encoders. Owned by the session,
 /// used by one job at a time.
 struct Stream {
-  StreamSettings settings;  // the seat in it outlives the encoder
+  StreamSettings settings;  // the seat in it outlives the encoders
   std::unique_ptr<View> view;
-  std::unique_ptr<Encoder> encoder;
+  StreamEncoders encoders;
   FrameView picture;  // borrowed from `view`: the last one rendered
 };
 
@@ -42,6 +43,7 @@ struct FrameJob {
   std::shared_ptr<Stream> stream;
   FrameTicket ticket;  // refined: nothing is rendered
   FrameRequest request;
+  EncoderSettings encoding;             // other ones than before: with `force_idr`
   int bitrate_kbps = min_bitrate_kbps;  // for now
   int real_fps = 1;                     // what the session reaches: shares the bitrate out
   bool force_idr = false;
@@ -52,6 +54,9 @@ struct FrameResult {
   std::string message;  // stage and cause of a failure
   OutgoingFrame frame;
   FrameStats stats;
+  std::string codec_string;          // of the encoder
+  bool sharp = false;                // see EncodedFrame
+  bool encoder_unavailable = false;  // not ok for want of the encoder alone
 };
 
 /// What renders and encodes: the CPU's thread pool, or GPUs with a few render threads and a pool of

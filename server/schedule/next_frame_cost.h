@@ -11,8 +11,12 @@ namespace catgs {
 class NextFrameCost {
  public:
   void add(const FrameTicket& ticket) {
-    add_to(encode_, ticket.encode_end - ticket.render_end);
-    if (ticket.refined) return;
+    const Clock::duration encode = ticket.encode_end - ticket.render_end;
+    if (ticket.still) {
+      if (ticket.refined) return add_to(refine_, encode);
+      return add_to(still_, ticket.encode_end - ticket.render_start);
+    }
+    add_to(encode_, encode);
     add_to(ticket.speculated ? sub_ : key_, ticket.render_end - ticket.render_start);
     sub_frames_left_ = ticket.speculated ? sub_frames_left_ - 1 : static_cast<int>(ticket.window);
   }
@@ -22,7 +26,13 @@ class NextFrameCost {
   [[nodiscard]] bool key_is_next() const { return sub_frames_left_ <= 0; }
   /// Of the next frame: rendering and encoding, 0 before the first.
   [[nodiscard]] Clock::duration next() const { return (key_is_next() ? key_ : sub_) + encode_; }
-  [[nodiscard]] Clock::duration refinement() const { return encode_; }
+  /// Of a picture that stays, perhaps of another size; as those in motion before the first.
+  [[nodiscard]] Clock::duration still() const {
+    return still_ == Clock::duration{} ? key_ + encode_ : still_;
+  }
+  [[nodiscard]] Clock::duration refinement() const {
+    return refine_ == Clock::duration{} ? encode_ : refine_;
+  }
 
  private:
   static void add_to(Clock::duration& mean, Clock::duration cost) {
@@ -32,6 +42,8 @@ class NextFrameCost {
   Clock::duration key_{};
   Clock::duration sub_{};
   Clock::duration encode_{};
+  Clock::duration still_{};
+  Clock::duration refine_{};
   int sub_frames_left_ = 0;
 };
 

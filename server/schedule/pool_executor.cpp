@@ -25,11 +25,10 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
     return opened;
   }
   try {
-    if (!stream.encoder || stream.settings.encoder != settings.encoder ||
-        stream.settings.encoding != settings.encoding) {
-      stream.encoder.reset();  // first: a driver may open no second one
-      stream.encoder = encoders(settings.encoder, settings.encoding);
-    }
+    const Encoder& encoder = stream.encoders.use(settings.encoder, settings.encoding, encoders);
+    opened.codec = encoder.codec();
+    opened.codec_string = encoder.codec_string();
+    opened.encoder_name = encoder.name();
   } catch (const std::exception& error) {
     opened.message = error.what();
     opened.encoder_unavailable = true;
@@ -38,9 +37,6 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
   stream.picture = {};
   stream.settings = std::move(settings);
   opened.ok = true;
-  opened.codec = stream.encoder->codec();
-  opened.codec_string = stream.encoder->codec_string();
-  opened.encoder_name = stream.encoder->name();
   opened.device = stream.view->device();
   return opened;
 }
@@ -65,20 +61,34 @@ bool render_now(FrameJob& job, FrameResult& result) {
   return true;
 }
 
-void encode_now(FrameJob& job, FrameResult& result) {
-  Stream& stream = *job.stream;
+/// Null: it cannot be opened, and `result` says why.
+Encoder* encoder_for(const FrameJob& job, const EncoderFactory& encoders, FrameResult& result) {
+  try {
+    return &job.stream->encoders.use(job.stream->settings.encoder, job.encoding, encoders);
+  } catch (const std::exception& error) {
+    result.message = error.what();
+    result.encoder_unavailable = true;
+    return nullptr;
+  }
+}
+
+void encode_now(FrameJob& job, const EncoderFactory& encoders, FrameResult& result) {
   FrameTicket& ticket = result.frame.ticket;
   EncodedFrame encoded;
   ticket.encode_start = Clock::now();
-  stream.encoder->set_rate(job.bitrate_kbps, job.real_fps);
-  const EncodeStatus status = stream.encoder->encode(stream.picture, job.force_idr, encoded);
+  Encoder* const encoder = encoder_for(job, encoders, result);
+  if (!encoder) return;
+  encoder->set_rate(job.bitrate_kbps, job.real_fps);
+  const EncodeStatus status = encoder->encode(job.stream->picture, job.force_idr, encoded);
   ticket.encode_end = Clock::now();
   if (!status.ok) {
     result.message = status.message;
     return;
   }
-  ticket.codec = stream.encoder->codec();
+  ticket.codec = encoder->codec();
   ticket.idr = encoded.idr;
+  result.codec_string = encoder->codec_string();
+  result.sharp = encoded.sharp;
   result.frame.bitstream = std::move(encoded.bytes);
   result.ok = true;
 }
@@ -137,10 +147,10 @@ void PoolExecutor::submit(FrameJob job, std::function<void(FrameResult)> done) {
   };
   auto work = std::make_shared<Work>(Work{std::move(job), {}, std::move(done)});
   ThreadPool* const encode = pools_.encode == pools_.render ? nullptr : pools_.encode.get();
-  pools_.render->submit([encode, work = std::move(work)]() mutable {
+  pools_.render->submit([encode, encoders = encoders_, work = std::move(work)]() mutable {
     const bool rendered = render_now(work->job, work->result);
-    const auto finish = [rendered](Work& w) {
-      if (rendered) encode_now(w.job, w.result);
+    const auto finish = [rendered, encoders](Work& w) {
+      if (rendered) encode_now(w.job, encoders, w.result);
       w.report();
     };
     if (!encode || !rendered) return finish(*work);

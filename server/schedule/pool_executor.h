@@ -10,9 +10,6 @@
 
 namespace catgs {
 
-/// Makes encoders: make_encoder(), or what stands in for hardware that is not there.
-using EncoderFactory = std::function<std::unique_ptr<Encoder>(EncoderKind, const EncoderSettings&)>;
-
 /// Threads that render and encode. As many frames are under way as there are threads.
 /// - The CPU core renders and encodes in one pool: work is parallel across sessions first; with
 ///   fewer sessions the pool's idle workers help inside a frame.

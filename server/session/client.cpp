@@ -47,14 +47,17 @@ void Client::on_message(Peer& from, const ClientMessage& message, TimePoint now)
   if (const auto* hello = std::get_if<Hello>(&message);
       hello && session_.state() == Session::State::awaiting_hello)
     return registry_.on_hello(from.shared_from_this(), shared_from_this(), *hello, now);
-  if (const auto* ack = std::get_if<Ack>(&message)) {
+  const int in_flight = session_.flow().credit().in_flight();
+  session_.on_message(message, now);
+  // An acknowledgement of what was never sent, or a second one, is no measurement.
+  if (const auto* ack = std::get_if<Ack>(&message);
+      ack && session_.flow().credit().in_flight() < in_flight) {
     if (ack->presented_us > 0) {
       registry_.metrics_.motion_to_photon_seconds.Observe(1e-6 * ack->pose_age_us);
       usage_.frame_shown(1e-6 * ack->pose_age_us);
     }
     if (ack->dropped) registry_.metrics_.frames_dropped_by_client.Increment();
   }
-  session_.on_message(message, now);
   note_readiness(Clock::now());
 }
 
@@ -236,8 +239,9 @@ void Client::start_frame(const FrameCandidate& candidate, TimePoint now) {
   order.ticket.ready = std::min(std::exchange(ready_since_, std::nullopt).value_or(now), now);
   order.ticket.started = now;
   usage_.frame_started(now);
-  FrameJob job{stream_,        order.ticket,   order.request, order.bitrate_kbps,
-               order.real_fps, order.force_idr};
+  FrameJob job{
+      stream_,        order.ticket,   order.request, std::move(order.encoding), order.bitrate_kbps,
+      order.real_fps, order.force_idr};
   registry_.scheduler_.frame_started(candidate);
   executor_->submit(
       std::move(job),
@@ -251,7 +255,10 @@ void Client::start_frame(const FrameCandidate& candidate, TimePoint now) {
         metrics.list_entries_overflowed.Increment(
             static_cast<double>(result.stats.overflowed_entries));
         const TimePoint ended = Clock::now();
-        client.usage_.frame_ended(result.frame.ticket, client.device_seconds(result.stats), ended);
+        const glm::dvec2 size_px = result.frame.ticket.size_px;
+        const glm::dvec2 moving_px = client.session_.moving_size_px();
+        client.usage_.frame_ended(result.frame.ticket, client.device_seconds(result.stats), ended,
+                                  size_px.x * size_px.y / (moving_px.x * moving_px.y));
         client.session_.on_frame(std::move(result), ended);
         client.note_readiness(ended);
       }));

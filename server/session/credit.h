@@ -28,7 +28,7 @@ class CreditWindow {
   struct InFlight {
     std::uint64_t frame_id = 0;
     std::size_t bytes = 0;
-    std::size_t pixels = 0;
+    std::size_t pixels = 0;  // that its decoder is judged by
     TimePoint sent;
   };
   /// What an acknowledgement settles.

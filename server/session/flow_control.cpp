@@ -58,10 +58,10 @@ void FlowControl::set_wish(const FlowWish& wish) {
   apply_interval();
 }
 
-void FlowControl::sent(std::uint64_t frame_id, std::size_t bytes, glm::ivec2 size_px,
-                       TimePoint now) {
-  frame_size_px_ = size_px;
-  credit_.sent({frame_id, bytes, static_cast<std::size_t>(size_px.x) * size_px.y, now});
+void FlowControl::sent(const SentFrame& frame, TimePoint now) {
+  if (!frame.still) frame_size_px_ = frame.size_px;
+  const auto pixels = frame.still ? 0 : static_cast<std::size_t>(frame.size_px.x) * frame.size_px.y;
+  credit_.sent({frame.frame_id, frame.bytes, pixels, now});
 }
 
 bool FlowControl::acknowledged(const Ack& ack, TimePoint now) {
@@ -91,6 +91,7 @@ void FlowControl::observe_network(const Ack& ack, const CreditWindow::Settled& s
 
 void FlowControl::observe_decoder(const Ack& ack, const CreditWindow::Settled& settled,
                                   TimePoint now) {
+  if (settled.frame.pixels == 0) return;
   if (ack.received_us <= 0 || ack.decoded_us < ack.received_us) return;
   RateController::Sample sample;
   sample.delays_us[0] = ack.decoded_us - ack.received_us;

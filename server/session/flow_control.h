@@ -32,8 +32,14 @@ class FlowControl {
 
   void set_wish(const FlowWish& wish);
 
-  /// A frame of `size_px` was handed over to the connection.
-  void sent(std::uint64_t frame_id, std::size_t bytes, glm::ivec2 size_px, TimePoint now);
+  struct SentFrame {
+    std::uint64_t frame_id = 0;
+    std::size_t bytes = 0;
+    glm::ivec2 size_px{0};
+    bool still = false;  // tells nothing of how fast a decoder takes frames of a moving camera
+  };
+  /// A frame was handed over to the connection.
+  void sent(const SentFrame& frame, TimePoint now);
   void lost(std::uint64_t frame_id) { credit_.lost(frame_id); }
   /// False: the frame is not in flight.
   bool acknowledged(const Ack& ack, TimePoint now);
@@ -73,7 +79,7 @@ class FlowControl {
   RateController network_;  // bits
   RateController decoder_;  // pixels
   QualityLadder ladder_;
-  glm::ivec2 frame_size_px_{16, 16};  // of the newest frame
+  glm::ivec2 frame_size_px_{16, 16};  // of the newest frame in motion
   std::chrono::microseconds real_interval_{0};
   LinkState link_;
   TimePoint link_seen_{};

@@ -41,6 +41,12 @@ class FramePace {
     due_since_.reset();
   }
 
+  /// The camera rests: the time until it moves again is no interval between frames.
+  void rests() {
+    last_start_ = {};
+    due_since_.reset();
+  }
+
   /// Between starts of frames, the mean over about eight of them; 0: not known.
   [[nodiscard]] std::chrono::microseconds real_interval() const {
     return std::chrono::duration_cast<std::chrono::microseconds>(measured_ ? mean_interval_

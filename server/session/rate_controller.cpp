@@ -17,6 +17,8 @@ constexpr double most_over_delivered = 2.5;
 constexpr double back_off_share = 0.92;
 constexpr double long_queue_share = 0.85;
 constexpr microseconds long_queue = 50ms;
+// Times of a client are its own: whatever it says, its queue is no longer than this.
+constexpr std::int64_t longest_queue_us = 10'000'000;
 constexpr auto memory = 200ms;
 constexpr std::size_t least_remembered = 3;  // frames of a slow link are further apart
 constexpr std::size_t most_remembered = 64;
@@ -73,7 +75,7 @@ std::int64_t RateController::queue_of(const Sample& sample, TimePoint now) {
     const std::int64_t excess_us = *sample.delays_us[i] - *base_[i].value();
     queue_us = std::min(excess_us, queue_us.value_or(excess_us));
   }
-  return queue_us.value_or(0);
+  return std::min(queue_us.value_or(0), longest_queue_us);
 }
 
 void RateController::remember(const Sample& sample, std::int64_t queue_us, TimePoint now) {

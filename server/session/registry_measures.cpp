@@ -44,7 +44,7 @@ void SessionRegistry::control_effort(TimePoint now) {
     const SessionUsage& usage = client->usage();
     const std::chrono::duration<double> interval = session.flow().frame_interval();
     encoding.push_back({session.effort(), usage.encoder_load() * session.effort().threads,
-                        usage.encode_seconds() / interval.count(), session.config().size_px});
+                        usage.encode_seconds() / interval.count(), session.moving_size_px()});
     sessions.push_back(&session);
   }
   for (const auto& [index, effort] :

@@ -27,11 +27,20 @@ FlowWish wish_within(const SessionPolicy& policy, const Settings& settings,
           std::min(kbps, policy.max_bitrate_kbps), settings.fixed_quality};
 }
 
+glm::ivec2 still_size_within(const SessionPolicy& policy, const Settings& settings,
+                             glm::ivec2 viewport_px) {
+  const glm::ivec2 moving_px = wish_within(policy, settings, viewport_px).size_px;
+  if (settings.fixed_quality || settings.still_size_px.x == 0) return moving_px;
+  const glm::ivec2 still_px = frame_size(settings.still_size_px, policy.max_pixels);
+  return still_px.x * still_px.y > moving_px.x * moving_px.y ? still_px : moving_px;
+}
+
 Session::Session(std::string id, const SessionPolicy& policy, SessionHost& host, TimePoint now)
     : id_(std::move(id)),
       policy_(policy),
       host_(host),
       created_(now),
+      rest_(policy.still_after),
       last_said_(now),
       last_activity_(now),
       picks_(4.0, 4.0, now),
@@ -94,6 +103,7 @@ void Session::greet(const Hello& hello, TimePoint now) {
   viewport_px_ = hello.viewport_px;
   settings_ = hello.settings;
   state_ = State::opening;
+  encode_as_wished();
   go_on_from(hello, now);
   request_stream();
 }
@@ -124,20 +134,19 @@ void Session::on_resumed(const Hello& hello, Admission admission, TimePoint now)
   note_activity(now);
   paused_ = false;  // a page that is still hidden says so again
   idr_.begin();
-  const bool same_stream = admission.scene == admission_.scene &&
-                           admission.encoder.kind == admission_.encoder.kind &&
-                           hello.settings == settings_ && hello.viewport_px == viewport_px_;
+  const bool same_stream =
+      admission.scene == admission_.scene && admission.encoder.kind == admission_.encoder.kind;
   admission_.encoder = std::move(admission.encoder);
   if (admission.scene != admission_.scene) enter_scene(std::move(admission.scene));
   welcome_due_ = true;
   viewport_px_ = hello.viewport_px;
   settings_ = hello.settings;
+  encode_as_wished();
   if (hello.resume_pose) track_.begin_anew();  // as the numbers of a page that was loaded anew
   go_on_from(hello, now);
-  if (!same_stream)
-    request_stream();
-  else if (state_ == State::live && !opening_stream_)
-    say_config(now);
+  if (!same_stream) return request_stream();
+  describe_encoding();
+  if (state_ == State::live && !opening_stream_) say_config(now);
 }
 
 void Session::on(const PoseSample& sample, TimePoint now) {
@@ -148,7 +157,7 @@ void Session::on(const PoseSample& sample, TimePoint now) {
   pace_.pose_arrived(flow_.frame_interval(), now);
   if (before && same_view(*before, sample, admission_.scene->facts.near_z)) return;
   note_activity(now);
-  last_motion_ = now;
+  rest_.moved(now);
 }
 
 void Session::on(const PosePath& path, TimePoint now) {
@@ -172,7 +181,26 @@ void Session::on(const Settings& settings, TimePoint now) {
   note_activity(now);
   if (settings == settings_) return;
   settings_ = settings;
-  request_stream();
+  settings_wait_ = true;
+  follow_settings(now);
+}
+
+void Session::follow_settings(TimePoint now) {
+  if (!settings_wait_ || now - settings_followed_ < policy_.settings_gap) return;
+  settings_wait_ = false;
+  settings_followed_ = now;
+  stills_fail_ = false;
+  encode_as_wished();
+}
+
+void Session::encode_as_wished() {
+  const FlowWish wish = wish_within(policy_, settings_, viewport_px_);
+  flow_.set_wish(wish);
+  encoding_.size_px = scaled_size(wish.size_px, flow_.rung().scale);
+  encoding_.fps = wish.fps;
+  encoding_.bitrate_kbps = wish.bitrate_kbps;
+  apply(admission_.effort, encoding_);
+  still_size_px_ = still_size_within(policy_, settings_, viewport_px_);
 }
 
 void Session::on(const RequestIdr&, TimePoint) { idr_.request(); }
@@ -199,20 +227,15 @@ void Session::request_stream() {
   }
   opening_stream_ = true;
   stream_outdated_ = false;
-  const FlowWish wish = flow_wish();
-  flow_.set_wish(wish);
-  EncoderSettings encoding;
-  encoding.size_px = scaled_size(wish.size_px, flow_.rung().scale);
-  encoding.fps = wish.fps;
-  encoding.bitrate_kbps = wish.bitrate_kbps;
-  apply(admission_.effort, encoding);
-  config_.size_px = encoding.size_px;
-  config_.fps = encoding.fps;
-  config_.bitrate_kbps = encoding.bitrate_kbps;
-  host_.open_stream({admission_.scene->renderer, admission_.encoder.kind, encoding});
+  describe_encoding();
+  host_.open_stream({admission_.scene->renderer, admission_.encoder.kind, encoding_});
 }
 
-FlowWish Session::flow_wish() const { return wish_within(policy_, settings_, viewport_px_); }
+void Session::describe_encoding() {
+  config_.size_px = encoding_.size_px;
+  config_.fps = encoding_.fps;
+  config_.bitrate_kbps = encoding_.bitrate_kbps;
+}
 
 void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   opening_stream_ = false;
@@ -231,6 +254,8 @@ void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   config_.encoder = admission_.encoder.text;
   device_ = opened.device;
   state_ = State::live;
+  encoded_as_.reset();
+  stills_fail_ = false;
   idr_.begin();
   say_config(now);
 }
@@ -267,7 +292,8 @@ void Session::on_tick(TimePoint now) {
     if (now - *lost_at_ >= policy_.resume_grace) state_ = State::closed;
     return;
   }
-  if (flow_.update(now)) follow_ladder();
+  follow_settings(now);
+  if (flow_.update(now)) encode_as_wished();
   if (policy_.idle_timeout > 0ms) {
     const auto left = last_activity_ + policy_.idle_timeout - now;
     if (left <= 0ms) return fail(ErrorCode::idle_timeout, "nothing has moved for a long time");
@@ -291,12 +317,7 @@ void Session::on_tick(TimePoint now) {
 
 void Session::use_effort(const EncoderEffort& effort) {
   admission_.effort = effort;
-  if (state_ == State::live) request_stream();
-}
-
-void Session::follow_ladder() {
-  const glm::ivec2 size_px = scaled_size(flow_wish().size_px, flow_.rung().scale);
-  if (state_ == State::live && size_px != config_.size_px) request_stream();
+  apply(effort, encoding_);
 }
 
 void Session::drain(std::chrono::milliseconds deadline) {

@@ -25,6 +25,7 @@
 #include "server/session/frame_pace.h"
 #include "server/session/idr_policy.h"
 #include "server/session/rate_limit.h"
+#include "server/session/rest.h"
 #include "server/session/scene_source.h"
 
 namespace catgs {
@@ -66,13 +67,18 @@ struct SessionPolicy {
   int max_fps = 120;
   int default_bitrate_kbps = 8000;
   int max_bitrate_kbps = 100'000;
-  int max_pixels = 3840 * 2160;  // larger wishes are scaled down
-  int refine_frames = 6;         // sent after motion stops, so that the still picture sharpens
-  std::chrono::milliseconds still_after{100};  // without another view: motion has stopped
+  int max_pixels = 3840 * 2160;                // larger wishes are scaled down
+  std::chrono::milliseconds still_after{100};  // without another view, at least: see Rest
+  int refine_frames = 60;  // that sharpen a still picture at most, where the link is slow
+  /// Between encoders that a client's settings ask for; the newest ones count.
+  std::chrono::milliseconds settings_gap{250};
 };
 
-/// What a client's wishes come to within the server's limits.
+/// What a client's wishes come to within the server's limits, while the camera moves.
 FlowWish wish_within(const SessionPolicy& policy, const Settings& settings, glm::ivec2 viewport_px);
+/// The same for a picture that stays.
+glm::ivec2 still_size_within(const SessionPolicy& policy, const Settings& settings,
+                             glm::ivec2 viewport_px);
 
 /// What a session needs from the server around it. Its owner implements it; tests fake it.
 class SessionHost {
@@ -98,6 +104,7 @@ class SessionHost {
 struct FrameOrder {
   FrameTicket ticket;
   FrameRequest request;
+  EncoderSettings encoding;
   int bitrate_kbps = min_bitrate_kbps;
   int real_fps = 1;
   bool force_idr = false;
@@ -164,7 +171,11 @@ class Session {
     return std::max(flow_.frame_interval(), pace_.real_interval());
   }
   [[nodiscard]] const FlowControl& flow() const { return flow_; }
+  /// What the client has been told last.
   [[nodiscard]] const StreamConfig& config() const { return config_; }
+  /// Of pictures of a moving camera.
+  [[nodiscard]] glm::ivec2 moving_size_px() const { return encoding_.size_px; }
+  [[nodiscard]] int fps() const { return encoding_.fps; }
   [[nodiscard]] const SceneEntry* scene() const { return admission_.scene.get(); }
   [[nodiscard]] std::optional<int> device() const { return device_; }
   [[nodiscard]] std::uint64_t frames_sent() const { return frames_sent_; }
@@ -205,11 +216,25 @@ class Session {
   void say(const ServerMessage& message, TimePoint now);
   void say_config(TimePoint now);
   void request_stream();
+  void describe_encoding();
   void send_statistics(TimePoint now);
   [[nodiscard]] bool view_has_changed() const;
-  [[nodiscard]] FlowWish flow_wish() const;
-  /// The stream has another size on the rung that holds now.
-  void follow_ladder();
+  /// The client's wishes and the rung of the ladder hold for the next frame.
+  void encode_as_wished();
+  /// Not more often than the policy says, so that settings that alternate open few encoders.
+  void follow_settings(TimePoint now);
+  [[nodiscard]] glm::ivec2 still_size_px() const {
+    return stills_fail_ ? encoding_.size_px : still_size_px_;
+  }
+  /// The picture on show is not the one that may stay.
+  [[nodiscard]] bool wants_still() const {
+    return shown_is_passing_ || !encoded_as_ || encoded_as_->size_px != still_size_px();
+  }
+  [[nodiscard]] EncoderSettings encoding_at(bool rest) const;
+  /// How large it may become, and how soon another may follow.
+  void limit(FrameOrder& order, TimePoint now);
+  void on_failed_frame(const FrameResult& result);
+  void tell_config(const FrameResult& result, TimePoint now);
 
   const std::string id_;
   const SessionPolicy& policy_;
@@ -225,9 +250,16 @@ class Session {
   glm::ivec2 viewport_px_{0};
   Settings settings_;
   StreamConfig config_;
+  EncoderSettings encoding_;                   // while the camera moves
+  std::optional<EncoderSettings> encoded_as_;  // the last frame; none: of another stream
+  EncoderSettings described_;    // while the camera moves, when the last frame started
+  glm::ivec2 still_size_px_{0};  // when it rests
+  bool stills_fail_ = false;     // in that size: as in motion
+  bool settings_wait_ = false;
+  TimePoint settings_followed_{};
   std::optional<int> device_;  // that its stream renders on, where a device has a number
   bool opening_stream_ = false;
-  bool stream_outdated_ = false;  // settings changed while the stream was busy
+  bool stream_outdated_ = false;  // another one was wanted while it was busy
   bool welcome_due_ = false;      // the scene is new to the client
 
   FlowControl flow_;
@@ -236,7 +268,8 @@ class Session {
   IdrPolicy idr_;
   CameraTrack track_;
   TimePoint pose_received_{};
-  TimePoint last_motion_{};
+  Rest rest_;
+  TimePoint next_refinement_{};
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
   bool shown_is_passing_ = false;    // it may not stay: a sub-frame, or of a forecast
   int refinements_left_ = 0;

@@ -12,6 +12,17 @@ using namespace std::chrono_literals;
 
 constexpr int max_failures_in_a_row = 3;
 
+// A still has the share of a frame at this rate of what the link carries, and what sharpens it has
+// three quarters of that: a queue that the motion left goes down meanwhile, as it has to be short
+// when the camera moves on.
+constexpr int still_fps = 30;
+constexpr int refinement_fps = 40;
+// JPEGs do not add up: each may be twice as large as the one before, down to a quarter of a second.
+constexpr int last_jpeg_fps = 4;
+constexpr int jpeg_refinements = 3;
+// More can hardly be seen, however much the link carries. A rendered city has 45 dB with 1.
+constexpr double still_bits_per_pixel = 1.5;
+
 }  // namespace
 
 bool Session::view_has_changed() const {
@@ -27,15 +38,16 @@ std::optional<FrameCandidate> Session::next_frame() const {
                        cost_.key_is_next(),
                        device_};
   if (!moved) {
-    // Between two poses of a moving camera a refinement would only be in the next one's way.
-    const bool refines = refinements_left_ > 0 || shown_is_passing_;
-    const TimePoint still = last_motion_ + policy_.still_after;
-    if (idr_.wanted() && (!refines || idr_.earliest() <= still)) {
+    // Between two poses of a moving camera a still would only be in the next one's way.
+    const TimePoint rest = rest_.begins();
+    const bool draws = wants_still();
+    const bool refines = refinements_left_ > 0;
+    if (idr_.wanted() && (!(draws || refines) || idr_.earliest() <= rest)) {
       frame.ready = std::max(frame.ready, idr_.earliest());
-    } else if (refines) {
-      frame.ready = std::max(frame.ready, still);
-      frame.key = shown_is_passing_;
-      if (!frame.key) frame.cost = cost_.refinement();
+    } else if (draws || refines) {
+      frame.ready = std::max({frame.ready, rest, next_refinement_});
+      frame.key = draws;
+      frame.cost = draws ? cost_.still() : cost_.refinement();
     } else {
       return std::nullopt;
     }
@@ -45,66 +57,130 @@ std::optional<FrameCandidate> Session::next_frame() const {
   return frame;
 }
 
+/// A still of the same size needs no encoder of its own.
+EncoderSettings Session::encoding_at(bool rest) const {
+  EncoderSettings encoding = encoding_;
+  const glm::ivec2 size_px = still_size_px();
+  if (!rest || size_px == encoding.size_px) return encoding;
+  encoding.size_px = size_px;
+  encoding.fps = std::min(encoding.fps, refinement_fps);  // for a level that decoders take
+  return encoding;
+}
+
 FrameOrder Session::start_frame(TimePoint now) {
-  pace_.frame_starts(flow_.frame_interval(), now);
-  flow_.set_real_interval(pace_.real_interval());
   rendering_ = true;
   FrameOrder order;
+  FrameTicket& ticket = order.ticket;
+  // By time alone: where credit was missing, the first picture of a pose may already be the still.
+  ticket.still = now >= rest_.begins();
+  order.encoding = encoding_at(ticket.still);
+  if (encoded_as_ != order.encoding) idr_.begin();
+  encoded_as_ = order.encoding;
+  described_ = encoding_;
   order.force_idr = idr_.take(now);
-  order.bitrate_kbps = flow_.bitrate_kbps();
-  order.real_fps = pace_.real_fps(config_.fps);
-  const bool still = !order.force_idr && !view_has_changed();
   // What stays is a key frame of the pose itself: a sub-frame may lack a little at the edges of
   // tiles, and a forecast goes further than a camera that stops.
-  order.ticket.refined = still && !shown_is_passing_;
-  if (still) track_.aim_at_newest();
+  ticket.refined = ticket.still && !order.force_idr && !view_has_changed() && !shown_is_passing_;
+  if (ticket.still) track_.aim_at_newest();
   const PoseSample& aim = track_.aim();
   shown_is_passing_ = !same_view(aim, *track_.newest(), admission_.scene->facts.near_z);
+  shown_ = aim;
+  limit(order, now);
+
+  ticket.frame_id = ++frames_started_;
+  ticket.pose_id = aim.pose_id;
+  ticket.pose_client_time_us = aim.client_time_us;
+  ticket.render_pose = aim.world_from_camera;
+  ticket.fov_y_rad = aim.fov_y_rad;
+  ticket.size_px = order.encoding.size_px;
+  ticket.pose_received = pose_received_;
+  order.request.camera = make_camera(aim.world_from_camera, ticket.size_px,
+                                     focal_from_fov_y(aim.fov_y_rad, ticket.size_px.y),
+                                     admission_.scene->facts.near_z);
+  if (!ticket.still)
+    order.request.forecast = track_.forecast(order.real_fps, SpeculationSettings{}.initial_window);
+  return order;
+}
+
+void Session::limit(FrameOrder& order, TimePoint now) {
+  const bool h264 = config_.codec == Codec::h264;
+  const int refinements = h264 ? policy_.refine_frames : jpeg_refinements;
+  order.bitrate_kbps = flow_.bitrate_kbps();
   if (order.ticket.refined)
     --refinements_left_;
   else
-    refinements_left_ = config_.codec == Codec::h264 ? policy_.refine_frames : 0;
-  shown_ = aim;
-
-  order.ticket.frame_id = ++frames_started_;
-  order.ticket.pose_id = aim.pose_id;
-  order.ticket.pose_client_time_us = aim.client_time_us;
-  order.ticket.render_pose = aim.world_from_camera;
-  order.ticket.fov_y_rad = aim.fov_y_rad;
-  order.ticket.size_px = config_.size_px;
-  order.ticket.pose_received = pose_received_;
-  order.request.camera = make_camera(aim.world_from_camera, config_.size_px,
-                                     focal_from_fov_y(aim.fov_y_rad, config_.size_px.y),
-                                     admission_.scene->facts.near_z);
-  if (!still)
-    order.request.forecast = track_.forecast(order.real_fps, SpeculationSettings{}.initial_window);
-  return order;
+    refinements_left_ = refinements;
+  if (!order.ticket.still) {
+    pace_.frame_starts(flow_.frame_interval(), now);
+    flow_.set_real_interval(pace_.real_interval());
+    order.real_fps = pace_.real_fps(encoding_.fps);
+    return;
+  }
+  pace_.rests();
+  const int done = refinements - refinements_left_;
+  const int jpeg_fps = std::max(still_fps >> done, last_jpeg_fps);
+  const int pace_fps = std::min(h264 ? still_fps : jpeg_fps, order.encoding.fps);
+  order.real_fps = h264 && done > 0 ? std::min(refinement_fps, order.encoding.fps) : pace_fps;
+  const std::chrono::microseconds interval(1'000'000 / pace_fps);
+  next_refinement_ = now + interval;
+  flow_.set_real_interval(interval);
+  const glm::dvec2 size_px = order.encoding.size_px;
+  const double enough_kbps = 1e-3 * still_bits_per_pixel * size_px.x * size_px.y * order.real_fps;
+  order.bitrate_kbps =
+      std::max(min_bitrate_kbps, std::min(order.bitrate_kbps, static_cast<int>(enough_kbps)));
 }
 
 void Session::on_frame(FrameResult result, TimePoint now) {
   rendering_ = false;
   if (state_ == State::closed) return;
   if (stream_outdated_) request_stream();
-  if (!result.ok) {
-    shown_.reset();
-    idr_.missed();
-    if (++failures_ >= max_failures_in_a_row)
-      fail(ErrorCode::render_failed, "rendering failed: " + result.message);
-    return;
-  }
+  if (!result.ok) return on_failed_frame(result);
   failures_ = 0;
-  if (result.frame.ticket.frame_id <= obsolete_frames_) return;
+  const FrameTicket& ticket = result.frame.ticket;
+  if (ticket.frame_id <= obsolete_frames_) return;
   last_said_ = now;
-  cost_.add(result.frame.ticket);
-  if (result.frame.ticket.speculated) shown_is_passing_ = true;
-  flow_.sent(result.frame.ticket.frame_id, result.frame.bitstream.size(),
-             result.frame.ticket.size_px, now);
+  cost_.add(ticket);
+  if (ticket.speculated) shown_is_passing_ = true;
+  if (result.sharp) refinements_left_ = 0;
+  tell_config(result, now);
+  flow_.sent({ticket.frame_id, result.frame.bitstream.size(), ticket.size_px, ticket.still}, now);
   const auto dropped = host_.send(std::move(result.frame));
   for (const std::uint64_t id : dropped) flow_.lost(id);
   if (dropped.empty()) return;
   idr_.dropped(now);
   frames_dropped_ += dropped.size();
   stats_.dropped_packets += static_cast<std::uint32_t>(dropped.size());
+}
+
+void Session::on_failed_frame(const FrameResult& result) {
+  shown_.reset();
+  idr_.missed();
+  if (result.frame.ticket.still && encoded_as_ && encoded_as_->size_px != encoding_.size_px) {
+    stills_fail_ = true;  // no memory for so large a picture, no level of the encoder: as in motion
+    return;
+  }
+  if (result.encoder_unavailable) {
+    if (auto other = host_.other_encoder()) {
+      admission_.encoder = *std::move(other);
+      return request_stream();
+    }
+    return fail(ErrorCode::internal, "the stream cannot be opened: " + result.message);
+  }
+  if (++failures_ >= max_failures_in_a_row)
+    fail(ErrorCode::render_failed, "rendering failed: " + result.message);
+}
+
+/// Before the first frame that it describes, which is an IDR.
+void Session::tell_config(const FrameResult& result, TimePoint now) {
+  if (!result.frame.ticket.idr) return;
+  StreamConfig config = config_;
+  config.size_px = result.frame.ticket.size_px;
+  config.fps = described_.fps;
+  config.bitrate_kbps = described_.bitrate_kbps;
+  config.codec_string = result.codec_string;
+  if (config == config_) return;
+  config_ = config;
+  say_config(now);
 }
 
 void Session::on_frame_sent(const FrameTicket& ticket, std::size_t bytes) {

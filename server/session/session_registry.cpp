@@ -227,8 +227,9 @@ std::vector<SessionDemand> SessionRegistry::demands() const {
   std::vector<SessionDemand> demands;
   for (const auto& client : clients_) {
     if (!client->admitted_at()) continue;
-    const StreamConfig& config = client->session().config();
-    demands.push_back({client->usage().frame_cost(), megapixels(config.size_px), config.fps});
+    const Session& session = client->session();
+    demands.push_back(
+        {client->usage().frame_cost(), megapixels(session.moving_size_px()), session.fps()});
   }
   return demands;
 }

@@ -43,16 +43,17 @@ std::optional<Percentiles> RecentTimes::percentiles() const {
 
 void SessionUsage::frame_started(TimePoint now) { under_way_since_ = now; }
 
-void SessionUsage::frame_ended(const FrameTicket& ticket, double device_seconds, TimePoint now) {
+void SessionUsage::frame_ended(const FrameTicket& ticket, double device_seconds, TimePoint now,
+                               double frames) {
   if (const auto since = std::exchange(under_way_since_, std::nullopt))
     busy_seconds_ += seconds_between(*since, now);
   gpu_seconds_ += device_seconds;
   const double encoding = seconds_between(ticket.encode_start, ticket.encode_end);
   encoding_seconds_ += encoding;
-  if (encoding > 0)
+  if (encoding > 0 && !ticket.still)
     encode_seconds_ += encode_seconds_ == 0 ? encoding : (encoding - encode_seconds_) / 16.0;
   if (ticket.refined) return;
-  ++rendered_;
+  rendered_ += frames;
   rendered_gpu_seconds_ += device_seconds;
 }
 
@@ -63,8 +64,7 @@ void SessionUsage::add(SessionTime time, TimePoint from, TimePoint to) {
 void SessionUsage::frame_sent(const FrameTicket& ticket, TimePoint now) {
   add(SessionTime::send, ticket.encode_end, now);
   add(SessionTime::encode, ticket.encode_start, ticket.encode_end);
-  // A refinement is late on purpose, and nothing is rendered for it.
-  if (ticket.refined) return;
+  if (ticket.still) return;  // late on purpose, of another size perhaps
   add(SessionTime::queue_wait, ticket.ready, ticket.started);
   add(SessionTime::render, ticket.render_start, ticket.render_end);
   add(SessionTime::pose_to_frame, ticket.pose_received, now);
@@ -82,7 +82,7 @@ double SessionUsage::take_busy_seconds(TimePoint now) {
 
 void SessionUsage::charge_cpu(double seconds, double interval_s) {
   cpu_seconds_ += seconds;
-  const int frames = std::exchange(rendered_, 0);
+  const double frames = std::exchange(rendered_, 0.0);
   const double gpu_seconds = std::exchange(rendered_gpu_seconds_, 0.0);
   const double encoding_seconds = std::exchange(encoding_seconds_, 0.0);
   follow(gpu_load_, gpu_seconds, interval_s);
@@ -90,7 +90,7 @@ void SessionUsage::charge_cpu(double seconds, double interval_s) {
   if (frames == 0) return;
   constexpr double span_frames = 32;  // that the means reach back over
   frames_measured_ += frames;
-  const double weight = std::min(1.0, frames / std::min<double>(frames_measured_, span_frames));
+  const double weight = std::min(1.0, frames / std::min(frames_measured_, span_frames));
   cost_.cpu_seconds += (seconds / frames - cost_.cpu_seconds) * weight;
   cost_.gpu_seconds += (gpu_seconds / frames - cost_.gpu_seconds) * weight;
 }

@@ -49,8 +49,10 @@ class RecentTimes {
 class SessionUsage {
  public:
   void frame_started(TimePoint now);
-  /// `device_seconds`: that a GPU worked for it; 0 on the CPU core.
-  void frame_ended(const FrameTicket& ticket, double device_seconds, TimePoint now);
+  /// `device_seconds`: that a GPU worked for it; 0 on the CPU core. A still has the pixels of
+  /// `frames` in motion, and counts as so many.
+  void frame_ended(const FrameTicket& ticket, double device_seconds, TimePoint now,
+                   double frames = 1.0);
   void frame_sent(const FrameTicket& ticket, TimePoint now);
   void frame_shown(double motion_to_photon_s);
 
@@ -84,10 +86,10 @@ class SessionUsage {
   double cpu_seconds_ = 0;
   double gpu_seconds_ = 0;
   // Since the last charge_cpu().
-  int rendered_ = 0;
+  double rendered_ = 0;
   double rendered_gpu_seconds_ = 0;
   double encoding_seconds_ = 0;
-  int frames_measured_ = 0;
+  double frames_measured_ = 0;
   FrameCost cost_;
   double gpu_load_ = 0;
   double encoder_load_ = 0;

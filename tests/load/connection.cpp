@@ -105,6 +105,13 @@ void Connection::say_hello() {
   hello.add_decoders(v1::CODEC_H264);
   hello.add_decoders(v1::CODEC_MJPEG);
   hello.set_token(settings_.token);
+  if (settings_.moving_size_px.x > 0) {
+    v1::Settings& sizes = *hello.mutable_settings();
+    sizes.set_width_px(static_cast<std::uint32_t>(settings_.moving_size_px.x));
+    sizes.set_height_px(static_cast<std::uint32_t>(settings_.moving_size_px.y));
+    sizes.set_still_width_px(hello.viewport_width_px());
+    sizes.set_still_height_px(hello.viewport_height_px());
+  }
   hello.mutable_settings()->set_max_fps(static_cast<std::uint32_t>(settings_.fps));
   hello.mutable_settings()->set_max_bitrate_kbps(
       static_cast<std::uint32_t>(settings_.max_bitrate_kbps));
@@ -122,7 +129,12 @@ asio::awaitable<void> Connection::send_poses() {
   replay = PoseReplay(trajectory_, static_cast<std::int64_t>(
                                        settings_.offset * static_cast<double>(replay.span_us())));
   begin_us_ = now_us();
+  std::int64_t moving_since_us = begin_us_;
   while (true) {
+    if (settings_.rest_us > 0 && now_us() - moving_since_us >= settings_.move_us) {
+      co_await rest();
+      moving_since_us = now_us();
+    }
     const std::int64_t due_us = begin_us_ + replay.next_time_us();
     if (due_us >= settings_.stop_us) break;
     co_await wait_until(clock_time(due_us));
@@ -150,6 +162,16 @@ asio::awaitable<void> Connection::send_poses() {
   bye_said_ = true;
   end_ = End::finished;
   co_await wait_until(clock_time(settings_.stop_us + 2'000'000));  // for the outbox to end it all
+}
+
+/// As a browser whose visitor looks: no poses, and the way goes on from here.
+asio::awaitable<void> Connection::rest() {
+  if (!state_.last_pose) co_return;
+  report_.rest = {++report_.rests, state_.last_pose->pose_id(), state_.last_pose->client_time_us()};
+  co_await wait_until(clock_time(std::min(now_us() + settings_.rest_us, settings_.stop_us)));
+  if (now_us() >= settings_.stop_us) --report_.rests;  // cut short: proves nothing
+  report_.rest.reset();
+  begin_us_ += settings_.rest_us;
 }
 
 bool Connection::stalled() const {

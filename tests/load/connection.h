@@ -35,6 +35,7 @@ class Connection {
 
  private:
   boost::asio::awaitable<void> send_poses();
+  boost::asio::awaitable<void> rest();
   boost::asio::awaitable<void> write_outbox();
   boost::asio::awaitable<void> read_inbox();
   boost::asio::awaitable<void> flood();

@@ -1,5 +1,6 @@
 #include "tests/load/decode_stage.h"
 
+#include <algorithm>
 #include <utility>
 
 #include <boost/asio/bind_cancellation_slot.hpp>
@@ -16,6 +17,8 @@ namespace {
 namespace asio = boost::asio;
 
 constexpr std::size_t max_queued = 16;
+constexpr std::int64_t min_stills_apart_us = 30'000;
+constexpr std::size_t max_stills = 120;
 
 }  // namespace
 
@@ -34,7 +37,8 @@ bool DecodeStage::has_work() const {
 }
 
 bool DecodeStage::picture_is_due() const {
-  const std::size_t kept = report_.pictures.size();
+  const auto kept =
+      static_cast<std::size_t>(std::ranges::count(report_.pictures, 0, &PictureSample::rest));
   if (kept == settings_.pictures) return false;
   const double part = (static_cast<double>(kept) + 0.5) / static_cast<double>(settings_.pictures);
   const auto span_us = static_cast<double>(settings_.stop_us - settings_.start_us);
@@ -85,6 +89,7 @@ asio::awaitable<void> DecodeStage::decode(Item& item) {
       callbacks_.request_idr();
     } else {
       report_.stats.frame_decoded(decoded.duration_us);
+      keep_still(item, decoded);
       keep_picture(item, decoded);
     }
   }
@@ -121,6 +126,23 @@ void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
                               .near_z = scene_.near_z(),
                               .scene_id = scene_.scene_id(),
                               .picture = std::move(decoded.picture)});
+}
+
+void DecodeStage::keep_still(const Item& item, const Decoded& decoded) {
+  if (settings_.pictures == 0 || !report_.rest || report_.rest->number > max_rests) return;
+  if (!item.header.still() || item.header.pose_id() != report_.rest->pose_id) return;
+  if (report_.pictures.size() >= max_stills) return;
+  const std::int64_t after_us = now_us() - report_.rest->since_us;
+  const auto last = std::ranges::find(report_.pictures.rbegin(), report_.pictures.rend(),
+                                      report_.rest->number, &PictureSample::rest);
+  if (last != report_.pictures.rend() && after_us - last->after_us < min_stills_apart_us) return;
+  report_.pictures.push_back({.render_pose = from_wire(item.header.render_pose()),
+                              .fov_y_rad = item.header.fov_y_rad(),
+                              .near_z = scene_.near_z(),
+                              .scene_id = scene_.scene_id(),
+                              .picture = decoded.picture,
+                              .rest = report_.rest->number,
+                              .after_us = after_us});
 }
 
 }  // namespace catgs::load

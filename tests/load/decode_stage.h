@@ -58,6 +58,8 @@ class DecodeStage {
   /// In the middles of equal parts of the session's time.
   [[nodiscard]] bool picture_is_due() const;
   void keep_picture(const Item& item, Decoded& decoded);
+  /// The first ones of the first rests, until one is large and late enough to be sharp.
+  void keep_still(const Item& item, const Decoded& decoded);
 
   const SessionSettings& settings_;
   boost::asio::thread_pool& decoders_;

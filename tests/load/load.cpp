@@ -134,7 +134,7 @@ class Run {
 
   void start_session(const GroupOptions& group, const TrajectoryMaker& trajectories, int number,
                      SessionReport& report) {
-    SessionSettings settings = settings_of(group, number);
+    SessionSettings settings = settings_of(group, number, report);
     settings.make_trajectory = [&trajectories, number](const SceneHints& scene) {
       return trajectories.make(number, scene);
     };
@@ -161,13 +161,18 @@ class Run {
     co_await run_session(std::move(settings), {tls_, decoders_}, report);
   }
 
-  SessionSettings settings_of(const GroupOptions& group, int number) const {
+  SessionSettings settings_of(const GroupOptions& group, int number, SessionReport& report) const {
     SessionSettings settings;
     settings.url = url_;
     settings.token = options_.token;
     settings.scene_id = group.scene;
     settings.size_px =
         parse_size("--size", group.sizes[static_cast<std::size_t>(number) % group.sizes.size()]);
+    if (!group.moving_size.empty())
+      settings.moving_size_px = parse_size("--moving-size", group.moving_size);
+    report.still_size_px = settings.size_px;
+    settings.move_us = microseconds(group.move_for_s);
+    settings.rest_us = microseconds(group.rest_for_s);
     settings.fps = group.fps;
     settings.max_bitrate_kbps = group.max_bitrate_kbps;
     settings.fixed_quality = group.fixed_quality;

@@ -31,6 +31,7 @@ struct ProgramOptions {
   GroupOptions group;
   std::string file, server, server_log, url, token;
   std::string duration, ramp = "0s", link, decode_time = "0s", reconnect_every = "0s";
+  std::string move_for = "0s", rest_for = "0s";
   bool insecure = false;
   std::string json, html;
   std::vector<std::string> without;
@@ -58,6 +59,11 @@ void add_client_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--scene", group.scene, "Scene id (default: the server's first)");
   app.add_option("--size", group.sizes, "Wanted frame sizes, pixels; sessions take turns")
       ->capture_default_str();
+  app.add_option("--moving-size", group.moving_size,
+                 "Wanted while the camera moves; --size then is that of pictures at rest");
+  auto* rest = app.add_option("--rest-for", options.rest_for,
+                              "Stop and go: no poses for this long, again and again");
+  app.add_option("--move-for", options.move_for, "Between two rests")->needs(rest);
   app.add_option("--fps", group.fps, "Wanted and nominal frame rate")
       ->check(CLI::Range(1, 240))
       ->capture_default_str();
@@ -137,6 +143,8 @@ Scenario scenario_of(const ProgramOptions& options) {
     group.ramp_s = parse_duration_s("--ramp", options.ramp);
     group.link = parse_link("--link", options.link);
     group.decode_time_s = parse_duration_s("--decode-time", options.decode_time);
+    group.move_for_s = parse_duration_s("--move-for", options.move_for);
+    group.rest_for_s = parse_duration_s("--rest-for", options.rest_for);
     group.reconnect_every_s = parse_duration_s("--reconnect-every", options.reconnect_every);
     scenario.load.groups = {group};
   } else {

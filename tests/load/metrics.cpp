@@ -35,6 +35,9 @@ constexpr NamedCount counts[] = {{"frames", &SessionStats::frames},
                                  {"frames_skipped", &SessionStats::frames_skipped},
                                  {"reconnects", &SessionStats::reconnects}};
 
+// A picture at rest with this much, of chroma at half the size too, is one that stays.
+constexpr double sharp_db = 38.0;
+
 struct Range {
   double min = std::numeric_limits<double>::infinity(), mean = 0.0, max = 0.0;
 };
@@ -66,6 +69,7 @@ void add_pictures(const SessionReports& sessions, Metrics& metrics) {
   double sum = 0.0, count = 0.0, min = std::numeric_limits<double>::infinity();
   for (const auto& session : sessions) {
     for (const PictureSample& sample : session->pictures) {
+      if (sample.rest > 0) continue;
       sum += squared_error(sample.psnr_db);
       min = std::min(min, sample.psnr_db);
       ++count;
@@ -75,6 +79,36 @@ void add_pictures(const SessionReports& sessions, Metrics& metrics) {
   metrics.emplace_back("pictures", count);
   metrics.emplace_back("psnr_mean_db", count > 0.0 ? psnr_db(sum / count) : none);
   metrics.emplace_back("psnr_min_db", count > 0.0 ? min : none);
+}
+
+/// Of a rest, until a picture of the wanted size was there that shows what the scene does.
+double sharp_after_ms(const SessionReport& session, int rest) {
+  for (const PictureSample& sample : session.pictures)
+    if (sample.rest == rest && sample.picture.size_px == session.still_size_px &&
+        sample.psnr_db >= sharp_db)
+      return 1e-3 * static_cast<double>(sample.after_us);
+  return std::numeric_limits<double>::infinity();
+}
+
+void add_rests(const SessionReports& sessions, Metrics& metrics) {
+  std::vector<double> times_ms;
+  double worst_db = std::numeric_limits<double>::infinity();
+  for (const auto& session : sessions) {
+    for (int rest = 1; rest <= std::min(session->rests, max_rests); ++rest) {
+      times_ms.push_back(sharp_after_ms(*session, rest));
+      double best_db = 0.0;
+      for (const PictureSample& sample : session->pictures)
+        if (sample.rest == rest) best_db = std::max(best_db, sample.psnr_db);
+      worst_db = std::min(worst_db, best_db);
+    }
+  }
+  std::ranges::sort(times_ms);
+  const bool none = times_ms.empty();
+  metrics.emplace_back("rests", static_cast<double>(times_ms.size()));
+  metrics.emplace_back("sharp_after_rest_p50_ms",
+                       none ? std::nan("") : times_ms[times_ms.size() / 2]);
+  metrics.emplace_back("sharp_after_rest_max_ms", none ? std::nan("") : times_ms.back());
+  metrics.emplace_back("still_psnr_min_db", none ? std::nan("") : worst_db);
 }
 
 Metrics window_metrics(const SeriesBin& bin, double bin_s, std::size_t sessions) {
@@ -101,9 +135,13 @@ double value_of(const Metrics& metrics, std::string_view name) {
 
 double mean_psnr_db(const SessionReport& session) {
   if (session.pictures.empty()) return std::nan("");
-  double sum = 0.0;
-  for (const PictureSample& sample : session.pictures) sum += squared_error(sample.psnr_db);
-  return psnr_db(sum / static_cast<double>(session.pictures.size()));
+  double sum = 0.0, count = 0.0;
+  for (const PictureSample& sample : session.pictures) {
+    if (sample.rest > 0) continue;
+    sum += squared_error(sample.psnr_db);
+    ++count;
+  }
+  return count > 0.0 ? psnr_db(sum / count) : std::nan("");
 }
 
 bool holds(const SessionReport& session, double nominal_fps, const HoldBounds& bounds) {
@@ -147,6 +185,7 @@ Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
   add("bitrate_kbps_mean", bitrate.mean);
   add("bitrate_kbps_max", bitrate.max);
   add_pictures(sessions, metrics);
+  add_rests(sessions, metrics);
   for (const NamedCount& count : counts) {
     double sum = 0.0;
     for (const auto& session : sessions) {

@@ -25,6 +25,9 @@ struct GroupOptions {
   bool anchor = false;
   ScriptOptions script;
   std::vector<std::string> sizes = {"1280x720"};
+  std::string moving_size;  // smaller than those while the camera moves; empty: as they are
+  double move_for_s = 0.0;  // stop and go: poses for this long, …
+  double rest_for_s = 0.0;  // … then none for this long; 0: never
   int fps = 60;
   int pose_hz = 0;  // of a script; 0: display rate, as browsers do: 60, or fps where that is more
   int max_bitrate_kbps = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,19 @@ struct PictureSample {
   float near_z = 0.0f;
   std::string scene_id;
   DecodedPicture picture;
-  double psnr_db = 0.0;  // once check_pictures() has judged it
+  double psnr_db = 0.0;       // once check_pictures() has judged it
+  int rest = 0;               // counted from 1: the camera rests; 0: taken as it went
+  std::int64_t after_us = 0;  // at rest: decoded so long after the last pose that moved
+};
+
+/// Pictures of so many rests are kept: they stay in memory until the end.
+inline constexpr int max_rests = 6;
+
+/// The camera of a session rests.
+struct RestingCamera {
+  int number = 0;  // counted from 1
+  std::uint64_t pose_id = 0;
+  std::int64_t since_us = 0;  // when its last pose was sent
 };
 
 struct SessionReport {
@@ -26,6 +39,9 @@ struct SessionReport {
   SessionStats stats;
   std::string renderer, encoder, server_version;  // as the last Welcome said
   std::vector<PictureSample> pictures;
+  std::optional<RestingCamera> rest;
+  int rests = 0;  // that lasted
+  glm::ivec2 still_size_px{0};
 };
 
 using SessionReports = std::vector<std::unique_ptr<SessionReport>>;

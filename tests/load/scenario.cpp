@@ -131,6 +131,9 @@ GroupOptions read_group(TableReader& reader, const std::filesystem::path& folder
   reader.take("seed", seed, 0, 1'000'000'000);
   group.script.seed = static_cast<std::uint64_t>(seed);
   reader.take("sizes", group.sizes);
+  reader.take("moving-size", group.moving_size);
+  reader.take_seconds("move-for", group.move_for_s);
+  reader.take_seconds("rest-for", group.rest_for_s);
   reader.take("fps", group.fps, 1, 240);
   reader.take("pose-hz", group.pose_hz, 0, 1000);
   reader.take("max-bitrate-kbps", group.max_bitrate_kbps, 0, 200'000);

@@ -29,6 +29,8 @@ struct SessionSettings {
   std::string token;
   std::string scene_id;
   glm::ivec2 size_px{0};
+  glm::ivec2 moving_size_px{0};           // 0: the same
+  std::int64_t move_us = 0, rest_us = 0;  // stop and go
   int fps = 60;
   int max_bitrate_kbps = 0;  // 0: the server's default
   bool fixed_quality = false;

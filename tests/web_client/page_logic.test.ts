@@ -3,6 +3,7 @@ import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { Settling } from '#client/automation';
 import { AutoHeight } from '#client/session/auto_height';
+import { QualityChoice } from '#client/session/quality';
 import { scene_address } from '#client/session/scenes';
 import { take_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
@@ -86,6 +87,14 @@ describe('automatic height', () => {
   it('stays where it is when a frame takes what it may, or when there is none', () => {
     expect(look_often(new AutoHeight(), 40)).toEqual([]);
     expect(look_often(new AutoHeight(), NaN)).toEqual([]);
+  });
+
+  it('is that of pictures in motion: what rests has the size of the view, or the chosen one', () => {
+    const quality = new QualityChoice();
+    for (let i = 0; i < 12; ++i) quality.look(400, 1080);
+    expect(quality.in_view(1080)).toMatchObject({ height_px: 240, still_height_px: 0 });
+    quality.choose(480, 0);
+    expect(quality.in_view(1080)).toMatchObject({ height_px: 480, still_height_px: 480 });
   });
 
   it('forgets a vote that is followed by another opinion', () => {

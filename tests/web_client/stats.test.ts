@@ -124,6 +124,15 @@ describe('metrics', () => {
     expect(metrics.snapshot(600 * ms).motion_to_photon_ms).toEqual({ p50: 30, p95: 30 });
   });
 
+  it('tell stages of a moving camera, whatever pictures at rest take', () => {
+    const metrics = new Metrics();
+    const moving = frame(1n, 0, 20 * ms);
+    metrics.presented(moving, 30 * ms);
+    const header = create(FrameHeaderSchema, { ...moving.header, still: true, renderUs: 90_000 });
+    metrics.presented({ ...moving, header }, 200 * ms);
+    expect(metrics.snapshot(300 * ms).stages_ms.render).toBe(12);
+  });
+
   it('say so when nothing was measured', () => {
     const stats = new Metrics().snapshot(0);
     expect(stats.fps_shown).toBe(0);

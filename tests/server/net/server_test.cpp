@@ -13,6 +13,7 @@
 #include "render_core/error.h"
 #include "render_core/scene/save_scene.h"
 #include "render_core/scene/synth.h"
+#include "server/encode/decoder.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -85,6 +86,66 @@ TEST(Server, NewSettingsGiveANewConfigAndThenAnIdr) {
   const ReceivedFrame frame = client.receive_frame();
   EXPECT_TRUE(frame.header.idr());
   EXPECT_EQ(frame.header.width_px(), 320u);
+}
+
+// As where a processor keeps up with no more in motion.
+TEST(Server, APictureAtRestHasItsOwnSize) {
+  RunningServer server;
+  WireClient client(server.port());
+  client.greet(160, 96);
+  v1::ClientMessage settings;
+  settings.mutable_settings()->set_width_px(160);
+  settings.mutable_settings()->set_height_px(96);
+  settings.mutable_settings()->set_still_width_px(640);
+  settings.mutable_settings()->set_still_height_px(384);
+  client.send(settings);
+  std::uint64_t pose = 1;
+  client.send_pose(pose);
+  std::uint32_t told_px = 160;
+  DecodedPicture picture;
+  for (int stills = 0; stills < 3;) {
+    const Received received = client.receive();
+    ASSERT_FALSE(received.closed);
+    if (received.message && received.message->has_config())
+      told_px = received.message->config().width_px();
+    if (!received.frame) continue;
+    const v1::FrameHeader& header = received.frame->header;
+    client.send_ack(header.frame_id());
+    EXPECT_EQ(header.width_px(), header.still() ? 640u : 160u);
+    EXPECT_EQ(header.width_px(), told_px) << "before the first frame of that size";
+    if (!header.still() || header.pose_id() != pose || !header.idr()) continue;
+    Decoder decoder(Codec::h264);
+    ASSERT_TRUE(decoder.decode(received.frame->bitstream, picture).ok);
+    ++stills;
+    ++pose;
+    client.send_pose(pose, 0.1f * static_cast<float>(pose));
+  }
+  EXPECT_EQ(picture.size_px, glm::ivec2(640, 384));
+}
+
+TEST(Server, AClaimOfAClientSpoilsNoMetric) {
+  RunningServer server;
+  WireClient client(server.port());
+  client.greet(160, 96);
+  client.send_pose(1);
+  v1::ClientMessage lie;
+  v1::Ack& ack = *lie.mutable_ack();
+  ack.set_frame_id(client.receive_frame().header.frame_id());
+  ack.set_presented_us(1);
+  ack.set_pose_age_us(4'000'000'000);
+  for (int i = 0; i < 50; ++i) client.send(lie);  // one frame was shown once
+  ack.set_frame_id(1'000'000);
+  client.send(lie);
+  ack.set_dropped(true);
+  client.send(lie);
+  v1::ClientMessage bye;
+  bye.mutable_bye();
+  client.send(bye);
+  client.receive_until_closed();
+  const std::string metrics = http_get(server.admin_port(), "/metrics").body;
+  EXPECT_THAT(metrics, HasSubstr("catgs_motion_to_photon_seconds_count 1\n"));
+  EXPECT_THAT(metrics, HasSubstr("catgs_motion_to_photon_seconds_sum 10\n"));
+  EXPECT_THAT(metrics, HasSubstr("catgs_frames_dropped_total{by=\"client\"} 0\n"));
 }
 
 TEST(Server, CreditBoundsWhatIsInFlight) {

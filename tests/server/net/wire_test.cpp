@@ -171,7 +171,12 @@ TEST(Wire, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(complaint(hello), HasSubstr("hello.token"));
   hello = good_hello();
   hello.mutable_hello()->mutable_settings()->set_width_px(640);
-  EXPECT_THAT(complaint(hello), HasSubstr("settings"));
+  EXPECT_THAT(complaint(hello), HasSubstr("settings.width_px and settings.height_px"));
+  hello = good_hello();
+  hello.mutable_hello()->mutable_settings()->set_still_height_px(640);
+  EXPECT_THAT(complaint(hello), HasSubstr("settings.still_width_px"));
+  hello.mutable_hello()->mutable_settings()->set_still_width_px(9000);
+  EXPECT_THAT(complaint(hello), HasSubstr("settings.still_width_px"));
   hello = good_hello();
   for (int i = 0; i < 9; ++i) hello.mutable_hello()->add_decoders(v1::CODEC_H264);
   EXPECT_THAT(complaint(hello), HasSubstr("hello.decoders"));
@@ -190,6 +195,17 @@ TEST(Wire, NamesTheFieldThatIsWrong) {
     auto pose = good_pose();
     pose.mutable_pose()->set_fov_y_rad(fov);
     EXPECT_THAT(complaint(pose), HasSubstr("pose.fov_y_rad")) << fov;
+  }
+}
+
+TEST(Wire, NoPictureIsTakenForOlderThanTenSeconds) {
+  for (const std::uint32_t age_us : {0u, 10'000'000u, 10'000'001u, 4'294'967'295u}) {
+    v1::ClientMessage message;
+    message.mutable_ack()->set_frame_id(1);
+    message.mutable_ack()->set_pose_age_us(age_us);
+    const std::string text = message.SerializeAsString();
+    const auto* data = reinterpret_cast<const std::byte*>(text.data());
+    EXPECT_EQ(parsed<Ack>({data, data + text.size()}).pose_age_us, std::min(age_us, 10'000'000u));
   }
 }
 

@@ -78,12 +78,14 @@ class WatchedEncoder final : public Encoder {
 };
 
 TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
-  PoolExecutor executor({std::make_shared<ThreadPool>(3), std::make_shared<ThreadPool>(2)});
-  EXPECT_EQ(executor.slots(), 5);
   std::thread::id rendered_on, encoded_on;
+  PoolExecutor executor({std::make_shared<ThreadPool>(3), std::make_shared<ThreadPool>(2)},
+                        [&](EncoderKind, const EncoderSettings&) {
+                          return std::make_unique<WatchedEncoder>(&encoded_on);
+                        });
+  EXPECT_EQ(executor.slots(), 5);
   auto stream = std::make_shared<Stream>();
   stream->view = std::make_unique<WatchedView>(&rendered_on);
-  stream->encoder = std::make_unique<WatchedEncoder>(&encoded_on);
   std::promise<FrameResult> done;
   FrameJob job;
   job.stream = stream;
@@ -112,6 +114,69 @@ TEST(PoolExecutor, AnEncoderThatCannotBeOpenedIsTold) {
   EXPECT_TRUE(opened.encoder_unavailable);
   EXPECT_EQ(opened.message, "no session left");
   executor.close(std::move(stream));
+}
+
+TEST(PoolExecutor, AFrameWhoseEncoderCannotBeOpenedIsTold) {
+  PoolExecutor executor({std::make_shared<ThreadPool>(1), std::make_shared<ThreadPool>(1)},
+                        [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
+                          throw std::runtime_error("no session left");
+                        });
+  std::thread::id rendered_on;
+  FrameJob job;
+  job.stream = std::make_shared<Stream>();
+  job.stream->view = std::make_unique<WatchedView>(&rendered_on);
+  std::promise<FrameResult> done;
+  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
+  const FrameResult result = done.get_future().get();
+  EXPECT_FALSE(result.ok);
+  EXPECT_TRUE(result.encoder_unavailable);
+  EXPECT_EQ(result.message, "no session left");
+}
+
+TEST(StreamEncoders, KeepsTheTwoUsedLast) {
+  int opened = 0;
+  std::thread::id on;
+  const EncoderFactory make = [&](EncoderKind, const EncoderSettings&) {
+    ++opened;
+    return std::make_unique<WatchedEncoder>(&on);
+  };
+  EncoderSettings moving, still, other;
+  moving.size_px = {640, 360};
+  still.size_px = {1280, 720};
+  other.size_px = {960, 540};
+  StreamEncoders encoders;
+  for (int i = 0; i < 100; ++i) {
+    encoders.use(EncoderKind::x264, moving, make);
+    encoders.use(EncoderKind::x264, still, make);
+  }
+  EXPECT_EQ(opened, 2) << "a camera that stops and goes opens nothing";
+  const Encoder* const kept = &encoders.use(EncoderKind::x264, still, make);
+  encoders.use(EncoderKind::x264, other, make);
+  EXPECT_EQ(encoders.size(), 2u);
+  EXPECT_EQ(&encoders.use(EncoderKind::x264, still, make), kept);
+  EXPECT_EQ(opened, 3);
+  encoders.use(EncoderKind::jpeg, still, make);
+  EXPECT_EQ(encoders.size(), 1u) << "those of another kind serve no more";
+}
+
+TEST(StreamEncoders, NvencHasOneAtATimeAndWhatFailsHarmsNoOther) {
+  std::thread::id on;
+  bool fails = false;
+  const EncoderFactory make = [&](EncoderKind, const EncoderSettings&) {
+    if (fails) throw std::runtime_error("no memory");
+    return std::make_unique<WatchedEncoder>(&on);
+  };
+  EncoderSettings moving, still;
+  moving.size_px = {640, 360};
+  still.size_px = {1280, 720};
+  StreamEncoders encoders;
+  encoders.use(EncoderKind::nvenc, moving, make);
+  encoders.use(EncoderKind::nvenc, still, make);
+  EXPECT_EQ(encoders.size(), 1u);
+  const Encoder* const kept = &encoders.use(EncoderKind::x264, moving, make);
+  fails = true;
+  EXPECT_THROW(encoders.use(EncoderKind::x264, still, make), std::runtime_error);
+  EXPECT_EQ(&encoders.use(EncoderKind::x264, moving, make), kept);
 }
 
 TEST(PoolExecutor, AClientThatNeverOpenedAStreamClosesIt) {

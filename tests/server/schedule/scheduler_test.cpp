@@ -160,10 +160,16 @@ TEST(NextFrameCost, TellsKeyFramesFromSubFrames) {
   add(3ms, 4ms);
   EXPECT_TRUE(cost.key_is_next());
   EXPECT_EQ(cost.next(), 14ms);
-  ticket.refined = true;
-  add(0ms, 4ms);
-  EXPECT_TRUE(cost.key_is_next());
+  EXPECT_EQ(cost.still(), 14ms) << "of the same size, as far as is known";
   EXPECT_EQ(cost.refinement(), 4ms);
+  ticket.still = true;
+  add(40ms, 20ms);
+  ticket.refined = true;
+  add(0ms, 15ms);
+  EXPECT_EQ(cost.still(), 60ms);
+  EXPECT_EQ(cost.refinement(), 15ms);
+  EXPECT_TRUE(cost.key_is_next());
+  EXPECT_EQ(cost.next(), 14ms) << "of another size";
 }
 
 }  // namespace

@@ -16,10 +16,12 @@ struct FlowScenario {
   LinkPlan link;
   ClientPlan client;
   glm::ivec2 size_px{1280, 720};
+  glm::ivec2 still_size_px{0};  // 0: the same
   int fps = 60;
   int max_bitrate_kbps = 40'000;
   bool fixed_quality = false;
   double demand_bits_per_pixel = 1.0;  // the most that the content is worth
+  double sharp_bits_per_pixel = 0.6;   // of a still and its refinements, together
   microseconds frame_cost{8'000};      // rendering and encoding
   /// The camera stands still in these.
   std::vector<Outage> rests;
@@ -34,6 +36,7 @@ struct FrameTrace {
   microseconds arrival{0};
   microseconds queueing{0};  // on the way: all but the link's own delay
   bool idr = false;
+  bool sharp = false;
 };
 
 class FlowSimulation {
@@ -48,6 +51,10 @@ class FlowSimulation {
     hello.version = 1;
     hello.viewport_px = scenario_.size_px;
     hello.decoders = {Codec::h264};
+    if (scenario_.still_size_px.x > 0) {
+      hello.settings.size_px = scenario_.size_px;
+      hello.settings.still_size_px = scenario_.still_size_px;
+    }
     hello.settings.max_fps = scenario_.fps;
     hello.settings.max_bitrate_kbps = scenario_.max_bitrate_kbps;
     hello.settings.fixed_quality = scenario_.fixed_quality;
@@ -61,7 +68,24 @@ class FlowSimulation {
 
   [[nodiscard]] const std::vector<FrameTrace>& frames() const { return frames_; }
   [[nodiscard]] const Session& session() const { return session_; }
-  [[nodiscard]] int streams_opened() const { return static_cast<int>(host_.opened.size()); }
+  /// How often frames of the moving camera got another size, the first one included.
+  [[nodiscard]] int sizes() const {
+    int count = 0;
+    glm::ivec2 size_px{0};
+    for (const FrameTrace& frame : frames_)
+      if (!frame.ticket.still &&
+          std::exchange(size_px, frame.ticket.size_px) != frame.ticket.size_px)
+        ++count;
+    return count;
+  }
+  /// From a time until a sharp picture of this size has come.
+  [[nodiscard]] std::optional<microseconds> sharp_after(microseconds from,
+                                                        glm::ivec2 size_px) const {
+    for (const FrameTrace& frame : frames_)
+      if (frame.sent >= from && frame.sharp && frame.ticket.size_px == size_px)
+        return frame.arrival - from;
+    return std::nullopt;
+  }
   [[nodiscard]] int presented(microseconds from, microseconds to) const {
     return static_cast<int>(std::ranges::count_if(
         presented_, [&](const Presented& p) { return p.at >= from && p.at < to; }));
@@ -178,12 +202,17 @@ class FlowSimulation {
     result.frame.ticket.idr = order_.force_idr;
     result.frame.bitstream.resize(
         static_cast<std::size_t>(std::min(budget * (order_.force_idr ? 1.15 : fill), demand)) + 1);
+    result.codec_string = "avc1.42C01F";
+    if (!order_.ticket.refined) still_bits_ = 0.0;
+    still_bits_ += 8.0 * static_cast<double>(result.frame.bitstream.size());
+    result.sharp = still_bits_ >= scenario_.sharp_bits_per_pixel * size.x * size.y;
     FrameTrace trace;
     trace.ticket = result.frame.ticket;
     trace.bytes = result.frame.bitstream.size();
     trace.bitrate_kbps = order_.bitrate_kbps;
     trace.sent = now_;
     trace.idr = order_.force_idr;
+    trace.sharp = result.sharp;
     session_.on_frame(std::move(result), at(now_));
     host_.frames.clear();
     trace.arrival = link_.send(trace.bytes, now_);
@@ -210,6 +239,7 @@ class FlowSimulation {
   bool rendering_ = false;
   microseconds rendered_at_{0};
   FrameOrder order_;
+  double still_bits_ = 0.0;  // of the picture on show
   std::minstd_rand random_{7};
   std::vector<FrameTrace> frames_;
   std::vector<Presented> presented_;

@@ -43,7 +43,7 @@ TEST_P(OnEveryPath, FollowsALinkThatSlowsDownAndRecovers) {
   EXPECT_GE(simulation.sent_kbps(12s, 20s), 0.8 * 5000.0) << "the link is made use of";
   EXPECT_GE(simulation.sent_kbps(25s, 30s), 0.9 * before) << "quality is back within five seconds";
   EXPECT_LT(simulation.longest_queueing(21s, 30s), 50ms);
-  EXPECT_EQ(simulation.streams_opened(), 1) << "a want of quality that the bitrate alone can meet";
+  EXPECT_EQ(simulation.sizes(), 1) << "a want of quality that the bitrate alone can meet";
 }
 
 TEST_P(OnEveryPath, KeepsItsNominalRateWhereTheLinkIsEnough) {
@@ -93,7 +93,7 @@ TEST(Flow, PacesAndShrinksForASlowDecoder) {
   EXPECT_GE(simulation.presented(5s, 60s), 40 * 55);
   EXPECT_LT(simulation.oldest_shown(5s, 60s), 150ms)
       << "frames do not wait in front of the decoder";
-  EXPECT_LE(simulation.streams_opened(), 6) << "no flapping";
+  EXPECT_LE(simulation.sizes(), 6) << "no flapping";
 }
 
 TEST(Flow, ADecoderThatHardlyWorksStillShowsSomething) {
@@ -126,7 +126,7 @@ TEST(Flow, StepsDownTheLadderAndUpAgain) {
   EXPECT_EQ(simulation.sent(15s, 20s).back().ticket.size_px, glm::ivec2(640, 360));
   EXPECT_LT(simulation.longest_queueing(12s, 20s), 150ms);
   EXPECT_EQ(simulation.frames().back().ticket.size_px, glm::ivec2(1280, 720));
-  EXPECT_EQ(simulation.streams_opened(), 5) << "the first, two steps down, two up";
+  EXPECT_EQ(simulation.sizes(), 5) << "the first, two steps down, two up";
 }
 
 // A link that is hardly enough for a rung, and content that asks for all of it.
@@ -136,7 +136,7 @@ TEST(Flow, DoesNotFlap) {
     scenario.link.rates = {{0us, bits_per_s}};
     FlowSimulation simulation(scenario);
     simulation.run(120s);
-    EXPECT_LE(simulation.streams_opened(), 6) << bits_per_s;
+    EXPECT_LE(simulation.sizes(), 6) << bits_per_s;
   }
 }
 
@@ -146,7 +146,7 @@ TEST(Flow, SimpleContentKeepsItsSize) {
   scenario.demand_bits_per_pixel = 0.01;
   FlowSimulation simulation(scenario);
   simulation.run(10s);
-  EXPECT_EQ(simulation.streams_opened(), 1);
+  EXPECT_EQ(simulation.sizes(), 1);
 }
 
 TEST(Flow, LeavesAFixedQualityAlone) {
@@ -156,21 +156,56 @@ TEST(Flow, LeavesAFixedQualityAlone) {
   FlowSimulation simulation(scenario);
   simulation.run(10s);
   EXPECT_EQ(least_bitrate_kbps(simulation.frames()), scenario.max_bitrate_kbps);
-  EXPECT_EQ(simulation.streams_opened(), 1);
+  EXPECT_EQ(simulation.sizes(), 1);
 }
 
-// What sharpens a picture comes as soon as the camera rests.
-TEST(Flow, RefinesWithin200Milliseconds) {
+// Whatever the ladder makes of moving pictures: one that stays is full size and sharp.
+struct StillCase {
+  const char* name;
+  double bits_per_s;
+  microseconds sharp_within;
+};
+
+class Stills : public testing::TestWithParam<StillCase> {};
+
+TEST_P(Stills, AreSharpSoonAfterMotionStops) {
   FlowScenario scenario;
-  scenario.link.rates = {{0us, 25e6}};
-  scenario.rests = {{5s, 10s}};
+  scenario.link.rates = {{0us, GetParam().bits_per_s}};
+  scenario.rests = {{20s, 25s}};
+  scenario.size_px = {426, 240};  // for a processor that keeps up with no more, say
+  scenario.still_size_px = {1280, 720};
   FlowSimulation simulation(scenario);
-  simulation.run(10s);
-  const auto sharper = simulation.sent(5s + 30ms, 5s + 200ms);
-  EXPECT_GE(std::ranges::count_if(sharper, [](const FrameTrace& f) { return f.ticket.refined; }),
-            4);
-  EXPECT_LT(simulation.longest_queueing(5s, 10s), 100ms);
-  EXPECT_TRUE(simulation.sent(6s, 10s).empty()) << "then there is nothing to send";
+  simulation.run(30s);
+  const auto sharp = simulation.sharp_after(20s, {1280, 720});
+  ASSERT_TRUE(sharp);
+  EXPECT_LE(*sharp, GetParam().sharp_within);
+  RecordProperty("sharp_after_ms", static_cast<int>(sharp->count() / 1000));
+  EXPECT_LT(simulation.longest_queueing(18s, 26s), 100ms) << "nor does the next motion wait for it";
+  EXPECT_TRUE(simulation.sent(23s, 25s).empty()) << "then there is nothing to send";
+  const double before = simulation.sent_kbps(15s, 20s);
+  EXPECT_GE(simulation.sent_kbps(26s, 30s), 0.85 * before) << "what was learnt of the link is kept";
+  EXPECT_LE(simulation.presented(25s, 30s), 5 * 60 + 2);
+  EXPECT_GE(simulation.presented(25s, 30s), 0.9 * simulation.presented(15s, 20s));
+}
+
+INSTANTIATE_TEST_SUITE_P(Links, Stills,
+                         testing::Values(StillCase{"At50Mbit", 50e6, 200ms},
+                                         StillCase{"At5Mbit", 5e6, 400ms},
+                                         StillCase{"At1Mbit", 1e6, 1200ms}),
+                         [](const auto& instance) { return std::string(instance.param.name); });
+
+TEST(Flow, AStillForASlowDecoderIsFullSizeToo) {
+  FlowScenario scenario;
+  scenario.client.decode_s_per_megapixel = 0.1;
+  scenario.rests = {{30s, 35s}};
+  FlowSimulation simulation(scenario);
+  simulation.run(40s);
+  ASSERT_LT(simulation.sent(25s, 30s).back().ticket.size_px.x, 1280);
+  EXPECT_TRUE(simulation.sharp_after(30s, {1280, 720}));
+  EXPECT_EQ(simulation.frames().back().ticket.size_px,
+            simulation.sent(25s, 30s).back().ticket.size_px)
+      << "its decoding time is not taken for that of moving pictures";
+  EXPECT_GE(simulation.presented(39s, 40s), 0.9 * simulation.presented(29s, 30s));
 }
 
 TEST(FlowControl, AFrameThatWasGivenUpUnseenTellsNothingOfTheLink) {
@@ -180,7 +215,7 @@ TEST(FlowControl, AFrameThatWasGivenUpUnseenTellsNothingOfTheLink) {
   std::uint64_t id = 0;
   const auto pass = [&](std::chrono::milliseconds delay, bool given_up) {
     now += 20ms;
-    flow.sent(++id, 20'000, {1280, 720}, now);
+    flow.sent({++id, 20'000, {1280, 720}}, now);
     const TimePoint there = now + delay;
     Ack ack;
     ack.frame_id = id;

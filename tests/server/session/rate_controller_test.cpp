@@ -71,6 +71,22 @@ TEST(RateController, AJumpOfTheClientsClockIsNoQueue) {
   EXPECT_GE(feed.controller.rate(), before);
 }
 
+TEST(RateController, NoClaimOfAClientMakesAQueueOfDays) {
+  RateController controller(limits);
+  TimePoint now = TimePoint{} + 1h;
+  for (const std::int64_t delay_us : {std::int64_t{0}, std::int64_t{1} << 53}) {
+    for (int i = 0; i < 16; ++i) {
+      RateController::Sample sample;
+      sample.delays_us[0] = delay_us;
+      sample.finished_us = delay_us + i;
+      sample.units = 1000.0;
+      sample.round_trip = 45ms;
+      controller.add(sample, now += 16ms);
+    }
+  }
+  EXPECT_EQ(controller.queue_delay(), 10s);
+}
+
 TEST(RateController, APathThatBecameLongerIsNoQueueForLong) {
   Feed feed;
   feed.frames(120, 0us);

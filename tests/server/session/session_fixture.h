@@ -98,7 +98,10 @@ class SessionTest : public testing::Test {
     FrameResult result;
     result.ok = true;
     result.frame.ticket = order.ticket;
+    result.frame.ticket.idr = order.force_idr;
     result.frame.bitstream.resize(100);
+    result.codec_string = "avc1.42C01F";
+    result.sharp = sharp;
     const bool dropped = std::ranges::count(host.drop_next, order.ticket.frame_id) > 0;
     session.on_frame(std::move(result), now);
     if (!dropped) session.on_frame_sent(order.ticket, 100);
@@ -111,6 +114,7 @@ class SessionTest : public testing::Test {
     session.on_message(message, now);
   }
 
+  bool sharp = false;  // what the encoder says of its pictures
   TimePoint now = TimePoint{} + 1h;
   SessionPolicy policy;
   FakeHost host;

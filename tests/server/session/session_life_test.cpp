@@ -142,14 +142,15 @@ TEST_F(SessionLife, TakesTheWishesOfTheResumingHello) {
   hello.viewport_px = {320, 180};
   hello.resume_pose = PoseSample{2, 2000, {}, 1.0f};  // of a page that counts anew
   session.on_resumed(hello, admission(), now);
-  ASSERT_EQ(host.opened.size(), 2u);
-  EXPECT_EQ(host.opened[1].encoding.size_px, glm::ivec2(320, 180));
-  EXPECT_EQ(host.count<Welcome>(), 1) << "the welcome follows the stream that it describes";
-  open_stream();
-  EXPECT_EQ(host.count<Welcome>(), 2);
+  EXPECT_EQ(host.opened.size(), 1u) << "the stream with its caches is the same";
+  ASSERT_EQ(host.count<Welcome>(), 2);
+  EXPECT_EQ(std::get<Welcome>(host.said.back()).config.size_px, glm::ivec2(320, 180));
   now += 1s;
   ASSERT_TRUE(frame_is_due());
-  EXPECT_EQ(run_frame().ticket.pose_id, 2u);
+  const FrameOrder order = run_frame();
+  EXPECT_EQ(order.ticket.pose_id, 2u);
+  EXPECT_EQ(order.ticket.size_px, glm::ivec2(320, 180));
+  EXPECT_TRUE(order.force_idr);
 }
 
 TEST_F(SessionLife, AnotherCodecOrSceneReopensTheStream) {

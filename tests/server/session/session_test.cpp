@@ -137,7 +137,7 @@ TEST_F(SessionTest, PauseStopsFramesAndBeginsAnewWithAnIdr) {
   EXPECT_TRUE(run_frame().force_idr);
 }
 
-TEST_F(SessionTest, SettingsDuringAFrameReopenTheStreamAfterIt) {
+TEST_F(SessionTest, SettingsHoldForTheNextFrame) {
   greet();
   pose(1, 0.0f);
   const FrameOrder order = session.start_frame(now);
@@ -145,17 +145,45 @@ TEST_F(SessionTest, SettingsDuringAFrameReopenTheStreamAfterIt) {
   settings.size_px = {320, 180};
   settings.max_fps = 30;
   session.on_message(settings, now);
-  EXPECT_EQ(host.opened.size(), 1u) << "the stream is busy";
   finish(order);
-  ASSERT_EQ(host.opened.size(), 2u);
-  EXPECT_EQ(host.opened[1].encoding.size_px, glm::ivec2(320, 180));
-  EXPECT_EQ(host.opened[1].encoding.fps, 30);
-  EXPECT_FALSE(session.next_frame()) << "not before the stream is open";
-  session.on_stream_opened({true, "", Codec::h264, "avc1.42C00D", "libx264"}, now);
-  ASSERT_EQ(host.count<StreamConfig>(), 1);
-  now += 1s;
+  EXPECT_EQ(host.count<StreamConfig>(), 0) << "that frame was of the old size";
+  now += 20ms;
   ack(order.ticket.frame_id);
-  EXPECT_TRUE(run_frame().force_idr);
+  pose(2, 1.0f);
+  ASSERT_TRUE(frame_is_due());
+  const FrameOrder next = run_frame();
+  EXPECT_EQ(next.encoding.size_px, glm::ivec2(320, 180));
+  EXPECT_EQ(next.ticket.size_px, glm::ivec2(320, 180));
+  EXPECT_EQ(next.encoding.fps, 30);
+  EXPECT_TRUE(next.force_idr);
+  ASSERT_EQ(host.count<StreamConfig>(), 1);
+  EXPECT_EQ(std::get<StreamConfig>(host.said.back()).size_px, glm::ivec2(320, 180));
+  EXPECT_EQ(host.opened.size(), 1u) << "its view, with its caches, goes on";
+}
+
+// Each combination would be another encoder, and an IDR.
+TEST_F(SessionTest, SettingsThatAlternateQuicklyAreFollowedFourTimesASecond) {
+  greet();
+  int encoders = 0;
+  std::optional<EncoderSettings> last;
+  Settings settings;
+  for (std::uint64_t ms = 1; ms <= 1000; ++ms) {
+    now += 1ms;
+    settings.size_px = {320 + 2 * (static_cast<int>(ms) % 100), 180};
+    session.on_message(settings, now);
+    if (ms % 250 == 0) session.on_tick(now);
+    pose(ms, 0.01f * static_cast<float>(ms));
+    if (!frame_is_due()) continue;
+    const FrameOrder order = run_frame();
+    ack(order.ticket.frame_id);
+    if (std::exchange(last, order.encoding) != order.encoding) ++encoders;
+  }
+  EXPECT_LE(encoders, 6);
+  EXPECT_GE(encoders, 3);
+  now += 250ms;
+  session.on_tick(now);
+  pose(2000, 20.0f);
+  EXPECT_EQ(run_frame().encoding.size_px, settings.size_px) << "the last wish is not forgotten";
 }
 
 TEST_F(SessionTest, SpeaksAtLeastOnceASecond) {
@@ -257,9 +285,13 @@ TEST_F(SessionTest, GoesOnWithAnotherEncoderWhereTheDriverOpensNoMore) {
   ASSERT_EQ(host.count<Welcome>(), 1);
   EXPECT_EQ(std::get<Welcome>(host.said.back()).config.encoder, "libx264");
 
-  session.on_message(Settings{.size_px = {320, 180}}, now);
-  refused.message = "no memory";
-  session.on_stream_opened(refused, now);
+  pose(1, 0.0f);
+  const FrameOrder order = session.start_frame(now);
+  FrameResult failed;
+  failed.frame.ticket = order.ticket;
+  failed.encoder_unavailable = true;
+  failed.message = "no memory";
+  session.on_frame(std::move(failed), now);
   EXPECT_EQ(host.last_error().code, ErrorCode::internal) << "nothing is left";
   EXPECT_THAT(host.last_error().message, HasSubstr("no memory"));
 }
@@ -270,15 +302,16 @@ TEST_F(SessionTest, AnotherEffortOpensTheEncoderAnewWithAnIdr) {
   pose(1, 0.0f);
   ack(run_frame().ticket.frame_id);
   session.use_effort({.preset = 0, .threads = 4});
-  ASSERT_EQ(host.opened.size(), 2u);
-  EXPECT_EQ(host.opened[1].encoding.x264_preset, "ultrafast");
-  EXPECT_EQ(host.opened[1].encoding.threads, 4);
-  EXPECT_EQ(host.opened[1].encoding.size_px, host.opened[0].encoding.size_px);
-  open_stream();
-  EXPECT_EQ(host.count<StreamConfig>(), 1);
   now += 20ms;
+  EXPECT_FALSE(frame_is_due()) << "it makes no picture by itself";
+  pose(2, 1.0f);
   ASSERT_TRUE(frame_is_due());
-  EXPECT_TRUE(run_frame().force_idr);
+  const FrameOrder order = run_frame();
+  EXPECT_EQ(order.encoding.x264_preset, "ultrafast");
+  EXPECT_EQ(order.encoding.threads, 4);
+  EXPECT_EQ(order.encoding.size_px, host.opened[0].encoding.size_px);
+  EXPECT_TRUE(order.force_idr);
+  EXPECT_EQ(host.count<StreamConfig>(), 0) << "nothing that the client was told has changed";
 }
 
 TEST_F(SessionTest, AFewFailedFramesEndItWithTheirCause) {

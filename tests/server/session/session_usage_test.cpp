@@ -25,6 +25,7 @@ class SessionUsageTest : public testing::Test {
  protected:
   void frame(std::chrono::milliseconds duration, double device_s = 0.0, bool refined = false) {
     FrameTicket ticket;
+    ticket.still = refined;
     ticket.refined = refined;
     usage.frame_started(now);
     now += duration;
@@ -87,7 +88,20 @@ TEST_F(SessionUsageTest, KnowsWhatKeepsAGpuAndAnEncoderBusy) {
   EXPECT_NEAR(usage.encode_seconds(), 0.01, 1e-4) << "what the next one will take";
 }
 
-TEST_F(SessionUsageTest, TimesOfRefinementsAreNoLatency) {
+TEST_F(SessionUsageTest, AStillCountsAsSoManyFramesAsItHasPixels) {
+  for (int i = 0; i < 16; ++i) frame(5ms);
+  usage.charge_cpu(16 * 0.005, 0.25);
+  FrameTicket still;
+  still.still = true;
+  for (int i = 0; i < 16; ++i) {
+    usage.frame_started(now);
+    usage.frame_ended(still, 0.0, now += 20ms, 4.0);
+    usage.charge_cpu(0.020, 0.25);
+  }
+  EXPECT_NEAR(usage.frame_cost()->cpu_seconds, 0.005, 1e-9);
+}
+
+TEST_F(SessionUsageTest, TimesOfStillsAreNoLatency) {
   FrameTicket ticket;
   ticket.pose_received = now;
   ticket.ready = now + 1ms;
@@ -97,7 +111,7 @@ TEST_F(SessionUsageTest, TimesOfRefinementsAreNoLatency) {
   ticket.encode_start = now + 9ms;
   ticket.encode_end = now + 11ms;
   usage.frame_sent(ticket, now + 12ms);
-  ticket.refined = true;
+  ticket.still = true;
   usage.frame_sent(ticket, now + 10s);
   EXPECT_DOUBLE_EQ(usage.times(SessionTime::queue_wait).percentiles()->p99, 0.002);
   EXPECT_DOUBLE_EQ(usage.times(SessionTime::render).percentiles()->p99, 0.005);

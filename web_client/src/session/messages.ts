@@ -17,7 +17,8 @@ export interface View {
 }
 
 export interface Quality {
-  readonly height_px: number; // 0: the view's
+  readonly height_px: number; // while the camera moves; 0: the view's
+  readonly still_height_px: number; // when it rests; 0: the view's
   readonly max_fps: number; // 0: the server's default
 }
 

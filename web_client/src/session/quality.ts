@@ -33,6 +33,8 @@ export class QualityChoice {
   in_view(view_height_px: number): Quality {
     const height_px =
       typeof this.size_ === 'number' ? this.size_ : this.automatic_.height_px(view_height_px);
-    return { height_px, max_fps: this.max_fps_ };
+    // However small pictures have to be to keep up with a moving camera: one that stays can wait.
+    const still_height_px = typeof this.size_ === 'number' ? this.size_ : 0;
+    return { height_px, still_height_px, max_fps: this.max_fps_ };
   }
 }

@@ -280,12 +280,17 @@ function viewport(view: View): [width_px: number, height_px: number, ratio: numb
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
 
-/** The frame size: the chosen height or the view's, in the view's shape, with overscan. */
+/** Frame sizes: the chosen heights or the view's, in the view's shape, with overscan. */
 function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
-  const height_px = quality.height_px > 0 ? quality.height_px : view.height_px;
+  const width_px = (height_px: number): number =>
+    frame_side(height_px * aspect_of(view) * overscan.x);
+  const moving_px = quality.height_px > 0 ? quality.height_px : view.height_px;
+  const still_px = quality.still_height_px > 0 ? quality.still_height_px : view.height_px;
   return {
-    widthPx: frame_side(height_px * aspect_of(view) * overscan.x),
-    heightPx: frame_side(height_px * overscan.y),
+    widthPx: width_px(moving_px),
+    heightPx: frame_side(moving_px * overscan.y),
+    stillWidthPx: width_px(still_px),
+    stillHeightPx: frame_side(still_px * overscan.y),
     maxFps: quality.max_fps,
   };
 }

@@ -16,7 +16,7 @@ export interface StatsSnapshot {
   readonly motion_to_photon_ms: Percentiles;
   readonly pose_age_ms: Percentiles;
   readonly bitrate_kbps: number;
-  /** Means over frames, from the server's header and the client's clock. */
+  /** Means over frames of a moving camera, from the server's header and the client's clock. */
   readonly stages_ms: {
     readonly wait: number;
     readonly render: number;
@@ -91,6 +91,7 @@ export class Metrics {
       this.subs_.push(now_us, header.speculated ? 1 : 0);
     }
     this.last_pose_id_ = header.poseId;
+    if (header.still) return; // late on purpose, and of another size perhaps
     const stages = this.stages_us_;
     stages.wait.push(now_us, header.waitUs);
     stages.render.push(now_us, header.renderUs);

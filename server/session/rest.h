@@ -1,0 +1,36 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+
+#include "server/pipeline/frame_ticket.h"
+
+namespace catgs {
+
+/// When a camera rests: it has not moved for `least`, nor for twice as long as its poses take to
+/// follow each other, the quickest of the last few. What a client that sends few of them shows
+/// between two is no rest. Pure; not thread-safe.
+class Rest {
+ public:
+  explicit Rest(std::chrono::milliseconds least) : least_(least) {}
+
+  void moved(TimePoint now) {
+    constexpr Clock::duration longest_gap = std::chrono::milliseconds(500);
+    gaps_[next_] = std::min(now - last_motion_, longest_gap);
+    next_ = (next_ + 1) % gaps_.size();
+    last_motion_ = now;
+  }
+  [[nodiscard]] TimePoint begins() const {
+    return last_motion_ + std::max<Clock::duration>(least_, 2 * *std::ranges::min_element(gaps_));
+  }
+
+ private:
+  std::chrono::milliseconds least_;
+  TimePoint last_motion_{};
+  std::array<Clock::duration, 4> gaps_{};
+  std::size_t next_ = 0;
+};
+
+}  // namespace catgs
