@@ -15,11 +15,12 @@ constexpr int ultrafast = 0, superfast = 2;
 /// Sessions whose encoders cost what their presets say, on a machine with other work too.
 class EffortControlTest : public testing::Test {
  protected:
-  /// They come together: each has as many threads as there will be for it.
+  /// They have come one by one when there was room; each has as many threads as there will be.
   void add(int count, double cpus_at_ultrafast) {
     const int all = static_cast<int>(sessions.size()) + count;
     for (int i = 0; i < count; ++i) {
-      sessions.push_back({.effort = control.initial(all, full_hd), .size_px = full_hd});
+      sessions.push_back(
+          {.effort = {superfast, control.initial(all, full_hd).threads}, .size_px = full_hd});
       base_cpus.push_back(cpus_at_ultrafast);
     }
   }
@@ -157,6 +158,13 @@ TEST(EffortControl, AFixedPresetStays) {
   TimePoint now = TimePoint{} + 1h;
   for (int i = 0; i < 400; ++i, now += 250ms)
     EXPECT_TRUE(control.update(0.1, 1, std::span(&session, 1), now).empty());
+}
+
+TEST_F(EffortControlTest, ManyWhoComeTogetherBeginWithWhatTheyUsuallyCost) {
+  EXPECT_EQ(control.initial(1, full_hd).preset, superfast);
+  EXPECT_EQ(control.initial(6, full_hd).preset, superfast);
+  EXPECT_EQ(control.initial(12, full_hd).preset, ultrafast);
+  EXPECT_EQ(control.initial(12, {640, 360}).preset, superfast);
 }
 
 TEST_F(EffortControlTest, ANewcomerBeginsWithWhatThereIsRoomFor) {
