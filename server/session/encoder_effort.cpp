@@ -10,16 +10,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Processors that are threads of one core slow each other down long before all are busy.
-constexpr double busy_share = 0.8;
-constexpr double calm_share = 0.5;
+constexpr double busy_share = 0.7;
+constexpr double calm_share = 0.4;
 constexpr auto busy_for = 1s;
 constexpr double encoding_part = 0.4;  // of what is busy
-constexpr double too_long = 0.7;       // of the time between frames
-constexpr double roomy_share = 0.6;
+constexpr double too_long = 0.55;      // of the time between frames
+constexpr double roomy_share = 0.5;
 // 60 pictures a second with the fastest preset: 6 ms for a million pixels.
 constexpr double usual_cpus_per_pixel = 60 * 6e-9;
-constexpr double comfortable = 0.5;
+constexpr double comfortable = 0.4;
 constexpr auto settle = 1s;  // until a change shows in what is measured
 constexpr auto proof = 30s;
 constexpr auto most_patience = 120s;

@@ -41,15 +41,14 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings);
 /// time, since each opens a stream anew, with an IDR.
 /// - Threads: where sessions are fewer than processors, pictures are cut into as many slices, which
 ///   shortens the wait for each; rounded up, as frames of different sessions rarely coincide.
-/// - A newcomer begins with the best preset that leaves 40 % of the processors free, if it
+/// - A newcomer begins with the best preset that leaves half of the processors free, if it
 ///   costs what the others do.
-/// - The faster preset where processors were busy (80 %) for a second and encoding is a good part
-/// of
-///   that, for the quarter of the sessions whose encoders cost the most; or where an encoder by
-///   itself takes most of the time between frames. Where rendering holds frames up, a worse picture
-///   would gain next to nothing.
-/// - The better one again where half of the processors were free for five seconds and will be with
-///   its cost, and where it takes at most half of the time between frames. When it has to be taken
+/// - The faster preset where processors were busy (70 %, as threads of one core slow each other
+///   down) for a second and encoding is a good part of that, for the quarter of the sessions whose
+///   encoders cost the most; or where an encoder by itself takes most of the time between frames.
+///   Where rendering holds frames up, a worse picture would gain next to nothing.
+/// - The better one again where 60 % of the processors were free for five seconds and will be with
+///   its cost, and where it takes at most 40 % of the time between frames. When it has to be taken
 ///   back within half a minute the next try waits twice as long, two minutes at most.
 /// Pure; not thread-safe.
 class EffortControl {
@@ -62,7 +61,7 @@ class EffortControl {
   struct Session {
     EncoderEffort effort;
     double cpus = 0;               // that its encoder keeps busy
-    double share_of_interval = 0;  // encoding a frame, over the nominal time between frames
+    double share_of_interval = 0;  // encoding a frame, over the time between frames
     glm::ivec2 size_px{0};
   };
   struct Change {

@@ -42,7 +42,7 @@ void SessionRegistry::control_effort(TimePoint now) {
     Session& session = client->session();
     if (session.encoder_kind() != EncoderKind::x264 || !session.streams()) continue;
     const SessionUsage& usage = client->usage();
-    const std::chrono::duration<double> interval = session.flow().frame_interval();
+    const std::chrono::duration<double> interval = session.frame_interval();
     encoding.push_back({session.effort(), usage.encoder_load() * session.effort().threads,
                         usage.encode_seconds() / interval.count(), session.moving_size_px()});
     sessions.push_back(&session);
