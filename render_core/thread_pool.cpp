@@ -5,7 +5,20 @@
 #include <exception>
 #include <utility>
 
+#include <sched.h>
+
 namespace catgs {
+namespace {
+
+/// Those that this process may run on, not all of the machine: std::thread::hardware_concurrency()
+/// counts the latter with glibc 2.35 and later.
+int processors() {
+  cpu_set_t allowed;
+  if (sched_getaffinity(0, sizeof(allowed), &allowed) == 0) return CPU_COUNT(&allowed);
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+}  // namespace
 
 struct ThreadPool::Loop {
   Loop(std::size_t n, BodyRef f) : count(n), body(f) {}
@@ -28,9 +41,7 @@ struct ThreadPool::Loop {
   }
 };
 
-ThreadPool::ThreadPool(int threads)
-    : threads_(threads > 0 ? threads
-                           : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))) {
+ThreadPool::ThreadPool(int threads) : threads_(threads > 0 ? threads : processors()) {
   workers_.reserve(static_cast<std::size_t>(threads_));
   for (int i = 0; i < threads_; ++i)
     workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 namespace catgs {
 namespace {
@@ -60,6 +61,21 @@ TEST(ThreadPool, DestructorFinishesSubmittedTasks) {
     for (int i = 0; i < 50; ++i) pool.submit([&] { ++ran; });
   }
   EXPECT_EQ(ran.load(), 50);
+}
+
+TEST(ThreadPool, HasAThreadForEachProcessorThatItMayUse) {
+  cpu_set_t before;
+  ASSERT_EQ(sched_getaffinity(0, sizeof(before), &before), 0);
+  cpu_set_t one;
+  CPU_ZERO(&one);
+  int cpu = 0;
+  while (!CPU_ISSET(cpu, &before)) ++cpu;
+  CPU_SET(cpu, &one);
+  ASSERT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
+  const int threads = ThreadPool(0).threads();
+  ASSERT_EQ(sched_setaffinity(0, sizeof(before), &before), 0);
+  EXPECT_EQ(threads, 1);
+  EXPECT_EQ(ThreadPool(0).threads(), CPU_COUNT(&before));
 }
 
 }  // namespace
