@@ -62,7 +62,6 @@ main() {
   if ((full)); then
     test_packages+=(clang-tidy-14 debootstrap "${deploy_test_packages[@]}")
   fi
-  lock_build release
   steps_begin 4 "$log"
   ensure_packages "${build_packages[@]}" "${test_packages[@]}"
   # Where nvcc is, the CUDA core must compile: for the GPU that is there, else for one generation.
@@ -75,6 +74,7 @@ main() {
     cuda_options=(-DCATGS_CUDA=ON "-DCMAKE_CUDA_COMPILER=$nvcc_path"
       "-DCMAKE_CUDA_ARCHITECTURES=$generation")
   fi
+  lock_build release
   configure_build release "${cuda_options[@]}"
   build_all release "Build with tests"
   rm -f "$build_dir/tests.xml"

@@ -53,7 +53,6 @@ std::vector<Variant> ablations(const PaperOptions& options) {
       {"Ours-w/o colour cache", Pipeline::catgs, "--no-colour-cache"},
       {"Ours-w/o fresh order", Pipeline::catgs, "--order key"},
       {"Ours-w/o doubt", Pipeline::catgs, "--constant-velocity"},
-      {"Ours-w/o regard to costs", Pipeline::catgs, "--always-speculate"},
   };
   for (const std::string& flags : options.variants) {
     all.push_back({"Ours " + flags, Pipeline::catgs, flags});

@@ -42,6 +42,7 @@ void refuse_without_caches(const PipelineOptions& options) {
   refuse(options.no_cache, "--no-cache");
   refuse(options.no_colour_cache, "--no-colour-cache");
   refuse(options.constant_velocity, "--constant-velocity");
+  refuse(options.cost_aware, "--cost-aware");
 }
 
 }  // namespace
@@ -57,8 +58,9 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
       ->excludes(command.get_option("--window"));
   command.add_flag("--no-colour-cache", options.no_colour_cache,
                    "catgs: every Gaussian in view is shaded in every frame");
-  command.add_flag("--always-speculate", options.always_speculate,
-                   "catgs: windows even where key frames with one cost more than they save");
+  command.add_flag("--cost-aware", options.cost_aware,
+                   "catgs: no windows for a while where they cost more than they save, as in the "
+                   "server; which frames are key frames then depends on the machine");
   command.add_flag("--constant-velocity", options.constant_velocity,
                    "catgs: forecasts go on undamped, however wrong earlier ones were");
   command.add_flag("--no-split", options.no_split,
@@ -107,7 +109,7 @@ ViewSettings view_settings(const PipelineOptions& options) {
   if (options.grid) speculation.grid = parse_grid(*options.grid);
   check_speculation(speculation);
   if (options.order) settings.order = parse_order(*options.order);
-  speculation.cost_aware = !options.always_speculate;
+  speculation.cost_aware = options.cost_aware;
   settings.colour_cache = !options.no_colour_cache;
   settings.split_tasks = !options.no_split;
   return settings;

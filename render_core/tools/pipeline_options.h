@@ -22,7 +22,7 @@ struct PipelineOptions {
   std::optional<float> guard_px{};
   std::optional<std::string> order{};
   bool no_cache = false;
-  bool always_speculate = false;
+  bool cost_aware = false;
   bool no_colour_cache = false;
   bool constant_velocity = false;
   bool no_split = false;

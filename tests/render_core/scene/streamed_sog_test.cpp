@@ -125,14 +125,15 @@ TEST_F(StreamedSogTest, ErrorsNameTheField) {
 }
 
 TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
-  constexpr int depth = 200000;
-  std::string text = R"({"lodLevels": 1, "filenames": [], "tree": )";
-  for (int i = 0; i < depth; ++i) text += R"({"children":[)";
-  for (int i = 0; i < depth; ++i) text += "]}";
-  const std::string document = text + "}";
-  EXPECT_THAT(
-      input_error([&] { read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))); }),
-      HasSubstr("lies deeper than 64"));
+  const auto error_at = [](int depth) {
+    std::string text = R"({"lodLevels": 1, "filenames": [], "tree": )";
+    for (int i = 0; i < depth; ++i) text += R"({"children":[)";
+    for (int i = 0; i < depth; ++i) text += "]}";
+    const std::string document = text + "}";
+    return input_error([&] { read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))); });
+  };
+  EXPECT_THAT(error_at(100), HasSubstr("lies deeper than 64"));
+  EXPECT_THAT(error_at(200'000), HasSubstr("nested deeper than 256"));
 }
 
 }  // namespace
