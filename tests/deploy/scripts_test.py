@@ -120,7 +120,7 @@ class Scripts(Machine):
         options = ["--log", str(self.folder / "log")]
         result = self.run_script(TEST, "--full", *options)
         self.assertEqual(result.returncode, 3, result.stdout + result.stderr)
-        self.assertRegex(result.stderr, r"\bbuildah\b.*\bhaproxy\b")
+        self.assertRegex(result.stderr, r"\bbuildah\b.*\bprometheus\b")
         # They are there already, perhaps by packages that exclude Debian's.
         self.assertNotRegex(result.stderr, r"\brunc\b|\bkubernetes-client\b")
         self.assertNotIn("buildah", self.run_script(TEST, *options).stderr)
