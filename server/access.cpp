@@ -108,9 +108,8 @@ std::optional<std::string> AccessControl::refusal(std::string_view token, std::s
                                                   std::int64_t now_unix_s, Use use) {
   const std::lock_guard lock(mutex_);
   if (use == Use::save && key_.empty())
-    return "nobody can save on this server: it was started without --token-key-file, which links "
-           "of "
-           "role author are made with";
+    return "nobody can save on this server: it was started without --token-key-file, which "
+           "links of role author are made with";
   if (token_file_.empty() && key_.empty()) return std::nullopt;
   if (token.empty()) return "this server needs an access token: open the link you were given";
   if (!token_file_.empty()) {

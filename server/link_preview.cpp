@@ -2,33 +2,11 @@
 
 #include <fmt/format.h>
 
+#include "server/net/http.h"
 #include "server/poster.h"
 
 namespace catgs {
 namespace {
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 /// As a part of a path: all but letters, digits and "-._~" by their bytes.
 std::string url_part(std::string_view text) {
@@ -46,7 +24,7 @@ std::string url_part(std::string_view text) {
 std::string preview_elements(const LinkPreview& preview) {
   std::string out;
   const auto add = [&](std::string_view kind, std::string_view name, std::string_view content) {
-    out += fmt::format("<meta {}=\"{}\" content=\"{}\" />\n", kind, name, escaped(content));
+    out += fmt::format("<meta {}=\"{}\" content=\"{}\" />\n", kind, name, escape_html(content));
   };
   add("property", "og:type", "website");
   add("property", "og:title", preview.title);

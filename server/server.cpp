@@ -42,8 +42,7 @@ using namespace std::chrono_literals;
 constexpr auto quick_stop_deadline = 1000ms;
 constexpr auto farewell_time = 500ms;  // for close frames, after the deadline
 constexpr auto drain_poll = 20ms;
-// Two or three frames at a time keep a GPU busy; more only take turns on it: 40 sessions of
-// 1280x720 in a heavy scene on an H200 got 1,056 frames a second with three, 960 with six.
+// Two or three frames at a time keep a GPU busy; more only take turns on it.
 constexpr int render_threads_per_gpu = 3;
 
 constexpr std::string_view no_client_page =

@@ -369,7 +369,7 @@ void CudaView::deliver() {
         "counts");
   times_.end(Stage::convert, stream_.get());
   // Pictures for an encoder come from servers, whose processors have work while a GPU draws; others
-  // are waited for in a loop, which answers some 10 us sooner.
+  // are waited for in a loop, which answers sooner.
   if (settings_.format == PixelFormat::i420) {
     check(cudaEventRecord(delivered_.get(), stream), "frame");
     check(cudaEventSynchronize(delivered_.get()), "frame");

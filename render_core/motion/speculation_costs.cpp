@@ -41,11 +41,11 @@ void SpeculationCosts::close_group() {
   grouped_.add(group_.cost / group_.frames);
   group_ = {};
   if (grouped_.samples >= few && exact_.samples > 0 && grouped_.value > margin * exact_.value) {
-    rest(rest_);
+    resting_ = rest_;
     rest_ = std::min(2 * rest_, most_rest);
     grouped_ = {};  // of another view, when it is tried again
   } else if (since_exact_ >= exact_every || exact_.samples == 0) {
-    rest(1);
+    resting_ = 1;
   } else if (grouped_.samples >= 2 * few) {
     rest_ = least_rest;
   }

@@ -18,7 +18,7 @@ class SpeculationCosts {
   void forget() { group_ = {}; }
 
  private:
-  /// A running mean over about the last `weight` samples.
+  /// A running mean over about the last eight samples.
   struct Mean {
     double value = 0.0;
     int samples = 0;
@@ -32,7 +32,6 @@ class SpeculationCosts {
   };
 
   void close_group();
-  void rest(int frames) { resting_ = frames; }
 
   Mean exact_;    // of a frame without a window
   Mean grouped_;  // of a frame of a group, key frame and sub-frames alike

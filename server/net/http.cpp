@@ -47,6 +47,29 @@ bool loopback_host_allowed(std::string_view host, const std::vector<std::string>
          });
 }
 
+std::string escape_html(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
 std::string content_security_policy(const std::vector<std::string>& embed_origins) {
   std::string policy =
       "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; "

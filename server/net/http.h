@@ -68,6 +68,9 @@ bool is_loopback(std::string_view address);
 /// names, for hosts of `allowed` origins (a proxy forwards them), and without a Host (no browser).
 bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed);
 
+/// As text, or as an attribute in quotes, of an HTML page.
+std::string escape_html(std::string_view text);
+
 /// Security headers of every page. `embed_origins`: who may show it in a frame.
 std::string content_security_policy(const std::vector<std::string>& embed_origins);
 

@@ -25,8 +25,8 @@ struct EncoderEffort {
 /// Slower ones are not worth theirs without looking ahead, which costs frames of delay: a walk
 /// through a rendered city at 1280x720 and 1.5 Mbit/s, 30 fps, took 5.1 / 9.3 / 16.4 / 25.2 / 40.1
 /// / 47.1 ms with ultrafast, superfast, veryfast, faster, fast and medium, at 36.7 / 42.7 / 42.4
-/// / 43.0 / 43.0 / 43.2 dB. A recorded head there at 1920x1080 and 14 Mbit/s, 60 fps: 13.7 / 18.9 /
-/// 26.0 ms with ultrafast, ultrafast-subpel and superfast, at 39.9 / 43.8 / 44.2 dB, a calmer one
+/// / 43.0 / 43.0 / 43.2 dB. A recorded head there at 1920x1080 and 14 Mbit/s, 60 fps: 14 / 20 / 26
+/// ms with ultrafast, ultrafast-subpel and superfast, at 39.9 / 43.8 / 44.2 dB, a calmer one
 /// at 47.6 / 50.6 / 50.4.
 struct EffortPreset {
   std::string_view name;

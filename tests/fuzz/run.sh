@@ -12,8 +12,8 @@ The first form gives each target (default: all) an equal part of SECONDS. The se
 minute at a time, until each has found no new edge for QUIET_SECONDS of its own time; it can be stopped at
 any time and goes on where it was.
 
-Inputs that reach new code are kept in build/fuzz/work/TARGET/corpus and used by later runs. What ends a
-parser is left in build/fuzz/work/TARGET/found: mend it, and put the input into tests/fuzz/findings/TARGET.
+Inputs that reach new code are kept in build/fuzz/runs/TARGET/corpus and used by later runs. What ends a
+parser is left in build/fuzz/runs/TARGET/found: mend it, and put the input into tests/fuzz/findings/TARGET.
 
 Exit status: 0 nothing was found, 1 something was, 2 wrong usage, 77 clang++ or its libFuzzer is missing.
 USAGE
@@ -36,7 +36,7 @@ build_fuzzer() {
 # fuzz TARGET MAX_BYTES SECONDS: one run. `state` of a target: edges, seconds since the last new one,
 # inputs tried, seconds altogether.
 fuzz() {
-  local target=$1 max_bytes=$2 seconds=$3 work=$build/work/$1
+  local target=$1 max_bytes=$2 seconds=$3 work=$build/runs/$1
   local edges=0 quiet=0 tried=0 spent=0 begin=$EPOCHSECONDS newest line now
   local -a inputs=("$work/corpus" "$work/seeds")
   [[ ! -d tests/fuzz/findings/$target ]] || inputs+=("tests/fuzz/findings/$target")
@@ -67,7 +67,7 @@ fuzz() {
 }
 
 # Seconds since the last new edge; nothing for a target that has not run.
-quiet_of() { [[ ! -f $build/work/$1/state ]] || cut -d ' ' -f 2 "$build/work/$1/state"; }
+quiet_of() { [[ ! -f $build/runs/$1/state ]] || cut -d ' ' -f 2 "$build/runs/$1/state"; }
 
 main() {
   local until_quiet=0 seconds

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "server/net/http.h"
+
 namespace catgs::load {
 namespace {
 
@@ -106,29 +108,6 @@ void draw_legend(const std::vector<Curve>& curves, std::string& svg) {
 }
 
 }  // namespace
-
-std::string escape_html(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 std::string line_plot(const PlotSettings& settings, const std::vector<Curve>& curves) {
   double min_x = INFINITY, max_x = 0.0, max_y = settings.max_y;

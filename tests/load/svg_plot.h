@@ -24,7 +24,4 @@ struct PlotSettings {
 /// Curves in one frame with axes and a legend.
 std::string line_plot(const PlotSettings& settings, const std::vector<Curve>& curves);
 
-/// Text with the characters of markup escaped.
-std::string escape_html(const std::string& text);
-
 }  // namespace catgs::load
