@@ -104,7 +104,9 @@ TEST_F(SidecarUpload, IsCheckedBeforeAnythingIsWritten) {
   EXPECT_EQ(wrong.status, 400);
   EXPECT_THAT(wrong.body, HasSubstr("tours[0].stops[0].position"));
   EXPECT_EQ(put(author, {}, "").status, 411);
-  EXPECT_EQ(put(author, {}, std::string(max_upload_bytes + 1, ' ')).status, 413);
+  // From the head alone: what is on its way when the connection closes would cost the answer.
+  const std::string too_long = std::to_string(max_upload_bytes + 1);
+  EXPECT_EQ(put(author, {{"content-length", too_long}}, "").status, 413);
   EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
   EXPECT_EQ(put(author, {}, sidecar, "absent").status, 404);
   EXPECT_EQ(http_put(server->port(), "/index.html", "x", {}).status, 405);
