@@ -1,0 +1,315 @@
+#!/usr/bin/env python3
+"""Churns the sessions of one server process for a long time, and says whether it stays as it was.
+
+  soak.py [--minutes 60] [--program build/release/bin/catgs-load] [--out build/soak]
+  soak.py --minutes 9 --attach PID --url ws://127.0.0.1:8080 [--admin http://127.0.0.1:9090]
+          [--server-log FILE] [--out build/soak] [-- further arguments of catgs-load]
+
+Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose their sockets and
+resume, stand still; in each round one generator more is killed. Once a second the server's memory,
+descriptors and threads are read from /proc, every five seconds /metrics, and nvidia-smi where there
+is one. --out gets samples.jsonl, soak.json and soak.html.
+
+Without --attach it starts the catgs-server beside the program, and stops it at the end. With it the
+server is one that runs already, and stays; a later run with the same --out and the same process
+goes on where the last one ended and judges both together.
+
+Flat: see soak_report.py. Errors: each line of the server's log of level warning and above must be
+among those that EXPLAINED names, each counter of NEVER must stand still, each round's requirements
+must hold, and when all clients have gone the server must have no sessions and no connections.
+
+Exit status: 0 flat and no error that is not explained; 1 otherwise; 2 it could not be run.
+"""
+
+import argparse
+import collections
+import json
+import pathlib
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+import urllib.error
+import urllib.request
+
+import soak_report
+
+SCENARIO = pathlib.Path(__file__).parent / "scenarios" / "soak.toml"
+SCENES = {"park": 2, "square": 3}  # of the scenario, with their seeds
+# Longer than a lost client's session is kept.
+SETTLE_S = 40.0
+SAMPLE_S, SCRAPE_S = 1.0, 5.0
+
+# Lines of the log that this load causes, each with the reason.
+EXPLAINED: dict[str, str] = {}
+
+# Counters that nothing here may move.
+NEVER = ("catgs_frames_failed_total", "catgs_bad_messages_total", "catgs_scene_loads_failed_total",
+         "catgs_encoders_refused_total", "catgs_sessions_refused_total")
+GAUGES = ("catgs_sessions", "catgs_sessions_lost", "catgs_connections", "catgs_scenes_in_memory")
+COUNTERS = ("catgs_sessions_admitted_total", "catgs_sessions_resumed_total", "catgs_frames_sent_total",
+            "catgs_scenes_loaded_total", "catgs_scenes_released_total")
+
+
+class Cannot(Exception):
+    """The soak could not be run."""
+
+
+def get(url: str) -> str:
+    with urllib.request.urlopen(url, timeout=10) as answer:
+        return answer.read().decode("utf-8")
+
+
+def parse_metrics(text: str) -> dict[str, float]:
+    """Name to value; the values of a name's labels are summed."""
+    values: dict[str, float] = collections.defaultdict(float)
+    for name, value in re.findall(r"^(\w+)(?:\{[^}]*\})? (\S+)$", text, re.MULTILINE):
+        values[name] += float(value)
+    return values
+
+
+def device_mb() -> float | None:
+    """Memory in use on the first GPU; None where nvidia-smi cannot say."""
+    if shutil.which("nvidia-smi") is None:
+        return None
+    result = subprocess.run(["nvidia-smi", "--query-gpu=memory.used", "--format=csv,noheader,nounits"],
+                            capture_output=True, text=True, check=False)
+    first = result.stdout.split("\n")[0].strip()
+    return float(first) if result.returncode == 0 and first.isdigit() else None
+
+
+class Process:
+    """A running server, as /proc and /metrics show it."""
+
+    def __init__(self, pid: int, admin: str):
+        self.folder = pathlib.Path("/proc") / str(pid)
+        self.admin = admin
+        self.begin_s = self._begin_s()
+
+    def _begin_s(self) -> float:
+        """When it was started, seconds since the machine was."""
+        try:
+            fields = (self.folder / "stat").read_text("utf-8", "replace").rpartition(")")[2].split()
+        except OSError as error:
+            raise Cannot(f"the server's process cannot be read: {error}") from error
+        return int(fields[19]) / 100.0  # field 22 of proc(5), in ticks of USER_HZ
+
+    def alive(self) -> bool:
+        try:
+            return "State:\tZ" not in (self.folder / "status").read_text("utf-8")
+        except OSError:
+            return False
+
+    def sample(self) -> dict[str, float]:
+        status = (self.folder / "status").read_text("utf-8")
+
+        def field(name: str) -> int:
+            return int(re.search(rf"^{name}:\s+(\d+)", status, re.MULTILINE).group(1))
+
+        uptime_s = float(pathlib.Path("/proc/uptime").read_text("ascii").split()[0])
+        return {"at_s": round(uptime_s - self.begin_s, 2), "rss_mb": field("VmRSS") * 1024e-6,
+                "descriptors": len(list((self.folder / "fd").iterdir())), "threads": field("Threads")}
+
+    def metrics(self) -> dict[str, float]:
+        return parse_metrics(get(self.admin + "/metrics"))
+
+
+class Sampler(threading.Thread):
+    """Writes samples of the process until it is told to stop or the process has ended."""
+
+    def __init__(self, process: Process, path: pathlib.Path):
+        super().__init__()
+        self.process, self.path = process, path
+        self.settling = False  # all clients have gone: shown, not judged
+        self.stopped = threading.Event()
+
+    def run(self) -> None:
+        scraped = 0.0
+        with self.path.open("a", encoding="utf-8") as file:
+            while not self.stopped.wait(SAMPLE_S):
+                try:
+                    sample = self.process.sample() | ({"settling": 1} if self.settling else {})
+                    if sample["at_s"] - scraped >= SCRAPE_S:
+                        scraped = sample["at_s"]
+                        metrics = self.process.metrics()
+                        sample |= {name: metrics[name] for name in (*GAUGES, *COUNTERS, *NEVER)}
+                        memory = device_mb()
+                        sample |= {} if memory is None else {"device_mb": memory}
+                except (OSError, AttributeError):  # it ends, or is too busy to answer
+                    if not self.process.alive():
+                        return
+                    continue
+                file.write(json.dumps(sample) + "\n")
+                file.flush()
+
+    def stop(self) -> None:
+        self.stopped.set()
+        self.join()
+
+
+def log_findings(text: str) -> tuple[dict[str, int], list[str]]:
+    """Of a log in either format: how often each explained reason came, and what has none."""
+    explained: dict[str, int] = collections.Counter()
+    unexplained = []
+    for line in text.splitlines():
+        if line.startswith("{"):
+            entry = json.loads(line)
+            level, message = entry["level"], entry["message"]
+        elif match := re.match(r"[\d:.]+ (?:\x1b\[\S*?m)?(\w+)(?:\x1b\[m)? (.*)", line):
+            level, message = match.groups()
+        else:
+            level, message = "error", line  # no line of ours: a sanitizer's, a library's
+        if level in ("debug", "info"):
+            continue
+        reason = next((reason for pattern, reason in EXPLAINED.items() if re.search(pattern, message)), None)
+        if reason is None:
+            unexplained.append(line)
+        else:
+            explained[reason] += 1
+    return explained, unexplained
+
+
+def make_scenes(program: pathlib.Path, folder: pathlib.Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, seed in SCENES.items():
+        subprocess.run([program.parent / "catgs-render", "synth", "city", "--gaussians", "50000", "--seed", str(seed),
+                        folder / f"{name}.ply"], check=True, stdout=subprocess.DEVNULL)
+
+
+def start_server(program: pathlib.Path, out: pathlib.Path) -> tuple[subprocess.Popen, str, str]:
+    """The process, its address for clients and its admin address."""
+    make_scenes(program, out / "scenes")
+    arguments = tomllib.loads(SCENARIO.read_text("utf-8"))["server"]["args"]
+    log = out / "server.log"
+    with log.open("wb") as file:
+        # pylint: disable=consider-using-with
+        server = subprocess.Popen([program.parent / "catgs-server", *arguments, "--port", "0", "--admin-bind",
+                                   "127.0.0.1:0", "--log-format", "json"], cwd=out, stdout=file, stderr=file)
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline and server.poll() is None:
+        text = log.read_text("utf-8")
+        admin = re.search(r"metrics: (http://[\d.:]+)/", text)
+        port = re.search(r"open http://([\d.:]+)/", text)
+        if admin and port:
+            return server, f"ws://{port.group(1)}", admin.group(1)
+        time.sleep(0.1)
+    server.kill()
+    raise Cannot(f"the server does not serve: {log}")
+
+
+def one_round(command: list[str], number: int, out: pathlib.Path, rest: list[str]) -> list[str]:
+    """Runs the scenario once, and kills a further generator somewhere in it. Returns what failed."""
+    with (out / "last_round.txt").open("wb") as file, subprocess.Popen(
+            [*command, "--scenario", SCENARIO, *rest], stdout=file, stderr=file) as load, subprocess.Popen(
+            [*command, "--sessions", "2", "--size", "160x90", "--fps", "12", "--script", "walk", "--ramp", "3s",
+             "--duration", "300s"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+        try:
+            time.sleep(random.Random(number).uniform(2.0, 30.0))
+        finally:
+            killed.send_signal(signal.SIGKILL)
+        status = load.wait()
+    if status == 0:
+        return []
+    text = (out / "last_round.txt").read_text("utf-8", "replace")
+    failed = [line for line in text.splitlines() if "requirement failed" in line] or [text[-500:]]
+    return [f"round {number}: {line}" for line in failed]
+
+
+def churn(arguments: argparse.Namespace, process: Process, sampler: Sampler, url: str) -> tuple[int, list[str]]:
+    """Rounds until the time is over, and then silence until all that was kept for clients is gone."""
+    errors: list[str] = []
+    command = [str(arguments.program), "--url", url]
+    end = time.monotonic() + 60.0 * arguments.minutes - SETTLE_S
+    rounds = 0
+    while process.alive() and (rounds == 0 or time.monotonic() < end):
+        rounds += 1
+        errors += one_round(command, rounds, arguments.out, arguments.rest)
+        if process.alive():
+            print(f"round {rounds}: {json.dumps(process.sample())}", flush=True)
+    sampler.settling = True
+    time.sleep(SETTLE_S)
+    if not process.alive():
+        return rounds, errors + ["the server has ended"]
+    metrics = process.metrics()
+    errors += [f"{name} is {metrics[name]:.0f} after all have gone" for name in ("catgs_sessions", "catgs_connections")
+               if metrics[name] != 0]
+    errors += [f"{name} is {metrics[name]:.0f}" for name in NEVER if metrics[name] != 0]
+    return rounds, errors
+
+
+def read_samples(path: pathlib.Path, process: Process) -> list[dict[str, float]]:
+    """Those of earlier runs with the same process; others are forgotten."""
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    if not lines or json.loads(lines[0]) != {"process": process.folder.name, "begin_s": process.begin_s}:
+        path.write_text(json.dumps({"process": process.folder.name, "begin_s": process.begin_s}) + "\n", "utf-8")
+        return []
+    return [json.loads(line) for line in lines[1:]]
+
+
+def soak(arguments: argparse.Namespace) -> bool:
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    server = None
+    log = arguments.server_log
+    if arguments.attach is None:
+        server, url, admin = start_server(arguments.program, arguments.out)
+        log = arguments.out / "server.log"
+    else:
+        url, admin = arguments.url, arguments.admin
+    try:
+        process = Process(server.pid if server else arguments.attach, admin)
+        samples_file = arguments.out / "samples.jsonl"
+        read_samples(samples_file, process)
+        sampler = Sampler(process, samples_file)
+        sampler.start()
+        try:
+            rounds, errors = churn(arguments, process, sampler, url)
+        finally:
+            sampler.stop()
+    finally:
+        if server:
+            server.terminate()
+            status = server.wait(timeout=60)
+    if server and status != 0:
+        errors.append(f"the server ended with {status}")
+    explained, unexplained = log_findings(log.read_text("utf-8", "replace")) if log else ({}, [])
+    errors += [f"log: {line}" for line in unexplained]
+    report = soak_report.judge(read_samples(samples_file, process))
+    report |= {"rounds": rounds, "errors": errors, "explained_log_lines": explained}
+    (arguments.out / "soak.json").write_text(json.dumps(report, indent=2) + "\n", "utf-8")
+    (arguments.out / "soak.html").write_text(soak_report.to_html(report, read_samples(samples_file, process)), "utf-8")
+    print(soak_report.to_text(report))
+    return report["flat"] and not errors
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--program", type=pathlib.Path, default=pathlib.Path("build/release/bin/catgs-load"))
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("build/soak"))
+    parser.add_argument("--attach", type=int, metavar="PID")
+    parser.add_argument("--url", help="of the server that --attach names")
+    parser.add_argument("--admin", default="http://127.0.0.1:9090", help="its admin address (default: %(default)s)")
+    parser.add_argument("--server-log", type=pathlib.Path, help="its log, whose lines are judged")
+    own, rest = sys.argv[1:], []
+    if "--" in own:
+        own, rest = own[:own.index("--")], own[own.index("--") + 1:]
+    arguments = parser.parse_args(own)
+    if (arguments.attach is None) != (arguments.url is None):
+        parser.error("--attach and --url belong together")
+    arguments.rest = rest
+    arguments.program = arguments.program.resolve()
+    arguments.out = arguments.out.resolve()
+    try:
+        return 0 if soak(arguments) else 1
+    except (Cannot, OSError, subprocess.CalledProcessError) as error:
+        print(f"soak.py: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
