@@ -15,7 +15,8 @@ constexpr double calm_share = 0.4;
 constexpr auto busy_for = 1s;
 constexpr double encoding_part = 0.4;  // of what is busy
 constexpr double too_long = 0.55;      // of the time between frames
-constexpr double roomy_share = 0.5;
+constexpr double relieved_share = 0.6;
+constexpr double roomy_share = 0.25;
 // 60 pictures a second with the fastest preset: 6 ms for a million pixels.
 constexpr double usual_cpus_per_pixel = 60 * 6e-9;
 constexpr double comfortable = 0.4;
@@ -114,17 +115,22 @@ std::vector<EffortControl::Change> EffortControl::faster(double busy,
       std::transform_reduce(sessions.begin(), sessions.end(), 0.0, std::plus(),
                             [](const Session& session) { return session.cpus; });
   const bool all_busy = busy_since_ != TimePoint{} && now - busy_since_ >= busy_for;
-  const bool by_encoding = encoding >= encoding_part * busy * cpus_;
+  const bool relieve = all_busy && encoding >= encoding_part * busy * cpus_;
+  std::vector<std::size_t> costliest_first(sessions.size());
+  std::iota(costliest_first.begin(), costliest_first.end(), std::size_t{0});
+  std::ranges::sort(costliest_first, std::ranges::greater(),
+                    [&](std::size_t i) { return sessions[i].cpus; });
   std::vector<Change> changes;
-  for (std::size_t i = 0; i < sessions.size(); ++i) {
+  const std::size_t quarter = (sessions.size() + 3) / 4;
+  for (const std::size_t i : costliest_first) {
     const Session& session = sessions[i];
-    if (session.effort.preset <= presets_.lowest) continue;
-    if (!(all_busy && by_encoding) && session.share_of_interval < too_long) continue;
-    changes.push_back({i, {session.effort.preset - 1, session.effort.threads}});
+    const int preset = session.effort.preset;
+    if (preset <= presets_.lowest) continue;
+    const bool late = session.share_of_interval >= too_long && changes.size() < quarter;
+    if (!late && !(relieve && busy > relieved_share)) continue;
+    changes.push_back({i, {preset - 1, session.effort.threads}});
+    busy -= session.cpus * (1.0 - cost_ratio(preset, preset - 1)) / cpus_;
   }
-  std::ranges::sort(changes, std::ranges::greater(),
-                    [&](const Change& change) { return sessions[change.session].cpus; });
-  changes.resize(std::min(changes.size(), (sessions.size() + 3) / 4));
   return changes;
 }
 

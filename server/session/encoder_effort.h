@@ -41,12 +41,14 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings);
 /// time, since each opens a stream anew, with an IDR.
 /// - Threads: where sessions are fewer than processors, pictures are cut into as many slices, which
 ///   shortens the wait for each; rounded up, as frames of different sessions rarely coincide.
-/// - A newcomer begins with the best preset that leaves half of the processors free, if it
-///   costs what the others do.
+/// - A newcomer begins with the best preset that leaves three quarters of the processors free, if
+///   it costs what the others do: more may follow, and a bad start costs them all frames, while a
+///   better preset can come later.
 /// - The faster preset where processors were busy (70 %, as threads of one core slow each other
-///   down) for a second and encoding is a good part of that, for the quarter of the sessions whose
-///   encoders cost the most; or where an encoder by itself takes most of the time between frames.
-///   Where rendering holds frames up, a worse picture would gain next to nothing.
+///   down) for a second and encoding is a good part of that, for as many sessions as bring them
+///   to 60 %, those whose encoders cost the most; or where an encoder by itself takes most of the
+///   time between frames, for a quarter of the sessions at a time. Where rendering holds frames up,
+///   a worse picture would gain next to nothing.
 /// - The better one again where 60 % of the processors were free for five seconds and will be with
 ///   its cost, and where it takes at most 40 % of the time between frames. When it has to be taken
 ///   back within half a minute the next try waits twice as long, two minutes at most.

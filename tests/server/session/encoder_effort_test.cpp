@@ -90,9 +90,9 @@ TEST_F(EffortControlTest, ThreadsFollowTheNumberOfSessionsOneAtATime) {
 TEST_F(EffortControlTest, EncodersThatKeepAllBusyGoFasterUntilTheyFit) {
   add(40, 0.25);  // 19 processors at superfast, 10 at ultrafast
   EXPECT_EQ(run(1s), 0) << "a second of it may be chance";
-  run(60s);
-  EXPECT_LE(busy(), 0.7);
-  EXPECT_GT(busy(), 0.6) << "no more than needed";
+  run(4s);
+  EXPECT_LE(busy(), 0.7) << "who waits for all of them, one by one, loses frames";
+  EXPECT_GT(busy(), 0.55) << "no more than needed";
   EXPECT_EQ(run(10min), 0) << "it does not flap";
 }
 
@@ -162,7 +162,8 @@ TEST(EffortControl, AFixedPresetStays) {
 
 TEST_F(EffortControlTest, ManyWhoComeTogetherBeginWithWhatTheyUsuallyCost) {
   EXPECT_EQ(control.initial(1, full_hd).preset, superfast);
-  EXPECT_EQ(control.initial(5, full_hd).preset, superfast);
+  EXPECT_EQ(control.initial(2, full_hd).preset, superfast);
+  EXPECT_EQ(control.initial(3, full_hd).preset, superfast - 1);
   EXPECT_EQ(control.initial(12, full_hd).preset, ultrafast);
   EXPECT_EQ(control.initial(12, {640, 360}).preset, superfast);
 }
@@ -170,10 +171,10 @@ TEST_F(EffortControlTest, ManyWhoComeTogetherBeginWithWhatTheyUsuallyCost) {
 TEST_F(EffortControlTest, ANewcomerBeginsWithWhatThereIsRoomFor) {
   EXPECT_EQ(control.initial(1, full_hd).preset, superfast);
   other_cpus = 2.0;
-  add(6, 0.4);
-  run(1s);  // 4.56 at superfast, and a seventh takes 0.76
+  add(6, 0.1);
+  run(1s);  // 3.14 with these at superfast, and a seventh takes 0.19
   EXPECT_EQ(control.initial(7, full_hd).preset, superfast);
-  other_cpus = 2.8;
+  other_cpus = 2.7;
   run(1s);
   EXPECT_EQ(control.initial(7, full_hd).preset, superfast - 1);
   EXPECT_EQ(control.initial(7, {640, 360}).preset, superfast);
