@@ -1,5 +1,6 @@
 #include "server/sidecar_saver.h"
 
+#include <filesystem>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -40,47 +41,67 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   return scene;
 }
 
+HttpResponse tagged(int status, std::string text, std::string etag) {
+  HttpResponse response = text_response(status, std::move(text));
+  response.etag = std::move(etag);
+  return response;
+}
+
 }  // namespace
 
-std::future<HttpResponse> SidecarSaver::save(std::string scene_id, std::string json) {
-  auto answer = std::make_shared<std::promise<HttpResponse>>();
-  auto future = answer->get_future();
-  boost::asio::post(io_, [this, answer, scene_id = std::move(scene_id), json = std::move(json)] {
-    auto entry = scenes_.in_memory(scene_id);
-    if (!entry)
-      return answer->set_value(
+std::future<HttpResponse> SidecarSaver::save(std::string scene_id, std::string json,
+                                             Precondition precondition) {
+  auto request = std::make_shared<Request>(
+      Request{std::move(scene_id), std::move(json), std::move(precondition)});
+  auto future = request->answer.get_future();
+  boost::asio::post(io_, [this, request = std::move(request)] {
+    request->entry = scenes_.in_memory(request->scene_id);
+    if (!request->entry)
+      return request->answer.set_value(
           text_response(409, "409: the scene is not in memory: open it, then save\n"));
-    if (entry->sidecar.empty())
-      return answer->set_value(
+    if (request->entry->sidecar.empty())
+      return request->answer.set_value(
           text_response(409, "409: this scene is no file: there is nowhere to save beside it\n"));
-    boost::asio::post(writer_, [this, scene_id, json, entry = std::move(entry), answer] {
-      write(scene_id, json, entry, answer);
-    });
+    boost::asio::post(writer_, [this, request] { write(request); });
   });
   return future;
 }
 
-void SidecarSaver::write(const std::string& scene_id, const std::string& json,
-                         std::shared_ptr<const SceneEntry> entry, const Answer& answer) {
+void SidecarSaver::write(const SharedRequest& request) {
+  const std::string& json = request->json;
+  const std::filesystem::path& file = request->entry->sidecar;
   Sidecar sidecar;
   try {
     sidecar = check_sent_sidecar(json);
   } catch (const InputError& mistake) {
-    return answer->set_value(text_response(400, fmt::format("400: {}\n", mistake.what())));
+    return request->answer.set_value(text_response(400, fmt::format("400: {}\n", mistake.what())));
   }
   try {
-    replace_file(entry->sidecar, json);
-    spdlog::info("scene {}: an author saved {} ({} bytes)", scene_id, entry->sidecar.string(),
+    const std::string current = sidecar_etag(file);
+    if (!request->precondition.holds(current)) {
+      spdlog::info("scene {}: an author's sidecar was made from an older one than {}",
+                   request->scene_id, file.string());
+      return put_in_force(
+          request, current.empty() ? Sidecar() : read_sidecar(FileSource(file)),
+          tagged(412, "412: somebody else saved this scene since you opened it\n", current));
+    }
+    replace_file(file, json);
+    spdlog::info("scene {}: an author saved {} ({} bytes)", request->scene_id, file.string(),
                  json.size());
-    auto scene = revised(*entry, sidecar);
-    boost::asio::post(io_, [this, scene_id, scene = std::move(scene), answer] {
-      scenes_.revise(scene_id, scene);
-      answer->set_value(text_response(200, "saved\n"));
-    });
+    put_in_force(request, sidecar, tagged(200, "saved\n", etag_of(json)));
   } catch (const InputError& unwritable) {
-    spdlog::warn("scene {}: an author cannot save: {}", scene_id, unwritable.what());
-    answer->set_value(text_response(409, fmt::format("409: {}\n", unwritable.what())));
+    spdlog::warn("scene {}: an author cannot save: {}", request->scene_id, unwritable.what());
+    request->answer.set_value(text_response(409, fmt::format("409: {}\n", unwritable.what())));
   }
+}
+
+void SidecarSaver::put_in_force(const SharedRequest& request, const Sidecar& sidecar,
+                                HttpResponse answer) {
+  auto scene = revised(*request->entry, sidecar);
+  boost::asio::post(io_, [this, request, scene = std::move(scene), answer = std::move(answer)] {
+    scenes_.revise(request->scene_id, scene);
+    request->answer.set_value(answer);
+  });
 }
 
 }  // namespace catgs

@@ -7,6 +7,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/thread_pool.hpp>
 
+#include "render_core/scene/hints.h"
 #include "server/net/http.h"
 #include "server/scene_library.h"
 
@@ -25,13 +26,23 @@ class SidecarSaver {
   SidecarSaver& operator=(const SidecarSaver&) = delete;
 
   /// Any thread. The answer comes when visitors get what was saved; whether the sender may save is
-  /// the caller's to know.
-  std::future<HttpResponse> save(std::string scene_id, std::string json);
+  /// the caller's to know. Where the sidecar that is there is not the one that `precondition` asks
+  /// for, it stays, is put in force itself (another server may have written it), and the answer is
+  /// 412 with its tag.
+  std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition);
 
  private:
-  using Answer = std::shared_ptr<std::promise<HttpResponse>>;
-  void write(const std::string& scene_id, const std::string& json,
-             std::shared_ptr<const SceneEntry> entry, const Answer& answer);
+  struct Request {
+    std::string scene_id;
+    std::string json;
+    Precondition precondition;
+    std::shared_ptr<const SceneEntry> entry{};
+    std::promise<HttpResponse> answer{};
+  };
+  using SharedRequest = std::shared_ptr<Request>;
+  void write(const SharedRequest& request);
+  /// Answers when visitors get what the sidecar on the disk says.
+  void put_in_force(const SharedRequest& request, const Sidecar& sidecar, HttpResponse answer);
 
   SceneLibrary& scenes_;
   boost::asio::io_context& io_;

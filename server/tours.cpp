@@ -6,7 +6,9 @@
 #include <initializer_list>
 #include <optional>
 #include <span>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -14,6 +16,7 @@
 
 #include "render_core/error.h"
 #include "render_core/scene/json_field.h"
+#include "server/net/http.h"
 
 namespace catgs {
 namespace {
@@ -29,9 +32,13 @@ bool is_file(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file, error);
 }
 
-nlohmann::json sidecar_tours(const std::filesystem::path& sidecar) {
-  if (!is_file(sidecar)) return nullptr;
-  const FileSource file(sidecar);
+std::string text_of(const std::filesystem::path& file) {
+  const std::vector<std::byte> bytes = FileSource(file).read_all(max_bytes);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+nlohmann::json sidecar_tours(const std::filesystem::path& sidecar, std::string_view text) {
+  const MemorySource file(sidecar.string(), std::as_bytes(std::span(text)));
   const nlohmann::json document = read_json(file, max_bytes);
   const auto tours = JsonField(file.name(), document).find("tours");
   if (!tours) return nullptr;
@@ -117,8 +124,18 @@ Sidecar check_sent_sidecar(std::string_view json) {
 }
 
 std::string read_tours(const std::filesystem::path& sidecar) {
-  return nlohmann::json{{"tours", sidecar_tours(sidecar)}, {"settings", viewer_settings(sidecar)}}
-      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  nlohmann::json document{
+      {"tours", nullptr}, {"etag", nullptr}, {"settings", viewer_settings(sidecar)}};
+  if (is_file(sidecar)) {
+    const std::string text = text_of(sidecar);
+    document["tours"] = sidecar_tours(sidecar, text);
+    document["etag"] = etag_of(text);
+  }
+  return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string sidecar_etag(const std::filesystem::path& sidecar) {
+  return is_file(sidecar) ? etag_of(text_of(sidecar)) : std::string();
 }
 
 }  // namespace catgs

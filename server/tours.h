@@ -9,13 +9,17 @@
 
 namespace catgs {
 
-/// What pages are told about tours through a scene, as JSON: {"tours": …, "settings": …}. `tours`
-/// is that member of its sidecar (see hints.h), `settings` what the SuperSplat viewer keeps beside
-/// a scene: `<scene>.settings.json`, or `settings.json` in its folder. Either is null where there
-/// is none. The page reads them; here they are checked for size and syntax. Throws InputError for a
-/// mistake in the sidecar; a settings file that cannot be used was not written for us: it is
-/// logged. `sidecar`: its path, whether it is there or not.
+/// What pages are told about tours through a scene, as JSON: {"tours": …, "settings": …, "etag":
+/// …}. `tours` is that member of its sidecar (see hints.h) and `etag` the tag of all of it,
+/// `settings` what the SuperSplat viewer keeps beside a scene: `<scene>.settings.json`, or
+/// `settings.json` in its folder. Each is null where there is none. The page reads them; here they
+/// are checked for size and syntax. Throws InputError for a mistake in the sidecar; a settings file
+/// that cannot be used was not written for us: it is logged. `sidecar`: its path, whether it is
+/// there or not.
 std::string read_tours(const std::filesystem::path& sidecar);
+
+/// The tag of what is there now; empty: nothing.
+std::string sidecar_etag(const std::filesystem::path& sidecar);
 
 /// A sidecar that somebody sent. Stricter than what operators write: every field of its tours is
 /// one that pages know, of the right kind and within its bounds. Throws InputError naming it.

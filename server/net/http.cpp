@@ -1,8 +1,10 @@
 #include "server/net/http.h"
 
 #include <algorithm>
+#include <cstdint>
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <netinet/in.h>
 
 namespace catgs {
@@ -14,6 +16,21 @@ std::string_view host_name(std::string_view authority) {
   return authority.substr(0, authority.rfind(':'));
 }
 
+/// Does a header with a list of tags, or "*", name this one? No, where there is none.
+bool names_tag(std::string_view header, std::string_view tag) {
+  if (tag.empty()) return false;
+  if (header == "*") return true;
+  while (!header.empty()) {
+    const auto end = std::min(header.find(','), header.size());
+    std::string_view one = header.substr(0, end);
+    header.remove_prefix(std::min(end + 1, header.size()));
+    while (one.starts_with(' ')) one.remove_prefix(1);
+    while (one.ends_with(' ')) one.remove_suffix(1);
+    if (one == tag) return true;
+  }
+  return false;
+}
+
 /// The host[:port] of "https://a.example:8443"; empty for what is no origin ("null", "*").
 std::string_view authority_of(std::string_view origin) {
   const auto scheme_end = origin.find("://");
@@ -21,6 +38,18 @@ std::string_view authority_of(std::string_view origin) {
 }
 
 }  // namespace
+
+/// FNV-1a, 64 bit: nobody gains by two contents of one tag.
+std::string etag_of(std::string_view content) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char c : content) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return fmt::format("\"{:016x}\"", hash);
+}
+
+bool Precondition::holds(std::string_view current) const {
+  if (!if_match.empty()) return names_tag(if_match, current);
+  return if_none_match.empty() || !names_tag(if_none_match, current);
+}
 
 bool origin_allowed(std::string_view origin, std::string_view host,
                     const std::vector<std::string>& allowed) {

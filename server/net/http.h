@@ -20,6 +20,7 @@ struct HttpRequest {
   std::string_view authorization = {};   // the header, as it came
   std::string_view site = {};            // "https://tours.example:8443": how the client came here
   std::vector<std::string> arguments{};  // of the query: "name=value", decoded
+  std::string_view if_match = {};
 };
 
 struct HttpResponse {
@@ -39,6 +40,19 @@ inline HttpResponse text_response(int status, std::string body,
   response.body = std::make_shared<const std::string>(std::move(body));
   return response;
 }
+
+/// The entity tag (RFC 9110) of a content: another content has another one.
+std::string etag_of(std::string_view content);
+
+/// What a request that replaces something asks of what is there: headers If-Match and
+/// If-None-Match. An empty one asks nothing.
+struct Precondition {
+  std::string if_match;
+  std::string if_none_match;
+
+  /// `current`: the tag of what is there; empty: nothing is.
+  [[nodiscard]] bool holds(std::string_view current) const;
+};
 
 /// Called on the network thread: answers at once and never waits.
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;

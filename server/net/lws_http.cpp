@@ -10,7 +10,10 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t chunk_bytes = 64 * 1024;
-constexpr int answer_timeout_s = 30;           // of who takes an upload
+constexpr int answer_timeout_s = 30;  // of who takes an upload
+// A whole body; libwebsockets' own timeout begins anew with each piece of it.
+constexpr lws_usec_t body_time_us = 30 * LWS_US_PER_SEC;
+constexpr std::size_t max_dropped_bytes = 16 << 20;
 constexpr lws_usec_t answer_poll_us = 10'000;  // authors save now and then
 
 /// Appends response headers to a fixed buffer; remembers whether everything found room.
@@ -92,26 +95,53 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
 int LwsHttpExchange::begin_upload(lws* wsi, std::optional<HttpResponse> refusal) {
   path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
   authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  precondition_ = {request_header(wsi, WSI_TOKEN_HTTP_IF_MATCH),
+                   request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH)};
   refusal_ = std::move(refusal);
+  await_body(wsi);
   return 0;
 }
 
-/// Of what is refused nothing is kept, but all of it is read: a connection that is closed with
-/// bytes unread takes the refusal with it.
-void LwsHttpExchange::take_body(std::string_view bytes) {
-  if (!refusal_) body_.append(bytes);
+int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
+                                 std::vector<std::byte>& scratch) {
+  response_ = std::move(response);
+  droppable_ = max_dropped_bytes;
+  await_body(wsi);
+  bool finished = false;
+  return write_headers(wsi, policy, true) == 0 ? write_body(wsi, scratch, finished) : -1;
+}
+
+void LwsHttpExchange::await_body(lws* wsi) {
+  body_due_ = true;
+  lws_set_timer_usecs(wsi, body_time_us);
+}
+
+/// Of what is refused nothing is kept, but it is read: see refuse_body().
+int LwsHttpExchange::take_body(std::string_view bytes) {
+  if (droppable_) {
+    if (bytes.size() > *droppable_) return -1;
+    *droppable_ -= bytes.size();
+  } else if (!refusal_) {
+    body_.append(bytes);
+  }
+  return 0;
 }
 
 int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy,
                               bool& finished) {
+  if (droppable_) return -1;  // answered long ago
+  body_due_ = false;
   if (refusal_) return answer(wsi, *std::move(refusal_), policy, finished);
-  answer_ = uploads.take({path_, {}, false, authorization_}, std::move(body_));
+  HttpRequest request{path_, precondition_.if_none_match, false, authorization_};
+  request.if_match = precondition_.if_match;
+  answer_ = uploads.take(request, std::move(body_));
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);
   lws_set_timer_usecs(wsi, answer_poll_us);
   return 0;
 }
 
-int LwsHttpExchange::poll_answer(lws* wsi, const std::string& policy, bool& finished) {
+int LwsHttpExchange::on_timer(lws* wsi, const std::string& policy, bool& finished) {
+  if (body_due_) return -1;
   if (!answer_.valid()) return 0;
   if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
     lws_set_timer_usecs(wsi, answer_poll_us);
@@ -133,12 +163,14 @@ int LwsHttpExchange::answer(lws* wsi, HttpResponse response, const std::string& 
   return 0;
 }
 
-int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy) {
+/// `last`: no other request is answered on this connection.
+int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy, bool last) {
   HeaderWriter headers(wsi, response_.status, response_.content_type,
                        response_.body ? response_.body->size() : 0);
   headers.add("cache-control:", response_.cache_control);
   if (!response_.etag.empty()) headers.add("etag:", response_.etag);
   if (response_.gzip) headers.add("content-encoding:", "gzip");
+  if (last) headers.add("connection:", "close");
   headers.add("vary:", "accept-encoding");
   headers.add("content-security-policy:", policy);
   headers.add("x-content-type-options:", "nosniff");

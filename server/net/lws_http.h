@@ -23,16 +23,23 @@ class LwsHttpExchange {
   /// A PUT request: its body follows, of a length that is known to be small. `refusal`: what it
   /// will be answered then, whatever it is.
   int begin_upload(lws* wsi, std::optional<HttpResponse> refusal);
-  void take_body(std::string_view bytes);
-  /// The body is whole: asks `uploads`. Calls of poll_answer() follow, by LWS_CALLBACK_TIMER.
+  /// A PUT request whose body is not wanted: it is answered now. What comes of the body is read and
+  /// dropped, within bounds, because a connection that is closed with bytes unread is reset, and
+  /// then the client may not see the answer.
+  int refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
+                  std::vector<std::byte>& scratch);
+  int take_body(std::string_view bytes);
+  /// The body is whole: asks `uploads`. Calls of on_timer() follow, by LWS_CALLBACK_TIMER.
   int end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy, bool& finished);
-  int poll_answer(lws* wsi, const std::string& policy, bool& finished);
+  /// The answer may have come, or the body's time is over.
+  int on_timer(lws* wsi, const std::string& policy, bool& finished);
 
   /// Writes the next piece of the body.
   int write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished);
 
  private:
-  int write_headers(lws* wsi, const std::string& policy);
+  void await_body(lws* wsi);
+  int write_headers(lws* wsi, const std::string& policy, bool last = false);
   int answer(lws* wsi, HttpResponse response, const std::string& policy, bool& finished);
 
   HttpResponse response_;
@@ -42,8 +49,11 @@ class LwsHttpExchange {
   // Of uploads. The request's head is gone when its body has come.
   std::string path_;
   std::string authorization_;
+  Precondition precondition_;
   std::string body_;
   std::optional<HttpResponse> refusal_;
+  std::optional<std::size_t> droppable_;  // bytes, of a body that is not wanted
+  bool body_due_ = false;                 // by the timer, which cannot be taken back
   std::future<HttpResponse> answer_;
 };
 

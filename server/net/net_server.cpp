@@ -134,12 +134,16 @@ int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   forget(slot);
   if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
-    if (const auto bytes = body_length(wsi); bytes < 1 || bytes > max_upload_bytes) {
-      lws_return_http_status(wsi, bytes < 1 ? 411 : 413, upload_length_rule.c_str());
-      return -1;
-    }
     slot.exchange = new LwsHttpExchange;
-    return slot.exchange->begin_upload(wsi, refuse_upload(wsi, site));
+    const auto bytes = body_length(wsi);
+    if (bytes >= 1 && bytes <= max_upload_bytes)
+      return slot.exchange->begin_upload(wsi, refuse_upload(wsi, site));
+    const int status = bytes < 1 ? 411 : 413;
+    const int failed = slot.exchange->refuse_body(
+        wsi, text_response(status, fmt::format("{}: {}\n", status, upload_length_rule)),
+        site.policy, service_of(wsi).scratch);
+    const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
+    return body_follows ? failed : -1;
   }
   if (!is_get_or_head(wsi)) {
     lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
@@ -157,13 +161,13 @@ int on_request(lws* wsi, HttpSlot& slot) {
   return 0;
 }
 
-/// The body of an upload is whole, or its answer may have come.
+/// The body of an upload is whole, or it is time to look after it.
 int go_on_with_upload(lws* wsi, HttpSlot& slot, bool body_is_whole) {
   const Site& site = site_of(wsi);
   bool finished = false;
   const int failed = body_is_whole
                          ? slot.exchange->end_body(wsi, site.uploads, site.policy, finished)
-                         : slot.exchange->poll_answer(wsi, site.policy, finished);
+                         : slot.exchange->on_timer(wsi, site.policy, finished);
   if (failed != 0) return -1;
   return finished ? finish_request(wsi, slot) : 0;
 }
@@ -173,8 +177,8 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
     case LWS_CALLBACK_HTTP:
       return on_request(wsi, *slot);
     case LWS_CALLBACK_HTTP_BODY:
-      if (slot && slot->exchange) slot->exchange->take_body({static_cast<const char*>(in), length});
-      return 0;
+      if (!slot || !slot->exchange) return 0;
+      return slot->exchange->take_body({static_cast<const char*>(in), length});
     case LWS_CALLBACK_HTTP_BODY_COMPLETION:
     case LWS_CALLBACK_TIMER:
       if (!slot || !slot->exchange) return 0;

@@ -1,7 +1,6 @@
 #include "server/net/static_files.h"
 
 #include <array>
-#include <cstdint>
 #include <fstream>
 #include <string_view>
 #include <utility>
@@ -54,13 +53,6 @@ std::string read_file(const std::filesystem::path& path) {
   std::string bytes(std::istreambuf_iterator<char>(in), {});
   if (!in.good() && !in.eof()) throw InputError(path.string(), {}, "cannot be read");
   return bytes;
-}
-
-/// FNV-1a, 64 bit: an ETag only has to change when the file does.
-std::string etag_of(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return fmt::format("\"{:016x}\"", hash);
 }
 
 /// Null when compression fails or saves nothing.

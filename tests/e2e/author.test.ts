@@ -105,16 +105,44 @@ describe('an author', () => {
     expect(visitor.errors).toEqual([]);
 
     // What the server refuses is said in its words, and the work is not lost.
-    unlinkSync(sidecar);
-    mkdirSync(path.join(sidecar, 'inside'), { recursive: true });
+    const in_the_way = path.join(folder, '.mine.json.new');
+    mkdirSync(in_the_way);
     await page.getByLabel('Title of stop 2').focus();
     await page.getByLabel('Caption of stop 2').fill('Changed.');
     await page.getByRole('button', { name: 'Save to the server' }).click();
     await page.getByText(/Not saved: mine.json: .*download the file/).waitFor();
-    rmSync(sidecar, { recursive: true });
+    rmSync(in_the_way, { recursive: true });
     await page.getByRole('button', { name: 'Save to the server' }).click();
     await page.getByText('Saved. Visitors get it').waitFor();
     expect(readFileSync(sidecar, 'utf8')).toContain('Changed.');
+  });
+
+  it('is told when another one saved meanwhile, and replaces theirs on purpose only', async () => {
+    const edit = async (page: Page, title: string): Promise<void> => {
+      await page.getByRole('button', { name: 'Add a stop here' }).click();
+      await page.getByLabel('Title of the tour', { exact: true }).fill(title);
+      await page.getByRole('button', { name: 'Save to the server' }).click();
+    };
+    const [{ page: first }, { page: second }] = [
+      await open_as('author', '?author'),
+      await open_as('author', '?author'),
+    ];
+    await edit(first, 'By the first');
+    await first.getByText('Saved. Visitors get it').waitFor();
+    const replace = second.getByRole('button', { name: 'Replace theirs' });
+    expect(await replace.isHidden()).toBe(true);
+    await edit(second, 'By the second');
+    await second.getByText('Not saved: someone else has saved this scene').waitFor();
+    await keep_screenshot(second, 'author-changed-meanwhile');
+    expect(readFileSync(sidecar, 'utf8')).toContain('By the first');
+    await replace.click();
+    await second.getByText('Saved. Visitors get it').waitFor();
+    expect(await replace.isHidden()).toBe(true);
+    expect(readFileSync(sidecar, 'utf8')).toContain('By the second');
+    await edit(second, 'By the second again');
+    await second.getByText('Saved. Visitors get it').waitFor();
+    await edit(first, 'By the first again');
+    await first.getByText('Not saved: someone else has saved this scene').waitFor();
   });
 
   it('whose link is a plain one saves a file, and is told how it gets to visitors', async () => {

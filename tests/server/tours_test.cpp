@@ -23,6 +23,8 @@ class Tours : public FolderTest {
 TEST_F(Tours, AreEmptyWithoutFiles) {
   EXPECT_TRUE(read()["tours"].is_null());
   EXPECT_TRUE(read()["settings"].is_null());
+  EXPECT_TRUE(read()["etag"].is_null());
+  EXPECT_EQ(sidecar_etag(folder_ / "museum.json"), "");
 }
 
 TEST_F(Tours, ComeFromTheSidecarAndTheViewersSettings) {
@@ -30,6 +32,7 @@ TEST_F(Tours, ComeFromTheSidecarAndTheViewersSettings) {
   write("settings.json", R"({"version": 2, "animTracks": [], "annotations": [{"title": "Door"}]})");
   EXPECT_EQ(read()["tours"][0]["title"], "Hall");
   EXPECT_EQ(read()["settings"]["annotations"][0]["title"], "Door");
+  EXPECT_EQ(read()["etag"], sidecar_etag(folder_ / "museum.json"));
   write("museum.settings.json", R"({"version": 2, "animTracks": [1]})");
   EXPECT_EQ(read()["settings"]["animTracks"].size(), 1u) << "the scene's own come first";
 }

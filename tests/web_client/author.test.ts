@@ -3,7 +3,7 @@ import type { SceneSetup } from '#client/camera/camera_controller';
 import { identity } from '#client/camera/vector';
 import { Picks } from '#client/session/picks';
 import { TourDraft } from '#client/tour/draft';
-import { save_sidecar } from '#client/tour/save';
+import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/save';
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
 import { FakeTime } from './fakes';
 
@@ -83,33 +83,57 @@ describe('a draft of a tour', () => {
 });
 
 describe('saving to the server', () => {
-  const save = (answer: () => Promise<Response>, sidecar = '{}'): Promise<string | undefined> => {
+  const save = (
+    answer: () => Promise<Response>,
+    sidecar = '{}',
+    made_from: SidecarTag = undefined,
+  ): Promise<SaveResult> => {
     vi.stubGlobal('fetch', answer);
-    return save_sidecar('https://tours.example/?author', 'secret', 'old hall', sidecar, 'no answer');
+    const page = 'https://tours.example/?author';
+    return save_sidecar(page, 'secret', 'old hall', sidecar, made_from, 'no answer');
   };
+  const answered =
+    (status: number, text: string, headers = {}) =>
+    (): Promise<Response> =>
+      Promise.resolve(new Response(text, { status, headers }));
   afterEach(() => {
     vi.unstubAllGlobals();
   });
 
   it('sends it with the token, to the scene', async () => {
-    const fetched = vi.fn(() => Promise.resolve(new Response('saved')));
-    expect(await save(fetched)).toBeUndefined();
+    const fetched = vi.fn(answered(200, 'saved', { etag: '"2"' }));
+    expect(await save(fetched)).toEqual({ kind: 'saved', tag: '"2"' });
     expect(fetched.mock.calls[0]).toMatchObject([
       new URL('https://tours.example/api/scenes/old%20hall/sidecar'),
       { method: 'PUT', headers: { authorization: 'Bearer secret' } },
     ]);
   });
 
-  it('says in plain words why it was not saved', async () => {
-    const answered = (status: number, text: string) => (): Promise<Response> =>
-      Promise.resolve(new Response(text, { status }));
-    expect(await save(answered(403, '403: this link does not let you save\n'))).toBe(
-      'this link does not let you save',
+  it.each([
+    ['"1"', '"1"', undefined],
+    [null, undefined, '*'],
+    [undefined, undefined, undefined],
+  ])('replaces only what it was made from: %s', async (made_from, match, none_match) => {
+    const fetched = vi.fn<(address: URL, request: RequestInit) => Promise<Response>>(
+      answered(412, '412: somebody else saved', { etag: '"7"' }),
     );
-    expect(await save(answered(502, '<html>Bad gateway</html>'))).toBe('status 502');
-    expect(await save(() => Promise.reject(new TypeError('failed')))).toBe('no answer');
+    expect(await save(fetched as never, '{}', made_from)).toEqual({ kind: 'changed', tag: '"7"' });
+    const { headers } = fetched.mock.calls[0]![1];
+    expect(new Headers(headers).get('if-match') ?? undefined).toBe(match);
+    expect(new Headers(headers).get('if-none-match') ?? undefined).toBe(none_match);
+  });
+
+  it('says in plain words why it was not saved', async () => {
+    const refused = (why: unknown): unknown => ({ kind: 'refused', why });
+    expect(await save(answered(403, '403: this link does not let you save\n'))).toEqual(
+      refused('this link does not let you save'),
+    );
+    expect(await save(answered(502, '<html>Bad gateway</html>'))).toEqual(refused('status 502'));
+    expect(await save(() => Promise.reject(new TypeError('failed')))).toEqual(refused('no answer'));
     const fetched = vi.fn(answered(200, ''));
-    expect(await save(fetched, ' '.repeat(2 ** 20 + 1))).toMatch(/too many/);
+    expect(await save(fetched, ' '.repeat(2 ** 20 + 1))).toEqual(
+      refused(expect.stringMatching(/too many/)),
+    );
     expect(fetched).not.toHaveBeenCalled();
   });
 });

@@ -234,6 +234,9 @@ export const text = {
     saved: 'Saved. Visitors get it when they open or reload the page.',
     not_saved: (why: string): string => `Not saved: ${why}.`,
     unreachable: 'the server does not answer',
+    replace: 'Replace theirs',
+    changed_meanwhile:
+      'Not saved: someone else has saved this scene since you opened it. To see theirs, download your file, then reload. Or replace theirs with yours.',
   },
   share: {
     link: 'Link to this view',

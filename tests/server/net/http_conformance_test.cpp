@@ -179,12 +179,18 @@ TEST_F(HttpConformance, HeadersHaveAnEnd) {
 }
 
 /// Slow senders, the silent, and websockets that do not answer pings: all at once, because each
-/// takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30 (server/net/net_server.cpp).
+/// takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30 (server/net/net_server.cpp),
+/// `body_time_us` 30 (server/net/lws_http.cpp).
 TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
   const std::size_t before = open_descriptors();
   {
     std::vector<RawSocket> slow;
-    for (int i = 0; i < 20; ++i) slow.emplace_back(server->port());
+    for (int i = 0; i < 20; ++i) {
+      slow.emplace_back(server->port());
+      if (i % 2 == 1)
+        slow.back().send("PUT /api/scenes/city/sidecar HTTP/1.1\r\n" + host() +
+                         "Content-Length: 1000\r\n\r\n");
+    }
     std::vector<RawSocket> silent;
     for (int i = 0; i < 20; ++i) silent.emplace_back(server->port());
     RawSocket half_open(server->port());
@@ -196,7 +202,7 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
     const std::string request =
         "GET /healthz HTTP/1.1\r\nX-Slow: aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa";
     bool all_closed = false;
-    for (std::size_t second = 0; second < 25 && !all_closed; ++second) {
+    for (std::size_t second = 0; second < 45 && !all_closed; ++second) {
       all_closed = true;
       for (RawSocket& socket : slow)
         if (!socket.closed_within(1ms)) {

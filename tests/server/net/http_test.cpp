@@ -26,6 +26,24 @@ TEST(Origin, OwnPagesAndListedOnesMayConnect) {
   EXPECT_TRUE(origin_allowed("null", "a.example", {"*"}));
 }
 
+TEST(Precondition, IsAboutWhatIsThere) {
+  const std::string tag = etag_of("a tour");
+  EXPECT_NE(tag, etag_of("a tour "));
+  EXPECT_THAT(tag, testing::MatchesRegex("\"[0-9a-f]{16}\""));
+  EXPECT_TRUE((Precondition{}.holds(tag)));
+  EXPECT_TRUE((Precondition{}.holds("")));
+  EXPECT_TRUE((Precondition{tag, ""}.holds(tag)));
+  EXPECT_TRUE((Precondition{"\"x\", " + tag + " ,\"y\"", ""}.holds(tag)));
+  EXPECT_FALSE((Precondition{"\"x\",,", ""}.holds(tag)));
+  EXPECT_FALSE((Precondition{tag, ""}.holds(""))) << "it is gone";
+  EXPECT_TRUE((Precondition{"*", ""}.holds(tag)));
+  EXPECT_FALSE((Precondition{"*", ""}.holds("")));
+  EXPECT_TRUE((Precondition{"", "*"}.holds("")));
+  EXPECT_FALSE((Precondition{"", "*"}.holds(tag))) << "somebody was first";
+  EXPECT_FALSE((Precondition{"", tag}.holds(tag)));
+  EXPECT_TRUE((Precondition{"", "\"x\""}.holds(tag)));
+}
+
 TEST(LoopbackHost, ForeignNamesAreRefusedUnlessListed) {
   for (const char* host :
        {"localhost", "localhost:8080", "127.0.0.1", "127.9.8.7:1", "[::1]", "[::1]:8080", ""})

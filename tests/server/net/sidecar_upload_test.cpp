@@ -12,6 +12,7 @@
 #include "render_core/scene/synth.h"
 #include "server/access.h"
 #include "server/net/http.h"
+#include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -104,13 +105,72 @@ TEST_F(SidecarUpload, IsCheckedBeforeAnythingIsWritten) {
   EXPECT_EQ(wrong.status, 400);
   EXPECT_THAT(wrong.body, HasSubstr("tours[0].stops[0].position"));
   EXPECT_EQ(put(author, {}, "").status, 411);
-  // From the head alone: what is on its way when the connection closes would cost the answer.
-  const std::string too_long = std::to_string(max_upload_bytes + 1);
-  EXPECT_EQ(put(author, {{"content-length", too_long}}, "").status, 413);
   EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
   EXPECT_EQ(put(author, {}, sidecar, "absent").status, 404);
   EXPECT_EQ(http_put(server->port(), "/index.html", "x", {}).status, 405);
   EXPECT_EQ(http_get(server->port(), "/healthz").status, 200) << "and goes on serving";
+}
+
+/// The whole of it is sent before the answer is read, as browsers do.
+TEST_F(SidecarUpload, ThatIsTooLongIsAnsweredAndNotCutOff) {
+  const HttpReply refused = put(token("author"), {}, std::string(4 * max_upload_bytes, ' '));
+  EXPECT_EQ(refused.status, 413);
+  EXPECT_THAT(refused.body, HasSubstr(std::to_string(max_upload_bytes)));
+  EXPECT_EQ(refused.headers.at("connection"), "close");
+  EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
+}
+
+TEST_F(SidecarUpload, IsNotReadWithoutEnd) {
+  RawSocket endless(server->port());
+  const std::string piece(1 << 20, ' ');
+  endless.send("PUT /api/scenes/hall/sidecar HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " +
+               std::to_string(1 << 30) + "\r\n\r\n");
+  int pieces = 0;
+  while (pieces < 128 && endless.send(piece)) ++pieces;
+  EXPECT_LT(pieces, 128);
+  EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
+}
+
+/// Two authors opened the scene before either of them saved.
+TEST_F(SidecarUpload, OfALaterAuthorDoesNotReplaceWhatTheyHaveNotSeen) {
+  const std::string author = token("author");
+  ASSERT_TRUE(tours_as(author)["document"]["etag"].is_null());
+  const HttpReply first = put(author, {{"if-none-match", "*"}});
+  EXPECT_EQ(first.status, 200) << first.body;
+  const std::string tag = first.headers.at("etag");
+  EXPECT_EQ(tours_as(author)["document"]["etag"], tag);
+
+  const std::string other(R"({"tours": [{"title": "Other", "stops": []}]})");
+  const HttpReply second = put(author, {{"if-none-match", "*"}}, other);
+  EXPECT_EQ(second.status, 412);
+  EXPECT_THAT(second.body, HasSubstr("somebody else saved this scene"));
+  EXPECT_EQ(second.headers.at("etag"), tag) << "with which it can be replaced on purpose";
+  EXPECT_EQ(tours_as(author)["document"]["tours"][0]["title"], "Hall");
+
+  const HttpReply replaced = put(author, {{"if-match", tag}}, other);
+  EXPECT_EQ(replaced.status, 200) << replaced.body;
+  EXPECT_NE(replaced.headers.at("etag"), tag);
+  EXPECT_EQ(put(author, {{"if-match", tag}}).status, 412);
+  EXPECT_EQ(tours_as(author)["document"]["tours"][0]["title"], "Other");
+  EXPECT_EQ(put(author).status, 200) << "who asks nothing of it replaces whatever is there";
+}
+
+/// By another server of the same folder, or by hand.
+TEST_F(SidecarUpload, ThatIsRefusedShowsWhatWasWrittenMeanwhile) {
+  const std::string author = token("author");
+  const std::string tag = put(author).headers.at("etag");
+  folder.write("hall.json", R"({"tours": [{"title": "Theirs", "stops": []}],
+                                "start_pose": {"position": [4, 5, 6], "look_at": [4, 5, 9]}})");
+  EXPECT_EQ(put(author, {{"if-match", tag}}).status, 412);
+  const auto document = tours_as(author)["document"];
+  EXPECT_EQ(document["tours"][0]["title"], "Theirs");
+  WireClient visitor(server->port());
+  EXPECT_FLOAT_EQ(visitor.greet(64, 64, v1::CODEC_H264, author).scene().start_pose().position().z(),
+                  6.0f);
+  EXPECT_EQ(put(author, {{"if-match", document["etag"]}}).status, 200);
+  std::filesystem::remove(folder / "hall.json");
+  EXPECT_EQ(put(author, {{"if-match", tag}}).status, 412) << "it was taken away";
+  EXPECT_TRUE(tours_as(author)["document"]["etag"].is_null());
 }
 
 TEST_F(SidecarUpload, SaysWhereNothingCanBeWritten) {

@@ -13,6 +13,8 @@ export interface SceneTours {
 export interface TourDocument {
   readonly tours?: unknown;
   readonly settings?: unknown;
+  /** Of the sidecar; null: there is none. */
+  readonly etag?: string | null;
 }
 
 /**

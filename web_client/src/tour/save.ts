@@ -1,26 +1,39 @@
 // Saves a scene's sidecar to the server, which takes it from authors.
 const most_bytes = 1 << 20; // the server takes no more
 
-/** Undefined when it is saved; otherwise what to tell the author. */
+/** The tag of a sidecar; null: there is none; undefined: the server does not tell. */
+export type SidecarTag = string | null | undefined;
+
+export type SaveResult =
+  | { readonly kind: 'saved'; readonly tag: SidecarTag }
+  /** What is there now is not what this one was made from. */
+  | { readonly kind: 'changed'; readonly tag: SidecarTag }
+  | { readonly kind: 'refused'; readonly why: string };
+
+/** `made_from`: replaces that one only. */
 export async function save_sidecar(
   page_url: string,
   token: string,
   scene_id: string,
   sidecar: string,
+  made_from: SidecarTag,
   unreachable: string,
-): Promise<string | undefined> {
+): Promise<SaveResult> {
   const body = new Blob([sidecar], { type: 'application/json' });
-  if (body.size > most_bytes) return `${body.size} bytes are too many, ${most_bytes} fit`;
+  if (body.size > most_bytes)
+    return { kind: 'refused', why: `${body.size} bytes are too many, ${most_bytes} fit` };
   const address = new URL(`./api/scenes/${encodeURIComponent(scene_id)}/sidecar`, page_url);
+  const headers: Record<string, string> = { authorization: `Bearer ${token}` };
+  if (made_from === null) headers['if-none-match'] = '*';
+  else if (made_from !== undefined) headers['if-match'] = made_from;
   try {
-    const response = await fetch(address, {
-      method: 'PUT',
-      body,
-      headers: { authorization: `Bearer ${token}` },
-    });
-    return response.ok ? undefined : refusal(response.status, await response.text());
+    const response = await fetch(address, { method: 'PUT', body, headers });
+    const tag = response.headers.get('etag');
+    if (response.ok) return { kind: 'saved', tag: tag ?? undefined };
+    if (response.status === 412) return { kind: 'changed', tag };
+    return { kind: 'refused', why: refusal(response.status, await response.text()) };
   } catch {
-    return unreachable;
+    return { kind: 'refused', why: unreachable };
   }
 }
 

@@ -2,7 +2,7 @@ import type { SceneSetup } from '../camera/camera_controller';
 import type { Vec3 } from '../camera/vector';
 import type { Eye } from '../present/warp';
 import { TourDraft } from '../tour/draft';
-import { save_sidecar } from '../tour/save';
+import { save_sidecar, type SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
@@ -31,8 +31,11 @@ export class AuthorPanel {
   private readonly autoplay_ = by_id('author-autoplay', HTMLInputElement);
   private readonly preview_ = by_id('author-preview', HTMLButtonElement);
   private readonly save_ = by_id('author-save', HTMLButtonElement);
+  private readonly replace_ = by_id('author-replace', HTMLButtonElement);
   private readonly done_ = by_id('author-done', HTMLOutputElement);
   private token_: string | undefined;
+  private made_from_: SidecarTag;
+  private theirs_: SidecarTag; // somebody else's, saved meanwhile
   private open_ = 0; // the stop of which all is shown
   private changes_ = 0;
   private saved_changes_ = 0;
@@ -49,7 +52,8 @@ export class AuthorPanel {
       this.done_.textContent = text.author.start_set;
     });
     click('author-preview', () => tools_.preview());
-    click('author-save', () => void this.save());
+    click('author-save', () => void this.save(this.made_from_));
+    click('author-replace', () => void this.save(this.theirs_));
     click('author-download', () => this.download());
     this.title_.addEventListener('input', () => {
       this.draft_.title = this.title_.value;
@@ -64,10 +68,15 @@ export class AuthorPanel {
     });
   }
 
-  /** `token`: the server takes the sidecar from who has it; undefined: from nobody here. */
-  load(tours: readonly Tour[], token: string | undefined): void {
+  /**
+   * `token`: the server takes the sidecar from who has it; undefined: from nobody here.
+   * `made_from`: the sidecar that has these tours.
+   */
+  load(tours: readonly Tour[], token: string | undefined, made_from: SidecarTag): void {
     this.token_ = token;
+    this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
+    this.replace_.hidden = true;
     this.draft_.load(tours);
     this.title_.value = this.draft_.title;
     this.autoplay_.checked = this.draft_.starts_itself;
@@ -92,22 +101,31 @@ export class AuthorPanel {
     return scene && `${JSON.stringify(this.draft_.sidecar(scene), undefined, 2)}\n`;
   }
 
-  private async save(): Promise<void> {
+  private async save(made_from: SidecarTag): Promise<void> {
     const sidecar = this.sidecar();
     if (sidecar === undefined || this.token_ === undefined) return;
     const { changes_: changes } = this;
-    this.save_.disabled = true;
+    this.save_.disabled = this.replace_.disabled = true;
     this.done_.textContent = text.author.saving;
-    const refused = await save_sidecar(
+    const result = await save_sidecar(
       location.href,
       this.token_,
       this.tools_.scene_id(),
       sidecar,
+      made_from,
       text.author.unreachable,
     );
-    this.save_.disabled = false;
-    if (refused === undefined) this.saved_changes_ = changes;
-    this.done_.textContent = refused === undefined ? text.author.saved : text.author.not_saved(refused);
+    this.save_.disabled = this.replace_.disabled = false;
+    if (result.kind === 'saved') {
+      this.saved_changes_ = changes;
+      this.made_from_ = result.tag;
+      this.replace_.hidden = true;
+      this.done_.textContent = text.author.saved;
+    } else if (result.kind === 'changed') {
+      this.theirs_ = result.tag;
+      this.replace_.hidden = false;
+      this.done_.textContent = text.author.changed_meanwhile;
+    } else this.done_.textContent = text.author.not_saved(result.why);
   }
 
   private download(): void {

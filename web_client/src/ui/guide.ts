@@ -143,7 +143,7 @@ export class Guide {
       if (!shared.eye) this.put(start);
     }
     this.tour_view.show_tours(tours);
-    this.author_?.load(tours, may_save ? token : undefined);
+    this.author_?.load(tours, may_save ? token : undefined, document.etag);
     // A link to a view or a stop is not led away from there, and neither is an author.
     const stays =
       shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
