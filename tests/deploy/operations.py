@@ -2,9 +2,10 @@
 """Checks what operators deploy, each subcommand with the tool that will read it in the end.
 
   operations.py prometheus              rules and configurations (promtool), and when alerts fire
+  operations.py grafana                 the dashboard's fields and panels, and that what it needs is provisioned
   operations.py haproxy                 both configurations (haproxy -c)
   operations.py systemd                 the unit and its exposure (systemd-analyze)
-  operations.py kubernetes              renders base and overlays (kubectl kustomize), asserts on them
+  operations.py kubernetes              renders base and overlays (kubectl kustomize), asserts on them and their fields
   operations.py compose                 the compose file: what every service has to have
   operations.py notices                 the notices name every package that the page contains
   operations.py metrics --server FILE   alerts and dashboard name only metrics that FILE serves
@@ -26,6 +27,9 @@ import sys
 import tempfile
 import time
 import urllib.request
+
+import dashboard_check
+import manifest_fields
 
 SOURCE_DIR = pathlib.Path(__file__).resolve().parents[2]
 DEPLOY = SOURCE_DIR / "deploy"
@@ -68,11 +72,12 @@ def alerts():
     return load_yaml((DEPLOY / "prometheus/alerts.yaml").read_text())[0]["groups"][0]["rules"]
 
 
+def dashboard():
+    return json.loads((DEPLOY / "grafana/dashboards/catgs.json").read_text())
+
+
 def dashboard_expressions():
-    dashboard = json.loads((DEPLOY / "grafana/dashboards/catgs.json").read_text())
-    for panel in dashboard["panels"]:
-        for target in panel.get("targets", []):
-            yield panel["title"], target["expr"].replace("$instance", ".*")
+    return [(title, text.replace("$instance", ".*")) for title, text in dashboard_check.expressions(dashboard())]
 
 
 def check_prometheus(_):
@@ -98,6 +103,25 @@ def check_prometheus(_):
         path.write_text(json.dumps({"groups": [{"name": f"g{i}", "rules": [r]} for i, r in enumerate(rules)]}))
         findings += run(promtool, "check", "rules", "--lint=none", path)
     return findings
+
+
+def check_grafana(_):
+    provisioning = DEPLOY / "grafana/provisioning"
+    sources = load_yaml((provisioning / "datasources/prometheus.yaml").read_text())[0]["datasources"]
+    provider = load_yaml((provisioning / "dashboards/catgs.yaml").read_text())[0]["providers"][0]
+    services = load_yaml((DOCKER / "compose.yaml").read_text())[0]["services"]
+    findings = dashboard_check.findings(field_table(), dashboard(), {source["uid"] for source in sources})
+    grafana = services["grafana"]
+    mounted = {inside: outside for outside, inside, _ in (volume.split(":") for volume in grafana["volumes"] if volume.endswith(":ro"))}
+    folder = provider["options"]["path"]
+    home = grafana["environment"]["GF_DASHBOARDS_DEFAULT_HOME_DASHBOARD_PATH"]
+    wanted = {
+        "Prometheus is where the compose file has it": sources[0]["url"] == "http://prometheus:9090" and "prometheus" in services,
+        "the dashboards are mounted where Grafana looks": (DOCKER / mounted.get(folder, "nowhere")).is_dir(),
+        "Grafana's first page is our dashboard": (DOCKER / mounted.get(os.path.dirname(home), "nowhere") / os.path.basename(home)).is_file(),
+        "provisioning is mounted": (DOCKER / mounted.get("/etc/grafana/provisioning", "nowhere")).resolve() == provisioning,
+    }
+    return findings + [f"not true: {what}" for what, holds in wanted.items() if not holds]
 
 
 def check_haproxy(_):
@@ -131,11 +155,21 @@ def check_systemd(_):
     return findings
 
 
+def field_table():
+    return load_yaml((SOURCE_DIR / "tests/deploy/manifest_fields.yaml").read_text())[0]
+
+
+def field_findings(where, manifests):
+    table = field_table()
+    return [f"{where}: {finding}" for manifest in manifests for finding in manifest_fields.findings(table, manifest)]
+
+
 def render(kubectl, folder):
     result = subprocess.run([kubectl, "kustomize", folder], capture_output=True, text=True, check=False, timeout=60)
     if result.returncode != 0:
         return None, [f"kubectl kustomize {folder}: {result.stderr.strip()}"]
-    return {(d["kind"], d["metadata"]["name"]): d for d in load_yaml(result.stdout)}, []
+    manifests = load_yaml(result.stdout)
+    return {(d["kind"], d["metadata"]["name"]): d for d in manifests}, field_findings(folder, manifests)
 
 
 def pod_findings(where, spec, drain_s):
@@ -209,6 +243,7 @@ def agones_findings(kubectl):
     spec = template["template"]["spec"]
     findings = pod_findings("overlays/agones", spec, drain_seconds(objects["ConfigMap", "catgs-config"]["data"]["catgs.toml"]))
     allocation = load_yaml((DEPLOY / "kubernetes/overlays/agones/allocation.example.yaml").read_text())[0]
+    findings += field_findings("allocation.example.yaml", [allocation])
     mounted = {v["configMap"]["name"] for v in spec["volumes"] if "configMap" in v}
     names = {c["name"] for c in spec["containers"]}
     wanted = {
@@ -326,12 +361,28 @@ def check_settings(options):
         for name in set(re.findall(r"\bCATGS_[A-Z_]+\b", text)) - {"CATGS_COMMIT"}:
             if name[6:].lower().replace("_", "-") not in known:
                 findings.append(f"{file}: the server has no setting for {name}")
-    named = re.findall(r"^\| `--([a-z-]+)`", (DEPLOY / "README.md").read_text(), re.M)
-    findings += [f"deploy/README.md: there is no --{name}" for name in named if name not in known]
-    return findings if named else ["deploy/README.md: no settings are explained"]
+    return findings + runbook_findings(dict(re.findall(r"^(\S+) = (.*?)  # default$", shown.stdout, re.M)) | {"scene": "[]"})
 
 
-CHECKS = {"prometheus": check_prometheus, "haproxy": check_haproxy, "systemd": check_systemd,
+def runbook_findings(defaults):
+    """The runbook's table has each setting once, with the default that the program prints."""
+    findings = []
+    named = {}
+    section = (DEPLOY / "README.md").read_text().split("\n## Settings\n")[1].split("\n## ")[0]
+    for names, values in re.findall(r"^\| (`--[^|]*) \| ([^|]*)\|", section, re.M):
+        names = re.findall(r"`--([a-z0-9-]+)`", names)
+        values = re.findall(r"`([^`]*)`", values) or [""] * len(names)
+        for name, value in zip(names, values, strict=True):
+            findings += [f"deploy/README.md: --{name} stands there twice"] * (name in named)
+            named[name] = value
+    shown = {name: "" if value in ("false", "[]") else value.strip('"') for name, value in defaults.items()}
+    for name in sorted(named.keys() | shown.keys()):
+        if named.get(name) != shown.get(name):
+            findings.append(f"deploy/README.md: --{name} is {named.get(name, 'missing')!r} there, {shown.get(name, 'unknown')!r} in the program")
+    return findings
+
+
+CHECKS = {"prometheus": check_prometheus, "grafana": check_grafana, "haproxy": check_haproxy, "systemd": check_systemd,
           "kubernetes": check_kubernetes, "compose": check_compose, "notices": check_notices, "metrics": check_metrics, "settings": check_settings}
 
 
