@@ -10,12 +10,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double busy_share = 0.7;
+constexpr double busy_share = 0.6;
 constexpr double calm_share = 0.4;
 constexpr auto busy_for = 1s;
 constexpr double encoding_part = 0.4;  // of what is busy
 constexpr double too_long = 0.55;      // of the time between frames
-constexpr double relieved_share = 0.6;
+constexpr double relieved_share = 0.5;
 constexpr double roomy_share = 0.25;
 // 60 pictures a second with the fastest preset: 6 ms for a million pixels.
 constexpr double usual_cpus_per_pixel = 60 * 6e-9;

@@ -44,11 +44,11 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings);
 /// - A newcomer begins with the best preset that leaves three quarters of the processors free, if
 ///   it costs what the others do: more may follow, and a bad start costs them all frames, while a
 ///   better preset can come later.
-/// - The faster preset where processors were busy (70 %, as threads of one core slow each other
-///   down) for a second and encoding is a good part of that, for as many sessions as bring them
-///   to 60 %, those whose encoders cost the most; or where an encoder by itself takes most of the
-///   time between frames, for a quarter of the sessions at a time. Where rendering holds frames up,
-///   a worse picture would gain next to nothing.
+/// - The faster preset where processors were busy (60 %, since frames that come together wait
+///   for each other long before all are) for a second and encoding is a good part of that, for as
+///   many sessions as bring them to 50 %, those whose encoders cost the most; or where an encoder
+///   by itself takes most of the time between frames, for a quarter of the sessions at a time.
+///   Where rendering holds frames up, a worse picture would gain next to nothing.
 /// - The better one again where 60 % of the processors were free for five seconds and will be with
 ///   its cost, and where it takes at most 40 % of the time between frames. When it has to be taken
 ///   back within half a minute the next try waits twice as long, two minutes at most.
