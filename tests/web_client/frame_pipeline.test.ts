@@ -21,6 +21,10 @@ class FakeDecoder implements Decoder {
     if (frame.header.frameId === fails_at) this.events.failed(new Error('broken'));
   }
 
+  reconfigure(): boolean {
+    return goes_on;
+  }
+
   queue_length(): number {
     return this.frames.length;
   }
@@ -37,6 +41,7 @@ let now_us: number;
 let decoders: FakeDecoder[];
 let failures_seen: number[];
 let has_decoder: boolean;
+let goes_on: boolean; // decoders take another stream
 let fails_at: bigint | undefined; // the frame on which decoders fail at once
 let refresh: (() => void)[];
 let drawn: FakePicture[];
@@ -52,6 +57,7 @@ beforeEach(() => {
   decoders = [];
   failures_seen = [];
   has_decoder = true;
+  goes_on = false;
   fails_at = undefined;
   refresh = [];
   drawn = [];
@@ -187,6 +193,45 @@ describe('key frames', () => {
     expect(acks).toHaveLength(9);
     push(20n, { idr: true });
     expect(decoder().frames).toHaveLength(1);
+  });
+});
+
+describe('another stream', () => {
+  it('goes to the decoder that there is, which gives what it still holds', async () => {
+    goes_on = true;
+    const made = await configure();
+    push(1n);
+    await configure();
+    push(2n); // of neither: the new stream begins with a key frame
+    push(3n, { idr: true });
+    expect(decoders).toEqual([made]);
+    expect(made.frames.map(({ header }) => header.frameId)).toEqual([1n, 3n]);
+    decode(made, 1n);
+    await display();
+    expect(drawn.map(({ id }) => id)).toEqual([1n]);
+    expect(dropped).toEqual([2n]);
+  });
+
+  it('gets another decoder where that one cannot go on', async () => {
+    const first = await configure();
+    push(1n);
+    const second = await configure();
+    expect(second).not.toBe(first);
+    expect(first.closed).toBe(true);
+    expect(dropped).toEqual([1n]);
+  });
+
+  it('counts no single failure of the former, but what cost a rung', async () => {
+    goes_on = true;
+    const fail = async (): Promise<void> => {
+      decoder().events.failed(new Error('broken'));
+      await settle();
+    };
+    await configure();
+    for (let i = 0; i < 3; ++i) await fail();
+    await configure();
+    await fail();
+    expect(failures_seen).toEqual([0, 1, 2, 3, 3]);
   });
 });
 

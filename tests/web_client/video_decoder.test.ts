@@ -1,8 +1,8 @@
-import { create } from '@bufbuild/protobuf';
+import { create, type MessageInitShape } from '@bufbuild/protobuf';
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import type { EncodedFrame } from '#client/decode/picture';
-import { decoder_config, WebCodecsDecoder } from '#client/decode/video_decoder';
-import { FrameHeaderSchema, StreamConfigSchema } from '#client/wire/wire';
+import { WebCodecsDecoder } from '#client/decode/video_decoder';
+import { Codec, FrameHeaderSchema, StreamConfigSchema, type StreamConfig } from '#client/wire/wire';
 
 class FakeChunk {
   constructor(readonly init: EncodedVideoChunkInit) {}
@@ -17,8 +17,9 @@ class FakeVideoDecoder {
     made.push(this);
   }
 
-  configure(): void {
+  configure(config: VideoDecoderConfig): void {
     this.state = 'configured';
+    configured.push(`${config.codec} ${config.hardwareAcceleration}`);
   }
 
   decode(): void {
@@ -43,6 +44,7 @@ class FakeVideoDecoder {
 }
 
 let made: FakeVideoDecoder[];
+let configured: string[];
 let decoded: bigint[];
 let skipped: bigint[];
 let failures: number;
@@ -52,11 +54,13 @@ beforeEach(() => {
   vi.stubGlobal('VideoDecoder', FakeVideoDecoder);
   vi.stubGlobal('EncodedVideoChunk', FakeChunk);
   made = [];
+  configured = [];
   decoded = [];
   skipped = [];
   failures = 0;
   decoder = new WebCodecsDecoder(
-    decoder_config(create(StreamConfigSchema, {}), 'no-preference'),
+    create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.42C01F' }),
+    'no-preference',
     () => 1,
     {
       decoded: (frame) => decoded.push(frame.header.frameId),
@@ -114,5 +118,25 @@ describe('every frame comes out once, decoded or skipped', () => {
     expect(skipped).toEqual([1n, 2n]);
     expect(browser_decoder().give(1).closed).toBe(true);
     expect(decoded).toEqual([]);
+  });
+});
+
+describe('another stream', () => {
+  const stream = (change: MessageInitShape<typeof StreamConfigSchema>): StreamConfig =>
+    create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.42C028', ...change });
+
+  it('is taken by the same decoder, with the acceleration that it has', () => {
+    decode(1n);
+    expect(decoder.reconfigure(stream({}))).toBe(true);
+    browser_decoder().give(1);
+    expect(configured).toEqual(['avc1.42C01F no-preference', 'avc1.42C028 no-preference']);
+    expect(decoded).toEqual([1n]);
+  });
+
+  it('is refused when it is of another codec or the decoder has failed', () => {
+    expect(decoder.reconfigure(stream({ codec: Codec.MJPEG }))).toBe(false);
+    browser_decoder().fail();
+    expect(decoder.reconfigure(stream({}))).toBe(false);
+    expect(configured).toHaveLength(1);
   });
 });

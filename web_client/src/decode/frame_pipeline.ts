@@ -1,6 +1,7 @@
 // From received bytes to the picture that is shown: decoder, newest-wins slot, presenter, and one
 // acknowledgement per frame, whatever became of it.
 import { Codec, type AckInit, type FrameHeader, type StreamConfig } from '../wire/wire';
+import { failures_per_rung } from './ladder';
 import { Latest } from './latest';
 import type { Decoder, DecoderEvents, EncodedFrame, Frame, Picture } from './picture';
 
@@ -53,6 +54,13 @@ export class FramePipeline {
 
   configure(config: StreamConfig): void {
     this.config_ = config;
+    // A picture that comes to rest and moves on changes the stream twice: to make a decoder each time
+    // would cost a look at what the browser supports, and the decoder's warm-up.
+    if (this.decoder_?.reconfigure(config)) {
+      this.needs_key_ = true;
+      this.failures_ -= this.failures_ % failures_per_rung; // what cost a rung stays counted
+      return;
+    }
     this.failures_ = 0;
     void this.renew_decoder();
   }

@@ -1,3 +1,4 @@
+import { Codec, type StreamConfig } from '../wire/wire';
 import { Latest } from './latest';
 import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
 
@@ -17,6 +18,10 @@ export class JpegDecoder implements Decoder {
   decode(frame: EncodedFrame): void {
     this.next_.put(frame);
     if (!this.current_) void this.run();
+  }
+
+  reconfigure(config: StreamConfig): boolean {
+    return config.codec === Codec.MJPEG;
   }
 
   queue_length(): number {

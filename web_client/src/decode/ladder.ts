@@ -8,6 +8,8 @@ export const decoder_ladder = [
 
 export type DecoderRung = (typeof decoder_ladder)[number];
 
+export const failures_per_rung = 2; // one may be a broken frame; two are a broken decoder
+
 /** The rungs from `first` down. */
 export function rungs_from(first: DecoderRung): readonly DecoderRung[] {
   return decoder_ladder.slice(decoder_ladder.indexOf(first));

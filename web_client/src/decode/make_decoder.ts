@@ -1,10 +1,8 @@
 import { Codec, type StreamConfig } from '../wire/wire';
 import { JpegDecoder } from './jpeg_decoder';
-import { rungs_from, type DecoderRung } from './ladder';
+import { failures_per_rung, rungs_from, type DecoderRung } from './ladder';
 import type { Decoder, DecoderEvents } from './picture';
 import { decoder_config, has_webcodecs, is_supported, WebCodecsDecoder } from './video_decoder';
-
-export const failures_per_rung = 2; // one may be a broken frame; two are a broken decoder
 
 /** What this browser can decode here from `first_rung` down, best first. */
 export function available_codecs(first_rung: DecoderRung): Codec[] {
@@ -39,5 +37,5 @@ export async function make_decoder(
   );
   const rung = rungs.flat()[Math.floor(failures / failures_per_rung)];
   if (!rung) return undefined;
-  return { decoder: new WebCodecsDecoder(decoder_config(config, rung), now_us, events), rung };
+  return { decoder: new WebCodecsDecoder(config, rung, now_us, events), rung };
 }

@@ -1,4 +1,4 @@
-import type { FrameHeader } from '../wire/wire';
+import type { FrameHeader, StreamConfig } from '../wire/wire';
 
 /** Decoded pixels. Whoever holds it must close() it: decoders have only a few to give. */
 export type Picture = VideoFrame | ImageBitmap;
@@ -27,6 +27,11 @@ export interface DecoderEvents {
 
 export interface Decoder {
   decode(frame: EncodedFrame): void;
+  /**
+   * Goes on with another stream, from its next key frame; frames inside still come out. False when it
+   * cannot: then it is as before.
+   */
+  reconfigure(config: StreamConfig): boolean;
   /** Frames waiting in the decoder. */
   queue_length(): number;
   /** Every frame inside is skipped, at once; no event follows. */

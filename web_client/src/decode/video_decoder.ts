@@ -1,4 +1,4 @@
-import type { StreamConfig } from '../wire/wire';
+import { Codec, type StreamConfig } from '../wire/wire';
 import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
 
 export function has_webcodecs(): boolean {
@@ -29,7 +29,8 @@ export class WebCodecsDecoder implements Decoder {
   private readonly inside_ = new Map<number, EncodedFrame>();
 
   constructor(
-    config: VideoDecoderConfig,
+    config: StreamConfig,
+    private readonly acceleration_: HardwareAcceleration,
     private readonly now_us_: () => number,
     private readonly events_: DecoderEvents,
   ) {
@@ -37,7 +38,7 @@ export class WebCodecsDecoder implements Decoder {
       output: (picture) => this.output(picture),
       error: (error) => this.events_.failed(error),
     });
-    this.decoder_.configure(config);
+    this.decoder_.configure(decoder_config(config, acceleration_));
   }
 
   decode(frame: EncodedFrame): void {
@@ -57,6 +58,13 @@ export class WebCodecsDecoder implements Decoder {
       this.events_.skipped(frame);
       this.events_.failed(error instanceof Error ? error : new Error(String(error)));
     }
+  }
+
+  /** What it cannot play after all, it says by failing. */
+  reconfigure(config: StreamConfig): boolean {
+    if (config.codec !== Codec.H264 || this.decoder_.state !== 'configured') return false;
+    this.decoder_.configure(decoder_config(config, this.acceleration_));
+    return true;
   }
 
   queue_length(): number {

@@ -1,10 +1,9 @@
 // The worker: everything between socket and canvas, so that a busy page delays no picture.
 import type { Vec3 } from '../camera/vector';
 import { FramePipeline } from '../decode/frame_pipeline';
-import type { DecoderRung } from '../decode/ladder';
+import { failures_per_rung, type DecoderRung } from '../decode/ladder';
 import {
   available_codecs,
-  failures_per_rung,
   make_decoder,
   type MadeDecoder,
 } from '../decode/make_decoder';
