@@ -2,7 +2,12 @@
 import type { Page } from 'playwright-core';
 import type { Pose } from '#client/camera/camera_controller';
 
-export const settle = (page: Page): Promise<void> => page.evaluate(() => window.catgs!.settled());
+/** Also of a document whose script has not run yet: a link has just been followed. */
+export const settle = (page: Page): Promise<void> =>
+  page.evaluate(async () => {
+    while (!window.catgs) await new Promise((resolve) => setTimeout(resolve, 20));
+    await window.catgs.settled();
+  });
 
 export const pose_of = (page: Page): Promise<Pose> => page.evaluate(() => window.catgs!.pose());
 
