@@ -1,0 +1,139 @@
+// Scenes of a folder as time passes: loads end when the test lets them, and a minute takes no time.
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <thread>
+
+#include "render_core/scene/save_scene.h"
+#include "render_core/thread_pool.h"
+#include "server/metrics.h"
+#include "server/scene_library.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+using Entry = std::shared_ptr<const SceneEntry>;
+
+/// The demo city in memory, and three scenes in a folder, of which two fit beside it.
+class SceneLibraryTime : public FolderTest {
+ protected:
+  void SetUp() override {
+    // 236 bytes each as decoded: 1.2 MB.
+    for (const char* name : {"a.ply", "b.ply", "c.ply"})
+      save_scene(random_cloud(5000, 3), folder_ / name);
+    ServerConfig config;
+    config.scenes = {"synth:city:1000"};
+    config.scene_folders = {folder_.path()};
+    config.scene_memory_mb = 3;
+    library_ = std::make_unique<SceneLibrary>(
+        config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_);
+  }
+
+  /// What the loader is through with comes to be known.
+  void run_until(const std::function<bool()>& holds) {
+    for (int i = 0; i < 20'000 && !holds(); ++i) {
+      io_.restart();
+      io_.poll();
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_TRUE(holds());
+  }
+  bool in_memory(const std::string& id) const { return library_->in_memory(id) != nullptr; }
+  bool awaited(const std::string& id) {
+    return std::holds_alternative<SceneAwaited>(library_->want(id, now_));
+  }
+  ErrorMessage refusal(const std::string& id) {
+    const auto answer = library_->want(id, now_);
+    const auto* error = std::get_if<ErrorMessage>(&answer);
+    return error ? *error : ErrorMessage{};
+  }
+  Entry load(const std::string& id) {
+    EXPECT_TRUE(awaited(id));
+    library_->on_tick(now_);
+    run_until([&] { return in_memory(id); });
+    return library_->in_memory(id);
+  }
+  /// So much later.
+  void tick(std::chrono::seconds later) { library_->on_tick(now_ += later); }
+
+  boost::asio::io_context io_;
+  Metrics metrics_;
+  std::unique_ptr<SceneLibrary> library_;
+  TimePoint now_ = Clock::now();
+};
+
+TEST_F(SceneLibraryTime, OneIsLoadedAnotherWaitsAndTheThirdIsRefused) {
+  EXPECT_TRUE(awaited("a"));
+  EXPECT_TRUE(awaited("b"));
+  const ErrorMessage refused = refusal("c");
+  EXPECT_EQ(refused.code, ErrorCode::server_full);
+  EXPECT_THAT(refused.message, HasSubstr("other scenes are being loaded"));
+  EXPECT_TRUE(awaited("a")) << "who wants the same waits with the first";
+  run_until([&] { return in_memory("a") && in_memory("b"); });
+  EXPECT_TRUE(awaited("c"));
+}
+
+TEST_F(SceneLibraryTime, AfterAMinuteTheLeastRecentlyUsedGoes) {
+  load("a");
+  load("b");
+  now_ = Clock::now();
+  EXPECT_TRUE(awaited("c"));
+  tick(40s);
+  library_->want("a", now_);
+  tick(19s);
+  EXPECT_TRUE(in_memory("a") && in_memory("b")) << "a minute at least";
+  tick(2s);
+  EXPECT_TRUE(in_memory("a"));
+  EXPECT_FALSE(in_memory("b"));
+  run_until([&] { return in_memory("c"); });
+}
+
+TEST_F(SceneLibraryTime, WhatSomebodyLooksAtNeverGoes) {
+  Entry seen = load("a");
+  const Entry also_seen = load("b");
+  tick(3600s);
+  const ErrorMessage refused = refusal("c");
+  EXPECT_EQ(refused.code, ErrorCode::server_full);
+  EXPECT_THAT(refused.message, HasSubstr("no memory for \"c\""));
+  tick(3600s);
+  EXPECT_TRUE(in_memory("a") && in_memory("b"));
+  seen.reset();
+  EXPECT_TRUE(awaited("c"));
+  tick(1s);
+  EXPECT_FALSE(in_memory("a"));
+  EXPECT_TRUE(in_memory("b"));
+}
+
+TEST_F(SceneLibraryTime, AReplacedFileIsLoadedAnewWhenNobodyLooksAtTheOldOne) {
+  Entry old = load("a");
+  const auto before = std::filesystem::last_write_time(folder_ / "a.ply");
+  save_scene(random_cloud(100, 0), folder_ / "a.ply");
+  std::filesystem::last_write_time(folder_ / "a.ply", before + 2s);
+  tick(31s);
+  run_until([&] { return library_->listing()->at(1).gaussians == 100; });
+  tick(1s);
+  EXPECT_EQ(library_->in_memory("a"), old);
+  old.reset();
+  tick(1s);
+  EXPECT_FALSE(in_memory("a"));
+  EXPECT_EQ(load("a")->facts.gaussians, 100u);
+}
+
+TEST_F(SceneLibraryTime, FilesThatComeAndGoAreNoticed) {
+  EXPECT_THAT(library_->scene_ids(), ElementsAre("city", "a", "b", "c"));
+  std::filesystem::rename(folder_ / "b.ply", folder_ / "d.ply");
+  tick(31s);
+  run_until([&] { return library_->has("d"); });
+  EXPECT_THAT(library_->scene_ids(), ElementsAre("city", "a", "c", "d"));
+  EXPECT_FALSE(library_->has("b"));
+  load("d");
+}
+
+}  // namespace
+}  // namespace catgs::test
