@@ -32,7 +32,7 @@ SESSIONS = 8
 NETWORK = "catgs-fleet"
 # What a service of the file may say: another key would be silently ignored here.
 KNOWN_KEYS = {"image", "build", "environment", "volumes", "depends_on", "read_only", "tmpfs", "cap_drop",
-              "security_opt", "stop_grace_period", "restart", "profiles", "networks", "network_mode", "command", "ports"}
+              "security_opt", "stop_grace_period", "restart", "profiles", "networks", "network_mode", "command", "ports", "logging"}
 
 failures = []
 
@@ -178,6 +178,8 @@ class Load:
             raise RuntimeError(f"catgs-load: {errors}")
         report = json.loads(text)
         say(f"catgs-load: {json.dumps({k: v for k, v in report['metrics'].items() if k in ('fps_mean', 'reconnects', 'errors', 'idrs', 'recovery_max_ms', 'recovery_p95_ms')})}")
+        kinds = [kind for group in report["groups"] for kind in group["error_counts"]]
+        check(not any("pose" in kind for kind in kinds), f"each session goes on at its own newest pose (errors: {kinds})")
         return report["metrics"]
 
 

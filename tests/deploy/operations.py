@@ -263,6 +263,8 @@ def check_compose(_):
     for name, service in services.items():
         if name != "keys" and service.get("cap_drop") != ["ALL"]:
             findings.append(f"{name}: capabilities are not dropped")
+        if name != "keys" and not {"max-size", "max-file"} <= service.get("logging", {}).get("options", {}).keys():
+            findings.append(f"{name}: its log has no bound")
         if name not in ("keys", "grafana") and service.get("read_only") is not True:
             findings.append(f"{name}: the file system is not read-only")
         for mapping in service.get("ports", []):
