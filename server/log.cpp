@@ -1,6 +1,8 @@
 #include "server/log.h"
 
+#include <atomic>
 #include <chrono>
+#include <cstdio>
 #include <iterator>
 #include <memory>
 #include <mutex>
@@ -9,11 +11,13 @@
 
 #include <fmt/chrono.h>
 #include <nlohmann/json.hpp>
+#include <poll.h>
 #include <spdlog/formatter.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "server/session/log_session.h"
 #include "server/session/rate_limit.h"
@@ -76,6 +80,41 @@ class PrintableMessage final : public spdlog::custom_flag_formatter {
   }
 };
 
+std::atomic<std::uint64_t> lines_lost{0};
+
+/// Standard error, as long as it takes lines at once: a full disk costs lines and nothing else, and
+/// whoever stops to read a pipe does not stop the sessions. The next line that gets through says
+/// how many did not.
+class PatientSink final : public spdlog::sinks::base_sink<std::mutex> {
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    const std::string text = fmt::format("{} lines were lost: standard error took none", lost_);
+    const bool told = lost_ == 0 || write({message.logger_name, spdlog::level::warn, text});
+    if (told) lost_ = 0;
+    if (told && write(message)) return;
+    ++lost_;
+    ++lines_lost;
+  }
+  void flush_() override { to_.flush(); }
+  void set_formatter_(std::unique_ptr<spdlog::formatter> formatter) override {
+    to_.set_formatter(std::move(formatter));
+  }
+
+ private:
+  /// False: it was not taken.
+  bool write(const spdlog::details::log_msg& message) {
+    pollfd standard_error{STDERR_FILENO, POLLOUT, 0};
+    if (::poll(&standard_error, 1, 0) != 1 || (standard_error.revents & POLLOUT) == 0) return false;
+    to_.log(message);
+    if (std::ferror(stderr) == 0) return true;
+    std::clearerr(stderr);
+    return false;
+  }
+
+  spdlog::sinks::stderr_color_sink_mt to_;  // writes through `stderr`, which has no buffer
+  std::uint64_t lost_ = 0;
+};
+
 /// Leaves lines out where there are too many, and says how many: strangers can cause a line with
 /// each connection, and somebody pays for the disk.
 class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
@@ -119,8 +158,7 @@ std::unique_ptr<spdlog::formatter> make_formatter(std::string_view format) {
 }  // namespace
 
 void set_up_log(std::string_view format, std::string_view level) {
-  std::shared_ptr<spdlog::sinks::sink> sink =
-      std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
+  std::shared_ptr<spdlog::sinks::sink> sink = std::make_shared<PatientSink>();
   const auto least = spdlog::level::from_str(std::string(level));
   // Who asks for debugging wants to see it all.
   if (least > spdlog::level::debug) sink = std::make_shared<BoundedSink>(std::move(sink));
@@ -129,5 +167,7 @@ void set_up_log(std::string_view format, std::string_view level) {
   logger->set_level(least);
   spdlog::set_default_logger(std::move(logger));
 }
+
+std::uint64_t log_lines_lost() { return lines_lost; }
 
 }  // namespace catgs

@@ -5,6 +5,7 @@
 
 #include <prometheus/text_serializer.h>
 
+#include "server/log.h"
 #include "server/process_metrics.h"
 
 namespace catgs {
@@ -117,6 +118,8 @@ Metrics::Metrics()
       frames_sent(counter(registry_, "catgs_frames_sent_total", "Frames handed to their sockets")),
       frames_failed(counter(registry_, "catgs_frames_failed_total",
                             "Frames that failed in rendering or encoding")),
+      streams_failed(counter(registry_, "catgs_streams_failed_total",
+                             "Streams that could not be opened: a View or an encoder was refused")),
       frames_dropped_by_server(counter(registry_, "catgs_frames_dropped_total",
                                        "Frames dropped before they were shown",
                                        {{"by", "server"}})),
@@ -148,6 +151,13 @@ Metrics::Metrics()
 std::string Metrics::scrape() const {
   auto families = registry_.Collect();
   std::ranges::move(process_metrics(), std::back_inserter(families));
+  prometheus::ClientMetric lost;
+  lost.counter.value = static_cast<double>(log_lines_lost());
+  families.push_back({"catgs_log_lines_lost_total",
+                      "Lines of the log that standard error did not take: a full disk, a pipe that "
+                      "nobody reads",
+                      prometheus::MetricType::Counter,
+                      {lost}});
   return prometheus::TextSerializer().Serialize(families);
 }
 

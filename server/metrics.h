@@ -65,6 +65,7 @@ class Metrics {
   prometheus::Counter& frames_refined;
   prometheus::Counter& frames_sent;
   prometheus::Counter& frames_failed;
+  prometheus::Counter& streams_failed;            // could not be opened
   prometheus::Counter& frames_dropped_by_server;  // overflow of a packet ring
   prometheus::Counter& frames_dropped_by_client;
   prometheus::Counter& bytes_sent;

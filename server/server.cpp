@@ -33,6 +33,7 @@
 #include "server/session/session_registry.h"
 #include "server/sidecar_saver.h"
 #include "server/signed_token.h"
+#include "server/stop_while_loading.h"
 
 namespace catgs {
 namespace {
@@ -134,12 +135,15 @@ struct Server::State {
   void wait_for_signal();
   /// Readiness ends; after `wait` clients are told, and after `deadline` more they are closed.
   void begin_stop(std::chrono::milliseconds wait, std::chrono::milliseconds deadline);
+  /// Nothing can be rendered here any more: clients are told, and run() throws.
+  void give_up(const std::string& why);
   void drain(std::chrono::milliseconds deadline);
   /// Goes on with `then` when nobody is connected any more, and at the latest at `deadline`.
   void when_empty(TimePoint deadline, std::function<void()> then);
   void finish_stop();
 
   const ServerConfig config;
+  std::optional<StopWhileLoading> stop_while_loading{std::in_place};
   AccessControl access;
   Metrics metrics;
   const StaticFiles client;
@@ -155,6 +159,7 @@ struct Server::State {
   boost::asio::steady_timer drain_timer;
   std::unique_ptr<SessionRegistry> registry;
   bool stopping = false;
+  std::string failure;  // for which run() ends; empty: as it was asked to
 };
 
 NetOptions Server::State::net_options() {
@@ -282,7 +287,8 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
   return text_response(404, "404: /metrics and /api/sessions are here\n");
 }
 
-Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(config)) {
+Server::Server(const ServerConfig& config, const WrapExecutor& wrap)
+    : state_(std::make_unique<State>(config)) {
   State& s = *state_;
   s.scenes = std::make_unique<SceneLibrary>(
       s.config, RendererOptions{s.config.renderer, s.pool, s.config.simd, s.devices}, s.io,
@@ -296,8 +302,10 @@ Server::Server(const ServerConfig& config) : state_(std::make_unique<State>(conf
   const auto gpus = static_cast<int>(s.devices->views().size());
   if (gpus > 0) options.devices = s.devices;
   options.cpus = s.pool->threads();
-  auto executor = std::make_shared<PoolExecutor>(PoolExecutor::Pools{
+  options.on_devices_lost = [&s](const std::string& why) { s.give_up(why); };
+  std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(PoolExecutor::Pools{
       s.pool, gpus > 0 ? std::make_shared<ThreadPool>(render_threads_per_gpu * gpus) : s.pool});
+  if (wrap) executor = wrap(std::move(executor));
   s.registry = std::make_unique<SessionRegistry>(s.io, std::move(options), std::move(executor),
                                                  *s.scenes, s.encoders, std::move(authorize),
                                                  session_tokens(s.config), s.metrics);
@@ -310,9 +318,9 @@ Server::~Server() {
 
 void Server::run() {
   State& s = *state_;
-  // Not before: while scenes load, nobody would hear the signal, and its default ends the process.
   s.stop_signals.add(SIGINT);
   s.stop_signals.add(SIGTERM);
+  s.stop_while_loading.reset();
   s.wait_for_signal();
   s.net.start();
   run_promptly();  // others have been started
@@ -320,6 +328,7 @@ void Server::run() {
   s.print_banner();
   s.io.run();
   spdlog::info("stopped");
+  if (!s.failure.empty()) throw std::runtime_error(s.failure);
 }
 
 void Server::stop() {
@@ -363,6 +372,13 @@ void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::mill
                std::chrono::duration_cast<std::chrono::seconds>(wait).count());
   drain_timer.expires_after(wait);
   drain_timer.async_wait([this, deadline](const boost::system::error_code&) { drain(deadline); });
+}
+
+void Server::State::give_up(const std::string& why) {
+  if (stopping) return;
+  failure = "no device renders any more: " + why;
+  spdlog::critical("{}; the process ends, for its supervisor to start it anew", failure);
+  begin_stop(0ms, quick_stop_deadline);
 }
 
 void Server::State::drain(std::chrono::milliseconds deadline) {

@@ -1,23 +1,31 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "server/config.h"
 
 namespace catgs {
 
+class FrameExecutor;
+
+/// Puts something between the sessions and what renders for them: who watches it, or lets it fail.
+using WrapExecutor =
+    std::function<std::shared_ptr<FrameExecutor>(std::shared_ptr<FrameExecutor> executor)>;
+
 /// The whole server, assembled from a validated configuration.
 class Server {
  public:
   /// Binds the ports, loads the scenes, probes the encoders. Throws InputError.
-  explicit Server(const ServerConfig& config);
+  explicit Server(const ServerConfig& config, const WrapExecutor& wrap = {});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   /// Serves until SIGINT, SIGTERM or stop(): then readiness ends, clients are told, and run()
   /// returns when they have left, within two seconds; on SIGTERM --drain-wait and --drain-deadline
-  /// give proxies and clients more time. A second signal ends the process at once.
+  /// give proxies and clients more time. A second signal ends the process at once. Where no device
+  /// renders any more, clients are told in the same way, and then it throws std::runtime_error.
   void run();
   /// Any thread.
   void stop();

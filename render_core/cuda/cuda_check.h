@@ -1,28 +1,21 @@
 #pragma once
 
-#include <stdexcept>
 #include <string>
 
 #include <cuda_runtime_api.h>
 
-#include "render_core/renderer.h"
+#include "render_core/device_error.h"
 
 namespace catgs::cuda {
 
 /// A failed CUDA call, thrown inside the core: set-up lets it out, the frame path turns it into a
 /// RenderStatus at its edge.
-class CudaError : public std::runtime_error {
+class CudaError : public DeviceError {
  public:
   CudaError(const char* stage, cudaError_t code)
-      : std::runtime_error(std::string(stage) + ": " + cudaGetErrorString(code)), code_(code) {}
-
-  [[nodiscard]] RenderStatus::Code status_code() const {
-    return code_ == cudaErrorMemoryAllocation ? RenderStatus::Code::out_of_memory
-                                              : RenderStatus::Code::device_failed;
-  }
-
- private:
-  cudaError_t code_;
+      : DeviceError(code == cudaErrorMemoryAllocation ? RenderStatus::Code::out_of_memory
+                                                      : RenderStatus::Code::device_failed,
+                    std::string(stage) + ": " + cudaGetErrorString(code)) {}
 };
 
 /// `stage` names what was being done, for people.

@@ -29,14 +29,23 @@ struct Stream {
   FrameView picture;  // borrowed from `view`: the last one rendered
 };
 
+/// Why no stream was opened or no frame made, as far as somebody can act on it.
+enum class Fault {
+  none,
+  encoder_unavailable,  // it cannot be opened: another one may serve
+  encoder_failed,       // it was ended: the next frame opens it anew
+  device_failed,        // the View was ended: the stream has to be opened again
+  other,                // for want of memory, for one: the next frame may succeed
+};
+
 struct StreamOpened {
   bool ok = false;
   std::string message;  // why not, for people
   Codec codec = Codec::h264;
   std::string codec_string;
   std::string encoder_name;
-  std::optional<int> device{};       // see View::device()
-  bool encoder_unavailable = false;  // not ok for want of the encoder alone
+  std::optional<int> device{};  // see View::device()
+  Fault fault = Fault::none;
 };
 
 struct FrameJob {
@@ -54,9 +63,9 @@ struct FrameResult {
   std::string message;  // stage and cause of a failure
   OutgoingFrame frame;
   FrameStats stats;
-  std::string codec_string;          // of the encoder
-  bool sharp = false;                // see EncodedFrame
-  bool encoder_unavailable = false;  // not ok for want of the encoder alone
+  std::string codec_string;  // of the encoder
+  bool sharp = false;        // see EncodedFrame
+  Fault fault = Fault::none;
 };
 
 /// What renders and encodes: the CPU's thread pool, or GPUs with a few render threads and a pool of

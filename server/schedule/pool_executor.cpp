@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "render_core/device_error.h"
+
 namespace catgs {
 namespace {
 
@@ -13,6 +15,8 @@ ViewSettings view_settings() {
   return settings;
 }
 
+bool lost(RenderStatus::Code code) { return code == RenderStatus::Code::device_failed; }
+
 StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFactory& encoders) {
   StreamOpened opened;
   try {
@@ -20,8 +24,13 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
       stream.view.reset();  // its memory first: two views of a large scene may not fit
       stream.view = settings.renderer->make_view(view_settings());
     }
+  } catch (const DeviceError& error) {
+    opened.message = error.what();
+    opened.fault = lost(error.status_code()) ? Fault::device_failed : Fault::other;
+    return opened;
   } catch (const std::exception& error) {
     opened.message = error.what();
+    opened.fault = Fault::other;
     return opened;
   }
   try {
@@ -31,7 +40,7 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
     opened.encoder_name = encoder.name();
   } catch (const std::exception& error) {
     opened.message = error.what();
-    opened.encoder_unavailable = true;
+    opened.fault = Fault::encoder_unavailable;
     return opened;
   }
   stream.picture = {};
@@ -51,6 +60,12 @@ bool render_now(FrameJob& job, FrameResult& result) {
     const RenderStatus rendered = stream.view->render(job.request, stream.picture);
     if (!rendered.ok()) {
       result.message = rendered.message;
+      result.fault = Fault::other;
+      if (lost(rendered.code)) {  // its buffers are worth nothing any more
+        result.fault = Fault::device_failed;
+        stream.picture = {};
+        stream.view.reset();
+      }
       return false;
     }
     result.stats = stream.picture.stats;
@@ -67,7 +82,7 @@ Encoder* encoder_for(const FrameJob& job, const EncoderFactory& encoders, FrameR
     return &job.stream->encoders.use(job.stream->settings.encoder, job.encoding, encoders);
   } catch (const std::exception& error) {
     result.message = error.what();
-    result.encoder_unavailable = true;
+    result.fault = Fault::encoder_unavailable;
     return nullptr;
   }
 }
@@ -83,6 +98,8 @@ void encode_now(FrameJob& job, const EncoderFactory& encoders, FrameResult& resu
   ticket.encode_end = Clock::now();
   if (!status.ok) {
     result.message = status.message;
+    result.fault = Fault::encoder_failed;
+    job.stream->encoders.drop_last();
     return;
   }
   ticket.codec = encoder->codec();

@@ -19,6 +19,8 @@ class StreamEncoders {
   /// The encoder with these settings, opened where it is not there; the one that was not used for
   /// longest goes for it. Throws what `make` throws, and keeps the others then.
   Encoder& use(EncoderKind kind, const EncoderSettings& settings, const EncoderFactory& make);
+  /// Ends the one used last: it failed, and what it would make next nobody knows.
+  void drop_last() { kept_.erase(kept_.begin()); }
 
   [[nodiscard]] std::size_t size() const { return kept_.size(); }
 

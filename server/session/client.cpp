@@ -159,7 +159,8 @@ std::uint32_t Client::session_count() { return registry_.admitted_; }
 void Client::sign(Welcome& welcome) {
   const std::string& scene_id = welcome.scene.scene_id;
   const SessionTokens& tokens = registry_.tokens_;
-  welcome.resume_token = tokens.resume_token(session_.id(), scene_id, unix_now_s());
+  welcome.resume_token =
+      tokens.resume_token(session_.id(), scene_id, registry_.options_.wall_clock_s());
   const bool shareable =
       registry_.options_.max_spectators > 0 && !registry_.authorize_(token_, scene_id, Use::watch);
   if (shareable) welcome.watch_token = tokens.watch_token(session_.id());
@@ -219,6 +220,9 @@ void Client::open_stream(StreamSettings settings) {
   settings.seat = encoder_.seat;
   executor_->open(stream_, std::move(settings),
                   on_session_thread<StreamOpened>([](Client& client, const StreamOpened& opened) {
+                    if (!opened.ok) client.registry_.metrics_.streams_failed.Increment();
+                    if (opened.fault == Fault::device_failed)
+                      client.registry_.on_view_refused(opened.message);
                     client.session_.on_stream_opened(opened, Clock::now());
                   }));
 }
@@ -226,12 +230,22 @@ void Client::open_stream(StreamSettings settings) {
 std::optional<EncoderChoice> Client::other_encoder() {
   const std::string refused = encoder_.encoder.text;
   auto other = registry_.encoders_.replace(encoder_, decoders_, Clock::now());
-  registry_.metrics_.encoders_refused.Increment();
+  if (encoder_.encoder.kind == EncoderKind::nvenc) registry_.metrics_.encoders_refused.Increment();
+  if (!other) return std::nullopt;  // the session says why it ends
   const LogSession about(session_.id());
-  spdlog::warn("{} opens no more: {}", refused, other ? other->encoder.text : "nothing is left");
-  if (!other) return std::nullopt;
+  spdlog::warn("{} serves no more: {}", refused, other->encoder.text);
   encoder_ = *std::move(other);
   return encoder_.encoder;
+}
+
+void Client::note_fault(const FrameResult& result) {
+  if (!result.ok) {
+    const LogSession about(session_.id());
+    spdlog::warn("a frame failed: {}", result.message);
+  }
+  const bool failed = result.fault == Fault::device_failed;
+  const bool rendered = result.ok && !result.frame.ticket.refined;
+  if (failed || rendered) registry_.on_device(failed);
 }
 
 void Client::start_frame(const FrameCandidate& candidate, TimePoint now) {
@@ -247,6 +261,7 @@ void Client::start_frame(const FrameCandidate& candidate, TimePoint now) {
       std::move(job),
       on_session_thread<FrameResult>([candidate](Client& client, FrameResult result) {
         client.registry_.scheduler_.frame_ended(candidate);
+        client.note_fault(result);
         Metrics& metrics = client.registry_.metrics_;
         (result.ok
              ? (result.frame.ticket.refined ? metrics.frames_refined : metrics.frames_rendered)

@@ -240,7 +240,7 @@ void Session::describe_encoding() {
 void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   opening_stream_ = false;
   if (state_ == State::closed) return;
-  if (opened.encoder_unavailable) {
+  if (opened.fault == Fault::encoder_unavailable) {
     if (auto other = host_.other_encoder()) {
       admission_.encoder = *std::move(other);
       return request_stream();

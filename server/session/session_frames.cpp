@@ -155,19 +155,24 @@ void Session::on_frame(FrameResult result, TimePoint now) {
 void Session::on_failed_frame(const FrameResult& result) {
   shown_.reset();
   idr_.missed();
-  if (result.frame.ticket.still && encoded_as_ && encoded_as_->size_px != encoding_.size_px) {
+  const Fault fault = result.fault;
+  const bool of_larger_still =
+      result.frame.ticket.still && encoded_as_ && encoded_as_->size_px != encoding_.size_px;
+  if (of_larger_still && fault != Fault::device_failed) {
     stills_fail_ = true;  // no memory for so large a picture, no level of the encoder: as in motion
     return;
   }
-  if (result.encoder_unavailable) {
+  if (fault == Fault::encoder_unavailable || fault == Fault::encoder_failed) {
     if (auto other = host_.other_encoder()) {
       admission_.encoder = *std::move(other);
       return request_stream();
     }
-    return fail(ErrorCode::internal, "the stream cannot be opened: " + result.message);
+    if (fault == Fault::encoder_unavailable)
+      return fail(ErrorCode::internal, "the stream cannot be opened: " + result.message);
   }
   if (++failures_ >= max_failures_in_a_row)
-    fail(ErrorCode::render_failed, "rendering failed: " + result.message);
+    return fail(ErrorCode::render_failed, "frames fail: " + result.message);
+  if (fault == Fault::device_failed) request_stream();  // perhaps on another device
 }
 
 /// Before the first frame that it describes, which is an IDR.

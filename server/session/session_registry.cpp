@@ -93,7 +93,7 @@ void SessionRegistry::forget_connection(const std::string& address) {
 void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_ptr<Client> newcomer,
                                Hello hello, TimePoint now) {
   if (!hello.watch_token.empty()) return watch(peer, *newcomer, hello);
-  const auto resumed = tokens_.read_resume_token(hello.resume_token, unix_now_s());
+  const auto resumed = tokens_.read_resume_token(hello.resume_token, options_.wall_clock_s());
   if (resumed && hello.version >= wire::version) {
     if (hello.scene_id.empty()) hello.scene_id = resumed->scene_id;
     if (const auto known = find(resumed->session_id)) {
@@ -187,6 +187,11 @@ void SessionRegistry::admit_waiting(TimePoint now) {
       if (const auto position = queue_.join(client->session().id()); position > 1)
         client->session().on_queue_moved(
             {*position, queue_.estimate(*position, static_cast<int>(admitted_))}, now);
+}
+
+/// Once may be chance, as a driver that is just being reset; without a frame in between it is none.
+void SessionRegistry::on_view_refused(const std::string& why) {
+  if (++device_failures_ > 1) options_.on_devices_lost(why);
 }
 
 std::shared_ptr<Client> SessionRegistry::find(std::string_view session_id) const {

@@ -26,6 +26,9 @@
 
 namespace catgs {
 
+/// Of the wall clock, as tokens have it.
+std::int64_t unix_now_s();
+
 struct RegistryOptions {
   SessionPolicy policy;
   int max_sessions = 16;
@@ -38,10 +41,10 @@ struct RegistryOptions {
   int max_queue = 64;                 // clients that wait for a place
   int max_spectators = 16;            // of one session
   int max_greeting = 64;              // connections beyond: their hello is to come, or was refused
+  std::function<std::int64_t()> wall_clock_s = unix_now_s;  // for tokens; may be set, back too
+  /// No device makes Views any more, and frames failed before: only a new process may help.
+  std::function<void(const std::string& why)> on_devices_lost = [](const auto&) {};
 };
-
-/// Of the wall clock, as tokens have it.
-std::int64_t unix_now_s();
 
 /// Every session of the server, and the loop that gives them frames. All but accept() and
 /// published_json() run on the thread of the io_context (the session thread): sessions need no
@@ -93,6 +96,10 @@ class SessionRegistry {
   /// Gives one session another encoder effort, where what is measured asks for it.
   void control_effort(TimePoint now);
   void remove(const Client& client);
+  /// A frame was rendered, or its device failed.
+  void on_device(bool failed) { device_failures_ = failed ? device_failures_ + 1 : 0; }
+  /// Each device has failed to make a View. Memory that is short is another matter.
+  void on_view_refused(const std::string& why);
   /// Those next in the queue ask again; the others hear where they stand.
   void admit_waiting(TimePoint now);
   [[nodiscard]] std::shared_ptr<Client> find(std::string_view session_id) const;
@@ -123,6 +130,7 @@ class SessionRegistry {
   int connections_ = 0;
   std::unordered_map<std::string, int> connections_by_address_;
   std::uint32_t admitted_ = 0;
+  int device_failures_ = 0;  // since a frame was rendered
   const AdmissionBudget budget_;
   EffortControl effort_;
   AdmissionQueue queue_;

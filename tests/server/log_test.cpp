@@ -5,10 +5,12 @@
 #include <sstream>
 #include <thread>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "server/session/log_session.h"
 
@@ -89,6 +91,47 @@ TEST(Log, TellsHowManyLinesItLeftOut) {
   EXPECT_THAT(bounded.back(), EndsWith("last"));
   EXPECT_THAT(bounded, Contains(HasSubstr("lines were left out")));
   EXPECT_EQ(lines_of("human", "debug", flood).size(), 20'001u);
+}
+
+/// Standard error is `descriptor` while `log` logs.
+void with_standard_error(int descriptor, const std::function<void()>& log) {
+  const int kept = ::dup(STDERR_FILENO);
+  ::dup2(descriptor, STDERR_FILENO);
+  log();
+  ::dup2(kept, STDERR_FILENO);
+  ::close(kept);
+}
+
+TEST(Log, AFullDiskLosesLinesAndSaysSo) {
+  const int full = ::open("/dev/full", O_WRONLY);
+  ASSERT_GE(full, 0);
+  const std::uint64_t lost_before = log_lines_lost();
+  const auto all = lines_of("json", "info", [&] {
+    with_standard_error(full, [] {
+      for (int i = 0; i < 3; ++i) spdlog::info("while the disk is full");
+    });
+    spdlog::info("room again");
+  });
+  ::close(full);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_THAT(all[0], HasSubstr("3 lines were lost"));
+  EXPECT_THAT(all[1], HasSubstr("room again"));
+  EXPECT_EQ(log_lines_lost() - lost_before, 3u);
+}
+
+TEST(Log, APipeThatNobodyReadsHoldsNobodyUp) {
+  int pipe[2];
+  ASSERT_EQ(::pipe(pipe), 0);
+  const std::uint64_t lost_before = log_lines_lost();
+  const std::string line(1000, '.');
+  lines_of("human", "debug", [&] {
+    with_standard_error(pipe[1], [&] {
+      for (int i = 0; i < 1000; ++i) spdlog::info(line);  // of which a pipe takes 64 KiB
+    });
+  });
+  EXPECT_GT(log_lines_lost() - lost_before, 800u);
+  ::close(pipe[0]);
+  ::close(pipe[1]);
 }
 
 }  // namespace

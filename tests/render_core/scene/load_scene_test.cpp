@@ -37,6 +37,22 @@ TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.ply.part"));
 }
 
+TEST_F(LoadScene, AFileThatIsCutOffWhileItIsReadIsRefused) {
+  const auto cut_off_at_the_first_piece = [&](const std::filesystem::path& path) {
+    LoadOptions options;
+    options.threads = 1;
+    options.progress = [&](double) { std::filesystem::resize_file(path, 1000); };
+    return input_error([&] { load_scene(path, options); });
+  };
+  const GaussianCloud cloud = random_cloud(200'000, 0);
+  for (const auto& path : {folder_ / "room.ply", folder_ / "room.splat"}) {
+    save_scene(cloud, path);
+    EXPECT_THAT(cut_off_at_the_first_piece(path),
+                AllOf(HasSubstr(path.filename().string()), HasSubstr("byte "),
+                      HasSubstr("the file became shorter while it was read")));
+  }
+}
+
 TEST_F(LoadScene, NamesAreUtf8WhateverTheFileIsCalled) {
   save_scene(random_cloud(10, 0), folder_ / "caf\xe9\xff.ply");
   EXPECT_EQ(load_scene(folder_ / "caf\xe9\xff.ply").name, "caf\ufffd\ufffd");

@@ -1,10 +1,13 @@
 // Integration: the program in a process of its own, and signals.
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +16,7 @@
 #include <unistd.h>
 
 #include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
 namespace {
@@ -22,23 +26,28 @@ using testing::HasSubstr;
 /// catgs-server on a port of the system's choice, serving synth:city. Its end kills it.
 class Program {
  public:
-  Program() {
+  /// Waits until the log says `until`. A later argument wins.
+  explicit Program(const std::vector<std::string>& more = {}, const std::string& until = "Ctrl-C") {
+    std::vector<std::string> words = {"catgs-server", "--port",       "0", "--admin-bind",
+                                      "off",          "--drain-wait", "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    if (std::ranges::count(more, "--scene") == 0)
+      words.insert(words.end(), {"--scene", "synth:city:2000"});
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
     int log_pipe[2];
     if (::pipe(log_pipe) != 0) throw std::runtime_error("no pipe");
     pid_ = ::fork();
     if (pid_ < 0) throw std::runtime_error("no process");
     if (pid_ == 0) {
       ::dup2(log_pipe[1], STDERR_FILENO);
-      ::execl(CATGS_SERVER_PROGRAM, "catgs-server", "--scene", "synth:city:2000", "--port", "0",
-              "--admin-bind", "off", "--drain-wait", "1", static_cast<char*>(nullptr));
+      ::execv(CATGS_SERVER_PROGRAM, arguments.data());
       ::_exit(127);
     }
     ::close(log_pipe[1]);
     log_end_ = log_pipe[0];
-    char buffer[512];
-    for (ssize_t n; log_.find("Ctrl-C") == std::string::npos &&
-                    (n = ::read(log_end_, buffer, sizeof buffer)) > 0;)
-      log_.append(buffer, static_cast<std::size_t>(n));
+    read_log(until);
   }
   ~Program() {
     if (pid_ > 0) {
@@ -50,7 +59,14 @@ class Program {
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
-  /// What it said until it was ready.
+  /// Until the log says this, or the process has ended.
+  void read_log(const std::string& until) {
+    char buffer[512];
+    for (ssize_t n; log_.find(until) == std::string::npos &&
+                    (n = ::read(log_end_, buffer, sizeof buffer)) > 0;)
+      log_.append(buffer, static_cast<std::size_t>(n));
+  }
+  /// What was read of it.
   [[nodiscard]] const std::string& log() const { return log_; }
   [[nodiscard]] int port() const {
     const std::string host = "http://127.0.0.1:";
@@ -62,6 +78,11 @@ class Program {
     int status = 0;
     ::waitpid(std::exchange(pid_, -1), &status, 0);
     return status;
+  }
+  /// Its exit status; -1 where a signal ended it.
+  int exit_status() {
+    const int status = wait();
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
  private:
@@ -79,9 +100,64 @@ TEST(ServerProgram, EndsCleanlyOnSigterm) {
   while (http_get(program.port(), "/readyz").status != 503)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(http_get(program.port(), "/healthz").status, 200) << "proxies see it go";
-  const int status = program.wait();
-  EXPECT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(program.exit_status(), 0);
+}
+
+TEST(ServerProgram, EndsCleanlyOnSigtermWhileItLoads) {
+  Program program({"--scene", "synth:city:1000000"}, "loading synth:city:1000000");
+  program.signal(SIGTERM);
+  program.read_log("stopped while scenes were loading");
+  EXPECT_THAT(program.log(), HasSubstr("stopped while scenes were loading"));
+  EXPECT_EQ(program.exit_status(), 0);
+}
+
+TEST(ServerProgram, ASecondSigtermEndsTheDrainAtOnce) {
+  Program program({"--drain-wait", "600"});
+  WireClient client(program.port());
+  client.greet();
+  program.signal(SIGTERM);
+  while (http_get(program.port(), "/readyz").status != 503)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.exit_status(), 1) << "somebody did not want to wait: visitors were cut off";
+}
+
+/// Settings with which a later process knows the tokens of an earlier one.
+std::vector<std::string> with_key(const TemporaryFolder& folder) {
+  return {"--resume-key-file", folder.write("key", "0123456789abcdef0123456789abcdef\n").string(),
+          "--drain-deadline", "1"};
+}
+
+TEST(ServerProgram, SessionsResumeAfterSigtermAndRestart) {
+  const TemporaryFolder folder;
+  auto program = std::make_unique<Program>(with_key(folder));
+  WireClient client(program->port());
+  const v1::Welcome welcome = client.greet();
+  program->signal(SIGTERM);
+  client.receive_message(v1::ServerMessage::kDrain);
+  EXPECT_EQ(client.receive_until_closed().close_code, 1001) << "it stayed until the deadline";
+  EXPECT_EQ(program->exit_status(), 0);
+  program = std::make_unique<Program>(with_key(folder));
+  WireClient again(program->port());
+  EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 7)).session_id(),
+            welcome.session_id());
+  EXPECT_EQ(again.receive_frame().header.pose_id(), 7u);
+}
+
+TEST(ServerProgram, SessionsResumeAfterItWasKilled) {
+  const TemporaryFolder folder;
+  auto program = std::make_unique<Program>(with_key(folder));
+  WireClient client(program->port());
+  const v1::Welcome welcome = client.greet();
+  client.send_pose(1);
+  client.receive_frame();
+  program->signal(SIGKILL);
+  EXPECT_EQ(program->exit_status(), -1);
+  program = std::make_unique<Program>(with_key(folder));
+  WireClient again(program->port());
+  EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 2)).session_id(),
+            welcome.session_id());
+  EXPECT_EQ(again.receive_frame().header.pose_id(), 2u);
 }
 
 TEST(ServerProgram, SessionsGoOnAfterItWasStopped) {

@@ -111,7 +111,7 @@ TEST(PoolExecutor, AnEncoderThatCannotBeOpenedIsTold) {
   executor.open(stream, {}, [&](StreamOpened opened) { done.set_value(std::move(opened)); });
   const StreamOpened opened = done.get_future().get();
   EXPECT_FALSE(opened.ok);
-  EXPECT_TRUE(opened.encoder_unavailable);
+  EXPECT_EQ(opened.fault, Fault::encoder_unavailable);
   EXPECT_EQ(opened.message, "no session left");
   executor.close(std::move(stream));
 }
@@ -129,7 +129,7 @@ TEST(PoolExecutor, AFrameWhoseEncoderCannotBeOpenedIsTold) {
   executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
   const FrameResult result = done.get_future().get();
   EXPECT_FALSE(result.ok);
-  EXPECT_TRUE(result.encoder_unavailable);
+  EXPECT_EQ(result.fault, Fault::encoder_unavailable);
   EXPECT_EQ(result.message, "no session left");
 }
 

@@ -194,6 +194,30 @@ TEST_F(SessionLife, AHiddenPageThatComesBackIsAskedAnew) {
   EXPECT_FALSE(session.paused());
 }
 
+TEST_F(SessionLife, TheClientsClockMayJump) {
+  greet();
+  constexpr std::int64_t hour_us = 3'600'000'000;
+  std::uint64_t id = 0;
+  for (const std::int64_t jump_us : {std::int64_t{0}, -hour_us, 2 * hour_us, -100 * hour_us}) {
+    for (int step = 0; step < 30; ++step) {
+      now += 17ms;
+      PoseSample sample;
+      sample.pose_id = ++id;
+      sample.client_time_us = 10 * hour_us + jump_us + 17'000 * step;
+      sample.world_from_camera.position.x = 0.01f * static_cast<float>(id);
+      sample.fov_y_rad = 1.0f;
+      session.on_message(sample, now);
+      ASSERT_TRUE(frame_is_due()) << jump_us;
+      const FrameOrder order = run_frame();
+      EXPECT_EQ(order.ticket.pose_id, id);
+      EXPECT_NEAR(order.ticket.render_pose.position.x, sample.world_from_camera.position.x, 0.1f)
+          << "no forecast crosses the jump";
+      ack(order.ticket.frame_id);
+    }
+  }
+  EXPECT_FALSE(host.closed);
+}
+
 TEST_F(SessionLife, GoesOnWhileTheServerDrains) {
   greet();
   pose(1, 0.0f);

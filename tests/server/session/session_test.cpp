@@ -277,7 +277,7 @@ TEST_F(SessionTest, GoesOnWithAnotherEncoderWhereTheDriverOpensNoMore) {
   hello.viewport_px = {640, 360};
   session.on_message(hello, now);
   StreamOpened refused;
-  refused.encoder_unavailable = true;
+  refused.fault = Fault::encoder_unavailable;
   session.on_stream_opened(refused, now);
   ASSERT_EQ(host.opened.size(), 2u);
   EXPECT_EQ(host.opened[1].encoder, EncoderKind::x264);
@@ -289,7 +289,7 @@ TEST_F(SessionTest, GoesOnWithAnotherEncoderWhereTheDriverOpensNoMore) {
   const FrameOrder order = session.start_frame(now);
   FrameResult failed;
   failed.frame.ticket = order.ticket;
-  failed.encoder_unavailable = true;
+  failed.fault = Fault::encoder_unavailable;
   failed.message = "no memory";
   session.on_frame(std::move(failed), now);
   EXPECT_EQ(host.last_error().code, ErrorCode::internal) << "nothing is left";

@@ -125,7 +125,7 @@ TEST_F(StillTest, WhatCannotBeMadeSoLargeStaysAsInMotion) {
   ASSERT_TRUE(frame_is_due());
   FrameResult failed;
   failed.frame.ticket = session.start_frame(now).ticket;
-  failed.encoder_unavailable = true;
+  failed.fault = Fault::encoder_unavailable;
   session.on_frame(std::move(failed), now);
   EXPECT_FALSE(host.closed);
   now += 300ms;

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+#include "render_core/renderer.h"
+
+namespace catgs {
+
+/// A device refused or failed, thrown where things are set up; on the frame path RenderStatus says
+/// the same. After out_of_memory the device serves others; after device_failed it may be lost until
+/// the process ends.
+class DeviceError : public std::runtime_error {
+ public:
+  DeviceError(RenderStatus::Code code, const std::string& message)
+      : std::runtime_error(message), code_(code) {}
+
+  [[nodiscard]] RenderStatus::Code status_code() const { return code_; }
+
+ private:
+  RenderStatus::Code code_;
+};
+
+}  // namespace catgs

@@ -1,0 +1,108 @@
+// Integration: a whole server under which something fails.
+
+#include <atomic>
+#include <future>
+#include <utility>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include "server/log.h"
+#include "server/schedule/frame_executor.h"
+#include "tests/support/server_client.h"
+
+namespace catgs::test {
+namespace {
+
+using testing::HasSubstr;
+
+/// What a GPU does after a kernel error: nothing, and it says so.
+class FailingExecutor final : public FrameExecutor {
+ public:
+  FailingExecutor(std::shared_ptr<FrameExecutor> working, const std::atomic<bool>& fails)
+      : working_(std::move(working)), fails_(fails) {}
+  [[nodiscard]] int slots() const override { return working_->slots(); }
+  void open(std::shared_ptr<Stream> stream, StreamSettings settings,
+            std::function<void(StreamOpened)> done) override {
+    if (!fails_) return working_->open(std::move(stream), std::move(settings), std::move(done));
+    StreamOpened refused;
+    refused.fault = Fault::device_failed;
+    refused.message = "stream: an illegal memory access was encountered";
+    done(std::move(refused));
+  }
+  void submit(FrameJob job, std::function<void(FrameResult)> done) override {
+    if (!fails_) return working_->submit(std::move(job), std::move(done));
+    FrameResult failed;
+    failed.frame.ticket = job.ticket;
+    failed.fault = Fault::device_failed;
+    failed.message = "blend: an illegal memory access was encountered";
+    done(std::move(failed));
+  }
+  void close(std::shared_ptr<Stream> stream) override { working_->close(std::move(stream)); }
+
+ private:
+  const std::shared_ptr<FrameExecutor> working_;
+  const std::atomic<bool>& fails_;
+};
+
+TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
+  std::atomic<bool> fails{false};
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "off";
+  config.threads = 2;
+  Server server(config, [&](std::shared_ptr<FrameExecutor> executor) {
+    return std::make_shared<FailingExecutor>(std::move(executor), fails);
+  });
+  auto ended = std::async(std::launch::async, [&] { server.run(); });
+  WireClient looks(server.port());
+  looks.greet();
+  looks.send_pose(1);
+  looks.send_ack(looks.receive_frame().header.frame_id());
+  WireClient stands(server.port());
+  stands.greet();
+  fails = true;
+  looks.send_pose(2, 1.0f);
+  std::optional<v1::Error> error;
+  EXPECT_EQ(looks.receive_until_closed(&error).close_code, 1013);
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code(), v1::Error::INTERNAL) << "its page comes again, to whom serves then";
+  EXPECT_GT(stands.receive_message(v1::ServerMessage::kDrain).drain().deadline_ms(), 0u);
+  try {
+    ended.get();
+    FAIL() << "run() returned as if somebody had asked for it";
+  } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
+    EXPECT_THAT(failure.what(), HasSubstr("no device renders any more: stream: an illegal memory"));
+  }
+}
+
+TEST(ServerFaults, ServesWhileTheDiskOfTheLogIsFull) {
+  const int full = ::open("/dev/full", O_WRONLY);
+  ASSERT_GE(full, 0);
+  const int kept = ::dup(STDERR_FILENO);
+  const auto logger = spdlog::default_logger();
+  ::dup2(full, STDERR_FILENO);
+  set_up_log("json", "info");
+  {
+    RunningServer server;
+    WireClient client(server.port());
+    client.greet();
+    client.send_pose(1);
+    client.receive_frame();
+    const std::string metrics = http_get(server.admin_port(), "/metrics").body;
+    EXPECT_THAT(metrics, HasSubstr("\ncatgs_log_lines_lost_total "));
+    EXPECT_EQ(metrics.find("\ncatgs_log_lines_lost_total 0\n"), std::string::npos);
+  }
+  spdlog::drop("catgs-server");
+  spdlog::set_default_logger(logger);
+  ::dup2(kept, STDERR_FILENO);
+  ::close(kept);
+  ::close(full);
+}
+
+}  // namespace
+}  // namespace catgs::test
