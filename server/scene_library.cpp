@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "render_core/scene/json_field.h"
 #include "render_core/thread_pool.h"
@@ -55,6 +56,9 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
       residency_(residency_limits(config)) {
   for (auto& entry : load_scenes(config_, core_)) pin(std::move(entry));
   if (!config_.scene_folders.empty()) open_folders();
+  // A later scene that no GPU takes is refused: the processors have the encoding of all to do.
+  const bool on_gpus = core_.devices && !core_.devices->views().empty();
+  if (core_.kind == RendererKind::automatic && on_gpus) core_.kind = RendererKind::cuda;
   publish();
 }
 

@@ -93,7 +93,7 @@ class SceneLibrary final : public SceneSource {
   void publish();
 
   const ServerConfig config_;
-  const RendererOptions core_;
+  RendererOptions core_;  // of scenes to come; settled once the first ones are in memory
   boost::asio::io_context& io_;
   Metrics& metrics_;
   SceneFolders folders_;  // on the loader's thread, once the constructor is through

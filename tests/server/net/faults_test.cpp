@@ -4,15 +4,24 @@
 #include <future>
 #include <utility>
 
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "render_core/cuda/cuda_renderer.h"
+#include "render_core/device_set.h"
+#include "render_core/scene/save_scene.h"
+#include "render_core/thread_pool.h"
 #include "server/log.h"
+#include "server/scene_library.h"
 #include "server/schedule/frame_executor.h"
+#include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
 namespace {
@@ -78,6 +87,31 @@ TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
     EXPECT_THAT(failure.what(), HasSubstr("no device renders any more: stream: an illegal memory"));
   }
+}
+
+TEST(ServerFaults, ASceneThatNoGpuTakesIsNotLeftToTheProcessors) {
+  if (cuda_obstacle().empty()) GTEST_SKIP() << "a GPU is here, and would take it";
+  const TemporaryFolder folder;
+  save_scene(random_cloud(100, 0), folder / "attic.ply");
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.scene_folders = {folder.path()};
+  const auto devices = std::make_shared<DeviceSet>(std::vector<int>{});
+  devices->add(0);  // as the CUDA core does that renders the first scene
+  boost::asio::io_context io;
+  const auto waits = boost::asio::make_work_guard(io);
+  Metrics metrics;
+  SceneLibrary library(config,
+                       {RendererKind::automatic, std::make_shared<ThreadPool>(1), "auto", devices},
+                       io, metrics);
+  const auto answer = library.want("attic", Clock::now());
+  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(answer));
+  const TimePoint end = Clock::now() + std::chrono::seconds(20);  // a bound against hanging
+  while (metrics.scene_loads_failed.Value() == 0 && Clock::now() < end)
+    io.run_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(metrics.scene_loads_failed.Value(), 1.0);
+  EXPECT_EQ(metrics.scenes_loaded.Value(), 0.0);
+  EXPECT_TRUE(std::holds_alternative<ErrorMessage>(library.want("attic", Clock::now())));
 }
 
 TEST(ServerFaults, ServesWhileTheDiskOfTheLogIsFull) {
