@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include "render_core/build_info.h"
 #include "render_core/command_line.h"
@@ -24,6 +25,14 @@ namespace {
 constexpr int exit_ok = 0;
 constexpr int exit_failure = 1;
 constexpr int exit_usage = 2;
+
+/// Large blocks (scenes, pictures, encoders' buffers) are mappings of their own, which go back to
+/// the system when they are freed. Left to itself, glibc raises the bound to the largest block that
+/// was ever freed, and what visitors needed then stays with the process, between small blocks.
+void return_large_blocks() {
+  constexpr int bound_bytes = 256 * 1024;
+  ::mallopt(M_MMAP_THRESHOLD, bound_bytes);
+}
 
 /// Flags as they were given, by setting name; applied after the file and the environment.
 struct CommandLine {
@@ -85,6 +94,7 @@ int serve(const CommandLine& line) {
 }
 
 int run(int argc, char** argv) {
+  return_large_blocks();
   CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
   app.set_version_flag("--version", build_version);
   app.failure_message([](const CLI::App*, const CLI::Error& error) {
