@@ -8,11 +8,16 @@
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+#include <google/protobuf/stubs/logging.h>
 
 #include "proto/catgs.pb.h"
 
 namespace catgs::wire {
 namespace {
+
+// Protobuf prints a line of its own for each text that is not UTF-8: beside our log, without its
+// bounds, as often as a stranger likes.
+[[maybe_unused]] auto* const former_log_handler = google::protobuf::SetLogHandler(nullptr);
 
 /// Positions beyond this are no place in a scene, and their squares overflow a float's precision.
 constexpr float max_coordinate = 1.0e9f;

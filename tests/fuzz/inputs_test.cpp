@@ -1,15 +1,48 @@
-// What fuzzing has found stays mended, and every seed is one that its parser accepts.
-#include <algorithm>
+// What fuzzing has found stays mended, what it has reached is reached, and mutants of all that
+// break nothing: without libFuzzer, with every compiler and sanitizer of ours.
+#include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include "tests/fuzz/corpus.h"
+#include "tests/fuzz/mutate.h"
 #include "tests/fuzz/target.h"
 
 namespace catgs::fuzz {
 namespace {
+
+namespace fs = std::filesystem;
+
+enum class Verdict { accepted, refused };
+
+/// Anything but an acceptance or an InputError that says something is a failure.
+Verdict parse(const Target& target, const std::string& input) {
+  try {
+    target.parse(bytes_of(input));
+    return Verdict::accepted;
+  } catch (const InputError& refused) {
+    EXPECT_STRNE(refused.what(), "");
+  } catch (const std::exception& error) {
+    ADD_FAILURE() << error.what();
+  }
+  return Verdict::refused;
+}
+
+std::vector<std::string> corpus_of(const Target& target) {
+  return read_corpus(fs::path(CATGS_FUZZ_CORPUS) / (target.name + ".tar.gz"));
+}
+
+/// How long each target gets mutants: a moment, or what fuzz.smoke says.
+std::chrono::duration<double> patience() {
+  const char* seconds = std::getenv("CATGS_FUZZ_SECONDS");
+  return std::chrono::duration<double>(seconds ? std::atof(seconds) : 0.1);
+}
 
 class FuzzInputs : public testing::TestWithParam<Target> {};
 
@@ -22,24 +55,49 @@ TEST_P(FuzzInputs, SeedsAreAccepted) {
   }
 }
 
+TEST_P(FuzzInputs, CorpusIsAcceptedOrRefused) {
+  int accepted = 0;
+  int refused = 0;
+  for (const std::string& input : corpus_of(GetParam()))
+    (parse(GetParam(), input) == Verdict::accepted ? accepted : refused) += 1;
+  EXPECT_GT(accepted, 0);
+  EXPECT_GT(refused, 0);
+}
+
+TEST_P(FuzzInputs, MutantsAreAcceptedOrRefused) {
+  const Target& target = GetParam();
+  std::vector<std::string> inputs = corpus_of(target);
+  for (const auto& [name, bytes] : target.seeds()) inputs.push_back(bytes);
+  // fuzz.smoke may run at the same time.
+  const std::string found = fmt::format(CATGS_FUZZ_FOUND "/{}.{}", target.name, ::getpid());
+  KeptInput kept(found);
+  std::mt19937_64 random(1);
+  int tried = 0;
+  const auto end = std::chrono::steady_clock::now() + patience();
+  do {
+    const std::string input = mutant(random, inputs, target.dictionary, target.max_bytes);
+    kept.keep(input);
+    parse(target, input);
+    ++tried;
+  } while (!HasFailure() && std::chrono::steady_clock::now() < end);
+  RecordProperty("mutants", tried);
+  if (!HasFailure()) return;
+  kept.leave();
+  ADD_FAILURE() << "by the input that is left in " << found;
+}
+
 INSTANTIATE_TEST_SUITE_P(Parser, FuzzInputs, testing::ValuesIn(targets()),
                          [](const auto& target) { return target.param.name; });
 
 TEST(FuzzFindings, StayMended) {
   int findings = 0;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(CATGS_FUZZ_FINDINGS)) {
+  for (const auto& entry : fs::recursive_directory_iterator(CATGS_FUZZ_FINDINGS)) {
     if (!entry.is_regular_file()) continue;
     SCOPED_TRACE(entry.path().string());
     ++findings;
     std::ifstream in(entry.path(), std::ios::binary);
     const std::string bytes(std::istreambuf_iterator<char>(in), {});
-    try {
-      target_called(entry.path().parent_path().filename().string()).parse(bytes_of(bytes));
-    } catch (const InputError& refused) {
-      EXPECT_STRNE(refused.what(), "");
-    } catch (const std::exception& error) {
-      ADD_FAILURE() << error.what();
-    }
+    parse(target_called(entry.path().parent_path().filename().string()), bytes);
   }
   EXPECT_GT(findings, 0);
 }

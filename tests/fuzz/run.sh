@@ -7,10 +7,12 @@ usage() {
   cat <<'USAGE'
 usage: tests/fuzz/run.sh SECONDS [TARGET...]
        tests/fuzz/run.sh --until-quiet QUIET_SECONDS [TARGET...]
+       tests/fuzz/run.sh --keep [TARGET...]
 
 The first form gives each target (default: all) an equal part of SECONDS. The second runs them in turn, a
 minute at a time, until each has found no new edge for QUIET_SECONDS of its own time; it can be stopped at
-any time and goes on where it was.
+any time and goes on where it was. The third puts the fewest inputs that reach every edge reached so far
+into tests/fuzz/corpus, where all runs begin, 64 KiB a target at most.
 
 Inputs that reach new code are kept in build/fuzz/runs/TARGET/corpus and used by later runs. What ends a
 parser is left in build/fuzz/runs/TARGET/found: mend it, and put the input into tests/fuzz/findings/TARGET.
@@ -21,6 +23,8 @@ USAGE
 
 readonly build=build/fuzz
 readonly fuzzer=$build/bin/catgs-fuzz
+readonly kept=tests/fuzz/corpus
+readonly kept_bytes=65536 # of one target
 found=0
 
 build_fuzzer() {
@@ -33,6 +37,14 @@ build_fuzzer() {
   nice ninja -C "$build" ${CATGS_FUZZ_JOBS:+-j "$CATGS_FUZZ_JOBS"} catgs-fuzz
 }
 
+# Where runs of a target begin: the seeds of our own writers, and what earlier runs have reached.
+write_seeds() {
+  local target=$1 work=$build/runs/$1
+  mkdir -p "$work/corpus" "$work/found"
+  "$fuzzer" "--target=$target" "--write-seeds=$work"
+  [[ ! -f $kept/$target.tar.gz ]] || tar -C "$work/seeds" -xzf "$kept/$target.tar.gz"
+}
+
 # fuzz TARGET MAX_BYTES SECONDS: one run. `state` of a target: edges, seconds since the last new one,
 # inputs tried, seconds altogether.
 fuzz() {
@@ -40,8 +52,7 @@ fuzz() {
   local edges=0 quiet=0 tried=0 spent=0 begin=$EPOCHSECONDS newest line now
   local -a inputs=("$work/corpus" "$work/seeds")
   [[ ! -d tests/fuzz/findings/$target ]] || inputs+=("tests/fuzz/findings/$target")
-  mkdir -p "$work/corpus" "$work/found"
-  "$fuzzer" "--target=$target" "--write-seeds=$work"
+  write_seeds "$target"
   [[ ! -f $work/state ]] || read -r edges quiet tried spent <"$work/state"
   newest=$((begin - quiet))
   while IFS= read -r line; do
@@ -66,27 +77,49 @@ fuzz() {
   fi
 }
 
+pack() {
+  tar -C "$1" --sort=name --mtime=@0 --owner=0 --group=0 --numeric-owner --mode=644 -cf - . | gzip -9n
+}
+
+# keep TARGET MAX_BYTES: of an archive that is too long the longest inputs are left out.
+keep() {
+  local target=$1 max_bytes=$2 work=$build/runs/$1 longest
+  write_seeds "$target"
+  rm -rf "$work/kept"
+  mkdir -p "$work/kept" "$kept"
+  "$fuzzer" "--target=$target" -set_cover_merge=1 -use_counters=0 -max_len="$max_bytes" -rss_limit_mb=1024 \
+    -malloc_limit_mb=512 -timeout=10 "$work/kept" "$work/corpus" "$work/seeds" >"$work/merge.log" 2>&1
+  while pack "$work/kept" >"$kept/$target.tar.gz" && (($(stat -c %s "$kept/$target.tar.gz") > kept_bytes)); do
+    longest=$(find "$work/kept" -type f -printf '%s %p\n' | sort -n | tail -1)
+    rm "${longest#* }"
+  done
+  printf '%-16s %4d inputs, %6d bytes, of %5d\n' "$target" "$(find "$work/kept" -type f | wc -l)" \
+    "$(stat -c %s "$kept/$target.tar.gz")" "$(find "$work/corpus" -type f | wc -l)"
+}
+
 # Seconds since the last new edge; nothing for a target that has not run.
 quiet_of() { [[ ! -f $build/runs/$1/state ]] || cut -d ' ' -f 2 "$build/runs/$1/state"; }
 
 main() {
-  local until_quiet=0 seconds
+  local mode=share seconds=0
   case ${1:-} in
     -h | --help)
       usage
       exit 0
       ;;
-    --until-quiet)
-      until_quiet=1
+    --until-quiet | --keep)
+      mode=$1
       shift
       ;;
   esac
-  if ! [[ ${1:-} =~ ^[1-9][0-9]*$ ]]; then
-    usage >&2
-    exit 2
+  if [[ $mode != --keep ]]; then
+    if ! [[ ${1:-} =~ ^[1-9][0-9]*$ ]]; then
+      usage >&2
+      exit 2
+    fi
+    seconds=$1
+    shift
   fi
-  seconds=$1
-  shift
   build_fuzzer
   local -A max_bytes=()
   local -a targets=()
@@ -102,7 +135,11 @@ main() {
     fi
     targets+=("$name")
   done
-  if ((!until_quiet)); then
+  if [[ $mode == --keep ]]; then
+    for name in "${targets[@]}"; do keep "$name" "${max_bytes[$name]}"; done
+    return
+  fi
+  if [[ $mode == share ]]; then
     local share=$((seconds / ${#targets[@]}))
     for name in "${targets[@]}"; do fuzz "$name" "${max_bytes[$name]}" $((share > 0 ? share : 1)); done
     return

@@ -262,6 +262,16 @@ v1::ClientMessage good_pick() {
   return message;
 }
 
+TEST(Wire, RefusesTextThatIsNotUtf8AndPrintsNothing) {
+  v1::ClientMessage message;
+  message.mutable_select_scene()->set_scene_id("\xff");
+  const std::string bytes = message.SerializeAsString();
+  testing::internal::CaptureStderr();
+  const auto parsed = wire::parse_client_message(std::as_bytes(std::span(bytes)));
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_TRUE(std::holds_alternative<wire::ParseError>(parsed));
+}
+
 TEST(Wire, ReadsAndChecksPicks) {
   const std::string text = good_pick().SerializeAsString();
   const auto* data = reinterpret_cast<const std::byte*>(text.data());
