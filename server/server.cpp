@@ -299,12 +299,13 @@ Server::Server(const ServerConfig& config, const WrapExecutor& wrap)
     return s.access.refusal(token, scene_id, unix_now_s(), use);
   };
   RegistryOptions options = registry_options(s.config);
-  const auto gpus = static_cast<int>(s.devices->views().size());
-  if (gpus > 0) options.devices = s.devices;
+  PoolExecutor::Pools pools{s.pool};
+  for (const auto& [device, views] : s.devices->views())
+    pools.render.emplace(device, std::make_shared<ThreadPool>(render_threads_per_gpu));
+  if (!pools.render.empty()) options.devices = s.devices;
   options.cpus = s.pool->threads();
   options.on_devices_lost = [&s](const std::string& why) { s.give_up(why); };
-  std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(PoolExecutor::Pools{
-      s.pool, gpus > 0 ? std::make_shared<ThreadPool>(render_threads_per_gpu * gpus) : s.pool});
+  std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(std::move(pools));
   if (wrap) executor = wrap(std::move(executor));
   s.registry = std::make_unique<SessionRegistry>(s.io, std::move(options), std::move(executor),
                                                  *s.scenes, s.encoders, std::move(authorize),

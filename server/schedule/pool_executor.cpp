@@ -125,7 +125,16 @@ PoolExecutor::~PoolExecutor() {
 }
 
 int PoolExecutor::slots() const {
-  return pools_.encode->threads() + (pools_.render == pools_.encode ? 0 : pools_.render->threads());
+  int threads = pools_.encode->threads();
+  for (const auto& [device, pool] : pools_.render) threads += pool->threads();
+  return threads;
+}
+
+/// Where frames of this View are rendered; null: where they are encoded.
+ThreadPool* PoolExecutor::render_pool(const View& view) const {
+  const std::optional<int> device = view.device();
+  const auto found = device ? pools_.render.find(*device) : pools_.render.end();
+  return found == pools_.render.end() ? nullptr : found->second.get();
 }
 
 void PoolExecutor::open(std::shared_ptr<Stream> stream, StreamSettings settings,
@@ -162,15 +171,17 @@ void PoolExecutor::submit(FrameJob job, std::function<void(FrameResult)> done) {
       done(std::move(result));
     }
   };
+  ThreadPool* const encode = pools_.encode.get();
+  ThreadPool* const render = render_pool(*job.stream->view);
   auto work = std::make_shared<Work>(Work{std::move(job), {}, std::move(done)});
-  ThreadPool* const encode = pools_.encode == pools_.render ? nullptr : pools_.encode.get();
-  pools_.render->submit([encode, encoders = encoders_, work = std::move(work)]() mutable {
+  ThreadPool* const first = render ? render : encode;
+  first->submit([encode, first, encoders = encoders_, work = std::move(work)]() mutable {
     const bool rendered = render_now(work->job, work->result);
     const auto finish = [rendered, encoders](Work& w) {
       if (rendered) encode_now(w.job, encoders, w.result);
       w.report();
     };
-    if (!encode || !rendered) return finish(*work);
+    if (first == encode || !rendered) return finish(*work);
     encode->submit([work = std::move(work), finish]() { finish(*work); });
   });
 }

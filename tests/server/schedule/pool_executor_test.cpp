@@ -50,15 +50,17 @@ TEST(PoolExecutor, AStreamEndsElsewhereAndBeforeTheExecutor) {
 /// Says which threads it was drawn and encoded on.
 class WatchedView final : public View {
  public:
-  explicit WatchedView(std::thread::id* on) : on_(on) {}
+  explicit WatchedView(std::thread::id* on, int device = 0) : on_(on), device_(device) {}
   RenderStatus render(const FrameRequest&, FrameView&) noexcept override {
     *on_ = std::this_thread::get_id();
     return {};
   }
   [[nodiscard]] std::size_t memory_bytes() const override { return 0; }
+  [[nodiscard]] std::optional<int> device() const override { return device_; }
 
  private:
   std::thread::id* on_;
+  int device_;
 };
 
 class WatchedEncoder final : public Encoder {
@@ -79,7 +81,7 @@ class WatchedEncoder final : public Encoder {
 
 TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
   std::thread::id rendered_on, encoded_on;
-  PoolExecutor executor({std::make_shared<ThreadPool>(3), std::make_shared<ThreadPool>(2)},
+  PoolExecutor executor({std::make_shared<ThreadPool>(3), {{0, std::make_shared<ThreadPool>(2)}}},
                         [&](EncoderKind, const EncoderSettings&) {
                           return std::make_unique<WatchedEncoder>(&encoded_on);
                         });
@@ -99,8 +101,34 @@ TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
   executor.close(std::move(stream));
 }
 
+TEST(PoolExecutor, NoGpuWaitsForFramesOfAnother) {
+  std::thread::id encoded_on;
+  const auto busy = std::make_shared<ThreadPool>(1);
+  PoolExecutor executor(
+      {std::make_shared<ThreadPool>(1), {{0, busy}, {1, std::make_shared<ThreadPool>(1)}}},
+      [&](EncoderKind, const EncoderSettings&) {
+        return std::make_unique<WatchedEncoder>(&encoded_on);
+      });
+  EXPECT_EQ(executor.slots(), 3);
+  std::promise<void> let_end;
+  busy->submit([may_end = let_end.get_future().share()] { may_end.wait(); });
+  std::thread::id rendered_on[2];
+  std::promise<bool> done[2];
+  for (int device = 0; device < 2; ++device) {
+    FrameJob job;
+    job.stream = std::make_shared<Stream>();
+    job.stream->view = std::make_unique<WatchedView>(&rendered_on[device], device);
+    executor.submit(std::move(job),
+                    [&, device](const FrameResult& result) { done[device].set_value(result.ok); });
+  }
+  EXPECT_TRUE(done[1].get_future().get());  // or this test never ends
+  let_end.set_value();
+  EXPECT_TRUE(done[0].get_future().get());
+  EXPECT_NE(rendered_on[0], rendered_on[1]);
+}
+
 TEST(PoolExecutor, AnEncoderThatCannotBeOpenedIsTold) {
-  PoolExecutor executor({std::make_shared<ThreadPool>(1), std::make_shared<ThreadPool>(1)},
+  PoolExecutor executor({std::make_shared<ThreadPool>(1), {{0, std::make_shared<ThreadPool>(1)}}},
                         [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
                           throw std::runtime_error("no session left");
                         });
@@ -117,7 +145,7 @@ TEST(PoolExecutor, AnEncoderThatCannotBeOpenedIsTold) {
 }
 
 TEST(PoolExecutor, AFrameWhoseEncoderCannotBeOpenedIsTold) {
-  PoolExecutor executor({std::make_shared<ThreadPool>(1), std::make_shared<ThreadPool>(1)},
+  PoolExecutor executor({std::make_shared<ThreadPool>(1), {{0, std::make_shared<ThreadPool>(1)}}},
                         [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
                           throw std::runtime_error("no session left");
                         });

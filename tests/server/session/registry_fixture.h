@@ -174,9 +174,8 @@ class RegistryTest : public testing::Test {
     options.min_fps = 0;
     const auto pool = std::make_shared<ThreadPool>(pool_threads);
     registry.emplace(
-        io, options,
-        std::make_shared<PoolExecutor>(PoolExecutor::Pools{pool, pool}, encoder_factory()), scenes,
-        encoders, [](const auto&, const auto&, Use) { return std::nullopt; },
+        io, options, std::make_shared<PoolExecutor>(PoolExecutor::Pools{pool}, encoder_factory()),
+        scenes, encoders, [](const auto&, const auto&, Use) { return std::nullopt; },
         SessionTokens("a key"), metrics);
   }
   void TearDown() override {
