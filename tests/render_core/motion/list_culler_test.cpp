@@ -70,5 +70,26 @@ TEST_F(ListCullerTest, KeepsWhatSubFramesShow) {
   EXPECT_GT(culled, 10'000);
 }
 
+// Only what is behind the near plane comes in from beside the picture: else clusters all around it
+// would be looked at in vain, more of them the farther the scene reaches.
+TEST_F(ListCullerTest, LeavesOutWhatIsBesideThePicture) {
+  const Camera key = camera_at({});
+  FrameGroups groups{SpeculationSettings{}};
+  const FramePlan plan = groups.plan(
+      key, Forecast{{{0.0f, 0.0f, 0.01f}, glm::quat(1.0f, 0.0f, 0.0f, 0.0f)}, 4}, {2.0f, 0.2f});
+  ASSERT_GT(plan.window, 0);
+  const ListCuller culler(key, plan);
+  const auto outside = [&](float slope_y, float depth) {
+    ClusterBounds bounds;
+    bounds.add(depth * glm::vec3(0.0f, slope_y, 1.0f), 0.01, 0.0f);
+    return culler.outside(bounds.cluster());
+  };
+  for (const float depth : {1.0f, 10.0f, 100.0f}) {
+    EXPECT_FALSE(outside(0.5f, depth)) << depth;  // the picture ends at 0.52, its corners at 1.02
+    EXPECT_TRUE(outside(0.8f, depth)) << depth;
+    EXPECT_TRUE(outside(-0.8f, depth)) << depth;
+  }
+}
+
 }  // namespace
 }  // namespace catgs
