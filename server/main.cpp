@@ -26,12 +26,15 @@ constexpr int exit_ok = 0;
 constexpr int exit_failure = 1;
 constexpr int exit_usage = 2;
 
-/// Large blocks (scenes, pictures, encoders' buffers) are mappings of their own, which go back to
-/// the system when they are freed. Left to itself, glibc raises the bound to the largest block that
-/// was ever freed, and what visitors needed then stays with the process, between small blocks.
+/// Large blocks (scenes, pictures, encoders' buffers: not what is made for each frame) are mappings
+/// of their own, which go back to the system when they are freed. Left to itself, glibc raises the
+/// bound to the largest block that was ever freed, up to 32 MiB, and what visitors needed then
+/// stays with the process, between small blocks. Where one bound is set it no longer adapts the
+/// other, by which the ends of heaps go back: that stays wide enough for what frames allocate and
+/// free.
 void return_large_blocks() {
-  constexpr int bound_bytes = 256 * 1024;
-  ::mallopt(M_MMAP_THRESHOLD, bound_bytes);
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
 }
 
 /// Flags as they were given, by setting name; applied after the file and the environment.

@@ -37,8 +37,10 @@ class ListCuller {
   /// math::may_turn_in() of any Gaussian in the cluster that is behind the near plane: of those
   /// before it the half-spaces tell.
   [[nodiscard]] CATGS_HD bool turns_in(const Cluster& cluster, const End& end) const {
-    constexpr float slack = 1.001f;  // the depths that are asked for are rounded otherwise
-    if (nearest_depth(end, cluster) > slack * near_z_) return false;
+    const float nearest = nearest_depth(end, cluster);
+    const glm::vec3& at = end.position;
+    const float rounding = 1e-5f * (fabsf(at.x) + fabsf(at.y) + fabsf(at.z) + fabsf(nearest));
+    if (nearest > near_z_ + rounding) return false;
     const glm::vec3& half = cluster.half_extent;
     const float radius = sqrtf(half.x * half.x + half.y * half.y + half.z * half.z);
     return math::may_turn_in<float>(growth_, seen_from(end, cluster.centre),

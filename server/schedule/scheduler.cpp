@@ -12,30 +12,39 @@ TimePoint latest_start(const FrameCandidate& candidate) {
 }  // namespace
 
 void FrameScheduler::frame_started(const FrameCandidate& frame) {
+  OnDevice& device = running_on_[frame.device];
   ++running_;
-  if (frame.key) ++key_frames_running_[frame.device];
+  ++device.frames;
+  if (frame.key) ++device.key_frames;
 }
 
 void FrameScheduler::frame_ended(const FrameCandidate& frame) {
+  OnDevice& device = running_on_[frame.device];
   --running_;
-  if (frame.key) --key_frames_running_[frame.device];
+  --device.frames;
+  if (frame.key) --device.key_frames;
 }
 
-bool FrameScheduler::can_wait(const FrameCandidate& candidate, TimePoint now) const {
-  const auto running = key_frames_running_.find(candidate.device);
-  return candidate.key && running != key_frames_running_.end() && running->second > 0 &&
-         latest_start(candidate) > now;
+FrameScheduler::OnDevice FrameScheduler::running_on(std::optional<int> device) const {
+  const auto found = running_on_.find(device);
+  return found == running_on_.end() ? OnDevice{} : found->second;
 }
 
 std::optional<std::size_t> FrameScheduler::choose(std::span<const FrameCandidate> candidates,
                                                   TimePoint now) const {
-  const auto rank = [&](const FrameCandidate& candidate) {
-    return std::pair(can_wait(candidate, now), latest_start(candidate));
-  };
+  using Rank = std::pair<bool, TimePoint>;
   std::optional<std::size_t> best;
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    if (candidates[i].ready <= now && (!best || rank(candidates[i]) < rank(candidates[*best])))
-      best = i;
+  Rank best_rank;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const FrameCandidate& candidate = candidates[i];
+    const OnDevice device = running_on(candidate.device);
+    if (candidate.ready > now || device.frames >= slots_of_device_) continue;
+    const bool can_wait = candidate.key && device.key_frames > 0 && latest_start(candidate) > now;
+    const Rank rank{can_wait, latest_start(candidate)};
+    if (best && best_rank <= rank) continue;
+    best = i;
+    best_rank = rank;
+  }
   return best;
 }
 

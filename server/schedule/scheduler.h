@@ -24,10 +24,13 @@ struct FrameCandidate {
 /// turns: everyone's rate falls and nobody starves. Key frames cost several times a sub-frame, and
 /// sessions that began together need theirs together: while a device renders one, sub-frames go
 /// first there, as long as the next key frame can wait without missing its deadline. No slot stays
-/// empty for it. Pure; not thread-safe.
+/// empty for it. One device takes no more than its share of the slots, or where it cannot keep up
+/// its frames, late as they are, would leave none to the others. Pure; not thread-safe.
 class FrameScheduler {
  public:
-  explicit FrameScheduler(int slots) : slots_(slots) {}
+  /// `devices`: that candidates name.
+  explicit FrameScheduler(int slots, int devices = 1)
+      : slots_(slots), slots_of_device_((slots + devices - 1) / devices) {}
 
   [[nodiscard]] bool has_free_slot() const { return running_ < slots_; }
   void frame_started(const FrameCandidate& frame);
@@ -40,11 +43,17 @@ class FrameScheduler {
                                                   TimePoint now) const;
 
  private:
-  [[nodiscard]] bool can_wait(const FrameCandidate& candidate, TimePoint now) const;
+  struct OnDevice {
+    int frames = 0;
+    int key_frames = 0;
+  };
+
+  [[nodiscard]] OnDevice running_on(std::optional<int> device) const;
 
   int slots_;
+  int slots_of_device_;
   int running_ = 0;
-  std::map<std::optional<int>, int> key_frames_running_;  // by device
+  std::map<std::optional<int>, OnDevice> running_on_;
 };
 
 }  // namespace catgs

@@ -55,7 +55,7 @@ int EffortControl::threads_for(int sessions, glm::ivec2 size_px) const {
 EncoderEffort EffortControl::initial(int sessions, glm::ivec2 size_px) const {
   const double pixels = static_cast<double>(size_px.x) * size_px.y;
   // When many come together, little is known of those who came just before.
-  const bool known = 2 * measured_ >= sessions - 1;
+  const bool known = measured_ > 0 && 2 * measured_ >= sessions - 1;
   const double cost = known ? cpus_per_pixel_ * pixels * (sessions - measured_) / cpus_
                             : usual_cpus_per_pixel * pixels * sessions / cpus_;
   const double before = known ? busy_ : 0.0;
@@ -121,14 +121,15 @@ std::vector<EffortControl::Change> EffortControl::faster(double busy,
   std::ranges::sort(costliest_first, std::ranges::greater(),
                     [&](std::size_t i) { return sessions[i].cpus; });
   std::vector<Change> changes;
-  const std::size_t quarter = (sessions.size() + 3) / 4;
+  const std::size_t most = (sessions.size() + 1) / 2;
   for (const std::size_t i : costliest_first) {
     const Session& session = sessions[i];
     const int preset = session.effort.preset;
     if (preset <= presets_.lowest) continue;
-    const bool late = session.share_of_interval >= too_long && changes.size() < quarter;
+    const bool late = session.share_of_interval >= too_long;
     if (!late && !(relieve && busy > relieved_share)) continue;
     changes.push_back({i, {preset - 1, session.effort.threads}});
+    if (changes.size() == most) break;
     busy -= session.cpus * (1.0 - cost_ratio(preset, preset - 1)) / cpus_;
   }
   return changes;

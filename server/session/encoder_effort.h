@@ -37,18 +37,18 @@ inline constexpr EffortPreset effort_presets[] = {
 
 void apply(const EncoderEffort& effort, EncoderSettings& settings);
 
-/// Chooses the effort of all software encoders by the headroom that is measured, few changes at a
-/// time, since each opens a stream anew, with an IDR.
+/// Chooses the effort of all software encoders by the headroom that is measured. Each change opens
+/// a stream anew, with an IDR: at most half of the sessions at once, and then none for a second.
 /// - Threads: where sessions are fewer than processors, pictures are cut into as many slices, which
 ///   shortens the wait for each; rounded up, as frames of different sessions rarely coincide.
 /// - A newcomer begins with the best preset that leaves three quarters of the processors free, if
 ///   it costs what the others do: more may follow, and a bad start costs them all frames, while a
 ///   better preset can come later.
-/// - The faster preset where processors were busy (60 %, since frames that come together wait
-///   for each other long before all are) for a second and encoding is a good part of that, for as
-///   many sessions as bring them to 50 %, those whose encoders cost the most; or where an encoder
-///   by itself takes most of the time between frames, for a quarter of the sessions at a time.
-///   Where rendering holds frames up, a worse picture would gain next to nothing.
+/// - The faster preset where processors were busy for a second (60 %: frames that come together
+///   wait for each other long before all are) and encoding is a good part of that, for as many
+///   sessions as bring them to 50 %, those whose encoders cost the most; or where an encoder by
+///   itself takes most of the time between frames. Where rendering holds frames up, a worse picture
+///   would gain next to nothing.
 /// - The better one again where 60 % of the processors were free for five seconds and will be with
 ///   its cost, and where it takes at most 40 % of the time between frames. When it has to be taken
 ///   back within half a minute the next try waits twice as long, two minutes at most.

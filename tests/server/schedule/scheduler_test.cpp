@@ -57,6 +57,22 @@ TEST(FrameScheduler, KeyFramesOfADeviceMakeWayForSubFramesWhileTheyCan) {
   EXPECT_EQ(scheduler.choose(std::array{sub, key}, now), 1u);
 }
 
+TEST(FrameScheduler, ADeviceThatCannotKeepUpLeavesTheOthersTheirSlots) {
+  const TimePoint now = TimePoint{} + 1h;
+  FrameScheduler scheduler(5, 2);
+  const FrameCandidate late{now, now - 100ms, 10ms, false, 0};
+  const FrameCandidate punctual{now, now + 16ms, 3ms, false, 1};
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(scheduler.choose(std::array{punctual, late}, now), 1u);
+    scheduler.frame_started(late);
+  }
+  EXPECT_TRUE(scheduler.has_free_slot());
+  EXPECT_EQ(scheduler.choose(std::array{punctual, late}, now), 0u);
+  EXPECT_EQ(scheduler.choose(std::array{late}, now), std::nullopt);
+  scheduler.frame_ended(late);
+  EXPECT_EQ(scheduler.choose(std::array{late}, now), 0u);
+}
+
 /// Sessions on one device in simulated time.
 struct Overload {
   struct Load {
