@@ -28,9 +28,9 @@ struct FrameCandidate {
 /// its frames, late as they are, would leave none to the others. Pure; not thread-safe.
 class FrameScheduler {
  public:
-  /// `devices`: that candidates name.
+  /// `devices`: that candidates name; none, or one: all slots are its own.
   explicit FrameScheduler(int slots, int devices = 1)
-      : slots_(slots), slots_of_device_((slots + devices - 1) / devices) {}
+      : slots_(slots), slots_of_device_(devices > 1 ? (slots + devices - 1) / devices : slots) {}
 
   [[nodiscard]] bool has_free_slot() const { return running_ < slots_; }
   void frame_started(const FrameCandidate& frame);

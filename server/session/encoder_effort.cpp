@@ -83,11 +83,11 @@ std::vector<EffortControl::Change> EffortControl::update(double busy, int admitt
   calm_since_ = since(calm_since_, busy <= calm_share, now);
   if (now - changed_ < settle) return {};
   std::vector<Change> changes;
-  if (const auto recut = with_other_threads(admitted, sessions)) {
-    changes = {*recut};
-  } else if (changes = faster(busy, sessions, now); !changes.empty()) {
+  if (changes = faster(busy, admitted, sessions, now); !changes.empty()) {
     patience_ = now - slowed_ < proof ? std::min<std::chrono::seconds>(2 * patience_, most_patience)
                                       : least_patience;
+  } else if (const auto recut = with_other_threads(admitted, sessions)) {
+    changes = {*recut};
   } else if (calm_since_ != TimePoint{} && now - calm_since_ >= patience_) {
     if (const auto better = slower(busy, sessions)) {
       changes = {*better};
@@ -108,7 +108,7 @@ std::optional<EffortControl::Change> EffortControl::with_other_threads(
   return std::nullopt;
 }
 
-std::vector<EffortControl::Change> EffortControl::faster(double busy,
+std::vector<EffortControl::Change> EffortControl::faster(double busy, int admitted,
                                                          std::span<const Session> sessions,
                                                          TimePoint now) const {
   const double encoding =
@@ -128,7 +128,7 @@ std::vector<EffortControl::Change> EffortControl::faster(double busy,
     if (preset <= presets_.lowest) continue;
     const bool late = session.share_of_interval >= too_long;
     if (!late && !(relieve && busy > relieved_share)) continue;
-    changes.push_back({i, {preset - 1, session.effort.threads}});
+    changes.push_back({i, {preset - 1, threads_for(admitted, session.size_px)}});
     if (changes.size() == most) break;
     busy -= session.cpus * (1.0 - cost_ratio(preset, preset - 1)) / cpus_;
   }

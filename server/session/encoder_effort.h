@@ -35,12 +35,11 @@ struct EffortPreset {
 inline constexpr EffortPreset effort_presets[] = {
     {"ultrafast", 1.0}, {"ultrafast-subpel", 1.4}, {"superfast", 1.9}};
 
-void apply(const EncoderEffort& effort, EncoderSettings& settings);
-
 /// Chooses the effort of all software encoders by the headroom that is measured. Each change opens
 /// a stream anew, with an IDR: at most half of the sessions at once, and then none for a second.
 /// - Threads: where sessions are fewer than processors, pictures are cut into as many slices, which
-///   shortens the wait for each; rounded up, as frames of different sessions rarely coincide.
+///   shortens the wait for each; rounded up, as frames of different sessions rarely coincide. One
+///   stream at a time is cut anew, when nothing more urgent is to be changed.
 /// - A newcomer begins with the best preset that leaves three quarters of the processors free, if
 ///   it costs what the others do: more may follow, and a bad start costs them all frames, while a
 ///   better preset can come later.
@@ -85,8 +84,8 @@ class EffortControl {
   void note_costs(double busy, std::span<const Session> sessions);
   [[nodiscard]] std::optional<Change> with_other_threads(int admitted,
                                                          std::span<const Session> sessions) const;
-  [[nodiscard]] std::vector<Change> faster(double busy, std::span<const Session> sessions,
-                                           TimePoint now) const;
+  [[nodiscard]] std::vector<Change> faster(double busy, int admitted,
+                                           std::span<const Session> sessions, TimePoint now) const;
   [[nodiscard]] std::optional<Change> slower(double busy, std::span<const Session> sessions) const;
 
   static constexpr std::chrono::seconds least_patience{5};
@@ -102,5 +101,7 @@ class EffortControl {
   TimePoint slowed_{};  // when a preset was last made slower
   std::chrono::seconds patience_ = least_patience;
 };
+
+void apply(const EncoderEffort& effort, EncoderSettings& settings);
 
 }  // namespace catgs

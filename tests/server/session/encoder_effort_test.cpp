@@ -97,6 +97,15 @@ TEST_F(EffortControlTest, EncodersThatKeepAllBusyGoFasterUntilTheyFit) {
   EXPECT_EQ(run(10min), 0) << "it does not flap";
 }
 
+TEST_F(EffortControlTest, BusyProcessorsDoNotWaitForStreamsThatAreCutAnew) {
+  for (int come = 0; come < 30; come += 3) add(3, 0.17);  // with more threads than are left for 30
+  ASSERT_NE(sessions[0].effort.threads, 1);
+  run(5s);
+  EXPECT_LE(busy(), 0.55);
+  run(30s);
+  for (const auto& session : sessions) EXPECT_EQ(session.effort.threads, 1);
+}
+
 TEST_F(EffortControlTest, RenderingThatKeepsAllBusyIsNoReasonForAWorsePicture) {
   other_cpus = 14.0;
   add(10, 0.25);
