@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "render_core/error.h"
 #include "render_core/renderer.h"
 
 namespace catgs {
@@ -19,6 +20,13 @@ class DeviceError : public std::runtime_error {
 
  private:
   RenderStatus::Code code_;
+};
+
+/// The wanted CUDA devices cannot be used now: none is found, too old, full, failed, not built for.
+/// Some of that mends without a change of the input.
+class DevicesUnusable : public InputError {
+ public:
+  using InputError::InputError;
 };
 
 }  // namespace catgs

@@ -3,6 +3,7 @@
 
 #include "render_core/cpu/cpu_renderer.h"
 #include "render_core/cuda/cuda_renderer.h"
+#include "render_core/device_error.h"
 #include "render_core/device_set.h"
 #include "render_core/error.h"
 #include "render_core/reference/reference.h"

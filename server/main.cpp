@@ -13,6 +13,7 @@
 
 #include "render_core/build_info.h"
 #include "render_core/command_line.h"
+#include "render_core/device_error.h"
 #include "render_core/error.h"
 #include "server/commands.h"
 #include "server/config.h"
@@ -105,7 +106,9 @@ int run(int argc, char** argv) {
   });
   app.footer(
       "Settings come from defaults, then --config FILE (TOML), then CATGS_<NAME> variables, then\n"
-      "flags. Exit codes: 0 ended as asked, 1 failed, 2 bad usage, scene or configuration.\n"
+      "flags. Exit codes: 0 ended as asked, 1 failed (no GPU can be used, where one has to), 2 "
+      "bad\n"
+      "usage, scene or configuration.\n"
       "Example: catgs-server --scene synth:city:300000");
   CommandLine line;
   add_options(app, line);
@@ -117,6 +120,11 @@ int run(int argc, char** argv) {
     return app.get_subcommands().empty() ? serve(line) : exit_code;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_ok : exit_usage;
+  } catch (const DevicesUnusable& error) {
+    // A fault, even where no GPU is found: one that is lost looks like one that never was, one that
+    // is full empties, and a supervisor that tries again loses nothing.
+    std::cerr << "catgs-server: " << error.what() << '\n';
+    return exit_failure;
   } catch (const InputError& error) {
     std::cerr << "catgs-server: " << error.what() << '\n';
     return exit_usage;

@@ -77,10 +77,9 @@ void SceneLibrary::open_folders() {
   if (wish != SceneResidency::Wish::awaited)
     throw InputError("--scene-memory", {}, refusal(wish, id, book).message);
   residency_.next(now, in_use());
-  Loaded loaded = load(id, book.found);
-  if (!loaded.entry) throw InputError("--scene-folder", {}, loaded.error);
+  auto entry = read(id, book.found);
   default_scene_ = id;
-  on_loaded(id, std::move(loaded), now, Clock::now());
+  on_loaded(id, {std::move(entry), {}}, now, Clock::now());
 }
 
 SceneLibrary::~SceneLibrary() {
@@ -197,16 +196,20 @@ void SceneLibrary::release(const std::string& id) {
   boost::asio::post(loader_, [entry = std::move(entry)]() mutable { entry.reset(); });
 }
 
+std::shared_ptr<const SceneEntry> SceneLibrary::read(const std::string& id,
+                                                     const FoundScene& found) const {
+  // Half of the processors go on with what visitors look at meanwhile.
+  const int threads = std::max(1, core_.pool->threads() / 2);
+  return load_scene(
+      found.path.string(), [&](const auto&) { return id; }, config_, core_, threads,
+      [this](double) {
+        if (stopping_) throw std::runtime_error("the server stops");
+      });
+}
+
 SceneLibrary::Loaded SceneLibrary::load(const std::string& id, const FoundScene& found) const {
   try {
-    // Half of the processors go on with what visitors look at meanwhile.
-    const int threads = std::max(1, core_.pool->threads() / 2);
-    return {load_scene(
-                found.path.string(), [&](const auto&) { return id; }, config_, core_, threads,
-                [this](double) {
-                  if (stopping_) throw std::runtime_error("the server stops");
-                }),
-            {}};
+    return {read(id, found), {}};
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }

@@ -81,6 +81,9 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] SceneResidency::InUse in_use() const;
   void start_next(TimePoint now);
   void release(const std::string& id);
+  [[nodiscard]] std::shared_ptr<const SceneEntry> read(const std::string& id,
+                                                       const FoundScene& found) const;
+  /// read(), with what it throws as `error`.
   Loaded load(const std::string& id, const FoundScene& found) const;
   void on_loaded(const std::string& id, Loaded loaded, TimePoint started, TimePoint now);
   void start_scan(TimePoint now);

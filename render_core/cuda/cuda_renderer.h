@@ -3,22 +3,17 @@
 #include <memory>
 #include <string>
 
+#include "render_core/device_error.h"
 #include "render_core/device_set.h"
-#include "render_core/error.h"
 #include "render_core/renderer.h"
 #include "render_core/thread_pool.h"
 
 namespace catgs {
 
-/// The wanted CUDA devices are there, but cannot be used: too old, full, not built for.
-class DevicesUnusable : public InputError {
- public:
-  using InputError::InputError;
-};
-
 /// The CUDA core, with a copy of the scene on each of `devices`. The reason says which of all
-/// devices were left out. Throws InputError when a wanted device does not exist, DevicesUnusable
-/// when one cannot be used; where all are wanted, when none can. `pool` packs the scene.
+/// devices were left out. Throws InputError when a wanted device is not among those that are there,
+/// or in a build without the core; DevicesUnusable when one cannot be used, and where all are
+/// wanted, when none can. `pool` packs the scene.
 MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
                                 ThreadPool& pool);
 

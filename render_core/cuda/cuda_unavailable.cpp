@@ -1,4 +1,5 @@
 #include "render_core/cuda/cuda_renderer.h"
+#include "render_core/error.h"
 
 // Stands in for the CUDA core in builds without nvcc.
 namespace catgs {
@@ -7,7 +8,7 @@ std::string cuda_obstacle() { return "this build has no CUDA core"; }
 
 MadeRenderer make_cuda_renderer(const GaussianCloud& /*cloud*/,
                                 std::shared_ptr<DeviceSet> /*devices*/, ThreadPool& /*pool*/) {
-  throw DevicesUnusable("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
+  throw InputError("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
 }
 
 }  // namespace catgs

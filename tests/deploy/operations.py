@@ -197,6 +197,13 @@ def drain_seconds(config):
     return sum(int(re.search(rf"^{key} = (\d+)$", config, re.M)[1]) for key in ("drain-wait", "drain-deadline"))
 
 
+def renderer_of(container, config):
+    """The renderer that a container asks for: variables win over the file."""
+    variables = {variable["name"]: variable.get("value") for variable in container.get("env", [])}
+    in_file = re.search(r'^renderer = "(\w+)"$', config, re.M)
+    return variables.get("CATGS_RENDERER", in_file and in_file[1])
+
+
 def check_kubernetes(_):
     kubectl = tool("kubectl")
     findings = []
@@ -220,6 +227,7 @@ def check_kubernetes(_):
             "probes name a port": all(server[p]["httpGet"]["port"] in ports for p in ("startupProbe", "readinessProbe", "livenessProbe")),
             "nobody is without a place in an update": deployment["spec"]["strategy"]["rollingUpdate"] == {"maxSurge": 1, "maxUnavailable": 0},
             "a GPU where one is meant": ("nvidia.com/gpu" in server["resources"]["limits"]) == (name != "overlays/cpu"),
+            "the renderer suits, and no other takes its place": renderer_of(server, config["data"]["catgs.toml"]) == ("cpu" if name == "overlays/cpu" else "cuda"),
             "the image suits": server["image"].endswith(":cpu" if name == "overlays/cpu" else ":cuda"),
             "replicas are KEDA's or ours": ("replicas" in deployment["spec"]) == (name != "overlays/keda"),
             "the disruption budget selects the Pods": objects["PodDisruptionBudget", "catgs-server"]["spec"]["selector"]["matchLabels"].items() <= labels.items(),
@@ -247,6 +255,7 @@ def agones_findings(kubectl):
     mounted = {v["configMap"]["name"] for v in spec["volumes"] if "configMap" in v}
     names = {c["name"] for c in spec["containers"]}
     wanted = {
+        "no other renderer takes the GPU's place": renderer_of(spec["containers"][0], objects["ConfigMap", "catgs-config"]["data"]["catgs.toml"]) == "cuda",
         "its configurations exist": all(("ConfigMap", name) in objects for name in mounted),
         "Agones knows the server's container": template["container"] in names,
         "the autoscaler's fleet exists": objects["FleetAutoscaler", "catgs-server"]["spec"]["fleetName"] == "catgs-server",
@@ -279,6 +288,8 @@ def check_compose(_):
             aliases.setdefault(profile, set()).update(service["networks"]["default"]["aliases"])
             environment = service["environment"]
             drain_s = environment["CATGS_DRAIN_WAIT"] + environment["CATGS_DRAIN_DEADLINE"]
+            if environment.get("CATGS_RENDERER") != ("cuda" if profile == "gpu" else None):
+                findings.append(f"{name}: another renderer than its profile's may start")
             if int(service["stop_grace_period"].rstrip("s")) <= drain_s:
                 findings.append(f"{name}: no time to drain")
     for profile in ("cpu", "gpu"):

@@ -15,6 +15,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "render_core/scene/save_scene.h"
+#include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -31,7 +33,7 @@ class Program {
     std::vector<std::string> words = {"catgs-server", "--port",       "0", "--admin-bind",
                                       "off",          "--drain-wait", "1"};
     words.insert(words.end(), more.begin(), more.end());
-    if (std::ranges::count(more, "--scene") == 0)
+    if (std::ranges::count(more, "--scene") + std::ranges::count(more, "--scene-folder") == 0)
       words.insert(words.end(), {"--scene", "synth:city:2000"});
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
@@ -109,6 +111,29 @@ TEST(ServerProgram, EndsCleanlyOnSigtermWhileItLoads) {
   program.read_log("stopped while scenes were loading");
   EXPECT_THAT(program.log(), HasSubstr("stopped while scenes were loading"));
   EXPECT_EQ(program.exit_status(), 0);
+}
+
+/// What catgs-server ends with, before it serves anybody.
+int status_of_refusal(const std::vector<std::string>& arguments, const std::string& reason) {
+  Program program(arguments, reason);
+  EXPECT_THAT(program.log(), HasSubstr(reason));
+  return program.exit_status();
+}
+
+TEST(ServerProgram, SupervisorsTellAFaultFromAMistake) {
+  constexpr int fault = 1, mistake = 2;
+  EXPECT_EQ(status_of_refusal({"--scene", "nowhere.ply"}, "there is no such file"), mistake);
+  EXPECT_EQ(status_of_refusal({"--renderer", "cpu", "--device", "0"}, "--device"), mistake);
+  // Without a GPU, as where one is lost; a build without the core stays one.
+  ::setenv("CUDA_VISIBLE_DEVICES", "", 1);
+  EXPECT_EQ(status_of_refusal({"--renderer", "cuda"}, "--renderer cuda"),
+            CATGS_HAS_CUDA ? fault : mistake);
+  const TemporaryFolder folder;
+  save_scene(random_cloud(100, 0), folder / "attic.ply");
+  EXPECT_EQ(status_of_refusal({"--renderer", "cuda", "--scene-folder", folder.path().string()},
+                              "--renderer cuda"),
+            CATGS_HAS_CUDA ? fault : mistake);
+  ::unsetenv("CUDA_VISIBLE_DEVICES");
 }
 
 TEST(ServerProgram, ASecondSigtermEndsTheDrainAtOnce) {
