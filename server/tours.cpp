@@ -46,7 +46,7 @@ nlohmann::json sidecar_tours(const std::filesystem::path& sidecar, std::string_v
   return tours->value();
 }
 
-nlohmann::json viewer_settings(std::filesystem::path sidecar) {
+nlohmann::json viewer_settings(const std::filesystem::path& sidecar) {
   const std::array candidates = {std::filesystem::path(sidecar).replace_extension(".settings.json"),
                                  sidecar.parent_path() / "settings.json"};
   for (const auto& path : candidates) {

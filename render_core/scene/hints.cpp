@@ -34,8 +34,8 @@ glm::vec3 parse_up(const JsonField& field) {
     up[static_cast<int>(k)] = name[0] == '-' ? -1.0f : 1.0f;
     return up;
   }
-  const glm::vec3 up = field.vec3();
-  if (glm::length(up) < 1e-6f) field.fail("has no direction");
+  const glm::dvec3 up = field.vec3();  // squares of large floats are no floats
+  if (glm::length(up) < 1e-6) field.fail("has no direction");
   return glm::normalize(up);
 }
 
@@ -73,8 +73,11 @@ glm::mat3 parse_rotation(const JsonField& rows, std::size_t size) {
     const auto row = elements[static_cast<std::size_t>(r)].numbers(size);
     for (int c = 0; c < 3; ++c) rotation[c][r] = row[static_cast<std::size_t>(c)];
   }
-  const float determinant = glm::determinant(rotation);
-  if (!(std::abs(determinant - 1.0f) < 0.05f)) rows.fail("is no rotation");
+  // A determinant of 1 alone may be a shear's, with numbers of any size.
+  bool is_rotation = std::abs(glm::determinant(rotation) - 1.0f) < 0.05f;
+  for (int c = 0; c < 3; ++c)
+    is_rotation = is_rotation && std::abs(glm::length(rotation[c]) - 1.0f) < 0.05f;
+  if (!is_rotation) rows.fail("is no rotation");
   return rotation;
 }
 
