@@ -1,5 +1,7 @@
 #pragma once
 
+#include <exception>
+#include <new>
 #include <stdexcept>
 #include <string>
 
@@ -21,6 +23,15 @@ class DeviceError : public std::runtime_error {
  private:
   RenderStatus::Code code_;
 };
+
+/// What ended a frame, for who asked for it. A host without memory has no device that failed.
+inline RenderStatus status_of(const std::exception& error) {
+  if (const auto* device = dynamic_cast<const DeviceError*>(&error))
+    return {device->status_code(), error.what()};
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return {RenderStatus::Code::out_of_memory, "the host is out of memory"};
+  return {RenderStatus::Code::device_failed, error.what()};
+}
 
 /// The wanted CUDA devices cannot be used now: none is found, too old, full, failed, not built for.
 /// Some of that mends without a change of the input.

@@ -11,6 +11,7 @@
 
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/cuda/cuda_view.cuh"
+#include "render_core/place_view.h"
 
 namespace catgs {
 namespace cuda {
@@ -80,21 +81,12 @@ class CudaRenderer final : public Renderer {
 
   [[nodiscard]] std::size_t scene_bytes() const override { return devices_.front().scene->bytes(); }
 
-  /// On the least loaded device that can take it: one that has failed loses its Views and would
-  /// look like the best place for the next.
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     std::vector<int> candidates;
     for (const Device& device : devices_) candidates.push_back(device.index);
-    for (;;) {
-      DeviceSet::Place place = set_->take(candidates);
-      const int index = place.device();
-      try {
-        return make_view_at(std::move(place), settings);
-      } catch (const CudaError&) {
-        std::erase(candidates, index);
-        if (candidates.empty()) throw;
-      }
-    }
+    return place_view(*set_, std::move(candidates), [&](DeviceSet::Place place) {
+      return make_view_at(std::move(place), settings);
+    });
   }
 
  private:

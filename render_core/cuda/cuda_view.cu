@@ -78,12 +78,9 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
     if (settings_.speculation.cost_aware)
       costs_.note(plan.kind, plan.window, frame.stats.total_ms());
     return {};
-  } catch (const CudaError& error) {
-    forget_frames();
-    return {error.status_code(), error.what()};
   } catch (const std::exception& error) {
     forget_frames();
-    return {RenderStatus::Code::device_failed, error.what()};
+    return status_of(error);
   }
 }
 

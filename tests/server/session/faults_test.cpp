@@ -91,7 +91,7 @@ TEST_F(Faults, WhoFindsNoDeviceMemoryMayComeBack) {
   start();
   join();
   move_on(3);
-  renderer->no_room = true;
+  renderer->full[0] = renderer->full[1] = true;
   for (int i = 0; i < 3; ++i) {
     const auto refused = join().connection;
     ASSERT_TRUE(refused->error);
@@ -103,7 +103,7 @@ TEST_F(Faults, WhoFindsNoDeviceMemoryMayComeBack) {
   EXPECT_EQ(failed_streams(), 3);
   move_on(3);
   EXPECT_EQ(lost, 0) << "the device works";
-  renderer->no_room = false;
+  renderer->full[0] = renderer->full[1] = false;
   EXPECT_TRUE(join().connection->welcome);
   move_on(3);
 }
@@ -140,6 +140,30 @@ TEST_F(Faults, WithoutAnyDeviceTheServerGivesUp) {
   EXPECT_THAT(lost, HasSubstr("illegal memory access"));
   EXPECT_EQ(failed_frames(), 2);
   EXPECT_EQ(failed_streams(), 2);
+}
+
+TEST_F(Faults, AFullDeviceBesideALostOneServesThoseItHas) {
+  int given_up = 0;
+  options.on_devices_lost = [&](const auto&) { ++given_up; };
+  start();
+  for (int i = 0; i < 3; ++i) join();
+  move_on(3);
+  ASSERT_EQ(devices->views(), (std::map<int, int>{{0, 2}, {1, 1}}));
+  renderer->full[1] = true;
+  renderer->lost[0] = true;
+  for (int i = 0; i < 3; ++i) {  // the full one has fewer Views: the lost one is asked last
+    const auto refused = join().connection;
+    EXPECT_EQ(refused->closed, CloseCode::try_again_later);
+    EXPECT_THAT(refused->error->message(), HasSubstr("out of memory"));
+    leave(3);
+  }
+  move_until([&] { return closed() == 2; });
+  move_on(3);
+  EXPECT_EQ(devices->views(), (std::map<int, int>{{0, 0}, {1, 1}}));
+  EXPECT_EQ(given_up, 0) << "a device works";
+  renderer->full[1] = false;
+  EXPECT_TRUE(join().connection->welcome);
+  move_on(3);
 }
 
 TEST_F(Faults, OneRefusalWithoutAFailedFrameIsNoLostDevice) {

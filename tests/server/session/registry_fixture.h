@@ -18,6 +18,7 @@
 
 #include "proto/catgs.pb.h"
 #include "render_core/device_error.h"
+#include "render_core/place_view.h"
 #include "server/schedule/pool_executor.h"
 #include "server/session/session_registry.h"
 
@@ -63,20 +64,20 @@ class PretendedRenderer final : public Renderer {
   explicit PretendedRenderer(std::shared_ptr<DeviceSet> devices) : devices_(std::move(devices)) {}
   [[nodiscard]] std::string description() const override { return "pretended"; }
   [[nodiscard]] std::size_t scene_bytes() const override { return 0; }
-  /// As the CUDA core does: on the least loaded device that works.
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings&) override {
-    if (no_room) throw DeviceError(RenderStatus::Code::out_of_memory, "lists: out of memory");
-    std::vector<int> works;
-    for (const int device : {0, 1})
-      if (!lost[static_cast<std::size_t>(device)]) works.push_back(device);
-    if (works.empty()) throw DeviceError(RenderStatus::Code::device_failed, "stream: " + fault);
-    ++views_made;
-    return std::make_unique<PretendedView>(*this, devices_->take(works));
+    return place_view(*devices_, {0, 1}, [this](DeviceSet::Place place) {
+      const auto device = static_cast<std::size_t>(place.device());
+      if (lost[device]) throw DeviceError(RenderStatus::Code::device_failed, "stream: " + fault);
+      if (full[device])
+        throw DeviceError(RenderStatus::Code::out_of_memory, "lists: out of memory");
+      ++views_made;
+      return std::make_unique<PretendedView>(*this, std::move(place));
+    });
   }
 
   std::array<std::atomic<float>, 2> frame_ms{};
   std::array<std::atomic<bool>, 2> lost{};  // as after a kernel error: nothing works on it any more
-  std::atomic<bool> no_room{false};         // for another View
+  std::array<std::atomic<bool>, 2> full{};  // for another View
   std::atomic<int> frames_without_memory{0};
   std::atomic<int> views_made{0};
   std::function<void(int device)> before_frame = [](int) {};  // set before the first frame
