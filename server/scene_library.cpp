@@ -56,9 +56,11 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
       residency_(residency_limits(config)) {
   for (auto& entry : load_scenes(config_, core_)) pin(std::move(entry));
   if (!config_.scene_folders.empty()) open_folders();
-  // A later scene that no GPU takes is refused: the processors have the encoding of all to do.
+  // The first scenes settle what this server is. On GPUs the processors have the encoding of all to
+  // do: a later scene that no GPU takes is refused. Without, no GPU is in its pools and budgets.
   const bool on_gpus = core_.devices && !core_.devices->views().empty();
-  if (core_.kind == RendererKind::automatic && on_gpus) core_.kind = RendererKind::cuda;
+  if (core_.kind == RendererKind::automatic)
+    core_.kind = on_gpus ? RendererKind::cuda : RendererKind::cpu;
   publish();
 }
 

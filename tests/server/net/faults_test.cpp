@@ -26,6 +26,7 @@
 namespace catgs::test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 /// What a GPU does after a kernel error: nothing, and it says so.
@@ -57,6 +58,18 @@ class FailingExecutor final : public FrameExecutor {
   const std::atomic<bool>& fails_;
 };
 
+/// Also where a test throws: who waits for run() would wait for ever.
+class Stopped {
+ public:
+  explicit Stopped(Server& server) : server_(server) {}
+  ~Stopped() { server_.stop(); }
+  Stopped(const Stopped&) = delete;
+  Stopped& operator=(const Stopped&) = delete;
+
+ private:
+  Server& server_;
+};
+
 TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   std::atomic<bool> fails{false};
   ServerConfig config;
@@ -68,6 +81,7 @@ TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
     return std::make_shared<FailingExecutor>(std::move(executor), fails);
   });
   auto ended = std::async(std::launch::async, [&] { server.run(); });
+  const Stopped stopped(server);
   WireClient looks(server.port());
   looks.greet();
   looks.send_pose(1);
@@ -89,53 +103,83 @@ TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   }
 }
 
-TEST(ServerFaults, ASceneThatNoGpuTakesIsNotLeftToTheProcessors) {
-  if (cuda_obstacle().empty()) GTEST_SKIP() << "a GPU is here, and would take it";
-  const TemporaryFolder folder;
-  save_scene(random_cloud(100, 0), folder / "attic.ply");
-  ServerConfig config;
-  config.scenes = {"synth:city:2000"};
-  config.scene_folders = {folder.path()};
-  const auto devices = std::make_shared<DeviceSet>(std::vector<int>{});
-  devices->add(0);  // as the CUDA core does that renders the first scene
-  boost::asio::io_context io;
-  const auto waits = boost::asio::make_work_guard(io);
-  Metrics metrics;
-  SceneLibrary library(config,
-                       {RendererKind::automatic, std::make_shared<ThreadPool>(1), "auto", devices},
-                       io, metrics);
-  const auto answer = library.want("attic", Clock::now());
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(answer));
-  const TimePoint end = Clock::now() + std::chrono::seconds(20);  // a bound against hanging
-  while (metrics.scene_loads_failed.Value() == 0 && Clock::now() < end)
-    io.run_for(std::chrono::milliseconds(5));
-  EXPECT_EQ(metrics.scene_loads_failed.Value(), 1.0);
-  EXPECT_EQ(metrics.scenes_loaded.Value(), 0.0);
-  EXPECT_TRUE(std::holds_alternative<ErrorMessage>(library.want("attic", Clock::now())));
+/// A library under --renderer auto whose first scene the processors render, and what it answers
+/// when it has tried to load another one.
+class SecondScene : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (cuda_obstacle().empty()) GTEST_SKIP() << "a GPU is here, and would take them";
+  }
+  SceneAnswer wanted_later() {
+    save_scene(random_cloud(100, 0), folder_ / "attic.ply");
+    ServerConfig config;
+    config.scenes = {"synth:city:2000"};
+    config.scene_folders = {folder_.path()};
+    boost::asio::io_context io;
+    const auto waits = boost::asio::make_work_guard(io);
+    SceneLibrary library(
+        config, {RendererKind::automatic, std::make_shared<ThreadPool>(1), "auto", devices_}, io,
+        metrics_);
+    EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library.want("attic", Clock::now())));
+    const TimePoint end = Clock::now() + std::chrono::seconds(20);  // a bound against hanging
+    while (metrics_.scene_loads_failed.Value() + metrics_.scenes_loaded.Value() == 0 &&
+           Clock::now() < end)
+      io.run_for(std::chrono::milliseconds(5));
+    return library.want("attic", Clock::now());
+  }
+
+  const TemporaryFolder folder_;
+  const std::shared_ptr<DeviceSet> devices_ = std::make_shared<DeviceSet>(std::vector<int>{});
+  Metrics metrics_;
+};
+
+TEST_F(SecondScene, ThatNoGpuTakesIsNotLeftToTheProcessors) {
+  devices_->add(0);  // as the CUDA core does that renders the first scene
+  EXPECT_TRUE(std::holds_alternative<ErrorMessage>(wanted_later()));
+  EXPECT_EQ(metrics_.scene_loads_failed.Value(), 1.0);
 }
 
-TEST(ServerFaults, ServesWhileTheDiskOfTheLogIsFull) {
-  const int full = ::open("/dev/full", O_WRONLY);
-  ASSERT_GE(full, 0);
-  const int kept = ::dup(STDERR_FILENO);
-  const auto logger = spdlog::default_logger();
-  ::dup2(full, STDERR_FILENO);
-  set_up_log("json", "info");
-  {
-    RunningServer server;
-    WireClient client(server.port());
-    client.greet();
-    client.send_pose(1);
-    client.receive_frame();
-    const std::string metrics = http_get(server.admin_port(), "/metrics").body;
-    EXPECT_THAT(metrics, HasSubstr("\ncatgs_log_lines_lost_total "));
-    EXPECT_EQ(metrics.find("\ncatgs_log_lines_lost_total 0\n"), std::string::npos);
+TEST_F(SecondScene, StaysWithTheProcessorsAfterAFirstThatNoGpuTook) {
+  const SceneAnswer answer = wanted_later();
+  const auto* entry = std::get_if<std::shared_ptr<const SceneEntry>>(&answer);
+  ASSERT_TRUE(entry);
+  EXPECT_THAT((*entry)->renderer_text, AllOf(HasSubstr("CPU"), HasSubstr("asked for")))
+      << "a GPU that is found meanwhile has no threads and no budget here";
+}
+
+/// The server's log goes to a full disk for as long as it lives.
+class FullDiskOfTheLog {
+ public:
+  FullDiskOfTheLog() {
+    const int full = ::open("/dev/full", O_WRONLY);
+    ::dup2(full, STDERR_FILENO);
+    ::close(full);
+    set_up_log("json", "info");
   }
-  spdlog::drop("catgs-server");
-  spdlog::set_default_logger(logger);
-  ::dup2(kept, STDERR_FILENO);
-  ::close(kept);
-  ::close(full);
+  ~FullDiskOfTheLog() {
+    spdlog::drop("catgs-server");
+    spdlog::set_default_logger(logger_);
+    ::dup2(kept_, STDERR_FILENO);
+    ::close(kept_);
+  }
+  FullDiskOfTheLog(const FullDiskOfTheLog&) = delete;
+  FullDiskOfTheLog& operator=(const FullDiskOfTheLog&) = delete;
+
+ private:
+  const int kept_ = ::dup(STDERR_FILENO);
+  const std::shared_ptr<spdlog::logger> logger_ = spdlog::default_logger();
+};
+
+TEST(ServerFaults, ServesWhileTheDiskOfTheLogIsFull) {
+  const FullDiskOfTheLog full;
+  RunningServer server;
+  WireClient client(server.port());
+  client.greet();
+  client.send_pose(1);
+  client.receive_frame();
+  const std::string metrics = http_get(server.admin_port(), "/metrics").body;
+  EXPECT_THAT(metrics, HasSubstr("\ncatgs_log_lines_lost_total "));
+  EXPECT_EQ(metrics.find("\ncatgs_log_lines_lost_total 0\n"), std::string::npos);
 }
 
 }  // namespace
