@@ -1,7 +1,10 @@
 #include "server/log.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
+#include <climits>
 #include <cstdio>
 #include <iterator>
 #include <memory>
@@ -12,10 +15,10 @@
 #include <fmt/chrono.h>
 #include <nlohmann/json.hpp>
 #include <poll.h>
+#include <spdlog/details/os.h>
 #include <spdlog/formatter.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/base_sink.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -47,6 +50,33 @@ class JsonFormatter final : public spdlog::formatter {
   [[nodiscard]] std::unique_ptr<formatter> clone() const override {
     return std::make_unique<JsonFormatter>();
   }
+};
+
+/// The level, in a colour where standard error is a terminal that has some.
+class LevelFlag final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& out) override {
+    const auto name = spdlog::level::to_string_view(message.level);
+    const std::string_view level(name.data(), name.size());
+    if (coloured_)
+      fmt::format_to(std::back_inserter(out), "\x1b[{}m{}\x1b[m", colour(message.level), level);
+    else
+      fmt::format_to(std::back_inserter(out), "{}", level);
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<LevelFlag>();
+  }
+
+ private:
+  /// Bold red, bold yellow, green, cyan.
+  static std::string_view colour(spdlog::level::level_enum level) {
+    if (level >= spdlog::level::err) return "1;31";
+    if (level == spdlog::level::warn) return "1;33";
+    return level == spdlog::level::info ? "32" : "36";
+  }
+  const bool coloured_ =
+      spdlog::details::os::in_terminal(stderr) && spdlog::details::os::is_color_terminal();
 };
 
 /// "session 1f2e3d4c: ", or nothing.
@@ -82,37 +112,73 @@ class PrintableMessage final : public spdlog::custom_flag_formatter {
 
 std::atomic<std::uint64_t> lines_lost{0};
 
-/// Standard error, as long as it takes lines at once: a full disk costs lines and nothing else, and
-/// whoever stops to read a pipe does not stop the sessions. The next line that gets through says
-/// how many did not.
-class PatientSink final : public spdlog::sinks::base_sink<std::mutex> {
- protected:
-  void sink_it_(const spdlog::details::log_msg& message) override {
-    const std::string text = fmt::format("{} lines were lost: standard error took none", lost_);
-    const bool told = lost_ == 0 || write({message.logger_name, spdlog::level::warn, text});
-    if (told) lost_ = 0;
-    if (told && write(message)) return;
-    ++lost_;
-    ++lines_lost;
-  }
-  void flush_() override { to_.flush(); }
-  void set_formatter_(std::unique_ptr<spdlog::formatter> formatter) override {
-    to_.set_formatter(std::move(formatter));
+/// A warning of the log itself, whatever session the line is about that it comes before.
+class LogsOwnLine {
+ public:
+  explicit LogsOwnLine(std::string text) : text_(std::move(text)) {}
+  [[nodiscard]] spdlog::details::log_msg message(spdlog::string_view_t logger) const {
+    return {logger, spdlog::level::warn, text_};
   }
 
  private:
-  /// False: it was not taken.
+  const std::string text_;
+  const LogSession about_nobody_{std::string_view()};
+};
+
+/// Standard error, as long as it takes lines at once: a full disk costs lines and nothing else, and
+/// whoever stops to read a pipe does not stop the sessions. The next line that gets through says
+/// how many did not. A line has at most PIPE_BUF bytes: a pipe that takes any takes so many, at
+/// once and in one piece.
+class PromptSink final : public spdlog::sinks::base_sink<std::mutex> {
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (lost_ > 0) {
+      const LogsOwnLine own(fmt::format("{} lines were lost: standard error took none", lost_));
+      if (write(own.message(message.logger_name))) lost_ = 0;
+    }
+    if (lost_ == 0 && write(message)) return;
+    ++lost_;
+    ++lines_lost;
+  }
+  void flush_() override {}  // nothing waits here
+
+ private:
+  static constexpr std::size_t max_line_bytes = PIPE_BUF;
+
+  /// False: it was not taken, or not whole.
   bool write(const spdlog::details::log_msg& message) {
     pollfd standard_error{STDERR_FILENO, POLLOUT, 0};
     if (::poll(&standard_error, 1, 0) != 1 || (standard_error.revents & POLLOUT) == 0) return false;
-    to_.log(message);
-    if (std::ferror(stderr) == 0) return true;
-    std::clearerr(stderr);
-    return false;
+    spdlog::memory_buf_t line;
+    if (torn_) line.push_back('\n');
+    append(message, line);
+    ssize_t taken = 0;
+    do taken = ::write(STDERR_FILENO, line.data(), line.size());
+    while (taken < 0 && errno == EINTR);
+    if (taken > 0) torn_ = static_cast<std::size_t>(taken) < line.size();
+    return taken == static_cast<ssize_t>(line.size());
   }
 
-  spdlog::sinks::stderr_color_sink_mt to_;  // writes through `stderr`, which has no buffer
+  /// Its end is left out where it would be too long. What a byte becomes depends on the format.
+  void append(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) const {
+    const std::size_t before = line.size();
+    const std::string mark = fmt::format("... ({} bytes)", message.payload.size());
+    spdlog::details::log_msg cut = message;
+    std::string text;
+    std::size_t kept = message.payload.size();
+    for (;;) {
+      formatter_->format(cut, line);
+      if (line.size() <= max_line_bytes || kept == 0) return;
+      const std::size_t excess = line.size() - max_line_bytes + mark.size();
+      kept -= std::min(excess, (kept + 1) / 2);
+      text.assign(message.payload.data(), kept).append(mark);
+      cut.payload = text;
+      line.resize(before);
+    }
+  }
+
   std::uint64_t lost_ = 0;
+  bool torn_ = false;  // the disk was full in the middle of a line
 };
 
 /// Leaves lines out where there are too many, and says how many: strangers can cause a line with
@@ -128,8 +194,8 @@ class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
       return;
     }
     if (const auto count = std::exchange(left_out_, 0); count > 0) {
-      const std::string text = fmt::format("{} lines were left out: there were too many", count);
-      to_->log(spdlog::details::log_msg(message.logger_name, spdlog::level::warn, text));
+      const LogsOwnLine own(fmt::format("{} lines were left out: there were too many", count));
+      to_->log(own.message(message.logger_name));
     }
     to_->log(message);
   }
@@ -150,15 +216,15 @@ class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
 std::unique_ptr<spdlog::formatter> make_formatter(std::string_view format) {
   if (format == "json") return std::make_unique<JsonFormatter>();
   auto human = std::make_unique<spdlog::pattern_formatter>();
-  human->add_flag<SessionFlag>('*').add_flag<PrintableMessage>('~').set_pattern(
-      "%H:%M:%S.%e %^%l%$ %*%~");
+  human->add_flag<LevelFlag>('L').add_flag<SessionFlag>('*').add_flag<PrintableMessage>('~');
+  human->set_pattern("%H:%M:%S.%e %L %*%~");
   return human;
 }
 
 }  // namespace
 
 void set_up_log(std::string_view format, std::string_view level) {
-  std::shared_ptr<spdlog::sinks::sink> sink = std::make_shared<PatientSink>();
+  std::shared_ptr<spdlog::sinks::sink> sink = std::make_shared<PromptSink>();
   const auto least = spdlog::level::from_str(std::string(level));
   // Who asks for debugging wants to see it all.
   if (least > spdlog::level::debug) sink = std::make_shared<BoundedSink>(std::move(sink));

@@ -1,6 +1,9 @@
 #include "server/log.h"
 
 #include <chrono>
+#include <climits>
+#include <csignal>
+#include <fstream>
 #include <functional>
 #include <sstream>
 #include <thread>
@@ -10,9 +13,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "server/session/log_session.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -120,18 +125,66 @@ TEST(Log, AFullDiskLosesLinesAndSaysSo) {
 }
 
 TEST(Log, APipeThatNobodyReadsHoldsNobodyUp) {
-  int pipe[2];
-  ASSERT_EQ(::pipe(pipe), 0);
-  const std::uint64_t lost_before = log_lines_lost();
-  const std::string line(1000, '.');
-  lines_of("human", "debug", [&] {
-    with_standard_error(pipe[1], [&] {
-      for (int i = 0; i < 1000; ++i) spdlog::info(line);  // of which a pipe takes 64 KiB
+  for (const std::size_t length : {1000u, 10'000u}) {  // of a page, and of some
+    int pipe[2];
+    ASSERT_EQ(::pipe(pipe), 0);
+    const std::uint64_t lost_before = log_lines_lost();
+    const std::string line(length, '.');
+    lines_of("human", "debug", [&] {
+      with_standard_error(pipe[1], [&] {
+        for (int i = 0; i < 1000; ++i) spdlog::info(line);  // of which a pipe takes 64 KiB
+      });
+    });
+    EXPECT_GT(log_lines_lost() - lost_before, 800u);
+    ::close(pipe[0]);
+    ::close(pipe[1]);
+  }
+}
+
+TEST(Log, LinesAreAsLongAsAPipeTakesWhole) {
+  for (const char* format : {"human", "json"})
+    for (const char* piece : {"a", "\x01", "\u00fc", "\xff"}) {  // as they are, and escaped
+      std::string text;
+      while (text.size() < 10'000) text += piece;
+      const auto all = lines_of(format, "info", [&] { spdlog::info("{}, the end", text); });
+      ASSERT_EQ(all.size(), 1u);
+      EXPECT_LT(all[0].size(), std::size_t{PIPE_BUF});
+      EXPECT_GT(all[0].size(), std::size_t{PIPE_BUF} / 3);
+      EXPECT_THAT(all[0], HasSubstr("... (10009 bytes)"));
+      EXPECT_THAT(all[0], Not(HasSubstr("the end")));
+      EXPECT_EQ(nlohmann::json::accept(all[0]), std::string_view(format) == "json");
+    }
+}
+
+TEST(Log, ADiskThatFillsWithinALineDoesNotSpoilTheNext) {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.write("log", "").string();
+  const int log = ::open(file.c_str(), O_WRONLY | O_APPEND);
+  ASSERT_GE(log, 0);
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const auto former = ::signal(SIGXFSZ, SIG_IGN);
+  lines_of("json", "info", [&] {
+    with_standard_error(log, [&] {
+      const LogSession about("1f2e3d4c");
+      const rlimit small{100, limit.rlim_max};
+      ::setrlimit(RLIMIT_FSIZE, &small);
+      for (int i = 0; i < 3; ++i) spdlog::info("while the disk fills, and after it");
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      spdlog::info("room again");
     });
   });
-  EXPECT_GT(log_lines_lost() - lost_before, 800u);
-  ::close(pipe[0]);
-  ::close(pipe[1]);
+  ::signal(SIGXFSZ, former);
+  ::close(log);
+  std::vector<std::string> all;
+  std::ifstream written(file);
+  for (std::string line; std::getline(written, line);) all.push_back(line);
+  ASSERT_EQ(all.size(), 3u);
+  EXPECT_EQ(all[0].size(), 100u) << "torn";
+  EXPECT_EQ(nlohmann::json::parse(all[1]).at("message"),
+            "3 lines were lost: standard error took none");
+  EXPECT_FALSE(nlohmann::json::parse(all[1]).contains("session")) << "they were anybody's";
+  EXPECT_EQ(nlohmann::json::parse(all[2]).at("session"), "1f2e3d4c");
 }
 
 }  // namespace
