@@ -16,7 +16,8 @@ using WrapExecutor =
 /// The whole server, assembled from a validated configuration.
 class Server {
  public:
-  /// Binds the ports, loads the scenes, probes the encoders. Throws InputError.
+  /// Binds the ports, loads the scenes, probes the encoders. Meanwhile, and until run(), SIGINT and
+  /// SIGTERM end the whole process with status 0. Throws InputError, or DevicesUnusable.
   explicit Server(const ServerConfig& config, const WrapExecutor& wrap = {});
   ~Server();
   Server(const Server&) = delete;
