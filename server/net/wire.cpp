@@ -9,15 +9,22 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <google/protobuf/stubs/logging.h>
+#include <spdlog/spdlog.h>
 
 #include "proto/catgs.pb.h"
 
 namespace catgs::wire {
 namespace {
 
-// Protobuf prints a line of its own for each text that is not UTF-8: beside our log, without its
-// bounds, as often as a stranger likes.
-[[maybe_unused]] auto* const former_log_handler = google::protobuf::SetLogHandler(nullptr);
+/// Protobuf has a line to say for each text that is not UTF-8, as often as a stranger likes; left
+/// to itself it prints them beside our log, without its bounds.
+void log_of_protobuf(google::protobuf::LogLevel level, const char* file, int line,
+                     const std::string& message) {
+  const bool ends_the_process = level == google::protobuf::LOGLEVEL_FATAL;
+  spdlog::log(ends_the_process ? spdlog::level::critical : spdlog::level::debug,
+              "protobuf: {}:{}: {}", file, line, message);
+}
+[[maybe_unused]] auto* const former_log_handler = google::protobuf::SetLogHandler(log_of_protobuf);
 
 /// Positions beyond this are no place in a scene, and their squares overflow a float's precision.
 constexpr float max_coordinate = 1.0e9f;

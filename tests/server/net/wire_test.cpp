@@ -2,11 +2,16 @@
 
 #include <fstream>
 #include <limits>
+#include <memory>
+#include <span>
+#include <sstream>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include "proto/catgs.pb.h"
 
@@ -196,6 +201,27 @@ TEST(Wire, NamesTheFieldThatIsWrong) {
     pose.mutable_pose()->set_fov_y_rad(fov);
     EXPECT_THAT(complaint(pose), HasSubstr("pose.fov_y_rad")) << fov;
   }
+}
+
+TEST(Wire, WhatProtobufSaysOfStrangersIsForWhoDebugs) {
+  const auto before = spdlog::default_logger();
+  std::ostringstream log;
+  const auto logger = std::make_shared<spdlog::logger>(
+      "wire test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log));
+  spdlog::set_default_logger(logger);
+  // hello { token: "\xff" } as bytes: protobuf's own writer refuses it.
+  v1::ClientMessage message;
+  message.mutable_hello()->set_token("t");
+  std::string text = message.SerializeAsString();
+  text.back() = '\xff';
+  const auto parse = [&] { return wire::parse_client_message(std::as_bytes(std::span(text))); };
+  parse();
+  EXPECT_EQ(log.str(), "");
+  logger->set_level(spdlog::level::debug);
+  EXPECT_TRUE(std::holds_alternative<wire::ParseError>(parse()));
+  EXPECT_THAT(log.str(), HasSubstr("protobuf: "));
+  EXPECT_THAT(log.str(), HasSubstr("UTF-8"));
+  spdlog::set_default_logger(before);
 }
 
 TEST(Wire, NoPictureIsTakenForOlderThanTenSeconds) {
