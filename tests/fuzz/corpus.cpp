@@ -31,7 +31,10 @@ std::vector<std::string> read_corpus(const std::filesystem::path& archive) {
     if (result == ARCHIVE_EOF) return inputs;
     if (archive_entry_filetype(entry) != AE_IFREG) continue;
     std::string bytes(static_cast<std::size_t>(archive_entry_size(entry)), '\0');
-    check(archive_read_data(reader.get(), bytes.data(), bytes.size()));
+    const la_ssize_t read = archive_read_data(reader.get(), bytes.data(), bytes.size());
+    check(read);
+    if (static_cast<std::size_t>(read) != bytes.size())
+      throw std::runtime_error(archive.string() + ": ends within " + archive_entry_pathname(entry));
     inputs.push_back(std::move(bytes));
   }
 }

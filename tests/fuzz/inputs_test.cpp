@@ -1,10 +1,15 @@
 // What fuzzing has found stays mended, what it has reached is reached, and mutants of all that
 // break nothing: without libFuzzer, with every compiler and sanitizer of ours.
 #include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <random>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -38,10 +43,26 @@ std::vector<std::string> corpus_of(const Target& target) {
   return read_corpus(fs::path(CATGS_FUZZ_CORPUS) / (target.name + ".tar.gz"));
 }
 
-/// How long each target gets mutants: a moment, or what fuzz.smoke says.
-std::chrono::duration<double> patience() {
-  const char* seconds = std::getenv("CATGS_FUZZ_SECONDS");
-  return std::chrono::duration<double>(seconds ? std::atof(seconds) : 0.1);
+/// Which mutants each target gets: the same few everywhere, or with CATGS_FUZZ_SECONDS, as
+/// fuzz.smoke sets it, others in each run for that long. CATGS_FUZZ_SEED tries those of a run
+/// again.
+struct Mutants {
+  std::uint64_t seed = 1;
+  int most = 300;
+  std::chrono::steady_clock::time_point end = std::chrono::steady_clock::time_point::max();
+};
+
+Mutants asked_mutants() {
+  Mutants mutants;
+  if (const char* seconds = std::getenv("CATGS_FUZZ_SECONDS")) {
+    mutants.seed = std::random_device()();
+    mutants.most = std::numeric_limits<int>::max();
+    mutants.end = std::chrono::steady_clock::now() +
+                  std::chrono::milliseconds(std::lround(1000.0 * std::atof(seconds)));
+  }
+  if (const char* seed = std::getenv("CATGS_FUZZ_SEED"))
+    mutants.seed = std::strtoull(seed, nullptr, 10);
+  return mutants;
 }
 
 class FuzzInputs : public testing::TestWithParam<Target> {};
@@ -71,19 +92,24 @@ TEST_P(FuzzInputs, MutantsAreAcceptedOrRefused) {
   // fuzz.smoke may run at the same time.
   const std::string found = fmt::format(CATGS_FUZZ_FOUND "/{}.{}", target.name, ::getpid());
   KeptInput kept(found);
-  std::mt19937_64 random(1);
+  const Mutants mutants = asked_mutants();
+  // At once: what ends the process leaves no other word.
+  fmt::print("CATGS_FUZZ_SEED={}\n", mutants.seed);
+  std::fflush(stdout);
+  std::mt19937_64 random(mutants.seed);
   int tried = 0;
-  const auto end = std::chrono::steady_clock::now() + patience();
-  do {
+  while (!HasFailure() && tried < mutants.most &&
+         (tried == 0 || std::chrono::steady_clock::now() < mutants.end)) {
     const std::string input = mutant(random, inputs, target.dictionary, target.max_bytes);
     kept.keep(input);
     parse(target, input);
     ++tried;
-  } while (!HasFailure() && std::chrono::steady_clock::now() < end);
+  }
   RecordProperty("mutants", tried);
   if (!HasFailure()) return;
   kept.leave();
-  ADD_FAILURE() << "by the input that is left in " << found;
+  ADD_FAILURE() << "by the input that is left in " << found << ", mutant " << tried
+                << " of CATGS_FUZZ_SEED=" << mutants.seed;
 }
 
 INSTANTIATE_TEST_SUITE_P(Parser, FuzzInputs, testing::ValuesIn(targets()),

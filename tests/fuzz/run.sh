@@ -89,9 +89,11 @@ keep() {
   mkdir -p "$work/kept" "$kept"
   "$fuzzer" "--target=$target" -set_cover_merge=1 -use_counters=0 -max_len="$max_bytes" -rss_limit_mb=1024 \
     -malloc_limit_mb=512 -timeout=10 "$work/kept" "$work/corpus" "$work/seeds" >"$work/merge.log" 2>&1
-  while pack "$work/kept" >"$kept/$target.tar.gz" && (($(stat -c %s "$kept/$target.tar.gz") > kept_bytes)); do
+  pack "$work/kept" >"$kept/$target.tar.gz"
+  while (($(stat -c %s "$kept/$target.tar.gz") > kept_bytes)); do
     longest=$(find "$work/kept" -type f -printf '%s %p\n' | sort -n | tail -1)
     rm "${longest#* }"
+    pack "$work/kept" >"$kept/$target.tar.gz"
   done
   printf '%-16s %4d inputs, %6d bytes, of %5d\n' "$target" "$(find "$work/kept" -type f | wc -l)" \
     "$(stat -c %s "$kept/$target.tar.gz")" "$(find "$work/corpus" -type f | wc -l)"
