@@ -98,7 +98,8 @@ Metrics::Metrics()
                             "Share of the processors' time that the server takes")),
       encoders_refused(
           counter(registry_, "catgs_encoders_refused_total",
-                  "Video encoders that their driver did not open, for want of sessions")),
+                  "NVENC encoders that their driver did not open; those that were open and failed "
+                  "are among catgs_frames_failed_total")),
       effort_changes(counter(registry_, "catgs_encoder_effort_changes_total",
                              "Changes of preset or threads of encoders in software")),
       sessions_admitted(counter(registry_, "catgs_sessions_admitted_total", "Sessions admitted")),

@@ -227,13 +227,16 @@ void Client::open_stream(StreamSettings settings) {
                   }));
 }
 
-std::optional<EncoderChoice> Client::other_encoder() {
-  const std::string refused = encoder_.encoder.text;
-  auto other = registry_.encoders_.replace(encoder_, decoders_, Clock::now());
-  if (encoder_.encoder.kind == EncoderKind::nvenc) registry_.metrics_.encoders_refused.Increment();
+std::optional<EncoderChoice> Client::other_encoder(Fault why) {
+  const EncoderChoice had = encoder_.encoder;
+  const bool failed = why == Fault::encoder_failed;
+  const TimePoint now = Clock::now();
+  auto other = failed ? registry_.encoders_.replace_failed(encoder_, decoders_, now)
+                      : registry_.encoders_.replace_refused(encoder_, decoders_, now);
+  if (!failed && had.kind == EncoderKind::nvenc) registry_.metrics_.encoders_refused.Increment();
   if (!other) return std::nullopt;  // the session says why it ends
   const LogSession about(session_.id());
-  spdlog::warn("{} serves no more: {}", refused, other->encoder.text);
+  spdlog::warn("{} {}: {}", had.text, failed ? "failed" : "cannot be opened", other->encoder.text);
   encoder_ = *std::move(other);
   return encoder_.encoder;
 }

@@ -43,7 +43,7 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;
   void close(CloseCode code, std::string_view reason) override;
   void open_stream(StreamSettings settings) override;
-  std::optional<EncoderChoice> other_encoder() override;
+  std::optional<EncoderChoice> other_encoder(Fault why) override;
 
   /// Continues the session of a client that was lost, through `peer`.
   void resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admission admission,

@@ -27,10 +27,10 @@ std::string EncoderAllocator::offer() const {
   return text;
 }
 
-std::optional<EncoderAllocator::Grant> EncoderAllocator::first_free(Codec codec, bool queue,
-                                                                    TimePoint now) const {
+std::optional<EncoderAllocator::Grant> EncoderAllocator::first_free(
+    Codec codec, bool queue, TimePoint now, std::optional<EncoderKind> except) const {
   for (const EncoderChoice& encoder : encoders_) {
-    if (encoder.codec != codec) continue;
+    if (encoder.codec != codec || encoder.kind == except) continue;
     if (auto seat = seats_->take(encoder.kind, now)) return Grant{encoder, std::move(seat)};
     if (queue) break;
   }
@@ -51,14 +51,21 @@ std::optional<EncoderAllocator::Grant> EncoderAllocator::renew(const Grant& had,
   return grant(decoders, now);
 }
 
-std::optional<EncoderAllocator::Grant> EncoderAllocator::replace(const Grant& refused,
-                                                                 std::span<const Codec> decoders,
-                                                                 TimePoint now) const {
+std::optional<EncoderAllocator::Grant> EncoderAllocator::replace_refused(
+    const Grant& refused, std::span<const Codec> decoders, TimePoint now) const {
   if (refused.encoder.kind != EncoderKind::nvenc) return std::nullopt;
   seats_->refused(*refused.seat, now);
   const auto codec = best_codec(decoders);
   if (!codec) return std::nullopt;
   return first_free(*codec, false, now);
+}
+
+std::optional<EncoderAllocator::Grant> EncoderAllocator::replace_failed(
+    const Grant& failed, std::span<const Codec> decoders, TimePoint now) const {
+  if (failed.encoder.kind != EncoderKind::nvenc) return std::nullopt;
+  const auto codec = best_codec(decoders);
+  if (!codec) return std::nullopt;
+  return first_free(*codec, false, now, EncoderKind::nvenc);
 }
 
 std::map<std::string, int> EncoderAllocator::in_use() const {

@@ -46,15 +46,22 @@ class EncoderAllocator {
   [[nodiscard]] std::optional<Grant> renew(const Grant& had, std::span<const Codec> decoders,
                                            TimePoint now) const;
   /// Its encoder could not be opened. Nothing: that is no matter of seats, or nothing is left.
-  [[nodiscard]] std::optional<Grant> replace(const Grant& refused, std::span<const Codec> decoders,
-                                             TimePoint now) const;
+  [[nodiscard]] std::optional<Grant> replace_refused(const Grant& refused,
+                                                     std::span<const Codec> decoders,
+                                                     TimePoint now) const;
+  /// Its encoder was open and failed, which says nothing about how many may be open: this session
+  /// does without NVENC, newcomers get it. Nothing: it was not NVENC, or nothing else is left.
+  [[nodiscard]] std::optional<Grant> replace_failed(const Grant& failed,
+                                                    std::span<const Codec> decoders,
+                                                    TimePoint now) const;
 
   /// Encoders in use, by libavcodec's name.
   [[nodiscard]] std::map<std::string, int> in_use() const;
 
  private:
   [[nodiscard]] std::optional<Codec> best_codec(std::span<const Codec> decoders) const;
-  [[nodiscard]] std::optional<Grant> first_free(Codec codec, bool queue, TimePoint now) const;
+  [[nodiscard]] std::optional<Grant> first_free(Codec codec, bool queue, TimePoint now,
+                                                std::optional<EncoderKind> except = {}) const;
 
   const std::vector<EncoderChoice> encoders_;
   const Policy policy_;

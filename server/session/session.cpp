@@ -241,7 +241,7 @@ void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   opening_stream_ = false;
   if (state_ == State::closed) return;
   if (opened.fault == Fault::encoder_unavailable) {
-    if (auto other = host_.other_encoder()) {
+    if (auto other = host_.other_encoder(opened.fault)) {
       admission_.encoder = *std::move(other);
       return request_stream();
     }

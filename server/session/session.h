@@ -96,8 +96,8 @@ class SessionHost {
   virtual void close(CloseCode code, std::string_view reason) = 0;
   /// Answered by Session::on_stream_opened().
   virtual void open_stream(StreamSettings settings) = 0;
-  /// The encoder of the admission cannot be opened: another one, or nothing.
-  virtual std::optional<EncoderChoice> other_encoder() = 0;
+  /// The encoder of the admission cannot be opened, or failed: another one, or nothing.
+  virtual std::optional<EncoderChoice> other_encoder(Fault why) = 0;
 };
 
 /// Frame of a session that its owner hands to an executor, with a stream of its own.

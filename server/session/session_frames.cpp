@@ -156,19 +156,24 @@ void Session::on_failed_frame(const FrameResult& result) {
   shown_.reset();
   idr_.missed();
   const Fault fault = result.fault;
+  const auto changes_encoder = [&] {
+    auto other = host_.other_encoder(fault);
+    if (!other) return false;
+    admission_.encoder = *std::move(other);
+    request_stream();
+    return true;
+  };
+  // First: NVENC that fails makes way, whatever the frame.
+  if (fault == Fault::encoder_failed && changes_encoder()) return;
   const bool of_larger_still =
       result.frame.ticket.still && encoded_as_ && encoded_as_->size_px != encoding_.size_px;
   if (of_larger_still && fault != Fault::device_failed) {
     stills_fail_ = true;  // no memory for so large a picture, no level of the encoder: as in motion
     return;
   }
-  if (fault == Fault::encoder_unavailable || fault == Fault::encoder_failed) {
-    if (auto other = host_.other_encoder()) {
-      admission_.encoder = *std::move(other);
-      return request_stream();
-    }
-    if (fault == Fault::encoder_unavailable)
-      return fail(ErrorCode::internal, "the stream cannot be opened: " + result.message);
+  if (fault == Fault::encoder_unavailable) {
+    if (changes_encoder()) return;
+    return fail(ErrorCode::internal, "the stream cannot be opened: " + result.message);
   }
   if (++failures_ >= max_failures_in_a_row)
     return fail(ErrorCode::render_failed, "frames fail: " + result.message);

@@ -75,7 +75,7 @@ TEST_F(EncoderAllocatorTest, LearnsTheLimitFromRefusalsAndTriesAgainAfterAMinute
   const EncoderAllocator allocator({nvenc, x264}, {});
   Grants open = take(allocator, 3);
   EXPECT_EQ(count(open, EncoderKind::nvenc), 3) << "nothing is known";
-  const auto other = allocator.replace(open.back(), both, now);  // the driver has two
+  const auto other = allocator.replace_refused(open.back(), both, now);  // the driver has two
   ASSERT_TRUE(other);
   EXPECT_EQ(other->encoder.kind, EncoderKind::x264);
   open.pop_back();
@@ -88,7 +88,19 @@ TEST_F(EncoderAllocatorTest, LearnsTheLimitFromRefusalsAndTriesAgainAfterAMinute
 TEST_F(EncoderAllocatorTest, ARefusalOfOneSoftwareEncoderIsNoMatterOfSeats) {
   const EncoderAllocator allocator({x264, jpeg}, {});
   const auto grant = allocator.grant(both, now);
-  EXPECT_FALSE(allocator.replace(*grant, both, now));
+  EXPECT_FALSE(allocator.replace_refused(*grant, both, now));
+  EXPECT_FALSE(allocator.replace_failed(*grant, both, now));
+}
+
+TEST_F(EncoderAllocatorTest, AnNvencThatFailedIsNoMatterOfSeatsEither) {
+  const EncoderAllocator allocator({nvenc, x264}, {});
+  const Grants open = take(allocator, 2);
+  const auto other = allocator.replace_failed(open.back(), both, now);
+  ASSERT_TRUE(other);
+  EXPECT_EQ(other->encoder.kind, EncoderKind::x264);
+  EXPECT_EQ(count(take(allocator, 3), EncoderKind::nvenc), 3) << "no limit is learnt";
+  EXPECT_FALSE(EncoderAllocator({nvenc, jpeg}, {}).replace_failed(open.back(), both, now))
+      << "a worse codec is no way out: it is opened anew";
 }
 
 TEST_F(EncoderAllocatorTest, WhoComesBackKeepsWhatItHad) {

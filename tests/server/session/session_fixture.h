@@ -38,7 +38,7 @@ struct FakeHost final : SessionHost {
   }
   void close(CloseCode code, std::string_view) override { closed = code; }
   void open_stream(StreamSettings settings) override { opened.push_back(std::move(settings)); }
-  std::optional<EncoderChoice> other_encoder() override { return std::exchange(other, {}); }
+  std::optional<EncoderChoice> other_encoder(Fault) override { return std::exchange(other, {}); }
 
   template <typename T>
   int count() const {

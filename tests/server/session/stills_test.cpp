@@ -137,6 +137,24 @@ TEST_F(StillTest, WhatCannotBeMadeSoLargeStaysAsInMotion) {
   EXPECT_EQ(rested().ticket.size_px, glm::ivec2(426, 240)) << "nor is it tried each time";
 }
 
+TEST_F(StillTest, AnEncoderThatFailsAtALargerOneMakesWayAsInMotion) {
+  greet(small_in_motion());
+  moved();
+  now += policy.still_after;
+  ASSERT_TRUE(frame_is_due());
+  host.other = EncoderChoice{EncoderKind::x264, Codec::h264, "libx264"};
+  FrameResult failed;
+  failed.frame.ticket = session.start_frame(now).ticket;
+  failed.fault = Fault::encoder_failed;
+  session.on_frame(std::move(failed), now);
+  ASSERT_FALSE(host.opened.empty());
+  EXPECT_EQ(host.opened.back().encoder, EncoderKind::x264);
+  session.on_stream_opened({true, {}, Codec::h264, "avc1.42c020", "libx264"}, now);
+  now += 300ms;
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_EQ(shown().ticket.size_px, glm::ivec2(1280, 720)) << "the other one may manage it";
+}
+
 TEST_F(StillTest, PosesThatComeSlowlyAreNoRest) {
   greet(small_in_motion());
   for (int i = 0; i < 40; ++i) {
