@@ -1,6 +1,8 @@
 #include "server/sidecar_saver.h"
 
 #include <filesystem>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -26,7 +28,8 @@ SceneHints hints_of(const SceneFacts& facts) {
 }
 
 /// The scene as its new sidecar wants it shown.
-std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar& sidecar) {
+std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar& sidecar,
+                                          const std::optional<std::string>& text) {
   SceneHints hints = hints_of(entry.facts);
   use_sidecar(sidecar, entry.sidecar.filename().string(), hints);
   auto scene = std::make_shared<SceneEntry>(entry);
@@ -36,9 +39,13 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   scene->facts.limits_min = hints.limits.min;
   scene->facts.limits_max = hints.limits.max;
   scene->facts.focus = hints.focus;
-  scene->tours = read_tours(entry.sidecar);
+  scene->tours = tours_of(entry.sidecar, text);
   if (auto poster = make_poster(*scene->renderer, scene->facts)) scene->poster = std::move(poster);
   return scene;
+}
+
+Sidecar sidecar_in(const std::filesystem::path& file, std::string_view text) {
+  return read_sidecar(MemorySource(file.string(), std::as_bytes(std::span(text))));
 }
 
 HttpResponse tagged(int status, std::string text, std::string etag) {
@@ -77,18 +84,20 @@ void SidecarSaver::write(const SharedRequest& request) {
     return request->answer.set_value(text_response(400, fmt::format("400: {}\n", mistake.what())));
   }
   try {
-    const std::string current = sidecar_etag(file);
+    // Read once: another server may replace it meanwhile.
+    const std::optional<std::string> there = sidecar_text(file);
+    const std::string current = there ? etag_of(*there) : "";
     if (!request->precondition.holds(current)) {
       spdlog::info("scene {}: an author's sidecar was made from an older one than {}",
                    request->scene_id, file.string());
       return put_in_force(
-          request, current.empty() ? Sidecar() : read_sidecar(FileSource(file)),
+          request, there ? sidecar_in(file, *there) : Sidecar(), there,
           tagged(412, "412: somebody else saved this scene since you opened it\n", current));
     }
     replace_file(file, json);
     spdlog::info("scene {}: an author saved {} ({} bytes)", request->scene_id, file.string(),
                  json.size());
-    put_in_force(request, sidecar, tagged(200, "saved\n", etag_of(json)));
+    put_in_force(request, sidecar, json, tagged(200, "saved\n", etag_of(json)));
   } catch (const InputError& unwritable) {
     spdlog::warn("scene {}: an author cannot save: {}", request->scene_id, unwritable.what());
     request->answer.set_value(text_response(409, fmt::format("409: {}\n", unwritable.what())));
@@ -96,8 +105,8 @@ void SidecarSaver::write(const SharedRequest& request) {
 }
 
 void SidecarSaver::put_in_force(const SharedRequest& request, const Sidecar& sidecar,
-                                HttpResponse answer) {
-  auto scene = revised(*request->entry, sidecar);
+                                const std::optional<std::string>& text, HttpResponse answer) {
+  auto scene = revised(*request->entry, sidecar, text);
   boost::asio::post(io_, [this, request, scene = std::move(scene), answer = std::move(answer)] {
     scenes_.revise(request->scene_id, scene);
     request->answer.set_value(answer);

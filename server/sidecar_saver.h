@@ -2,6 +2,7 @@
 
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <boost/asio/io_context.hpp>
@@ -28,7 +29,8 @@ class SidecarSaver {
   /// Any thread. The answer comes when visitors get what was saved; whether the sender may save is
   /// the caller's to know. Where the sidecar that is there is not the one that `precondition` asks
   /// for, it stays, is put in force itself (another server may have written it), and the answer is
-  /// 412 with its tag.
+  /// 412 with its tag. Requests are taken one after the other; two servers over one folder that are
+  /// asked at the same moment may both find the old one, and the later one's stays.
   std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition);
 
  private:
@@ -41,8 +43,9 @@ class SidecarSaver {
   };
   using SharedRequest = std::shared_ptr<Request>;
   void write(const SharedRequest& request);
-  /// Answers when visitors get what the sidecar on the disk says.
-  void put_in_force(const SharedRequest& request, const Sidecar& sidecar, HttpResponse answer);
+  /// Answers when visitors get what the sidecar says. `text`: all of it; nothing: there is none.
+  void put_in_force(const SharedRequest& request, const Sidecar& sidecar,
+                    const std::optional<std::string>& text, HttpResponse answer);
 
   SceneLibrary& scenes_;
   boost::asio::io_context& io_;

@@ -32,11 +32,6 @@ bool is_file(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file, error);
 }
 
-std::string text_of(const std::filesystem::path& file) {
-  const std::vector<std::byte> bytes = FileSource(file).read_all(max_bytes);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 nlohmann::json sidecar_tours(const std::filesystem::path& sidecar, std::string_view text) {
   const MemorySource file(sidecar.string(), std::as_bytes(std::span(text)));
   const nlohmann::json document = read_json(file, max_bytes);
@@ -124,18 +119,23 @@ Sidecar check_sent_sidecar(std::string_view json) {
 }
 
 std::string read_tours(const std::filesystem::path& sidecar) {
+  return tours_of(sidecar, sidecar_text(sidecar));
+}
+
+std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text) {
   nlohmann::json document{
       {"tours", nullptr}, {"etag", nullptr}, {"settings", viewer_settings(sidecar)}};
-  if (is_file(sidecar)) {
-    const std::string text = text_of(sidecar);
-    document["tours"] = sidecar_tours(sidecar, text);
-    document["etag"] = etag_of(text);
+  if (text) {
+    document["tours"] = sidecar_tours(sidecar, *text);
+    document["etag"] = etag_of(*text);
   }
   return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-std::string sidecar_etag(const std::filesystem::path& sidecar) {
-  return is_file(sidecar) ? etag_of(text_of(sidecar)) : std::string();
+std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar) {
+  if (!is_file(sidecar)) return std::nullopt;
+  const std::vector<std::byte> bytes = FileSource(sidecar).read_all(max_bytes);
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
 }  // namespace catgs

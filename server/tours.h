@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -17,9 +18,11 @@ namespace catgs {
 /// that cannot be used was not written for us: it is logged. `sidecar`: its path, whether it is
 /// there or not.
 std::string read_tours(const std::filesystem::path& sidecar);
+/// The same where the sidecar has this text, or is not there.
+std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text);
 
-/// The tag of what is there now; empty: nothing.
-std::string sidecar_etag(const std::filesystem::path& sidecar);
+/// What is there now; nothing: no sidecar. Tag, hints and tours of one text belong together.
+std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);
 
 /// A sidecar that somebody sent. Stricter than what operators write: every field of its tours is
 /// one that pages know, of the right kind and within its bounds. Throws InputError naming it.

@@ -5,6 +5,7 @@
 
 #include "render_core/error.h"
 #include "render_core/scene/save_scene.h"
+#include "server/net/http.h"
 #include "tests/render_core/scene/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
@@ -24,7 +25,7 @@ TEST_F(Tours, AreEmptyWithoutFiles) {
   EXPECT_TRUE(read()["tours"].is_null());
   EXPECT_TRUE(read()["settings"].is_null());
   EXPECT_TRUE(read()["etag"].is_null());
-  EXPECT_EQ(sidecar_etag(folder_ / "museum.json"), "");
+  EXPECT_FALSE(sidecar_text(folder_ / "museum.json"));
 }
 
 TEST_F(Tours, ComeFromTheSidecarAndTheViewersSettings) {
@@ -32,9 +33,18 @@ TEST_F(Tours, ComeFromTheSidecarAndTheViewersSettings) {
   write("settings.json", R"({"version": 2, "animTracks": [], "annotations": [{"title": "Door"}]})");
   EXPECT_EQ(read()["tours"][0]["title"], "Hall");
   EXPECT_EQ(read()["settings"]["annotations"][0]["title"], "Door");
-  EXPECT_EQ(read()["etag"], sidecar_etag(folder_ / "museum.json"));
+  EXPECT_EQ(read()["etag"], etag_of(sidecar_text(folder_ / "museum.json").value()));
   write("museum.settings.json", R"({"version": 2, "animTracks": [1]})");
   EXPECT_EQ(read()["settings"]["animTracks"].size(), 1u) << "the scene's own come first";
+}
+
+TEST_F(Tours, OfATextAreThoseOfThatTextWhateverIsOnTheDisk) {
+  write("museum.json", R"({"tours": [{"title": "Hall"}]})");
+  const std::string newer(R"({"tours": [{"title": "Tower"}]})");
+  const auto document = nlohmann::json::parse(tours_of(folder_ / "museum.json", newer));
+  EXPECT_EQ(document["tours"][0]["title"], "Tower");
+  EXPECT_EQ(document["etag"], etag_of(newer));
+  EXPECT_TRUE(nlohmann::json::parse(tours_of(folder_ / "museum.json", {}))["tours"].is_null());
 }
 
 TEST_F(Tours, LeaveForeignAndBrokenSettingsAlone) {
