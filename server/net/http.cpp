@@ -47,8 +47,8 @@ std::string etag_of(std::string_view content) {
 }
 
 bool Precondition::holds(std::string_view current) const {
-  if (!if_match.empty()) return names_tag(if_match, current);
-  return if_none_match.empty() || !names_tag(if_none_match, current);
+  return (if_match.empty() || names_tag(if_match, current)) &&
+         (if_none_match.empty() || !names_tag(if_none_match, current));
 }
 
 bool origin_allowed(std::string_view origin, std::string_view host,

@@ -25,7 +25,9 @@ class LwsHttpExchange {
   int begin_upload(lws* wsi, std::optional<HttpResponse> refusal);
   /// A PUT request whose body is not wanted: it is answered now. What comes of the body is read and
   /// dropped, within bounds, because a connection that is closed with bytes unread is reset, and
-  /// then the client may not see the answer.
+  /// then the client may not see the answer. It is written at once and not when the socket is
+  /// writable, as headers always are: it is a line longer, nothing else is on its way on this
+  /// connection, and libwebsockets keeps what the socket does not take.
   int refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
                   std::vector<std::byte>& scratch);
   int take_body(std::string_view bytes);
@@ -53,7 +55,9 @@ class LwsHttpExchange {
   std::string body_;
   std::optional<HttpResponse> refusal_;
   std::optional<std::size_t> droppable_;  // bytes, of a body that is not wanted
-  bool body_due_ = false;                 // by the timer, which cannot be taken back
+  // By the timer. LWS_SET_TIMER_USEC_CANCEL does not take it back: lws_set_timer_usecs() of 4.1.6
+  // adds it to the time of day like any other, so that the timer fires at once.
+  bool body_due_ = false;
   std::future<HttpResponse> answer_;
 };
 

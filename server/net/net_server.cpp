@@ -130,6 +130,10 @@ int finish_request(lws* wsi, HttpSlot& slot) {
   return lws_http_transaction_completed(wsi) ? -1 : 0;
 }
 
+// Results of callbacks.
+constexpr int keep_reading = 0;
+constexpr int close_connection = -1;
+
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   forget(slot);
@@ -139,11 +143,12 @@ int on_request(lws* wsi, HttpSlot& slot) {
     if (bytes >= 1 && bytes <= max_upload_bytes)
       return slot.exchange->begin_upload(wsi, refuse_upload(wsi, site));
     const int status = bytes < 1 ? 411 : 413;
-    const int failed = slot.exchange->refuse_body(
-        wsi, text_response(status, fmt::format("{}: {}\n", status, upload_length_rule)),
-        site.policy, service_of(wsi).scratch);
+    if (slot.exchange->refuse_body(
+            wsi, text_response(status, fmt::format("{}: {}\n", status, upload_length_rule)),
+            site.policy, service_of(wsi).scratch) != 0)
+      return close_connection;
     const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
-    return body_follows ? failed : -1;
+    return body_follows ? keep_reading : close_connection;
   }
   if (!is_get_or_head(wsi)) {
     lws_return_http_status(wsi, 405, "only GET and HEAD are served here");

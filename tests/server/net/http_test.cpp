@@ -39,6 +39,8 @@ TEST(Precondition, IsAboutWhatIsThere) {
   EXPECT_TRUE((Precondition{"*", ""}.holds(tag)));
   EXPECT_FALSE((Precondition{"*", ""}.holds("")));
   EXPECT_TRUE((Precondition{"", "*"}.holds("")));
+  EXPECT_TRUE((Precondition{tag, "\"x\""}.holds(tag)));
+  EXPECT_FALSE((Precondition{tag, tag}.holds(tag))) << "both are asked";
   EXPECT_FALSE((Precondition{"", "*"}.holds(tag))) << "somebody was first";
   EXPECT_FALSE((Precondition{"", tag}.holds(tag)));
   EXPECT_TRUE((Precondition{"", "\"x\""}.holds(tag)));
