@@ -14,6 +14,7 @@
 #include "render_core/error.h"
 #include "render_core/tools/json_report.h"
 #include "tests/load/html_report.h"
+#include "tests/load/metrics.h"
 #include "tests/load/record.h"
 #include "tests/load/report.h"
 #include "tests/load/run_scenario.h"
@@ -257,6 +258,10 @@ int run_checked(const ProgramOptions& options) {
     const bool held = requirement.holds(outcome.metrics);
     fmt::print(stderr, "catgs-load: {}: {}\n", held ? "holds" : "requirement failed",
                requirement.explain(outcome.metrics));
+  }
+  if (outcome.requirements.empty() && value_of(outcome.metrics, "sessions_connected") == 0.0) {
+    fmt::print(stderr, "catgs-load: requirement failed: no session ever connected, see above\n");
+    return exit_requirement_failed;
   }
   return outcome.all_hold() ? 0 : exit_requirement_failed;
 }
