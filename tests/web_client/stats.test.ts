@@ -81,6 +81,13 @@ describe('the history', () => {
     const file = JSON.parse(history.to_json({ renderer: 'CPU' }, '2026-01-01')) as object;
     expect(file).toMatchObject({ made: '2026-01-01', renderer: 'CPU' });
   });
+
+  it('forgets what is older, however seldom somebody looks', () => {
+    const history = new StatsHistory();
+    const empty = new Metrics().snapshot(0);
+    for (let s = 0; s <= 600; s += 20) history.add(empty, 1000 * s);
+    expect(history.samples.map(({ time_s }) => time_s)).toEqual([500, 520, 540, 560, 580, 600]);
+  });
 });
 
 describe('metrics', () => {

@@ -1,14 +1,38 @@
 // What JavaScript holds after a collection, of a page or of its worker, through the DevTools protocol.
 import type { CDPSession } from 'playwright-core';
 
-/** Sends a command without parameters; resolves with its result. */
-export type SendCommand = (method: string) => Promise<unknown>;
+/** A page or a worker: one heap of V8. */
+export interface HeapOwner {
+  /** Sends a command without parameters; resolves with its result. */
+  send(method: string): Promise<unknown>;
+  /** Takes the pieces of heap snapshots from now on. */
+  take_chunks(take: (chunk: string) => void): void;
+}
+
+const chunk_event = 'HeapProfiler.addHeapSnapshotChunk';
+
+export function heap_of_page(page: CDPSession): HeapOwner {
+  let take: (chunk: string) => void = () => undefined;
+  page.on(chunk_event, ({ chunk }) => take(chunk));
+  return {
+    send: (method) => page.send(method as 'HeapProfiler.enable'),
+    take_chunks: (taker) => (take = taker),
+  };
+}
+
+interface Message {
+  readonly id?: number;
+  readonly method?: string;
+  readonly params?: { readonly chunk: string };
+  readonly result?: unknown;
+  readonly error?: unknown;
+}
 
 /**
- * Commands to the page's worker. Playwright's sessions speak to pages only, so that they travel inside
- * messages of the page's session.
+ * Of the page's worker. Playwright's sessions speak to pages only, so that what is said to a worker
+ * travels inside messages of the page's session.
  */
-export async function attach_to_worker(page: CDPSession): Promise<SendCommand> {
+export async function heap_of_worker(page: CDPSession): Promise<HeapOwner> {
   const attached = new Promise<string>((resolve) => {
     page.on('Target.attachedToTarget', ({ sessionId, targetInfo }) => {
       if (targetInfo.type === 'worker') resolve(sessionId);
@@ -20,30 +44,98 @@ export async function attach_to_worker(page: CDPSession): Promise<SendCommand> {
     flatten: false,
   });
   const session = await attached;
-  const waiting = new Map<number, (reply: { result?: unknown; error?: unknown }) => void>();
+  const waiting = new Map<number, (reply: Message) => void>();
+  let take: (chunk: string) => void = () => undefined;
   page.on('Target.receivedMessageFromTarget', ({ sessionId, message }) => {
     if (sessionId !== session) return;
-    const reply = JSON.parse(message) as { id?: number; result?: unknown; error?: unknown };
-    if (reply.id !== undefined) waiting.get(reply.id)?.(reply);
+    const said = JSON.parse(message) as Message;
+    if (said.id !== undefined) waiting.get(said.id)?.(said);
+    else if (said.method === chunk_event && said.params) take(said.params.chunk);
   });
   let last_id = 0;
-  return async (method) => {
-    const id = ++last_id;
-    const replied = new Promise<{ result?: unknown; error?: unknown }>((resolve) => {
-      waiting.set(id, resolve);
-    });
-    await page.send('Target.sendMessageToTarget', {
-      sessionId: session,
-      message: JSON.stringify({ id, method }),
-    });
-    const { result, error } = await replied;
-    waiting.delete(id);
-    if (error) throw new Error(`${method}: ${JSON.stringify(error)}`);
-    return result;
+  return {
+    send: async (method) => {
+      const id = ++last_id;
+      const replied = new Promise<Message>((resolve) => {
+        waiting.set(id, resolve);
+      });
+      await page.send('Target.sendMessageToTarget', {
+        sessionId: session,
+        message: JSON.stringify({ id, method }),
+      });
+      const { result, error } = await replied;
+      waiting.delete(id);
+      if (error) throw new Error(`${method}: ${JSON.stringify(error)}`);
+      return result;
+    },
+    take_chunks: (taker) => (take = taker),
   };
 }
 
-export async function heap_bytes(send: SendCommand): Promise<number> {
-  await send('HeapProfiler.collectGarbage');
-  return ((await send('Runtime.getHeapUsage')) as { usedSize: number }).usedSize;
+/** Of everything, compiled code included, which V8 makes and throws away as it sees fit. */
+export async function heap_bytes(heap: HeapOwner): Promise<number> {
+  await heap.send('HeapProfiler.collectGarbage');
+  return ((await heap.send('Runtime.getHeapUsage')) as { usedSize: number }).usedSize;
+}
+
+/** What scripts hold, by class. */
+export type Held = ReadonlyMap<string, { readonly count: number; readonly bytes: number }>;
+
+/** Kinds of nodes that scripts make; others are the engine's: code, shapes, what is behind the DOM. */
+const made_by_scripts = new Set([
+  ...['object', 'array', 'closure', 'number', 'bigint', 'string', 'concatenated string'],
+  ...['sliced string', 'regexp', 'symbol'],
+]);
+
+interface Snapshot {
+  readonly snapshot: {
+    readonly meta: {
+      readonly node_fields: readonly string[];
+      readonly node_types: readonly [readonly string[], ...unknown[]];
+    };
+  };
+  readonly nodes: readonly number[];
+  readonly strings: readonly string[];
+}
+
+/** By a heap snapshot, which collects what nobody holds before. */
+export async function held_by_scripts(heap: HeapOwner): Promise<Held> {
+  const chunks: string[] = [];
+  heap.take_chunks((chunk) => chunks.push(chunk));
+  await heap.send('HeapProfiler.takeHeapSnapshot');
+  heap.take_chunks(() => undefined);
+  const { snapshot, nodes, strings } = JSON.parse(chunks.join('')) as Snapshot;
+  const { node_fields: fields, node_types } = snapshot.meta;
+  const [type_at, name_at, size_at] = ['type', 'name', 'self_size'].map((f) => fields.indexOf(f));
+  const held = new Map<string, { count: number; bytes: number }>();
+  for (let i = 0; i < nodes.length; i += fields.length) {
+    const type = node_types[0][nodes[i + type_at!]!]!;
+    if (!made_by_scripts.has(type)) continue;
+    // The name of an object is its class, that of a string its text.
+    const is_named = type === 'object' || type === 'closure' || type === 'array';
+    const name = is_named ? `${type} ${strings[nodes[i + name_at!]!]}` : type;
+    const before = held.get(name) ?? { count: 0, bytes: 0 };
+    held.set(name, {
+      count: before.count + 1,
+      bytes: before.bytes + nodes[i + size_at!]!,
+    });
+  }
+  return held;
+}
+
+export const bytes_of = (held: Held): number =>
+  [...held.values()].reduce((sum, { bytes }) => sum + bytes, 0);
+
+/** The classes that grew most, for people. */
+export function what_grew(before: Held, after: Held): string {
+  return [...after]
+    .map(([name, { count, bytes }]) => {
+      const was = before.get(name) ?? { count: 0, bytes: 0 };
+      return { name, count: count - was.count, bytes: bytes - was.bytes };
+    })
+    .filter(({ bytes }) => bytes > 0)
+    .sort((a, b) => b.bytes - a.bytes)
+    .slice(0, 8)
+    .map(({ name, count, bytes }) => `${name} +${count} (${bytes} bytes)`)
+    .join(', ');
 }

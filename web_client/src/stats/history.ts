@@ -5,17 +5,23 @@ export interface Sample {
   readonly stats: StatsSnapshot;
 }
 
-const capacity = 480; // two minutes of four a second
+const span_s = 120;
+const capacity = 480; // four a second
 
-/** The statistics of the last minutes, for plots and for a file. */
+/**
+ * The statistics of the last two minutes, for plots and for a file. What is older goes by its age, not
+ * only by its number: who looks now and then would otherwise keep, and see, samples of an hour.
+ */
 export class StatsHistory {
   private samples_: Sample[] = [];
   private first_ms_: number | undefined;
 
   add(stats: StatsSnapshot, now_ms: number): void {
     this.first_ms_ ??= now_ms;
-    this.samples_.push({ time_s: (now_ms - this.first_ms_) / 1000, stats });
-    if (this.samples_.length > capacity) this.samples_.shift();
+    const time_s = (now_ms - this.first_ms_) / 1000;
+    this.samples_.push({ time_s, stats });
+    const first = this.samples_.findIndex((sample) => sample.time_s > time_s - span_s);
+    this.samples_.splice(0, Math.max(first, this.samples_.length - capacity));
   }
 
   get samples(): readonly Sample[] {
