@@ -30,6 +30,7 @@ class CreditWindow {
     std::size_t bytes = 0;
     std::size_t pixels = 0;  // that its decoder is judged by
     TimePoint sent;
+    bool still = false;  // large on purpose
   };
   /// What an acknowledgement settles.
   struct Settled {

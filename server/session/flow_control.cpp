@@ -61,7 +61,8 @@ void FlowControl::set_wish(const FlowWish& wish) {
 void FlowControl::sent(const SentFrame& frame, TimePoint now) {
   if (!frame.still) frame_size_px_ = frame.size_px;
   const auto pixels = frame.still ? 0 : static_cast<std::size_t>(frame.size_px.x) * frame.size_px.y;
-  credit_.sent({frame.frame_id, frame.bytes, pixels, now});
+  credit_.sent({frame.frame_id, frame.bytes, pixels, now, frame.still});
+  carried_by_ = std::max(carried_by_, now) + time_on_link(frame.bytes, now);
 }
 
 bool FlowControl::acknowledged(const Ack& ack, TimePoint now) {
@@ -86,6 +87,9 @@ void FlowControl::observe_network(const Ack& ack, const CreditWindow::Settled& s
   sample.finished_us = ack.received_us > 0 ? ack.received_us : server_us(now);
   sample.units = 8.0 * static_cast<double>(settled.bytes);
   sample.round_trip = settled.round_trip;
+  // Judged as a frame that takes an interval of a link which it fills.
+  if (settled.frame.still)
+    sample.own = time_on_link(settled.frame.bytes, now) - network_.target_delay();
   network_.add(sample, now);
 }
 
@@ -132,6 +136,7 @@ void FlowControl::forget_path() {
   network_.forget_path();
   decoder_.forget_path();
   link_ = {};
+  carried_by_ = {};
   apply_interval();
 }
 
@@ -153,6 +158,20 @@ bool FlowControl::may_send() const {
 
 int FlowControl::bitrate_kbps() const {
   return wish_.fixed_quality ? wish_.bitrate_kbps : static_cast<int>(network_.rate() * 1e-3);
+}
+
+int FlowControl::still_bitrate_kbps(TimePoint now) const {
+  return wish_.fixed_quality ? wish_.bitrate_kbps
+                             : static_cast<int>(network_.steady_rate(now) * 1e-3);
+}
+
+microseconds FlowControl::time_on_link(std::size_t bytes, TimePoint now) const {
+  const double ms = 8.0 * static_cast<double>(bytes) / still_bitrate_kbps(now);
+  return microseconds(static_cast<std::int64_t>(1e3 * ms));
+}
+
+microseconds FlowControl::standing(TimePoint then) const {
+  return std::max(std::chrono::duration_cast<microseconds>(carried_by_ - then), 0us);
 }
 
 microseconds FlowControl::frame_interval() const {

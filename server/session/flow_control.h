@@ -23,6 +23,11 @@ struct FlowWish {
   bool operator==(const FlowWish&) const = default;
 };
 
+/// Pictures that stay may each take a second's share at this rate of what the link carries, 77 ms:
+/// one that is sharp at once costs three quarters of the bytes of two that become so, and a camera
+/// that moves on still waits for less than 100 ms.
+inline constexpr int still_fps = 13;
+
 /// What one client may be sent, when, and how large: credit, the rates of its link and of its
 /// decoder, the rung of the ladder. It learns from acknowledgements and from what the kernel knows
 /// of the socket. Pure; not thread-safe.
@@ -57,6 +62,12 @@ class FlowControl {
   [[nodiscard]] bool may_send() const;
   /// What the encoder is to be told. The level of the stream allows the wish.
   [[nodiscard]] int bitrate_kbps() const;
+  /// The same of a picture that stays: it is larger, so that a guess would make a longer queue.
+  [[nodiscard]] int still_bitrate_kbps(TimePoint now) const;
+  /// Of so many bytes, as far as the link is known.
+  [[nodiscard]] std::chrono::microseconds time_on_link(std::size_t bytes, TimePoint now) const;
+  /// What of all that was sent the link will not have carried by then.
+  [[nodiscard]] std::chrono::microseconds standing(TimePoint then) const;
   [[nodiscard]] const Rung& rung() const { return ladder_.rung(); }
   [[nodiscard]] std::size_t steps_down() const { return ladder_.steps_down(); }
   /// Between starts of frames, for the rung and the decoder.
@@ -83,6 +94,7 @@ class FlowControl {
   std::chrono::microseconds real_interval_{0};
   LinkState link_;
   TimePoint link_seen_{};
+  TimePoint carried_by_{};  // all that was sent
   double pose_to_photon_us_ = 0.0;
 };
 

@@ -24,6 +24,7 @@ constexpr std::size_t least_remembered = 3;  // frames of a slow link are furthe
 constexpr std::size_t most_remembered = 64;
 constexpr auto longest_step = 100ms;
 constexpr auto silence = 1s;
+constexpr auto busy_holds = 10s;
 constexpr double restart_share = 0.25;
 constexpr int futile_back_offs = 5;
 constexpr double hardly_shorter = 0.8;
@@ -64,6 +65,7 @@ void RateController::forget_path() {
   queue_ = {};
   last_add_ = {};
   hold_until_ = {};
+  last_back_off_ = {};
   back_offs_in_a_row_ = 0;
 }
 
@@ -75,7 +77,8 @@ std::int64_t RateController::queue_of(const Sample& sample, TimePoint now) {
     const std::int64_t excess_us = *sample.delays_us[i] - *base_[i].value();
     queue_us = std::min(excess_us, queue_us.value_or(excess_us));
   }
-  return std::min(queue_us.value_or(0), longest_queue_us);
+  const std::int64_t own_us = std::max<std::int64_t>(0, sample.own.count());
+  return std::clamp<std::int64_t>(queue_us.value_or(0) - own_us, 0, longest_queue_us);
 }
 
 void RateController::remember(const Sample& sample, std::int64_t queue_us, TimePoint now) {
@@ -84,6 +87,11 @@ void RateController::remember(const Sample& sample, std::int64_t queue_us, TimeP
          (recent_.size() > most_remembered || now - recent_.front().acknowledged > memory))
     recent_.pop_front();
   queue_ = microseconds(std::ranges::min(recent_, {}, &Passed::queue_us).queue_us);
+}
+
+double RateController::steady_rate(TimePoint now) const {
+  const bool known = last_back_off_ != TimePoint{} && now - last_back_off_ < busy_holds;
+  return known ? std::clamp(passed_when_busy_, limits_.least, rate_) : rate_;
 }
 
 std::optional<double> RateController::delivered() const {
@@ -112,7 +120,8 @@ std::optional<double> RateController::delivered() const {
 void RateController::back_off(const Sample& sample, TimePoint now) {
   const auto passed = delivered();
   if (!passed) return;
-  capacity_ = *passed;
+  capacity_ = passed_when_busy_ = *passed;
+  last_back_off_ = now;
   rate_ = std::min(rate_, *passed * (queue_ > long_queue ? long_queue_share : back_off_share));
   clamp_rate();
   hold_until_ = now + sample.round_trip + memory / 2;

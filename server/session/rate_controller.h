@@ -44,6 +44,7 @@ class RateController {
     std::int64_t finished_us = 0;  // when it arrived there, on the receiver's clock
     double units = 0.0;
     std::chrono::microseconds round_trip{0};  // until a change of the rate shows
+    std::chrono::microseconds own{0};  // of the delay, what is no queue: it was large on purpose
   };
 
   explicit RateController(const Limits& limits) : limits_(limits), rate_(limits.start) {}
@@ -56,6 +57,10 @@ class RateController {
   void forget_path();
 
   [[nodiscard]] double rate() const { return rate_; }  // units per second
+  /// What surely passes: no more than passed when the stage was last known to be busy, unless that
+  /// is long ago. The rate itself finds out what passes by going half again as far at times.
+  [[nodiscard]] double steady_rate(TimePoint now) const;
+  [[nodiscard]] std::chrono::microseconds target_delay() const { return target_; }
   /// What stands in front of the stage, least of the last 200 ms.
   [[nodiscard]] std::chrono::microseconds queue_delay() const { return queue_; }
   /// What has passed lately, units per second; nothing when that is not known.
@@ -81,6 +86,8 @@ class RateController {
   std::deque<Passed> recent_;
   std::chrono::microseconds queue_{0};
   std::optional<double> capacity_;  // what passed when the stage was last known to be busy
+  double passed_when_busy_ = 0.0;   // the same, kept however far the rate has grown since
+  TimePoint last_back_off_{};
   TimePoint last_add_{};
   TimePoint hold_until_{};  // what is on its way was sent at the rate before
   int back_offs_in_a_row_ = 0;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/session/encoder_effort.h"
 #include "server/session/same_view.h"
 #include "server/session/session.h"
 
@@ -12,14 +13,17 @@ using namespace std::chrono_literals;
 
 constexpr int max_failures_in_a_row = 3;
 
-// A still has the share of a frame at this rate of what the link carries, and what sharpens it has
-// three quarters of that: a queue that the motion left goes down meanwhile, as it has to be short
-// when the camera moves on.
-constexpr int still_fps = 30;
-constexpr int refinement_fps = 40;
+// How soon one picture that stays may follow the other: once the link has carried it, and a quarter
+// of that time later, so that what stands in line goes.
+constexpr double still_pause = 1.25;
+constexpr auto least_still_gap = 25ms;
+constexpr double least_still_share = 0.3;  // where another queue stands in front of it
 // JPEGs do not add up: each may be twice as large as the one before, down to a quarter of a second.
 constexpr int last_jpeg_fps = 4;
-constexpr int jpeg_refinements = 3;
+constexpr int jpeg_refinements = 2;
+// A still of less effort is no saving: of libx264's ultrafast 54 kB show what 37 of superfast do.
+constexpr int least_still_preset = 2;
+static_assert(effort_presets[least_still_preset].name == "superfast");
 // More can hardly be seen, however much the link carries. A rendered city has 45 dB with 1.
 constexpr double still_bits_per_pixel = 1.5;
 
@@ -57,13 +61,18 @@ std::optional<FrameCandidate> Session::next_frame() const {
   return frame;
 }
 
-/// A still of the same size needs no encoder of its own.
+/// A still of the same size needs no encoder of its own, and what sharpens it goes on in its
+/// stream, however moving pictures are to be encoded by now.
 EncoderSettings Session::encoding_at(bool rest) const {
-  EncoderSettings encoding = encoding_;
   const glm::ivec2 size_px = still_size_px();
+  if (rest && encoded_as_ && encoded_as_->size_px == size_px) return *encoded_as_;
+  EncoderSettings encoding = encoding_;
   if (!rest || size_px == encoding.size_px) return encoding;
+  EncoderEffort effort = admission_.effort;
+  effort.preset = std::max(effort.preset, least_still_preset);
+  apply(effort, encoding);
   encoding.size_px = size_px;
-  encoding.fps = std::min(encoding.fps, refinement_fps);  // for a level that decoders take
+  encoding.fps = std::min(encoding.fps, still_fps);  // the VBV that its first picture finds filled
   return encoding;
 }
 
@@ -118,12 +127,14 @@ void Session::limit(FrameOrder& order, TimePoint now) {
   }
   pace_.rests();
   const int done = refinements - refinements_left_;
-  const int jpeg_fps = std::max(still_fps >> done, last_jpeg_fps);
-  const int pace_fps = std::min(h264 ? still_fps : jpeg_fps, order.encoding.fps);
-  order.real_fps = h264 && done > 0 ? std::min(refinement_fps, order.encoding.fps) : pace_fps;
-  const std::chrono::microseconds interval(1'000'000 / pace_fps);
-  next_refinement_ = now + interval;
+  const int share_fps = h264 ? still_fps : std::max(still_fps >> done, last_jpeg_fps);
+  order.real_fps = std::min(share_fps, order.encoding.fps);
+  const std::chrono::microseconds interval(1'000'000 / order.real_fps);
   flow_.set_real_interval(interval);
+  const TimePoint sent = now + (order.ticket.refined ? cost_.refinement() : cost_.still());
+  const std::chrono::duration<double> in_line = flow_.standing(sent);
+  const double share = std::max(least_still_share, 1.0 - in_line / interval);
+  order.bitrate_kbps = static_cast<int>(share * flow_.still_bitrate_kbps(now));
   const glm::dvec2 size_px = order.encoding.size_px;
   const double enough_kbps = 1e-3 * still_bits_per_pixel * size_px.x * size_px.y * order.real_fps;
   order.bitrate_kbps =
@@ -143,7 +154,15 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   if (ticket.speculated) shown_is_passing_ = true;
   if (result.sharp) refinements_left_ = 0;
   tell_config(result, now);
-  flow_.sent({ticket.frame_id, result.frame.bitstream.size(), ticket.size_px, ticket.still}, now);
+  const std::size_t bytes = result.frame.bitstream.size();
+  if (ticket.still) {
+    const std::chrono::duration<double> passing = flow_.time_on_link(bytes, now);
+    next_refinement_ =
+        now +
+        std::max<Clock::duration>(
+            least_still_gap, std::chrono::duration_cast<Clock::duration>(still_pause * passing));
+  }
+  flow_.sent({ticket.frame_id, bytes, ticket.size_px, ticket.still}, now);
   const auto dropped = host_.send(std::move(result.frame));
   for (const std::uint64_t id : dropped) flow_.lost(id);
   if (dropped.empty()) return;

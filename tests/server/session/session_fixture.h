@@ -99,12 +99,13 @@ class SessionTest : public testing::Test {
     result.ok = true;
     result.frame.ticket = order.ticket;
     result.frame.ticket.idr = order.force_idr;
-    result.frame.bitstream.resize(100);
+    const std::size_t bytes = order.ticket.still ? still_bytes : 100;
+    result.frame.bitstream.resize(bytes);
     result.codec_string = "avc1.42C01F";
     result.sharp = sharp;
     const bool dropped = std::ranges::count(host.drop_next, order.ticket.frame_id) > 0;
     session.on_frame(std::move(result), now);
-    if (!dropped) session.on_frame_sent(order.ticket, 100);
+    if (!dropped) session.on_frame_sent(order.ticket, bytes);
   }
   void ack(std::uint64_t id, std::uint32_t pose_age_us = 0) {
     Ack message;
@@ -115,6 +116,7 @@ class SessionTest : public testing::Test {
   }
 
   bool sharp = false;  // what the encoder says of its pictures
+  std::size_t still_bytes = 100;
   TimePoint now = TimePoint{} + 1h;
   SessionPolicy policy;
   FakeHost host;

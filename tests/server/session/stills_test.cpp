@@ -176,15 +176,33 @@ TEST_F(StillTest, PosesThatComeSlowlyAreNoRest) {
 TEST_F(StillTest, TakesAShareOfTheLinkThatKeepsQueuesShort) {
   greet(small_in_motion());
   for (int i = 0; i < 30; ++i) moved();
+  still_bytes = 60'000;
   const FrameOrder still = rested();
-  EXPECT_EQ(still.real_fps, 30);
-  const int refined_fps = [&] {
-    now += 70ms;
-    return shown().real_fps;
-  }();
-  EXPECT_EQ(refined_fps, 40) << "while one follows the other at 30: what stands in line goes";
+  EXPECT_EQ(still.real_fps, 13);
   EXPECT_LE(still.bitrate_kbps, session.flow().bitrate_kbps());
   EXPECT_LE(still.bitrate_kbps / still.real_fps, 1.5e-3 * 1280 * 720) << "enough is enough";
+  const auto passing = session.flow().time_on_link(still_bytes, now);
+  now += passing;
+  EXPECT_FALSE(frame_is_due()) << "the link has only just carried it";
+  now += passing / 4;
+  ASSERT_TRUE(frame_is_due()) << "and what stood in front of it";
+  EXPECT_EQ(shown().real_fps, 13);
+}
+
+TEST_F(StillTest, WhatSharpensItGoesOnInItsStream) {
+  greet(small_in_motion());
+  session.use_effort({.preset = 0, .threads = 2});
+  moved();
+  const FrameOrder still = rested();
+  EXPECT_EQ(still.encoding.x264_preset, "superfast") << "less effort would cost more bytes";
+  session.use_effort({.preset = 2, .threads = 1});
+  now += 70ms;
+  ASSERT_TRUE(frame_is_due());
+  const FrameOrder refinement = shown();
+  EXPECT_TRUE(refinement.ticket.refined);
+  EXPECT_FALSE(refinement.force_idr);
+  EXPECT_EQ(refinement.encoding, still.encoding);
+  EXPECT_EQ(moved().encoding.threads, 1);
 }
 
 TEST_F(StillTest, JpegsGrowUntilTheyAreSharp) {
@@ -193,8 +211,8 @@ TEST_F(StillTest, JpegsGrowUntilTheyAreSharp) {
   say_hello(small_in_motion());
   session.on_stream_opened({true, "", Codec::mjpeg, "", "mjpeg"}, now);
   moved();
-  EXPECT_EQ(rested().real_fps, 30);
-  for (const int fps : {15, 7, 4}) {
+  EXPECT_EQ(rested().real_fps, 13);
+  for (const int fps : {6, 4}) {
     now += 300ms;
     ASSERT_TRUE(frame_is_due());
     EXPECT_EQ(shown().real_fps, fps);
