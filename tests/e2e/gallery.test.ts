@@ -96,6 +96,12 @@ const states: Readonly<Record<string, State>> = {
       await expect.poll(() => page.locator('.uplot canvas').count(), { timeout: 20_000 }).toBe(3);
     },
   },
+  'statistics-at-rest': {
+    reach: async (page) => {
+      await panel('Statistics')(page);
+      await page.getByText('The camera rests').waitFor();
+    },
+  },
   notice: {
     script: (peer, body) => {
       stream(peer, body);

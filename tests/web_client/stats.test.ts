@@ -5,7 +5,7 @@ import { StatsHistory } from '#client/stats/history';
 import { Metrics } from '#client/stats/metrics';
 import { PoseAge } from '#client/stats/pose_age';
 import { percentile, TimeWindow } from '#client/stats/window';
-import { slowest_stage, stats_rows } from '#client/ui/stats_panel';
+import { rest_note, row_texts, slowest_stage, stats_rows } from '#client/ui/stats_panel';
 import { FrameHeaderSchema } from '#client/wire/wire';
 
 const ms = 1000;
@@ -19,6 +19,8 @@ describe('TimeWindow', () => {
     expect(window.values(101)).toEqual([2]);
     for (let i = 0; i < 10; ++i) window.push(110, i);
     expect(window.values(110)).toEqual([7, 8, 9]);
+    expect(window.values(1000)).toEqual([]);
+    expect(window.newest()).toEqual([7, 8, 9]);
   });
 });
 
@@ -140,6 +142,28 @@ describe('metrics', () => {
     expect(metrics.snapshot(300 * ms).stages_ms.render).toBe(12);
   });
 
+  it('measure no stage at all by the first picture of a pose that is drawn at rest', () => {
+    const metrics = new Metrics();
+    const { header, ...rest } = frame(1n, 0, 20 * ms);
+    metrics.presented({ ...rest, header: { ...header, still: true } }, 30 * ms);
+    expect(new Set(Object.values(metrics.snapshot(40 * ms).stages_ms))).toEqual(new Set([NaN]));
+  });
+
+  it('keep what the last motion was like, through a rest of any length', () => {
+    const metrics = new Metrics();
+    metrics.pose_sent(1n, 0);
+    metrics.presented(frame(1n, 0, 20 * ms), 30 * ms);
+    const at_rest = metrics.snapshot(3600e6);
+    expect(at_rest.stages_ms.network).toBeNaN();
+    expect(at_rest.motion_to_photon_ms.p50).toBeNaN();
+    expect(at_rest.last_motion).toMatchObject({
+      motion_to_photon_ms: { p50: 30, p95: 30 },
+      stages_ms: { render: 12, network: 8, decode: 2, present: 8 },
+      window: 4,
+      sub_share: 0,
+    });
+  });
+
   it('say so when nothing was measured', () => {
     const stats = new Metrics().snapshot(0);
     expect(stats.fps_shown).toBe(0);
@@ -181,6 +205,33 @@ describe('statistics panel', () => {
       Picture: '640 × 360',
     });
     expect(slowest_stage(metrics.snapshot(220 * ms).stages_ms)).toBe('render');
+  });
+
+  it('tells of the last motion while the camera rests', () => {
+    const metrics = new Metrics();
+    expect(rest_note(metrics.snapshot(0))).toBe('');
+    metrics.presented(frame, 220 * ms);
+    const moving = metrics.snapshot(220 * ms);
+    expect(rest_note(moving)).toBe('');
+    expect(row_texts(moving).some(({ kept }) => kept)).toBe(false);
+    const resting = metrics.snapshot(3600e6);
+    expect(rest_note(resting)).toMatch(/last motion/);
+    const rows = Object.fromEntries(
+      row_texts(resting).map((row, i) => [stats_rows[i]!.label, row] as const),
+    );
+    expect(rows).toMatchObject({
+      Shown: { text: '0.0 fps', kept: false },
+      Render: { text: '133.0 ms', kept: true },
+      Network: { text: '7.0 ms', kept: true },
+      Display: { text: '8.0 ms', kept: true },
+      'Pose age': { text: '–', kept: false },
+    });
+  });
+
+  it('says how to measure where the camera has not moved', () => {
+    const metrics = new Metrics();
+    metrics.presented({ ...frame, header: { ...frame.header, still: true } }, 220 * ms);
+    expect(rest_note(metrics.snapshot(230 * ms))).toMatch(/move it/);
   });
 
   it('shows one dash for what was not measured', () => {

@@ -182,6 +182,8 @@ export const text = {
     drops: 'Drops',
     drops_title: 'Frames that arrived and were never shown; packets that the server never sent',
     drops_value: (here: number, server: number): string => `${here} here, ${server} at the server`,
+    at_rest: 'The camera rests: paler values are of its last motion.',
+    not_moved: 'The camera rests: move it to see how long pictures take.',
     renderer: 'Renderer',
     encoder: 'Encoder',
     presenter: 'Presenter',
@@ -246,5 +248,9 @@ export const text = {
     link_copied: 'The link is in the clipboard.',
     code_copied: 'The code is in the clipboard.',
     copy_yourself: 'Copy it from the field above.',
+    no_frames:
+      'Browsers show it in no other site yet: the server has to name that site with --embed-origin.',
+    frames: (sites: string): string =>
+      `Browsers show it in pages of ${sites} only: the server names them with --embed-origin.`,
   },
 } as const;

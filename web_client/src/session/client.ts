@@ -1,8 +1,8 @@
 // The page's end of the worker.
-import type { StatsSnapshot } from '../stats/metrics';
+import type { StatsReport } from '../stats/metrics';
 import type { FromWorker, Snapshot, ToWorker } from './messages';
 
-type Answer = StatsSnapshot | Snapshot | undefined;
+type Answer = StatsReport | Snapshot | undefined;
 type Said = Exclude<FromWorker, { kind: 'stats' } | { kind: 'snapshot' }>;
 
 export class WorkerClient {
@@ -29,8 +29,8 @@ export class WorkerClient {
     this.worker_.postMessage(message, transfer);
   }
 
-  stats(): Promise<StatsSnapshot> {
-    return this.ask('get_stats') as Promise<StatsSnapshot>;
+  stats(): Promise<StatsReport> {
+    return this.ask('get_stats') as Promise<StatsReport>;
   }
 
   /** Undefined before the first picture. */

@@ -6,7 +6,7 @@ import type { PresenterChoice } from '../present/make_presenter';
 import type { ShownView } from '../present/display';
 import type { CameraSample, Eye, Sides } from '../present/warp';
 import type { WarpMode } from '../present/warp_policy';
-import type { StatsSnapshot } from '../stats/metrics';
+import type { StatsReport } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
 import type { SessionState } from './state';
 
@@ -81,6 +81,6 @@ export type FromWorker =
   /** The decoders are at their end: the stream is asked for as JPEG pictures. */
   | { kind: 'fallback'; message: string }
   | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }
-  | { kind: 'stats'; request: number; stats: StatsSnapshot }
+  | { kind: 'stats'; request: number; stats: StatsReport }
   | { kind: 'snapshot'; request: number; snapshot: Snapshot | undefined }
   | { kind: 'broken'; message: string };

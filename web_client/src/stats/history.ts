@@ -1,4 +1,4 @@
-import type { StatsSnapshot } from './metrics';
+import type { Motion, StatsReport, StatsSnapshot } from './metrics';
 
 export interface Sample {
   readonly time_s: number; // since the first one
@@ -16,7 +16,9 @@ export class StatsHistory {
   private samples_: Sample[] = [];
   private first_ms_: number | undefined;
 
-  add(stats: StatsSnapshot, now_ms: number): void {
+  add(report: StatsReport, now_ms: number): void {
+    const stats: StatsSnapshot & { last_motion?: Motion } = { ...report };
+    delete stats.last_motion; // an earlier sample has it
     this.first_ms_ ??= now_ms;
     const time_s = (now_ms - this.first_ms_) / 1000;
     this.samples_.push({ time_s, stats });

@@ -9,14 +9,12 @@ export interface Percentiles {
   readonly p95: number;
 }
 
-/** Over the last seconds; NaN where nothing was measured. */
-export interface StatsSnapshot {
-  readonly fps_shown: number;
+/** How pictures of a moving camera came; NaN where nothing was measured. */
+export interface Motion {
   /** Presented minus pose sample time, of the first picture of each pose. */
   readonly motion_to_photon_ms: Percentiles;
   readonly pose_age_ms: Percentiles;
-  readonly bitrate_kbps: number;
-  /** Means over frames of a moving camera, from the server's header and the client's clock. */
+  /** Means over frames, from the server's header and the client's clock. */
   readonly stages_ms: {
     readonly wait: number;
     readonly render: number;
@@ -29,6 +27,12 @@ export interface StatsSnapshot {
   /** Sub-frames promised by key frames, in the mean over frames; share of frames that are sub-frames. */
   readonly window: number;
   readonly sub_share: number;
+}
+
+/** Over the last seconds; NaN where nothing was measured. */
+export interface StatsSnapshot extends Motion {
+  readonly fps_shown: number;
+  readonly bitrate_kbps: number;
   readonly width_px: number;
   readonly height_px: number;
   readonly frames_shown: number; // since the page was opened
@@ -36,6 +40,11 @@ export interface StatsSnapshot {
   readonly packets_dropped: number; // never sent by the server
   readonly server_fps: number;
   readonly sessions: number;
+}
+
+/** What is measured now, and what was when the camera moved last. */
+export interface StatsReport extends StatsSnapshot {
+  readonly last_motion: Motion;
 }
 
 const rate_span_us = 2e6;
@@ -51,7 +60,7 @@ export class Metrics {
     render: new TimeWindow(rate_span_us),
     encode: new TimeWindow(rate_span_us),
     send: new TimeWindow(rate_span_us),
-    network: new TimeWindow(latency_span_us),
+    network: new TimeWindow(rate_span_us),
     decode: new TimeWindow(rate_span_us),
     present: new TimeWindow(rate_span_us),
   };
@@ -85,13 +94,13 @@ export class Metrics {
     if (header.poseId > 0n && header.poseId !== this.last_pose_id_) {
       this.motion_us_.push(now_us, now_us - pose_time_us);
       this.pose_age_.shown(header.poseId, pose_time_us, now_us);
-      const server_us = header.waitUs + header.renderUs + header.encodeUs + header.sendWaitUs;
-      this.stages_us_.network.push(now_us, frame.received_us - pose_time_us - server_us);
+      // Late on purpose, and of another size perhaps, is what is drawn at rest.
+      if (!header.still) this.stages_us_.network.push(now_us, network_us(frame));
       this.windows_.push(now_us, header.window);
       this.subs_.push(now_us, header.speculated ? 1 : 0);
     }
     this.last_pose_id_ = header.poseId;
-    if (header.still) return; // late on purpose, and of another size perhaps
+    if (header.still) return;
     const stages = this.stages_us_;
     stages.wait.push(now_us, header.waitUs);
     stages.render.push(now_us, header.renderUs);
@@ -109,23 +118,37 @@ export class Metrics {
     this.server_ = stats;
   }
 
-  snapshot(now_us: number): StatsSnapshot {
+  snapshot(now_us: number): StatsReport {
     const per_second = 1e6 / rate_span_us;
+    return {
+      ...this.motion((window) => window.values(now_us)),
+      fps_shown: this.shown_.values(now_us).length * per_second,
+      bitrate_kbps: (sum(this.bytes_.values(now_us)) * 8 * per_second) / 1000,
+      width_px: this.size_px_[0],
+      height_px: this.size_px_[1],
+      frames_shown: this.frames_shown_,
+      frames_dropped: this.frames_dropped_,
+      packets_dropped: this.server_?.droppedPackets ?? 0,
+      server_fps: this.server_?.fps ?? NaN,
+      sessions: this.server_?.sessions ?? 0,
+      last_motion: this.motion((window) => window.newest()),
+    };
+  }
+
+  private motion(of: (window: TimeWindow | PoseAge) => readonly number[]): Motion {
     const mean = (window: TimeWindow): number => {
-      const values = window.values(now_us);
+      const values = of(window);
       return sum(values) / values.length;
     };
     const mean_ms = (window: TimeWindow): number => mean(window) / 1000;
-    const percentiles_ms = (values: readonly number[]): Percentiles => ({
-      p50: percentile(values, 0.5) / 1000,
-      p95: percentile(values, 0.95) / 1000,
-    });
+    const percentiles_ms = (window: TimeWindow | PoseAge): Percentiles => {
+      const values = of(window);
+      return { p50: percentile(values, 0.5) / 1000, p95: percentile(values, 0.95) / 1000 };
+    };
     const stages = this.stages_us_;
     return {
-      fps_shown: this.shown_.values(now_us).length * per_second,
-      motion_to_photon_ms: percentiles_ms(this.motion_us_.values(now_us)),
-      pose_age_ms: percentiles_ms(this.pose_age_.values(now_us)),
-      bitrate_kbps: (sum(this.bytes_.values(now_us)) * 8 * per_second) / 1000,
+      motion_to_photon_ms: percentiles_ms(this.motion_us_),
+      pose_age_ms: percentiles_ms(this.pose_age_),
       stages_ms: {
         wait: mean_ms(stages.wait),
         render: mean_ms(stages.render),
@@ -137,13 +160,12 @@ export class Metrics {
       },
       window: mean(this.windows_),
       sub_share: mean(this.subs_),
-      width_px: this.size_px_[0],
-      height_px: this.size_px_[1],
-      frames_shown: this.frames_shown_,
-      frames_dropped: this.frames_dropped_,
-      packets_dropped: this.server_?.droppedPackets ?? 0,
-      server_fps: this.server_?.fps ?? NaN,
-      sessions: this.server_?.sessions ?? 0,
     };
   }
+}
+
+/** There and back: from pose to picture, less what the server had of it. */
+function network_us({ header, received_us }: Frame): number {
+  const server_us = header.waitUs + header.renderUs + header.encodeUs + header.sendWaitUs;
+  return received_us - Number(header.poseClientTimeUs) - server_us;
 }

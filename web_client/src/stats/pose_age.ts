@@ -42,6 +42,11 @@ export class PoseAge {
     return this.ages_us_.values(now_us);
   }
 
+  /** Of the last seconds in which there was something to be late with. */
+  newest(): readonly number[] {
+    return this.ages_us_.newest();
+  }
+
   /** Adds the ticks since the last call; the shown picture was the same at all of them. */
   private advance(now_us: number): void {
     const newer = this.sent_[0];

@@ -1,4 +1,7 @@
-/** Time-stamped values of the last `span_us`, oldest first; at most `capacity` of them. */
+/**
+ * Time-stamped values, oldest first: those of the last `span_us` before the newest; at most `capacity`
+ * of them.
+ */
 export class TimeWindow {
   private times_us_: number[] = [];
   private values_: number[] = [];
@@ -11,21 +14,25 @@ export class TimeWindow {
   push(time_us: number, value: number): void {
     this.times_us_.push(time_us);
     this.values_.push(value);
-    this.trim(time_us);
+    const first = Math.max(this.first_at(time_us), this.values_.length - this.capacity_);
+    if (first === 0) return;
+    this.times_us_.splice(0, first);
+    this.values_.splice(0, first);
   }
 
   /** Values that are not older than the span at `now_us`. */
   values(now_us: number): readonly number[] {
-    this.trim(now_us);
+    return this.values_.slice(this.first_at(now_us));
+  }
+
+  /** Values of the span that ended with the newest, however long ago that was. */
+  newest(): readonly number[] {
     return this.values_;
   }
 
-  private trim(now_us: number): void {
-    let first = Math.max(0, this.values_.length - this.capacity_);
-    while (first < this.times_us_.length && this.times_us_[first]! < now_us - this.span_us_) ++first;
-    if (first === 0) return;
-    this.times_us_.splice(0, first);
-    this.values_.splice(0, first);
+  private first_at(now_us: number): number {
+    const first = this.times_us_.findIndex((time_us) => time_us >= now_us - this.span_us_);
+    return first < 0 ? this.times_us_.length : first;
   }
 }
 

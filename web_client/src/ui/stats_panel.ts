@@ -1,5 +1,5 @@
 import { StatsHistory } from '../stats/history';
-import type { StatsSnapshot } from '../stats/metrics';
+import type { StatsReport, StatsSnapshot } from '../stats/metrics';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
 import type { StatsCharts } from './stats_charts';
@@ -82,11 +82,28 @@ export const stats_rows: readonly Row[] = [
   },
 ];
 
+/** What the rows say: at rest nothing is measured, and what was measured last stays to be read. */
+export function row_texts(stats: StatsReport): { readonly text: string; readonly kept: boolean }[] {
+  return stats_rows.map((row) => {
+    const now = row.text(stats);
+    if (now !== nothing) return { text: now, kept: false };
+    const last = row.text({ ...stats, ...stats.last_motion });
+    return { text: last, kept: last !== nothing };
+  });
+}
+
+/** Why some rows are paler, or have nothing; empty while the camera moves. */
+export function rest_note({ frames_shown, stages_ms, last_motion }: StatsReport): string {
+  if (frames_shown === 0 || Number.isFinite(stages_ms.render)) return '';
+  return Number.isFinite(last_motion.stages_ms.render) ? text.stats.at_rest : text.stats.not_moved;
+}
+
 /** The statistics overlay. Reads nothing and draws nothing while it is hidden. */
 export class StatsPanel {
   private readonly values_: HTMLElement[] = [];
   private readonly facts_: Record<keyof Facts, HTMLElement>;
   private readonly history_ = new StatsHistory();
+  private readonly rest_ = document.createElement('p');
   private readonly plots_ = document.createElement('div');
   private charts_: StatsCharts | undefined;
   private shown_facts_: Facts | undefined;
@@ -111,12 +128,13 @@ export class StatsPanel {
       presenter: fact(text.stats.presenter),
       server_version: fact(text.stats.server_version),
     };
+    this.rest_.hidden = true;
     this.plots_.className = 'plots';
     const save = document.createElement('button');
     save.type = 'button';
     save.textContent = text.stats.save;
     save.addEventListener('click', () => this.save());
-    by_id('stats-panel', HTMLElement).append(list, this.plots_, about, save);
+    by_id('stats-panel', HTMLElement).append(this.rest_, list, this.plots_, about, save);
   }
 
   show_facts(facts: Facts): void {
@@ -126,17 +144,19 @@ export class StatsPanel {
     }
   }
 
-  show(stats: StatsSnapshot): void {
+  show(stats: StatsReport): void {
     this.history_.add(stats, performance.now());
-    const slowest = slowest_stage(stats.stages_ms);
-    stats_rows.forEach((row, i) => {
-      const value = this.values_[i]!;
-      const measured_now = row.text(stats);
-      // At rest nothing is measured: what was measured last stays to be read, paler.
-      const is_kept = measured_now === nothing && value.textContent !== '';
-      value.classList.toggle('kept', is_kept);
-      if (!is_kept) value.textContent = measured_now;
-      if (slowest) value.classList.toggle('slowest', row.stage === slowest);
+    const note = rest_note(stats);
+    this.rest_.hidden = note === '';
+    if (this.rest_.textContent !== note) this.rest_.textContent = note;
+    const { stages_ms } = note === '' ? stats : stats.last_motion;
+    const slowest = slowest_stage(stages_ms);
+    row_texts(stats).forEach(({ text: value, kept }, i) => {
+      const cell = this.values_[i]!;
+      cell.textContent = value;
+      cell.classList.toggle('kept', kept);
+      const { stage } = stats_rows[i]!;
+      cell.classList.toggle('slowest', stage !== undefined && stage === slowest);
     });
     this.charts_?.show(this.history_);
     if (!this.opened_) void this.load_charts();
