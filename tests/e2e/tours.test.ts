@@ -90,7 +90,7 @@ describe('a tour', () => {
     await page.getByText('A walk through the city').first().waitFor();
     const start = await pose_of(page);
     await page.getByRole('button', { name: 'Next stop' }).click();
-    await page.getByText('as a bird sees it').waitFor();
+    await page.locator('#tour-text', { hasText: 'as a bird sees it' }).waitFor();
     await expect.poll(async () => distance(start, await pose_of(page)), patience).toBeGreaterThan(0);
     await settle(page);
     const afar = await pose_of(page);
@@ -104,10 +104,49 @@ describe('a tour', () => {
     await settle(page);
     expect(distance(afar, await pose_of(page))).toBeLessThan(1e-3);
     await page.locator('.hotspot', { hasText: 'The square' }).click();
-    await page.getByText('Markets are held').waitFor();
+    await page.locator('#tour-text', { hasText: 'Markets are held' }).waitFor();
     await settle(page);
     expect(distance(square, await pose_of(page))).toBeLessThan(1e-3);
     expect(errors).toEqual([]);
+  });
+
+  it('tells of a stop before anybody goes there: to the mouse and to keys, not to a finger', async () => {
+    const { page } = await open(desktop);
+    const spot = page.locator('.hotspot', { hasText: 'The square' });
+    const label = spot.locator('.hotspot-label');
+    const opacity = (): Promise<string> => label.evaluate((el) => getComputedStyle(el).opacity);
+    await spot.waitFor();
+    expect(await opacity()).toBe('0');
+    await spot.hover();
+    expect(await opacity()).toBe('1');
+    expect(await label.innerText()).toContain('Markets are held here');
+    const box = (await label.boundingBox())!;
+    expect([box.x > 0, box.y > 0, box.x + box.width < 1280, box.y + box.height < 720]).not.toContain(false);
+    await keep_screenshot(page, 'hotspot-hover');
+    await page.mouse.move(10, 300);
+    expect(await opacity()).toBe('0');
+    await page.keyboard.press('Tab');
+    await page.locator('#view').focus();
+    for (let i = 0; i < 4 && (await opacity()) === '0'; ++i) await page.keyboard.press('Tab');
+    expect(await opacity()).toBe('1');
+    expect(await spot.evaluate((el) => el === document.activeElement)).toBe(true);
+    // Its name is the title; the caption describes it.
+    await page.getByRole('button', { name: 'The square', exact: true, description: /^Markets/ }).waitFor();
+    await keep_screenshot(page, 'hotspot-keys');
+    await page.keyboard.press('Enter');
+    await page.getByText('2 of 2').waitFor();
+    // There the card has the caption.
+    expect(await label.innerText()).not.toContain('Markets');
+
+    const phone = await open({ viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true });
+    await phone.page.locator('.hotspot', { hasText: 'The square' }).tap();
+    await phone.page.getByText('2 of 2').waitFor();
+    await settle(phone.page);
+    const shown = await phone.page
+      .locator('.hotspot-label')
+      .evaluateAll((all) => all.filter((el) => getComputedStyle(el).opacity !== '0').length);
+    expect(shown).toBe(0);
+    await keep_screenshot(phone.page, 'hotspot-phone');
   });
 
   it('plays by itself, until the visitor takes over', async () => {
@@ -196,6 +235,15 @@ describe('sharing', () => {
     expect(turned(mine, theirs)).toBeLessThan(0.001);
   });
 
+  it('says when no other page may show it', async () => {
+    const { page, errors } = await open();
+    await page.getByRole('button', { name: 'Share' }).click();
+    await page.getByRole('button', { name: 'Copy code for a web page' }).click();
+    await page.getByText('has to name that site with --embed-origin').waitFor();
+    await keep_screenshot(page, 'share-code-nobody');
+    expect(errors).toEqual([]);
+  });
+
   it('saves the picture', async () => {
     const { page, errors } = await open();
     await page.getByRole('button', { name: 'Share' }).click();
@@ -242,8 +290,15 @@ describe('sharing', () => {
     await expect
       .poll(async () => (await heard())[0], patience)
       .toMatchObject({ catgs: 'ready', scene: 'city', stops: ['From afar', 'The square'] });
+    // The code for it says who may use it.
+    const { page: sharing } = await open(desktop, embeddable.url);
+    await sharing.getByRole('button', { name: 'Share' }).click();
+    expect(await sharing.locator('#share-frames').isHidden()).toBe(true);
+    await sharing.getByRole('button', { name: 'Copy code for a web page' }).click();
+    await sharing.getByText(`in pages of ${origin} only`).waitFor();
+    await keep_screenshot(sharing, 'share-code');
     await say({ catgs: 'stop', stop: 1 });
-    await frame.getByText('Markets are held').waitFor();
+    await frame.locator('#tour-text', { hasText: 'Markets are held' }).waitFor();
     await expect.poll(async () => (await heard()).some((m) => m.stop === 1), patience).toBe(true);
     await keep_screenshot(page, 'embedded');
 

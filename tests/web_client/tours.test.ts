@@ -6,7 +6,7 @@ import type { PathSample } from '#client/session/messages';
 import { film_flight, type Film } from '#client/tour/camera_spline';
 import { read_document } from '#client/tour/load';
 import { TourPlayer, type TourState } from '#client/tour/player';
-import { embed_code, read_shared, share_address } from '#client/tour/share';
+import { embed_code, frame_sites, read_shared, share_address } from '#client/tour/share';
 import { read_supersplat } from '#client/tour/supersplat';
 import { read_tours, stay_of, write_tours, type Tour } from '#client/tour/tour';
 import settings from '../support/supersplat_settings.json';
@@ -391,5 +391,17 @@ describe('a shared link', () => {
   it('becomes a frame for other pages', () => {
     const code = embed_code('https://host/?scene=a&x=%22#stop=2');
     expect(code).toContain('src="https://host/?scene=a&amp;x=%22&amp;ui=0#stop=2"');
+  });
+
+  it("knows from the page's policy who may show it", () => {
+    const policy = (sites: string): string => `default-src 'none'; frame-ancestors ${sites}; img-src *`;
+    expect(frame_sites(policy("'none'"))).toEqual([]);
+    expect(frame_sites(policy('https://a.example https://*.b.example'))).toEqual([
+      'https://a.example',
+      'https://*.b.example',
+    ]);
+    expect(frame_sites(policy('*'))).toBeUndefined();
+    expect(frame_sites("default-src 'self'")).toBeUndefined();
+    expect(frame_sites(null)).toBeUndefined();
   });
 });

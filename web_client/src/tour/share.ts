@@ -66,6 +66,16 @@ function read_eye(text: string): Eye | undefined {
   };
 }
 
+/**
+ * Sites that may show a page of this Content-Security-Policy in a frame; undefined: all may. The server
+ * names them (--embed-origin).
+ */
+export function frame_sites(policy: string | null): readonly string[] | undefined {
+  const directives = (policy ?? '').split(';').map((text) => text.trim().split(/\s+/));
+  const sites = directives.find(([name]) => name === 'frame-ancestors')?.slice(1);
+  return sites?.includes('*') ? undefined : sites?.filter((site) => site !== "'none'");
+}
+
 /** For pages of others; the server names those that may show it (--embed-origin). */
 export function embed_code(address: string): string {
   const url = new URL(address);

@@ -1,5 +1,5 @@
 import type { Snapshot } from '../session/messages';
-import { embed_code } from '../tour/share';
+import { embed_code, frame_sites } from '../tour/share';
 import { by_id } from './dom';
 import { text as words } from '../text';
 
@@ -14,14 +14,16 @@ export interface ShareSource {
 export class SharePanel {
   private readonly link_ = by_id('share-link', HTMLInputElement);
   private readonly done_ = by_id('share-done', HTMLOutputElement);
+  private readonly frames_ = by_id('share-frames', HTMLElement);
 
   constructor(private readonly source_: ShareSource) {
     const click = (id: string, action: () => Promise<void>): void =>
       by_id(id, HTMLButtonElement).addEventListener('click', () => void action());
     click('share-copy', () => this.hand_over(source_.address(), words.share.link_copied));
-    click('share-embed', () =>
-      this.hand_over(embed_code(source_.address()), words.share.code_copied),
-    );
+    click('share-embed', async () => {
+      await this.hand_over(embed_code(source_.address()), words.share.code_copied);
+      await this.tell_of_frames();
+    });
     click('share-picture', () => this.save_picture());
     this.link_.addEventListener('focus', () => this.link_.select());
   }
@@ -29,6 +31,22 @@ export class SharePanel {
   shown(): void {
     this.link_.value = this.source_.address();
     this.done_.textContent = '';
+    this.frames_.hidden = true;
+  }
+
+  /** Where the code will not work: the page's own policy says who may show it. */
+  private async tell_of_frames(): Promise<void> {
+    try {
+      const { headers } = await fetch(location.href, { method: 'HEAD' });
+      const sites = frame_sites(headers.get('content-security-policy'));
+      this.frames_.hidden = sites === undefined;
+      if (sites) {
+        this.frames_.textContent =
+          sites.length === 0 ? words.share.no_frames : words.share.frames(sites.join(', '));
+      }
+    } catch (error) {
+      console.warn('the server did not say who may show this page', error); // it is away
+    }
   }
 
   /** Pages without a secure context have no clipboard: there the text is shown to be copied. */

@@ -87,6 +87,7 @@ export class TourView {
       if (!inside) continue;
       const [x, y] = [inside[0] * width_px, inside[1] * height_px];
       button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      button.classList.toggle('leftward', inside[0] > 0.5); // where its label has room
     }
   }
 
@@ -101,13 +102,31 @@ export class TourView {
       const number = document.createElement('span');
       number.textContent = String(i + 1);
       number.setAttribute('aria-hidden', 'true');
-      const name = document.createElement('span');
-      name.className = 'hotspot-name';
-      name.textContent = stop.title || text.tour.stop_numbered(i + 1);
-      button.append(number, name);
+      button.append(number, label_of(stop, i, button));
       button.addEventListener('click', () => this.player_?.go_to(i));
       return [{ stop, button }];
     });
     this.hotspots_.replaceChildren(...this.spots_.map(({ button }) => button));
   }
+}
+
+/** Title and caption, shown to who points at the hotspot or goes to it by keys. */
+function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLElement {
+  const label = document.createElement('span');
+  label.className = 'hotspot-label';
+  const name = document.createElement('span');
+  name.className = 'hotspot-name';
+  name.textContent = stop.title || text.tour.stop_numbered(index + 1);
+  label.append(name);
+  if (stop.caption) {
+    // It describes the button, whose name is the title alone.
+    const caption = document.createElement('span');
+    caption.className = 'hotspot-caption';
+    caption.id = `hotspot-caption-${index}`;
+    caption.textContent = stop.caption;
+    caption.setAttribute('aria-hidden', 'true');
+    button.setAttribute('aria-describedby', caption.id);
+    label.append(caption);
+  }
+  return label;
 }
