@@ -24,6 +24,7 @@ struct PoseSample {
   std::int64_t client_time_us = 0;  // client's clock
   Pose world_from_camera;
   float fov_y_rad = 0.0f;
+  bool at_rest = false;  // nothing moves the camera
 };
 
 struct PosePath {

@@ -88,6 +88,7 @@ PoseSample parse(const v1::PoseSample& message) {
       checked("pose.client_time_us", message.client_time_us(), -max_time_us, max_time_us);
   sample.world_from_camera = parse(message.world_from_camera());
   sample.fov_y_rad = checked("pose.fov_y_rad", message.fov_y_rad(), 0.1f, 2.8f);
+  sample.at_rest = message.at_rest();
   return sample;
 }
 

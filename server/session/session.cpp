@@ -152,12 +152,17 @@ void Session::on_resumed(const Hello& hello, Admission admission, TimePoint now)
 void Session::on(const PoseSample& sample, TimePoint now) {
   const auto before = track_.newest();
   // What is drawn now is seen as much later as pictures have come after their poses lately.
-  if (!track_.add(sample, flow_.pose_to_photon())) return;
+  if (!track_.add(sample, flow_.pose_to_photon())) {
+    if (sample.at_rest && sample.pose_id == before->pose_id) rest_.said(now);
+    return;
+  }
   pose_received_ = now;
   pace_.pose_arrived(flow_.frame_interval(), now);
-  if (before && same_view(*before, sample, admission_.scene->facts.near_z)) return;
-  note_activity(now);
-  rest_.moved(now);
+  if (!before || !same_view(*before, sample, admission_.scene->facts.near_z)) {
+    note_activity(now);
+    rest_.moved(now);
+  }
+  if (sample.at_rest) rest_.said(now);  // the first one with this id gave way to it
 }
 
 void Session::on(const PosePath& path, TimePoint now) {

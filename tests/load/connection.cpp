@@ -164,11 +164,20 @@ asio::awaitable<void> Connection::send_poses() {
   co_await wait_until(clock_time(settings_.stop_us + 2'000'000));  // for the outbox to end it all
 }
 
-/// As a browser whose visitor looks: no poses, and the way goes on from here.
+/// As a browser whose visitor looks: at the next refresh it says that nothing moves, then there are
+/// no poses, and the way goes on from here.
 asio::awaitable<void> Connection::rest() {
+  constexpr std::int64_t refresh_us = 16'667;
   if (!state_.last_pose) co_return;
-  report_.rest = {++report_.rests, state_.last_pose->pose_id(), state_.last_pose->client_time_us()};
-  co_await wait_until(clock_time(std::min(now_us() + settings_.rest_us, settings_.stop_us)));
+  const std::int64_t since_us = state_.last_pose->client_time_us();
+  const std::int64_t end_us = std::min(now_us() + settings_.rest_us, settings_.stop_us);
+  report_.rest = {++report_.rests, state_.last_pose->pose_id(), since_us};
+  co_await wait_until(clock_time(std::min(since_us + refresh_us, end_us)));
+  v1::ClientMessage message;
+  *message.mutable_pose() = *state_.last_pose;
+  message.mutable_pose()->set_at_rest(true);
+  say(message);
+  co_await wait_until(clock_time(end_us));
   if (now_us() >= settings_.stop_us) --report_.rests;  // cut short: proves nothing
   report_.rest.reset();
   begin_us_ += settings_.rest_us;

@@ -17,7 +17,7 @@ namespace {
 namespace asio = boost::asio;
 
 constexpr std::size_t max_queued = 16;
-constexpr std::int64_t min_stills_apart_us = 30'000;
+constexpr std::int64_t min_stills_apart_us = 10'000;
 constexpr std::size_t max_stills = 120;
 
 }  // namespace

@@ -85,6 +85,13 @@ v1::ClientMessage good_pose() {
   return message;
 }
 
+TEST(Wire, APoseMaySayThatNothingMoves) {
+  v1::ClientMessage message = good_pose();
+  EXPECT_FALSE(parsed<PoseSample>(message).at_rest);
+  message.mutable_pose()->set_at_rest(true);
+  EXPECT_TRUE(parsed<PoseSample>(message).at_rest);
+}
+
 TEST(Wire, ParsesGoldenClientMessages) {
   const auto hello = parsed<Hello>(unhex(golden("client_hello")));
   EXPECT_EQ(hello.version, 1u);

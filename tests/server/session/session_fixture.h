@@ -77,11 +77,12 @@ class SessionTest : public testing::Test {
   void open_stream() {
     session.on_stream_opened({true, "", Codec::h264, "avc1.42C01F", "libx264"}, now);
   }
-  void pose(std::uint64_t id, float x) {
+  void pose(std::uint64_t id, float x, bool at_rest = false) {
     PoseSample sample;
     sample.pose_id = id;
     sample.world_from_camera.position.x = x;
     sample.fov_y_rad = 1.0f;
+    sample.at_rest = at_rest;
     session.on_message(sample, now);
   }
   bool frame_is_due() const {

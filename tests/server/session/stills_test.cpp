@@ -173,6 +173,32 @@ TEST_F(StillTest, PosesThatComeSlowlyAreNoRest) {
   EXPECT_EQ(shown().ticket.size_px, glm::ivec2(1280, 720));
 }
 
+TEST_F(StillTest, ComesAtOnceWhereTheClientSaysThatNothingMoves) {
+  greet(small_in_motion());
+  for (int i = 0; i < 5; ++i) moved();
+  now += 17ms;
+  pose(poses_, static_cast<float>(poses_), true);
+  ASSERT_TRUE(frame_is_due());
+  const FrameOrder still = shown();
+  EXPECT_TRUE(still.ticket.still);
+  EXPECT_EQ(still.ticket.size_px, glm::ivec2(1280, 720));
+  const FrameOrder moving = moved();
+  EXPECT_FALSE(moving.ticket.still);
+  now += 99ms;
+  EXPECT_FALSE(frame_is_due()) << "what was said is over";
+  now += 1ms;
+  EXPECT_TRUE(frame_is_due());
+}
+
+TEST_F(StillTest, APoseThatNothingMovesIsAStillEvenIfTheOneBeforeWasHeldUp) {
+  greet(small_in_motion());
+  for (int i = 0; i < 5; ++i) moved();
+  now += 17ms;
+  ++poses_;
+  pose(poses_, static_cast<float>(poses_), true);
+  EXPECT_TRUE(run_frame().ticket.still);
+}
+
 TEST_F(StillTest, TakesAShareOfTheLinkThatKeepsQueuesShort) {
   greet(small_in_motion());
   for (int i = 0; i < 30; ++i) moved();

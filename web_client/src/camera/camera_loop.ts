@@ -8,7 +8,8 @@ const longest_step_s = 0.1; // a page that was held up does not leap
 
 /**
  * Steps the camera at display rate while there is movement, and hands out one sample per refresh
- * and change. At rest it does not run at all.
+ * and change. At rest it does not run at all; it begins with a refresh at which nothing moves, and
+ * unless a finger is held down, which may move on, the last sample is handed out again to say so.
  */
 export class CameraLoop {
   private running_ = false;
@@ -16,10 +17,12 @@ export class CameraLoop {
   private changed_ = false;
   private last_us_ = 0;
   private pose_id_ = 0;
+  private newest_: CameraSample | undefined;
 
   constructor(
     private readonly camera_: CameraController,
     private readonly axes_: () => Axes,
+    private readonly is_touched_: () => boolean,
     private readonly inertia_: Inertia,
     private readonly clock_: Clock,
     private readonly send_: (sample: CameraSample) => void,
@@ -59,12 +62,13 @@ export class CameraLoop {
   sample(): number {
     this.changed_ = false;
     this.pose_id_ += 1;
-    this.send_({
+    this.newest_ = {
       pose_id: this.pose_id_,
       time_us: this.clock_.now_us(),
       eye: { ...this.camera_.pose, fov_y_rad: this.camera_.fov_y_rad },
       distance: this.camera_.sight_distance,
-    });
+    };
+    this.send_(this.newest_);
     return this.pose_id_;
   }
 
@@ -76,9 +80,10 @@ export class CameraLoop {
     if (is_held(axes)) this.inertia_.stop();
     const glide = this.inertia_.step(dt_s);
     if (glide) this.camera_.gesture(glide);
-    const moved = this.camera_.step(dt_s, axes);
-    if (moved || this.changed_) this.sample();
+    const moved = this.camera_.step(dt_s, axes) || this.changed_;
+    if (moved) this.sample();
     this.running_ = is_held(axes) || moved || !this.camera_.at_rest || this.inertia_.active;
     if (this.running_) requestAnimationFrame(() => this.tick());
+    else if (this.newest_ && !this.is_touched_()) this.send_({ ...this.newest_, at_rest: true });
   }
 }

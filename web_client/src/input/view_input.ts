@@ -7,6 +7,8 @@ import { DoubleTap, Pointers, wheel_gesture, type PointerSample } from './pointe
 export interface ViewInputListener {
   gesture(gesture: Gesture): void;
   keys_changed(): void;
+  /** No pointer is down any more, and nothing glides on. */
+  let_go(): void;
   /** A double click or double tap; a share of the view's width and height, y down. */
   pointed_at(x: number, y: number): void;
 }
@@ -15,16 +17,21 @@ export function bind_view_input(
   view: HTMLElement,
   inertia: Inertia,
   listener: ViewInputListener,
-): HeldKeys {
+): { keys: HeldKeys; pointers: Pointers } {
   const keys = new HeldKeys();
-  bind_pointers(view, inertia, listener);
+  const pointers = new Pointers();
+  bind_pointers(view, pointers, inertia, listener);
   bind_keys(keys, listener);
   bind_focus(view);
-  return keys;
+  return { keys, pointers };
 }
 
-function bind_pointers(view: HTMLElement, inertia: Inertia, listener: ViewInputListener): void {
-  const pointers = new Pointers();
+function bind_pointers(
+  view: HTMLElement,
+  pointers: Pointers,
+  inertia: Inertia,
+  listener: ViewInputListener,
+): void {
   const taps = new DoubleTap();
   view.addEventListener('pointerdown', (event) => {
     if (event.button === 1) event.preventDefault(); // no scrolling by the middle button
@@ -48,6 +55,8 @@ function bind_pointers(view: HTMLElement, inertia: Inertia, listener: ViewInputL
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
         listener.keys_changed();
+      } else if (lifted) {
+        listener.let_go();
       }
     });
   }

@@ -15,6 +15,8 @@ export interface CameraSample {
   readonly eye: Eye;
   /** Of what the visitor looks at, along the view axis; Infinity: unknown. World units. */
   readonly distance: number;
+  /** The newest sample once more: nothing moves the camera. */
+  readonly at_rest?: boolean;
 }
 
 /** Column-major, for homogeneous coordinates (x, y, 1); x and y are -1…1 across an image, y down. */

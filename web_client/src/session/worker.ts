@@ -87,9 +87,11 @@ class Client {
   handle(message: Exclude<ToWorker, Start>): void {
     switch (message.kind) {
       case 'camera':
-        this.metrics_.pose_sent(BigInt(message.sample.pose_id), message.sample.time_us);
         this.camera_ = message.sample;
-        this.display_.camera = message.sample;
+        if (!message.sample.at_rest) {
+          this.metrics_.pose_sent(BigInt(message.sample.pose_id), message.sample.time_us);
+          this.display_.camera = message.sample;
+        }
         this.send_camera();
         break;
       case 'view':
@@ -212,7 +214,7 @@ class Client {
     const { camera_: camera } = this;
     if (!camera) return;
     this.session_.send_pose(
-      pose_message(camera.pose_id, camera.time_us, this.widened(camera.eye)),
+      pose_message(camera.pose_id, camera.time_us, this.widened(camera.eye), camera.at_rest),
     );
   }
 
@@ -297,7 +299,7 @@ function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
 /** Within the limits of the wire, and even: 4:2:0 video has no odd sides. */
 const frame_side = (px: number): number => Math.min(8192, Math.max(16, Math.round(px / 2) * 2));
 
-function pose_message(pose_id: number, time_us: number, eye: Eye): PoseInit {
+function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest = false): PoseInit {
   const [x, y, z, w] = eye.orientation;
   return {
     poseId: BigInt(pose_id),
@@ -307,6 +309,7 @@ function pose_message(pose_id: number, time_us: number, eye: Eye): PoseInit {
       orientation: { x, y, z, w },
     },
     fovYRad: eye.fov_y_rad,
+    atRest: at_rest,
   };
 }
 

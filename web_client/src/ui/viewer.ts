@@ -14,7 +14,6 @@ import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
 import { Inertia } from '../input/inertia';
-import type { HeldKeys } from '../input/keyboard';
 import { bind_view_input } from '../input/view_input';
 import type { PresenterChoice } from '../present/make_presenter';
 import { local_storage, session_storage } from '../session/browser_storage';
@@ -88,7 +87,7 @@ export class Viewer {
       (delay_ms, action) => browser_timers.after(delay_ms, action),
     );
     this.worker_ = new WorkerClient((message) => this.heard(message));
-    const keys = this.bind_input();
+    const { keys, pointers } = this.bind_input();
     const pads = new Gamepads({
       moved: () => {
         if (is_held(pads.axes())) this.taken_over();
@@ -96,7 +95,8 @@ export class Viewer {
       action: (action) => this.act(action),
     });
     const axes = (): Axes => sum_of(keys.axes(), pads.axes());
-    this.loop_ = new CameraLoop(this.camera_, axes, this.inertia_, clock, (sample) => {
+    const is_touched = (): boolean => pointers.count > 0;
+    this.loop_ = new CameraLoop(this.camera_, axes, is_touched, this.inertia_, clock, (sample) => {
       this.worker_.post({ kind: 'camera', sample });
       if (this.warps_) this.guide_.seen_from(sample.eye);
     });
@@ -176,7 +176,7 @@ export class Viewer {
     setInterval(() => void this.look_at_height(), auto_interval_ms);
   }
 
-  private bind_input(): HeldKeys {
+  private bind_input(): ReturnType<typeof bind_view_input> {
     return bind_view_input(this.view_, this.inertia_, {
       gesture: (gesture) => {
         this.guide_.player.pause();
@@ -184,6 +184,7 @@ export class Viewer {
         this.loop_.wake();
       },
       keys_changed: () => this.taken_over(),
+      let_go: () => this.loop_.wake(),
       pointed_at: (x, y) => void this.point_at(x, y),
     });
   }
