@@ -306,22 +306,22 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   deliver();
 }
 
-/// From the paper's l, the mean list of the last frame; 0: not known.
-std::uint32_t CudaView::slice_length() const {
+/// Entries of a tile's list that the last frame's tiles were expected to look at, in the mean; 0:
+/// not known.
+std::uint32_t CudaView::mean_reach() const {
   const std::uint64_t expected = memory_.host_counts.get()->expected_entries;
   if (!reach_known_ || expected == 0) return 0;
-  const std::uint64_t mean = expected / shape_.tiles();
-  return std::max(shortest_slice, static_cast<std::uint32_t>(slice_means * mean));
+  return std::max(1u, static_cast<std::uint32_t>(expected / shape_.tiles()));
 }
 
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
 void CudaView::split(ReorderRun* runs, const LastReach& last) {
   FrameMemory& m = memory_;
-  launch_split({shape_, lists_.range.get(), last, m.reach[1 - last_reach_].get(),
-                turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(),
-                m.queue.get(), runs, m.slice_transmittance.get(), lists_.counts.get(),
-                slice_length(), settings_.split_tasks},
-               stream_.get());
+  launch_split(
+      {shape_, lists_.range.get(), last, m.reach[1 - last_reach_].get(),
+       turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(), m.queue.get(),
+       runs, m.slice_transmittance.get(), lists_.counts.get(), mean_reach(), settings_.split_tasks},
+      stream_.get());
 }
 
 void CudaView::blend(const FrameRequest& request) {

@@ -47,7 +47,7 @@ class CudaView final : public View {
   void blend(const FrameRequest& request);
   void deliver();
   [[nodiscard]] FrameView finished(const FramePlan& plan, float near_z);
-  [[nodiscard]] std::uint32_t slice_length() const;
+  [[nodiscard]] std::uint32_t mean_reach() const;
 
   std::shared_ptr<const DeviceScene> scene_;
   int device_;

@@ -58,11 +58,9 @@ __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
   Cut cut{p.range[t], is_seen(p, t), last_reach(p, t), 0, 0, 0};
   cut = cut.whole();
   if (!p.split || !cut.seen) return cut;
-  const std::uint32_t length =
-      p.slice_length > 0
-          ? p.slice_length
-          : max(shortest_slice,
-                slice_means * (min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles()));
+  const std::uint32_t length = slice_length(
+      p.mean_list > 0 ? p.mean_list
+                      : min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles());
   const std::uint32_t reach = cut.reach;
   if (reach < cut.listed()) cut.expected = min(cut.listed(), reach + reach / 4 + 2 * warp_size);
   if (cut.expected > 2 * length)

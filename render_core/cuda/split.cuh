@@ -40,17 +40,20 @@ struct SplitParams {
   ReorderRun* runs;            // [run_bound]
   float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
   FrameCounts* counts;         // what split makes is set, and list_max
-  std::uint32_t slice_length;  // l; 0: not known, it comes from this frame's mean list
-  bool split;                  // else every tile is one task
+  std::uint32_t
+      mean_list;  // entries of a tile that l follows; 0: not known, then this frame's lists
+  bool split;     // else every tile is one task
 };
 void launch_split(const SplitParams& params, cudaStream_t stream);
 
-/// Mean lists in a slice. The paper has one; beginning and ending a part costs as much as a hundred
-/// entries, so that longer slices are faster (one H200, fungi_room: 6 % of the blend).
-constexpr std::uint32_t slice_means = 2;
-
-/// A slice shorter than this is not worth its own pixels.
-constexpr std::uint32_t shortest_slice = 4 * warp_size;
+/// The length of a slice where a tile lists `mean` entries in the mean: two mean lists. The paper
+/// has one; beginning and ending a part costs as much as a hundred entries, so that longer slices
+/// are faster (one H200, fungi_room: 6 % of the blend), and one that is shorter than four warps'
+/// entries is not worth its own pixels.
+__host__ __device__ inline std::uint32_t slice_length(std::uint32_t mean) {
+  constexpr std::uint32_t shortest = 4 * warp_size;
+  return mean > shortest / 2 ? 2 * mean : shortest;
+}
 
 inline std::uint32_t task_bound(const FrameShape& shape) {
   return shape.tile_bound + shape.slice_bound;

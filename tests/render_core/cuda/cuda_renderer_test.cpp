@@ -271,5 +271,36 @@ TEST(CudaRenderer, NothingShowsBehindAFinishedPixel) {
   }
 }
 
+// Against the reference, at its worst: two layers leave a little less than what the next one, as
+// opaque as may be, brings below transmittance_min. The reference finishes the pixel without it;
+// the round takes it in, wherever in the round it stands, and the others behind it.
+TEST(CudaRenderer, TheRestOfARoundAddsNoMoreThanItsBound) {
+  REQUIRE_DEVICE();
+  constexpr double bound = transmittance_min / (1.0 - alpha_max);
+  for (const int before : {0, 1, 7, 8, 27, 28, 29, 30, 31, 32, 62}) {
+    GaussianCloud cloud;
+    cloud.resize(static_cast<std::size_t>(before) + 2 + 40, 0);
+    for (int i = 0; i < static_cast<int>(cloud.size()); ++i) {
+      const int place = i - before;
+      cloud.mean[i] = {0.0f, 0.0f, 5.0f + 1e-2f * static_cast<float>(i)};
+      cloud.scale[i] = glm::vec3(40.0f, 40.0f, 1e-3f);  // as good as constant over the picture
+      cloud.rotation[i] = glm::quat(1.0f, 0.0f, 0.0f, 0.0f);
+      // Beside what stands before: 0.1 * 0.09 = 0.009 is left, of which the next leaves 0.00009.
+      cloud.opacity[i] = place < 0 ? 1.1f / 255.0f : place == 0 ? 0.9f : place == 1 ? 0.91f : 1.0f;
+      cloud.sh[i] = glm::vec3(place < 2 ? -1.7f : 1.7f);
+    }
+    TestScene scene;
+    scene.cloud = std::make_shared<const GaussianCloud>(std::move(cloud));
+    scene.request.camera = make_camera(Pose{}, {64, 48}, 60.0f);
+    const Rendered cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request);
+    const Rendered reference = render(*renderer_of(scene, RendererKind::reference), scene.request);
+    double most = 0.0;
+    for (std::size_t i = 0; i < cuda.rgb.size(); ++i)
+      most = std::max(most, std::abs(double{cuda.rgb[i]} - double{reference.rgb[i]}));
+    EXPECT_LE(most, bound) << before;
+    EXPECT_GE(most, before <= 1 ? 0.5 * bound : 0.0) << before;  // the case is the one meant
+  }
+}
+
 }  // namespace
 }  // namespace catgs
