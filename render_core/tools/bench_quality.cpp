@@ -59,6 +59,7 @@ class Judge {
   void compare_switch(std::size_t i, const Image& before, const Image& after) {
     const double excess =
         pop_excess({before, after}, {exact_image(i - 1, 0.0f), exact_image(i, 0.0f)});
+    if (excess > quality_.pop.max) quality_.worst_pop_frame = setup_.first + i;
     quality_.pop.add(excess);
     quality_.pops += excess > max_pop ? 1 : 0;
   }

@@ -72,6 +72,7 @@ struct QualityReport {
   // pop_excess() at the switches from a sub-frame to the next key frame.
   Extent pop;
   std::size_t pops = 0;  // switches over max_pop
+  std::size_t worst_pop_frame = 0;
 };
 
 /// What a switch may add to the change that the exact pipeline shows there.

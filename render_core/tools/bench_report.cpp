@@ -50,6 +50,7 @@ Json to_json(const QualityReport& quality) {
     json["pop"] = {{"switches", quality.pop.count},
                    {"mean", quality.pop.mean()},
                    {"max", quality.pop.max},
+                   {"worst_frame", quality.worst_pop_frame},
                    {"allowed", max_pop},
                    {"over", quality.pops}};
   }
@@ -163,9 +164,10 @@ void print_quality(const QualityReport& quality) {
                100.0 * quality.see_through.mean(), 100.0 * quality.see_through.max);
   }
   if (quality.pop.count > 0) {
-    fmt::print("{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} key switches, {} over 1/255\n", "pop",
-               255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
-               quality.pops);
+    fmt::print(
+        "{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} key switches (frame {}), {} over 1/255\n",
+        "pop", 255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
+        quality.worst_pop_frame, quality.pops);
   }
 }
 

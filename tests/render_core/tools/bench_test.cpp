@@ -133,6 +133,7 @@ TEST_F(BenchParts, JudgeFindsTheKnownErrors) {
   EXPECT_EQ(quality.pop.count, 4u);
   EXPECT_NEAR(quality.pop.max, sub_error - key_error - 2 * 0.001, 1e-5);
   EXPECT_EQ(quality.pops, 4u);
+  EXPECT_GT(quality.worst_pop_frame, 0u);  // the first has none before it
 }
 
 TEST_F(BenchParts, TheWorstFramesAreKeptAndWritten) {
