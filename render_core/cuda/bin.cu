@@ -112,8 +112,8 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
   const std::uint32_t begin = blockIdx.x * window_size;
   const std::uint32_t end = min(begin + window_size, p.shape.list_bound);
   const std::uint32_t visible = min(p.counts->visible, p.shape.visible_bound);
-  const bool any = begin < p.counts->list_entries;
-  if (any && thread / warp_size < 2) {
+  if (begin >= p.counts->list_entries) return;
+  if (thread / warp_size < 2) {
     // The last splat that begins at or before the window, to the last that begins in it.
     const std::uint32_t beyond =
         first_beyond(p.first, visible, thread < warp_size ? begin : end - 1);
@@ -130,32 +130,29 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
     large_count = 0;
   }
   __syncthreads();
-  if (any) {
-    for (std::uint32_t k = splats[0] + thread; k < splats[1]; k += block_size) {
-      const std::uint32_t slot = p.order[k];
-      std::uint32_t at = p.first[k];
-      const TileSpans spans = p.spans[slot];
-      if (spans.rows() == TileSpans::not_small) {
-        if (p.tile_count[slot] > 0) large[atomicAdd(&large_count, 1u)] = k;
-        continue;
-      }
-      std::uint32_t first_tile =
-          spans.row() * static_cast<std::uint32_t>(p.shape.tiles_x) + spans.column();
+  for (std::uint32_t k = splats[0] + thread; k < splats[1]; k += block_size) {
+    const std::uint32_t slot = p.order[k];
+    std::uint32_t at = p.first[k];
+    const TileSpans spans = p.spans[slot];
+    if (spans.rows() == TileSpans::not_small) {
+      if (p.tile_count[slot] > 0) large[atomicAdd(&large_count, 1u)] = k;
+      continue;
+    }
+    std::uint32_t first_tile =
+        spans.row() * static_cast<std::uint32_t>(p.shape.tiles_x) + spans.column();
 #pragma unroll
-      for (int j = 0; j < TileSpans::most_rows; ++j, first_tile += p.shape.tiles_x) {
-        if (j >= static_cast<int>(spans.rows())) break;
-        const int first = spans.first(j);
-        at =
-            window.put_row(first_tile, make_int2(first, first + spans.count(j) - 1), slot, at, end);
-      }
+    for (int j = 0; j < TileSpans::most_rows; ++j, first_tile += p.shape.tiles_x) {
+      if (j >= static_cast<int>(spans.rows())) break;
+      const int first = spans.first(j);
+      at = window.put_row(first_tile, make_int2(first, first + spans.count(j) - 1), slot, at, end);
     }
-    __syncthreads();
-    for (std::uint32_t j = thread / warp_size; j < large_count; j += warps) {
-      const std::uint32_t k = large[j];
-      emit_large(p, window, p.order[k], p.first[k]);
-    }
-    __syncthreads();
   }
+  __syncthreads();
+  for (std::uint32_t j = thread / warp_size; j < large_count; j += warps) {
+    const std::uint32_t k = large[j];
+    emit_large(p, window, p.order[k], p.first[k]);
+  }
+  __syncthreads();
   for (std::uint32_t at = begin + thread; at < end; at += block_size) {
     p.tile[at] = window.tile[at - begin];
     p.slot[at] = window.slot[at - begin];
@@ -168,21 +165,20 @@ constexpr std::uint32_t range_step = 4;
 template <class Tile>
 __global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams<Tile> p) {
   const std::uint32_t first = (blockIdx.x * block_size + threadIdx.x) * range_step;
-  if (first >= p.shape.list_bound) return;
+  if (first >= p.entries) return;
   const std::uint32_t tiles = p.shape.tiles();  // padding, and what is beyond the ends
   std::uint32_t before = first > 0 ? p.tile[first - 1] : tiles;
 #pragma unroll
   for (std::uint32_t j = 0; j < range_step; ++j) {
     const std::uint32_t i = first + j;
-    const std::uint32_t tile = i < p.shape.list_bound ? p.tile[i] : tiles;
+    const std::uint32_t tile = i < p.entries ? p.tile[i] : tiles;
     if (tile != before) {
       if (before < tiles) p.range[before].y = i;
       if (tile < tiles) p.range[tile].x = i;
     }
     before = tile;
   }
-  if (first + range_step >= p.shape.list_bound && before < tiles)
-    p.range[before].y = p.shape.list_bound;
+  if (first + range_step >= p.entries && before < tiles) p.range[before].y = p.entries;
 }
 
 }  // namespace
@@ -196,8 +192,9 @@ void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream) {
 template <class Tile>
 void launch_ranges(const RangesParams<Tile>& params, cudaStream_t stream) {
   check(cudaMemsetAsync(params.range, 0, params.shape.tiles() * sizeof(uint2), stream), "ranges");
+  if (params.entries == 0) return;
   constexpr std::uint32_t per_block = block_size * range_step;
-  ranges_kernel<<<blocks_for(params.shape.list_bound, per_block), block_size, 0, stream>>>(params);
+  ranges_kernel<<<blocks_for(params.entries, per_block), block_size, 0, stream>>>(params);
   check_launch("ranges");
 }
 

@@ -8,7 +8,7 @@ namespace catgs::cuda {
 // Tile: std::uint16_t or std::uint32_t, what holds shape.tiles(). The narrow one saves a quarter of
 // what sorting moves.
 
-/// Writes the tile list entries of all visible splats in depth order, and padding up to the bound.
+/// Writes the tile list entries of all visible splats in depth order.
 template <class Tile>
 struct EmitParams {
   FrameShape shape;
@@ -19,7 +19,7 @@ struct EmitParams {
   const std::uint32_t* tile_count;  // [visible_bound], by slot
   const TileSpans* spans;           // [visible_bound], by slot
   const SplatPath* path;            // [visible_bound], by slot; null: splats stay where they are
-  Tile* tile;                       // [list_bound], tile index; shape.tiles() in the padding
+  Tile* tile;                       // [list_bound], tile index; shape.tiles(): of no tile
   std::uint32_t* slot;              // [list_bound]
 };
 template <class Tile>
@@ -29,7 +29,8 @@ void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream);
 template <class Tile>
 struct RangesParams {
   FrameShape shape;
-  const Tile* tile;  // [list_bound], sorted
+  std::uint32_t entries;
+  const Tile* tile;  // [entries], sorted
   uint2* range;      // [tiles]
 };
 template <class Tile>

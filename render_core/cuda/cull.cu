@@ -61,7 +61,11 @@ __global__ void __launch_bounds__(block_size) compact_kernel(const CullParams p)
                              static_cast<std::uint32_t>(__popc(word & ((1u << lane) - 1u)));
     if ((word >> lane & 1u) != 0 && at < p.shape.visible_bound)
       p.visible[at] = p.clusters[rank] * block_size + threadIdx.x;
-    if (rank + 1 == clusters && threadIdx.x == 0) p.counts->visible = p.before[rank] + p.seen[rank];
+    if (rank + 1 == clusters && threadIdx.x == 0) {
+      const std::uint32_t visible = p.before[rank] + p.seen[rank];
+      p.counts->visible = visible;
+      p.host_counts->visible = visible;
+    }
   }
 }
 

@@ -21,16 +21,17 @@ struct CullParams {
   std::uint32_t* mask;      // [cull_words(scene.cluster_count)], by rank, a bit a Gaussian
   // [scene.cluster_count], first by cluster: whether it is in sight; then by rank: its set bits.
   std::uint32_t* seen;
-  std::uint32_t* before;   // [scene.cluster_count], of clusters of lower rank
-  std::uint32_t* visible;  // [visible_bound], scene indices
-  FrameCounts* counts;     // `clusters` is set, and `visible`, which may exceed visible_bound
-  SortScratch scratch;     // at least cull_scratch_bytes(scene.cluster_count)
-  int processors;          // of the device
+  std::uint32_t* before;    // [scene.cluster_count], of clusters of lower rank
+  std::uint32_t* visible;   // [visible_bound], scene indices
+  FrameCounts* counts;      // `clusters` is set, and `visible`, which may exceed visible_bound
+  HostCounts* host_counts;  // `visible` is set
+  SortScratch scratch;      // at least cull_scratch_bytes(scene.cluster_count)
+  int processors;           // of the device
 };
 
 std::uint32_t cull_words(std::uint32_t cluster_count);
 std::size_t cull_scratch_bytes(std::uint32_t cluster_count);
-/// counts->visible must be 0.
+/// `visible` of both counts must be 0.
 void launch_cull(const CullParams& params, cudaStream_t stream);
 
 }  // namespace catgs::cuda

@@ -29,8 +29,7 @@ static_assert(sizeof(SplatRecord) == 32);
 /// all that are farther back.
 constexpr int queue_classes = 8;
 
-/// Counts of a frame. Written by the device, copied to page-locked host memory at the frame's end;
-/// the host reads them only then.
+/// Counts of a frame. Written by the device, copied to page-locked host memory at the frame's end.
 struct FrameCounts {
   // Of the key frame; sub-frames keep them.
   std::uint32_t clusters = 0;      // in sight
@@ -49,7 +48,14 @@ struct FrameCounts {
   std::uint32_t allocated_slices = 0;
   std::uint32_t next_part = 0;              // of a task, that no warp of the blend has taken yet
   unsigned long long expected_entries = 0;  // list entries that tiles are expected to look at
-  unsigned long long blended_pairs = 0;     // only when counted
+  unsigned long long blended_pairs = 0;     // only when counted, with a pixel's whole last round
+};
+
+/// Counts of a key frame that the device writes straight to page-locked host memory, as soon as it
+/// knows them: sorting room that is not used would cost as much as sorting splats.
+struct HostCounts {
+  std::uint32_t visible = 0;
+  std::uint32_t list_entries = 0;
 };
 
 // In an array of visible Gaussians: this one is in no list. A turn may bring it into view (giants

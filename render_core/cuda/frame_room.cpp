@@ -9,8 +9,8 @@ namespace {
 
 constexpr int patience = 600;  // key frames
 
-// Padding is sorted, but room for slices costs nothing while it is not used.
-constexpr int sorted_span = 240;
+// Room for lists has threads, but room for slices costs nothing while it is not used.
+constexpr int lists_span = 240;
 constexpr int slices_span = 600;
 
 // What a large scene starts with: drawing its first frame says how much of it is in view, and
@@ -52,9 +52,9 @@ void Room::shrink_to(double part) {
 
 FrameRoom::FrameRoom(std::uint32_t gaussians, std::uint64_t list_limit, bool splits)
     : visible_(std::min<std::uint64_t>(gaussians / 4 + 1, first_visible), std::max(gaussians, 1u),
-               sorted_span),
+               lists_span),
       lists_(std::min<std::uint64_t>(gaussians + 65536ull, first_entries),
-             std::max<std::uint64_t>(list_limit, 1), sorted_span),
+             std::max<std::uint64_t>(list_limit, 1), lists_span),
       slices_(4096, splits ? std::numeric_limits<std::uint32_t>::max() : 0, slices_span) {}
 
 FrameSizes FrameRoom::sizes() const { return {visible_.size(), lists_.size(), slices_.size()}; }

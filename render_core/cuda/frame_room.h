@@ -35,9 +35,9 @@ struct FrameSizes {
   std::uint32_t slices = 0;        // of long tiles
 };
 
-/// How much room the frames of a View get. The host does not wait for counts within a frame: it
-/// allots by what the last frames needed (not much more, since the padding up to a bound is sorted
-/// too), and draws a frame again that needed more. Memory, once allocated, stays.
+/// How much room the frames of a View get. What fills it is launched before the host knows how much
+/// there is: it allots by what the last frames needed (not much more, since threads for the rest
+/// cost a little too), and draws a frame again that needed more. Memory, once allocated, stays.
 class FrameRoom {
  public:
   /// `list_limit`: most entries of all tile lists. `splits`: long tiles are cut into slices.

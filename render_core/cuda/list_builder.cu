@@ -11,7 +11,7 @@
 namespace catgs::cuda {
 namespace {
 
-/// Whether tile indices and shape.tiles(), the padding's, fit in 16 bits.
+/// Whether tile indices and shape.tiles(), which is none's, fit in 16 bits.
 bool is_narrow(const FrameShape& shape) {
   return shape.tiles() <= std::numeric_limits<std::uint16_t>::max();
 }
@@ -66,6 +66,7 @@ void ListBuilder::reserve(const FrameShape& shape, bool sweeps) {
   }
   m.slot.reserve(shape.list_bound);
   m.scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene_.cluster_count)));
+  m.counts.reserve(1);
 }
 
 std::size_t ListBuilder::bytes() const {
@@ -82,11 +83,13 @@ SortScratch ListBuilder::scratch() const {
 
 void ListBuilder::cull(const ListRequest& request, TileLists& lists, cudaStream_t stream) {
   check(cudaMemsetAsync(lists.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
+  *memory_.counts.get() = {};
   launch_cull(
       {scene_, request.culler, request.cameras, request.sweeps, lists.shape, lists.clusters.get(),
        lists.cull_mask.get(), memory_.cull_seen.get(), memory_.cull_before.get(),
-       lists.visible.get(), lists.counts.get(), scratch(), processors_},
+       lists.visible.get(), lists.counts.get(), memory_.counts.get(), scratch(), processors_},
       stream);
+  check(cudaEventRecord(counted_.get(), stream), "visible Gaussians");
 }
 
 void ListBuilder::project(const ListRequest& request, TileLists& lists, const ColourArrays& colours,
@@ -99,11 +102,13 @@ void ListBuilder::project(const ListRequest& request, TileLists& lists, const Co
       request.sweeps ? Listing::trails : Listing::ellipses, stream);
 }
 
-void ListBuilder::sort_by_depth(TileLists& lists, cudaStream_t stream) {
+void ListBuilder::sort_by_depth(const TileLists& lists, cudaStream_t stream) {
   const Memory& m = memory_;
+  check(cudaEventSynchronize(counted_.get()), "visible Gaussians");
+  visible_ = std::min(m.counts.get()->visible, lists.shape.visible_bound);
   PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
   PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
-  cuda::sort_by_depth(lists.shape, depth, order, scratch(), stream);
+  cuda::sort_by_depth(visible_, depth, order, scratch(), stream);
   order_ = order.current;
 }
 
@@ -118,8 +123,9 @@ void ListBuilder::emit(const ListRequest& request, TileLists& lists, cudaStream_
 template <class Tile>
 void ListBuilder::emit_as(const ListRequest& request, TileLists& lists, cudaStream_t stream) {
   const Memory& m = memory_;
-  scan_tile_counts(lists.shape, lists.counts.get(), order_, m.tile_count.get(), m.first.get(),
-                   scratch(), stream);
+  scan_tile_counts(visible_, lists.counts.get(), m.counts.get(), order_, m.tile_count.get(),
+                   m.first.get(), scratch(), stream);
+  check(cudaEventRecord(counted_.get(), stream), "list entries");
   launch_emit<Tile>({lists.shape, lists.counts.get(), m.records.get(), order_, m.first.get(),
                      m.tile_count.get(), m.spans.get(), request.sweeps ? m.path.get() : nullptr,
                      reinterpret_cast<Tile*>(m.tile[0].get()), m.slot.get()},
@@ -140,8 +146,10 @@ void ListBuilder::sort_as(TileLists& lists, cudaStream_t stream) {
   PingPong<Tile> tile{reinterpret_cast<Tile*>(m.tile[0].get()),
                       reinterpret_cast<Tile*>(m.tile[1].get())};
   PingPong<std::uint32_t> slot{m.slot.get(), lists.slot.get()};
-  cuda::sort_by_tile(lists.shape, tile, slot, scratch(), stream);
-  launch_ranges<Tile>({lists.shape, tile.current, lists.range.get()}, stream);
+  check(cudaEventSynchronize(counted_.get()), "list entries");
+  const std::uint32_t entries = std::min(m.counts.get()->list_entries, lists.shape.list_bound);
+  cuda::sort_by_tile(lists.shape, entries, tile, slot, scratch(), stream);
+  launch_ranges<Tile>({lists.shape, entries, tile.current, lists.range.get()}, stream);
   if (slot.current == m.slot.get()) std::swap(m.slot, lists.slot);
 }
 

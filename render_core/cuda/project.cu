@@ -39,12 +39,8 @@ __device__ void add_inverse_depth(const ProjectParams& p, bool counted, float de
 template <Listing listing>
 __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams p) {
   const std::uint32_t v = blockIdx.x * block_size + threadIdx.x;
-  if (v >= p.shape.visible_bound) return;
+  if (v >= min(p.counts->visible, p.shape.visible_bound)) return;
   if constexpr (listing != Listing::none) p.order[v] = v;
-  if (v >= p.counts->visible) {
-    p.depth_key[v] = no_depth_key;
-    return;
-  }
   const std::uint32_t i = p.visible[v] & ~watched_bit;
   const Centre centre = load_centre(p.scene, i);
   const bool shades = wants_shading(p.colours, i);

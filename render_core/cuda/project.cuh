@@ -17,7 +17,7 @@ struct ProjectParams {
   std::uint32_t* visible;     // [visible_bound], scene indices; key frames set watched_bit
   ColourArrays colours;       // what was shaded in earlier frames; all null: nothing
   SplatRecord* records;       // [visible_bound]
-  std::uint32_t* depth_key;   // [visible_bound], depth_key() of the view depth; no_depth_key beyond
+  std::uint32_t* depth_key;   // [visible_bound], depth_key() of the view depth
   std::uint32_t* tile_count;  // key frames: [visible_bound], its part of the tile lists
   TileSpans* spans;           // key frames: [visible_bound]
   SplatPath* path;            // key frames with a window: [visible_bound]

@@ -14,14 +14,11 @@ namespace {
 
 constexpr int depth_end_bit = depth_bits_below + depth_bits;
 
-/// Tile count of the k-th splat in depth order, 0 past the visible ones.
+/// Tile count of the k-th splat in depth order.
 struct CountInOrder {
-  const FrameCounts* counts;
   const std::uint32_t* order;
   const std::uint32_t* tile_count;
-  __device__ std::uint32_t operator()(std::uint32_t k) const {
-    return k < counts->visible ? tile_count[order[k]] : 0u;
-  }
+  __device__ std::uint32_t operator()(std::uint32_t k) const { return tile_count[order[k]]; }
 };
 
 struct SaturatingSum {
@@ -31,15 +28,15 @@ struct SaturatingSum {
   }
 };
 
-auto counts_in_order(const FrameCounts* counts, const std::uint32_t* order,
-                     const std::uint32_t* tile_count) {
-  return thrust::make_transform_iterator(thrust::make_counting_iterator(0u),
-                                         CountInOrder{counts, order, tile_count});
+auto counts_in_order(const CountInOrder& count) {
+  return thrust::make_transform_iterator(thrust::make_counting_iterator(0u), count);
 }
 
-__global__ void store_list_entries(FrameCounts* counts, CountInOrder count,
-                                   const std::uint32_t* first, std::uint32_t bound) {
-  counts->list_entries = SaturatingSum{}(first[bound - 1], count(bound - 1));
+__global__ void store_list_entries(FrameCounts* counts, HostCounts* host_counts, CountInOrder count,
+                                   const std::uint32_t* first, std::uint32_t visible) {
+  const std::uint32_t sum = SaturatingSum{}(first[visible - 1], count(visible - 1));
+  counts->list_entries = sum;
+  host_counts->list_entries = sum;
 }
 
 int tile_bits(const FrameShape& shape) { return static_cast<int>(std::bit_width(shape.tiles())); }
@@ -53,7 +50,7 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound,
                                         depth_bits_below, depth_end_bit),
         "depth sort size");
-  check(cub::DeviceScan::ExclusiveScan(nullptr, scan, counts_in_order(nullptr, nullptr, nullptr),
+  check(cub::DeviceScan::ExclusiveScan(nullptr, scan, counts_in_order({}),
                                        static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
                                        shape.visible_bound),
         "tile count scan size");
@@ -66,46 +63,45 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   return std::max({depth, scan, narrow, wide});
 }
 
-void sort_by_depth(const FrameShape& shape, PingPong<std::uint32_t>& depth,
+void sort_by_depth(std::uint32_t visible, PingPong<std::uint32_t>& depth,
                    PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
   cub::DoubleBuffer<std::uint32_t> values(order.current, order.other);
-  check(
-      cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
-                                      shape.visible_bound, depth_bits_below, depth_end_bit, stream),
-      "depth sort");
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, visible,
+                                        depth_bits_below, depth_end_bit, stream),
+        "depth sort");
   depth = {keys.Current(), keys.Alternate()};
   order = {values.Current(), values.Alternate()};
 }
 
-void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::uint32_t* order,
-                      const std::uint32_t* tile_count, std::uint32_t* first, SortScratch scratch,
-                      cudaStream_t stream) {
-  check(cub::DeviceScan::ExclusiveScan(scratch.memory, scratch.bytes,
-                                       counts_in_order(counts, order, tile_count), first,
-                                       SaturatingSum{}, 0u, shape.visible_bound, stream),
+void scan_tile_counts(std::uint32_t visible, FrameCounts* counts, HostCounts* host_counts,
+                      const std::uint32_t* order, const std::uint32_t* tile_count,
+                      std::uint32_t* first, SortScratch scratch, cudaStream_t stream) {
+  if (visible == 0) return;
+  const CountInOrder count{order, tile_count};
+  check(cub::DeviceScan::ExclusiveScan(scratch.memory, scratch.bytes, counts_in_order(count), first,
+                                       SaturatingSum{}, 0u, visible, stream),
         "tile count scan");
-  store_list_entries<<<1, 1, 0, stream>>>(counts, CountInOrder{counts, order, tile_count}, first,
-                                          shape.visible_bound);
+  store_list_entries<<<1, 1, 0, stream>>>(counts, host_counts, count, first, visible);
   check_launch("tile count total");
 }
 
 template <class Tile>
-void sort_by_tile(const FrameShape& shape, PingPong<Tile>& tile, PingPong<std::uint32_t>& slot,
-                  SortScratch scratch, cudaStream_t stream) {
+void sort_by_tile(const FrameShape& shape, std::uint32_t entries, PingPong<Tile>& tile,
+                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<Tile> keys(tile.current, tile.other);
   cub::DoubleBuffer<std::uint32_t> values(slot.current, slot.other);
-  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values,
-                                        shape.list_bound, 0, tile_bits(shape), stream),
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, entries, 0,
+                                        tile_bits(shape), stream),
         "tile sort");
   tile = {keys.Current(), keys.Alternate()};
   slot = {values.Current(), values.Alternate()};
 }
 
-template void sort_by_tile(const FrameShape&, PingPong<std::uint16_t>&, PingPong<std::uint32_t>&,
-                           SortScratch, cudaStream_t);
-template void sort_by_tile(const FrameShape&, PingPong<std::uint32_t>&, PingPong<std::uint32_t>&,
-                           SortScratch, cudaStream_t);
+template void sort_by_tile(const FrameShape&, std::uint32_t, PingPong<std::uint16_t>&,
+                           PingPong<std::uint32_t>&, SortScratch, cudaStream_t);
+template void sort_by_tile(const FrameShape&, std::uint32_t, PingPong<std::uint32_t>&,
+                           PingPong<std::uint32_t>&, SortScratch, cudaStream_t);
 
 std::size_t sum_scratch_bytes(std::uint32_t count) {
   std::size_t bytes = 0;

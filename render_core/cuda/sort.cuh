@@ -4,24 +4,22 @@
 
 namespace catgs::cuda {
 
-/// Radix sorts by CUB. Counts stay on the device: the host passes bounds, and what lies between a
-/// count and its bound is padded with keys that sort last.
+/// Radix sorts by CUB, of as many as there are: see HostCounts.
 
 // Positive floats sort like their bits. Counted from the near plane, 24 bits are enough: 32 octaves
 // of depth in steps of 2e-6. A quarter of the sort is saved.
 constexpr int depth_bits_below = 4;
 constexpr int depth_bits = 24;
 
-/// Key of what is not there, behind all that is.
-constexpr std::uint32_t no_depth_key = (1u << (depth_bits + depth_bits_below)) - 1u;
+/// The last key.
+constexpr std::uint32_t most_depth_key = (1u << (depth_bits + depth_bits_below)) - 1u;
 
 /// Key of a view depth; the lowest, where it is not beyond the near plane. What is of the same
 /// depth for one near plane is so for every other: they begin at a step.
 __device__ inline std::uint32_t depth_key(float depth, float near_z) {
   if (!(depth > near_z)) return 0;
   constexpr std::uint32_t below = (1u << depth_bits_below) - 1u;
-  return min(__float_as_uint(depth) - (__float_as_uint(near_z) & ~below),
-             no_depth_key - (1u << depth_bits_below));  // before it in the bits that are sorted
+  return min(__float_as_uint(depth) - (__float_as_uint(near_z) & ~below), most_depth_key);
 }
 
 /// Ping-pong buffers; CUB says which of the two holds the result.
@@ -40,23 +38,22 @@ struct SortScratch {
 /// bounds.
 std::size_t sort_scratch_bytes(const FrameShape& shape);
 
-/// Sorts visible splats front to back, stable: on return order.current[k] is the slot of the k-th
-/// nearest. Both arrays have shape.visible_bound entries; `order` holds their numbers, `depth` keys
-/// and, beyond the visible ones, no_depth_key.
-void sort_by_depth(const FrameShape& shape, PingPong<std::uint32_t>& depth,
+/// Sorts `visible` splats front to back, stable: on return order.current[k] is the slot of the k-th
+/// nearest. `order` holds their numbers.
+void sort_by_depth(std::uint32_t visible, PingPong<std::uint32_t>& depth,
                    PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream);
 
 /// first[k] = sum of tile_count[order[j]] over j < k: where the k-th splat writes its list entries.
-/// Sets counts->list_entries.
-void scan_tile_counts(const FrameShape& shape, FrameCounts* counts, const std::uint32_t* order,
-                      const std::uint32_t* tile_count, std::uint32_t* first, SortScratch scratch,
-                      cudaStream_t stream);
+/// Sets list_entries of both counts.
+void scan_tile_counts(std::uint32_t visible, FrameCounts* counts, HostCounts* host_counts,
+                      const std::uint32_t* order, const std::uint32_t* tile_count,
+                      std::uint32_t* first, SortScratch scratch, cudaStream_t stream);
 
-/// Sorts list entries by tile, stable, so that each tile keeps its front-to-back order. Keys beyond
-/// the count must be shape.tiles() or more. Tile: std::uint16_t or std::uint32_t.
+/// Sorts `entries` list entries by tile, stable, so that each tile keeps its front-to-back order.
+/// Keys are at most shape.tiles(). Tile: std::uint16_t or std::uint32_t.
 template <class Tile>
-void sort_by_tile(const FrameShape& shape, PingPong<Tile>& tile, PingPong<std::uint32_t>& slot,
-                  SortScratch scratch, cudaStream_t stream);
+void sort_by_tile(const FrameShape& shape, std::uint32_t entries, PingPong<Tile>& tile,
+                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
 
 /// For the original's way: sums[i] = tile_count[0] + … + tile_count[i], and list entries by 64-bit
 /// (tile | depth) keys.
