@@ -1,4 +1,4 @@
-import type { Motion, StatsReport, StatsSnapshot } from './metrics';
+import type { StatsSnapshot } from './metrics';
 
 export interface Sample {
   readonly time_s: number; // since the first one
@@ -16,9 +16,7 @@ export class StatsHistory {
   private samples_: Sample[] = [];
   private first_ms_: number | undefined;
 
-  add(report: StatsReport, now_ms: number): void {
-    const stats: StatsSnapshot & { last_motion?: Motion } = { ...report };
-    delete stats.last_motion; // an earlier sample has it
+  add(stats: StatsSnapshot, now_ms: number): void {
     this.first_ms_ ??= now_ms;
     const time_s = (now_ms - this.first_ms_) / 1000;
     this.samples_.push({ time_s, stats });

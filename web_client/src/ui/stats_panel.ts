@@ -144,14 +144,14 @@ export class StatsPanel {
     }
   }
 
-  show(stats: StatsReport): void {
+  show(report: StatsReport): void {
+    const { last_motion, ...stats } = report; // an earlier sample of the history has that
     this.history_.add(stats, performance.now());
-    const note = rest_note(stats);
+    const note = rest_note(report);
     this.rest_.hidden = note === '';
     if (this.rest_.textContent !== note) this.rest_.textContent = note;
-    const { stages_ms } = note === '' ? stats : stats.last_motion;
-    const slowest = slowest_stage(stages_ms);
-    row_texts(stats).forEach(({ text: value, kept }, i) => {
+    const slowest = slowest_stage((note === '' ? stats : last_motion).stages_ms);
+    row_texts(report).forEach(({ text: value, kept }, i) => {
       const cell = this.values_[i]!;
       cell.textContent = value;
       cell.classList.toggle('kept', kept);
