@@ -17,6 +17,7 @@
 
 #include "render_core/error.h"
 #include "server/net/certificate_watch.h"
+#include "server/net/listen_error.h"
 #include "server/net/lws_http.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/wire.h"
@@ -290,12 +291,20 @@ const lws_protocols protocols[] = {
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
 
-void forward_log(int level, const char* line) {
-  std::string_view text(line);
-  while (text.ends_with('\n')) text.remove_suffix(1);
-  spdlog::log(level == LLL_ERR ? spdlog::level::err : spdlog::level::debug, "libwebsockets: {}",
-              text);
+void forward_log(spdlog::level::level_enum level, std::string_view line) {
+  while (line.ends_with('\n')) line.remove_suffix(1);
+  spdlog::log(level, "libwebsockets: {}", line);
 }
+
+/// While its mistakes are reported by nobody else.
+void log_errors(int level, const char* line) {
+  forward_log(level == LLL_ERR ? spdlog::level::err : spdlog::level::debug, line);
+}
+
+/// While they become an InputError.
+void log_details(int, const char* line) { forward_log(spdlog::level::debug, line); }
+
+constexpr int log_levels = LLL_ERR | LLL_WARN;
 
 }  // namespace
 
@@ -337,20 +346,17 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
     info.ssl_private_key_filepath = tls->tls_key.c_str();
     info.alpn = "http/1.1";
   }
+  lws_set_log_level(log_levels, log_details);
   lws_vhost* made = lws_create_vhost(context, &info);
-  if (!made)
-    throw InputError(
-        fmt::format("{} {}:{}", flag, endpoint.address, endpoint.port), {},
-        tls ? "cannot listen: the port is busy, or certificate and key do not belong together"
-            : "cannot listen: the port is busy, or the address is not of this machine",
-        "stop the other program or choose another port");
+  lws_set_log_level(log_levels, log_errors);
+  if (!made) throw_listen_error(endpoint, flag, tls != nullptr);
   return lws_get_vhost_listen_port(made);
 }
 
 NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   // A peer that goes away while it is written to is an error code, not a signal.
   std::signal(SIGPIPE, SIG_IGN);
-  lws_set_log_level(LLL_ERR | LLL_WARN, forward_log);
+  lws_set_log_level(log_levels, log_errors);
   const bool tls = !options.tls_certificate.empty();
   if (tls) {
     open_required_file("--tls-cert", options.tls_certificate);
