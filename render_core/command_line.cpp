@@ -1,14 +1,13 @@
 #include "render_core/command_line.h"
 
 #include <algorithm>
-#include <numeric>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "render_core/error.h"
+#include "render_core/nearest_name.h"
 
 namespace catgs {
 namespace {
@@ -26,22 +25,6 @@ void refuse_negative_numbers(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands({})) refuse_negative_numbers(*command);
 }
 
-/// Letters to be put in, taken away or changed.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, changed});
-    }
-  }
-  return row.back();
-}
-
 std::vector<std::string> option_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options())
@@ -49,18 +32,6 @@ std::vector<std::string> option_names(const CLI::App& app) {
   for (const CLI::App* command : app.get_subcommands())  // those that were given
     for (std::string& name : option_names(*command)) names.push_back(std::move(name));
   return names;
-}
-
-std::string suggestion(const CLI::App& app, std::string_view unknown) {
-  std::string nearest;
-  std::size_t least = unknown.size() / 3;
-  for (const std::string& name : option_names(app)) {
-    const std::size_t distance = edit_distance(unknown, name);
-    if (distance > least || (distance == least && !nearest.empty())) continue;
-    least = distance;
-    nearest = name;
-  }
-  return nearest.empty() ? "--help lists them" : fmt::format("did you mean {}?", nearest);
 }
 
 /// The first word that nothing takes; an option before others, as those are probably its values.
@@ -72,7 +43,8 @@ std::string suggestion(const CLI::App& app, std::string_view unknown) {
     if (std::ranges::find(left, word) == left.end()) continue;
     if (word.size() > 1 && word.starts_with('-')) {
       const std::string name = word.substr(0, word.find('='));
-      throw InputError("unknown option " + name, "", suggestion(app, name));
+      throw InputError("unknown option " + name, "",
+                       suggest_name(name, option_names(app), "--help lists them"));
     }
     if (first.empty()) first = word;
   }

@@ -13,6 +13,7 @@
 
 #include "render_core/device_set.h"
 #include "render_core/error.h"
+#include "render_core/nearest_name.h"
 #include "server/net/http.h"
 #include "server/required_file.h"
 
@@ -156,6 +157,18 @@ Setting trusted_proxy() {
   return setting;
 }
 
+/// "*" stands for all.
+Setting origins(std::string name, std::string help, std::vector<std::string> ServerConfig::*member,
+                bool any_subdomain) {
+  Setting setting = list(std::move(name), "ORIGIN", std::move(help), member);
+  setting.set = [=](ServerConfig& c, const Values& v) {
+    for (const auto& origin : v)
+      if (origin != "*") check_origin(origin, any_subdomain);
+    c.*member = v;
+  };
+  return setting;
+}
+
 std::vector<Setting> make_settings() {
   using C = ServerConfig;
   return {
@@ -236,12 +249,12 @@ std::vector<Setting> make_settings() {
            &C::resume_key_file),
       text("tls-cert", "FILE", "Certificate chain, PEM: serve https and wss", &C::tls_cert),
       text("tls-key", "FILE", "Private key of the certificate, PEM", &C::tls_key),
-      list("allow-origin", "ORIGIN",
-           "Other sites whose pages may connect, or whose proxy forwards to a loopback address, "
-           "https://a.example; *: all",
-           &C::allow_origins),
-      list("embed-origin", "ORIGIN", "Sites that may show the client in a frame",
-           &C::embed_origins),
+      origins("allow-origin",
+              "Other sites whose pages may connect, or whose proxy forwards to a loopback address, "
+              "https://a.example; *: all",
+              &C::allow_origins, false),
+      origins("embed-origin", "Sites that may show the client in a frame; *: all",
+              &C::embed_origins, true),
       trusted_proxy(),
       choice<std::string>("log-format", "Form of the log on standard error", &C::log_format,
                           words({"human", "json"})),
@@ -256,6 +269,12 @@ const Setting* find_setting(std::string_view name) {
   return it == all.end() ? nullptr : &*it;
 }
 
+std::vector<std::string> setting_names() {
+  std::vector<std::string> names;
+  for (const auto& setting : settings()) names.push_back(setting.name);
+  return names;
+}
+
 void apply(const Setting& setting, const Values& values, const std::string& source,
            ServerConfig& config, ConfigSources& sources) {
   try {
@@ -266,8 +285,10 @@ void apply(const Setting& setting, const Values& values, const std::string& sour
   sources[setting.name] = source;
 }
 
-std::string variable_of(const Setting& setting) {
-  std::string variable = "CATGS_" + setting.name;
+constexpr std::string_view variable_prefix = "CATGS_";
+
+std::string variable_of(std::string_view setting_name) {
+  std::string variable = std::string(variable_prefix).append(setting_name);
   for (char& c : variable)
     c = c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   return variable;
@@ -320,7 +341,7 @@ void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& so
     const Setting* setting = find_setting(key.str());
     if (!setting)
       throw InputError(source, std::string(key.str()), "there is no such setting",
-                       "catgs-server --help lists them");
+                       suggest_name(key.str(), setting_names(), "catgs-server --help lists them"));
     Values values;
     try {
       values = toml_values(node);
@@ -334,13 +355,31 @@ void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& so
 void apply_environment(const std::function<const char*(const char*)>& lookup, ServerConfig& config,
                        ConfigSources& sources) {
   for (const auto& setting : settings()) {
-    const std::string variable = variable_of(setting);
+    const std::string variable = variable_of(setting.name);
     const char* value = lookup(variable.c_str());
     if (!value) continue;
     const Values values =
         setting.kind == Setting::Kind::list ? split_at_commas(value) : Values{value};
     apply(setting, values, variable, config, sources);
   }
+}
+
+std::string unknown_variables(const std::vector<std::string>& names) {
+  Values known = setting_names();
+  known.emplace_back("config");
+  std::string unknown;
+  for (const auto& name : names) {
+    if (!name.starts_with(variable_prefix)) continue;
+    const auto is_name = [&](const std::string& setting) { return variable_of(setting) == name; };
+    if (std::ranges::any_of(known, is_name)) continue;
+    std::string meant = name.substr(variable_prefix.size());
+    for (char& c : meant)
+      c = c == '_' ? '-' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const std::string nearest = nearest_name(meant, known);
+    unknown += (unknown.empty() ? "" : ", ") + name;
+    if (!nearest.empty()) unknown += fmt::format(" (did you mean {}?)", variable_of(nearest));
+  }
+  return unknown;
 }
 
 void apply_flag(const Setting& setting, const std::vector<std::string>& values,

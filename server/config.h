@@ -82,6 +82,10 @@ void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& so
 /// `lookup` is getenv, or a fake.
 void apply_environment(const std::function<const char*(const char*)>& lookup, ServerConfig& config,
                        ConfigSources& sources);
+/// Those of the environment's `names` that begin as the variables of settings do and are none, with
+/// what was probably meant; empty: there are none. They may be somebody else's (scripts', links of
+/// containers), so that this is for a warning.
+std::string unknown_variables(const std::vector<std::string>& names);
 void apply_flag(const Setting& setting, const std::vector<std::string>& values,
                 ServerConfig& config, ConfigSources& sources);
 

@@ -5,11 +5,14 @@
 #include <iostream>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <malloc.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "render_core/build_info.h"
 #include "render_core/command_line.h"
@@ -50,8 +53,10 @@ void add_options(CLI::App& app, CommandLine& line) {
   app.add_option("--config", line.config_file, "TOML file: KEY = VALUE, keys as the flags")
       ->envname("CATGS_CONFIG")
       ->option_text("FILE");
-  app.add_flag("--print-config", line.print_config,
-               "Print the settings in force and where each comes from, check them, then exit");
+  app.add_flag(
+      "--print-config", line.print_config,
+      "Print the settings in force and where each comes from, check them, then exit; files that "
+      "they name are read at the start only");
   const ServerConfig defaults;
   for (const auto& setting : settings()) {
     const std::string name = "--" + setting.name;
@@ -85,13 +90,24 @@ ServerConfig effective_config(const CommandLine& line, ConfigSources& sources) {
   return config;
 }
 
+std::vector<std::string> variable_names() {
+  std::vector<std::string> names;
+  for (char** variable = environ; *variable; ++variable) {
+    const std::string_view text = *variable;
+    names.emplace_back(text.substr(0, text.find('=')));
+  }
+  return names;
+}
+
 int serve(const CommandLine& line) {
   ConfigSources sources;
   const ServerConfig config = effective_config(line, sources);
   if (line.print_config) std::cout << print_config(config, sources);
   validate(config);
-  if (line.print_config) return exit_ok;
   set_up_log(config.log_format, config.log_level);
+  if (const std::string unknown = unknown_variables(variable_names()); !unknown.empty())
+    spdlog::warn("the environment has what is no setting: {}", unknown);
+  if (line.print_config) return exit_ok;
   Server server(config);
   server.run();
   return exit_ok;

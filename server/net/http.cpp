@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <stdexcept>
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -67,6 +68,31 @@ bool is_loopback(std::string_view address) {
   in6_addr v6{};
   if (::inet_pton(AF_INET, text.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
   return ::inet_pton(AF_INET6, text.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+void check_origin(std::string_view text, bool any_subdomain) {
+  std::string lower_case(text);
+  for (char& c : lower_case)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const std::string_view whole = lower_case;
+  const auto scheme_end = whole.find("://");
+  const bool has_scheme = scheme_end != std::string_view::npos;
+  const std::string_view scheme = has_scheme ? whole.substr(0, scheme_end) : "https";
+  std::string_view authority = has_scheme ? whole.substr(scheme_end + 3) : whole;
+  authority = authority.substr(0, authority.find_first_of("/?#"));
+  // Browsers leave the usual port out.
+  const std::string_view usual_port = scheme == "https" ? ":443" : scheme == "http" ? ":80" : "/";
+  if (authority.ends_with(usual_port)) authority.remove_suffix(usual_port.size());
+  std::string_view host = authority;
+  if (any_subdomain && host.starts_with("*.")) host.remove_prefix(2);
+  if (host.empty() || host.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789.:-_[]") !=
+                          std::string_view::npos)
+    throw std::invalid_argument(
+        fmt::format("\"{}\" is no origin (write it like https://a.example)", text));
+  const std::string meant = fmt::format("{}://{}", scheme, authority);
+  if (meant != text)
+    throw std::invalid_argument(
+        fmt::format("\"{}\" is not how browsers write an origin (did you mean {}?)", text, meant));
 }
 
 bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed) {

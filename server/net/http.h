@@ -73,6 +73,10 @@ inline constexpr std::size_t max_upload_bytes = 1 << 20;
 bool origin_allowed(std::string_view origin, std::string_view host,
                     const std::vector<std::string>& allowed);
 
+/// Throws std::invalid_argument where no browser writes this origin, so that it would match none,
+/// with the form that was probably meant. `any_subdomain`: "https://*.a.example" is good too.
+void check_origin(std::string_view text, bool any_subdomain);
+
 /// 127.0.0.0/8, ::1, localhost.
 bool is_loopback(std::string_view address);
 

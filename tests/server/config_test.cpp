@@ -93,6 +93,50 @@ TEST_F(ConfigTest, MistakesNameTheirPlace) {
                                               HasSubstr("No such file"), HasSubstr("check"))));
 }
 
+TEST_F(ConfigTest, AMistypedNameGetsTheNearest) {
+  EXPECT_THAT([&] { read_toml("max_session = 4\n"); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr(path + ":1: max_session"),
+                                              HasSubstr("did you mean max-sessions?"))));
+  EXPECT_THAT([&] { read_toml("colour = 4\n"); },
+              ThrowsMessage<InputError>(HasSubstr("--help lists them")));
+}
+
+TEST_F(ConfigTest, VariablesThatAreNoSettingsAreTold) {
+  EXPECT_EQ(unknown_variables({"PATH", "CATGS_PORT", "CATGS_CONFIG", "CATGS_MAX_SESSIONS"}), "");
+  EXPECT_EQ(unknown_variables({"CATGS_MAX_SESSION", "CATGS_BUILD_TREE", "CATGS_port"}),
+            "CATGS_MAX_SESSION (did you mean CATGS_MAX_SESSIONS?), CATGS_BUILD_TREE, "
+            "CATGS_port (did you mean CATGS_PORT?)");
+}
+
+TEST_F(ConfigTest, OriginsAreAsBrowsersWriteThem) {
+  const std::map<std::string, std::string> mistakes = {
+      {"example.com", "did you mean https://example.com?"},
+      {"example.com:8443/", "did you mean https://example.com:8443?"},
+      {"https://example.com/", "did you mean https://example.com?"},
+      {"https://Example.com:443", "did you mean https://example.com?"},
+      {"http://example.com:80/tour?a#b", "did you mean http://example.com?"},
+      {"https://", "is no origin"},
+      {"https://a.example; script-src *", "is no origin"},
+      {"https://a.example https://b.example", "is no origin"}};
+  for (const char* name : {"allow-origin", "embed-origin"}) {
+    for (const auto& [text, remedy] : mistakes)
+      EXPECT_THAT(
+          [&] {
+            read_flag(name, {"https://good.example", text});
+          },
+          ThrowsMessage<InputError>(AllOf(HasSubstr(name), HasSubstr(remedy))))
+          << text;
+    for (const char* good :
+         {"*", "https://a.example", "http://127.0.0.1:8080", "https://[::1]:8443",
+          "http://localhost:5173", "chrome-extension://abcdefgh"})
+      EXPECT_NO_THROW(read_flag(name, {good})) << good;
+  }
+  read_flag("embed-origin", {"https://*.a.example"});
+  EXPECT_THAT(config.embed_origins, ElementsAre("https://*.a.example"));
+  EXPECT_THAT([&] { read_flag("allow-origin", {"https://*.a.example"}); },
+              ThrowsMessage<InputError>(HasSubstr("is no origin")));
+}
+
 TEST_F(ConfigTest, RefusesAnOpenDoor) {
   config.scenes = {"synth:city:1000"};
   EXPECT_NO_THROW(validate(config));

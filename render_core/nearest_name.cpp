@@ -1,0 +1,46 @@
+#include "render_core/nearest_name.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+
+namespace catgs {
+namespace {
+
+/// Letters to be put in, taken away or changed.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, changed});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::string nearest_name(std::string_view unknown, const std::vector<std::string>& names) {
+  std::string nearest;
+  std::size_t least = unknown.size() / 3;
+  for (const std::string& name : names) {
+    const std::size_t distance = edit_distance(unknown, name);
+    if (distance > least || (distance == least && !nearest.empty())) continue;
+    least = distance;
+    nearest = name;
+  }
+  return nearest;
+}
+
+std::string suggest_name(std::string_view unknown, const std::vector<std::string>& names,
+                         std::string_view otherwise) {
+  const std::string nearest = nearest_name(unknown, names);
+  return nearest.empty() ? std::string(otherwise) : "did you mean " + nearest + "?";
+}
+
+}  // namespace catgs
