@@ -142,11 +142,12 @@ describe('metrics', () => {
     expect(metrics.snapshot(300 * ms).stages_ms.render).toBe(12);
   });
 
-  it('measure no stage at all by the first picture of a pose that is drawn at rest', () => {
+  it('measure no stage and no window by the first picture of a pose that is drawn at rest', () => {
     const metrics = new Metrics();
     const { header, ...rest } = frame(1n, 0, 20 * ms);
     metrics.presented({ ...rest, header: { ...header, still: true } }, 30 * ms);
-    expect(new Set(Object.values(metrics.snapshot(40 * ms).stages_ms))).toEqual(new Set([NaN]));
+    const { stages_ms, window, sub_share } = metrics.snapshot(40 * ms);
+    expect(new Set([...Object.values(stages_ms), window, sub_share])).toEqual(new Set([NaN]));
   });
 
   it('keep what the last motion was like, through a rest of any length', () => {

@@ -91,17 +91,20 @@ export class Metrics {
     this.shown_.push(now_us, 1);
     const pose_time_us = Number(header.poseClientTimeUs);
     // Pictures that only refine a still view, or come before any pose, say nothing of motion.
-    if (header.poseId > 0n && header.poseId !== this.last_pose_id_) {
+    const is_first = header.poseId > 0n && header.poseId !== this.last_pose_id_;
+    this.last_pose_id_ = header.poseId;
+    if (is_first) {
       this.motion_us_.push(now_us, now_us - pose_time_us);
       this.pose_age_.shown(header.poseId, pose_time_us, now_us);
-      // Late on purpose, and of another size perhaps, is what is drawn at rest.
-      if (!header.still) this.stages_us_.network.push(now_us, network_us(frame));
+    }
+    // Late on purpose, of another size perhaps, and always a key frame without a window.
+    if (header.still) return;
+    const stages = this.stages_us_;
+    if (is_first) {
+      stages.network.push(now_us, network_us(frame));
       this.windows_.push(now_us, header.window);
       this.subs_.push(now_us, header.speculated ? 1 : 0);
     }
-    this.last_pose_id_ = header.poseId;
-    if (header.still) return;
-    const stages = this.stages_us_;
     stages.wait.push(now_us, header.waitUs);
     stages.render.push(now_us, header.renderUs);
     stages.encode.push(now_us, header.encodeUs);
