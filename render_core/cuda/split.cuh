@@ -40,9 +40,8 @@ struct SplitParams {
   ReorderRun* runs;            // [run_bound]
   float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
   FrameCounts* counts;         // what split makes is set, and list_max
-  std::uint32_t
-      mean_list;  // entries of a tile that l follows; 0: not known, then this frame's lists
-  bool split;     // else every tile is one task
+  std::uint32_t mean_list;     // of a tile, for slice_length(); 0: not known, this frame's then
+  bool split;                  // else every tile is one task
 };
 void launch_split(const SplitParams& params, cudaStream_t stream);
 
