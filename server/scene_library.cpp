@@ -47,11 +47,13 @@ std::string megabytes(std::uint64_t bytes) {
 }  // namespace
 
 SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
-                           boost::asio::io_context& io, Metrics& metrics)
+                           boost::asio::io_context& io, Metrics& metrics,
+                           std::function<TimePoint()> clock)
     : config_(config),
       core_(std::move(core)),
       io_(io),
       metrics_(metrics),
+      clock_(std::move(clock)),
       folders_(paths(config.scene_folders), size_options(config)),
       residency_(residency_limits(config)) {
   for (auto& entry : load_scenes(config_, core_)) pin(std::move(entry));
@@ -67,21 +69,21 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
 /// A server that is up can show something: without another scene, their first one is loaded.
 void SceneLibrary::open_folders() {
   merge(folders_.scan());
-  next_scan_ = Clock::now() + scan_interval;
+  next_scan_ = clock_() + scan_interval;
   spdlog::info("{} scenes in folders, loaded when somebody asks for them", ids_.size());
   if (!default_scene_.empty()) return;
   if (shelf_.empty())
     throw InputError("--scene-folder " + config_.scene_folders.front(), {}, "holds no scene",
                      "put one there, or give --scene");
   const auto& [id, book] = *shelf_.begin();
-  const TimePoint now = Clock::now();
+  const TimePoint now = clock_();
   const auto wish = residency_.want(id, book.found.size.bytes(), now, in_use());
   if (wish != SceneResidency::Wish::awaited)
     throw InputError("--scene-memory", {}, refusal(wish, id, book).message);
   residency_.next(now, in_use());
   auto entry = read(id, book.found);
   default_scene_ = id;
-  on_loaded(id, {std::move(entry), {}}, now, Clock::now());
+  on_loaded(id, {std::move(entry), {}}, now, clock_());
 }
 
 SceneLibrary::~SceneLibrary() {
@@ -180,7 +182,7 @@ void SceneLibrary::start_next(TimePoint now) {
   boost::asio::post(loader_, [this, id = step->load, found = shelf_.at(step->load).found, now] {
     auto loaded = std::make_shared<Loaded>(load(id, found));
     boost::asio::post(
-        io_, [this, id, loaded, now] { on_loaded(id, std::move(*loaded), now, Clock::now()); });
+        io_, [this, id, loaded, now] { on_loaded(id, std::move(*loaded), now, clock_()); });
   });
 }
 

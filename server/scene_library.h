@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -38,9 +39,9 @@ class SceneLibrary final : public SceneSource {
   };
 
   /// Loads what --scene names, and where it names nothing, the first scene of the folders: a server
-  /// that is up can show something. Throws InputError.
+  /// that is up can show something. `clock` says when a load has ended. Throws InputError.
   SceneLibrary(const ServerConfig& config, RendererOptions core, boost::asio::io_context& io,
-               Metrics& metrics);
+               Metrics& metrics, std::function<TimePoint()> clock = Clock::now);
   ~SceneLibrary() override;  // waits for the part of a scene that is being read
 
   [[nodiscard]] std::string default_scene() const override { return default_scene_; }
@@ -99,6 +100,7 @@ class SceneLibrary final : public SceneSource {
   RendererOptions core_;  // of scenes to come; settled once the first ones are in memory
   boost::asio::io_context& io_;
   Metrics& metrics_;
+  const std::function<TimePoint()> clock_;
   SceneFolders folders_;  // on the loader's thread, once the constructor is through
   std::map<std::string, Book> shelf_;
   std::map<std::filesystem::path, std::string> ids_;  // a scene keeps its id
