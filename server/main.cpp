@@ -53,10 +53,10 @@ void add_options(CLI::App& app, CommandLine& line) {
   app.add_option("--config", line.config_file, "TOML file: KEY = VALUE, keys as the flags")
       ->envname("CATGS_CONFIG")
       ->option_text("FILE");
-  app.add_flag(
-      "--print-config", line.print_config,
-      "Print the settings in force and where each comes from, check them, then exit; files that "
-      "they name are read at the start only");
+  app.add_flag("--print-config", line.print_config,
+               "Print the settings in force and where each comes from, check them, then exit; the "
+               "files that "
+               "they name are not opened");
   const ServerConfig defaults;
   for (const auto& setting : settings()) {
     const std::string name = "--" + setting.name;

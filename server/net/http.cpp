@@ -81,7 +81,7 @@ void check_origin(std::string_view text, bool any_subdomain) {
   std::string_view authority = has_scheme ? whole.substr(scheme_end + 3) : whole;
   authority = authority.substr(0, authority.find_first_of("/?#"));
   // Browsers leave the usual port out.
-  const std::string_view usual_port = scheme == "https" ? ":443" : scheme == "http" ? ":80" : "/";
+  const std::string_view usual_port = scheme == "https" ? ":443" : scheme == "http" ? ":80" : "";
   if (authority.ends_with(usual_port)) authority.remove_suffix(usual_port.size());
   std::string_view host = authority;
   if (any_subdomain && host.starts_with("*.")) host.remove_prefix(2);
