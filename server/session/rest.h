@@ -12,7 +12,9 @@ namespace catgs {
 
 /// When a camera rests: as its client says that nothing moves it, or when it has not moved for
 /// `least`, nor for twice as long as its poses take to follow each other, the quickest of the last
-/// few. What a client that sends few of them shows between two is no rest. Pure; not thread-safe.
+/// few. What a client that sends few of them shows between two is no rest. A client is believed
+/// once in `least`: one that says it with every pose gets no more stills than one that stops so
+/// often. Pure; not thread-safe.
 class Rest {
  public:
   explicit Rest(std::chrono::milliseconds least) : least_(least) {}
@@ -26,7 +28,8 @@ class Rest {
   }
   /// The client says so.
   void said(TimePoint now) {
-    if (!said_) said_ = now;
+    if (said_ || now - believed_ < least_) return;
+    said_ = believed_ = now;
   }
   [[nodiscard]] TimePoint begins() const {
     const Clock::duration quickest = *std::ranges::min_element(gaps_);
@@ -37,7 +40,8 @@ class Rest {
  private:
   std::chrono::milliseconds least_;
   TimePoint last_motion_{};
-  std::optional<TimePoint> said_;
+  std::optional<TimePoint> said_;  // since the last motion
+  TimePoint believed_{};
   std::array<Clock::duration, 4> gaps_{};
   std::size_t next_ = 0;
 };

@@ -199,6 +199,20 @@ TEST_F(StillTest, APoseThatNothingMovesIsAStillEvenIfTheOneBeforeWasHeldUp) {
   EXPECT_TRUE(run_frame().ticket.still);
 }
 
+TEST_F(StillTest, WhoSaysWithEveryPoseThatNothingMovesGetsNoMoreOfThem) {
+  greet(small_in_motion());
+  int stills = 0;
+  const TimePoint begin = now;
+  while (now - begin < 2s) {
+    now += 5ms;
+    ++poses_;
+    pose(poses_, static_cast<float>(poses_), true);
+    if (frame_is_due()) stills += shown().ticket.still ? 1 : 0;
+  }
+  EXPECT_GT(stills, 0);
+  EXPECT_LE(stills, 2s / policy.still_after);
+}
+
 TEST_F(StillTest, TakesAShareOfTheLinkThatKeepsQueuesShort) {
   greet(small_in_motion());
   for (int i = 0; i < 30; ++i) moved();
