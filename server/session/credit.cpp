@@ -41,6 +41,12 @@ std::optional<CreditWindow::Settled> CreditWindow::acknowledged(std::uint64_t fr
   return settled;
 }
 
+std::size_t CreditWindow::bytes_in_flight() const {
+  std::size_t bytes = 0;
+  for (const InFlight& frame : in_flight_) bytes += frame.bytes;
+  return bytes;
+}
+
 int CreditWindow::limit() const {
   const auto rtt = usual_rtt().count();
   const auto interval = std::max<std::int64_t>(1, frame_interval_.count());
@@ -52,10 +58,8 @@ bool CreditWindow::available() const {
   if (in_flight_.empty()) return true;
   if (in_flight() >= limit()) return false;
   if (!bits_per_s_) return true;
-  double bytes = 0.0;
-  for (const InFlight& frame : in_flight_) bytes += static_cast<double>(frame.bytes);
   const std::chrono::duration<double> span = usual_rtt() + frame_interval_ + slack;
-  return bytes * 8.0 <= *bits_per_s_ * span.count();
+  return static_cast<double>(bytes_in_flight()) * 8.0 <= *bits_per_s_ * span.count();
 }
 
 microseconds CreditWindow::usual_rtt() const {

@@ -56,6 +56,7 @@ class CreditWindow {
   void reset() { in_flight_.clear(); }
 
   [[nodiscard]] int in_flight() const { return static_cast<int>(in_flight_.size()); }
+  [[nodiscard]] std::size_t bytes_in_flight() const;
   [[nodiscard]] int limit() const;
   [[nodiscard]] bool available() const;
   [[nodiscard]] std::chrono::microseconds base_rtt() const;  // 0: not known yet

@@ -71,6 +71,8 @@ bool FlowControl::acknowledged(const Ack& ack, TimePoint now) {
   observe_network(ack, *settled, now);
   observe_decoder(ack, *settled, now);
   observe_pose_age(ack);
+  // The rest has passed, however little the link was thought to carry.
+  carried_by_ = std::min(carried_by_, now + time_on_link(credit_.bytes_in_flight(), now));
   if (!wish_.fixed_quality) credit_.set_link_rate(network_.rate());
   return true;
 }

@@ -94,7 +94,7 @@ class FlowControl {
   std::chrono::microseconds real_interval_{0};
   LinkState link_;
   TimePoint link_seen_{};
-  TimePoint carried_by_{};  // all that was sent
+  TimePoint carried_by_{};  // all that was sent, at the latest as acknowledgements tell
   double pose_to_photon_us_ = 0.0;
 };
 

@@ -208,6 +208,26 @@ TEST(Flow, AStillForASlowDecoderIsFullSizeToo) {
   EXPECT_GE(simulation.presented(39s, 40s), 0.9 * simulation.presented(29s, 30s));
 }
 
+TEST(FlowControl, WhatIsAcknowledgedStandsInNoLine) {
+  FlowControl flow;
+  flow.set_wish({{1280, 720}, 60, 8'000, false});
+  TimePoint now = TimePoint{} + 1h;
+  constexpr std::size_t bytes = 40'000;  // 40 ms at 8 Mbit/s
+  for (std::uint64_t id = 1; id <= 60; ++id) {
+    flow.sent({id, bytes, {1280, 720}}, now);
+    now += 20ms;
+    Ack ack;
+    ack.frame_id = id;
+    ack.received_us = ack.decoded_us = ack.presented_us =
+        std::chrono::duration_cast<microseconds>(now.time_since_epoch()).count();
+    ASSERT_TRUE(flow.acknowledged(ack, now));
+  }
+  EXPECT_EQ(flow.standing(now), 0us) << "the link carries more than it was asked to";
+  flow.sent({61, bytes, {1280, 720}}, now);
+  EXPECT_EQ(flow.standing(now), flow.time_on_link(bytes, now));
+  EXPECT_EQ(flow.standing(now + 1s), 0us);
+}
+
 TEST(FlowControl, AFrameThatWasGivenUpUnseenTellsNothingOfTheLink) {
   FlowControl flow;
   flow.set_wish({{1280, 720}, 60, 20'000, false});

@@ -17,7 +17,8 @@ struct Feed {
   std::int64_t client_us = -5'000'000;
 
   /// `queue` on top of a path of 20 ms; the frame used `share` of the rate.
-  void frame(microseconds queue, double share = 1.0, microseconds clock_jump = 0us) {
+  void frame(microseconds queue, double share = 1.0, microseconds clock_jump = 0us,
+             microseconds own = 0us) {
     now += 16'667us;
     client_us += 16'667;
     RateController::Sample sample;
@@ -25,6 +26,7 @@ struct Feed {
     sample.finished_us = client_us + queue.count() + clock_jump.count();
     sample.units = share * controller.rate() / 60.0;
     sample.round_trip = 45ms + queue;
+    sample.own = own;
     controller.add(sample, now);
   }
   void frames(int count, microseconds queue, double share = 1.0, microseconds clock_jump = 0us) {
@@ -105,6 +107,31 @@ TEST(RateController, BeginsAnewAfterNothingPassed) {
   feed.now += 5s;  // stuck
   feed.frame(5s);
   EXPECT_LE(feed.controller.rate(), limits.start / 4);
+}
+
+TEST(RateController, WhatIsLargeOnPurposeIsNoQueueOfItsOwn) {
+  Feed feed;
+  feed.frames(60, 0us);
+  const double before = feed.controller.rate();
+  for (int i = 0; i < 20; ++i) feed.frame(60ms, 1.0, 0us, 60ms);
+  EXPECT_EQ(feed.controller.queue_delay(), 0us);
+  EXPECT_GE(feed.controller.rate(), before);
+  for (int i = 0; i < 20; ++i) feed.frame(90ms, 1.0, 0us, 60ms);
+  EXPECT_EQ(feed.controller.queue_delay(), 30ms) << "what stands in front of it is";
+  EXPECT_LT(feed.controller.rate(), before);
+}
+
+TEST(RateController, OnlyWhatPassedWhenBusySurelyPasses) {
+  Feed feed;
+  EXPECT_EQ(feed.controller.steady_rate(feed.now), feed.controller.rate()) << "nothing is known";
+  feed.frames(3, 0us);
+  feed.frames(20, 30ms);
+  const double when_busy = feed.controller.steady_rate(feed.now);
+  feed.frames(300, 0us);
+  EXPECT_GT(feed.controller.rate(), 1.2 * when_busy);
+  EXPECT_LT(feed.controller.steady_rate(feed.now), 1.2 * when_busy);
+  EXPECT_EQ(feed.controller.steady_rate(feed.now + 10s), feed.controller.rate())
+      << "that is too long ago";
 }
 
 TEST(RateController, StaysWithinItsLimits) {
