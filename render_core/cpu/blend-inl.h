@@ -22,13 +22,17 @@ namespace HWY_NAMESPACE {
 inline constexpr std::size_t batch_size = 64;
 
 /// Splats as culling reads them, by field.
-struct alignas(64) Batch {
+struct Batch {
+  // Whitened coordinates of the origin, and what they grow by per pixel; see Whitening. Aligned, as
+  // whole registers are stored.
+  alignas(64) float u[batch_size];
+  alignas(64) float v[batch_size];
+  alignas(64) float xx[batch_size];
+  alignas(64) float xy[batch_size];
+  alignas(64) float yy[batch_size];
+  alignas(64) float reach[batch_size];
   const Splat* splats[batch_size];
   std::size_t count = 0;
-  // Whitened coordinates of the origin, and what they grow by per pixel; see Whitening.
-  float u[batch_size], v[batch_size];
-  float xx[batch_size], xy[batch_size], yy[batch_size];
-  float reach[batch_size];
 };
 
 /// Fills the batch from the front of `list`. `origin`: of its coordinates, px.
@@ -60,9 +64,11 @@ HWY_INLINE void load(const BlendTask& task, std::span<const DepthSlot> list, Vec
 }
 
 /// The splats of a batch that meet a block.
-struct alignas(64) Hits {
-  std::uint64_t splats = 0;            // a bit each
-  float u[batch_size], v[batch_size];  // whitened coordinates of the block's first pixel
+struct Hits {
+  // Whitened coordinates of the block's first pixel.
+  alignas(64) float u[batch_size];
+  alignas(64) float v[batch_size];
+  std::uint64_t splats = 0;  // a bit each
 };
 
 /// Finds splats whose ellipse alpha >= alpha_min may meet the block at `offset` from the batch's
