@@ -290,6 +290,17 @@ describe('drain', () => {
     expect(sockets).toHaveLength(3);
   });
 
+  it('tries less and less often where nobody else takes it', () => {
+    const old = go_live();
+    old.say({ case: 'drain', value: {} });
+    for (let ms = 0, refused = 1; ms < 10_000; ms += 25) {
+      for (; refused < sockets.length; refused += 1) socket(refused).events.closed(1006, '');
+      time.advance(25);
+    }
+    expect(sockets.length).toBeGreaterThan(4);
+    expect(sockets.length).toBeLessThan(8); // 28 with half a second between two
+  });
+
   it('goes on with the new connection when the old one ends first', () => {
     const old = go_live();
     session.send_pose(pose(4n));

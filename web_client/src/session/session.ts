@@ -69,6 +69,7 @@ interface Link {
 export class Session {
   private link_: Link | undefined;
   private successor_: Link | undefined;
+  private successor_attempt_ = 0;
   private attempt_ = 0;
   private cancel_retry_: () => void = () => undefined;
   private cancel_successor_: () => void = () => undefined;
@@ -319,6 +320,7 @@ export class Session {
     }
     this.link_ = link;
     this.successor_ = undefined;
+    this.successor_attempt_ = 0;
     if (link.welcome) this.go_live(link);
     else this.listener_.state({ phase: 'connecting', attempt: this.attempt_ });
   }
@@ -346,8 +348,11 @@ export class Session {
     }
   }
 
+  /** Less and less often: a server that is the only one refuses until it ends. */
   private open_successor_later(): void {
-    this.cancel_successor_ = this.env_.timers.after(backoff_ms(1, this.env_.random), () => {
+    this.successor_attempt_ += 1;
+    const retry_in_ms = backoff_ms(this.successor_attempt_, this.env_.random);
+    this.cancel_successor_ = this.env_.timers.after(retry_in_ms, () => {
       if (this.link_ && !this.successor_) this.successor_ = this.open_link();
     });
   }

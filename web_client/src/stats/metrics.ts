@@ -47,25 +47,24 @@ export interface StatsReport extends StatsSnapshot {
   readonly last_motion: Motion;
 }
 
-const rate_span_us = 2e6;
-const latency_span_us = 5e6;
+const span_us = 2e6;
 
 export class Metrics {
-  private readonly shown_ = new TimeWindow(rate_span_us);
-  private readonly bytes_ = new TimeWindow(rate_span_us);
-  private readonly motion_us_ = new TimeWindow(latency_span_us);
-  private readonly pose_age_ = new PoseAge(latency_span_us, 1e6 / 60);
+  private readonly shown_ = new TimeWindow(span_us);
+  private readonly bytes_ = new TimeWindow(span_us);
+  private readonly motion_us_ = new TimeWindow(span_us);
+  private readonly pose_age_ = new PoseAge(span_us, 1e6 / 60);
   private readonly stages_us_ = {
-    wait: new TimeWindow(rate_span_us),
-    render: new TimeWindow(rate_span_us),
-    encode: new TimeWindow(rate_span_us),
-    send: new TimeWindow(rate_span_us),
-    network: new TimeWindow(rate_span_us),
-    decode: new TimeWindow(rate_span_us),
-    present: new TimeWindow(rate_span_us),
+    wait: new TimeWindow(span_us),
+    render: new TimeWindow(span_us),
+    encode: new TimeWindow(span_us),
+    send: new TimeWindow(span_us),
+    network: new TimeWindow(span_us),
+    decode: new TimeWindow(span_us),
+    present: new TimeWindow(span_us),
   };
-  private readonly windows_ = new TimeWindow(rate_span_us);
-  private readonly subs_ = new TimeWindow(rate_span_us);
+  private readonly windows_ = new TimeWindow(span_us);
+  private readonly subs_ = new TimeWindow(span_us);
   private last_pose_id_ = -1n;
   private frames_shown_ = 0;
   private frames_dropped_ = 0;
@@ -90,17 +89,15 @@ export class Metrics {
     this.size_px_ = [header.widthPx, header.heightPx];
     this.shown_.push(now_us, 1);
     const pose_time_us = Number(header.poseClientTimeUs);
-    // Pictures that only refine a still view, or come before any pose, say nothing of motion.
+    // Of each pose one picture counts, and none that came before any pose.
     const is_first = header.poseId > 0n && header.poseId !== this.last_pose_id_;
     this.last_pose_id_ = header.poseId;
-    if (is_first) {
-      this.motion_us_.push(now_us, now_us - pose_time_us);
-      this.pose_age_.shown(header.poseId, pose_time_us, now_us);
-    }
+    if (is_first) this.pose_age_.shown(header.poseId, pose_time_us, now_us);
     // Late on purpose, of another size perhaps, and always a key frame without a window.
     if (header.still) return;
     const stages = this.stages_us_;
     if (is_first) {
+      this.motion_us_.push(now_us, now_us - pose_time_us);
       stages.network.push(now_us, network_us(frame));
       this.windows_.push(now_us, header.window);
       this.subs_.push(now_us, header.speculated ? 1 : 0);
@@ -122,7 +119,7 @@ export class Metrics {
   }
 
   snapshot(now_us: number): StatsReport {
-    const per_second = 1e6 / rate_span_us;
+    const per_second = 1e6 / span_us;
     return {
       ...this.motion((window) => window.values(now_us)),
       fps_shown: this.shown_.values(now_us).length * per_second,
