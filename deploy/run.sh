@@ -41,7 +41,7 @@ demo_scene=$build_dir/scenes/city.ply
 # The server's options, by the table in its source: there before anything is built.
 server_option_names() {
   tr '\n' ' ' <"$SOURCE_DIR/server/config.cpp" |
-    grep -oE '((list|integer|text|flag|choice<[A-Za-z:]+>)\( *|return \{)"[a-z0-9-]+", ' |
+    grep -oE '((list|origins|integer|text|flag|choice<[A-Za-z:]+>)\( *|return \{)"[a-z0-9-]+", ' |
     sed -E 's/.*"(.*)".*/--\1/'
   printf -- '--config\n'
 }
