@@ -99,7 +99,7 @@ describe('an author', () => {
     expect(distance(start, await pose_of(visitor.page))).toBeGreaterThan(0.1);
     await visitor.page.getByRole('button', { name: 'Play the tour' }).click();
     await visitor.page.getByRole('heading', { name: 'Nearer' }).waitFor();
-    await visitor.page.getByText('It was here.').waitFor();
+    await visitor.page.locator('#tour-text', { hasText: 'It was here.' }).waitFor();
     await settle(visitor.page);
     expect(distance(start, await pose_of(visitor.page))).toBeLessThan(1e-3);
     expect(visitor.errors).toEqual([]);
@@ -159,6 +159,16 @@ describe('an author', () => {
     };
     expect(tours).toMatchObject([{ stops: expect.any(Array) as unknown }]);
     await page.getByText('link of role author').waitFor();
+  });
+
+  it('sees the card of a preview in a window too narrow for it beside the panel', async () => {
+    const options = { viewport: { width: 1000, height: 640 } };
+    const { page } = await open_as('author', '?author', options);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    expect(await page.locator('#tour').isHidden()).toBe(true);
+    await page.getByRole('button', { name: 'Preview' }).click();
+    await page.locator('#tour').waitFor();
+    expect(await page.locator('#author-panel').isHidden()).toBe(true);
   });
 
   it.each([

@@ -21,6 +21,8 @@ type Panel = (typeof panels)[number];
 
 // Here one panel leaves little of the picture to see.
 const small_screen = '(max-width: 800px), (max-height: 500px)';
+// Here a panel hides the tour's card: tour.css has the same.
+const no_room_for_card = '(max-width: 1100px), (max-height: 500px)';
 
 /** Buttons, their panels and their keys. */
 export class Toolbar {
@@ -60,9 +62,9 @@ export class Toolbar {
     if (!this.is_open(panel)) this.toggle(panel);
   }
 
-  /** On a small screen, for the picture. */
+  /** For the picture and the tour's card, where panels would hide them. */
   make_room(): void {
-    if (this.small_screen_.matches) this.close_all();
+    if (matchMedia(no_room_for_card).matches) this.close_all();
   }
 
   show_mode(mode: CameraMode): void {
