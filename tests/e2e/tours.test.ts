@@ -173,7 +173,7 @@ describe('a tour', () => {
     const choice = page.getByLabel('Choose a tour');
     expect(await choice.locator('option').allInnerTexts()).toEqual(['Tour 1', 'cameraAnim']);
     await page.getByRole('button', { name: 'Next stop' }).click();
-    await page.getByText('It squeaks.').waitFor();
+    await page.locator('#tour-text', { hasText: 'It squeaks.' }).waitFor();
     await choice.selectOption('cameraAnim');
     const before = await pose_of(page);
     await page.getByRole('button', { name: 'Play the tour' }).click();
