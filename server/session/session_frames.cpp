@@ -152,7 +152,10 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   last_said_ = now;
   cost_.add(ticket);
   if (ticket.speculated) shown_is_passing_ = true;
-  if (result.sharp) refinements_left_ = 0;
+  // The VBV follows the bitrate a picture late: the first still in the stream of motion had no more
+  // room than that, whatever was planned for it.
+  const bool had_room = ticket.refined || ticket.size_px != encoding_.size_px;
+  if (result.sharp && had_room) refinements_left_ = 0;
   tell_config(result, now);
   const std::size_t bytes = result.frame.bitstream.size();
   if (ticket.still) {
