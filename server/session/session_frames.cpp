@@ -152,9 +152,10 @@ void Session::on_frame(FrameResult result, TimePoint now) {
   last_said_ = now;
   cost_.add(ticket);
   if (ticket.speculated) shown_is_passing_ = true;
-  // The VBV follows the bitrate a picture late: the first still in the stream of motion had no more
-  // room than that, whatever was planned for it.
-  const bool had_room = ticket.refined || ticket.size_px != encoding_.size_px;
+  // The VBV follows the bitrate a picture late: the first at rest in the stream of motion had no
+  // more room than motion, whatever was planned for it.
+  const bool had_room =
+      ticket.size_px != encoding_.size_px || refinements_left_ + 1 < policy_.refine_frames;
   if (result.sharp && had_room) refinements_left_ = 0;
   tell_config(result, now);
   const std::size_t bytes = result.frame.bitstream.size();

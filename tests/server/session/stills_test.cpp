@@ -76,6 +76,19 @@ TEST_F(StillTest, EndsWhenTheEncoderFindsItSharp) {
   EXPECT_FALSE(session.next_frame());
 }
 
+// The first picture in the stream of motion has no more room than motion had.
+TEST_F(StillTest, OfTheSizeOfMotionIsRefinedAgainWhateverTheEncoderFinds) {
+  greet({});
+  sharp = true;
+  moved();
+  EXPECT_TRUE(rested().ticket.still);
+  now += 100ms;
+  ASSERT_TRUE(frame_is_due());
+  EXPECT_TRUE(shown().ticket.refined);
+  now += 10s;
+  EXPECT_FALSE(session.next_frame());
+}
+
 TEST_F(StillTest, TheLadderAndWishesForMotionLeaveItAlone) {
   greet(small_in_motion());
   sharp = true;
