@@ -67,7 +67,8 @@ class ListBuilder {
   SceneArrays scene_;
   int processors_;
   // The count that is waited for next. In a loop: it comes soon, and the device must not run dry
-  // (one H200, 40 sessions of fungi_room: 1,200 frames a second, 1,130 with threads that sleep).
+  // (one H200, 40 sessions of fungi_room that have just begun: 1,200 frames a second, with threads
+  // that sleep 1,137).
   Event counted_{cudaEventDisableTiming};
   Memory memory_;
   // After sort_by_depth().
