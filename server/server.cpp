@@ -168,7 +168,7 @@ NetOptions Server::State::net_options() {
   options.http = [this](const HttpRequest& request) { return respond(request); };
   options.uploads.refusal = [this](const HttpRequest& request) { return refuse_upload(request); };
   options.uploads.take = [this](const HttpRequest& request, std::string body) {
-    return saver->save(std::string(*scene_of(request.path, sidecar_part)), std::move(body),
+    return saver->save(std::string(scene_of(request.path, sidecar_part).value()), std::move(body),
                        {std::string(request.if_match), std::string(request.if_none_match)});
   };
   options.accept = [this](std::shared_ptr<Connection> connection) {

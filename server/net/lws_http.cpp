@@ -105,7 +105,7 @@ int LwsHttpExchange::begin_upload(lws* wsi, std::optional<HttpResponse> refusal)
 int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
                                  std::vector<std::byte>& scratch) {
   response_ = std::move(response);
-  droppable_ = max_dropped_bytes;
+  answered_ = true;
   await_body(wsi);
   bool finished = false;
   return write_headers(wsi, policy, true) == 0 ? write_body(wsi, scratch, finished) : -1;
@@ -116,20 +116,19 @@ void LwsHttpExchange::await_body(lws* wsi) {
   lws_set_timer_usecs(wsi, body_time_us);
 }
 
-/// Of what is refused nothing is kept, but it is read: see refuse_body().
 int LwsHttpExchange::take_body(std::string_view bytes) {
-  if (droppable_) {
-    if (bytes.size() > *droppable_) return -1;
-    *droppable_ -= bytes.size();
-  } else if (!refusal_) {
+  if (body_due_ && !answered_ && !refusal_) {
     body_.append(bytes);
+    return 0;
   }
-  return 0;
+  dropped_bytes_ += bytes.size();
+  return dropped_bytes_ <= max_dropped_bytes ? 0 : -1;
 }
 
 int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy,
                               bool& finished) {
-  if (droppable_) return -1;  // answered long ago
+  if (!body_due_) return 0;  // of a GET, which is being answered
+  if (answered_) return -1;
   body_due_ = false;
   if (refusal_) return answer(wsi, *std::move(refusal_), policy, finished);
   HttpRequest request{path_, precondition_.if_none_match, false, authorization_};

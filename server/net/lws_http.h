@@ -30,8 +30,11 @@ class LwsHttpExchange {
   /// connection, and libwebsockets keeps what the socket does not take.
   int refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
                   std::vector<std::byte>& scratch);
+  /// A piece of a body, of whatever request: a GET may have one, too. Only that of an upload which
+  /// is not refused is kept.
   int take_body(std::string_view bytes);
-  /// The body is whole: asks `uploads`. Calls of on_timer() follow, by LWS_CALLBACK_TIMER.
+  /// The body is whole; that of an upload is what `uploads` is asked to take. Calls of on_timer()
+  /// follow, by LWS_CALLBACK_TIMER.
   int end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy, bool& finished);
   /// The answer may have come, or the body's time is over.
   int on_timer(lws* wsi, const std::string& policy, bool& finished);
@@ -54,7 +57,8 @@ class LwsHttpExchange {
   Precondition precondition_;
   std::string body_;
   std::optional<HttpResponse> refusal_;
-  std::optional<std::size_t> droppable_;  // bytes, of a body that is not wanted
+  bool answered_ = false;          // before its body has come
+  std::size_t dropped_bytes_ = 0;  // of a body that is not wanted
   // By the timer. LWS_SET_TIMER_USEC_CANCEL does not take it back: lws_set_timer_usecs() of 4.1.6
   // adds it to the time of day like any other, so that the timer fires at once.
   bool body_due_ = false;

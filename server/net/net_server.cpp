@@ -103,12 +103,14 @@ std::string site_address(lws* wsi, const Site& site, const std::string& host) {
 const std::string upload_length_rule =
     fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
 
-/// Of the request; 0: it does not say.
-std::uint64_t body_length(lws* wsi) {
+/// Of the request; 0: it does not say; nothing: what it says is no length.
+std::optional<std::uint64_t> body_length(lws* wsi) {
   const std::string text = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
+  if (text.empty()) return 0;
   std::uint64_t bytes = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bytes);
-  return error == std::errc() && end == text.data() + text.size() ? bytes : 0;
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return bytes;
 }
 
 /// Why nothing is taken from this request; nothing: its body may come.
@@ -135,12 +137,14 @@ int finish_request(lws* wsi, HttpSlot& slot) {
 constexpr int keep_reading = 0;
 constexpr int close_connection = -1;
 
+constexpr std::uint64_t max_ignored_body_bytes = 64 << 10;
+
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   forget(slot);
   if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
     slot.exchange = new LwsHttpExchange;
-    const auto bytes = body_length(wsi);
+    const std::uint64_t bytes = body_length(wsi).value_or(0);
     if (bytes >= 1 && bytes <= max_upload_bytes)
       return slot.exchange->begin_upload(wsi, refuse_upload(wsi, site));
     const int status = bytes < 1 ? 411 : 413;
@@ -153,7 +157,12 @@ int on_request(lws* wsi, HttpSlot& slot) {
   }
   if (!is_get_or_head(wsi)) {
     lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
-    return -1;
+    return close_connection;
+  }
+  // libwebsockets reads it to its end, however long, before the next request.
+  if (const auto bytes = body_length(wsi); !bytes || *bytes > max_ignored_body_bytes) {
+    lws_return_http_status(wsi, bytes ? 413 : 400, "a GET needs no body");
+    return close_connection;
   }
   slot.exchange = new LwsHttpExchange;
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);

@@ -169,6 +169,7 @@ void ServerProcess::sample(const std::stop_token& stop) {
   const auto begin = std::chrono::steady_clock::now();
   double at_s = 0.0, server_s = process_cpu_s(pid), own_s = process_cpu_s("self"),
          machine_s = machine_cpu_s();
+  std::vector<UsageSample> usage;  // metrics() may be asked for names meanwhile
   while (!stop.stop_requested()) {
     std::this_thread::sleep_for(sample_interval);
     const double now_s =
@@ -177,12 +178,13 @@ void ServerProcess::sample(const std::stop_token& stop) {
     const auto share = [&](double& last, double current) {
       return std::max(0.0, current - std::exchange(last, current)) / core_s;
     };
-    usage_.push_back({.at_s = now_s,
-                      .server_cpu = share(server_s, process_cpu_s(pid)),
-                      .generator_cpu = share(own_s, process_cpu_s("self")),
-                      .machine_cpu = share(machine_s, machine_cpu_s()),
-                      .server_rss_mb = process_rss_mb(pid)});
+    usage.push_back({.at_s = now_s,
+                     .server_cpu = share(server_s, process_cpu_s(pid)),
+                     .generator_cpu = share(own_s, process_cpu_s("self")),
+                     .machine_cpu = share(machine_s, machine_cpu_s()),
+                     .server_rss_mb = process_rss_mb(pid)});
   }
+  usage_ = std::move(usage);
 }
 
 void ServerProcess::stop() {

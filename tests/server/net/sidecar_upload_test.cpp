@@ -121,13 +121,35 @@ TEST_F(SidecarUpload, ThatIsTooLongIsAnsweredAndNotCutOff) {
 }
 
 TEST_F(SidecarUpload, IsNotReadWithoutEnd) {
-  RawSocket endless(server->port());
   const std::string piece(1 << 20, ' ');
-  endless.send("PUT /api/scenes/hall/sidecar HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " +
-               std::to_string(1 << 30) + "\r\n\r\n");
-  int pieces = 0;
-  while (pieces < 128 && endless.send(piece)) ++pieces;
-  EXPECT_LT(pieces, 128);
+  for (const std::string method : {"PUT", "GET", "HEAD"}) {
+    RawSocket endless(server->port());
+    endless.send(method +
+                 " /api/scenes/hall/sidecar HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " +
+                 std::to_string(1 << 30) + "\r\n\r\n");
+    int pieces = 0;
+    while (pieces < 128 && endless.send(piece)) ++pieces;
+    EXPECT_LT(pieces, 128) << method;
+  }
+  for (const std::string length : {"99999999999999999999", "-1", "1e3"}) {
+    RawSocket odd(server->port());
+    odd.send("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " + length + "\r\n\r\n");
+    EXPECT_TRUE(odd.closed_within(std::chrono::seconds(20))) << length;
+  }
+  EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
+}
+
+/// It once was taken for one, of a scene whose name was whatever lay in memory.
+TEST_F(SidecarUpload, IsNotTheBodyOfAGet) {
+  for (const std::string method : {"GET", "HEAD"}) {
+    RawSocket odd(server->port());
+    odd.send(method + " /api/scenes/hall/tours HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: " +
+             std::to_string(sidecar.size()) + "\r\n\r\n" + std::string(sidecar));
+    const std::string answer = odd.receive(std::chrono::milliseconds(300));
+    EXPECT_THAT(answer, testing::StartsWith("HTTP/1.1 401")) << method;
+    EXPECT_THAT(answer.substr(1), testing::Not(HasSubstr("HTTP/1.1"))) << "one answer: " << method;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "hall.json"));
   EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
 }
 
