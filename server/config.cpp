@@ -275,16 +275,6 @@ std::vector<std::string> setting_names() {
   return names;
 }
 
-void apply(const Setting& setting, const Values& values, const std::string& source,
-           ServerConfig& config, ConfigSources& sources) {
-  try {
-    setting.set(config, values);
-  } catch (const std::invalid_argument& error) {
-    throw InputError(source, setting.name, error.what());
-  }
-  sources[setting.name] = source;
-}
-
 constexpr std::string_view variable_prefix = "CATGS_";
 
 std::string variable_of(std::string_view setting_name) {
@@ -292,6 +282,17 @@ std::string variable_of(std::string_view setting_name) {
   for (char& c : variable)
     c = c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   return variable;
+}
+
+void apply(const Setting& setting, const Values& values, const std::string& source,
+           ServerConfig& config, ConfigSources& sources) {
+  try {
+    setting.set(config, values);
+  } catch (const std::invalid_argument& error) {
+    const bool named = source == "--" + setting.name || source == variable_of(setting.name);
+    throw InputError(source, named ? "" : setting.name, error.what());
+  }
+  sources[setting.name] = source;
 }
 
 Values split_at_commas(std::string_view text_value) {

@@ -126,7 +126,7 @@ AdmissionAnswer Client::admit(const Hello& hello) {
     admitted_at_ = Clock::now();
     const LogSession about(session_.id());
     spdlog::info("{} looks at {}, {}x{}, {}", peer_address_, admission->scene->facts.scene_id,
-                 hello.viewport_px.x, hello.viewport_px.y, admission->encoder.text);
+                 hello.viewport_px.x, hello.viewport_px.y, encoder_name(admission->encoder.kind));
   }
   return answer;
 }

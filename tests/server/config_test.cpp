@@ -83,7 +83,8 @@ TEST_F(ConfigTest, MistakesNameTheirPlace) {
       [&] {
         read_environment({{"CATGS_FPS", "0"}});
       },
-      ThrowsMessage<InputError>(AllOf(HasSubstr("CATGS_FPS"), HasSubstr("1…240"))));
+      ThrowsMessage<InputError>(
+          testing::StartsWith("CATGS_FPS: \"0\" is not a whole number in 1…240")));
   EXPECT_THAT([&] { read_flag("encoder", {"vp9"}); },
               ThrowsMessage<InputError>(AllOf(HasSubstr("--encoder"), HasSubstr("x264"))));
   EXPECT_THAT([&] { read_flag("admin-bind", {"9090"}); },
