@@ -130,6 +130,10 @@ describe('page', () => {
     await page.getByRole('button', { name: 'Connect' }).click();
     await page.evaluate(() => window.catgs!.settled());
     expect(await page.locator('#toolbar').getAttribute('inert')).toBeNull();
+    await page.getByRole('button', { name: 'Share' }).click();
+    await page.getByText('Your access token is not in it').waitFor();
+    expect(await page.getByLabel('Link to this view').inputValue()).not.toContain('right');
+    await keep_screenshot(page, 'fake-token-share');
   });
 
   it('leads from a scene that does not exist to those that do', async () => {

@@ -123,6 +123,14 @@ describe('a tour', () => {
     const box = (await label.boundingBox())!;
     expect([box.x > 0, box.y > 0, box.x + box.width < 1280, box.y + box.height < 720]).not.toContain(false);
     await keep_screenshot(page, 'hotspot-hover');
+    // It stays for a pointer that goes there to read it, and goes for who wants to see what it hides.
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2, { steps: 8 });
+    expect(await opacity()).toBe('1');
+    await page.keyboard.press('Escape');
+    expect(await opacity()).toBe('0');
+    await page.mouse.move(10, 300);
+    await spot.hover();
+    expect(await opacity()).toBe('1');
     await page.mouse.move(10, 300);
     expect(await opacity()).toBe('0');
     await page.keyboard.press('Tab');
@@ -214,6 +222,7 @@ describe('a tour', () => {
     const apart = tour!.right <= bar!.left || tour!.bottom <= bar!.top;
     expect(apart).toBe(true);
     await page.getByRole('button', { name: 'Share' }).click();
+    expect(await page.locator('#share-token').isHidden()).toBe(true); // nobody needs one here
     await keep_screenshot(page, `share-${name}`);
   });
 });

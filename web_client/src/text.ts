@@ -248,6 +248,7 @@ export const text = {
     link_copied: 'The link is in the clipboard.',
     code_copied: 'The code is in the clipboard.',
     copy_yourself: 'Copy it from the field above.',
+    token: 'Your access token is not in it: who opens it needs one, too.',
     no_frames:
       'Browsers show it in no other site yet: the server has to name that site with --embed-origin.',
     frames: (sites: string): string =>

@@ -41,6 +41,7 @@ export class Guide {
   private readonly embed_: EmbedApi;
   private readonly author_: AuthorPanel | undefined;
   private scene_id_ = '';
+  private has_token_ = false;
   private loads_ = 0;
 
   constructor(private readonly parts_: GuideParts) {
@@ -72,6 +73,7 @@ export class Guide {
       address: () => this.address(),
       snapshot: () => worker.snapshot(),
       name: () => this.scene_id_ || 'scene',
+      has_token: () => this.has_token_,
     });
     this.embed_ = new EmbedApi({
       eye: () => camera.eye,
@@ -124,6 +126,7 @@ export class Guide {
   /** The scene has told where its camera starts: its tours come, and a shared view is taken. */
   async enter(scene_id: string, token: string): Promise<void> {
     this.scene_id_ = scene_id;
+    this.has_token_ = token !== '';
     const load = ++this.loads_;
     const shared = read_shared(location.href);
     if (shared.eye) this.apply_shared();

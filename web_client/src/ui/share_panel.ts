@@ -8,12 +8,15 @@ export interface ShareSource {
   snapshot(): Promise<Snapshot | undefined>;
   /** For file names. */
   name(): string;
+  /** Whether this page has shown a token to the server. */
+  has_token(): boolean;
 }
 
 /** Link, code for other pages, picture. */
 export class SharePanel {
   private readonly link_ = by_id('share-link', HTMLInputElement);
   private readonly done_ = by_id('share-done', HTMLOutputElement);
+  private readonly token_ = by_id('share-token', HTMLElement);
   private readonly frames_ = by_id('share-frames', HTMLElement);
 
   constructor(private readonly source_: ShareSource) {
@@ -31,6 +34,7 @@ export class SharePanel {
   shown(): void {
     this.link_.value = this.source_.address();
     this.done_.textContent = '';
+    this.token_.hidden = !this.source_.has_token();
     this.frames_.hidden = true;
   }
 

@@ -33,6 +33,8 @@ export class TourView {
     };
     window.addEventListener('keydown', (event) => {
       const { target } = event;
+      // A label may hide what is behind it (WCAG 1.4.13).
+      if (event.code === 'Escape') this.hotspots_.classList.add('labels-dismissed');
       if (event.ctrlKey || event.metaKey || event.altKey || is_typing(target)) return;
       if (event.code === 'Space' && target instanceof HTMLButtonElement) return; // a click
       const action = actions[event.code];
@@ -104,6 +106,9 @@ export class TourView {
       number.setAttribute('aria-hidden', 'true');
       button.append(number, label_of(stop, i, button));
       button.addEventListener('click', () => this.player_?.go_to(i));
+      for (const arrival of ['pointerenter', 'focus']) {
+        button.addEventListener(arrival, () => this.hotspots_.classList.remove('labels-dismissed'));
+      }
       return [{ stop, button }];
     });
     this.hotspots_.replaceChildren(...this.spots_.map(({ button }) => button));
