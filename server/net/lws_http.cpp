@@ -2,9 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <chrono>
 #include <cstring>
 #include <string_view>
+
+#include <linux/tcp.h>  // glibc's tcp_info lacks the newer fields
+#include <netinet/in.h>
+#include <strings.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
 
 namespace catgs {
 namespace {
@@ -57,6 +64,19 @@ std::vector<std::string> query_arguments(lws* wsi) {
   return arguments;
 }
 
+/// That libwebsockets has read of this connection.
+std::uintptr_t bytes_read(lws* wsi) {
+  const int fd = lws_get_socket_fd(wsi);
+  tcp_info info{};
+  socklen_t size = sizeof info;
+  int unread = 0;
+  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
+      ::ioctl(fd, FIONREAD, &unread) != 0)
+    return 0;
+  return static_cast<std::uintptr_t>(info.tcpi_bytes_received) -
+         static_cast<std::uintptr_t>(unread);
+}
+
 }  // namespace
 
 std::string request_header(lws* wsi, lws_token_indexes token) {
@@ -77,6 +97,31 @@ std::string custom_header(lws* wsi, std::string_view name_with_colon) {
       lws_hdr_custom_copy(wsi, value.data(), length + 1, name_with_colon.data(), name_length);
   value.resize(static_cast<std::size_t>(std::max(copied, 0)));
   return value;
+}
+
+std::optional<std::uint64_t> body_length(lws* wsi) {
+  const std::string text = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
+  if (text.empty()) return 0;
+  // Longer ones libwebsockets does not read, zeros in front or not, and takes 100 MiB or none.
+  constexpr std::size_t max_digits = 20;
+  if (text.size() > max_digits) return std::nullopt;
+  std::uint64_t bytes = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bytes);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return bytes;
+}
+
+void note_answered(lws* wsi) {
+  lws_set_opaque_user_data(wsi, reinterpret_cast<void*>(bytes_read(wsi) + 1));
+}
+
+bool is_pipelined(lws* wsi) {
+  const void* before = lws_get_opaque_user_data(wsi);
+  return before && reinterpret_cast<std::uintptr_t>(before) == bytes_read(wsi) + 1;
+}
+
+bool asks_for_websocket(lws* wsi) {
+  return ::strcasecmp(request_header(wsi, WSI_TOKEN_UPGRADE).c_str(), "websocket") == 0;
 }
 
 int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site,
@@ -112,12 +157,14 @@ int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, const std::str
 }
 
 void LwsHttpExchange::await_body(lws* wsi) {
+  upload_ = true;
   body_due_ = true;
   lws_set_timer_usecs(wsi, body_time_us);
 }
 
 int LwsHttpExchange::take_body(std::string_view bytes) {
   if (body_due_ && !answered_ && !refusal_) {
+    if (body_.size() + bytes.size() > max_upload_bytes) return -1;  // more than was announced
     body_.append(bytes);
     return 0;
   }
@@ -127,7 +174,7 @@ int LwsHttpExchange::take_body(std::string_view bytes) {
 
 int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy,
                               bool& finished) {
-  if (!body_due_) return 0;  // of a GET, which is being answered
+  if (!body_due_) return 0;  // more has come after it: libwebsockets tells it again
   if (answered_) return -1;
   body_due_ = false;
   if (refusal_) return answer(wsi, *std::move(refusal_), policy, finished);
@@ -157,7 +204,7 @@ int LwsHttpExchange::answer(lws* wsi, HttpResponse response, const std::string& 
                             bool& finished) {
   response_ = std::move(response);
   finished = !response_.body || response_.body->empty();
-  if (write_headers(wsi, policy) != 0) return -1;
+  if (write_headers(wsi, policy, true) != 0) return -1;
   if (!finished) lws_callback_on_writable(wsi);
   return 0;
 }

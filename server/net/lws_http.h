@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <future>
 #include <optional>
 #include <string>
@@ -30,14 +31,15 @@ class LwsHttpExchange {
   /// connection, and libwebsockets keeps what the socket does not take.
   int refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
                   std::vector<std::byte>& scratch);
-  /// A piece of a body, of whatever request: a GET may have one, too. Only that of an upload which
-  /// is not refused is kept.
+  /// A piece of a body. Only that of an upload which is not refused is kept.
   int take_body(std::string_view bytes);
   /// The body is whole; that of an upload is what `uploads` is asked to take. Calls of on_timer()
   /// follow, by LWS_CALLBACK_TIMER.
   int end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy, bool& finished);
   /// The answer may have come, or the body's time is over.
   int on_timer(lws* wsi, const std::string& policy, bool& finished);
+
+  [[nodiscard]] bool is_upload() const { return upload_; }
 
   /// Writes the next piece of the body.
   int write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished);
@@ -52,6 +54,7 @@ class LwsHttpExchange {
   std::size_t written_ = 0;
 
   // Of uploads. The request's head is gone when its body has come.
+  bool upload_ = false;
   std::string path_;
   std::string authorization_;
   Precondition precondition_;
@@ -71,5 +74,18 @@ std::string custom_header(lws* wsi, std::string_view name_with_colon);
 
 /// Header of the request, or an empty string.
 std::string request_header(lws* wsi, lws_token_indexes token);
+
+/// Of the request; 0: it does not say; nothing: what it says is no length.
+std::optional<std::uint64_t> body_length(lws* wsi);
+
+/// The next request of this connection begins after what has been read of it.
+void note_answered(lws* wsi);
+/// Was this request sent before the one before it was answered? libwebsockets has kept it since,
+/// and nothing was read for it. Of such a one lws_http_action() takes the head for the body, and
+/// reads that in a loop that does not end when the body does.
+bool is_pipelined(lws* wsi);
+
+/// Not the callback's own text: of what libwebsockets has already refused it may be gone.
+bool asks_for_websocket(lws* wsi);
 
 }  // namespace catgs

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <csignal>
 #include <cstdint>
 #include <exception>
@@ -103,16 +102,6 @@ std::string site_address(lws* wsi, const Site& site, const std::string& host) {
 const std::string upload_length_rule =
     fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
 
-/// Of the request; 0: it does not say; nothing: what it says is no length.
-std::optional<std::uint64_t> body_length(lws* wsi) {
-  const std::string text = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
-  if (text.empty()) return 0;
-  std::uint64_t bytes = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), bytes);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return bytes;
-}
-
 /// Why nothing is taken from this request; nothing: its body may come.
 std::optional<HttpResponse> refuse_upload(lws* wsi, const Site& site) {
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
@@ -127,22 +116,33 @@ std::optional<HttpResponse> refuse_upload(lws* wsi, const Site& site) {
   return site.uploads.refusal({path, {}, false, authorization});
 }
 
-/// An answered request leaves the connection open for the next one.
-int finish_request(lws* wsi, HttpSlot& slot) {
-  forget(slot);
-  return lws_http_transaction_completed(wsi) ? -1 : 0;
-}
-
 // Results of callbacks.
 constexpr int keep_reading = 0;
 constexpr int close_connection = -1;
 
-constexpr std::uint64_t max_ignored_body_bytes = 64 << 10;
+/// An answered request leaves the connection open for the next one; an upload does not, for
+/// libwebsockets goes on reading into the body that it has had.
+int finish_request(lws* wsi, HttpSlot& slot) {
+  const bool last = slot.exchange && slot.exchange->is_upload();
+  forget(slot);
+  if (last) return close_connection;
+  note_answered(wsi);
+  return lws_http_transaction_completed(wsi) ? close_connection : keep_reading;
+}
 
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   forget(slot);
+  // libwebsockets knows no chunks and would take them for the next request.
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0) {
+    lws_return_http_status(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
+    return close_connection;
+  }
   if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
+    if (is_pipelined(wsi)) {
+      lws_return_http_status(wsi, 400, "wait for the answer before you upload");
+      return close_connection;
+    }
     slot.exchange = new LwsHttpExchange;
     const std::uint64_t bytes = body_length(wsi).value_or(0);
     if (bytes >= 1 && bytes <= max_upload_bytes)
@@ -159,8 +159,8 @@ int on_request(lws* wsi, HttpSlot& slot) {
     lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
     return close_connection;
   }
-  // libwebsockets reads it to its end, however long, before the next request.
-  if (const auto bytes = body_length(wsi); !bytes || *bytes > max_ignored_body_bytes) {
+  // It means nothing, and libwebsockets would report it while the answer is on its way.
+  if (const auto bytes = body_length(wsi); bytes != 0) {
     lws_return_http_status(wsi, bytes ? 413 : 400, "a GET needs no body");
     return close_connection;
   }
@@ -189,6 +189,10 @@ int go_on_with_upload(lws* wsi, HttpSlot& slot, bool body_is_whole) {
 
 int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
   switch (reason) {
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:  // h2c is another parser, without our time limits
+      return asks_for_websocket(wsi) ? 0 : close_connection;
+    case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
+      return close_connection;
     case LWS_CALLBACK_HTTP:
       return on_request(wsi, *slot);
     case LWS_CALLBACK_HTTP_BODY:

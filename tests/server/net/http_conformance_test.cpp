@@ -161,6 +161,47 @@ TEST_F(HttpConformance, ABodyIsNoSecondRequest) {
   expect_alive();
 }
 
+/// libwebsockets reads it by its first 30 characters, or takes none, or one that is wrong.
+TEST_F(HttpConformance, ALengthOfManyZerosHidesNoSecondRequest) {
+  const std::string hidden = "GET /healthz HTTP/1.1\r\n" + host() + "\r\n";
+  const std::string length =
+      "Content-Length: " + std::string(40, '0') + std::to_string(hidden.size()) + "\r\n\r\n";
+  for (const char* method : {"GET", "HEAD", "PUT"})
+    EXPECT_THAT(answer(std::string(method) + " /nowhere HTTP/1.1\r\n" + host() + length + hidden),
+                Not(HasSubstr("200 OK")))
+        << method;
+  expect_alive();
+}
+
+/// libwebsockets looks for their bodies in a loop that does not end.
+TEST_F(HttpConformance, PipelinedBodiesDoNotStopTheServer) {
+  const std::string get = "GET / HTTP/1.1\r\n" + host() + "\r\n";
+  for (const std::string method : {"GET", "HEAD", "PUT"}) {
+    const std::string odd =
+        method + " /api/scenes/city/sidecar HTTP/1.1\r\n" + host() + "Content-Length: 1\r\n\r\nx";
+    for (const std::string& requests : {odd + odd + odd, get + odd, get + odd + get, odd + get})
+      answer(requests);
+    expect_alive();
+  }
+}
+
+/// CONNECT and h2c lead libwebsockets to protocols that nobody here speaks, without time limits.
+TEST_F(HttpConformance, NothingButAWebsocketIsUpgradedTo) {
+  const std::string get = "GET /healthz HTTP/1.1\r\n" + host();
+  for (const std::string& request :
+       {"CONNECT / HTTP/1.1\r\n" + host() + "\r\n",
+        get + "Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"
+              "HTTP2-Settings: AAMAAABkAAQAAP__\r\n\r\n",
+        get + "Connection: Upgrade\r\nUpgrade: nonsense\r\n\r\n",
+        get + "\r\n" + get + "Connection: Upgrade\r\nUpgrade: nonsense\r\n\r\n"}) {
+    RawSocket socket(server->port());
+    socket.send(request);
+    EXPECT_THAT(socket.receive(300ms), Not(HasSubstr(" 101 "))) << request;
+    EXPECT_TRUE(socket.closed_within(1s)) << request;
+  }
+  expect_alive();
+}
+
 TEST_F(HttpConformance, HeadersHaveAnEnd) {
   const std::string start = "GET /healthz HTTP/1.1\r\n" + host();
   EXPECT_THAT(answer(start + "Cookie: " + std::string(100'000, 'c') + "\r\n\r\n"),
