@@ -120,8 +120,14 @@ bool is_pipelined(lws* wsi) {
   return before && reinterpret_cast<std::uintptr_t>(before) == bytes_read(wsi) + 1;
 }
 
-bool asks_for_websocket(lws* wsi) {
-  return ::strcasecmp(request_header(wsi, WSI_TOKEN_UPGRADE).c_str(), "websocket") == 0;
+bool refuse_upgrade(lws* wsi) {
+  // Not the callback's own text: what libwebsockets does not know it has answered already, and
+  // then the text may be gone.
+  const std::string protocol = request_header(wsi, WSI_TOKEN_UPGRADE);
+  if (::strcasecmp(protocol.c_str(), "websocket") == 0) return false;
+  if (::strcasecmp(protocol.c_str(), "h2c") == 0)
+    lws_return_http_status(wsi, 400, "HTTP/1.1 and websockets are spoken here, not h2c");
+  return true;
 }
 
 int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site,

@@ -85,7 +85,8 @@ void note_answered(lws* wsi);
 /// reads that in a loop that does not end when the body does.
 bool is_pipelined(lws* wsi);
 
-/// Not the callback's own text: of what libwebsockets has already refused it may be gone.
-bool asks_for_websocket(lws* wsi);
+/// Answers a request for another protocol than websocket, and says whether it was one. h2c is
+/// another parser, without our time limits.
+bool refuse_upgrade(lws* wsi);
 
 }  // namespace catgs

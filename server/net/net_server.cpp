@@ -189,8 +189,8 @@ int go_on_with_upload(lws* wsi, HttpSlot& slot, bool body_is_whole) {
 
 int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
   switch (reason) {
-    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:  // h2c is another parser, without our time limits
-      return asks_for_websocket(wsi) ? 0 : close_connection;
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+      return refuse_upgrade(wsi) ? close_connection : keep_reading;
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
       return close_connection;
     case LWS_CALLBACK_HTTP:

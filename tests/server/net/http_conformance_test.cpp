@@ -17,6 +17,7 @@ namespace catgs::test {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -197,8 +198,11 @@ TEST_F(HttpConformance, NothingButAWebsocketIsUpgradedTo) {
     RawSocket socket(server->port());
     socket.send(request);
     EXPECT_THAT(socket.receive(300ms), Not(HasSubstr(" 101 "))) << request;
-    EXPECT_TRUE(socket.closed_within(1s)) << request;
+    EXPECT_TRUE(socket.closed_within(20s)) << request;
   }
+  EXPECT_THAT(answer(get + "Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"
+                           "HTTP2-Settings: AAMAAABkAAQAAP__\r\n\r\n"),
+              AllOf(HasSubstr(" 400 "), HasSubstr("not h2c")));
   expect_alive();
 }
 
