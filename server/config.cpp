@@ -284,15 +284,21 @@ std::string variable_of(std::string_view setting_name) {
   return variable;
 }
 
-void apply(const Setting& setting, const Values& values, const std::string& source,
-           ServerConfig& config, ConfigSources& sources) {
-  try {
-    setting.set(config, values);
-  } catch (const std::invalid_argument& error) {
-    const bool named = source == "--" + setting.name || source == variable_of(setting.name);
-    throw InputError(source, named ? "" : setting.name, error.what());
-  }
+/// Throws std::invalid_argument.
+void set(const Setting& setting, const Values& values, const std::string& source,
+         ServerConfig& config, ConfigSources& sources) {
+  setting.set(config, values);
   sources[setting.name] = source;
+}
+
+/// From a source that is named after the setting.
+void set_from(const std::string& source, const Setting& setting, const Values& values,
+              ServerConfig& config, ConfigSources& sources) {
+  try {
+    set(setting, values, source, config, sources);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(source, {}, error.what());
+  }
 }
 
 Values split_at_commas(std::string_view text_value) {
@@ -343,13 +349,11 @@ void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& so
     if (!setting)
       throw InputError(source, std::string(key.str()), "there is no such setting",
                        suggest_name(key.str(), setting_names(), "catgs-server --help lists them"));
-    Values values;
     try {
-      values = toml_values(node);
+      set(*setting, toml_values(node), source, config, sources);
     } catch (const std::invalid_argument& error) {
       throw InputError(source, setting->name, error.what());
     }
-    apply(*setting, values, source, config, sources);
   }
 }
 
@@ -361,7 +365,7 @@ void apply_environment(const std::function<const char*(const char*)>& lookup, Se
     if (!value) continue;
     const Values values =
         setting.kind == Setting::Kind::list ? split_at_commas(value) : Values{value};
-    apply(setting, values, variable, config, sources);
+    set_from(variable, setting, values, config, sources);
   }
 }
 
@@ -385,7 +389,7 @@ std::string unknown_variables(const std::vector<std::string>& names) {
 
 void apply_flag(const Setting& setting, const std::vector<std::string>& values,
                 ServerConfig& config, ConfigSources& sources) {
-  apply(setting, values, "--" + setting.name, config, sources);
+  set_from("--" + setting.name, setting, values, config, sources);
 }
 
 std::string print_config(const ServerConfig& config, const ConfigSources& sources) {
