@@ -7,6 +7,7 @@
 #include "render_core/cuda/blend.cuh"
 #include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/cuda_view.cuh"
+#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/pixel_runs.cuh"
 #include "render_core/cuda/project.cuh"
 #include "render_core/cuda/reorder.cuh"
@@ -89,12 +90,11 @@ void CudaView::forget_frames() {
   groups_.forget();
   costs_.forget();
   shape_ = {};
-  reach_known_ = false;
+  reach_.forget();
   colours_known_ = false;
 }
 
 void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
-  if (last_shape_.width_px != size_px.x || last_shape_.height_px != size_px.y) reach_known_ = false;
   shape_.width_px = size_px.x;
   shape_.height_px = size_px.y;
   shape_.tiles_x = grid.tiles.x;
@@ -127,6 +127,7 @@ void CudaView::reserve_all(Headroom headroom) {
   lists_.reserve(roomy, scene_->arrays());
   builder_.reserve(roomy, speculates(settings_));
   memory_.reserve(roomy, scene_->arrays(), settings_);
+  reach_.reserve(roomy.tile_bound);
 }
 
 /// Sets the frame's shape and makes room for it; where the device has too little memory, without
@@ -137,15 +138,13 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   for (;;) {
     set_shape(size_px, grid);
     try {
-      const std::size_t known = memory_.reach[last_reach_].bytes();
       reserve_all(headroom);
-      if (memory_.reach[last_reach_].bytes() != known) reach_known_ = false;
       return;
     } catch (const CudaError& error) {
       memory_ = {};
       builder_.release();
       lists_ = {};
-      reach_known_ = false;
+      reach_ = {};
       colours_known_ = false;
       const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
       const bool had_headroom = std::exchange(headroom, Headroom::none) == Headroom::some;
@@ -170,14 +169,14 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
     make_room(request.camera.size_px, plan.grid);
     times_.begin(stream_.get());
     list_tiles(listed);
-    split(nullptr, last_reach());
+    split(nullptr, reach_.last(shape_, false));
     times_.end(Stage::sort, stream_.get());
     blend(request);
     deliver();
     if (!needs_more_room()) break;
     colours_known_ = false;  // not of Gaussians that found no room
   }
-  remember_reach({});
+  reach_.keep(shape_, {});
 }
 
 /// Stages project, bin and most of sort of a key frame.
@@ -206,6 +205,7 @@ bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   const CameraPair now = make_camera_pair(request.camera);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
   const ColourArrays colours = want_colours(now.single);
+  const GiantSet giants = want_giants(plan);
   launch_project({scene_->arrays(),
                   {now, now.single, request.camera.near_z},
                   picture_of(shape_),
@@ -218,25 +218,44 @@ bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
                   nullptr,
                   nullptr,
                   nullptr,
-                  nullptr},
+                  nullptr,
+                  giants},
                  Listing::none, stream);
   times_.end(Stage::project, stream);
   place_tiles(plan);
   times_.end(Stage::bin, stream);
   const bool reorders = settings_.order == BlendOrder::fresh;
-  LastReach last = last_reach();
-  last.same_grid = true;
-  split(reorders ? memory_.runs.get() : nullptr, last);
-  if (reorders)
-    launch_reorder(
-        {memory_.runs.get(), counts, builder_.depth_keys(), lists_.slot.get(), processors_},
-        stream);
+  split(reorders ? memory_.runs.get() : nullptr, reach_.last(shape_, true));
+  if (reorders) reorder(giants);
   times_.end(Stage::sort, stream);
   blend(request);
   deliver();
   if (memory_.host_counts.get()->unlisted != 0) return false;
-  remember_reach(plan.list_from_frame);
+  reach_.keep(shape_, plan.list_from_frame);
   return true;
+}
+
+/// Decides whether a sub-frame tells giants from others.
+GiantSet CudaView::want_giants(const FramePlan& plan) {
+  if (!plan.warped || settings_.order != BlendOrder::fresh) return {};
+  if (!makes_giants(plan.list_from_frame, {shape_.width_px, shape_.height_px})) return {};
+  std::uint32_t* bits = memory_.giants.get();
+  check(cudaMemsetAsync(bits, 0, giant_words * sizeof(std::uint32_t), stream_.get()), "giants");
+  return {math::convert<float>(plan.list_from_frame), bits};
+}
+
+/// Brings the lists of a sub-frame into its own depth order.
+void CudaView::reorder(const GiantSet& giants) {
+  const cudaStream_t stream = stream_.get();
+  const FrameCounts* counts = lists_.counts.get();
+  const std::uint32_t* depth_keys = builder_.depth_keys();
+  std::uint32_t* slot = lists_.slot.get();
+  if (giants.bits != nullptr)
+    launch_giants(
+        {shape_, giants, math::inverse(giants.list_from_frame), lists_.range.get(),
+         memory_.ordered.get(), builder_.records(), depth_keys, slot, counts, processors_},
+        stream);
+  launch_reorder({memory_.runs.get(), counts, depth_keys, slot, processors_}, stream);
 }
 
 /// Says which pixels of a sub-frame belong to each tile of its key frame.
@@ -249,25 +268,6 @@ void CudaView::place_tiles(const FramePlan& plan) {
                      math::convert<float>(math::inverse(plan.list_from_frame)),
                      memory_.pixels.get(), memory_.pixel_count.get()},
                     stream_.get());
-}
-
-LastReach CudaView::last_reach() const {
-  if (!reach_known_) return {};
-  return {memory_.reach[last_reach_].get(),
-          false,
-          math::convert<float>(last_list_from_frame_),
-          last_shape_.first_x_px,
-          last_shape_.first_y_px,
-          last_shape_.tiles_x,
-          last_shape_.tiles_y};
-}
-
-/// After a frame whose pixels found their tiles by `list_from_frame`.
-void CudaView::remember_reach(const Homography<double>& list_from_frame) {
-  last_reach_ = 1 - last_reach_;
-  last_shape_ = shape_;
-  last_list_from_frame_ = list_from_frame;
-  reach_known_ = true;
 }
 
 /// Decides which Gaussians in view are shaded for the camera.
@@ -306,21 +306,17 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   deliver();
 }
 
-/// Entries of a tile's list that the last frame's tiles were expected to look at, in the mean; 0:
-/// not known.
-std::uint32_t CudaView::mean_reach() const {
-  const std::uint64_t expected = memory_.host_counts.get()->expected_entries;
-  if (!reach_known_ || expected == 0) return 0;
-  return std::max(1u, static_cast<std::uint32_t>(expected / shape_.tiles()));
-}
-
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
 void CudaView::split(ReorderRun* runs, const LastReach& last) {
   FrameMemory& m = memory_;
+  // What the last frame expected, in the mean; 0: not known.
+  std::uint32_t mean = 0;
+  if (const auto expected = m.host_counts.get()->expected_entries; last.reach && expected > 0)
+    mean = std::max(1u, static_cast<std::uint32_t>(expected / shape_.tiles()));
   launch_split(
-      {shape_, lists_.range.get(), last, m.reach[1 - last_reach_].get(),
-       turned_ ? m.pixel_count.get() : nullptr, m.tasks.get(), m.tile_slices.get(), m.queue.get(),
-       runs, m.slice_transmittance.get(), lists_.counts.get(), mean_reach(), settings_.split_tasks},
+      {shape_, lists_.range.get(), last, reach_.current(), turned_ ? m.pixel_count.get() : nullptr,
+       m.tasks.get(), m.tile_slices.get(), m.queue.get(), runs, m.ordered.get(),
+       m.slice_transmittance.get(), lists_.counts.get(), mean, settings_.split_tasks},
       stream_.get());
 }
 
@@ -331,7 +327,7 @@ void CudaView::blend(const FrameRequest& request) {
       make_float3(request.background.x, request.background.y, request.background.z);
   const PixelPlace* pixels = turned_ ? m.pixels.get() : nullptr;
   const std::uint32_t* pixel_count = turned_ ? m.pixel_count.get() : nullptr;
-  std::uint32_t* reach = m.reach[1 - last_reach_].get();
+  std::uint32_t* reach = reach_.current();
   launch_blend({shape_, builder_.records(), lists_.slot.get(), m.tasks.get(), m.queue.get(),
                 background, m.rgb.get(), pixels, pixel_count, m.slice_pixels.get(),
                 m.consumed.get(), m.slice_transmittance.get(), reach, lists_.counts.get(),
@@ -376,7 +372,7 @@ void CudaView::deliver() {
 }
 
 std::size_t CudaView::memory_bytes() const {
-  return lists_.bytes() + builder_.bytes() + memory_.bytes() + vanilla_.bytes();
+  return lists_.bytes() + builder_.bytes() + memory_.bytes() + reach_.bytes() + vanilla_.bytes();
 }
 
 std::vector<std::uint32_t> CudaView::tile_loads() const {

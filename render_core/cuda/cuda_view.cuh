@@ -5,7 +5,9 @@
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_memory.cuh"
 #include "render_core/cuda/frame_room.h"
+#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/list_builder.cuh"
+#include "render_core/cuda/reach_history.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/stage_times.h"
@@ -40,14 +42,13 @@ class CudaView final : public View {
   void draw_vanilla(const FrameRequest& request);
   void list_tiles(const ListRequest& request);
   ColourArrays want_colours(const math::CameraModel<float>& camera);
+  [[nodiscard]] GiantSet want_giants(const FramePlan& plan);
+  void reorder(const GiantSet& giants);
   void split(ReorderRun* runs, const LastReach& last);
   void place_tiles(const FramePlan& plan);
-  [[nodiscard]] LastReach last_reach() const;
-  void remember_reach(const Homography<double>& list_from_frame);
   void blend(const FrameRequest& request);
   void deliver();
   [[nodiscard]] FrameView finished(const FramePlan& plan, float near_z);
-  [[nodiscard]] std::uint32_t mean_reach() const;
 
   std::shared_ptr<const DeviceScene> scene_;
   int device_;
@@ -70,12 +71,7 @@ class CudaView final : public View {
   SceneDepths depths_;
   bool turned_ = false;  // the frame's tiles are runs of pixels
   bool colours_known_ = false;
-
-  // What the last frame looked at: the reach of its tiles, and how they lay in its picture.
-  bool reach_known_ = false;
-  int last_reach_ = 0;  // of FrameMemory::reach
-  FrameShape last_shape_;
-  Homography<double> last_list_from_frame_{};
+  ReachHistory reach_;
 };
 
 }  // namespace catgs::cuda

@@ -1,4 +1,5 @@
 #include "render_core/cuda/frame_memory.cuh"
+#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/split.cuh"
 
 namespace catgs::cuda {
@@ -15,7 +16,11 @@ void FrameMemory::reserve(const FrameShape& shape, const SceneArrays& scene,
                           const ViewSettings& settings) {
   if (settings.pipeline == Pipeline::catgs) {
     if (settings.colour_cache) colours.reserve(scene);
-    if (settings.order == BlendOrder::fresh) runs.reserve(run_bound(shape));
+    if (settings.order == BlendOrder::fresh) {
+      runs.reserve(run_bound(shape));
+      ordered.reserve(shape.tile_bound);
+      giants.reserve(giant_words);
+    }
   }
   tasks.reserve(task_bound(shape));
   queue.reserve(queue_bound(shape));
@@ -24,7 +29,6 @@ void FrameMemory::reserve(const FrameShape& shape, const SceneArrays& scene,
   consumed.reserve(slices * static_cast<unsigned>(shape.tile_parts));
   slice_transmittance.reserve(slices * static_cast<unsigned>(shape.tile_parts));
   slice_pixels.reserve(slices * run_bound_px(shape));
-  for (auto& of_frame : reach) of_frame.reserve(shape.tile_bound);
   if (turns_tiles(settings)) {
     pixels.reserve(static_cast<std::size_t>(shape.tile_bound) * run_bound_px(shape));
     pixel_count.reserve(shape.tile_bound);
@@ -45,9 +49,9 @@ void FrameMemory::reserve_image(const FrameShape& shape, const ViewSettings& set
 }
 
 std::size_t FrameMemory::bytes() const {
-  return colours.bytes() + tasks.bytes() + queue.bytes() + consumed.bytes() + reach[0].bytes() +
-         reach[1].bytes() + pixels.bytes() + pixel_count.bytes() + tile_slices.bytes() +
-         runs.bytes() + slice_transmittance.bytes() + slice_pixels.bytes() + rgb.bytes() +
+  return colours.bytes() + tasks.bytes() + queue.bytes() + consumed.bytes() + pixels.bytes() +
+         pixel_count.bytes() + tile_slices.bytes() + runs.bytes() + ordered.bytes() +
+         giants.bytes() + slice_transmittance.bytes() + slice_pixels.bytes() + rgb.bytes() +
          i420.bytes();
 }
 

@@ -18,11 +18,11 @@ struct FrameMemory {
   ColourCache colours;
   DeviceBuffer<BlendTask> tasks;
   DeviceBuffer<std::uint32_t> queue, consumed;
-  DeviceBuffer<std::uint32_t> reach[2];  // of this frame and the last
   DeviceBuffer<PixelPlace> pixels;
   DeviceBuffer<std::uint32_t> pixel_count;
   DeviceBuffer<uint2> tile_slices;
   DeviceBuffer<ReorderRun> runs;
+  DeviceBuffer<std::uint32_t> ordered, giants;
   DeviceBuffer<float> slice_transmittance;
   DeviceBuffer<float4> slice_pixels;
   DeviceBuffer<float> rgb;

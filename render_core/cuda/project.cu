@@ -36,6 +36,14 @@ __device__ void add_inverse_depth(const ProjectParams& p, bool counted, float de
   atomicAdd(&p.counts->sampled, count);
 }
 
+/// Puts a Gaussian that is a giant into the frame's set.
+__device__ void note_giant(const ProjectParams& p, std::uint32_t v, const Splat& splat) {
+  if (p.giants.bits == nullptr || !splat.in_view || !p.giants.holds(splat.centre_px, splat.half_px))
+    return;
+  atomicOr(&p.giants.bits[v / warp_size % giant_words], 1u << v % warp_size);
+  atomicAdd(&p.counts->giants, 1u);
+}
+
 template <Listing listing>
 __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams p) {
   const std::uint32_t v = blockIdx.x * block_size + threadIdx.x;
@@ -64,6 +72,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const bool counted = listed && splat.depth > fmaxf(p.min_depth, p.camera.near_z);
   raise(&p.counts->nearness, counted ? ~__float_as_uint(splat.depth) : 0u);
   if (blockIdx.x % sampled_blocks == 0) add_inverse_depth(p, counted, splat.depth);
+  if constexpr (listing == Listing::none) note_giant(p, v, splat);
   if (listing == Listing::none && splat.in_view && (p.visible[v] & watched_bit) != 0)
     p.counts->unlisted = 1;
   if constexpr (listing != Listing::none) {

@@ -2,6 +2,7 @@
 
 #include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/splat.cuh"
 
 namespace catgs::cuda {
@@ -13,7 +14,7 @@ struct ProjectParams {
   FrameCameras camera;
   FrameShape shape;
   float min_depth;            // of splats that counts->displacement, ->nearness speak of
-  FrameCounts* counts;        // displacement, nearness, unlisted, depths
+  FrameCounts* counts;        // displacement, nearness, giants, unlisted, depths
   std::uint32_t* visible;     // [visible_bound], scene indices; key frames set watched_bit
   ColourArrays colours;       // what was shaded in earlier frames; all null: nothing
   SplatRecord* records;       // [visible_bound]
@@ -22,6 +23,7 @@ struct ProjectParams {
   TileSpans* spans;           // key frames: [visible_bound]
   SplatPath* path;            // key frames with a window: [visible_bound]
   std::uint32_t* order;       // key frames: [visible_bound], as sort_by_depth() wants it
+  GiantSet giants{};          // of sub-frames
 };
 
 enum class Listing {

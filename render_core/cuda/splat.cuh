@@ -34,6 +34,7 @@ constexpr float never = -1e30f;
 /// A Gaussian in the image plane, before its colour.
 struct Splat {
   float2 centre_px = {0.0f, 0.0f};
+  float2 half_px = {0.0f, 0.0f};  // of the box around it where it is seen at all
   math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
   float log2_opacity = never;
   float depth = 0.0f;
@@ -98,6 +99,7 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   }
   out.in_view = true;
   out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
+  out.half_px = make_float2(half.x, half.y);
   out.whitening = math::whitening(s.shape);
   if (in_front) out.log2_opacity = centre.log2_opacity;
   out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, grow, {}};

@@ -43,8 +43,10 @@ __device__ std::uint32_t last_reach(const SplitParams& p, std::uint32_t t) {
   constexpr float tile = tile_size_px;
   const int last_x = static_cast<int>((at.x - static_cast<float>(last.first_x_px)) / tile);
   const int last_y = static_cast<int>((at.y - static_cast<float>(last.first_y_px)) / tile);
-  return last.reach[min(max(last_y, 0), last.tiles_y - 1) * last.tiles_x +
-                    min(max(last_x, 0), last.tiles_x - 1)];
+  // A turn shows what the last frame did not list.
+  const bool listed = at.x >= static_cast<float>(last.first_x_px) && last_x < last.tiles_x &&
+                      at.y >= static_cast<float>(last.first_y_px) && last_y < last.tiles_y;
+  return listed ? last.reach[last_y * last.tiles_x + last_x] : ~0u;
 }
 
 __device__ bool is_seen(const SplitParams& p, std::uint32_t t) {
@@ -190,7 +192,10 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
     atomicMax(&p.counts->list_max, longest);
   }
   __syncthreads();
-  if (present) write_runs(p, cut, first_run + before.runs);
+  if (present && p.runs != nullptr) {
+    write_runs(p, cut, first_run + before.runs);
+    p.ordered[t] = ordered_of(p, cut);
+  }
   const std::uint32_t first = make_room(p, cut, before, all);
   std::uint32_t place[queue_classes];
 #pragma unroll

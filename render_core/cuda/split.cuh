@@ -38,6 +38,7 @@ struct SplitParams {
   std::uint32_t* queue;              // [queue_bound(shape)], see FrameCounts
   // For the reorder stage; null: it does not follow.
   ReorderRun* runs;            // [run_bound]
+  std::uint32_t* ordered;      // [tiles], entries that are in runs
   float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
   FrameCounts* counts;         // what split makes is set, and list_max
   std::uint32_t mean_list;     // of a tile, for slice_length(); 0: not known, this frame's then

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <glm/vec2.hpp>
+
+#include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/math/homography-inl.h"
+
+namespace catgs::cuda {
+
+// A turn of the camera changes all depths in one direction by one and the same share: what is seen
+// at p now had weight_at(list_from_frame, p) times its depth in the key frame. So the order of a
+// tile's list changes little, but for Gaussians so large that the tile sees them far from their
+// centres: these have another share, belong thousands of entries away, and are the giants.
+
+/// How far a centre's share may be from that of what is seen beside it. (One H200, fungi_room,
+/// recorded heads: with 0.02 nothing changes, with 0.05 one switch between frames is 1.7 / 255,
+/// with 0.08 two are up to 3.7.)
+constexpr float giant_tolerance = 0.03f;
+
+/// Whether such a turn has giants worth a search.
+bool makes_giants(const Homography<double>& list_from_frame, glm::ivec2 size_px);
+
+/// The giants of a frame: bit slot % giant_bits is set for each, so that others may seem to be
+/// some.
+constexpr std::uint32_t giant_words = 1024, giant_bits = giant_words * warp_size;
+
+struct GiantSet {
+  Homography<float> list_from_frame{};
+  std::uint32_t* bits = nullptr;  // [giant_words], zero at first; null: nobody asks for giants
+
+  __device__ float share(float2 centre_px) const {
+    return math::weight_at<float>(list_from_frame, {centre_px.x, centre_px.y});
+  }
+  /// Whether a Gaussian that reaches so far is one in some tile.
+  __device__ bool holds(float2 centre_px, float2 half_px) const {
+    const float varies =
+        fabsf(list_from_frame.wx) * half_px.x + fabsf(list_from_frame.wy) * half_px.y;
+    return varies > giant_tolerance * share(centre_px);
+  }
+};
+
+/// Carries giants to those runs of their tiles' lists that their depths lie in, or from behind all
+/// runs into them, or out. Runs keep their lengths: where more giants pass a boundary one way than
+/// the other, as many of the entries beside it go back. Within runs launch_reorder() does the rest.
+struct GiantParams {
+  FrameShape shape;
+  GiantSet giants;
+  Homography<float> frame_from_list;
+  const uint2* range;              // [tiles]
+  const std::uint32_t* ordered;    // [tiles], how many of its entries are in runs
+  const SplatRecord* records;      // [visible_bound], of this frame
+  const std::uint32_t* depth_key;  // [visible_bound], of this frame
+  std::uint32_t* slot;             // [list_bound]
+  const FrameCounts* counts;
+  int processors;  // of the device
+};
+void launch_giants(const GiantParams& params, cudaStream_t stream);
+
+}  // namespace catgs::cuda
