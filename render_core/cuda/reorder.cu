@@ -1,3 +1,5 @@
+#include <bit>
+
 #include "render_core/cuda/cuda_check.h"
 #include "render_core/cuda/reorder.cuh"
 #include "render_core/cuda/sort.cuh"
@@ -8,75 +10,105 @@ namespace {
 constexpr int warps = 4;
 constexpr int block_size = warps * warp_size;
 
-// A warp sorts a window of 256 entries, eight a lane, writes the first three quarters and slides by
-// them.
-constexpr int per_lane = 8;
-constexpr int window = per_lane * warp_size;
-constexpr int step = window / 4 * 3, carried = window - step;
-
-// A key holds the depth and, below it, the place in the window.
-constexpr int place_bits = 8;
-static_assert(window == 1 << place_bits);
-static_assert(depth_bits + place_bits <= 32);
+// A key holds a depth and, below it, the entry's place in what the warp sorts. Key j of lane l is
+// number per_lane l + j.
+template <int per_lane>
+using Keys = std::uint32_t[per_lane];
+template <int per_lane>
+constexpr int entries_of = warp_size* per_lane;
+template <int per_lane>
+constexpr int place_bits = std::bit_width(static_cast<unsigned>(entries_of<per_lane>)) - 1;
 constexpr std::uint32_t behind_all = ~0u;
 
-using Keys = std::uint32_t[per_lane];
+// Keys a lane of a whole run.
+constexpr int run_keys = reorder_run / warp_size;
 
-/// Ascending bitonic sort of the warp's keys; key j of lane l is number per_lane l + j.
-__device__ void sort_window(Keys& key) {
-  const int lane = static_cast<int>(threadIdx.x) % warp_size;
-#pragma unroll
-  for (int size = 2; size <= window; size *= 2) {
-#pragma unroll
-    for (int stride = size / 2; stride > 0; stride /= 2) {
-#pragma unroll
-      for (int j = 0; j < per_lane; ++j) {
-        const int number = per_lane * lane + j;
-        const bool up = (number & size) == 0;
-        if (stride >= per_lane) {
-          const std::uint32_t other = __shfl_xor_sync(~0u, key[j], stride / per_lane);
-          const bool low = (number & stride) == 0;
-          key[j] = low == up ? min(key[j], other) : max(key[j], other);
-        } else if ((j & stride) == 0) {
-          const std::uint32_t a = key[j], b = key[j + stride];
-          key[j] = up ? min(a, b) : max(a, b);
-          key[j + stride] = up ? max(a, b) : min(a, b);
-        }
-      }
-    }
-  }
+__device__ int lane_index() { return static_cast<int>(threadIdx.x) % warp_size; }
+
+/// The slots that a warp sorts, by place; padded, for lanes that read places a power of two apart.
+class Held {
+ public:
+  __device__ std::uint32_t& operator[](int place) { return slot_[place + place / warp_size]; }
+
+ private:
+  std::uint32_t slot_[reorder_run + reorder_run / warp_size];
+};
+
+/// Orders a lane's key with another lane's; `low`: this one takes the smaller.
+__device__ std::uint32_t ordered(std::uint32_t key, std::uint32_t other, bool low) {
+  return low ? min(key, other) : max(key, other);
 }
 
-/// A run of the list as a pass over it sees it: from its front, or from its back with depths that
-/// count the other way.
-template <bool forwards>
-struct Pass {
-  const std::uint32_t* depth_key;
-  std::uint32_t* run;
-  int count;
+/// Within each lane, the stages of a bitonic merge that order numbers `stride` and less apart.
+template <int per_lane, int stride>
+__device__ void merge_in_lane(Keys<per_lane>& key) {
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) {
+    if ((j & stride) != 0) continue;
+    const std::uint32_t a = key[j], b = key[j + stride];
+    key[j] = min(a, b);
+    key[j + stride] = max(a, b);
+  }
+  if constexpr (stride > 1) merge_in_lane<per_lane, stride / 2>(key);
+}
 
-  __device__ std::uint32_t& slot(int i) const { return run[forwards ? i : count - 1 - i]; }
-  __device__ std::uint32_t depth(std::uint32_t slot) const {
-    constexpr std::uint32_t most = (1u << depth_bits) - 1u;
-    const std::uint32_t depth = depth_key[slot] >> depth_bits_below;
-    return forwards ? depth : most - depth;
+/// Sorts each lane's keys, in ascending groups of `size` at first.
+template <int per_lane, int size = 2>
+__device__ void sort_in_lane(Keys<per_lane>& key) {
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) {
+    const int mirrored = j ^ (size - 1);
+    if (mirrored < j) continue;
+    const std::uint32_t a = key[j], b = key[mirrored];
+    key[j] = min(a, b);
+    key[mirrored] = max(a, b);
   }
-  /// Whether slots of the same depth stand in the wrong order.
-  __device__ static bool swapped(std::uint32_t a, std::uint32_t b) {
-    return forwards ? b < a : a < b;
+  if constexpr (size > 2) merge_in_lane<per_lane, size / 4>(key);
+  if constexpr (size < per_lane) sort_in_lane<per_lane, 2 * size>(key);
+}
+
+/// Merges the sorted halves of each group of `lanes` lanes: a bitonic merge, of which the first
+/// stage takes the second half backwards. Loops, for the network as a whole would not fit the
+/// instruction cache.
+template <int per_lane>
+__device__ void merge(Keys<per_lane>& key, int lanes) {
+  const int lane = lane_index();
+  bool low = (lane & lanes / 2) == 0;
+#pragma unroll
+  for (int j = 0; j < per_lane / 2; ++j) {
+    const int mirrored = per_lane - 1 - j;
+    const std::uint32_t a = __shfl_xor_sync(~0u, key[mirrored], lanes - 1);
+    const std::uint32_t b = __shfl_xor_sync(~0u, key[j], lanes - 1);
+    key[j] = ordered(key[j], a, low);
+    key[mirrored] = ordered(key[mirrored], b, low);
   }
-};
+#pragma unroll 1
+  for (int apart = lanes / 4; apart > 0; apart /= 2) {
+    low = (lane & apart) == 0;
+#pragma unroll
+    for (int j = 0; j < per_lane; ++j)
+      key[j] = ordered(key[j], __shfl_xor_sync(~0u, key[j], apart), low);
+  }
+  merge_in_lane<per_lane, per_lane / 2>(key);
+}
+
+template <int per_lane>
+__device__ void sort(Keys<per_lane>& key) {
+  sort_in_lane<per_lane>(key);
+#pragma unroll 1
+  for (int lanes = 2; lanes <= warp_size; lanes *= 2) merge<per_lane>(key, lanes);
+}
 
 /// Sorted by depth, neighbours of the same depth are brought into the order of their slots, that of
 /// key frames: how they stood before says nothing. Two rounds of odd-even transposition do that
 /// for two of the same depth, and nearly for three; more are rare.
-template <bool forwards>
-__device__ void order_ties(const Keys& key, Keys& slot) {
-  const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  const auto depth = [](std::uint32_t k) { return k >> place_bits; };
-  const auto order = [&](std::uint32_t depth_a, std::uint32_t depth_b, std::uint32_t& a,
-                         std::uint32_t& b) {
-    if (depth_a != depth_b || !Pass<forwards>::swapped(a, b)) return;
+template <int per_lane>
+__device__ void order_ties(const Keys<per_lane>& key, Keys<per_lane>& slot) {
+  const int lane = lane_index();
+  const auto depth = [](std::uint32_t k) { return k >> place_bits<per_lane>; };
+  const auto order = [](std::uint32_t depth_a, std::uint32_t depth_b, std::uint32_t& a,
+                        std::uint32_t& b) {
+    if (depth_a != depth_b || a < b) return;
     const std::uint32_t first = b;
     b = a;
     a = first;
@@ -95,105 +127,130 @@ __device__ void order_ties(const Keys& key, Keys& slot) {
   if (lane > 0) order(depth_before, depth(key[0]), before, slot[0]);
 }
 
-/// One pass over a run, by one warp. What belongs towards the end is carried there, however far;
-/// what belongs towards the beginning comes as far as windows overlap. Returns whether that was too
-/// little for some entry. `held` is the warp's scratch.
-template <bool forwards>
-__device__ bool slide(const Pass<forwards>& pass, std::uint32_t (&held)[window]) {
-  const int lane = static_cast<int>(threadIdx.x) % warp_size;
-  // Past the first-level cache: another warp may have written the neighbouring entries.
-  const auto load = [&](int place, int at) {
-    held[place] = at < pass.count ? __ldcg(&pass.slot(at)) : 0;
-  };
-  for (int j = 0; j < per_lane; ++j) load(j * warp_size + lane, j * warp_size + lane);
-  bool too_far = false;
-  std::uint32_t last_depth = 0;
-  for (int first = 0;; first += step) {
-    __syncwarp();
-    const int present = min(pass.count - first, window);
-    Keys key, slot;
+/// Makes keys of depths; a key of behind_all remains. Depths count from the nearest, and should
+/// they have too many bits, lose the lowest. place(j): that of key j.
+template <int per_lane, class Place>
+__device__ void pack(Keys<per_lane>& key, const Place& place) {
+  std::uint32_t nearest = behind_all, farthest = 0;
 #pragma unroll
-    for (int j = 0; j < per_lane; ++j) {
-      const int place = per_lane * lane + j;
-      key[j] = behind_all;
-      if (place < present)
-        key[j] = pass.depth(held[place]) << place_bits | static_cast<std::uint32_t>(place);
-    }
-    sort_window(key);
-    too_far |= __shfl_sync(~0u, key[0], 0) >> place_bits < last_depth;
-    last_depth = __shfl_sync(~0u, key[per_lane - 1], step / per_lane - 1) >> place_bits;
+  for (int j = 0; j < per_lane; ++j) {
+    nearest = min(nearest, key[j]);
+    if (key[j] != behind_all) farthest = max(farthest, key[j]);
+  }
+  nearest = __reduce_min_sync(~0u, nearest);
+  farthest = __reduce_max_sync(~0u, farthest);
+  constexpr int bits = 32 - place_bits<per_lane>;
+  const int excess = max(0, 32 - __clz(static_cast<int>(farthest - nearest)) - bits);
 #pragma unroll
-    for (int j = 0; j < per_lane; ++j) slot[j] = held[key[j] & (window - 1)];
-    order_ties<forwards>(key, slot);
-    __syncwarp();
-#pragma unroll
-    for (int j = 0; j < per_lane; ++j) held[per_lane * lane + j] = slot[j];
-    __syncwarp();
-    const bool ends = first + window >= pass.count;
-    for (int place = lane; place < (ends ? present : step); place += warp_size)
-      pass.slot(first + place) = held[place];
-    if (ends) return too_far;
-    __syncwarp();
-    std::uint32_t kept[carried / warp_size];
-#pragma unroll
-    for (int j = 0; j < carried / warp_size; ++j) kept[j] = held[step + j * warp_size + lane];
-    __syncwarp();
-#pragma unroll
-    for (int j = 0; j < carried / warp_size; ++j) held[j * warp_size + lane] = kept[j];
-#pragma unroll
-    for (int j = 0; j < step / warp_size; ++j)
-      load(carried + j * warp_size + lane, first + window + j * warp_size + lane);
+  for (int j = 0; j < per_lane; ++j) {
+    if (key[j] == behind_all) continue;
+    key[j] =
+        (key[j] - nearest) >> excess << place_bits<per_lane> | static_cast<std::uint32_t>(place(j));
   }
 }
 
-/// Entries first…last - 1 of the lists, in a pass or two.
-__device__ void reorder(const ReorderParams& p, std::uint32_t first, std::uint32_t last,
-                        std::uint32_t (&held)[window]) {
-  std::uint32_t* run = p.slot + first;
-  const int count = static_cast<int>(last - first);
-  const bool too_far = slide<true>({p.depth_key, run, count}, held);
+/// Writes the slots that stand in `held` back to `list` in the order of their keys.
+template <int per_lane>
+__device__ void write(const Keys<per_lane>& key, Held& held, std::uint32_t* list, int count) {
+  const int lane = lane_index();
+  Keys<per_lane> slot;
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j)
+    slot[j] = held[static_cast<int>(key[j] & (entries_of<per_lane> - 1))];
+  order_ties<per_lane>(key, slot);
   __syncwarp();
-  if (too_far) slide<false>({p.depth_key, run, count}, held);
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) held[per_lane * lane + j] = slot[j];
+  __syncwarp();
+  for (int place = lane; place < count; place += warp_size) list[place] = held[place];
   __syncwarp();
 }
 
-// Entries on either side of where two runs meet that are stitched.
-constexpr std::uint32_t stitched = window;
-static_assert(2 * stitched <= reorder_run);
+__device__ std::uint32_t depth_of(const ReorderParams& p, std::uint32_t slot) {
+  return p.depth_key[slot] >> depth_bits_below;
+}
+
+/// Sorts `count` entries.
+template <int per_lane>
+__device__ void sort_run(const ReorderParams& p, std::uint32_t* list, int count, Held& held) {
+  const int lane = lane_index();
+  Keys<per_lane> key;
+  const auto place = [lane](int j) { return j * warp_size + lane; };
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) key[j] = list[min(place(j), count - 1)];
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j) {
+    held[place(j)] = key[j];
+    key[j] = place(j) < count ? depth_of(p, key[j]) : behind_all;
+  }
+  pack<per_lane>(key, place);
+  sort<per_lane>(key);
+  __syncwarp();
+  write<per_lane>(key, held, list, count);
+}
+
+/// Merges the sorted half of a run before `middle` with as many entries behind it, or `behind`.
+__device__ void stitch(const ReorderParams& p, std::uint32_t* middle, int behind, Held& held) {
+  constexpr int per_lane = run_keys, half = reorder_run / 2;
+  const int lane = lane_index();
+  const int count = half + min(behind, half);
+  std::uint32_t* list = middle - half;
+  // Past the first-level cache: another warp may have written them.
+  for (int place = lane; place < count; place += warp_size) held[place] = __ldcg(&list[place]);
+  __syncwarp();
+  const auto place = [lane](int j) { return per_lane * lane + j; };
+  Keys<per_lane> key;
+#pragma unroll
+  for (int j = 0; j < per_lane; ++j)
+    key[j] = place(j) < count ? depth_of(p, held[place(j)]) : behind_all;
+  pack<per_lane>(key, place);
+  merge<per_lane>(key, warp_size);
+  write<per_lane>(key, held, list, count);
+}
 
 /// To be called when one of the two runs that meet at `run` is in order; the later of the two calls
 /// puts their neighbouring ends in order.
-__device__ void meet(const ReorderParams& p, ReorderRun& run, std::uint32_t (&held)[window]) {
-  const int lane = static_cast<int>(threadIdx.x) % warp_size;
+__device__ void meet(const ReorderParams& p, ReorderRun& run, Held& held) {
   std::uint32_t met = 0;
   __threadfence();  // what this warp wrote, before the other one may see that it did
   __syncwarp();
-  if (lane == 0) met = atomicAdd(&run.met, 1u);
+  if (lane_index() == 0) met = atomicAdd(&run.met, 1u);
   if (__shfl_sync(~0u, met, 0) == 0) return;
   __threadfence();
   __syncwarp();
-  const auto depth = [&](std::uint32_t at) {
-    return p.depth_key[__ldcg(&p.slot[at])] >> depth_bits_below;
-  };
+  const auto depth = [&](std::uint32_t at) { return depth_of(p, __ldcg(&p.slot[at])); };
   if (depth(run.first - 1) <= depth(run.first)) return;
-  reorder(p, run.first - stitched, min(run.first + stitched, run.last), held);
+  stitch(p, p.slot + run.first, static_cast<int>(run.last - run.first), held);
 }
 
-__global__ void __launch_bounds__(block_size) reorder_kernel(const ReorderParams p) {
-  __shared__ std::uint32_t held[warps][window];
+// More warps at a time are faster than no spilled registers, up to here.
+constexpr int blocks_at_a_time = 8;
+
+__global__ void __launch_bounds__(block_size, blocks_at_a_time)
+    reorder_kernel(const ReorderParams p) {
+  __shared__ Held of_warp[warps];
+  Held& held = of_warp[threadIdx.x / warp_size];
   const std::uint32_t warp = threadIdx.x / warp_size, runs = p.counts->runs;
   for (std::uint32_t r = blockIdx.x * warps + warp; r < runs; r += gridDim.x * warps) {
     ReorderRun& run = p.runs[r];
-    reorder(p, run.first, run.last, held[warp]);
-    if (run.continues != 0) meet(p, run, held[warp]);
-    if (run.follows != 0) meet(p, p.runs[r + 1], held[warp]);
+    std::uint32_t* list = p.slot + run.first;
+    const int count = static_cast<int>(run.last - run.first);
+    if (count <= entries_of<4>)
+      sort_run<4>(p, list, count, held);
+    else if (count <= entries_of<8>)
+      sort_run<8>(p, list, count, held);
+    else
+      sort_run<run_keys>(p, list, count, held);
+    if (run.continues != 0) meet(p, run, held);
+    if (run.follows != 0) meet(p, p.runs[r + 1], held);
   }
 }
 
 }  // namespace
 
 void launch_reorder(const ReorderParams& params, cudaStream_t stream) {
-  constexpr int blocks_per_processor = 16;
+  // As runs differ in work, more than fit at a time: most blocks take one run a warp.
+  constexpr int blocks_per_processor = 6 * blocks_at_a_time;
   reorder_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
   check_launch("reorder");
 }
