@@ -84,11 +84,11 @@ start_group() {
   set +m
 }
 
-# Ends the running groups, the youngest first, and waits for each leader.
+# stop_groups [SIGNAL]: ends the running groups, the youngest first, and waits for each leader.
 stop_groups() {
   local i
   for ((i = ${#groups[@]} - 1; i >= 0; i--)); do
-    kill -TERM -- "-${groups[i]}" 2>/dev/null || true
+    kill -"${1:-TERM}" -- "-${groups[i]}" 2>/dev/null || true
     wait "${groups[i]}" 2>/dev/null || true
   done
   groups=()

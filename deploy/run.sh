@@ -313,11 +313,13 @@ print_welcome() {
   fi
 }
 
-# Ctrl-C and TERM while serving: the server tells its clients and ends within seconds.
+# stop_serving SIGNAL: the server tells open pages and ends, after Ctrl-C within two seconds, after
+# SIGTERM when they have had the time of --drain-wait and --drain-deadline to go elsewhere.
 stop_serving() {
   trap - INT TERM HUP
-  stop_groups
-  printf '\nStopped.\n'
+  printf '\nStopping: open pages are told.\n'
+  stop_groups "$1"
+  printf 'Stopped.\n'
   exit 0
 }
 
@@ -354,7 +356,8 @@ main() {
   start_server
   local server=${groups[-1]}
   step "Start the server" wait_until_serving "$server"
-  trap stop_serving INT TERM HUP
+  trap 'stop_serving INT' INT
+  trap 'stop_serving TERM' TERM HUP
   print_welcome
   local status=0
   wait "$server" || status=$?

@@ -4,10 +4,12 @@
 The system is played by stand-ins in front of PATH, so nothing is installed, built or served.
 """
 
+import contextlib
 import os
 import pathlib
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import tempfile
@@ -272,18 +274,35 @@ class Serving(Machine):
         self.assertNotIn("Another script", outputs[0])
         self.assertEqual((self.folder / "order").read_text().split(), ["begin", "end"] * 2)
 
-    def test_a_server_that_runs_keeps_nobody_from_building(self):
-        self.stand_in("serves", SERVER + 'exec sleep 30')
+    @contextlib.contextmanager
+    def serving(self, server):
+        """run.sh while this stand-in of the server goes on."""
+        self.stand_in("serves", server)
         (self.folder / "bin/serves").rename(self.bin / "catgs-server")
         environment = {"PATH": f"{self.folder}/bin:/usr/bin:/bin", "HOME": str(self.folder),
                        "CATGS_OS_RELEASE": str(self.folder / "os-release")}
         with subprocess.Popen([str(self.checkout / "deploy/run.sh"), *self.options()],
-                              env=environment, stdout=subprocess.PIPE, text=True) as serving:
-            while "Try" not in serving.stdout.readline():
+                              env=environment, stdout=subprocess.PIPE, text=True) as script:
+            while "Try" not in script.stdout.readline():
                 pass
+            yield script
+
+    def test_a_server_that_runs_keeps_nobody_from_building(self):
+        with self.serving(SERVER + "exec sleep 30") as script:
             lock = self.checkout / "build/run/.lock"
             self.assertEqual(subprocess.run(["flock", "-n", str(lock), "true"], check=False).returncode, 0)
-            serving.terminate()
+            script.terminate()
+
+    def test_the_server_gets_the_signal_that_ends_the_script(self):
+        # SIGINT is a person who waits for the prompt, SIGTERM a supervisor: only for that it drains.
+        for name in ("INT", "TERM"):
+            record = self.folder / f"got-{name}"
+            traps = "".join(f"trap 'echo {s} >{record}; exit 0' {s}\n" for s in ("INT", "TERM"))
+            with self.serving(traps + SERVER + "while :; do sleep 0.05; done") as script:
+                script.send_signal(getattr(signal, f"SIG{name}"))
+                self.assertRegex(script.stdout.read(), r"\nStopping: .*\nStopped\.\n$")
+            self.assertEqual(script.returncode, 0)
+            self.assertEqual(record.read_text(), f"{name}\n")
 
     def test_a_scene_that_fails_shows_the_error_and_not_the_progress(self):
         result = self.serve(self.scene("empty.ply"), *self.options())
