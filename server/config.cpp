@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -151,7 +152,7 @@ Setting trusted_proxy() {
                          "Networks of proxies whose X-Forwarded-For is believed, 10.0.0.0/8",
                          &ServerConfig::trusted_proxies);
   setting.set = [](ServerConfig& c, const Values& v) {
-    TrustedProxies{v};
+    [[maybe_unused]] const TrustedProxies valid{v};  // throws else
     c.trusted_proxies = v;
   };
   return setting;
@@ -169,7 +170,7 @@ Setting origins(std::string name, std::string help, std::vector<std::string> Ser
   return setting;
 }
 
-std::vector<Setting> make_settings() {
+std::vector<Setting> scene_settings() {
   using C = ServerConfig;
   return {
       list("scene", "PATH", "Scene files or folders, or synth:KIND:COUNT[:SEED] (city, garden)",
@@ -189,6 +190,12 @@ std::vector<Setting> make_settings() {
       admin_bind(),
       text("client-dir", "DIR", "Built browser client; by default found beside the program",
            &C::client_dir),
+  };
+}
+
+std::vector<Setting> picture_settings() {
+  using C = ServerConfig;
+  return {
       choice<RendererKind>("renderer", "Core that renders", &C::renderer,
                            {{"auto", RendererKind::automatic},
                             {"cpu", RendererKind::cpu},
@@ -218,6 +225,12 @@ std::vector<Setting> make_settings() {
       integer("fps", "N", "Nominal frame rate of a session", &C::fps, 1, 240),
       integer("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
               200'000),
+  };
+}
+
+std::vector<Setting> session_settings() {
+  using C = ServerConfig;
+  return {
       integer("max-sessions", "N", "Sessions at the same time", &C::max_sessions, 1, 10'000),
       integer(
           "min-fps", "N",
@@ -236,6 +249,12 @@ std::vector<Setting> make_settings() {
               &C::drain_wait_s, 0, 600),
       integer("drain-deadline", "SECONDS", "Time for clients to go to another server after that",
               &C::drain_deadline_s, 0, 3600),
+  };
+}
+
+std::vector<Setting> access_settings() {
+  using C = ServerConfig;
+  return {
       flag("open", "Serve other machines without a token", &C::open),
       flag("admin-open", "--admin-bind may be another than a loopback address: a private network",
            &C::admin_open),
@@ -261,6 +280,14 @@ std::vector<Setting> make_settings() {
       choice<std::string>("log-level", "Least level that is logged", &C::log_level,
                           words({"debug", "info", "warn", "error"})),
   };
+}
+
+/// In the order of --help.
+std::vector<Setting> make_settings() {
+  std::vector<Setting> all;
+  for (auto* part : {scene_settings, picture_settings, session_settings, access_settings})
+    std::ranges::move(part(), std::back_inserter(all));
+  return all;
 }
 
 const Setting* find_setting(std::string_view name) {
