@@ -84,11 +84,11 @@ start_group() {
   set +m
 }
 
-# stop_groups [SIGNAL]: ends the running groups, the youngest first, and waits for each leader.
+# stop_groups SIGNAL: ends the running groups, the youngest first, and waits for each leader.
 stop_groups() {
   local i
   for ((i = ${#groups[@]} - 1; i >= 0; i--)); do
-    kill -"${1:-TERM}" -- "-${groups[i]}" 2>/dev/null || true
+    kill -"$1" -- "-${groups[i]}" 2>/dev/null || true
     wait "${groups[i]}" 2>/dev/null || true
   done
   groups=()
@@ -97,12 +97,12 @@ stop_groups() {
 # Ctrl-C or TERM while a step runs.
 interrupted() {
   trap - INT TERM HUP
-  stop_groups
+  stop_groups TERM
   printf '\nStopped.\n'
   exit 130
 }
 trap interrupted INT TERM HUP
-trap stop_groups EXIT
+trap 'stop_groups TERM' EXIT
 
 # step TITLE COMMAND...: runs the command with its output in the log. TITLE is printed with the
 # time it took; on a terminal a counter runs meanwhile, elsewhere a line tells every half minute that
