@@ -6,9 +6,11 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <toml++/toml.h>
 
 #include "render_core/error.h"
+#include "render_core/nearest_name.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {
@@ -94,7 +96,9 @@ class TableReader {
   void finish() const {
     for (const auto& [key, node] : table_) {
       if (!taken_.contains(std::string(key.str()))) {
-        refuse(node, fmt::format("nothing is called \"{}\" here", key.str()));
+        const std::vector<std::string> names(taken_.begin(), taken_.end());
+        refuse(node, fmt::format("nothing is called \"{}\" here", key.str()),
+               suggest_name(key.str(), names, fmt::format("one of {}", fmt::join(names, ", "))));
       }
     }
   }
