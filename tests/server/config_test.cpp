@@ -111,6 +111,7 @@ TEST_F(ConfigTest, VariablesThatAreNoSettingsAreTold) {
 
 TEST_F(ConfigTest, OriginsAreAsBrowsersWriteThem) {
   const std::map<std::string, std::string> mistakes = {
+      {"null", "allow-same-origin"},
       {"example.com", "did you mean https://example.com?"},
       {"example.com:8443/", "did you mean https://example.com:8443?"},
       {"https://example.com/", "did you mean https://example.com?"},
