@@ -403,5 +403,9 @@ describe('a shared link', () => {
     expect(frame_sites(policy('*'))).toBeUndefined();
     expect(frame_sites("default-src 'self'")).toBeUndefined();
     expect(frame_sites(null)).toBeUndefined();
+    const [ours, proxy] = [policy('https://a.example https://b.example'), policy('https://b.example')];
+    expect(frame_sites(`${ours}, ${proxy}`)).toEqual(['https://b.example']);
+    expect(frame_sites(`${ours}, default-src 'self'`)).toEqual(['https://a.example', 'https://b.example']);
+    expect(frame_sites(`default-src 'self', ${ours}, ${policy("'none'")}`)).toEqual([]);
   });
 });

@@ -67,11 +67,19 @@ function read_eye(text: string): Eye | undefined {
 }
 
 /**
- * Sites that may show a page of this Content-Security-Policy in a frame; undefined: all may. The server
- * names them (--embed-origin).
+ * Sites that may show a page with this Content-Security-Policy header in a frame; undefined: all may. The
+ * server names them (--embed-origin). A proxy may have added a policy of its own: then both must name a
+ * site.
  */
-export function frame_sites(policy: string | null): readonly string[] | undefined {
-  const directives = (policy ?? '').split(';').map((text) => text.trim().split(/\s+/));
+export function frame_sites(header: string | null): readonly string[] | undefined {
+  return (header ?? '')
+    .split(',')
+    .map(sites_of_policy)
+    .reduce((both, sites) => (both && sites ? both.filter((site) => sites.includes(site)) : (both ?? sites)));
+}
+
+function sites_of_policy(policy: string): readonly string[] | undefined {
+  const directives = policy.split(';').map((text) => text.trim().split(/\s+/));
   const sites = directives.find(([name]) => name === 'frame-ancestors')?.slice(1);
   return sites?.includes('*') ? undefined : sites?.filter((site) => site !== "'none'");
 }
