@@ -100,7 +100,8 @@ TEST_P(FuzzInputs, MutantsAreAcceptedOrRefused) {
   int tried = 0;
   while (!HasFailure() && tried < mutants.most &&
          (tried == 0 || std::chrono::steady_clock::now() < mutants.end)) {
-    const std::string input = mutant(random, inputs, target.dictionary, target.max_bytes);
+    const std::string input =
+        mutant({random, inputs, target.dictionary}, target.change, target.max_bytes);
     kept.keep(input);
     parse(target, input);
     ++tried;

@@ -8,29 +8,20 @@
 namespace catgs::fuzz {
 namespace {
 
-/// A number of [0, end); 0 where that is empty.
-std::size_t below(std::mt19937_64& random, std::size_t end) {
-  return end == 0 ? 0 : static_cast<std::size_t>(random() % end);
-}
-
-const std::string& any_of(std::mt19937_64& random, std::span<const std::string> texts) {
-  return texts[below(random, texts.size())];
-}
-
 /// Where and how long: short ranges are likelier, for they leave more of the input whole.
 struct Range {
   std::size_t begin;
   std::size_t length;
 };
 
-Range any_range(std::mt19937_64& random, const std::string& text) {
-  const std::size_t begin = below(random, text.size());
-  const std::size_t longest = std::min(text.size() - begin, std::size_t{1} << below(random, 12));
-  return {begin, longest == 0 ? 0 : 1 + below(random, longest)};
+Range any_range(const Material& from, const std::string& text) {
+  const std::size_t begin = from.below(text.size());
+  const std::size_t longest = std::min(text.size() - begin, std::size_t{1} << from.below(12));
+  return {begin, longest == 0 ? 0 : 1 + from.below(longest)};
 }
 
 /// Numbers around which parsers err, in one to eight bytes, least significant first.
-std::string edge_number(std::mt19937_64& random) {
+std::string edge_number(const Material& from) {
   using Limits = std::numeric_limits<std::int64_t>;
   constexpr std::array<std::int64_t, 16> edges = {0,
                                                   1,
@@ -48,8 +39,8 @@ std::string edge_number(std::mt19937_64& random) {
                                                   0x7fc0'0000,
                                                   Limits::max(),
                                                   Limits::min()};
-  auto value = static_cast<std::uint64_t>(edges[below(random, edges.size())]);
-  std::string bytes(std::size_t{1} << below(random, 4), '\0');
+  auto value = static_cast<std::uint64_t>(edges[from.below(edges.size())]);
+  std::string bytes(std::size_t{1} << from.below(4), '\0');
   for (char& byte : bytes) {
     byte = static_cast<char>(value & 0xff);
     value >>= 8;
@@ -58,28 +49,29 @@ std::string edge_number(std::mt19937_64& random) {
 }
 
 /// Digits as texts have them.
-std::string written_number(std::mt19937_64& random) {
+std::string written_number(const Material& from) {
   constexpr std::array<const char*, 10> numbers = {
       "0", "-1", "1e38", "1e400", "-0.0", "nan", "65536", "4294967296", "2147483648", "1e-320"};
-  return numbers[below(random, numbers.size())];
+  return numbers[from.below(numbers.size())];
 }
 
-void change(std::mt19937_64& random, std::string& text, std::span<const std::string> inputs,
-            std::span<const std::string> words) {
-  const Range range = any_range(random, text);
-  const std::size_t place = below(random, text.size() + 1);
+}  // namespace
+
+void change_bytes(const Material& from, std::string& text) {
+  const Range range = any_range(from, text);
+  const std::size_t place = from.below(text.size() + 1);
   const auto put = [&](const std::string& piece) {
-    if (random() % 2 == 0)
+    if (from.one_in(2))
       text.insert(place, piece);
     else
       text.replace(place, piece.size(), piece);
   };
-  switch (below(random, 9)) {
+  switch (from.below(9)) {
     case 0:
-      if (!text.empty()) text[range.begin] ^= static_cast<char>(1 << below(random, 8));
+      if (!text.empty()) text[range.begin] ^= static_cast<char>(1 << from.below(8));
       break;
     case 1:
-      if (!text.empty()) text[range.begin] = static_cast<char>(random());
+      if (!text.empty()) text[range.begin] = static_cast<char>(from.random());
       break;
     case 2:
       text.erase(range.begin, range.length);
@@ -88,17 +80,17 @@ void change(std::mt19937_64& random, std::string& text, std::span<const std::str
       text.insert(place, text.substr(range.begin, range.length));
       break;
     case 4:
-      put(edge_number(random));
+      put(edge_number(from));
       break;
     case 5:
-      put(written_number(random));
+      put(written_number(from));
       break;
     case 6:
-      if (!words.empty()) put(any_of(random, words));
+      if (!from.words.empty()) put(from.any_of(from.words));
       break;
     case 7: {
-      const std::string& other = any_of(random, inputs);
-      const Range piece = any_range(random, other);
+      const std::string& other = from.any_of(from.inputs);
+      const Range piece = any_range(from, other);
       put(other.substr(piece.begin, piece.length));
       break;
     }
@@ -108,13 +100,10 @@ void change(std::mt19937_64& random, std::string& text, std::span<const std::str
   }
 }
 
-}  // namespace
-
-std::string mutant(std::mt19937_64& random, std::span<const std::string> inputs,
-                   std::span<const std::string> words, std::size_t max_bytes) {
-  std::string text = any_of(random, inputs);
-  do change(random, text, inputs, words);
-  while (random() % 4 != 0);
+std::string mutant(const Material& material, Change change, std::size_t max_bytes) {
+  std::string text = material.any_of(material.inputs);
+  do (change && material.one_in(2) ? change : change_bytes)(material, text);
+  while (!material.one_in(4));
   text.resize(std::min(text.size(), max_bytes));
   return text;
 }

@@ -62,8 +62,8 @@ fuzz() {
       tried=$((tried + BASH_REMATCH[1]))
     fi
   done < <("$fuzzer" "--target=$target" -max_total_time="$seconds" -max_len="$max_bytes" \
-    -dict="$work/words.dict" -rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=10 -print_final_stats=1 \
-    -artifact_prefix="$work/found/" "${inputs[@]}" 2>&1 |
+    -len_control=100 -dict="$work/words.dict" -rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=10 \
+    -print_final_stats=1 -artifact_prefix="$work/found/" "${inputs[@]}" 2>&1 |
     tee "$work/log")
   now=$EPOCHSECONDS
   spent=$((spent + now - begin))

@@ -1,8 +1,10 @@
 #include "tests/fuzz/target.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <numeric>
 #include <stdexcept>
 #include <system_error>
 
@@ -11,6 +13,7 @@
 #include <unistd.h>
 
 #include "render_core/scene/sanitize.h"
+#include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {
 
@@ -60,6 +63,32 @@ void require_sound(GaussianCloud cloud) {
   for (const glm::vec3& sh : cloud.sh) require(finite(sh), "sanitized colours are finite");
 }
 
+/// M. D. McIlroy, A Killer Adversary for Quicksort, 1999: numbers are chosen while they are sorted.
+std::vector<std::size_t> hard_to_sort(std::size_t count) {
+  std::vector<std::size_t> numbers(count, count);  // not chosen yet: larger than all others
+  std::size_t chosen = 0;
+  std::size_t pivot = 0;  // presumably
+  std::vector<std::size_t> places(count);
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  std::sort(places.begin(), places.end(), [&](std::size_t a, std::size_t b) {
+    if (numbers[a] == count && numbers[b] == count) numbers[a == pivot ? a : b] = chosen++;
+    if (numbers[a] == count)
+      pivot = a;
+    else if (numbers[b] == count)
+      pivot = b;
+    return numbers[a] < numbers[b];
+  });
+  return numbers;
+}
+
+GaussianCloud cloud_hard_to_sort() {
+  GaussianCloud cloud = test::random_cloud(64, 0);
+  const std::vector<std::size_t> numbers = hard_to_sort(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    cloud.mean[i] = glm::vec3(static_cast<float>(numbers[i]));
+  return cloud;
+}
+
 std::string text_of(Bytes input) {
   return {reinterpret_cast<const char*>(input.data()), input.size()};
 }
@@ -67,12 +96,16 @@ std::string text_of(Bytes input) {
 Bytes bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 FileInMemory::FileInMemory(Bytes content) : descriptor_(::memfd_create("input", MFD_CLOEXEC)) {
-  if (descriptor_ < 0 ||
-      ::write(descriptor_, content.data(), content.size()) != static_cast<ssize_t>(content.size()))
-    throw std::system_error(errno, std::generic_category(), "memfd");
+  rewrite(content);
 }
 
 FileInMemory::~FileInMemory() { ::close(descriptor_); }
+
+void FileInMemory::rewrite(Bytes content) {
+  if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, content.data(), content.size(),
+                                                   0) != static_cast<ssize_t>(content.size()))
+    throw std::system_error(errno, std::generic_category(), "memfd");
+}
 
 std::string FileInMemory::path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
 

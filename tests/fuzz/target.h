@@ -11,6 +11,7 @@
 #include "render_core/scene/byte_source.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/load_context.h"
+#include "tests/fuzz/mutate.h"
 
 namespace catgs::fuzz {
 
@@ -26,6 +27,9 @@ struct Target {
   std::map<std::string, std::string> (*seeds)();
   /// Words of the format, which mutation would hardly find by itself.
   std::vector<std::string> dictionary;
+  /// Changes an input as its format is built, where bytes alone seldom make what a parser goes on
+  /// to read; null where they do.
+  Change change = nullptr;
   /// Longer inputs hold nothing new for this parser.
   std::size_t max_bytes = 4096;
 };
@@ -62,17 +66,24 @@ const LoadContext& one_thread();
 /// What every reader of scenes promises, and what sanitize() makes of it.
 void require_sound(GaussianCloud cloud);
 
+/// Numbers that std::sort, where it meets them in this order, cannot part in halves: it makes a
+/// heap of them, which mutation would hardly see happen.
+std::vector<std::size_t> hard_to_sort(std::size_t count);
+/// Gaussians at such places.
+GaussianCloud cloud_hard_to_sort();
+
 std::string text_of(Bytes input);
 Bytes bytes_of(const std::string& text);
 
 /// A file in memory, for parsers that open theirs by name.
 class FileInMemory {
  public:
-  explicit FileInMemory(Bytes content);
+  explicit FileInMemory(Bytes content = {});
   ~FileInMemory();
   FileInMemory(const FileInMemory&) = delete;
   FileInMemory& operator=(const FileInMemory&) = delete;
 
+  void rewrite(Bytes content);
   [[nodiscard]] std::string path() const;
 
  private:

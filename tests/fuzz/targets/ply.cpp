@@ -42,6 +42,9 @@ std::map<std::string, std::string> plain_seeds() {
     write_ply(test::random_cloud(3, degree), out);
     seeds["degree_" + std::to_string(degree)] = out.str();
   }
+  std::ostringstream hard;
+  write_ply(cloud_hard_to_sort(), hard);
+  seeds["hard_to_sort"] = hard.str();
   seeds["ascii"] = two_rows("ascii", "float", "-0.5e-1 ");
   seeds["big_endian"] = two_rows("binary_big_endian", "double", std::string(8, '\0'));
   seeds["half"] = two_rows("binary_little_endian", "short", std::string(2, '\1'));
@@ -50,8 +53,11 @@ std::map<std::string, std::string> plain_seeds() {
 
 std::map<std::string, std::string> compressed_seeds() {
   return {{"plain", test::encode_compressed_ply(test::random_cloud(5, 0), false)},
+          {"hard_to_sort", test::encode_compressed_ply(cloud_hard_to_sort(), false)},
           {"colour_limits", test::encode_compressed_ply(test::random_cloud(300, 0), true)},
-          {"harmonics", test::encode_compressed_ply(test::random_cloud(5, 2), true)}};
+          {"degree_1", test::encode_compressed_ply(test::random_cloud(5, 1), false)},
+          {"degree_2", test::encode_compressed_ply(test::random_cloud(5, 2), true)},
+          {"degree_3", test::encode_compressed_ply(test::random_cloud(5, 3), true)}};
 }
 
 const std::vector<std::string> header_words = {"ply\n",
@@ -93,7 +99,9 @@ Target ply() {
           .parse = parse_plain,
           .seeds = plain_seeds,
           .dictionary = with_header_words({"f_dc_0", "f_rest_0", "f_rest_44", "opacity", "scale_0",
-                                           "rot_0", "nan", "inf", "1e39", "4294967296"})};
+                                           "rot_0", "nan", "inf", "1e39", "4294967296"}),
+          .change = change_header,
+          .max_bytes = 8192};
 }
 
 Target compressed_ply() {
@@ -103,6 +111,7 @@ Target compressed_ply() {
           .dictionary = with_header_words({"chunk ", "sh ", "packed_position", "packed_rotation",
                                            "packed_scale", "packed_color", "min_x", "max_scale_z",
                                            "min_r", "f_rest_0", "f_rest_8"}),
+          .change = change_header,
           .max_bytes = 16384};
 }
 

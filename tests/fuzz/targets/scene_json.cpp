@@ -1,5 +1,9 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "render_core/scene/hints.h"
 #include "render_core/scene/streamed_sog.h"
@@ -30,8 +34,23 @@ void parse_lod_tree(Bytes input) {
       require(choice->count <= budget, "a budget is kept");
 }
 
+/// A tree of 64 nodes, whose costs are hard to sort; a budget of a million pays for a few of them.
+std::string wide_lod_tree() {
+  constexpr std::size_t coarse = (1 << 14) - 8;
+  std::vector<std::size_t> costs = hard_to_sort(64);
+  std::ranges::reverse(costs);  // children are read from the last to the first
+  std::string nodes;
+  for (const std::size_t cost : costs)
+    nodes += fmt::format(
+        R"({}{{"lods":{{"0":{{"file":0,"offset":0,"count":{}}},"1":{{"file":0,"offset":0,"count":{}}}}}}})",
+        nodes.empty() ? "" : ",", coarse + cost, coarse);
+  return fmt::format(R"({{"lodLevels":2,"filenames":["a.sog"],"tree":{{"children":[{}]}}}})",
+                     nodes);
+}
+
 std::map<std::string, std::string> lod_tree_seeds() {
-  return {{"two_levels",
+  return {{"wide", wide_lod_tree()},
+          {"two_levels",
            R"({"version":1,"lodLevels":2,"environment":null,"filenames":["0_0/meta.json"],"tree":{
                "bound":{"min":[0,0,0],"max":[1,1,1]},"children":[{"lods":{"0":{"file":0,"offset":0,
                "count":9},"1":{"file":0,"offset":9,"count":4}}},{"lods":{"1":{"file":0,"offset":13,
@@ -75,16 +94,24 @@ std::map<std::string, std::string> cameras_seeds() {
                              [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]})"}};
 }
 
+/// Both names lead to one file in memory: writing files anew would take most of a run's time.
+struct SidecarFolder {
+  SidecarFolder() {
+    spdlog::set_level(spdlog::level::off);  // a warning about nearly every input
+    std::filesystem::create_symlink(file.path(), sidecar);
+    std::filesystem::create_symlink(file.path(), folder / "a.settings.json");
+  }
+  FileInMemory file;
+  test::TemporaryFolder folder;
+  std::filesystem::path sidecar = folder / "a.json";
+};
+
 /// The sidecar's tours and the SuperSplat viewer's settings, as pages get them.
 void parse_tours(Bytes input) {
-  static const test::TemporaryFolder folder;
-  static const auto sidecar = folder / "a.json";
-  std::filesystem::remove(sidecar);
-  folder.write("a.settings.json", text_of(input));
-  require(read_tours(sidecar).size() >= std::string(R"({"settings":,"tours":})").size(),
+  static SidecarFolder folder;
+  folder.file.rewrite(input);
+  require(read_tours(folder.sidecar).size() >= std::string(R"({"settings":,"tours":})").size(),
           "two parts");
-  folder.write("a.json", text_of(input));
-  read_tours(sidecar);
 }
 
 /// What is taken from an author can be written, and read again as any sidecar.
@@ -142,7 +169,9 @@ Target lod_tree() {
           .seeds = lod_tree_seeds,
           .dictionary = with_json_words(
               {"\"lodLevels\":", "\"filenames\":", "\"tree\":", "\"children\":", "\"lods\":",
-               "\"file\":", "\"offset\":", "\"count\":", "\"environment\":", "\"version\":"})};
+               "\"file\":", "\"offset\":", "\"count\":", "\"environment\":", "\"version\":"}),
+          .change = change_json,
+          .max_bytes = 8192};
 }
 
 Target sidecar() {
@@ -152,7 +181,8 @@ Target sidecar() {
           .dictionary =
               with_json_words({"\"up\":", "\"near\":", "\"focus\":", "\"start_pose\":",
                                "\"position\":", "\"look_at\":", "\"orientation\":", "\"limits\":",
-                               "\"min\":", "\"max\":", "\"tours\":", "\"-y\"", "\"+z\""})};
+                               "\"min\":", "\"max\":", "\"tours\":", "\"-y\"", "\"+z\""}),
+          .change = change_json};
 }
 
 Target cameras() {
@@ -160,7 +190,8 @@ Target cameras() {
           .parse = parse_cameras,
           .seeds = cameras_seeds,
           .dictionary = with_json_words(
-              {"\"position\":", "\"rotation\":", "\"frames\":", "\"transform_matrix\":"})};
+              {"\"position\":", "\"rotation\":", "\"frames\":", "\"transform_matrix\":"}),
+          .change = change_json};
 }
 
 Target tours() {
@@ -169,6 +200,7 @@ Target tours() {
           .seeds = tours_seeds,
           .dictionary = with_json_words(
               {"\"tours\":", "\"animTracks\":", "\"annotations\":", "\"cameras\":"}),
+          .change = change_json,
           .max_bytes = 65536};
 }
 
@@ -180,6 +212,7 @@ Target sent_sidecar() {
               with_json_words({"\"tours\":", "\"stops\":", "\"title\":", "\"caption\":",
                                "\"autoplay\":", "\"fov_deg\":", "\"marker\":", "\"stay_s\":",
                                "\"position\":", "\"look_at\":", "\"orientation\":", "\"up\":"}),
+          .change = change_json,
           .max_bytes = 65536};
 }
 

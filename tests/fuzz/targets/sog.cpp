@@ -1,8 +1,12 @@
 #include "render_core/scene/sog.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <iterator>
+#include <map>
 #include <memory>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -27,21 +31,25 @@ std::string packed(const std::map<std::string, std::string>& files) {
   return bytes;
 }
 
+std::map<std::string, Bytes> unpacked(Bytes bytes) {
+  std::map<std::string, Bytes> files;
+  while (!bytes.empty()) {
+    const auto name_end = std::find(bytes.begin(), bytes.end(), std::byte{0});
+    const std::string name = text_of({bytes.begin(), name_end});
+    bytes = bytes.subspan(std::min(bytes.size(), name.size() + 1));
+    std::uint32_t size = 0;
+    const std::size_t prefix = std::min<std::size_t>(3, bytes.size());
+    std::memcpy(&size, bytes.data(), prefix);
+    bytes = bytes.subspan(prefix);
+    files[name] = bytes.first(std::min<std::size_t>(size, bytes.size()));
+    bytes = bytes.subspan(files[name].size());
+  }
+  return files;
+}
+
 class PackedFiles final : public FileSet {
  public:
-  explicit PackedFiles(Bytes bytes) {
-    while (!bytes.empty()) {
-      const auto name_end = std::find(bytes.begin(), bytes.end(), std::byte{0});
-      const std::string name = text_of({bytes.begin(), name_end});
-      bytes = bytes.subspan(std::min(bytes.size(), name.size() + 1));
-      std::uint32_t size = 0;
-      const std::size_t prefix = std::min<std::size_t>(3, bytes.size());
-      std::memcpy(&size, bytes.data(), prefix);
-      bytes = bytes.subspan(prefix);
-      files_[name] = bytes.first(std::min<std::size_t>(size, bytes.size()));
-      bytes = bytes.subspan(files_[name].size());
-    }
-  }
+  explicit PackedFiles(Bytes bytes) : files_(unpacked(bytes)) {}
   [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
     const auto found = files_.find(name);
     if (found == files_.end()) throw InputError(name, "", "is missing");
@@ -52,6 +60,60 @@ class PackedFiles final : public FileSet {
   std::map<std::string, Bytes> files_;
 };
 
+/// Of a few colours: with 252 to 255, which are tags of rotations in the fourth channel.
+std::string any_image(const Material& from) {
+  constexpr std::array<int, 9> widths = {1, 2, 3, 4, 16, 64, 192, 512, 960};
+  constexpr std::array<int, 6> heights = {1, 2, 4, 64, 1024, 1025};
+  constexpr std::array<std::uint8_t, 9> edges = {0, 1, 127, 128, 251, 252, 253, 254, 255};
+  const int width = from.any_of(widths);
+  const int height = width > 64 ? 1 : from.any_of(heights);
+  std::array<char, 16> colours{};
+  for (char& c : colours)
+    c = static_cast<char>(from.one_in(2) ? from.any_of(edges) : from.below(256));
+  std::string rgba;
+  for (int i = 0; i < width * height; ++i) rgba.append(&colours[4 * from.below(4)], 4);
+  return test::encode_webp(rgba, width, height, !from.one_in(8));
+}
+
+/// One of the files, as its format has it.
+void change_sog(const Material& from, std::string& text) {
+  std::map<std::string, std::string> files;
+  for (const auto& [name, content] : unpacked(bytes_of(text))) files[name] = text_of(content);
+  const auto others = unpacked(bytes_of(from.any_of(from.inputs)));
+  if (files.empty() || others.empty()) return change_bytes(from, text);
+  const auto any = [&](auto& map) {
+    return std::next(map.begin(), static_cast<std::ptrdiff_t>(from.below(map.size())));
+  };
+  if (from.one_in(2)) {
+    const auto other = others.find("meta.json");
+    const std::string piece = text_of(other == others.end() ? any(others)->second : other->second);
+    change_json({from.random, {&piece, 1}, from.words}, files["meta.json"]);
+    text = packed(files);
+    return;
+  }
+  std::string& content = any(files)->second;
+  switch (from.below(8)) {
+    case 0:
+      files.erase(any(files));
+      break;
+    case 1: {
+      const auto other = any(others);
+      files[other->first] = text_of(other->second);
+      break;
+    }
+    case 2:
+      content = text_of(any(others)->second);
+      break;
+    case 3:
+      content = any_image(from);
+      break;
+    default:
+      change_bytes(from, content);
+      break;
+  }
+  text = packed(files);
+}
+
 void parse_sog(Bytes input) {
   require_sound(read_sog(PackedFiles(input), "meta.json", one_thread()).cloud);
 }
@@ -59,9 +121,10 @@ void parse_sog(Bytes input) {
 std::map<std::string, std::string> sog_seeds() {
   std::map<std::string, std::string> seeds;
   for (const int version : {1, 2})
-    for (const int degree : {0, 1, 3})
+    for (const int degree : {0, 1, 2, 3})
       seeds[fmt::format("v{}_{}", version, degree)] =
           packed(test::encode_sog(test::random_cloud(4, degree), version));
+  seeds["hard_to_sort"] = packed(test::encode_sog(cloud_hard_to_sort(), 2));
   return seeds;
 }
 
@@ -109,6 +172,7 @@ Target sog() {
                          "means_l.webp",      "means_u.webp", "quats.webp",  "scales.webp",
                          "sh0.webp",          "RIFF",         "WEBPVP8L",    "shN_labels.webp",
                          "shN_centroids.webp"},
+          .change = change_sog,
           .max_bytes = 16384};
 }
 

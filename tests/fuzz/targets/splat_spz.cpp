@@ -20,7 +20,9 @@ void parse_splat(Bytes input) {
 std::map<std::string, std::string> splat_seeds() {
   std::ostringstream out;
   write_splat(test::random_cloud(5, 0), out);
-  return {{"five", out.str()}};
+  std::ostringstream hard;
+  write_splat(cloud_hard_to_sort(), hard);
+  return {{"five", out.str()}, {"hard_to_sort", hard.str()}};
 }
 
 void parse_file(Bytes input) {
@@ -50,6 +52,7 @@ std::map<std::string, std::string> spz_seeds() {
       seeds[fmt::format("v{}_{}", version, degree)] =
           test::encode_spz(test::random_cloud(4, degree), style);
     }
+  seeds["v4_hard_to_sort"] = test::encode_spz(cloud_hard_to_sort(), {.version = 4});
   return seeds;
 }
 
@@ -75,7 +78,7 @@ Target splat() {
           .parse = parse_splat,
           .seeds = splat_seeds,
           .dictionary = {"\xff\xff\xff\x7f", std::string("\0\0\x80\x7f", 4)},
-          .max_bytes = 512};
+          .max_bytes = 2048};
 }
 
 Target spz() {
