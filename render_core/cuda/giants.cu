@@ -13,17 +13,18 @@ constexpr int block_size = 128;
 // A set that holds more is too full to tell giants from others; no scene was seen to have them.
 constexpr std::uint32_t most_giants = giant_bits / 4;
 
-// Of one tile's list: giants, and entries that change places. What is beyond stays where it is.
+// Of one tile's list: giants that are carried, and entries that change places for them, one more at
+// each boundary that a giant passes. A tile with more moves keeps its list as it is.
 constexpr std::uint32_t found_per_thread = 4, most_found = found_per_thread * block_size;
 constexpr std::uint32_t most_moves = 1536;
 
-// The parts of a list: runs of the reorder stage, then whatever is behind them.
+// The parts of a list: runs of the reorder stage, 31 at most, then whatever is behind those.
 constexpr std::uint32_t most_parts = warp_size;
 
 /// A block's notes about the list of one tile.
 struct Notes {
   std::uint32_t bits[giant_words];  // GiantSet::bits
-  std::uint32_t found;              // giants that are out of place, maybe more than `at` holds
+  std::uint32_t found;              // giants that the tile sees, maybe more than `at` holds
   std::uint32_t at[most_found];
   // Of each part of the list.
   std::uint32_t begin[most_parts + 1];

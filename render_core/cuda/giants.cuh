@@ -8,7 +8,7 @@
 namespace catgs::cuda {
 
 // A turn of the camera changes all depths in one direction by one and the same share: what is seen
-// at p now had weight_at(list_from_frame, p) times its depth in the key frame. So the order of a
+// at p at depth z was at weight_at(list_from_frame, p) z in the key frame. So the order of a
 // tile's list changes little, but for Gaussians so large that the tile sees them far from their
 // centres: these have another share, belong thousands of entries away, and are the giants.
 
@@ -31,7 +31,8 @@ struct GiantSet {
   __device__ float share(float2 centre_px) const {
     return math::weight_at<float>(list_from_frame, {centre_px.x, centre_px.y});
   }
-  /// Whether a Gaussian that reaches so far is one in some tile.
+  /// Whether a Gaussian that reaches so far is one in some tile; any that was behind the key
+  /// frame's camera, too.
   __device__ bool holds(float2 centre_px, float2 half_px) const {
     const float varies =
         fabsf(list_from_frame.wx) * half_px.x + fabsf(list_from_frame.wy) * half_px.y;
