@@ -3,7 +3,6 @@
 #include "render_core/cuda/cuda_check.h"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/reorder.cuh"
-#include "render_core/cuda/sort.cuh"
 
 namespace catgs::cuda {
 namespace {

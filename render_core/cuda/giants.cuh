@@ -43,6 +43,7 @@ struct GiantSet {
 /// Carries giants to those runs of their tiles' lists that their depths lie in, or from behind all
 /// runs into them, or out. Runs keep their lengths: where more giants pass a boundary one way than
 /// the other, as many of the entries beside it go back. Within runs launch_reorder() does the rest.
+/// A turn back leaves them where they were carried until the next key frame.
 struct GiantParams {
   FrameShape shape;
   GiantSet giants;

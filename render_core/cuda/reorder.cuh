@@ -5,8 +5,8 @@
 namespace catgs::cuda {
 
 /// List entries that one warp sorts; the last run of a tile may be shorter. (One H200, fungi_room,
-/// head2: 1,024, for which a lane has to hold twice as many keys, cost 3 % of the frames a second;
-/// 256 leave blocks of 18 dB.)
+/// head2: 1,024, for which a lane has to hold twice as many keys, cost 2 to 3 % of the frames a
+/// second; 256 leave blocks of 18 dB.)
 constexpr std::uint32_t reorder_run = 512;
 
 struct ReorderRun {

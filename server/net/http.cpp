@@ -74,8 +74,7 @@ void check_origin(std::string_view text, bool any_subdomain) {
   if (text == "null")
     throw std::invalid_argument(
         "\"null\" is every page from a file and every sandboxed frame (serve the page by http, or "
-        "give "
-        "its frame sandbox=\"allow-same-origin\")");
+        "give its frame sandbox=\"allow-same-origin\")");
   std::string lower_case(text);
   for (char& c : lower_case)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
