@@ -165,6 +165,7 @@ bool CudaView::needs_more_room() {
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   const ListRequest listed(request.camera, plan, settings_.speculation);
   turned_ = false;
+  seeks_giants_ = false;
   for (;;) {
     make_room(request.camera.size_px, plan.grid);
     times_.begin(stream_.get());
@@ -238,9 +239,12 @@ bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
 /// Decides whether a sub-frame tells giants from others.
 GiantSet CudaView::want_giants(const FramePlan& plan) {
   if (!plan.warped || settings_.order != BlendOrder::fresh) return {};
-  if (!makes_giants(plan.list_from_frame, {shape_.width_px, shape_.height_px})) return {};
   std::uint32_t* bits = memory_.giants.get();
-  check(cudaMemsetAsync(bits, 0, giant_words * sizeof(std::uint32_t), stream_.get()), "giants");
+  if (!seeks_giants_) {
+    if (!makes_giants(plan.list_from_frame, {shape_.width_px, shape_.height_px})) return {};
+    check(cudaMemsetAsync(bits, 0, giant_words * sizeof(std::uint32_t), stream_.get()), "giants");
+    seeks_giants_ = true;
+  }
   return {math::convert<float>(plan.list_from_frame), bits};
 }
 
@@ -251,10 +255,9 @@ void CudaView::reorder(const GiantSet& giants) {
   const std::uint32_t* depth_keys = builder_.depth_keys();
   std::uint32_t* slot = lists_.slot.get();
   if (giants.bits != nullptr)
-    launch_giants(
-        {shape_, giants, math::inverse(giants.list_from_frame), lists_.range.get(),
-         memory_.ordered.get(), builder_.records(), depth_keys, slot, counts, processors_},
-        stream);
+    launch_giants({shape_, giants.bits, lists_.range.get(), memory_.ordered.get(), depth_keys, slot,
+                   counts, processors_},
+                  stream);
   launch_reorder({memory_.runs.get(), counts, depth_keys, slot, processors_}, stream);
 }
 

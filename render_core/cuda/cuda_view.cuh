@@ -69,7 +69,8 @@ class CudaView final : public View {
   SpeculationCosts costs_;
   TileLists lists_;
   SceneDepths depths_;
-  bool turned_ = false;  // the frame's tiles are runs of pixels
+  bool turned_ = false;        // the frame's tiles are runs of pixels
+  bool seeks_giants_ = false;  // since some turn of this group
   bool colours_known_ = false;
   ReachHistory reach_;
 };

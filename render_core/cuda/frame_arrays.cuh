@@ -36,11 +36,11 @@ struct FrameCounts {
   std::uint32_t visible = 0;       // Gaussians in view
   std::uint32_t list_entries = 0;  // sum of all tile lists, before any bound was applied
   std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float
+  std::uint32_t giants = 0;        // in the GiantSet, which its sub-frames add to
   // Of the frame.
   std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
   std::uint32_t sampled = 0;   // counted Gaussians of which inverse_depths is the sum
   unsigned long long inverse_depths = 0;     // in units of 1 / (near_z * inverse_depth_scale)
-  std::uint32_t giants = 0;                  // in its GiantSet
   std::uint32_t unlisted = 0;                // 1: a watched Gaussian came into view
   std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles

@@ -23,7 +23,7 @@ constexpr std::uint32_t most_parts = warp_size;
 /// A block's notes about the list of one tile.
 struct Notes {
   std::uint32_t bits[giant_words];  // GiantSet::bits
-  std::uint32_t found;              // giants that the tile sees, maybe more than `at` holds
+  std::uint32_t found;              // giants to be carried, maybe more than `at` holds
   std::uint32_t at[most_found];
   // Of each part of the list.
   std::uint32_t begin[most_parts + 1];
@@ -58,18 +58,39 @@ __device__ bool may_be_giant(const Notes& notes, std::uint32_t slot) {
   return (notes.bits[slot / warp_size % giant_words] >> slot % warp_size & 1u) != 0;
 }
 
-/// Of what is seen in the middle of a tile.
-__device__ float share_of(const GiantParams& p, std::uint32_t t) {
-  const int x = static_cast<int>(t) % p.shape.tiles_x, y = static_cast<int>(t) / p.shape.tiles_x;
-  const auto middle = [](int first_px, int k) {
-    return static_cast<float>(first_px + k * tile_size_px) + 0.5f * tile_size_px;
-  };
-  return 1.0f / math::weight_at<float>(p.frame_from_list, {middle(p.shape.first_x_px, x),
-                                                           middle(p.shape.first_y_px, y)});
+/// By one warp, a part a lane: notes where parts begin, at which depths, and that nothing moves yet.
+__device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes) {
+  const std::uint32_t r = threadIdx.x;
+  const std::uint32_t begin = r < list.runs() ? r * reorder_run : list.behind();
+  notes.begin[r] = r < list.parts() ? begin : list.length;
+  notes.gain[r] = 0;
+  notes.leaving[r] = 0;
+  if (r == 0) {
+    notes.begin[most_parts] = list.length;
+    notes.found = 0;
+    notes.lacking = false;
+  }
+  if (r >= list.parts()) return;
+  // Giants may stand in the wrong part: the depth of a part is that of its first other entry.
+  std::uint32_t first = begin;
+  const std::uint32_t last = min(begin + reorder_run / 2, list.length - 1);
+  while (first < last && may_be_giant(notes, list.slot[first])) ++first;
+  notes.depth[r] = p.depth_key[list.slot[first]];
 }
 
-/// Notes the giants that have another share of their depth than the tile.
-__device__ void find(const GiantParams& p, const List& list, float share, Notes& notes) {
+/// The part that a giant in part `source` belongs to.
+__device__ std::uint32_t target_of(const Notes& notes, const List& list, std::uint32_t source,
+                                   std::uint32_t key) {
+  const std::uint32_t last = list.parts() - 1;
+  std::uint32_t target = 0;
+  while (target < last && notes.depth[target + 1] <= key) ++target;
+  // A short part has no neighbours to give for those that come.
+  const bool is_short = list.length - notes.begin[last] < reorder_run / 2;
+  return target == last && source != last && is_short ? last - 1 : target;
+}
+
+/// Notes the giants that lie in another part than they belong to.
+__device__ void find(const GiantParams& p, const List& list, Notes& notes) {
   constexpr std::uint32_t loads = 8;
   for (std::uint32_t first = 0; first < list.length; first += loads * block_size) {
     std::uint32_t slot[loads];
@@ -80,36 +101,18 @@ __device__ void find(const GiantParams& p, const List& list, float share, Notes&
     for (std::uint32_t j = 0; j < loads; ++j) {
       const std::uint32_t at = first + j * block_size + threadIdx.x;
       if (at >= list.length || !may_be_giant(notes, slot[j])) continue;
-      const float own = p.giants.share(p.records[slot[j]].centre_px);
-      if (fabsf(own - share) <= giant_tolerance * share) continue;
+      const std::uint32_t source = list.part_of(at);
+      const std::uint32_t key = p.depth_key[slot[j]];
+      if (key == 0 || target_of(notes, list, source, key) == source) continue;  // 0: hidden
       const std::uint32_t k = atomicAdd(&notes.found, 1u);
       if (k < most_found) notes.at[k] = at;
     }
   }
 }
 
-/// Notes where parts begin, at which depths, and that nothing moves yet.
-__device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes) {
-  const std::uint32_t r = threadIdx.x;
-  if (r >= most_parts) return;
-  const std::uint32_t begin = r < list.runs() ? r * reorder_run : list.behind();
-  notes.begin[r] = r < list.parts() ? begin : list.length;
-  notes.gain[r] = 0;
-  notes.leaving[r] = 0;
-  if (r == 0) {
-    notes.begin[most_parts] = list.length;
-    notes.lacking = false;
-  }
-  if (r >= list.parts()) return;
-  std::uint32_t first = begin;
-  while (first + 1 < list.length && first < begin + 8 && may_be_giant(notes, list.slot[first]))
-    ++first;
-  notes.depth[r] = p.depth_key[list.slot[first]];
-}
-
 /// By one warp, a part a lane: how many neighbours each boundary lets pass so that all parts keep
 /// their lengths, and where a part's moves are noted.
-__device__ void plan(std::uint32_t parts, Notes& notes) {
+__device__ void plan(Notes& notes) {
   const std::uint32_t r = threadIdx.x;
   int gives = notes.gain[r];
 #pragma unroll
@@ -117,7 +120,6 @@ __device__ void plan(std::uint32_t parts, Notes& notes) {
     const int before = __shfl_up_sync(~0u, gives, d);
     if (r >= d) gives += before;
   }
-  if (r + 1 >= parts) gives = 0;
   const int before = __shfl_up_sync(~0u, gives, 1);
   const std::uint32_t leave = notes.leaving[r] + max(gives, 0) + (r > 0 ? max(-before, 0) : 0);
   std::uint32_t next = leave;
@@ -169,9 +171,7 @@ __device__ void give(const List& list, std::uint32_t r, Notes& notes) {
 
 /// Carries the giants that were found to the parts that their depths lie in.
 __device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
-  begin_parts(p, list, notes);
-  __syncthreads();
-  const std::uint32_t found = min(notes.found, most_found), parts = list.parts();
+  const std::uint32_t found = min(notes.found, most_found);
   std::uint32_t giant[found_per_thread], source[found_per_thread], target[found_per_thread];
 #pragma unroll
   for (std::uint32_t j = 0; j < found_per_thread; ++j) {
@@ -179,16 +179,14 @@ __device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
     source[j] = target[j] = 0;
     if (k >= found) continue;
     giant[j] = list.slot[notes.at[k]];
-    const std::uint32_t key = p.depth_key[giant[j]];
     source[j] = list.part_of(notes.at[k]);
-    for (std::uint32_t r = 1; r < parts; ++r) target[j] += notes.depth[r] <= key ? 1 : 0;
-    if (target[j] == source[j]) continue;
+    target[j] = target_of(notes, list, source[j], p.depth_key[giant[j]]);
     atomicAdd(&notes.gain[target[j]], 1);
     atomicSub(&notes.gain[source[j]], 1);
     atomicAdd(&notes.leaving[source[j]], 1u);
   }
   __syncthreads();
-  if (threadIdx.x < warp_size) plan(parts, notes);
+  if (threadIdx.x < warp_size) plan(notes);
   __syncthreads();
   if (notes.moves == 0 || notes.moves > most_moves) return;
 #pragma unroll
@@ -197,7 +195,7 @@ __device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
     notes.left[atomicAdd(&notes.next_left[source[j]], 1u)] = notes.at[j * block_size + threadIdx.x];
     notes.taken[atomicAdd(&notes.next_taken[target[j]], 1u)] = giant[j];
   }
-  for (std::uint32_t r = threadIdx.x / warp_size; r + 1 < parts; r += block_size / warp_size)
+  for (std::uint32_t r = threadIdx.x / warp_size; r + 1 < list.parts(); r += block_size / warp_size)
     give(list, r, notes);
   __syncthreads();
   if (notes.lacking) return;
@@ -210,17 +208,17 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
   const std::uint32_t giants = p.counts->giants;
   if (p.counts->unlisted != 0 || giants == 0 || giants > most_giants) return;
   for (std::uint32_t i = threadIdx.x; i < giant_words; i += block_size)
-    notes.bits[i] = p.giants.bits[i];
+    notes.bits[i] = p.bits[i];
   for (std::uint32_t t = blockIdx.x; t < p.shape.tiles(); t += gridDim.x) {
     const uint2 range = p.range[t];
     const List list{p.slot + range.x, range.y - range.x, p.ordered[t]};
     if (list.ordered == 0 || list.parts() < 2) continue;
-    if (threadIdx.x == 0) notes.found = 0;
     __syncthreads();
-    find(p, list, share_of(p, t), notes);
+    if (threadIdx.x < warp_size) begin_parts(p, list, notes);
+    __syncthreads();
+    find(p, list, notes);
     __syncthreads();
     if (notes.found > 0) carry(p, list, notes);
-    __syncthreads();
   }
 }
 

@@ -20,37 +20,33 @@ constexpr float giant_tolerance = 0.03f;
 /// Whether such a turn has giants worth a search.
 bool makes_giants(const Homography<double>& list_from_frame, glm::ivec2 size_px);
 
-/// The giants of a frame: bit slot % giant_bits is set for each, so that others may seem to be
-/// some.
+/// The giants of a group of frames: bit slot % giant_bits is set for each, so that others may seem
+/// to be some. Who is one in a frame remains one: a later frame's turn may lead back, and the list
+/// stands in the order of the frame before.
 constexpr std::uint32_t giant_words = 1024, giant_bits = giant_words * warp_size;
 
 struct GiantSet {
   Homography<float> list_from_frame{};
   std::uint32_t* bits = nullptr;  // [giant_words], zero at first; null: nobody asks for giants
 
-  __device__ float share(float2 centre_px) const {
-    return math::weight_at<float>(list_from_frame, {centre_px.x, centre_px.y});
-  }
   /// Whether a Gaussian that reaches so far is one in some tile; any that was behind the key
   /// frame's camera, too.
   __device__ bool holds(float2 centre_px, float2 half_px) const {
     const float varies =
         fabsf(list_from_frame.wx) * half_px.x + fabsf(list_from_frame.wy) * half_px.y;
-    return varies > giant_tolerance * share(centre_px);
+    const float share = math::weight_at<float>(list_from_frame, {centre_px.x, centre_px.y});
+    return varies > giant_tolerance * share;
   }
 };
 
 /// Carries giants to those runs of their tiles' lists that their depths lie in, or from behind all
 /// runs into them, or out. Runs keep their lengths: where more giants pass a boundary one way than
 /// the other, as many of the entries beside it go back. Within runs launch_reorder() does the rest.
-/// A turn back leaves them where they were carried until the next key frame.
 struct GiantParams {
   FrameShape shape;
-  GiantSet giants;
-  Homography<float> frame_from_list;
+  const std::uint32_t* bits;       // GiantSet::bits
   const uint2* range;              // [tiles]
   const std::uint32_t* ordered;    // [tiles], how many of its entries are in runs
-  const SplatRecord* records;      // [visible_bound], of this frame
   const std::uint32_t* depth_key;  // [visible_bound], of this frame
   std::uint32_t* slot;             // [list_bound]
   const FrameCounts* counts;

@@ -36,12 +36,13 @@ __device__ void add_inverse_depth(const ProjectParams& p, bool counted, float de
   atomicAdd(&p.counts->sampled, count);
 }
 
-/// Puts a Gaussian that is a giant into the frame's set.
+/// Puts a Gaussian that is a giant into the group's set.
 __device__ void note_giant(const ProjectParams& p, std::uint32_t v, const Splat& splat) {
   if (p.giants.bits == nullptr || !splat.in_view || !p.giants.holds(splat.centre_px, splat.half_px))
     return;
-  atomicOr(&p.giants.bits[v / warp_size % giant_words], 1u << v % warp_size);
-  atomicAdd(&p.counts->giants, 1u);
+  const std::uint32_t bit = 1u << v % warp_size;
+  if ((atomicOr(&p.giants.bits[v / warp_size % giant_words], bit) & bit) == 0)
+    atomicAdd(&p.counts->giants, 1u);
 }
 
 template <Listing listing>

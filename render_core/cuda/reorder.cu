@@ -155,8 +155,10 @@ __device__ void write(const Keys<per_lane>& key, Held& held, std::uint32_t* list
   const int lane = lane_index();
   Keys<per_lane> slot;
 #pragma unroll
-  for (int j = 0; j < per_lane; ++j)
-    slot[j] = held[static_cast<int>(key[j] & (entries_of<per_lane> - 1))];
+  for (int j = 0; j < per_lane; ++j)  // whatever is no entry ties with none
+    slot[j] = per_lane * lane + j < count
+                  ? held[static_cast<int>(key[j] & (entries_of<per_lane> - 1))]
+                  : behind_all;
   order_ties<per_lane>(key, slot);
   __syncwarp();
 #pragma unroll
