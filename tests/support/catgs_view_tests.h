@@ -196,7 +196,7 @@ TEST_P(CatgsView, GiantsAreDrawnWhereATurnPutsThem) {
   const auto view = renderer->make_view(patient_settings()), exact = renderer->make_view({});
   const Move yaw{"yaw", {0, 0, 0}, {0, 0.04f, 0}};
   FrameKind kind = FrameKind::key;
-  for (const int k : {0, window, 1}) {
+  for (const int k : {0, window, 0}) {
     SCOPED_TRACE(k);
     const FrameRequest request = request_on_path(scene, yaw, k);
     const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
