@@ -1,5 +1,6 @@
 #include "render_core/cuda/blend_round.cuh"
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/part_pixels.cuh"
 #include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/splat.cuh"
@@ -331,6 +332,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
 template <bool count_pairs, class Pixels>
 __global__ void __launch_bounds__(block_size, blocks_per_processor)
     blend_kernel(const BlendParams p) {
+  let_next_kernel_begin();
   __shared__ WarpScratch scratch[warps_per_block];
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const int warp = static_cast<int>(threadIdx.x) / warp_size;

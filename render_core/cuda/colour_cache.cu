@@ -1,5 +1,6 @@
 #include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/early_launch.cuh"
 #include "render_core/scene/clusters.h"
 
 namespace catgs::cuda {
@@ -10,6 +11,7 @@ constexpr std::uint32_t words_per_cluster = cluster_size / warp_size;
 
 /// A thread a cluster.
 __global__ void __launch_bounds__(block_size) want_colours_kernel(const WantColoursParams p) {
+  let_next_kernel_begin();
   const std::uint32_t rank = blockIdx.x * block_size + threadIdx.x;
   if (rank >= p.counts->clusters) return;
   const std::uint32_t c = p.clusters[rank];

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/reorder.cuh"
 
@@ -58,7 +58,8 @@ __device__ bool may_be_giant(const Notes& notes, std::uint32_t slot) {
   return (notes.bits[slot / warp_size % giant_words] >> slot % warp_size & 1u) != 0;
 }
 
-/// By one warp, a part a lane: notes where parts begin, at which depths, and that nothing moves yet.
+/// By one warp, a part a lane: notes where parts begin, at which depths, and that nothing moves
+/// yet.
 __device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes) {
   const std::uint32_t r = threadIdx.x;
   const std::uint32_t begin = r < list.runs() ? r * reorder_run : list.behind();
@@ -205,10 +206,11 @@ __device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
 
 __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p) {
   __shared__ Notes notes;
+  let_next_kernel_begin();
+  wait_for_earlier_work();
   const std::uint32_t giants = p.counts->giants;
   if (p.counts->unlisted != 0 || giants == 0 || giants > most_giants) return;
-  for (std::uint32_t i = threadIdx.x; i < giant_words; i += block_size)
-    notes.bits[i] = p.bits[i];
+  for (std::uint32_t i = threadIdx.x; i < giant_words; i += block_size) notes.bits[i] = p.bits[i];
   for (std::uint32_t t = blockIdx.x; t < p.shape.tiles(); t += gridDim.x) {
     const uint2 range = p.range[t];
     const List list{p.slot + range.x, range.y - range.x, p.ordered[t]};
@@ -225,8 +227,9 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
 }  // namespace
 
 bool makes_giants(const Homography<double>& list_from_frame, glm::ivec2 size_px) {
-  // From one side of the picture to the other. Measured, one H200, fungi_room: with 0.01 drone has a
-  // switch between frames of 2 / 255, recorded heads none; the search costs 2 % of its sub-frames.
+  // From one side of the picture to the other. Measured, one H200, fungi_room: with 0.01 drone has
+  // a switch between frames of 2 / 255, recorded heads none; the search costs 2 % of its
+  // sub-frames.
   constexpr double least_spread = 0.003;
   return std::abs(list_from_frame.wx) * size_px.x + std::abs(list_from_frame.wy) * size_px.y >=
          least_spread;
@@ -234,8 +237,8 @@ bool makes_giants(const Homography<double>& list_from_frame, glm::ivec2 size_px)
 
 void launch_giants(const GiantParams& params, cudaStream_t stream) {
   constexpr int blocks_per_processor = 14;  // more than it holds at a time
-  giants_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
-  check_launch("giants");
+  launch_early("giants", giants_kernel, params.processors * blocks_per_processor, block_size,
+               stream, params);
 }
 
 }  // namespace catgs::cuda

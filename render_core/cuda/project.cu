@@ -1,4 +1,4 @@
-#include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/project.cuh"
 #include "render_core/cuda/shade.cuh"
 #include "render_core/cuda/sort.cuh"
@@ -48,6 +48,7 @@ __device__ void note_giant(const ProjectParams& p, std::uint32_t v, const Splat&
 template <Listing listing>
 __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams p) {
   const std::uint32_t v = blockIdx.x * block_size + threadIdx.x;
+  wait_for_earlier_work();
   if (v >= min(p.counts->visible, p.shape.visible_bound)) return;
   if constexpr (listing != Listing::none) p.order[v] = v;
   const std::uint32_t i = p.visible[v] & ~watched_bit;
@@ -102,8 +103,7 @@ void launch_project(const ProjectParams& params, Listing listing, cudaStream_t s
   const auto kernel = listing == Listing::none       ? project_kernel<Listing::none>
                       : listing == Listing::ellipses ? project_kernel<Listing::ellipses>
                                                      : project_kernel<Listing::trails>;
-  kernel<<<blocks, block_size, 0, stream>>>(params);
-  check_launch("project");
+  launch_early("project", kernel, blocks, block_size, stream, params);
 }
 
 }  // namespace catgs::cuda

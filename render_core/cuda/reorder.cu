@@ -1,6 +1,6 @@
 #include <bit>
 
-#include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/reorder.cuh"
 #include "render_core/cuda/sort.cuh"
 
@@ -232,6 +232,7 @@ __global__ void __launch_bounds__(block_size, blocks_at_a_time)
     reorder_kernel(const ReorderParams p) {
   __shared__ Held of_warp[warps];
   Held& held = of_warp[threadIdx.x / warp_size];
+  wait_for_earlier_work();
   const std::uint32_t warp = threadIdx.x / warp_size, runs = p.counts->runs;
   for (std::uint32_t r = blockIdx.x * warps + warp; r < runs; r += gridDim.x * warps) {
     ReorderRun& run = p.runs[r];
@@ -253,8 +254,8 @@ __global__ void __launch_bounds__(block_size, blocks_at_a_time)
 void launch_reorder(const ReorderParams& params, cudaStream_t stream) {
   // As runs differ in work, more than fit at a time: most blocks take one run a warp.
   constexpr int blocks_per_processor = 6 * blocks_at_a_time;
-  reorder_kernel<<<params.processors * blocks_per_processor, block_size, 0, stream>>>(params);
-  check_launch("reorder");
+  launch_early("reorder", reorder_kernel, params.processors * blocks_per_processor, block_size,
+               stream, params);
 }
 
 }  // namespace catgs::cuda

@@ -2,6 +2,7 @@
 #include <cub/block/block_scan.cuh>
 
 #include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/split.cuh"
 
@@ -171,6 +172,7 @@ __device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places&
 }
 
 __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p) {
+  let_next_kernel_begin();
   if (p.counts->unlisted != 0) return;  // no tasks, no runs: the frame will be drawn again
   using Scan = cub::BlockScan<Places, split_block>;
   __shared__ Scan::TempStorage scratch;
@@ -255,6 +257,7 @@ __device__ std::uint32_t fold(const CompositeParams& p, uint2 slices, int in_til
 }
 
 __global__ void __launch_bounds__(composite_block) composite_kernel(const CompositeParams p) {
+  wait_for_earlier_work();
   if (p.counts->unlisted != 0) return;
   using Reduce = cub::BlockReduce<std::uint32_t, composite_block>;
   __shared__ Reduce::TempStorage scratch;
@@ -283,8 +286,8 @@ void launch_split(const SplitParams& params, cudaStream_t stream) {
 }
 
 void launch_composite(const CompositeParams& params, cudaStream_t stream) {
-  composite_kernel<<<params.shape.tiles(), composite_block, 0, stream>>>(params);
-  check_launch("composite");
+  launch_early("composite", composite_kernel, params.shape.tiles(), composite_block, stream,
+               params);
 }
 
 }  // namespace catgs::cuda
