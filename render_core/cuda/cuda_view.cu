@@ -239,13 +239,14 @@ bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
 /// Decides whether a sub-frame tells giants from others.
 GiantSet CudaView::want_giants(const FramePlan& plan) {
   if (!plan.warped || settings_.order != BlendOrder::fresh) return {};
+  const double spread = depth_spread(plan.list_from_frame, {shape_.width_px, shape_.height_px});
   std::uint32_t* bits = memory_.giants.get();
   if (!seeks_giants_) {
-    if (!makes_giants(plan.list_from_frame, {shape_.width_px, shape_.height_px})) return {};
+    if (spread < least_spread) return {};
     check(cudaMemsetAsync(bits, 0, giant_words * sizeof(std::uint32_t), stream_.get()), "giants");
     seeks_giants_ = true;
   }
-  return {math::convert<float>(plan.list_from_frame), bits};
+  return {math::convert<float>(plan.list_from_frame), giant_variation(spread), bits};
 }
 
 /// Brings the lists of a sub-frame into its own depth order.

@@ -27,7 +27,7 @@ struct Notes {
   std::uint32_t at[most_found];
   // Of each part of the list.
   std::uint32_t begin[most_parts + 1];
-  std::uint32_t depth[most_parts];    // key of its first entry
+  std::uint32_t depth[most_parts];    // key of one of its first entries
   std::uint32_t leaving[most_parts];  // giants that belong to another part
   int gain[most_parts];               // giants that come, less those that leave
   int gives[most_parts];  // neighbours that go to the next part; negative: that come from there
@@ -71,12 +71,15 @@ __device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes
     notes.found = 0;
     notes.lacking = false;
   }
+  __syncwarp();
   if (r >= list.parts()) return;
-  // Giants may stand in the wrong part: the depth of a part is that of its first other entry.
-  std::uint32_t first = begin;
-  const std::uint32_t last = min(begin + reorder_run / 2, list.length - 1);
-  while (first < last && may_be_giant(notes, list.slot[first])) ++first;
-  notes.depth[r] = p.depth_key[list.slot[first]];
+  // Not of its very first entries, which may be some that belong farther in front or are hidden;
+  // nor of giants, for they may stand in the wrong part: one that has no others is of no depth.
+  const std::uint32_t length = notes.begin[r + 1] - begin;
+  std::uint32_t at = begin + min(length / 2, 16u);
+  const std::uint32_t end = begin + min(length, reorder_run / 2);
+  while (at < end && may_be_giant(notes, list.slot[at])) ++at;
+  notes.depth[r] = at < end ? p.depth_key[list.slot[at]] : ~0u;
 }
 
 /// The part that a giant in part `source` belongs to.
@@ -84,7 +87,7 @@ __device__ std::uint32_t target_of(const Notes& notes, const List& list, std::ui
                                    std::uint32_t key) {
   const std::uint32_t last = list.parts() - 1;
   std::uint32_t target = 0;
-  while (target < last && notes.depth[target + 1] <= key) ++target;
+  for (std::uint32_t r = 1; r <= last; ++r) target += notes.depth[r] <= key ? 1 : 0;
   // A short part has no neighbours to give for those that come.
   const bool is_short = list.length - notes.begin[last] < reorder_run / 2;
   return target == last && source != last && is_short ? last - 1 : target;
@@ -226,13 +229,8 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
 
 }  // namespace
 
-bool makes_giants(const Homography<double>& list_from_frame, glm::ivec2 size_px) {
-  // From one side of the picture to the other. Measured, one H200, fungi_room: with 0.01 drone has
-  // a switch between frames of 2 / 255, recorded heads none; the search costs 2 % of its
-  // sub-frames.
-  constexpr double least_spread = 0.003;
-  return std::abs(list_from_frame.wx) * size_px.x + std::abs(list_from_frame.wy) * size_px.y >=
-         least_spread;
+double depth_spread(const Homography<double>& list_from_frame, glm::ivec2 size_px) {
+  return std::abs(list_from_frame.wx) * size_px.x + std::abs(list_from_frame.wy) * size_px.y;
 }
 
 void launch_giants(const GiantParams& params, cudaStream_t stream) {

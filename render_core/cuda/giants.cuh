@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include <glm/vec2.hpp>
 
 #include "render_core/cuda/frame_arrays.cuh"
@@ -12,13 +14,21 @@ namespace catgs::cuda {
 // tile's list changes little, but for Gaussians so large that the tile sees them far from their
 // centres: these have another share, belong thousands of entries away, and are the giants.
 
-/// How far a centre's share may be from that of what is seen beside it. (One H200, fungi_room,
-/// recorded heads: with 0.02 nothing changes, with 0.05 one switch between frames is 1.7 / 255,
-/// with 0.08 two are up to 3.7.)
-constexpr float giant_tolerance = 0.03f;
+/// How much more a turn changes depths at one side of the picture than at the other, as a share.
+double depth_spread(const Homography<double>& list_from_frame, glm::ivec2 size_px);
 
-/// Whether such a turn has giants worth a search.
-bool makes_giants(const Homography<double>& list_from_frame, glm::ivec2 size_px);
+/// Turns of a smaller spread have no giants worth a search. (One H200, fungi_room: with 0.01 drone
+/// has a switch between frames of 2 / 255; with 0 nothing changes.)
+constexpr double least_spread = 0.003;
+
+/// By how much a giant's share varies at least from its centre to where its footprint ends: by as
+/// much as across one and a half pictures, or by 3 %. (The same: with 3 % alone, slow turns of
+/// drone leave blocks of 34 dB; with 0.375 pictures or 1 %, fast ones have more giants than can
+/// move, and head2 blocks of 28 and 20 dB. With 5 % one switch of head2 is 1.7 / 255, with 8 % two
+/// are up to 3.7.)
+inline float giant_variation(double spread) {
+  return std::min(static_cast<float>(1.5 * spread), 0.03f);
+}
 
 /// The giants of a group of frames: bit slot % giant_bits is set for each, so that others may seem
 /// to be some. Who is one in a frame remains one: a later frame's turn may lead back, and the list
@@ -27,6 +37,7 @@ constexpr std::uint32_t giant_words = 1024, giant_bits = giant_words * warp_size
 
 struct GiantSet {
   Homography<float> list_from_frame{};
+  float least_variation = 0.0f;   // see giant_variation()
   std::uint32_t* bits = nullptr;  // [giant_words], zero at first; null: nobody asks for giants
 
   /// Whether a Gaussian that reaches so far is one in some tile; any that was behind the key
@@ -35,7 +46,7 @@ struct GiantSet {
     const float varies =
         fabsf(list_from_frame.wx) * half_px.x + fabsf(list_from_frame.wy) * half_px.y;
     const float share = math::weight_at<float>(list_from_frame, {centre_px.x, centre_px.y});
-    return varies > giant_tolerance * share;
+    return varies > least_variation * share;
   }
 };
 
