@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <ostream>
 #include <random>
 #include <string>
 #include <utility>
@@ -29,6 +30,9 @@ struct Core {
   double exact_db;   // between frames that differ by rounding alone
   double repeat_db;  // between frames that were made in the same way
 };
+inline void PrintTo(const Core& core, std::ostream* out) {
+  *out << (core.kind == RendererKind::cuda ? "cuda" : "cpu");
+}
 
 class CatgsView : public testing::TestWithParam<Core> {
  protected:

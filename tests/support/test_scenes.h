@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct TestScene {
   std::shared_ptr<const GaussianCloud> cloud;
   FrameRequest request;
 };
+inline void PrintTo(const TestScene& scene, std::ostream* out) { *out << scene.name; }
 
 /// Scenes small enough for the reference that hold what breaks renderers: near-plane crossings,
 /// Gaussians larger than the image, needles, nothing at all, one pixel, odd sizes, coincident

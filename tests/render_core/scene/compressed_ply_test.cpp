@@ -23,6 +23,9 @@ struct Case {
   int sh_degree;
   bool colour_limits;
 };
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << "sh " << c.sh_degree << (c.colour_limits ? ", limits" : ", no limits");
+}
 
 class CompressedPly : public ::testing::TestWithParam<Case> {};
 

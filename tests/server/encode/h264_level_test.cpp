@@ -1,5 +1,7 @@
 #include "server/encode/h264_level.h"
 
+#include <ostream>
+
 #include <gtest/gtest.h>
 
 namespace catgs::h264 {
@@ -11,13 +13,16 @@ struct Case {
   int bitrate_kbps;
   int level_idc;
 };
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.size_px.x << "x" << c.size_px.y << " at " << c.fps << " fps, " << c.bitrate_kbps
+       << " kbit/s";
+}
 
 class Level : public testing::TestWithParam<Case> {};
 
 TEST_P(Level, IsTheLowestThatAdmits) {
   const Case& c = GetParam();
-  EXPECT_EQ(level(c.size_px, c.fps, c.bitrate_kbps), c.level_idc)
-      << c.size_px.x << "x" << c.size_px.y << " at " << c.fps << " fps, " << c.bitrate_kbps;
+  EXPECT_EQ(level(c.size_px, c.fps, c.bitrate_kbps), c.level_idc);
 }
 
 // The maximum rates that ITU-T H.264 table A-6 lists for common sizes, and the steps beside them.

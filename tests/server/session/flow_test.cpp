@@ -21,6 +21,7 @@ struct Path {
   microseconds delay;
   microseconds jitter;
 };
+void PrintTo(const Path& path, std::ostream* out) { *out << path.name; }
 
 class OnEveryPath : public testing::TestWithParam<Path> {
  protected:
@@ -165,6 +166,7 @@ struct StillCase {
   double bits_per_s;
   microseconds sharp_within;
 };
+void PrintTo(const StillCase& still, std::ostream* out) { *out << still.name; }
 
 class Stills : public testing::TestWithParam<StillCase> {};
 
