@@ -13,16 +13,17 @@ namespace catgs::cuda {
 // programmatic dependent launch in the CUDA programming guide. (One H200, hon_sui_sen: 1 % more
 // frames of head2 a second, 0.3 % of drone.)
 
-/// Whether the current device can. Throws CudaError.
-inline bool launches_early() {
-  int device = 0, major = 0;
-  check(cudaGetDevice(&device), "device");
-  check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device), "device");
-  return major >= 9;
+/// Whether this code of the kernel waits: what a newer device compiled from code for an older one
+/// does not. Throws CudaError.
+inline bool launches_early(const void* kernel, const char* stage) {
+  cudaFuncAttributes attributes{};
+  check(cudaFuncGetAttributes(&attributes, kernel), stage);
+  return attributes.ptxVersion >= 90;
 }
 
-/// Launches a kernel that calls wait_for_earlier_work() before it reads or writes what others do.
-/// `stage`: as for check(). Throws CudaError.
+/// Launches a kernel of which every thread calls wait_for_earlier_work() before it does anything
+/// that others see, or returns. Early is it only behind a kernel that calls
+/// let_next_kernel_begin(). `stage`: as for check(). Throws CudaError.
 template <class Params>
 void launch_early(const char* stage, void (*kernel)(Params), std::uint32_t blocks,
                   std::uint32_t block_size, cudaStream_t stream, const Params& params) {
@@ -34,11 +35,12 @@ void launch_early(const char* stage, void (*kernel)(Params), std::uint32_t block
   config.blockDim = block_size;
   config.stream = stream;
   config.attrs = &early;
-  config.numAttrs = launches_early() ? 1 : 0;
+  config.numAttrs = launches_early(reinterpret_cast<const void*>(kernel), stage) ? 1 : 0;
   check(cudaLaunchKernelEx(&config, kernel, params), stage);
 }
 
-/// Waits until all that was given to the stream before this kernel is done and can be seen.
+/// Waits until the kernel before is done and can be seen. All before that is too, for it waited
+/// itself or was begun when they were done.
 __device__ inline void wait_for_earlier_work() {
 #if __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" ::: "memory");
