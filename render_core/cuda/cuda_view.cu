@@ -239,7 +239,9 @@ bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
 /// Decides whether a sub-frame tells giants from others.
 GiantSet CudaView::want_giants(const FramePlan& plan) {
   if (!plan.warped || settings_.order != BlendOrder::fresh) return {};
-  const double spread = depth_spread(plan.list_from_frame, {shape_.width_px, shape_.height_px});
+  const double spread = depth_spread<double>(
+      plan.list_from_frame,
+      {static_cast<double>(shape_.width_px), static_cast<double>(shape_.height_px)});
   std::uint32_t* bits = memory_.giants.get();
   if (!seeks_giants_) {
     if (spread < least_spread) return {};

@@ -1,5 +1,3 @@
-#include <cmath>
-
 #include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/reorder.cuh"
@@ -17,7 +15,9 @@ constexpr std::uint32_t most_giants = giant_bits / 4;
 constexpr std::uint32_t found_per_thread = 4, most_found = found_per_thread * block_size;
 constexpr std::uint32_t most_moves = 1536;
 
-// The parts of a list: runs of the reorder stage, 31 at most, then whatever is behind those.
+// The parts of a list: runs of the reorder stage, 31 at most, then whatever is behind those. This
+// is hardly looked at and in no order: giants that are carried there are out of the way, and
+// neighbours that took their places there may stand too far back.
 constexpr std::uint32_t most_parts = warp_size;
 
 /// A block's notes about the list of one tile.
@@ -55,7 +55,7 @@ struct List {
 };
 
 __device__ bool may_be_giant(const Notes& notes, std::uint32_t slot) {
-  return (notes.bits[slot / warp_size % giant_words] >> slot % warp_size & 1u) != 0;
+  return (notes.bits[giant_word(slot)] & giant_bit(slot)) != 0;
 }
 
 /// By one warp, a part a lane: notes where parts begin, at which depths, and that nothing moves
@@ -72,14 +72,22 @@ __device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes
     notes.lacking = false;
   }
   __syncwarp();
-  if (r >= list.parts()) return;
-  // Not of its very first entries, which may be some that belong farther in front or are hidden;
-  // nor of giants, for they may stand in the wrong part: one that has no others is of no depth.
-  const std::uint32_t length = notes.begin[r + 1] - begin;
-  std::uint32_t at = begin + min(length / 2, 16u);
-  const std::uint32_t end = begin + min(length, reorder_run / 2);
-  while (at < end && may_be_giant(notes, list.slot[at])) ++at;
-  notes.depth[r] = at < end ? p.depth_key[list.slot[at]] : ~0u;
+  // Not of its very first entries, some of which may belong farther in front; nor of what is
+  // hidden, nor of giants, for they may stand in the wrong part. One that has no others is skipped:
+  // it takes the depth of the next.
+  constexpr std::uint32_t unknown = ~0u;
+  std::uint32_t depth = unknown;
+  const std::uint32_t length = notes.begin[r + 1] - notes.begin[r];
+  const std::uint32_t end = notes.begin[r] + min(length, reorder_run / 2);
+  for (std::uint32_t at = notes.begin[r] + min(length / 2, 16u); at < end && depth == unknown; ++at)
+    if (const std::uint32_t slot = list.slot[at]; !may_be_giant(notes, slot))
+      depth = p.depth_key[slot] > 0 ? p.depth_key[slot] : unknown;
+#pragma unroll
+  for (int d = 1; d < warp_size; d *= 2) {
+    const std::uint32_t next = __shfl_down_sync(~0u, depth, d);
+    if (depth == unknown) depth = next;
+  }
+  notes.depth[r] = depth;
 }
 
 /// The part that a giant in part `source` belongs to.
@@ -228,10 +236,6 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
 }
 
 }  // namespace
-
-double depth_spread(const Homography<double>& list_from_frame, glm::ivec2 size_px) {
-  return std::abs(list_from_frame.wx) * size_px.x + std::abs(list_from_frame.wy) * size_px.y;
-}
 
 void launch_giants(const GiantParams& params, cudaStream_t stream) {
   constexpr int blocks_per_processor = 14;  // more than it holds at a time

@@ -14,11 +14,14 @@ namespace catgs::cuda {
 // tile's list changes little, but for Gaussians so large that the tile sees them far from their
 // centres: these have another share, belong thousands of entries away, and are the giants.
 
-/// How much more a turn changes depths at one side of the picture than at the other, as a share.
-double depth_spread(const Homography<double>& list_from_frame, glm::ivec2 size_px);
+/// By how much a turn's shares of depths differ across `extent_px`.
+template <class T>
+__host__ __device__ T depth_spread(const Homography<T>& list_from_frame, math::Vec2<T> extent_px) {
+  return std::abs(list_from_frame.wx) * extent_px.x + std::abs(list_from_frame.wy) * extent_px.y;
+}
 
-/// Turns of a smaller spread have no giants worth a search. (One H200, fungi_room: with 0.01 drone
-/// has a switch between frames of 2 / 255; with 0 nothing changes.)
+/// Turns of a smaller spread over the picture have no giants worth a search. (One H200, fungi_room:
+/// with 0.01 drone has a switch between frames of 2 / 255; with 0 nothing changes.)
 constexpr double least_spread = 0.003;
 
 /// By how much a giant's share varies at least from its centre to where its footprint ends: by as
@@ -34,6 +37,10 @@ inline float giant_variation(double spread) {
 /// to be some. Who is one in a frame remains one: a later frame's turn may lead back, and the list
 /// stands in the order of the frame before.
 constexpr std::uint32_t giant_words = 1024, giant_bits = giant_words * warp_size;
+__device__ inline std::uint32_t giant_word(std::uint32_t slot) {
+  return slot / warp_size % giant_words;
+}
+__device__ inline std::uint32_t giant_bit(std::uint32_t slot) { return 1u << slot % warp_size; }
 
 struct GiantSet {
   Homography<float> list_from_frame{};
@@ -42,9 +49,8 @@ struct GiantSet {
 
   /// Whether a Gaussian that reaches so far is one in some tile; any that was behind the key
   /// frame's camera, too.
-  __device__ bool holds(float2 centre_px, float2 half_px) const {
-    const float varies =
-        fabsf(list_from_frame.wx) * half_px.x + fabsf(list_from_frame.wy) * half_px.y;
+  __device__ bool is_giant(float2 centre_px, float2 half_px) const {
+    const float varies = depth_spread<float>(list_from_frame, {half_px.x, half_px.y});
     const float share = math::weight_at<float>(list_from_frame, {centre_px.x, centre_px.y});
     return varies > least_variation * share;
   }

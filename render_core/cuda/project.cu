@@ -17,8 +17,7 @@ __device__ void raise(std::uint32_t* target, std::uint32_t value) {
 
 /// Whether a Gaussian has no colour from an earlier frame.
 __device__ bool wants_shading(const ColourArrays& colours, std::uint32_t i) {
-  return colours.wanted == nullptr ||
-         (__ldg(&colours.wanted[i / warp_size]) >> i % warp_size & 1u) != 0;
+  return colours.wanted == nullptr || (colours.wanted[i / warp_size] >> i % warp_size & 1u) != 0;
 }
 
 // The mean depth is that of a part of the blocks: it needs no more, and their sums meet in one
@@ -38,11 +37,11 @@ __device__ void add_inverse_depth(const ProjectParams& p, bool counted, float de
 
 /// Puts a Gaussian that is a giant into the group's set.
 __device__ void note_giant(const ProjectParams& p, std::uint32_t v, const Splat& splat) {
-  if (p.giants.bits == nullptr || !splat.in_view || !p.giants.holds(splat.centre_px, splat.half_px))
-    return;
-  const std::uint32_t bit = 1u << v % warp_size;
-  if ((atomicOr(&p.giants.bits[v / warp_size % giant_words], bit) & bit) == 0)
-    atomicAdd(&p.counts->giants, 1u);
+  const bool is_giant = p.giants.bits != nullptr && splat.in_view &&
+                        p.giants.is_giant(splat.centre_px, splat.half_px);
+  if (!is_giant) return;
+  const std::uint32_t bit = giant_bit(v);
+  if ((atomicOr(&p.giants.bits[giant_word(v)], bit) & bit) == 0) atomicAdd(&p.counts->giants, 1u);
 }
 
 template <Listing listing>
