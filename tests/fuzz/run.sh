@@ -17,7 +17,7 @@ into tests/fuzz/corpus, where all runs begin, 64 KiB a target at most.
 Inputs that reach new code are kept in build/fuzz/runs/TARGET/corpus and used by later runs. What ends a
 parser is left in build/fuzz/runs/TARGET/found: mend it, and put the input into tests/fuzz/findings/TARGET.
 
-Exit status: 0 nothing was found, 1 something was, 2 wrong usage, 77 clang++ or its libFuzzer is missing.
+Exit status: 0 nothing was found, 1 something was or a fuzzer was ended, 2 wrong usage, 77 clang++ or its libFuzzer is missing.
 USAGE
 }
 
@@ -49,7 +49,7 @@ write_seeds() {
 # inputs tried, seconds altogether.
 fuzz() {
   local target=$1 max_bytes=$2 seconds=$3 work=$build/runs/$1
-  local edges=0 quiet=0 tried=0 spent=0 begin=$EPOCHSECONDS newest line now
+  local edges=0 quiet=0 tried=0 spent=0 status=0 begin=$EPOCHSECONDS newest line now
   local -a inputs=("$work/corpus" "$work/seeds")
   [[ ! -d tests/fuzz/findings/$target ]] || inputs+=("tests/fuzz/findings/$target")
   write_seeds "$target"
@@ -65,6 +65,7 @@ fuzz() {
     -len_control=100 -dict="$work/words.dict" -rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=10 \
     -print_final_stats=1 -artifact_prefix="$work/found/" "${inputs[@]}" 2>&1 |
     tee "$work/log")
+  wait $! || status=$?
   now=$EPOCHSECONDS
   spent=$((spent + now - begin))
   printf '%d %d %d %d\n' "$edges" $((now - newest)) "$tried" "$spent" >"$work/state"
@@ -74,6 +75,9 @@ fuzz() {
     found=1
     printf '  FOUND, see %s and %s:\n' "$work/log" "$work/found"
     grep -m 3 -E 'ERROR:|runtime error:|broken promise|SUMMARY' "$work/log" | sed 's/^/    /' || true
+  elif ((status != 0)); then
+    found=1
+    printf '  the fuzzer itself ended with status %d, see %s\n' "$status" "$work/log"
   fi
 }
 

@@ -181,9 +181,12 @@ def bad_lines(text: str) -> list[str]:
 
 
 def make_scenes(program: pathlib.Path, folder: pathlib.Path) -> None:
+    render = program.parent / "catgs-render"
+    if not render.exists():
+        raise Cannot(f"{render} is missing, which makes the scenes: ninja -C {program.parent.parent} catgs-render")
     folder.mkdir(parents=True, exist_ok=True)
     for name, seed in SCENES.items():
-        subprocess.run([program.parent / "catgs-render", "synth", "city", "--gaussians", "50000", "--seed", str(seed),
+        subprocess.run([render, "synth", "city", "--gaussians", "50000", "--seed", str(seed),
                         folder / f"{name}.ply"], check=True, stdout=subprocess.DEVNULL)
 
 

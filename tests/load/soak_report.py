@@ -92,6 +92,10 @@ def to_text(report: dict) -> str:
         lines.append(f"  {name:12} first {quantity['first']}, last {quantity['last']}, max {quantity['max']}; lower "
                      f"envelope grew by {quantity['growth']}, allowed {quantity['allowed']}"
                      f"{'' if quantity['flat'] else '  <- NOT FLAT'}")
+    memory = report["quantities"].get("rss_mb")
+    whole_warm_up_min = WARM_UP_S / WARM_UP_SHARE / 60.0
+    if memory and not memory["flat"] and report["minutes"] < whole_warm_up_min - 1.0:
+        lines.append(f"  too short to judge memory by: heaps fill at first; take {whole_warm_up_min:.0f} minutes")
     lines += [f"  ERROR {error}" for error in report["errors"]]
     return "\n".join(lines)
 

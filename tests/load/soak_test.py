@@ -35,6 +35,11 @@ class Flatness(unittest.TestCase):
         short = self.judge(fills, 18.0)
         self.assertFalse(short["flat"], "of eighteen minutes too few are left")
         self.assertGreater(len(short["quantities"]["rss_mb"]["envelope"]), 0)
+        said = {"rounds": 3, "errors": []}
+        self.assertIn("too short to judge memory by", soak_report.to_text(short | said))
+        long = self.judge(lambda s: 150.0 + 0.002 * s) | said
+        self.assertIn("NOT FLAT", soak_report.to_text(long))
+        self.assertNotIn("too short", soak_report.to_text(long))
 
     def test_one_window_that_stands_out_is_flat(self):
         self.assertTrue(self.judge(lambda s: 150.0 + 80.0 * (2000 <= s < 2300))["flat"])
