@@ -1,9 +1,10 @@
 #include "render_core/scene/save_scene.h"
 
-#include <fstream>
-#include <system_error>
+#include <ostream>
+#include <string>
 
 #include "render_core/error.h"
+#include "render_core/part_file.h"
 #include "render_core/scene/ply.h"
 #include "render_core/scene/splat.h"
 #include "render_core/scene/spz.h"
@@ -20,26 +21,13 @@ void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path) {
     throw InputError(path.string(), "", "cannot be written: unknown extension '" + extension + "'",
                      "use .ply, .splat or .spz");
 
-  std::filesystem::path part = path;
-  part += ".part";
-  std::error_code error, ignored;
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  if (file) {
-    try {
-      write(cloud, file);
-    } catch (const InputError& e) {  // the writers do not know the file's name
-      std::filesystem::remove(part, ignored);
-      throw InputError(path.string(), "", e.what());
-    }
-    file.close();
+  PartFile file(path);
+  try {
+    write(cloud, file.stream());
+  } catch (const InputError& e) {  // the writers do not know the file's name
+    throw InputError(path.string(), "", e.what());
   }
-  const bool written = file.good();
-  if (written) std::filesystem::rename(part, path, error);
-  if (!written || error) {
-    std::filesystem::remove(part, ignored);
-    throw InputError(path.string(), "", error ? error.message() : "cannot be written",
-                     "does the folder exist, and is there space?");
-  }
+  file.finish();
 }
 
 }  // namespace catgs

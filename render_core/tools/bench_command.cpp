@@ -27,6 +27,8 @@ void bench(const BenchOptions& options, bool quiet) {
     throw InputError("--worst", "", "has no whole pictures of the exact pipeline to compare with",
                      "use --pipeline catgs or vanilla");
   }
+  check_json(options.json);
+  if (!options.worst.empty()) make_worst_frames_folder(options.worst);
   const RenderSetup setup = prepare(options.render, quiet);
   BenchResult result;
   result.settings = setup.view;
@@ -43,10 +45,10 @@ void bench(const BenchOptions& options, bool quiet) {
     Progress progress("judging", quiet);
     result.quality = judge(setup, setup.view, options.quality_every,
                            [&](double fraction) { progress.update(fraction); });
-    if (!options.worst.empty()) write_worst_frames(options.worst, *result.quality);
   }
   if (options.json != "-") print_report(setup, result);
   if (!options.json.empty()) write_json(options.json, report_json(options.render, setup, result));
+  if (!options.worst.empty()) write_worst_frames(options.worst, *result.quality);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "render_core/error.h"
 #include "render_core/image/png.h"
+#include "render_core/part_file.h"
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/reference_check.h"
 
@@ -202,10 +203,14 @@ void Extent::add(double value) {
   ++count;
 }
 
-void write_worst_frames(const std::filesystem::path& folder, const QualityReport& report) {
+void make_worst_frames_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw InputError(folder.string(), "", "cannot be made", error.message());
+  check_writable(folder / "key_worst_frame.png");
+}
+
+void write_worst_frames(const std::filesystem::path& folder, const QualityReport& report) {
   const auto write = [&](std::string_view what, const JudgedFrame& frame) {
     if (frame.judged.rgb.empty()) return;
     const std::string name = fmt::format("{}_{:06}", what, frame.number);

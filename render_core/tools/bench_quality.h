@@ -78,7 +78,11 @@ struct QualityReport {
 /// What a switch may add to the change that the exact pipeline shows there.
 inline constexpr double max_pop = 1.0 / 255.0;
 
-/// Writes the worst frames of a report on whole images into a folder, which is made:
+/// Makes the folder of write_worst_frames(), and tries whether files can be made in it. Throws
+/// InputError.
+void make_worst_frames_folder(const std::filesystem::path& folder);
+
+/// Writes the worst frames of a report on whole images into a folder:
 /// sub_worst_frame_000123.png and …_exact.png, with …_difference.png, 16 times too bright. Throws
 /// InputError.
 void write_worst_frames(const std::filesystem::path& folder, const QualityReport& report);

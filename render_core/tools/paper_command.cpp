@@ -76,14 +76,21 @@ std::vector<const PaperTableKind*> chosen_kinds(const std::vector<std::string>& 
   return kinds;
 }
 
-Json read_baseline(const std::string& path) {
+/// Rows of fps_table(), whose columns are `labels`.
+Json read_baseline(const std::string& path, const std::vector<std::string>& labels) {
   std::ifstream file(path);
   if (!file) throw InputError(path, "", "cannot be read");
+  Json baseline;
   try {
-    return Json::parse(file);
+    baseline = Json::parse(file);
   } catch (const Json::parse_error& error) {
     throw InputError(path, fmt::format("byte {}", error.byte), "is not JSON");
   }
+  PaperTable unmeasured;  // a mistake shows before anything is measured
+  unmeasured.columns = labels;
+  unmeasured.rows = {{"", std::vector<Number>(labels.size())}};
+  add_rows(unmeasured, 0, baseline, path);
+  return baseline;
 }
 
 /// Ours over the fastest of the rows that `baseline` names, where they have a number.
@@ -136,8 +143,9 @@ void paper(const PaperCommand& command, bool quiet) {
   const PaperOptions& options = command.options;
   check(options);
   const auto kinds = chosen_kinds(command.tables);
-  const Json baseline = command.baseline.empty() ? Json() : read_baseline(command.baseline);
+  check_json(command.json);
   const std::vector<std::string> labels = case_labels(options.cases);
+  const Json baseline = command.baseline.empty() ? Json() : read_baseline(command.baseline, labels);
   Json report = {{"version", build_version}, {"commit", build_commit}, {"cases", Json::array()}};
   std::vector<std::vector<PaperTable>> parts(kinds.size());  // [kind][case]
   for (std::size_t i = 0; i < options.cases.size(); ++i) {

@@ -104,6 +104,7 @@ void forecast(const ForecastOptions& options, bool quiet) {
   std::vector<double> inputs_hz;
   for (const std::string& input : options.inputs) inputs_hz.push_back(parse_input_hz(input));
   const std::vector<Trajectory> traces = read_traces(options.traces);
+  check_json(options.json);
   const std::vector<ForecastModel> models = forecast_models();
   nlohmann::ordered_json report{{"traces", options.traces},     {"jitter_ms", options.jitter_ms},
                                 {"seed", options.seed},         {"size", options.size},

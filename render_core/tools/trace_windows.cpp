@@ -218,6 +218,7 @@ void windows(const WindowsOptions& options, bool quiet) {
   for (const Rule& rule : all_rules) (void)with_flags(options.pipeline, rule.flags);
   std::vector<Trajectory> traces;
   for (const std::string& file : options.traces) traces.push_back(read_tum(file));
+  check_json(options.json);
   PaperTable table;
   {
     Progress progress("windows", quiet);

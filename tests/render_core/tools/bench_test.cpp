@@ -147,6 +147,7 @@ TEST_F(BenchParts, TheWorstFramesAreKeptAndWritten) {
               key_error, 1e-6f);
 
   const test::TemporaryFolder folder;
+  make_worst_frames_folder(folder / "new/worst");
   write_worst_frames(folder / "new/worst", quality);
   const auto name = fmt::format("new/worst/sub_worst_frame_{:06}", quality.sub.worst_frame());
   EXPECT_EQ(read_png(folder / (name + ".png")).size_px, size_px);

@@ -24,6 +24,7 @@ using test::Outcome;
 using test::run;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 /// A ball of opaque Gaussians around the origin, seen from outside.
@@ -141,6 +142,22 @@ TEST_F(CatgsRender, BenchReportsEveryFrame) {
         "stage_ms_key", "list_length_key", "windows_cut", "view_bytes"}) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
+}
+
+TEST_F(CatgsRender, BenchTriesItsOutputsBeforeTheSceneIsLoaded) {
+  const auto bench = [&](const std::string& outputs) {
+    return run(fmt::format("bench {} --script orbit --quality --pipeline catgs {}",
+                           path("absent.ply"), outputs));
+  };
+  const std::string nowhere = path("no/bench.json");
+  for (const char* outputs : {"--json {0}", "--worst /proc/none", "--worst {1}/worst"}) {
+    const Outcome outcome = bench(fmt::format(fmt::runtime(outputs), nowhere, scene()));
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.out, Not(HasSubstr("absent.ply"))) << outcome.out;
+  }
+  std::ofstream(path("bench.json")) << "old";
+  EXPECT_THAT(bench("--json " + path("bench.json")).out, HasSubstr("absent.ply"));
+  EXPECT_EQ(std::filesystem::file_size(path("bench.json")), 3u);
 }
 
 TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {

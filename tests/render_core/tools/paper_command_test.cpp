@@ -363,12 +363,35 @@ TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {
          "is not of the catgs pipeline");
   expect(paper(fmt::format("--table ablation {} --variant '--window 99'", cloud_case())),
          "--window: is out of range");
-  std::ofstream(path("bad.json")) << R"({"FlashGS": {"clod": 1}})";
-  expect(paper(fmt::format("--table fps {} --baseline {}", cloud_case(), path("bad.json"))),
-         "FlashGS: has none of the columns (they are called cloud)");
-  std::ofstream(path("bad.json")) << "{";
-  expect(paper(fmt::format("--table fps {} --baseline {}", cloud_case(), path("bad.json"))),
-         "is not JSON");
+}
+
+TEST_F(Paper, OutputsAndBaselineAreReadBeforeAnythingIsLoaded) {
+  std::ofstream(path("none.ply")) << "no scene";
+  const std::string fps =
+      fmt::format("--table fps --case {} {} ", path("none.ply"), path("glide.tum"));
+  const auto complaint = [&](const std::string& more) {
+    const Outcome outcome = paper(fps + more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.out;
+  };
+  EXPECT_THAT(complaint(""), HasSubstr("none.ply: "));
+  const std::string nowhere = path("no/tables.json");
+  EXPECT_THAT(complaint("--json " + nowhere), HasSubstr(nowhere + ": cannot be written"));
+  const auto baseline = [&](const char* text) {
+    std::ofstream(path("bad.json")) << text;
+    return complaint("--baseline " + path("bad.json"));
+  };
+  EXPECT_THAT(baseline(R"({"FlashGS": {"clod": 1}})"),
+              HasSubstr("FlashGS: has none of the columns (they are called none)"));
+  EXPECT_THAT(baseline(R"({"FlashGS": {"none": "fast"}})"),
+              HasSubstr("is not a number everywhere"));
+  EXPECT_THAT(baseline("{"), HasSubstr("is not JSON"));
+
+  std::ofstream(path("tables.json")) << "old";
+  EXPECT_THAT(complaint("--json " + path("tables.json")), HasSubstr("none.ply: "));
+  std::string kept;
+  std::ifstream(path("tables.json")) >> kept;
+  EXPECT_EQ(kept, "old");
 }
 
 }  // namespace
