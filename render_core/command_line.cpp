@@ -34,6 +34,19 @@ std::vector<std::string> option_names(const CLI::App& app) {
   return names;
 }
 
+/// Throws where a command is due and a word that is none stands in its place.
+void refuse_unknown_command(const CLI::App& app) {
+  const std::vector<std::string> left = app.remaining(true);
+  if (left.empty() || left.front().starts_with('-')) return;
+  const CLI::App* last = &app;
+  while (!last->get_subcommands().empty()) last = last->get_subcommands().back();
+  std::vector<std::string> names;
+  for (const CLI::App* command : last->get_subcommands({})) names.push_back(command->get_name());
+  if (names.empty()) return;
+  throw InputError("unknown command " + left.front(), "",
+                   suggest_name(left.front(), names, "--help lists them"));
+}
+
 /// The first word that nothing takes; an option before others, as those are probably its values.
 [[noreturn]] void refuse_unknown(const CLI::App& app, int argc, const char* const* argv) {
   const std::vector<std::string> left = app.remaining(true);
@@ -57,6 +70,9 @@ void parse_command_line(CLI::App& app, int argc, const char* const* argv) {
   refuse_negative_numbers(app);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError&) {
+    refuse_unknown_command(app);
+    throw;
   } catch (const CLI::ExtrasError&) {
     refuse_unknown(app, argc, argv);
   }

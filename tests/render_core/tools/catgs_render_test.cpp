@@ -288,6 +288,7 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
   expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
   expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
+  expect(run("bnech " + scene()), "unknown command bnech: did you mean bench?");
   expect(run("compare " + path("none.png") + " " + path("none.png")), path("none.png"));
 }
 

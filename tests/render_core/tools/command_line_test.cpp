@@ -63,5 +63,17 @@ TEST_F(CommandLine, AnUnknownOptionIsNamedWithTheNearest) {
   EXPECT_EQ(complaint({"--port", "1", "word"}), "\"word\": is one word too many (see --help)");
 }
 
+TEST_F(CommandLine, AnUnknownCommandIsNamedWithTheNearest) {
+  app_.require_subcommand(1);
+  CLI::App* trace = app_.add_subcommand("trace");
+  trace->require_subcommand(1);
+  trace->add_subcommand("anchor");
+  EXPECT_EQ(complaint({"snyth", "--gaussians", "5"}), "unknown command snyth: did you mean synth?");
+  EXPECT_EQ(complaint({"zzzzzz"}), "unknown command zzzzzz: --help lists them");
+  EXPECT_EQ(complaint({"trace", "anchr"}), "unknown command anchr: did you mean anchor?");
+  EXPECT_EQ(complaint({"--port", "1"}), "A subcommand is required");
+  EXPECT_EQ(complaint({"trace"}), "A subcommand is required");
+}
+
 }  // namespace
 }  // namespace catgs
