@@ -62,7 +62,11 @@ PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame) {
     return [pose](double) { return pose; };
   }
   if (script.starts_with(tour_prefix)) {
-    return tour_script(frame, read_tum(script.substr(tour_prefix.size())));
+    const std::string_view file = script.substr(tour_prefix.size());
+    if (file.empty()) {
+      throw InputError("--script", "", "tour: names no file", "tour:FILE, a TUM file of keyframes");
+    }
+    return tour_script(frame, read_tum(file));
   }
   throw InputError("--script", "", fmt::format("unknown script \"{}\"", script),
                    "one of orbit, walk, head, drone, still, tour:FILE");

@@ -63,6 +63,11 @@ Camera make_lens(const LensOptions& options, float hinted_near_z) {
     throw InputError("--focal-px, --fov-deg", "", "the focal length must be positive",
                      "a field of view lies between 0 and 180 degrees");
   }
+  if (options.near_z && !(std::isfinite(*options.near_z) && *options.near_z > 0.0f)) {
+    throw InputError("--near", "",
+                     fmt::format("{} is not a positive, finite distance", *options.near_z),
+                     "world units; without it, the scene's hint");
+  }
   return make_camera({}, size_px, focal_px, options.near_z.value_or(hinted_near_z));
 }
 

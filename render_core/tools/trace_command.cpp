@@ -102,7 +102,8 @@ void add_anchor(CLI::App& trace) {
       "anchor", "Moves a recorded trace to a scene's start pose, upright and with its heading");
   add_trace_options(*command, *options);
   command->add_option("--trace", options->trace, "TUM file to read, up is -y")->required();
-  command->add_option("--fps", options->rate_hz, "Resample (default: the samples as recorded)");
+  command->add_option("--fps", options->rate_hz, "Resample (default: the samples as recorded)")
+      ->check(CLI::Range(1.0, 1000.0));
   command->callback([options, command] {
     const bool quiet = is_quiet(*command);
     const Trajectory recorded = read_tum(options->trace);

@@ -288,6 +288,11 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
   expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
   expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
+  expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");
+  expect(frames(still + "--near 0 --out x"), "--near: 0 is not a positive, finite distance");
+  expect(frames("--script tour: --out x"), "--script: tour: names no file");
+  expect(run(fmt::format("trace anchor {} --trace {} --fps 0 --out x", scene(), path("path.tum"))),
+         "--fps: Value 0 not in range");
   expect(run("bnech " + scene()), "unknown command bnech: did you mean bench?");
   expect(run("compare " + path("none.png") + " " + path("none.png")), path("none.png"));
 }
