@@ -107,6 +107,11 @@ ViewSettings view_settings(const PipelineOptions& options) {
   speculation.max_deviation_px = options.max_deviation_px.value_or(speculation.max_deviation_px);
   speculation.guard_px = options.guard_px.value_or(speculation.guard_px);
   if (options.grid) speculation.grid = parse_grid(*options.grid);
+  if (options.guard_px && speculation.grid != GridKind::warp) {
+    throw InputError("--guard-px", "",
+                     fmt::format("means nothing to the {} grid", grid_name(speculation.grid)),
+                     "use --grid warp");
+  }
   check_speculation(speculation);
   if (options.order) settings.order = parse_order(*options.order);
   speculation.cost_aware = options.cost_aware;
@@ -128,6 +133,9 @@ PipelineOptions with_flags(PipelineOptions options, const std::string& flags) {
   if (options.pipeline != catgs) {
     throw InputError("--variant", flags, "is not of the catgs pipeline", "leave --pipeline out");
   }
+  // What all rows are given is for those that have it; what the flags give is for this one.
+  const bool warps = options.grid.value_or("warp") == "warp";
+  if (!warps && parser.count("--guard-px") == 0) options.guard_px.reset();
   (void)view_settings(options);
   return options;
 }

@@ -288,6 +288,8 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
   expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
   expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
+  expect(frames(still + "--pipeline catgs --grid fixed --guard-px 1 --out x"),
+         "--guard-px: means nothing to the fixed grid (use --grid warp)");
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");
   expect(frames(still + "--near 0 --out x"), "--near: 0 is not a positive, finite distance");
   expect(frames("--script tour: --out x"), "--script: tour: names no file");

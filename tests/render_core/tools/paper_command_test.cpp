@@ -109,6 +109,15 @@ TEST_F(Paper, PrintsMarkdownAndWritesJson) {
   EXPECT_EQ(json.at("settings").at("size_px"), (Json{96, 64}));
 }
 
+TEST_F(Paper, TheGuardIsOfTheRowsThatHaveOne) {
+  const Outcome outcome = paper(fmt::format("--table ablation {} --guard-px 1", cloud_case()));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Outcome refused =
+      paper(fmt::format("--table ablation {} --variant '--grid shift --guard-px 1'", cloud_case()));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.out, HasSubstr("--guard-px: means nothing to the shift grid"));
+}
+
 TEST_F(Paper, AblationTakesOnePartAwayAtATime) {
   const Json ablation =
       tables("ablation", "--window 6 --variant '--window 2' --variant '--order key --no-split'");
