@@ -1,5 +1,6 @@
 // catgs-render bench: how fast a camera path renders, and how well.
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -14,7 +15,7 @@ namespace {
 
 struct BenchOptions {
   RenderOptions render;
-  std::size_t warmup = 10;
+  std::optional<std::size_t> warmup;
   std::size_t views = 1;
   bool quality = false;
   std::size_t quality_every = 10;
@@ -32,12 +33,12 @@ void bench(const BenchOptions& options, bool quiet) {
   const RenderSetup setup = prepare(options.render, quiet);
   BenchResult result;
   result.settings = setup.view;
-  result.warmup = options.warmup;
+  result.warmup = warmup_frames(options.warmup, setup);
   result.views = options.views;
   {
     Progress progress("measuring", quiet);
     result.measurement = measure(
-        setup, setup.view, options.warmup, [&](double fraction) { progress.update(fraction); },
+        setup, setup.view, result.warmup, [&](double fraction) { progress.update(fraction); },
         options.views);
   }
   result.pair_cost = count_pairs(setup, setup.view, result.measurement);
@@ -57,8 +58,8 @@ void add_bench_command(CLI::App& app) {
   auto options = std::make_shared<BenchOptions>();
   CLI::App* command = app.add_subcommand("bench", "Measures how fast a camera path renders");
   add_render_options(*command, options->render);
-  command->add_option("--warmup", options->warmup, "Frames rendered before measuring")
-      ->capture_default_str();
+  command->add_option("--warmup", options->warmup,
+                      fmt::format("Frames rendered before measuring ({})", default_warmup));
   command
       ->add_option("--views", options->views,
                    "Views that render the path at the same time; the rate is that of all")

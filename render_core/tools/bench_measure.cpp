@@ -5,6 +5,9 @@
 #include <future>
 #include <memory>
 
+#include <fmt/format.h>
+
+#include "render_core/error.h"
 #include "render_core/tools/frame_feed.h"
 
 namespace catgs {
@@ -125,6 +128,15 @@ std::size_t Measurement::windows_cut() const {
   return cut;
 }
 
+std::size_t warmup_frames(std::optional<std::size_t> asked, const RenderSetup& setup) {
+  const std::size_t most = setup.poses.size();
+  if (asked && *asked > most) {
+    throw InputError("--warmup", "", fmt::format("{} frames of a path of {}", *asked, most),
+                     "the path's first frames warm up: at most all of them");
+  }
+  return std::min(asked.value_or(default_warmup), most);
+}
+
 Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t warmup,
                     const ProgressReport& report, std::size_t views) {
   settings.format = PixelFormat::rgb_f32;
@@ -134,7 +146,7 @@ Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t
     warm[v] = setup.made.renderer->make_view(settings);
     FrameView frame;
     FrameFeed feed(setup, settings);
-    for (std::size_t i = 0; i < std::min(warmup, setup.poses.size()); ++i) {
+    for (std::size_t i = 0; i < warmup; ++i) {
       render_or_throw(*warm[v], feed.next(), frame);
     }
   });

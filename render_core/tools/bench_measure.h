@@ -48,6 +48,11 @@ struct Measurement {
 
 using ProgressReport = std::function<void(double fraction)>;
 
+/// How many frames of the path to render before measuring: as many as were asked for, which the
+/// path must have, or by default 10, or all of a shorter path. Throws InputError.
+inline constexpr std::size_t default_warmup = 10;
+std::size_t warmup_frames(std::optional<std::size_t> asked, const RenderSetup& setup);
+
 /// Renders the first `warmup` frames of the path unmeasured, then the whole path, with a View of
 /// these settings whose frames stay on the device; or with several at the same time, each on a
 /// thread of its own, and the wall clock of all. Throws as make_view() and render_or_throw().

@@ -83,8 +83,10 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
                    const BenchResult& result) {
   Json json;
   if (options.trace.empty()) {
-    json["script"] = options.script.script;
-    json["seed"] = options.script.seed;
+    const ScriptOptions script = script_options(options);
+    json["script"] = script.script;
+    json["seed"] = script.seed;
+    json["duration_s"] = script.duration_s;
   } else {
     json["trace"] = options.trace;
     json["anchor"] = options.anchor;

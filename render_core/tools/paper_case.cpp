@@ -22,7 +22,7 @@ bool is_script(std::string_view trace) {
 
 /// The render options of one trace of a case.
 RenderOptions with_trace(RenderOptions options, const std::string& trace) {
-  (is_script(trace) ? options.script.script : options.trace) = trace;
+  (is_script(trace) ? options.script : options.trace) = trace;
   return options;
 }
 
@@ -65,7 +65,13 @@ PaperCase::PaperCase(const PaperOptions& options, std::size_t index, std::string
       index_(index),
       label_(std::move(label)),
       quiet_(quiet),
-      setup_(load_case(options, index, quiet)) {}
+      setup_(load_case(options, index, quiet)) {
+  const std::vector<std::string>& files = options.cases[index];
+  for (std::size_t i = 1; i < files.size(); ++i) {  // mistakes show before anything is measured
+    set_path(setup_, with_trace(options.render, files[i]));
+    (void)warmup_frames(options.warmup, setup_);
+  }
+}
 
 PaperCase::PaperCase(const PaperCase& whole, RenderSetup setup)
     : options_(whole.options_),
@@ -119,7 +125,8 @@ std::vector<Measurement> PaperCase::runs(const ViewSettings& settings, std::stri
   std::vector<Measurement> runs;
   try {
     for_each_trace(name, [&](std::size_t, const ProgressReport& report) {
-      runs.push_back(measure(setup_, settings, options_->warmup, report));
+      const std::size_t warmup = warmup_frames(options_->warmup, setup_);
+      runs.push_back(measure(setup_, settings, warmup, report));
     });
   } catch (const InputError& error) {
     throw InputError(label_, fmt::format("{} ({})", name, pipeline_name(settings.pipeline)),
@@ -134,9 +141,6 @@ std::string PaperCase::trace_name(std::size_t trace) const {
 
 void PaperCase::for_each_trace(std::string_view doing, const Visit& visit) {
   const std::vector<std::string>& files = options_->cases[index_];
-  if (files.size() < 2) {
-    throw InputError("--case", label_, "has no trace", "name one or more behind the scene");
-  }
   for (std::size_t i = 1; i < files.size(); ++i) {
     set_path(setup_, with_trace(options_->render, files[i]));
     Progress progress(fmt::format("{}: {}, {}", label_, doing, trace_name(i - 1)), quiet_);
@@ -178,16 +182,21 @@ std::vector<std::string> case_labels(const std::vector<std::vector<std::string>>
   return labels;
 }
 
+bool has_script(const PaperOptions& options) {
+  return std::ranges::any_of(options.cases, [](const std::vector<std::string>& files) {
+    return std::any_of(files.begin() + 1, files.end(), is_script);
+  });
+}
+
 void check(const PaperOptions& options) {
-  const auto require = [](const std::string& path) {
-    if (std::error_code error; !std::filesystem::exists(path, error)) {
-      throw InputError(path, "", "does not exist",
-                       "a scene, then its traces, then the next --case");
-    }
+  const auto require = [](const std::string& path, std::string_view remedy) {
+    std::error_code error;
+    if (!std::filesystem::exists(path, error)) throw InputError(path, "", "does not exist", remedy);
   };
   for (const auto& files : options.cases) {
     for (const std::string& file : files) {
-      if (&file == &files.front() || !is_script(file)) require(file);
+      if (&file != &files.front() && is_script(file)) continue;
+      require(file, "a scene, then its traces, then the next --case");
     }
   }
   if (!options.images.empty() && options.images.size() != options.cases.size()) {
@@ -196,7 +205,10 @@ void check(const PaperOptions& options) {
         fmt::format("{} folders for {} scenes", options.images.size(), options.cases.size()),
         "name one for each --case, in their order");
   }
-  for (const std::string& folder : options.images) require(folder);
+  for (const std::string& folder : options.images) {
+    require(folder, "--images takes the folder of a COLMAP reconstruction");
+  }
+  if (!has_script(options)) refuse_script_options(options.render);
   for (const std::string& flags : options.variants) {
     (void)with_flags(options.render.pipeline, flags);
   }

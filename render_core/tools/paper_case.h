@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,8 +19,8 @@ struct PaperOptions {
   std::vector<std::vector<std::string>> cases;  // scene, traces…
   std::vector<std::string> images;              // COLMAP folders, one per case, or none at all
   double image_rate_hz = 30.0;                  // photographs per second
-  std::size_t warmup = 10;
-  std::size_t every = 10;  // quality and tiles look at one frame in so many
+  std::optional<std::size_t> warmup;            // as warmup_frames() takes it
+  std::size_t every = 10;                       // quality and tiles look at one frame in so many
   std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
   std::vector<std::string> variants;  // flags of more rows of ablation
   DeviceRates rates;                  // of floor
@@ -72,7 +73,7 @@ class PaperCase {
   [[nodiscard]] std::string trace_name(std::size_t trace) const;
 
   /// Calls visit(index of the trace, progress) with setup() on each trace in turn; `doing` is what
-  /// the terminal shows. Throws InputError where the case has no traces.
+  /// the terminal shows.
   using Visit = std::function<void(std::size_t trace, const ProgressReport& report)>;
   void for_each_trace(std::string_view doing, const Visit& visit);
 
@@ -102,6 +103,9 @@ Measurement pooled(const std::vector<Measurement>& runs);
 /// A column's name per case: the scene's, with its traces where that alone would not tell them
 /// apart.
 std::vector<std::string> case_labels(const std::vector<std::vector<std::string>>& cases);
+
+/// Whether a trace of any case is a script.
+bool has_script(const PaperOptions& options);
 
 /// Finds mistakes in the options before a large scene is read: counts, files that are not there.
 /// Throws InputError.

@@ -107,6 +107,43 @@ void add_lead(PaperTable& fps, const Json& baseline) {
   fps.rows.push_back(std::move(lead));
 }
 
+/// Options of some tables alone. Without these they would change nothing, unnoticed.
+void refuse_unused(const CLI::App& app, const std::vector<const PaperTableKind*>& kinds) {
+  struct Use {
+    const char* option;
+    std::vector<std::string_view> tables;
+  };
+  static const std::array<Use, 9> uses = {{{"--baseline", {"fps"}},
+                                           {"--images", {"quality"}},
+                                           {"--image-rate", {"quality"}},
+                                           {"--keep-fraction", {"pruned"}},
+                                           {"--variant", {"ablation"}},
+                                           {"--every", {"quality", "tiles", "traces"}},
+                                           {"--dram-bytes-per-s", {"floor"}},
+                                           {"--warp-instructions-per-s", {"floor"}},
+                                           {"--instructions-per-evaluation", {"floor"}}}};
+  for (const Use& use : uses) {
+    const bool used = std::ranges::any_of(kinds, [&](const PaperTableKind* kind) {
+      return std::ranges::find(use.tables, kind->name) != use.tables.end();
+    });
+    if (used || app.count(use.option) == 0) continue;
+    throw InputError(use.option, "", "means nothing to the tables that were asked for",
+                     fmt::format("it is of --table {}", fmt::join(use.tables, ", ")));
+  }
+}
+
+/// Every table follows traces but that of photographs.
+void require_traces(const PaperOptions& options, const std::vector<std::string>& labels,
+                    const std::vector<const PaperTableKind*>& kinds) {
+  for (const PaperTableKind* kind : kinds) {
+    if (kind->name == "quality" && !options.images.empty()) continue;
+    for (std::size_t i = 0; i < options.cases.size(); ++i) {
+      if (options.cases[i].size() > 1) continue;
+      throw InputError("--case", labels[i], "has no trace", "name one or more behind the scene");
+    }
+  }
+}
+
 Json case_json(const PaperCase& scene, const std::vector<std::string>& files) {
   const RenderSetup& setup = scene.setup();
   return {{"name", scene.label()},
@@ -122,9 +159,13 @@ Json case_json(const PaperCase& scene, const std::vector<std::string>& files) {
 Json settings_json(const PaperCase& scene) {
   const RenderSetup& setup = scene.setup();
   const SpeculationSettings& speculation = setup.view.speculation;
+  const bool scripted = has_script(scene.options());
+  const ScriptOptions script = script_options(scene.options().render);
   return {{"size_px", {setup.camera.size_px.x, setup.camera.size_px.y}},
           {"focal_px", setup.camera.focal_px.x},
           {"fps", scene.options().render.fps ? Json(*scene.options().render.fps) : Json()},
+          {"seed", scripted ? Json(script.seed) : Json()},
+          {"duration_s", scripted ? Json(script.duration_s) : Json()},
           {"anchor", scene.options().render.anchor},
           {"frames", scene.options().render.frames},
           {"window", speculation.initial_window},
@@ -135,16 +176,19 @@ Json settings_json(const PaperCase& scene) {
           {"guard_px", speculation.guard_px},
           {"cost_aware", speculation.cost_aware},
           {"order", setup.view.order == BlendOrder::fresh ? "fresh" : "key"},
-          {"warmup", scene.options().warmup},
+          {"warmup", scene.options().warmup.value_or(default_warmup)},
           {"every", scene.options().every}};
 }
 
-void paper(const PaperCommand& command, bool quiet) {
+void paper(const PaperCommand& command, const CLI::App& app) {
   const PaperOptions& options = command.options;
-  check(options);
+  const bool quiet = is_quiet(app);
   const auto kinds = chosen_kinds(command.tables);
-  check_json(command.json);
+  refuse_unused(app, kinds);
+  check(options);
   const std::vector<std::string> labels = case_labels(options.cases);
+  require_traces(options, labels, kinds);
+  check_json(command.json);
   const Json baseline = command.baseline.empty() ? Json() : read_baseline(command.baseline, labels);
   Json report = {{"version", build_version}, {"commit", build_commit}, {"cases", Json::array()}};
   std::vector<std::vector<PaperTable>> parts(kinds.size());  // [kind][case]
@@ -228,11 +272,13 @@ void add_paper_command(CLI::App& app) {
                    "drone, still, tour:FILE). Repeated, it adds a column for each scene")
       ->required()
       ->type_name("SCENE TRACE...");
-  paper_app->add_option("--images", options.images,
-                        "quality: a COLMAP folder per case; compares with its photographs (PNG)");
+  auto* images = paper_app->add_option(
+      "--images", options.images,
+      "quality: a COLMAP folder per case; compares with its photographs (PNG)");
   paper_app
       ->add_option("--image-rate", options.image_rate_hz,
                    "Photographs per second of the video that they are from")
+      ->needs(images)
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   paper_app->add_option(
@@ -253,8 +299,8 @@ void add_paper_command(CLI::App& app) {
                       "Move the traces to the start pose of their scene");
   add_frame_options(*paper_app, options.render);
   add_speculation_options(*paper_app, options.render.pipeline);
-  paper_app->add_option("--warmup", options.warmup, "Frames rendered before measuring")
-      ->capture_default_str();
+  paper_app->add_option("--warmup", options.warmup,
+                        fmt::format("Frames rendered before measuring ({})", default_warmup));
   paper_app
       ->add_option("--every", options.every,
                    "quality, tiles, traces: look at one frame in N of a trace")
@@ -262,7 +308,7 @@ void add_paper_command(CLI::App& app) {
       ->capture_default_str();
   paper_app->add_option("--json", command->json,
                         "Write the tables here too; - prints JSON instead");
-  paper_app->callback([command, paper_app] { paper(*command, is_quiet(*paper_app)); });
+  paper_app->callback([command, paper_app] { paper(*command, *paper_app); });
 }
 
 }  // namespace catgs

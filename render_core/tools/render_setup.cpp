@@ -24,15 +24,11 @@ bool parse_whole(std::string_view text, T& value) {
 
 /// The camera's recorded or scripted samples.
 Trajectory make_samples(const RenderOptions& options, const SceneHints& hints) {
-  if (options.trace.empty() == options.script.script.empty()) {
+  if (options.trace.empty() == options.script.empty()) {
     throw InputError("--trace, --script", "", "one of them is needed",
                      "--script orbit is a good start");
   }
-  if (!options.script.script.empty()) {
-    ScriptOptions script = options.script;
-    script.rate_hz = options.fps.value_or(script.rate_hz);
-    return make_script(script, hints);
-  }
+  if (!options.script.empty()) return make_script(script_options(options), hints);
   const Trajectory trace = read_tum(options.trace);
   return options.anchor ? anchored(trace, hints) : trace;
 }
@@ -48,7 +44,7 @@ double mean_rate_hz(const Trajectory& path) {
 void add_render_options(CLI::App& command, RenderOptions& options) {
   add_scene_options(command, options.scene);
   auto* trace = command.add_option("--trace", options.trace, "Camera path: a TUM file");
-  auto* script = command.add_option("--script", options.script.script,
+  auto* script = command.add_option("--script", options.script,
                                     "Camera path: orbit, walk, head, drone, still or tour:FILE");
   trace->excludes(script);
   command.add_flag("--anchor", options.anchor, "Move the trace to the scene's start pose")
@@ -58,9 +54,10 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
 }
 
 void add_frame_options(CLI::App& command, RenderOptions& options) {
-  command.add_option("--seed", options.script.seed, "Of the script")->capture_default_str();
-  command.add_option("--duration", options.script.duration_s, "Of the script, seconds")
-      ->capture_default_str();
+  const ScriptOptions defaults;
+  command.add_option("--seed", options.seed, fmt::format("Of the script ({})", defaults.seed));
+  command.add_option("--duration", options.duration_s,
+                     fmt::format("Of the script, seconds ({})", defaults.duration_s));
   command.add_option(
       "--fps", options.fps,
       "Frames per second (default: a trace's own samples, 120 of a script). A trace is "
@@ -85,7 +82,25 @@ FrameRequest RenderSetup::request(std::size_t i) const {
   return request;
 }
 
+ScriptOptions script_options(const RenderOptions& options) {
+  ScriptOptions script{.script = options.script};
+  script.seed = options.seed.value_or(script.seed);
+  script.duration_s = options.duration_s.value_or(script.duration_s);
+  script.rate_hz = options.fps.value_or(script.rate_hz);
+  return script;
+}
+
+void refuse_script_options(const RenderOptions& options) {
+  const auto refuse = [](bool given, std::string_view flag) {
+    if (!given) return;
+    throw InputError(flag, "", "means nothing to a recorded trace", "it is of a script");
+  };
+  refuse(options.seed.has_value(), "--seed");
+  refuse(options.duration_s.has_value(), "--duration");
+}
+
 RenderSetup prepare(const RenderOptions& options, bool quiet) {
+  if (!options.trace.empty()) refuse_script_options(options);
   RenderSetup setup = prepare_scene(options, quiet);
   set_path(setup, options);
   return setup;

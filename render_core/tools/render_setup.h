@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,7 +23,10 @@ struct RenderOptions {
   SceneOptions scene;
   std::string trace;
   bool anchor = false;
-  ScriptOptions script;
+  std::string script;
+  // Of the script; unset ones keep the default of ScriptOptions.
+  std::optional<std::uint64_t> seed;
+  std::optional<double> duration_s;
   LensOptions lens;
   std::optional<double> fps;
   std::string frames;
@@ -61,6 +65,12 @@ RenderSetup prepare(const RenderOptions& options, bool quiet);
 /// The same in two steps, for several paths through one scene.
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet);
 void set_path(RenderSetup& setup, const RenderOptions& options);
+
+/// The script of the options, as set_path() makes it.
+ScriptOptions script_options(const RenderOptions& options);
+/// Throws InputError where an option of scripts is given. One that changes nothing, as where only
+/// recorded traces are followed, would spoil a comparison unnoticed.
+void refuse_script_options(const RenderOptions& options);
 
 /// The choice of core, checked; without a thread pool. Throws InputError.
 RendererOptions renderer_options(const RenderOptions& options);

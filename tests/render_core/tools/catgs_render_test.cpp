@@ -132,6 +132,9 @@ TEST_F(CatgsRender, BenchReportsEveryFrame) {
   EXPECT_EQ(json.at("key_frames").get<int>() + json.at("sub_frames").get<int>(), 12);
   EXPECT_EQ(json.at("scene").at("gaussians"), 400);
   EXPECT_EQ(json.at("settings").at("size_px"), (nlohmann::json{64, 48}));
+  EXPECT_EQ(json.at("settings").at("seed"), 1);
+  EXPECT_EQ(json.at("settings").at("duration_s"), 0.1);
+  EXPECT_EQ(json.at("settings").at("warmup"), 10);
   EXPECT_GT(json.at("fps_mean").get<double>(), 0.0);
   EXPECT_GE(json.at("frame_ms").at("max"), json.at("frame_ms").at("p50"));
   EXPECT_GT(json.at("blended_pairs_mean").get<double>(), 64.0);
@@ -288,8 +291,13 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
   expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
   expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
+  expect(frames("--trace x --duration 2 --out x"),
+         "--duration: means nothing to a recorded trace (it is of a script)");
+  expect(frames("--trace x --seed 1 --out x"), "--seed: means nothing to a recorded trace");
   expect(frames(still + "--pipeline catgs --grid fixed --guard-px 1 --out x"),
          "--guard-px: means nothing to the fixed grid (use --grid warp)");
+  expect(run(fmt::format("bench {} --script still --frames :2 --warmup 100000000000", scene())),
+         "--warmup: 100000000000 frames of a path of 2");
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");
   expect(frames(still + "--near 0 --out x"), "--near: 0 is not a positive, finite distance");
   expect(frames("--script tour: --out x"), "--script: tour: names no file");

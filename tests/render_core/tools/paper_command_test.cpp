@@ -107,6 +107,42 @@ TEST_F(Paper, PrintsMarkdownAndWritesJson) {
   EXPECT_THAT(names(json.at("tables")), ElementsAre("ablation", "list"));
   EXPECT_EQ(json.at("cases").at(0).at("gaussians"), 2000);
   EXPECT_EQ(json.at("settings").at("size_px"), (Json{96, 64}));
+  EXPECT_TRUE(json.at("settings").at("seed").is_null());
+}
+
+TEST_F(Paper, TheReportHoldsTheScriptsSeedAndDuration) {
+  const Outcome outcome =
+      paper(fmt::format("--table list {} head --seed 3 --duration 0.1 --json -", cloud_case()));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Json settings = Json::parse(outcome.out).at("settings");
+  EXPECT_EQ(settings.at("seed"), 3);
+  EXPECT_EQ(settings.at("duration_s"), 0.1);
+  EXPECT_EQ(settings.at("warmup"), 10);
+}
+
+TEST_F(Paper, OptionsOfScriptsAreRefusedWithoutOne) {
+  const Outcome outcome = paper(fmt::format("--table list {} --seed 3", cloud_case()));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, HasSubstr("--seed: means nothing to a recorded trace"));
+}
+
+TEST_F(Paper, OptionsThatWouldChangeNothingAreRefused) {
+  const auto complaint = [&](const std::string& arguments) {
+    const Outcome outcome = paper(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.out;
+  };
+  for (const char* option :
+       {"--baseline x", "--images x", "--keep-fraction 1", "--variant '--window 2'", "--every 2",
+        "--images x --image-rate 5", "--dram-bytes-per-s 1"}) {
+    EXPECT_THAT(complaint(fmt::format("--table list {} {}", cloud_case(), option)),
+                HasSubstr("means nothing to the tables that were asked for (it is of --table"))
+        << option;
+  }
+  EXPECT_THAT(complaint(fmt::format("--table quality {} --image-rate 5", cloud_case())),
+              HasSubstr("--image-rate requires --images"));
+  EXPECT_THAT(complaint(fmt::format("--table list {} --warmup 41", cloud_case())),
+              HasSubstr("--warmup: 41 frames of a path of 40"));
 }
 
 TEST_F(Paper, TheGuardIsOfTheRowsThatHaveOne) {
@@ -357,7 +393,12 @@ TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(paper(cloud_case()), "--table is required");
   expect(paper("--table fps"), "--case is required");
   expect(paper("--table speed " + cloud_case()), "speed not in");
-  expect(paper("--table fps --case " + path("cloud.ply")), "cloud: has no trace");
+  expect(paper("--table fps --case " + path("none.ply")), "none.ply: does not exist");
+  std::ofstream(path("none.ply")) << "no scene";
+  expect(paper("--table fps --case " + path("none.ply")),
+         "catgs-render: --case: none: has no trace");
+  expect(paper(fmt::format("--table quality {} --images /nofolder", cloud_case())),
+         "/nofolder: does not exist (--images takes the folder of a COLMAP reconstruction)");
   expect(paper(fmt::format("--table fps --case {} none.tum", path("cloud.ply"))),
          "none.tum: does not exist");
   expect(paper(fmt::format("--table quality {} --images {} {}", cloud_case(), path(""), path(""))),
