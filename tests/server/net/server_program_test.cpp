@@ -23,7 +23,9 @@
 namespace catgs::test {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 /// catgs-server on a port of the system's choice, serving synth:city. Its end kills it.
 class Program {
@@ -134,6 +136,15 @@ TEST(ServerProgram, SupervisorsTellAFaultFromAMistake) {
                               "--renderer cuda"),
             CATGS_HAS_CUDA ? fault : mistake);
   ::unsetenv("CUDA_VISIBLE_DEVICES");
+}
+
+TEST(ServerProgram, WarningsAboutSettingsAreLinesOfTheLog) {
+  ::setenv("CATGS_MAX_SESSION", "3", 1);
+  Program program({"--print-config", "--log-format", "json"}, "}\n");
+  ::unsetenv("CATGS_MAX_SESSION");
+  EXPECT_THAT(program.log(), AllOf(StartsWith("{\"time\":"), HasSubstr("CATGS_MAX_SESSION")))
+      << "standard output is a file of settings";
+  EXPECT_EQ(program.exit_status(), 0);
 }
 
 TEST(ServerProgram, ASecondSigtermEndsTheDrainAtOnce) {
