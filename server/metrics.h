@@ -57,6 +57,7 @@ class Metrics {
   prometheus::Counter& effort_changes;        // of software encoders
   prometheus::Counter& sessions_admitted;
   prometheus::Counter& sessions_refused;
+  prometheus::Counter& requests_refused;  // before there was a session
   prometheus::Counter& sessions_resumed;
   prometheus::Counter& scenes_loaded;  // when somebody asked for them
   prometheus::Counter& scene_loads_failed;

@@ -174,6 +174,10 @@ NetOptions Server::State::net_options() {
   options.accept = [this](std::shared_ptr<Connection> connection) {
     return registry->accept(std::move(connection));
   };
+  options.on_refused = [this](const std::string& line) {
+    metrics.requests_refused.Increment();
+    spdlog::warn(line);
+  };
   options.allowed_origins = config.allow_origins;
   options.embed_origins = config.embed_origins;
   options.trusted_proxies = config.trusted_proxies;

@@ -57,6 +57,8 @@ class ConnectionListener {
   virtual ~ConnectionListener() = default;
   /// One whole binary message within the size limit, and the link as it is now.
   virtual void on_message(std::span<const std::byte> bytes, const LinkState& link) = 0;
+  /// One that is not binary or beyond the limit: the connection closes for it.
+  virtual void on_bad_message(std::string_view why) = 0;
   /// The frame was handed to the socket.
   virtual void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                              TimePoint now) = 0;

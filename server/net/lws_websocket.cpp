@@ -115,9 +115,9 @@ void LwsWebsocket::service_woken() {
 
 int LwsWebsocket::service_receive(std::span<const std::byte> fragment) {
   if (!lws_frame_is_binary(wsi_))
-    return close_now(CloseCode::unsupported_data, "binary messages only");
+    return refuse_message(CloseCode::unsupported_data, "binary messages only");
   if (received_.size() + fragment.size() > wire::max_client_message_bytes)
-    return close_now(CloseCode::too_big, "message over 64 KiB");
+    return refuse_message(CloseCode::too_big, "message over 64 KiB");
   received_.insert(received_.end(), fragment.begin(), fragment.end());
   if (lws_is_final_fragment(wsi_) && lws_remaining_packet_payload(wsi_) == 0) {
     listener_->on_message(received_, link_state(lws_get_socket_fd(wsi_)));
@@ -168,6 +168,15 @@ void LwsWebsocket::service_closed() {
   }
   if (listener_) listener_->on_close(peer_leaves_);
   listener_.reset();
+}
+
+int LwsWebsocket::refuse_message(CloseCode code, std::string_view why) {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;  // nothing goes out behind the close frame
+  }
+  listener_->on_bad_message(why);
+  return close_now(code, why);
 }
 
 int LwsWebsocket::close_now(CloseCode code, std::string_view reason) {

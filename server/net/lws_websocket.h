@@ -57,6 +57,7 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
     CloseCode code;
     std::string reason;
   };
+  int refuse_message(CloseCode code, std::string_view why);
   int close_now(CloseCode code, std::string_view reason);
 
   const std::shared_ptr<LwsWaker> waker_;

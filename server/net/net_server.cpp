@@ -1,6 +1,5 @@
 #include "server/net/net_server.h"
 
-#include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdint>
@@ -18,6 +17,7 @@
 #include "server/net/certificate_watch.h"
 #include "server/net/listen_error.h"
 #include "server/net/lws_http.h"
+#include "server/net/lws_site.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/wire.h"
 #include "server/prompt_thread.h"
@@ -30,17 +30,6 @@ constexpr int request_timeout_s = 10;  // a peer that is slow to send its reques
 constexpr int keep_alive_timeout_s = 15;
 constexpr std::uint16_t ping_after_s = 20;  // of silence; hung up ten seconds later
 constexpr std::uint16_t hang_up_after_s = 30;
-
-/// What one listening port serves; the vhost's user pointer.
-struct Site {
-  HttpHandler http;
-  HttpUploads uploads;
-  ConnectionAcceptor accept;  // null: no websockets
-  std::vector<std::string> allowed_origins;
-  std::string policy;
-  bool loopback = false;  // listens on a loopback address
-  TrustedProxies proxies;
-};
 
 /// Per-connection memory that libwebsockets owns, zeroed at its birth.
 struct HttpSlot {
@@ -60,29 +49,6 @@ Service& service_of(lws* wsi) {
   return *static_cast<Service*>(lws_context_user(lws_get_context(wsi)));
 }
 
-const Site& site_of(lws* wsi) {
-  return *static_cast<const Site*>(lws_get_vhost_user(lws_get_vhost(wsi)));
-}
-
-/// See loopback_host_allowed().
-bool host_allowed(const Site& site, const std::string& host) {
-  return !site.loopback || loopback_host_allowed(host, site.allowed_origins);
-}
-
-HttpResponse refuse_host(const std::string& host) {
-  spdlog::warn("request refused: this server is not known as {} (--allow-origin)", host);
-  return text_response(
-      403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
-                       "Open it as localhost, or start it with --allow-origin https://{0}\n",
-                       host));
-}
-
-std::string peer_address_of(lws* wsi) {
-  std::array<char, 64> name{};
-  lws_get_peer_simple(wsi, name.data(), name.size());
-  return name.data();
-}
-
 void forget(HttpSlot& slot) { delete std::exchange(slot.exchange, nullptr); }
 
 bool is_get_or_head(lws* wsi) {
@@ -90,31 +56,8 @@ bool is_get_or_head(lws* wsi) {
          lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
 }
 
-/// How the client came here. A proxy says whether it was by TLS.
-std::string site_address(lws* wsi, const Site& site, const std::string& host) {
-  if (host.empty()) return {};
-  bool tls = lws_is_ssl(wsi) != 0;
-  if (site.proxies.is_proxy(peer_address_of(wsi)))
-    tls |= custom_header(wsi, "x-forwarded-proto:") == "https";
-  return (tls ? "https://" : "http://") + host;
-}
-
 const std::string upload_length_rule =
     fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
-
-/// Why nothing is taken from this request; nothing: its body may come.
-std::optional<HttpResponse> refuse_upload(lws* wsi, const Site& site) {
-  const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-  if (!host_allowed(site, host)) return refuse_host(host);
-  const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
-  if (!origin_allowed(origin, host, site.allowed_origins)) {
-    spdlog::warn("upload refused: origin {} is not allowed at {} (--allow-origin)", origin, host);
-    return text_response(403, "403: pages of this origin may not save here\n");
-  }
-  const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
-  const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  return site.uploads.refusal({path, {}, false, authorization});
-}
 
 // Results of callbacks.
 constexpr int keep_reading = 0;
@@ -146,7 +89,7 @@ int on_request(lws* wsi, HttpSlot& slot) {
     slot.exchange = new LwsHttpExchange;
     const std::uint64_t bytes = body_length(wsi).value_or(0);
     if (bytes >= 1 && bytes <= max_upload_bytes)
-      return slot.exchange->begin_upload(wsi, refuse_upload(wsi, site));
+      return slot.exchange->begin_upload(wsi, refuse_upload(wsi));
     const int status = bytes < 1 ? 411 : 413;
     if (slot.exchange->refuse_body(
             wsi, text_response(status, fmt::format("{}: {}\n", status, upload_length_rule)),
@@ -166,10 +109,10 @@ int on_request(lws* wsi, HttpSlot& slot) {
   }
   slot.exchange = new LwsHttpExchange;
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-  const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(host); };
+  const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(wsi, host); };
   bool finished = false;
   if (slot.exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse,
-                           site_address(wsi, site, host), site.policy, finished) != 0)
+                           site_address(wsi, host), site.policy, finished) != 0)
     return -1;
   if (finished) return finish_request(wsi, slot);
   lws_callback_on_writable(wsi);
@@ -241,16 +184,15 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
       if (site.accept && host_allowed(site, host) &&
           origin_allowed(origin, host, site.allowed_origins))
         return 0;
-      spdlog::warn("websocket refused: origin {} is not allowed at {} (--allow-origin)", origin,
-                   host);
+      note_refused(wsi,
+                   fmt::format("websocket refused: origin {} is not allowed at {} (--allow-origin)",
+                               origin, host));
       lws_return_http_status(wsi, 403, "this origin is not allowed");
       return -1;
     }
     case LWS_CALLBACK_ESTABLISHED: {
-      auto connection = std::make_shared<LwsWebsocket>(
-          wsi, service_of(wsi).waker,
-          site_of(wsi).proxies.client_address(peer_address_of(wsi),
-                                              request_header(wsi, WSI_TOKEN_X_FORWARDED_FOR)));
+      auto connection =
+          std::make_shared<LwsWebsocket>(wsi, service_of(wsi).waker, client_address_of(wsi));
       slot->connection = new std::shared_ptr<LwsWebsocket>(connection);
       connection->service_listen(site_of(wsi).accept(connection));
       return 0;
@@ -382,14 +324,16 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
             options.allowed_origins,
             content_security_policy(options.embed_origins),
             is_loopback(options.listen.address),
-            TrustedProxies(options.trusted_proxies)};
+            TrustedProxies(options.trusted_proxies),
+            options.on_refused};
   s.admin_site = {std::move(options.admin_http),
                   {},
                   nullptr,
                   options.allowed_origins,
                   content_security_policy({}),
                   is_loopback(options.admin_listen.address),
-                  {}};
+                  {},
+                  options.on_refused};
   s.idle_policy.secs_since_valid_ping = ping_after_s;
   s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,7 +25,10 @@ struct NetOptions {
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
-  std::string tls_certificate;               // PEM files; both or neither
+  /// Of each request that is refused before anybody is asked for a session: whose, and why. Called
+  /// on the network thread.
+  std::function<void(const std::string& line)> on_refused = [](const auto&) {};
+  std::string tls_certificate;  // PEM files; both or neither
   std::string tls_key;
 
   bool admin = false;

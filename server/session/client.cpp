@@ -114,8 +114,16 @@ void Client::on_close(Peer& closed, bool by_leaving) {
 void Client::refuse(Peer& from, ErrorCode code, std::string_view why) {
   if (is_host(from)) return session_.fail(code, why);
   spectators_.remove(from);
-  from.connection().send(wire::serialize(ErrorMessage{code, std::string(why), true}));
+  const ErrorMessage error{code, std::string(why), true};
+  note_error(from.connection().peer_address(), error);
+  from.connection().send(wire::serialize(error));
   from.dismiss(CloseCode::policy_violation, why);
+}
+
+void Client::note_error(const std::string& address, const ErrorMessage& error) {
+  const LogSession about(session_.id());
+  spdlog::warn("{}: {}", address, error.message);
+  if (error.fatal) registry_.metrics_.sessions_refused.Increment();
 }
 
 AdmissionAnswer Client::admit(const Hello& hello) {
@@ -167,11 +175,7 @@ void Client::sign(Welcome& welcome) {
 }
 
 void Client::send(const ServerMessage& message) {
-  if (const auto* error = std::get_if<ErrorMessage>(&message)) {
-    const LogSession about(session_.id());
-    spdlog::warn("{}: {}", peer_address_, error->message);
-    if (error->fatal) registry_.metrics_.sessions_refused.Increment();
-  }
+  if (const auto* error = std::get_if<ErrorMessage>(&message)) note_error(peer_address_, *error);
   if (peer_) peer_->connection().send(wire::serialize(message));
   const TimePoint now = Clock::now();
   if (const auto* welcome = std::get_if<Welcome>(&message))

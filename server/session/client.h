@@ -74,6 +74,8 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   template <typename Result, typename Handle>
   std::function<void(Result)> on_session_thread(Handle handle);
 
+  /// An error's line in the log, and its count where a connection ends for it.
+  void note_error(const std::string& address, const ErrorMessage& error);
   /// A failed frame's line in the log, and what it says about the device.
   void note_fault(const FrameResult& result);
   /// That a GPU worked for a frame; 0 on the CPU core.

@@ -41,13 +41,8 @@ void Peer::on_message(std::span<const std::byte> bytes, const LinkState& link) {
     });
   }
   auto parsed = wire::parse_client_message(bytes);
-  if (auto* error = std::get_if<wire::ParseError>(&parsed)) {
-    refused_ = true;
-    registry_.metrics_.bad_messages.Increment();
-    return post([what = std::move(error->what)](Peer& self, Client& c) {
-      c.refuse(self, ErrorCode::bad_message, what);
-    });
-  }
+  if (const auto* error = std::get_if<wire::ParseError>(&parsed))
+    return on_bad_message(error->what);
   auto& message = std::get<ClientMessage>(parsed);
   if (const auto* sample = std::get_if<PoseSample>(&message)) {
     registry_.metrics_.poses_received.Increment();
@@ -63,6 +58,15 @@ void Peer::on_message(std::span<const std::byte> bytes, const LinkState& link) {
   post([message = std::move(message), now, link](Peer& self, Client& c) {
     c.on_link(self, link, now);
     c.on_message(self, message, now);
+  });
+}
+
+void Peer::on_bad_message(std::string_view why) {
+  if (refused_) return;
+  refused_ = true;
+  registry_.metrics_.bad_messages.Increment();
+  post([what = std::string(why)](Peer& self, Client& c) {
+    c.refuse(self, ErrorCode::bad_message, what);
   });
 }
 

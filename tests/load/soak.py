@@ -47,8 +47,8 @@ ROUND_S = 300.0  # a round takes 50 s; one that hangs is ended
 
 # Counters that nothing here may move.
 NEVER = ("catgs_frames_failed_total", "catgs_bad_messages_total", "catgs_scene_loads_failed_total",
-         "catgs_encoders_refused_total", "catgs_sessions_refused_total", "catgs_streams_failed_total",
-         "catgs_log_lines_lost_total")
+         "catgs_encoders_refused_total", "catgs_sessions_refused_total", "catgs_requests_refused_total",
+         "catgs_streams_failed_total", "catgs_log_lines_lost_total")
 GAUGES = ("catgs_sessions", "catgs_sessions_lost", "catgs_connections", "catgs_scenes_in_memory")
 COUNTERS = ("catgs_sessions_admitted_total", "catgs_sessions_resumed_total", "catgs_frames_sent_total",
             "catgs_scenes_loaded_total", "catgs_scenes_released_total")

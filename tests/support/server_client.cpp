@@ -117,6 +117,13 @@ HttpReply http_put(int port, const std::string& target, const std::string& body,
   return exchange(port, std::move(request), headers);
 }
 
+double metric(const RunningServer& server, const std::string& name) {
+  const std::string text = http_get(server.admin_port(), "/metrics").body;
+  const auto at = text.find("\n" + name + " ");
+  if (at == std::string::npos) throw std::runtime_error(name + " is not in /metrics");
+  return std::stod(text.substr(at + name.size() + 2));
+}
+
 struct WireClient::State {
   asio::io_context io;
   websocket::stream<beast::tcp_stream> socket{io};

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -44,6 +46,19 @@ HttpReply http_get(int port, const std::string& target,
 
 HttpReply http_put(int port, const std::string& target, const std::string& body,
                    const std::map<std::string, std::string>& headers = {});
+
+/// Of a gauge or counter without labels.
+double metric(const RunningServer& server, const std::string& name);
+
+/// Whether the condition comes true. Twenty seconds are a bound against hanging, no measurement.
+template <typename Condition>
+bool eventually(Condition condition) {
+  for (int polls = 0; polls < 1000; ++polls) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return false;
+}
 
 struct ReceivedFrame {
   v1::FrameHeader header;

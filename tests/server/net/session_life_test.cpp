@@ -21,24 +21,6 @@ nlohmann::json sessions(const RunningServer& server) {
   return nlohmann::json::parse(http_get(server.admin_port(), "/api/sessions").body);
 }
 
-/// Of a gauge or counter without labels.
-double metric(const RunningServer& server, const std::string& name) {
-  const std::string text = http_get(server.admin_port(), "/metrics").body;
-  const auto at = text.find("\n" + name + " ");
-  if (at == std::string::npos) throw std::runtime_error(name + " is not in /metrics");
-  return std::stod(text.substr(at + name.size() + 2));
-}
-
-/// Whether the condition comes true. Twenty seconds are a bound against hanging, no measurement.
-template <typename Condition>
-bool eventually(Condition condition) {
-  for (int polls = 0; polls < 1000; ++polls) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  return false;
-}
-
 TEST(SessionLifeOnSockets, ALostSocketFindsItsSessionAgain) {
   RunningServer server;
   std::string id;

@@ -1,0 +1,73 @@
+#include "server/net/lws_site.h"
+
+#include <array>
+
+#include <fmt/format.h>
+
+#include "server/net/lws_http.h"
+
+namespace catgs {
+namespace {
+
+std::string peer_address_of(lws* wsi) {
+  std::array<char, 64> name{};
+  lws_get_peer_simple(wsi, name.data(), name.size());
+  return name.data();
+}
+
+}  // namespace
+
+const Site& site_of(lws* wsi) {
+  return *static_cast<const Site*>(lws_get_vhost_user(lws_get_vhost(wsi)));
+}
+
+std::string client_address_of(lws* wsi) {
+  return site_of(wsi).proxies.client_address(peer_address_of(wsi),
+                                             request_header(wsi, WSI_TOKEN_X_FORWARDED_FOR));
+}
+
+std::string site_address(lws* wsi, const std::string& host) {
+  if (host.empty()) return {};
+  bool tls = lws_is_ssl(wsi) != 0;
+  if (site_of(wsi).proxies.is_proxy(peer_address_of(wsi)))
+    tls |= custom_header(wsi, "x-forwarded-proto:") == "https";
+  return (tls ? "https://" : "http://") + host;
+}
+
+bool host_allowed(const Site& site, const std::string& host) {
+  return !site.loopback || loopback_host_allowed(host, site.allowed_origins);
+}
+
+void note_refused(lws* wsi, std::string_view why) {
+  site_of(wsi).on_refused(fmt::format("{}: {}", client_address_of(wsi), why));
+}
+
+HttpResponse refuse_host(lws* wsi, const std::string& host) {
+  note_refused(
+      wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)", host));
+  return text_response(
+      403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
+                       "Open it as localhost, or start it with --allow-origin https://{0}\n",
+                       host));
+}
+
+std::optional<HttpResponse> refuse_upload(lws* wsi) {
+  const Site& site = site_of(wsi);
+  const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+  if (!host_allowed(site, host)) return refuse_host(wsi, host);
+  const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
+  if (!origin_allowed(origin, host, site.allowed_origins)) {
+    note_refused(wsi, fmt::format("upload refused: origin {} is not allowed at {} (--allow-origin)",
+                                  origin, host));
+    return text_response(403, "403: pages of this origin may not save here\n");
+  }
+  const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
+  const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  auto refusal = site.uploads.refusal({path, {}, false, authorization});
+  if (refusal)
+    note_refused(wsi, fmt::format("upload refused: {}",
+                                  refusal->body->substr(0, refusal->body->find('\n'))));
+  return refusal;
+}
+
+}  // namespace catgs

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <libwebsockets.h>
+
+#include "server/net/connection.h"
+#include "server/net/http.h"
+#include "server/net/trusted_proxies.h"
+
+namespace catgs {
+
+/// What one listening port serves; the vhost's user pointer.
+struct Site {
+  HttpHandler http;
+  HttpUploads uploads;
+  ConnectionAcceptor accept;  // null: no websockets
+  std::vector<std::string> allowed_origins;
+  std::string policy;
+  bool loopback = false;  // listens on a loopback address
+  TrustedProxies proxies;
+  std::function<void(const std::string&)> on_refused;
+};
+
+const Site& site_of(lws* wsi);
+
+/// Who is behind the proxies that are trusted.
+std::string client_address_of(lws* wsi);
+
+/// How the client came here. A proxy says whether it was by TLS.
+std::string site_address(lws* wsi, const std::string& host);
+
+/// See loopback_host_allowed().
+bool host_allowed(const Site& site, const std::string& host);
+
+/// Tells Site::on_refused whose request is refused, and why.
+void note_refused(lws* wsi, std::string_view why);
+
+HttpResponse refuse_host(lws* wsi, const std::string& host);
+
+/// Why nothing is taken from this upload; nothing: its body may come.
+std::optional<HttpResponse> refuse_upload(lws* wsi);
+
+}  // namespace catgs
