@@ -22,6 +22,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "render_core/printable.h"
 #include "server/session/log_session.h"
 #include "server/session/rate_limit.h"
 
@@ -91,19 +92,13 @@ class SessionFlag final : public spdlog::custom_flag_formatter {
   }
 };
 
-/// The message. Clients have a say in it: what would move a terminal's cursor or begin a line of
-/// its own comes out as \\x1b.
+/// The message. Clients have a say in it.
 class PrintableMessage final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& out) override {
-    for (const char c : message.payload) {
-      const auto byte = static_cast<unsigned char>(c);
-      if (byte < 0x20 || byte == 0x7f)
-        fmt::format_to(std::back_inserter(out), "\\x{:02x}", byte);
-      else
-        out.push_back(c);
-    }
+    const std::string text = printable({message.payload.data(), message.payload.size()});
+    out.append(text.data(), text.data() + text.size());
   }
   [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
     return std::make_unique<PrintableMessage>();

@@ -18,6 +18,7 @@
 #include "render_core/command_line.h"
 #include "render_core/device_error.h"
 #include "render_core/error.h"
+#include "render_core/printable.h"
 #include "server/commands.h"
 #include "server/config.h"
 #include "server/log.h"
@@ -139,13 +140,13 @@ int run(int argc, char** argv) {
   } catch (const DevicesUnusable& error) {
     // A fault, even where no GPU is found: one that is lost looks like one that never was, one that
     // is full empties, and a supervisor that tries again loses nothing.
-    std::cerr << "catgs-server: " << error.what() << '\n';
+    std::cerr << "catgs-server: " << printable(error.what()) << '\n';
     return exit_failure;
   } catch (const InputError& error) {
-    std::cerr << "catgs-server: " << error.what() << '\n';
+    std::cerr << "catgs-server: " << printable(error.what()) << '\n';
     return exit_usage;
   } catch (const std::exception& error) {
-    std::cerr << "catgs-server: " << error.what() << '\n';
+    std::cerr << "catgs-server: " << printable(error.what()) << '\n';
     return exit_failure;
   }
 }

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "render_core/error.h"
+#include "render_core/printable.h"
 #include "render_core/scene/hints.h"
 #include "render_core/scene/prune.h"
 #include "render_core/scene/save_scene.h"
@@ -50,7 +51,7 @@ void convert(const ConvertOptions& options, bool quiet) {
                scene.report.dropped);
   if (scene.cloud.size() < loaded)
     fmt::print("{} of least importance were pruned\n", loaded - scene.cloud.size());
-  for (const std::string& note : scene.notes) fmt::print(stderr, "note: {}\n", note);
+  for (const std::string& note : scene.notes) fmt::print(stderr, "note: {}\n", printable(note));
   write_hints_beside(scene.hints, options.out);
 }
 

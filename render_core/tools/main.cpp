@@ -8,6 +8,7 @@
 #include "render_core/build_info.h"
 #include "render_core/command_line.h"
 #include "render_core/error.h"
+#include "render_core/printable.h"
 #include "render_core/tools/commands.h"
 
 namespace catgs {
@@ -40,13 +41,13 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : exit_bad_input;
   } catch (const CheckFailed& error) {
-    fmt::print(stderr, "catgs-render: {}\n", error.what());
+    fmt::print(stderr, "catgs-render: {}\n", printable(error.what()));
     return exit_check_failed;
   } catch (const InputError& error) {
-    fmt::print(stderr, "catgs-render: {}\n", error.what());
+    fmt::print(stderr, "catgs-render: {}\n", printable(error.what()));
     return exit_bad_input;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "catgs-render: internal error: {}\n", error.what());
+    fmt::print(stderr, "catgs-render: internal error: {}\n", printable(error.what()));
     return exit_internal;
   }
 }

@@ -12,6 +12,7 @@
 #include "render_core/build_info.h"
 #include "render_core/command_line.h"
 #include "render_core/error.h"
+#include "render_core/printable.h"
 #include "render_core/tools/json_report.h"
 #include "tests/load/html_report.h"
 #include "tests/load/metrics.h"
@@ -284,10 +285,10 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : exit_bad_input;
   } catch (const InputError& error) {
-    fmt::print(stderr, "catgs-load: {}\n", error.what());
+    fmt::print(stderr, "catgs-load: {}\n", printable(error.what()));
     return exit_bad_input;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "catgs-load: internal error: {}\n", error.what());
+    fmt::print(stderr, "catgs-load: internal error: {}\n", printable(error.what()));
     return exit_internal;
   }
 }

@@ -63,6 +63,13 @@ class CatgsRender : public ::testing::Test {
   const test::TemporaryFolder folder_;
 };
 
+TEST_F(CatgsRender, FilesWriteNoColoursIntoTheTerminal) {
+  const auto evil = folder_.write("evil.ply", "ply\nformat \x1b[31mevil 1.0\n");
+  const Outcome info = run("info " + evil.string());
+  EXPECT_EQ(info.exit_code, 2);
+  EXPECT_THAT(info.out, HasSubstr("unknown encoding '\\x1b[31mevil'"));
+}
+
 TEST_F(CatgsRender, FramesOfATraceAreItsSamples) {
   const Outcome outcome = frames(fmt::format("--trace {} --out {}", path("path.tum"), path("out")));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out;

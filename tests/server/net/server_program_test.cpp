@@ -125,12 +125,14 @@ int status_of_refusal(const std::vector<std::string>& arguments, const std::stri
 TEST(ServerProgram, SupervisorsTellAFaultFromAMistake) {
   constexpr int fault = 1, mistake = 2;
   EXPECT_EQ(status_of_refusal({"--scene", "nowhere.ply"}, "there is no such file"), mistake);
+  const TemporaryFolder folder;
+  const auto evil = folder.write("evil.ply", "ply\nformat \x1b[31mevil 1.0\n").string();
+  EXPECT_EQ(status_of_refusal({"--scene", evil}, "'\\x1b[31mevil'"), mistake);
   EXPECT_EQ(status_of_refusal({"--renderer", "cpu", "--device", "0"}, "--device"), mistake);
   // Without a GPU, as where one is lost; a build without the core stays one.
   ::setenv("CUDA_VISIBLE_DEVICES", "", 1);
   EXPECT_EQ(status_of_refusal({"--renderer", "cuda"}, "--renderer cuda"),
             CATGS_HAS_CUDA ? fault : mistake);
-  const TemporaryFolder folder;
   save_scene(random_cloud(100, 0), folder / "attic.ply");
   EXPECT_EQ(status_of_refusal({"--renderer", "cuda", "--scene-folder", folder.path().string()},
                               "--renderer cuda"),
