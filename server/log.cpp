@@ -107,6 +107,9 @@ class PrintableMessage final : public spdlog::custom_flag_formatter {
 
 std::atomic<std::uint64_t> lines_lost{0};
 
+/// What this thread logs is a refusal. Sinks are called by the thread that logs.
+thread_local bool logs_refusal = false;
+
 /// A warning of the log itself, whatever session the line is about that it comes before.
 class LogsOwnLine {
  public:
@@ -177,15 +180,17 @@ class PromptSink final : public spdlog::sinks::base_sink<std::mutex> {
 };
 
 /// Leaves lines out where there are too many, and says how many: strangers can cause a line with
-/// each connection, and somebody pays for the disk.
+/// each connection, and somebody pays for the disk. Refusals have a smaller share of their own: who
+/// is refused without end hides nothing else.
 class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
  public:
   explicit BoundedSink(std::shared_ptr<spdlog::sinks::sink> to) : to_(std::move(to)) {}
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    if (!rate_.take(Clock::now())) {
+    if (!(logs_refusal ? refusals_ : rate_).take(Clock::now())) {
       ++left_out_;
+      ++lines_lost;
       return;
     }
     if (const auto count = std::exchange(left_out_, 0); count > 0) {
@@ -202,9 +207,12 @@ class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
  private:
   static constexpr double lines_per_second = 50.0;
   static constexpr double burst = 500.0;
+  static constexpr double refusals_per_second = 10.0;
+  static constexpr double refusal_burst = 100.0;
 
   const std::shared_ptr<spdlog::sinks::sink> to_;
   RateLimit rate_{lines_per_second, burst, Clock::now()};
+  RateLimit refusals_{refusals_per_second, refusal_burst, Clock::now()};
   std::uint64_t left_out_ = 0;
 };
 
@@ -227,6 +235,12 @@ void set_up_log(std::string_view format, std::string_view level) {
   logger->set_formatter(make_formatter(format));
   logger->set_level(least);
   spdlog::set_default_logger(std::move(logger));
+}
+
+void log_refusal(const std::string& line) {
+  logs_refusal = true;
+  spdlog::warn(line);
+  logs_refusal = false;
 }
 
 std::uint64_t log_lines_lost() { return lines_lost; }

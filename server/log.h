@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 namespace catgs {
@@ -13,7 +14,12 @@ namespace catgs {
 /// once is lost and counted. Lines are cut at 4,096 bytes.
 void set_up_log(std::string_view format, std::string_view level);
 
-/// Lines that were lost since the process began: a disk was full, a pipe not read. Any thread.
+/// A warning about a request of a stranger, who may send as many as they like: at most 10 a second
+/// are written, and 100 at once, whatever else is logged. Any thread.
+void log_refusal(const std::string& line);
+
+/// Lines that are not in the log since the process began: there were too many, a disk was full, a
+/// pipe not read. Any thread.
 [[nodiscard]] std::uint64_t log_lines_lost();
 
 }  // namespace catgs

@@ -158,8 +158,8 @@ std::string Metrics::scrape() const {
   prometheus::ClientMetric lost;
   lost.counter.value = static_cast<double>(log_lines_lost());
   families.push_back({"catgs_log_lines_lost_total",
-                      "Lines of the log that standard error did not take: a full disk, a pipe that "
-                      "nobody reads",
+                      "Lines that are not in the log: there were too many, or standard error did "
+                      "not take them (a full disk, a pipe that nobody reads)",
                       prometheus::MetricType::Counter,
                       {lost}});
   return prometheus::TextSerializer().Serialize(families);

@@ -23,6 +23,7 @@
 #include "render_core/thread_pool.h"
 #include "server/access.h"
 #include "server/link_preview.h"
+#include "server/log.h"
 #include "server/metrics.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
@@ -176,7 +177,7 @@ NetOptions Server::State::net_options() {
   };
   options.on_refused = [this](const std::string& line) {
     metrics.requests_refused.Increment();
-    spdlog::warn(line);
+    log_refusal(line);
   };
   options.allowed_origins = config.allow_origins;
   options.embed_origins = config.embed_origins;

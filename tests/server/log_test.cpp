@@ -1,5 +1,6 @@
 #include "server/log.h"
 
+#include <algorithm>
 #include <chrono>
 #include <climits>
 #include <csignal>
@@ -90,12 +91,29 @@ TEST(Log, TellsHowManyLinesItLeftOut) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));  // room for one more, or two
     spdlog::info("last");
   };
+  const std::uint64_t lost_before = log_lines_lost();
   const auto bounded = lines_of("human", "info", flood);
+  EXPECT_GT(log_lines_lost() - lost_before, 15'000u);
   EXPECT_GE(bounded.size(), 502u);
   EXPECT_LT(bounded.size(), 5000u);
   EXPECT_THAT(bounded.back(), EndsWith("last"));
   EXPECT_THAT(bounded, Contains(HasSubstr("lines were left out")));
   EXPECT_EQ(lines_of("human", "debug", flood).size(), 20'001u);
+}
+
+TEST(Log, WhoIsRefusedWithoutEndHidesNothingElse) {
+  const std::uint64_t lost_before = log_lines_lost();
+  const auto all = lines_of("human", "info", [] {
+    for (int i = 0; i < 20'000; ++i) log_refusal("of a stranger");
+    for (int i = 0; i < 300; ++i) spdlog::warn("of somebody else");
+  });
+  EXPECT_EQ(std::ranges::count_if(all, [](auto& line) { return line.ends_with("else"); }), 300);
+  const auto refusals =
+      std::ranges::count_if(all, [](auto& line) { return line.ends_with("stranger"); });
+  EXPECT_GE(refusals, 100);
+  EXPECT_LT(refusals, 1000);
+  EXPECT_EQ(log_lines_lost() - lost_before, static_cast<std::uint64_t>(20'000 - refusals));
+  EXPECT_THAT(all, Contains(HasSubstr("lines were left out")));
 }
 
 /// Standard error is `descriptor` while `log` logs.
