@@ -28,6 +28,10 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_name(std::string_view unknown, const std::vector<std::string>& names) {
+  const bool ends_a_word = !unknown.empty() && unknown.back() != '-';
+  const std::string first_words = std::string(unknown) + "-";
+  for (const std::string& name : names)
+    if (ends_a_word && name.starts_with(first_words)) return name;
   std::string nearest;
   std::size_t least = unknown.size() / 3;
   for (const std::string& name : names) {

@@ -21,6 +21,7 @@ constexpr std::string_view link_purpose = "catgs-link-v1";
 constexpr std::size_t min_key_bytes = 16;
 constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
+constexpr std::chrono::days longest_link{3650};
 constexpr std::string_view not_an_author =
     "this link does not let you save: ask for one of role author";
 
@@ -91,7 +92,11 @@ std::chrono::seconds parse_duration(std::string_view text) {
   if (error != std::errc() || unit == std::string_view::npos || count < 1 || count > 1'000'000)
     throw InputError("--expires " + std::string(text), {}, "is no duration",
                      "give 90s, 30m, 12h or 7d");
-  return std::chrono::seconds(count * unit_s[unit]);
+  const std::chrono::seconds duration(count * unit_s[unit]);
+  if (duration > longest_link)
+    throw InputError("--expires " + std::string(text), {}, "is too long",
+                     fmt::format("links live {} days at most", longest_link.count()));
+  return duration;
 }
 
 AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::path key_file)

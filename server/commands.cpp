@@ -37,12 +37,14 @@ void add_token_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--expires", options->expires, "Life of the link: 90s, 30m, 12h, 7d")
       ->capture_default_str();
-  command->add_option("--key-file", options->key_file, "The server's --token-key-file")->required();
+  command->add_option("--token-key-file", options->key_file, "The key file of the server")
+      ->required();
   command->callback([options, &exit_code] {
     const auto now = std::chrono::system_clock::now() + parse_duration(options->expires);
     options->grant.expires_unix_s =
         std::chrono::duration_cast<std::chrono::seconds>(now.time_since_epoch()).count();
-    std::cout << make_link_token(options->grant, read_key_file("--key-file", options->key_file))
+    std::cout << make_link_token(options->grant,
+                                 read_key_file("--token-key-file", options->key_file))
               << '\n';
     std::cerr << "append it to the page's address: https://HOST/#token=TOKEN\n";
     exit_code = 0;

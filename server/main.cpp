@@ -118,8 +118,10 @@ int run(int argc, char** argv) {
   return_large_blocks();
   CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
   app.set_version_flag("--version", build_version);
-  app.failure_message([](const CLI::App*, const CLI::Error& error) {
-    return fmt::format("catgs-server: {} (see catgs-server --help)\n", error.what());
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    std::string command;
+    for (const CLI::App* given : failed->get_subcommands()) command += given->get_name() + " ";
+    return fmt::format("catgs-server: {} (see catgs-server {}--help)\n", error.what(), command);
   });
   app.footer(
       "Settings come from defaults, then --config FILE (TOML), then CATGS_<NAME> variables, then\n"

@@ -129,12 +129,17 @@ TEST_F(AccessTest, FilesThatCannotBeReadAreNamedWithTheirFlag) {
 }
 
 TEST_F(AccessTest, NamesWhatIsWrong) {
-  EXPECT_THAT([&] { read_key_file("--key-file", folder.write("short", "abc")); },
-              ThrowsMessage<InputError>(AllOf(HasSubstr("--key-file"), HasSubstr("openssl rand"))));
+  EXPECT_THAT(
+      [&] { read_key_file("--token-key-file", folder.write("short", "abc")); },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("--token-key-file"), HasSubstr("openssl rand"))));
   EXPECT_THROW(AccessControl(folder.write("empty", "# nothing\n"), {}), InputError);
   EXPECT_THROW(make_link_token({"city", "A B", 0}, key), InputError);
   for (const char* text : {"", "7", "d", "7x", "-1d", "0s", "7d ", "99999999d"})
     EXPECT_THROW(parse_duration(text), InputError) << text;
+  for (const char* text : {"3651d", "99999d", "1000000d"})
+    EXPECT_THAT([&] { parse_duration(text); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr("too long"), HasSubstr("3650 days"))));
+  EXPECT_EQ(parse_duration("3650d"), std::chrono::days(3650));
   EXPECT_EQ(parse_duration("7d"), std::chrono::hours(168));
   EXPECT_EQ(parse_duration("90s"), std::chrono::seconds(90));
 }

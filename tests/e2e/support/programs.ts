@@ -24,7 +24,7 @@ export function catgs_render(...args: string[]): void {
 
 /** What `catgs-server token` prints. */
 export function access_token(role: string, key_file: string): string {
-  const args = ['token', '--role', role, '--key-file', key_file];
+  const args = ['token', '--role', role, '--token-key-file', key_file];
   return execFileSync(program('catgs-server'), args, { stdio: ['ignore', 'pipe', 'ignore'] })
     .toString()
     .trim();

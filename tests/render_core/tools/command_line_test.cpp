@@ -15,6 +15,8 @@ class CommandLine : public testing::Test {
  protected:
   CommandLine() {
     app_.add_option("--port", port_);
+    app_.add_flag("--open");
+    app_.add_option("--token-file", token_file_);
     app_.add_option("--pose-hz", pose_hz_);
     CLI::App* synth = app_.add_subcommand("synth");
     synth->add_option("--gaussians", gaussians_);
@@ -38,6 +40,7 @@ class CommandLine : public testing::Test {
   CLI::App app_;
   int port_ = 0;
   unsigned pose_hz_ = 0;
+  std::string token_file_;
   std::size_t gaussians_ = 0;
   std::vector<std::uint64_t> sizes_;
   int lod_ = 0;
@@ -59,6 +62,7 @@ TEST_F(CommandLine, AnUnknownOptionIsNamedWithTheNearest) {
             "unknown option --gausians: did you mean --gaussians?");
   EXPECT_EQ(complaint({"--gausians", "5"}), "unknown option --gausians: --help lists them")
       << "of commands that were given";
+  EXPECT_EQ(complaint({"--token", "x"}), "unknown option --token: did you mean --token-file?");
   EXPECT_EQ(complaint({"--zzzzzz"}), "unknown option --zzzzzz: --help lists them");
   EXPECT_EQ(complaint({"--port", "1", "word"}), "\"word\": is one word too many (see --help)");
 }

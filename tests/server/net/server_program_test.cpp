@@ -149,6 +149,13 @@ TEST(ServerProgram, WarningsAboutSettingsAreLinesOfTheLog) {
   EXPECT_EQ(program.exit_status(), 0);
 }
 
+TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
+  Program program({"token"}, "--help");
+  EXPECT_THAT(program.log(), HasSubstr("--token-key-file is required"));
+  EXPECT_THAT(program.log(), HasSubstr("see catgs-server token --help"));
+  EXPECT_EQ(program.exit_status(), 2);
+}
+
 TEST(ServerProgram, ASecondSigtermEndsTheDrainAtOnce) {
   Program program({"--drain-wait", "600"});
   WireClient client(program.port());
