@@ -10,6 +10,9 @@
 
 namespace catgs {
 
+/// Beyond it, on each axis, is no place in a scene: squares would overflow a float's precision.
+inline constexpr float max_coordinate = 1.0e9f;
+
 /// Camera-to-world rigid transform. Camera axes: x right, y down, z forward. World units are the
 /// scene's. `orientation` is a unit quaternion that rotates camera axes into the world.
 struct Pose {

@@ -100,7 +100,10 @@ void SidecarSaver::write(const SharedRequest& request) {
     put_in_force(request, sidecar, json, tagged(200, "saved\n", etag_of(json)));
   } catch (const InputError& unwritable) {
     spdlog::warn("scene {}: an author cannot save: {}", request->scene_id, unwritable.what());
-    request->answer.set_value(text_response(409, fmt::format("409: {}\n", unwritable.what())));
+    std::string why = unwritable.what();
+    const std::string path = file.string();  // the operator's matter
+    if (why.starts_with(path)) why.replace(0, path.size(), file.filename().string());
+    request->answer.set_value(text_response(409, fmt::format("409: {}\n", why)));
   }
 }
 

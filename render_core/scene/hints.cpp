@@ -41,11 +41,11 @@ glm::vec3 parse_up(const JsonField& field) {
 
 Sidecar::StartPose parse_start_pose(const JsonField& field) {
   Sidecar::StartPose pose;
-  pose.position = field.at("position").vec3();
+  pose.position = field.at("position").place();
   const auto orientation = field.find("orientation");
   if (const auto target = field.find("look_at")) {
     if (orientation) field.fail("has both 'look_at' and 'orientation'", "keep one");
-    pose.look_at = target->vec3();
+    pose.look_at = target->place();
     if (*pose.look_at == pose.position) target->fail("is the position itself");
   } else {
     const std::vector<float> q = field.at("orientation").numbers(4);
@@ -58,7 +58,7 @@ Sidecar::StartPose parse_start_pose(const JsonField& field) {
 }
 
 Bounds parse_limits(const JsonField& field) {
-  const Bounds limits{field.at("min").vec3(), field.at("max").vec3()};
+  const Bounds limits{field.at("min").place(), field.at("max").place()};
   for (int k = 0; k < 3; ++k)
     if (!(limits.min[k] < limits.max[k])) field.fail("'min' is not below 'max' on every axis");
   return limits;
@@ -146,9 +146,11 @@ Sidecar read_sidecar(const ByteSource& file) {
   if (const auto near = root.find("near")) {
     sidecar.near_z = near->number();
     if (*sidecar.near_z <= 0.0f) near->fail("is not positive");
+    if (*sidecar.near_z > max_coordinate)
+      near->fail(fmt::format("is beyond {} units", max_coordinate));
   }
   if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits);
-  if (const auto focus = root.find("focus")) sidecar.focus = focus->vec3();
+  if (const auto focus = root.find("focus")) sidecar.focus = focus->place();
   return sidecar;
 }
 
@@ -189,7 +191,7 @@ std::vector<Pose> read_cameras_json(const ByteSource& file) {
   const nlohmann::json document = read_json(file, max_cameras_bytes);
   std::vector<Pose> poses;
   for (const JsonField& camera : JsonField(file.name(), document).elements())
-    poses.push_back({camera.at("position").vec3(),
+    poses.push_back({camera.at("position").place(),
                      glm::normalize(glm::quat_cast(parse_rotation(camera.at("rotation"), 3)))});
   return poses;
 }

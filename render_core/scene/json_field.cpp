@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "render_core/camera.h"
 #include "render_core/error.h"
 
 namespace catgs {
@@ -106,6 +107,14 @@ std::vector<float> JsonField::numbers(std::size_t expected_size) const {
 glm::vec3 JsonField::vec3() const {
   const std::vector<float> v = numbers(3);
   return {v[0], v[1], v[2]};
+}
+
+glm::vec3 JsonField::place() const {
+  const glm::vec3 at = vec3();
+  for (int k = 0; k < 3; ++k)
+    if (!(std::abs(at[k]) <= max_coordinate))
+      fail(fmt::format("is no place in a scene: beyond {} units", max_coordinate));
+  return at;
 }
 
 }  // namespace catgs

@@ -37,6 +37,8 @@ class JsonField {
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] std::string text() const;
   [[nodiscard]] glm::vec3 vec3() const;
+  /// Three coordinates, at most max_coordinate from the origin on each axis.
+  [[nodiscard]] glm::vec3 place() const;
   [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
 
   [[nodiscard]] const nlohmann::json& value() const { return *value_; }

@@ -26,8 +26,6 @@ void log_of_protobuf(google::protobuf::LogLevel level, const char* file, int lin
 }
 [[maybe_unused]] auto* const former_log_handler = google::protobuf::SetLogHandler(log_of_protobuf);
 
-/// Positions beyond this are no place in a scene, and their squares overflow a float's precision.
-constexpr float max_coordinate = 1.0e9f;
 /// Beyond it differences of times might overflow, and a browser's numbers are no longer exact.
 constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
 // What is told of how old a picture is: a clock that jumped would spoil every mean.

@@ -187,6 +187,9 @@ TEST(Sidecar, ErrorsNameTheField) {
   EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
   EXPECT_THAT(error(R"({"up": [0, 0, 0]})"), HasSubstr("up: has no direction"));
   EXPECT_THAT(error(R"({"near": 0})"), HasSubstr("near: is not positive"));
+  EXPECT_THAT(error(R"({"near": 1.1e9})"), HasSubstr("near: is beyond 1000000000 units"));
+  EXPECT_THAT(error(R"({"focus": [0, -1.1e9, 0]})"),
+              HasSubstr("focus: is no place in a scene: beyond 1000000000 units"));
   EXPECT_THAT(error(R"({"near": 1e99})"), HasSubstr("near: is out of range"));
   EXPECT_THAT(error(R"({"focus": [1, 2, "c"]})"), HasSubstr("focus[2]: is not a number"));
   EXPECT_THAT(error(R"({"limits": {"min": [0, 0, 0], "max": [1, 0, 1]}})"), HasSubstr("limits"));

@@ -20,6 +20,7 @@ namespace catgs::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr std::string_view sidecar =
     R"({"up": "-y", "start_pose": {"position": [1, 2, 3], "look_at": [1, 2, 9]},
@@ -204,6 +205,15 @@ TEST_F(SidecarUpload, SaysWhereNothingCanBeWritten) {
   const HttpReply taken = put(token("author"));
   EXPECT_EQ(taken.status, 409);
   EXPECT_THAT(taken.body, HasSubstr("download the file"));
+}
+
+/// Where the server keeps its scenes is the operator's matter.
+TEST_F(SidecarUpload, TellsNobodyTheServersFolders) {
+  folder.write("hall.json", "{");
+  const HttpReply refused = put(token("author"), {{"if-match", "\"other\""}});
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, HasSubstr("hall.json"));
+  EXPECT_THAT(refused.body, Not(HasSubstr(scene.parent_path().string())));
 }
 
 }  // namespace
