@@ -61,12 +61,16 @@ struct FrameStats {
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::uint64_t tasks = 0;               // parts that the tiles were blended in
+  std::uint32_t giants = 0;  // CUDA core: Gaussians of the group that turns move far in lists
+  std::uint32_t uncarried_lists = 0;  // CUDA core: with more of those than could be moved
   // Pipeline::catgs
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
   // Of visible Gaussians deeper than speculation_min_depth(): see SceneDepths.
   float nearest_depth = 0;       // world units
   float mean_inverse_depth = 0;  // 1 / world units
+  // Of the drawing that succeeded: what was drawn before for lack of room, or as a sub-frame that a
+  // watched Gaussian came into, is not in them.
   std::array<float, stage_count> stage_ms{};
 
   [[nodiscard]] float total_ms() const {

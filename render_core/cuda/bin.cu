@@ -1,6 +1,7 @@
 #include "render_core/cuda/bin.cuh"
 #include "render_core/cuda/cuda_check.h"
 #include "render_core/cuda/tiles.cuh"
+#include "render_core/cuda/warp_sums.cuh"
 
 namespace catgs::cuda {
 namespace {
@@ -76,15 +77,10 @@ __device__ void emit_together(const EmitParams<Tile>& p, Window<Tile>& window,
     const int row = top + lane;
     const int2 columns = row <= f.last_row ? f.columns(row) : make_int2(0, -1);
     const std::uint32_t count = static_cast<std::uint32_t>(max(0, columns.y - columns.x + 1));
-    std::uint32_t before = count;  // inclusive scan over the warp
-#pragma unroll
-    for (int step = 1; step < warp_size; step *= 2) {
-      const std::uint32_t other = __shfl_up_sync(~0u, before, step);
-      if (lane >= step) before += other;
-    }
+    const WarpSums<std::uint32_t> counts = warp_sums(count);
     window.put_row(static_cast<std::uint32_t>(row * p.shape.tiles_x), columns, slot,
-                   at + before - count, last);
-    at += __shfl_sync(~0u, before, warp_size - 1);
+                   at + counts.before, last);
+    at += counts.all;
   }
 }
 

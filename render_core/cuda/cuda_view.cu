@@ -254,7 +254,7 @@ GiantSet CudaView::want_giants(const FramePlan& plan) {
 /// Brings the lists of a sub-frame into its own depth order.
 void CudaView::reorder(const GiantSet& giants) {
   const cudaStream_t stream = stream_.get();
-  const FrameCounts* counts = lists_.counts.get();
+  FrameCounts* counts = lists_.counts.get();
   const std::uint32_t* depth_keys = builder_.depth_keys();
   std::uint32_t* slot = lists_.slot.get();
   if (giants.bits != nullptr)
@@ -430,6 +430,8 @@ FrameView CudaView::finished(const FramePlan& plan, float near_z) {
   stats.overflowed_entries = counts.list_entries - stats.list_entries;
   stats.list_max = counts.list_max;
   for (const std::uint32_t queued : counts.queued) stats.tasks += queued;
+  stats.giants = counts.giants;
+  stats.uncarried_lists = counts.uncarried_lists;
   stats.blended_pairs = counts.blended_pairs;
   if (plan.kind == FrameKind::key)
     stats.displacement_px = std::bit_cast<float>(counts.displacement);

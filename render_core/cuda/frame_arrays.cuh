@@ -45,6 +45,7 @@ struct FrameCounts {
   std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
   std::uint32_t runs = 0;                    // of the reorder stage
+  std::uint32_t uncarried_lists = 0;         // with more giants than launch_giants() can carry
   std::uint32_t wanted_slices = 0;           // of long tiles; allocated_slices found room
   std::uint32_t allocated_slices = 0;
   std::uint32_t next_part = 0;              // of a task, that no warp of the blend has taken yet

@@ -1,6 +1,7 @@
 #include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/reorder.cuh"
+#include "render_core/cuda/warp_sums.cuh"
 
 namespace catgs::cuda {
 namespace {
@@ -126,24 +127,13 @@ __device__ void find(const GiantParams& p, const List& list, Notes& notes) {
 /// their lengths, and where a part's moves are noted.
 __device__ void plan(Notes& notes) {
   const std::uint32_t r = threadIdx.x;
-  int gives = notes.gain[r];
-#pragma unroll
-  for (int d = 1; d < warp_size; d *= 2) {
-    const int before = __shfl_up_sync(~0u, gives, d);
-    if (r >= d) gives += before;
-  }
-  const int before = __shfl_up_sync(~0u, gives, 1);
-  const std::uint32_t leave = notes.leaving[r] + max(gives, 0) + (r > 0 ? max(-before, 0) : 0);
-  std::uint32_t next = leave;
-#pragma unroll
-  for (int d = 1; d < warp_size; d *= 2) {
-    const std::uint32_t more = __shfl_up_sync(~0u, next, d);
-    if (r >= d) next += more;
-  }
-  const std::uint32_t moves = __shfl_sync(~0u, next, warp_size - 1);
+  const int taken = warp_sums(notes.gain[r]).before;  // from the part before
+  const int gives = taken + notes.gain[r];
+  const std::uint32_t leave = notes.leaving[r] + max(gives, 0) + max(-taken, 0);
+  const WarpSums<std::uint32_t> leaving = warp_sums(leave);
   notes.gives[r] = gives;
-  notes.next_left[r] = notes.next_taken[r] = next - leave;
-  if (r == 0) notes.moves = moves;
+  notes.next_left[r] = notes.next_taken[r] = leaving.before;
+  if (r == 0) notes.moves = leaving.all;
 }
 
 /// By one warp: notes the neighbours that pass the boundary behind part r. A part gives from its
@@ -181,8 +171,8 @@ __device__ void give(const List& list, std::uint32_t r, Notes& notes) {
   }
 }
 
-/// Carries the giants that were found to the parts that their depths lie in.
-__device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
+/// Carries the giants that were found to the parts that their depths lie in; false: not all.
+__device__ bool carry(const GiantParams& p, const List& list, Notes& notes) {
   const std::uint32_t found = min(notes.found, most_found);
   std::uint32_t giant[found_per_thread], source[found_per_thread], target[found_per_thread];
 #pragma unroll
@@ -200,7 +190,7 @@ __device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
   __syncthreads();
   if (threadIdx.x < warp_size) plan(notes);
   __syncthreads();
-  if (notes.moves == 0 || notes.moves > most_moves) return;
+  if (notes.moves > most_moves) return false;
 #pragma unroll
   for (std::uint32_t j = 0; j < found_per_thread; ++j) {
     if (target[j] == source[j]) continue;
@@ -210,9 +200,10 @@ __device__ void carry(const GiantParams& p, const List& list, Notes& notes) {
   for (std::uint32_t r = threadIdx.x / warp_size; r + 1 < list.parts(); r += block_size / warp_size)
     give(list, r, notes);
   __syncthreads();
-  if (notes.lacking) return;
+  if (notes.lacking) return false;
   for (std::uint32_t k = threadIdx.x; k < notes.moves; k += block_size)
     list.slot[notes.left[k]] = notes.taken[k];
+  return notes.found <= most_found;
 }
 
 __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p) {
@@ -220,7 +211,11 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
   let_next_kernel_begin();
   wait_for_earlier_work();
   const std::uint32_t giants = p.counts->giants;
-  if (p.counts->unlisted != 0 || giants == 0 || giants > most_giants) return;
+  if (p.counts->unlisted != 0 || giants == 0) return;
+  if (giants > most_giants) {
+    p.counts->uncarried_lists = p.shape.tiles();
+    return;
+  }
   for (std::uint32_t i = threadIdx.x; i < giant_words; i += block_size) notes.bits[i] = p.bits[i];
   for (std::uint32_t t = blockIdx.x; t < p.shape.tiles(); t += gridDim.x) {
     const uint2 range = p.range[t];
@@ -231,7 +226,8 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
     __syncthreads();
     find(p, list, notes);
     __syncthreads();
-    if (notes.found > 0) carry(p, list, notes);
+    if (notes.found > 0 && !carry(p, list, notes) && threadIdx.x == 0)
+      atomicAdd(&p.counts->uncarried_lists, 1u);
   }
 }
 

@@ -66,7 +66,7 @@ struct GiantParams {
   const std::uint32_t* ordered;    // [tiles], how many of its entries are in runs
   const std::uint32_t* depth_key;  // [visible_bound], of this frame
   std::uint32_t* slot;             // [list_bound]
-  const FrameCounts* counts;
+  FrameCounts* counts;
   int processors;  // of the device
 };
 void launch_giants(const GiantParams& params, cudaStream_t stream);

@@ -207,6 +207,8 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
   add_times(json, measurement, FrameKind::sub, "_sub");
   json["visible_mean"] = lists.visible_mean;
   json["overflowed_entries"] = lists.overflowed;
+  json["giants_max"] = lists.giants_max;
+  json["uncarried_lists"] = lists.uncarried;
   json["key_frames"] = measurement.frame_ms(FrameKind::key).size();
   json["sub_frames"] = measurement.frame_ms(FrameKind::sub).size();
   json["frames_per_key"] = measurement.frames_per_key();
@@ -251,6 +253,10 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
   if (lists.overflowed > 0) {
     fmt::print("{:<14}{} list entries found no memory and were not drawn\n", "OVERFLOW",
                lists.overflowed);
+  }
+  if (lists.uncarried > 0) {
+    fmt::print("{:<14}{} lists had more giants (up to {} in view) than can be carried\n", "ORDER",
+               lists.uncarried, lists.giants_max);
   }
   if (result.quality) print_quality(*result.quality);
 }
