@@ -234,7 +234,8 @@ compose_server_command() {
 # A wrong value of an option is told before scenes are made and loaded.
 check_server_options() {
   local message status=0
-  message=$("${server_command[@]}" --print-config 2>&1 >/dev/null) || status=$?
+  # In front: behind an option that lacks its value it would be taken for that.
+  message=$("${server_command[0]}" --print-config "${server_command[@]:1}" 2>&1 >/dev/null) || status=$?
   ((status == 0)) || fail "$status" "$message" "All options: $bin_dir/catgs-server --help"
 }
 

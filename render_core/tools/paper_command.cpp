@@ -180,6 +180,15 @@ Json settings_json(const PaperCase& scene) {
           {"every", scene.options().every}};
 }
 
+/// What a table that is copied elsewhere should not be without.
+std::string provenance(const Json& report) {
+  const Json& settings = report["settings"];
+  return fmt::format("{}x{}, focal length {} px, {}; version {}, commit {}.\n",
+                     settings["size_px"][0].get<int>(), settings["size_px"][1].get<int>(),
+                     settings["focal_px"].get<float>(),
+                     report["cases"][0]["device"].get<std::string>(), build_version, build_commit);
+}
+
 void paper(const PaperCommand& command, const CLI::App& app) {
   const PaperOptions& options = command.options;
   const bool quiet = is_quiet(app);
@@ -218,6 +227,7 @@ void paper(const PaperCommand& command, const CLI::App& app) {
       json.push_back(to_json(tables[t]));
     }
   }
+  if (command.json != "-") fmt::print("\n{}", provenance(report));
   if (!command.json.empty()) write_json(command.json, report);
 }
 

@@ -107,11 +107,13 @@ ViewSettings view_settings(const PipelineOptions& options) {
   speculation.max_deviation_px = options.max_deviation_px.value_or(speculation.max_deviation_px);
   speculation.guard_px = options.guard_px.value_or(speculation.guard_px);
   if (options.grid) speculation.grid = parse_grid(*options.grid);
-  if (options.guard_px && speculation.grid != GridKind::warp) {
-    throw InputError("--guard-px", "",
-                     fmt::format("means nothing to the {} grid", grid_name(speculation.grid)),
-                     "use --grid warp");
-  }
+  const bool warps = speculation.grid == GridKind::warp;
+  const auto refuse = [&](std::string_view flag, std::string_view remedy) {
+    throw InputError(
+        flag, "", fmt::format("means nothing to the {} grid", grid_name(speculation.grid)), remedy);
+  };
+  if (options.guard_px && !warps) refuse("--guard-px", "use --grid warp");
+  if (options.max_deviation_px && warps) refuse("--max-deviation-px", "use --grid fixed or shift");
   check_speculation(speculation);
   if (options.order) settings.order = parse_order(*options.order);
   speculation.cost_aware = options.cost_aware;

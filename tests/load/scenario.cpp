@@ -16,6 +16,10 @@
 namespace catgs::load {
 namespace {
 
+std::string_view kind_of(bool) { return "true or false"; }
+std::string_view kind_of(std::int64_t) { return "a whole number"; }
+std::string_view kind_of(const std::string&) { return "a text in quotes"; }
+
 /// Takes the values of one table by name; what nobody took is a mistake.
 class TableReader {
  public:
@@ -31,7 +35,7 @@ class TableReader {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const auto found = node->value_exact<T>();
-    if (!found) refuse(*node, fmt::format("{} has another type", key));
+    if (!found) refuse(*node, fmt::format("{} is not {}", key, kind_of(T())));
     value = *found;
   }
 

@@ -77,10 +77,11 @@ stall-for = "2s"
 
 TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
   expect_refused("", "has no [[clients]]");
-  expect_refused("duration = 5\n[[clients]]\n", "line 1: duration has another type");
+  expect_refused("duration = 5\n[[clients]]\n", "line 1: duration is not a text in quotes");
   expect_refused("[[clients]]\nsession = 3\n",
                  "line 2: nothing is called \"session\" here (did you mean sessions?)");
   expect_refused("[held]\nlag = 3\n", "(one of pose-age-p95-ms, pose-to-frame-p95-ms, psnr-db)");
+  expect_refused("[[clients]]\nsessions = \"3\"\n", "line 2: sessions is not a whole number");
   expect_refused("[[clients]]\nsessions = 0\n", "line 2: sessions is not in 1…1000");
   expect_refused("[[clients]]\nlink = \"speed=1mbit\"\n", "line 2: link");
   expect_refused("[[clients]]\nsizes = [1]\n", "line 2: sizes is no list of texts");

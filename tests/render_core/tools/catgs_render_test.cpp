@@ -303,6 +303,8 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames("--trace x --seed 1 --out x"), "--seed: means nothing to a recorded trace");
   expect(frames(still + "--pipeline catgs --grid fixed --guard-px 1 --out x"),
          "--guard-px: means nothing to the fixed grid (use --grid warp)");
+  expect(frames(still + "--pipeline catgs --max-deviation-px 1 --out x"),
+         "--max-deviation-px: means nothing to the warp grid (use --grid fixed or shift)");
   expect(run(fmt::format("bench {} --script still --frames :2 --warmup 100000000000", scene())),
          "--warmup: 100000000000 frames of a path of 2");
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");

@@ -102,6 +102,7 @@ TEST_F(Paper, PrintsMarkdownAndWritesJson) {
                                       "| Average FPS | cloud | mist |\n|---|---:|---:|\n"
                                       "| Ours-Full | "));
   EXPECT_THAT(outcome.out, HasSubstr("| List length (10³) | cloud | mist |\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("\n96x64, focal length "));
   std::ifstream file(path("tables.json"));
   const Json json = Json::parse(file);
   EXPECT_THAT(names(json.at("tables")), ElementsAre("ablation", "list"));
