@@ -114,7 +114,8 @@ std::shared_ptr<const SceneEntry> load_scene(
   Scene scene = load(spec, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->facts = facts_of(scene, id_of(scene.name));
-  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud);
+  ThreadPool pool(threads);
+  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, pool);
   if (!is_synthetic(spec)) {
     entry->sidecar = locate_scene(spec).hints.sidecar;
     entry->tours = read_tours(entry->sidecar);

@@ -17,7 +17,7 @@ SceneStore::SceneStore(const GaussianCloud& cloud, ThreadPool& pool)
   sh_ = hwy::AllocateAligned<float>(std::max<std::size_t>(1, packets * sh_floats_per_packet()));
   if (!attributes_ || !original_index_ || !sh_) throw std::bad_alloc();
 
-  const std::vector<std::uint32_t> order = morton_order(cloud, pool);
+  const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
   clusters_.resize(clusters_of(size_));
   pool.parallel_for(clusters_.size(), [&](std::size_t c) {
     constexpr std::size_t packets_per_cluster = cluster_size / packet_size;

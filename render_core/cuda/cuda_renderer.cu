@@ -180,7 +180,7 @@ MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<Devi
     throw DevicesUnusable("--renderer cuda", "", obstacle, "use --renderer cpu");
   int count = 0;
   (void)cudaGetDeviceCount(&count);
-  const cuda::SceneSource source{cloud, morton_order(cloud, pool), pool};
+  const cuda::SceneSource source{cloud, morton_order(cloud.mean, pool), pool};
   std::vector<std::future<cuda::Device>> uploads;
   for (const int index : devices->among(count)) {
     uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(source), index));

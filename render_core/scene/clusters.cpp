@@ -27,18 +27,18 @@ std::uint64_t spread_bits(std::uint64_t v) {
 
 }  // namespace
 
-std::vector<std::uint32_t> morton_order(const GaussianCloud& cloud, ThreadPool& pool) {
+std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> places, ThreadPool& pool) {
   glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-  for (const glm::vec3& mean : cloud.mean) {
-    low = glm::min(low, mean);
-    high = glm::max(high, mean);
+  for (const glm::vec3& place : places) {
+    low = glm::min(low, place);
+    high = glm::max(high, place);
   }
   constexpr double cells = 1 << 21;
   const glm::dvec3 scale = (cells - 1.0) / glm::max(glm::dvec3(high) - glm::dvec3(low), 1e-30);
 
-  std::vector<CodedIndex> codes(cloud.size()), scratch(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const glm::dvec3 cell = (glm::dvec3(cloud.mean[i]) - glm::dvec3(low)) * scale;
+  std::vector<CodedIndex> codes(places.size()), scratch(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const glm::dvec3 cell = (glm::dvec3(places[i]) - glm::dvec3(low)) * scale;
     codes[i] = {spread_bits(static_cast<std::uint64_t>(cell.x)) |
                     spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
                     spread_bits(static_cast<std::uint64_t>(cell.z)) << 2,
@@ -46,7 +46,7 @@ std::vector<std::uint32_t> morton_order(const GaussianCloud& cloud, ThreadPool& 
   }
   RadixSorter sorter;
   sorter.sort(codes, scratch, 63, pool);
-  std::vector<std::uint32_t> order(cloud.size());
+  std::vector<std::uint32_t> order(places.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = codes[i].value;
   return order;
 }

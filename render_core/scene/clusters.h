@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -23,9 +24,9 @@ constexpr std::size_t clusters_of(std::size_t gaussians) {
   return (gaussians + cluster_size - 1) / cluster_size;
 }
 
-/// Indices of the cloud's Gaussians along a Morton curve; equal codes keep their order. Cluster c
-/// is a run of them, from c * cluster_size on.
-std::vector<std::uint32_t> morton_order(const GaussianCloud& cloud, ThreadPool& pool);
+/// Indices of places along a Morton curve; equal codes keep their order. Of a cloud's means,
+/// cluster c is a run of them, from c * cluster_size on.
+std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> places, ThreadPool& pool);
 
 /// Bounds of a cluster for culling.
 struct Cluster {

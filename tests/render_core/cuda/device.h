@@ -50,7 +50,7 @@ inline TestScene in_cluster_order(TestScene scene) {
   GaussianCloud to;
   to.resize(from.size(), from.sh_degree);
   std::size_t i = 0;
-  for (const std::uint32_t original : morton_order(from, pool)) {
+  for (const std::uint32_t original : morton_order(from.mean, pool)) {
     to.mean[i] = from.mean[original];
     to.rotation[i] = from.rotation[original];
     to.scale[i] = from.scale[original];

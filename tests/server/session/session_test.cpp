@@ -348,7 +348,8 @@ TEST_F(SessionTest, SaysWhatARayMeetsButNotEndlessly) {
   cloud.scale[0] = glm::vec3(0.5f);
   cloud.opacity[0] = 0.9f;
   auto scene = std::make_shared<SceneEntry>();
-  scene->surface = std::make_shared<const SurfacePoints>(cloud);
+  ThreadPool pool(1);
+  scene->surface = std::make_shared<const SurfacePoints>(cloud, pool);
   host.admission = Admission{scene, {EncoderKind::x264, Codec::h264, "libx264"}};
   greet();
   session.on_message(Pick{5, glm::vec3(0.0f), {0.0f, 0.0f, 1.0f}}, now);
