@@ -66,6 +66,11 @@ Metrics::Metrics()
                  .Name("catgs_device_views")
                  .Help("Streams that render on a CUDA device")
                  .Register(registry_)),
+      loop_stalled_(prometheus::BuildGauge()
+                        .Name("catgs_loop_stalled_seconds")
+                        .Help("Since the session thread moved, and the age of the oldest frame "
+                              "under way")
+                        .Register(registry_)),
       encoder_sessions_(prometheus::BuildGauge()
                             .Name("catgs_encoder_sessions")
                             .Help("Sessions by their video encoder")
@@ -167,6 +172,10 @@ std::string Metrics::scrape() const {
 
 void Metrics::set_views(int device, int views) {
   views_.Add({{"device", std::to_string(device)}}).Set(views);  // the gauge that is there already
+}
+
+void Metrics::set_loop_stalled(const std::string& loop, Clock::duration stalled) {
+  loop_stalled_.Add({{"loop", loop}}).Set(std::chrono::duration<double>(stalled).count());
 }
 
 void Metrics::set_encoder_sessions(const std::string& encoder, int count) {

@@ -25,6 +25,8 @@ class Metrics {
 
   /// Views that live on a CUDA device, as of now.
   void set_views(int device, int views);
+  /// How long a loop has not moved, as of now.
+  void set_loop_stalled(const std::string& loop, Clock::duration stalled);
   /// Sessions that have an encoder of this name, as of now.
   void set_encoder_sessions(const std::string& encoder, int count);
 
@@ -34,6 +36,7 @@ class Metrics {
  private:
   prometheus::Registry registry_;
   prometheus::Family<prometheus::Gauge>& views_;
+  prometheus::Family<prometheus::Gauge>& loop_stalled_;
   prometheus::Family<prometheus::Gauge>& encoder_sessions_;
 
  public:

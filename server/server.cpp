@@ -23,6 +23,7 @@
 #include "render_core/thread_pool.h"
 #include "server/access.h"
 #include "server/link_preview.h"
+#include "server/liveness.h"
 #include "server/log.h"
 #include "server/metrics.h"
 #include "server/net/net_server.h"
@@ -31,10 +32,12 @@
 #include "server/scene_catalog.h"
 #include "server/scene_library.h"
 #include "server/schedule/pool_executor.h"
+#include "server/schedule/watched_executor.h"
 #include "server/session/session_registry.h"
 #include "server/sidecar_saver.h"
 #include "server/signed_token.h"
 #include "server/stop_while_loading.h"
+#include "server/watchdog.h"
 
 namespace catgs {
 namespace {
@@ -111,8 +114,9 @@ std::string bearer_token(std::string_view authorization) {
 }  // namespace
 
 struct Server::State {
-  explicit State(const ServerConfig& configuration)
+  State(const ServerConfig& configuration, const ServerParts& parts)
       : config(configuration),
+        liveness(parts.liveness_clock),
         access(config.token_file, config.token_key_file),
         client(find_client(config.client_dir)),
         net(net_options()),
@@ -145,6 +149,7 @@ struct Server::State {
 
   const ServerConfig config;
   std::optional<StopWhileLoading> stop_while_loading{std::in_place};
+  Liveness liveness;
   AccessControl access;
   Metrics metrics;
   const StaticFiles client;
@@ -193,10 +198,11 @@ NetOptions Server::State::net_options() {
 }
 
 std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& request) const {
+  if (request.path != "/healthz" && request.path != "/readyz") return std::nullopt;
+  if (const std::string complaint = liveness.complaint(); !complaint.empty())
+    return text_response(503, complaint + "\n");
   if (request.path == "/healthz") return text_response(200, "ok\n");
-  if (request.path == "/readyz")
-    return ready ? text_response(200, "ready\n") : text_response(503, "not ready\n");
-  return std::nullopt;
+  return ready ? text_response(200, "ready\n") : text_response(503, "not ready\n");
 }
 
 HttpResponse Server::State::respond(const HttpRequest& request) {
@@ -285,6 +291,8 @@ std::optional<HttpResponse> Server::State::refuse_upload(const HttpRequest& requ
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
   for (const auto& [device, views] : devices->views()) metrics.set_views(device, views);
+  for (const Liveness::Loop& loop : liveness.loops())
+    metrics.set_loop_stalled(std::string(loop.name), loop.stalled);
   if (request.path == "/metrics")
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
   if (request.path == "/api/sessions")
@@ -292,8 +300,8 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
   return text_response(404, "404: /metrics and /api/sessions are here\n");
 }
 
-Server::Server(const ServerConfig& config, const WrapExecutor& wrap)
-    : state_(std::make_unique<State>(config)) {
+Server::Server(const ServerConfig& config, const ServerParts& parts)
+    : state_(std::make_unique<State>(config, parts)) {
   State& s = *state_;
   s.scenes = std::make_unique<SceneLibrary>(
       s.config, RendererOptions{s.config.renderer, s.pool, s.config.simd, s.devices}, s.io,
@@ -310,8 +318,10 @@ Server::Server(const ServerConfig& config, const WrapExecutor& wrap)
   if (!pools.render.empty()) options.devices = s.devices;
   options.cpus = s.pool->threads();
   options.on_devices_lost = [&s](const std::string& why) { s.give_up(why); };
+  options.on_tick = [&s] { s.liveness.session_moved(); };
   std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(std::move(pools));
-  if (wrap) executor = wrap(std::move(executor));
+  if (parts.wrap) executor = parts.wrap(std::move(executor));
+  executor = std::make_shared<WatchedExecutor>(std::move(executor), s.liveness);
   s.registry = std::make_unique<SessionRegistry>(s.io, std::move(options), std::move(executor),
                                                  *s.scenes, s.encoders, std::move(authorize),
                                                  session_tokens(s.config), s.metrics);
@@ -332,6 +342,10 @@ void Server::run() {
   run_promptly();  // others have been started
   s.ready = true;
   s.print_banner();
+  const Watchdog watchdog(s.liveness, [](const std::string& why) {
+    spdlog::critical("{}; the process ends, for its supervisor to start it anew", why);
+    ::_exit(1);
+  });
   s.io.run();
   spdlog::info("stopped");
   if (!s.failure.empty()) throw std::runtime_error(s.failure);

@@ -4,21 +4,26 @@
 #include <memory>
 
 #include "server/config.h"
+#include "server/pipeline/frame_ticket.h"
 
 namespace catgs {
 
 class FrameExecutor;
 
-/// Puts something between the sessions and what renders for them: who watches it, or lets it fail.
-using WrapExecutor =
-    std::function<std::shared_ptr<FrameExecutor>(std::shared_ptr<FrameExecutor> executor)>;
+/// What a test may put into a server.
+struct ServerParts {
+  /// Puts something between the sessions and what renders for them: who watches it, or lets it
+  /// fail.
+  std::function<std::shared_ptr<FrameExecutor>(std::shared_ptr<FrameExecutor> executor)> wrap{};
+  std::function<TimePoint()> liveness_clock = Clock::now;  // by which /healthz judges
+};
 
 /// The whole server, assembled from a validated configuration.
 class Server {
  public:
   /// Binds the ports, loads the scenes, probes the encoders. Meanwhile, and until run(), SIGINT and
   /// SIGTERM end the whole process with status 0. Throws InputError, or DevicesUnusable.
-  explicit Server(const ServerConfig& config, const WrapExecutor& wrap = {});
+  explicit Server(const ServerConfig& config, const ServerParts& parts = {});
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -27,6 +32,7 @@ class Server {
   /// returns when they have left, within two seconds; on SIGTERM --drain-wait and --drain-deadline
   /// give proxies and clients more time. A second signal ends the process at once. Where no device
   /// renders any more, clients are told in the same way, and then it throws std::runtime_error.
+  /// Where a thread that serves visitors stalls for minutes, it ends the process with status 1.
   void run();
   /// Any thread.
   void stop();

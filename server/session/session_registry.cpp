@@ -314,6 +314,7 @@ void SessionRegistry::give_frames() {
 
 void SessionRegistry::tick() {
   if (stopped_) return;
+  options_.on_tick();
   const TimePoint now = Clock::now();
   scenes_.on_tick(now);
   std::vector<std::shared_ptr<Client>> gone;

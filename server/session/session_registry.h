@@ -44,6 +44,7 @@ struct RegistryOptions {
   std::function<std::int64_t()> wall_clock_s = unix_now_s;  // for tokens; may be set, back too
   /// No device makes Views any more, and frames failed before: only a new process may help.
   std::function<void(const std::string& why)> on_devices_lost = [](const auto&) {};
+  std::function<void()> on_tick = [] {};  // the session thread has come round
 };
 
 /// Every session of the server, and the loop that gives them frames. All but accept() and

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <thread>
 
 #include "render_core/scene/save_scene.h"
@@ -123,6 +124,34 @@ TEST_F(SceneLibraryTime, AReplacedFileIsLoadedAnewWhenNobodyLooksAtTheOldOne) {
   tick(1s);
   EXPECT_FALSE(in_memory("a"));
   EXPECT_EQ(load("a")->facts.gaussians, 100u);
+}
+
+TEST_F(SceneLibraryTime, AMountThatHangsHoldsUpNobodyElse) {
+  std::promise<void> mount;
+  load("b");
+  {
+    // The loader frees this one, and stays in it.
+    const auto free = [&mount](const SceneEntry* entry) {
+      mount.get_future().wait();
+      delete entry;
+    };
+    library_->revise("a", Entry(new SceneEntry(*load("a")), free));
+  }
+  tick(3600s);
+  library_->want("b", now_);
+  EXPECT_TRUE(awaited("c"));
+  tick(1s);
+  EXPECT_FALSE(in_memory("a"));
+  for (int hour = 0; hour < 3; ++hour) {
+    tick(3600s);
+    EXPECT_TRUE(std::holds_alternative<Entry>(library_->want("b", now_)));
+    EXPECT_TRUE(awaited("c")) << "who asked for it waits";
+    EXPECT_THAT(library_->scene_ids(), ElementsAre("city", "a", "b", "c"));
+  }
+  EXPECT_TRUE(awaited("a"));
+  save_scene(random_cloud(5000, 3), folder_ / "d.ply");
+  mount.set_value();
+  run_until([&] { return in_memory("c"); });
 }
 
 TEST_F(SceneLibraryTime, FilesThatComeAndGoAreNoticed) {

@@ -26,6 +26,7 @@
 namespace catgs::test {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -77,9 +78,11 @@ TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   config.port = 0;
   config.admin_bind = "off";
   config.threads = 2;
-  Server server(config, [&](std::shared_ptr<FrameExecutor> executor) {
+  ServerParts parts;
+  parts.wrap = [&](std::shared_ptr<FrameExecutor> executor) {
     return std::make_shared<FailingExecutor>(std::move(executor), fails);
-  });
+  };
+  Server server(config, parts);
   auto ended = std::async(std::launch::async, [&] { server.run(); });
   const Stopped stopped(server);
   WireClient looks(server.port());
@@ -107,6 +110,86 @@ TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
     EXPECT_THAT(failure.what(), HasSubstr("no device renders any more: stream: an illegal memory"));
   }
+}
+
+/// Keeps the next frame, as a GPU call does that never returns, or the thread that submits it.
+class StuckExecutor final : public FrameExecutor {
+ public:
+  explicit StuckExecutor(std::shared_ptr<FrameExecutor> working) : working_(std::move(working)) {}
+  [[nodiscard]] int slots() const override { return working_->slots(); }
+  void open(std::shared_ptr<Stream> stream, StreamSettings settings,
+            std::function<void(StreamOpened)> done) override {
+    working_->open(std::move(stream), std::move(settings), std::move(done));
+  }
+  void submit(FrameJob job, std::function<void(FrameResult)> done) override {
+    if (keeps_the_frame.exchange(false))
+      kept_ = [this, job, done] { working_->submit(job, done); };
+    else
+      working_->submit(std::move(job), std::move(done));
+    if (keeps_the_thread.exchange(false)) released_.get_future().wait();
+  }
+  void close(std::shared_ptr<Stream> stream) override { working_->close(std::move(stream)); }
+  void release_thread() { released_.set_value(); }
+  void release_frame() { std::exchange(kept_, nullptr)(); }
+
+  std::atomic<bool> keeps_the_frame{false};
+  std::atomic<bool> keeps_the_thread{false};
+
+ private:
+  const std::shared_ptr<FrameExecutor> working_;
+  std::function<void()> kept_;
+  std::promise<void> released_;
+};
+
+TEST(ServerFaults, ProbesNameTheThreadThatStandsStill) {
+  std::atomic<Clock::duration> later{0s};
+  ServerParts parts;
+  parts.liveness_clock = [&] { return Clock::now() + later.load(); };
+  std::shared_ptr<StuckExecutor> stuck;
+  parts.wrap = [&](std::shared_ptr<FrameExecutor> executor) {
+    return stuck = std::make_shared<StuckExecutor>(std::move(executor));
+  };
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "127.0.0.1:0";
+  config.threads = 2;
+  Server server(config, parts);
+  auto ended = std::async(std::launch::async, [&] { server.run(); });
+  const Stopped stopped(server);
+  const auto healthy = [&] {
+    return http_get(server.port(), "/healthz").status == 200 &&
+           http_get(server.admin_port(), "/readyz").status == 200;
+  };
+  const auto complaint = [&] { return http_get(server.admin_port(), "/healthz").body; };
+  EXPECT_TRUE(healthy());
+  WireClient client(server.port());
+  client.greet();
+
+  stuck->keeps_the_frame = true;
+  client.send_pose(1);
+  ASSERT_TRUE(eventually([&] { return !stuck->keeps_the_frame; }));
+  later = 29s;
+  EXPECT_TRUE(eventually(healthy)) << "a slow frame";
+  later = 60s;
+  EXPECT_TRUE(eventually([&] { return complaint().starts_with("frames stalled for 6"); }));
+  EXPECT_EQ(http_get(server.admin_port(), "/healthz").status, 503);
+  EXPECT_EQ(http_get(server.port(), "/readyz").status, 503) << "proxies send nobody any more";
+  EXPECT_THAT(http_get(server.admin_port(), "/metrics").body,
+              HasSubstr("\ncatgs_loop_stalled_seconds{loop=\"frames\"} 6"));
+  stuck->release_frame();
+  client.send_ack(client.receive_frame().header.frame_id());
+  EXPECT_TRUE(eventually(healthy));
+
+  stuck->keeps_the_thread = true;
+  client.send_pose(2, 1.0f);
+  ASSERT_TRUE(eventually([&] { return !stuck->keeps_the_thread; }));
+  EXPECT_TRUE(healthy()) << "it has moved lately";
+  later = 80s;
+  EXPECT_THAT(complaint(), testing::StartsWith("session stalled for 2"));
+  EXPECT_EQ(http_get(server.port(), "/healthz").status, 503);
+  stuck->release_thread();
+  EXPECT_TRUE(eventually(healthy));
 }
 
 /// A library under --renderer auto whose first scene the processors render, and what it answers

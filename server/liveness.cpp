@@ -1,0 +1,52 @@
+#include "server/liveness.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto session_patience = 10s;
+// A key frame of the largest scene and picture takes a busy processor seconds.
+constexpr auto frame_patience = 30s;
+
+}  // namespace
+
+Liveness::Liveness(std::function<TimePoint()> clock)
+    : clock_(std::move(clock)), session_moved_(clock_()) {}
+
+void Liveness::session_moved() {
+  const std::lock_guard lock(mutex_);
+  session_moved_ = clock_();
+}
+
+std::shared_ptr<const void> Liveness::frame_started() {
+  const std::lock_guard lock(frames_->mutex);
+  const auto frame = frames_->started.insert(frames_->started.end(), clock_());
+  return {&*frame, [frames = frames_, frame](const void*) {
+            const std::lock_guard ended(frames->mutex);
+            frames->started.erase(frame);
+          }};
+}
+
+std::array<Liveness::Loop, 2> Liveness::loops() const {
+  const std::scoped_lock lock(mutex_, frames_->mutex);
+  const TimePoint now = clock_();
+  const TimePoint oldest = frames_->started.empty() ? now : frames_->started.front();
+  return {{{"session", now - session_moved_, session_patience},
+           {"frames", now - oldest, frame_patience}}};
+}
+
+std::string Liveness::complaint() const {
+  std::string text;
+  for (const Loop& loop : loops())
+    if (loop.stalled > loop.patience)
+      text += fmt::format("{}{} stalled for {} s", text.empty() ? "" : ", ", loop.name,
+                          std::chrono::duration_cast<std::chrono::seconds>(loop.stalled).count());
+  return text;
+}
+
+}  // namespace catgs

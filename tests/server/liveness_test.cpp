@@ -1,0 +1,75 @@
+#include "server/liveness.h"
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/watchdog.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// At a time that passes when the test says so.
+struct LivenessTest : testing::Test {
+  Clock::duration now = 1h;
+  Liveness liveness{[this] { return TimePoint(now); }};
+};
+
+TEST_F(LivenessTest, NamesTheSessionThreadAfterTenSeconds) {
+  EXPECT_EQ(liveness.complaint(), "");
+  now = 1h + 10s;
+  EXPECT_EQ(liveness.complaint(), "");
+  now = 1h + 11s;
+  EXPECT_EQ(liveness.complaint(), "session stalled for 11 s");
+  liveness.session_moved();
+  EXPECT_EQ(liveness.complaint(), "");
+}
+
+TEST_F(LivenessTest, TheOldestFrameUnderWayTells) {
+  auto first = liveness.frame_started();
+  now = 1h + 20s;
+  auto second = liveness.frame_started();
+  liveness.session_moved();
+  now = 1h + 30s;
+  EXPECT_EQ(liveness.complaint(), "");
+  now = 1h + 31s;
+  EXPECT_EQ(liveness.complaint(), "session stalled for 11 s, frames stalled for 31 s");
+  first.reset();
+  liveness.session_moved();
+  EXPECT_EQ(liveness.complaint(), "");
+  now = 1h + 51s;
+  liveness.session_moved();
+  EXPECT_EQ(liveness.complaint(), "frames stalled for 31 s");
+  second.reset();
+  EXPECT_EQ(liveness.complaint(), "");
+}
+
+TEST_F(LivenessTest, TheWatchdogGivesUpWhatStaysStalled) {
+  now = 2h;
+  std::promise<std::string> why;
+  const Watchdog watchdog(
+      liveness, [&](const std::string& text) { why.set_value(text); }, 1ms);
+  EXPECT_EQ(why.get_future().get(), "session stalled for 3600 s");
+}
+
+TEST_F(LivenessTest, TheWatchdogForgetsWhatHasPassed) {
+  std::atomic<int> looks{0};
+  Liveness recovers([&] {
+    // Stalled in all but one of each sixty rounds.
+    const int look = looks++;
+    return TimePoint(look % Watchdog::rounds == 0 ? 1h : 2h);
+  });
+  {
+    const Watchdog watchdog(
+        recovers, [](const std::string& text) { FAIL() << text; }, 1ms);
+    while (looks < 3 * Watchdog::rounds) std::this_thread::yield();
+  }
+}
+
+}  // namespace
+}  // namespace catgs
