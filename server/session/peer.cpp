@@ -14,6 +14,9 @@ namespace {
 // Poses and acks at 240 Hz each, and room for bursts after a stall.
 constexpr double messages_per_second = 600.0;
 constexpr double message_burst = 1200.0;
+// That the session thread has not come to: four seconds of acks at 240 Hz.
+constexpr int max_waiting_messages = 1024;
+constexpr std::size_t max_waiting_bytes = 1 << 20;
 
 }  // namespace
 
@@ -23,9 +26,13 @@ Peer::Peer(SessionRegistry& registry, std::shared_ptr<Connection> connection)
       rate_(messages_per_second, message_burst, Clock::now()) {}
 
 template <typename Handle>
-void Peer::post(Handle handle) {
+void Peer::post(Handle handle, std::size_t bytes) {
+  ++waiting_messages_;
+  waiting_bytes_ += bytes;
   boost::asio::post(registry_.io_,
-                    [self = shared_from_this(), handle = std::move(handle)]() mutable {
+                    [self = shared_from_this(), handle = std::move(handle), bytes]() mutable {
+                      --self->waiting_messages_;
+                      self->waiting_bytes_ -= bytes;
                       if (const auto client = self->client_.lock()) handle(*self, *client);
                       self->registry_.give_frames();
                     });
@@ -34,12 +41,7 @@ void Peer::post(Handle handle) {
 void Peer::on_message(std::span<const std::byte> bytes, const LinkState& link) {
   if (refused_) return;
   const TimePoint now = Clock::now();
-  if (!rate_.take(now)) {
-    refused_ = true;
-    return post([](Peer& self, Client& c) {
-      c.refuse(self, ErrorCode::rate_limited, "too many messages");
-    });
-  }
+  if (!rate_.take(now)) return refuse(ErrorCode::rate_limited, "too many messages");
   auto parsed = wire::parse_client_message(bytes);
   if (const auto* error = std::get_if<wire::ParseError>(&parsed))
     return on_bad_message(error->what);
@@ -55,19 +57,26 @@ void Peer::on_message(std::span<const std::byte> bytes, const LinkState& link) {
       c.on_message(self, pose->sample, pose->received);
     });
   }
-  post([message = std::move(message), now, link](Peer& self, Client& c) {
-    c.on_link(self, link, now);
-    c.on_message(self, message, now);
-  });
+  if (waiting_messages_ >= max_waiting_messages ||
+      waiting_bytes_ + bytes.size() > max_waiting_bytes)
+    return refuse(ErrorCode::rate_limited, "too many messages wait");
+  post(
+      [message = std::move(message), now, link](Peer& self, Client& c) {
+        c.on_link(self, link, now);
+        c.on_message(self, message, now);
+      },
+      bytes.size());
+}
+
+void Peer::refuse(ErrorCode code, std::string why) {
+  refused_ = true;
+  post([code, why = std::move(why)](Peer& self, Client& c) { c.refuse(self, code, why); });
 }
 
 void Peer::on_bad_message(std::string_view why) {
   if (refused_) return;
-  refused_ = true;
   registry_.metrics_.bad_messages.Increment();
-  post([what = std::string(why)](Peer& self, Client& c) {
-    c.refuse(self, ErrorCode::bad_message, what);
-  });
+  refuse(ErrorCode::bad_message, std::string(why));
 }
 
 void Peer::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) {

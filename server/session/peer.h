@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <string>
 
@@ -17,7 +18,7 @@ class SessionRegistry;
 /// One websocket as sessions see it. What comes in on the network thread is limited in rate, parsed
 /// and posted to the session thread, where it belongs to a Client: that of its own session, the one
 /// that a resume token led to, or the one it watches. Poses wait in a slot where the newest wins;
-/// other messages are few and posted one by one.
+/// other messages are few and posted one by one, up to a bound.
 class Peer final : public ConnectionListener, public std::enable_shared_from_this<Peer> {
  public:
   Peer(SessionRegistry& registry, std::shared_ptr<Connection> connection);
@@ -46,15 +47,21 @@ class Peer final : public ConnectionListener, public std::enable_shared_from_thi
     TimePoint received;
     LinkState link;
   };
-  /// Posts `handle(client)` to the session thread, then lets the registry look for work.
+  /// Posts `handle(client)`, which holds a message of so many `bytes`, to the session thread, then
+  /// lets the registry look for work.
   template <typename Handle>
-  void post(Handle handle);
+  void post(Handle handle, std::size_t bytes = 0);
+  /// Nothing more is read, and the connection closes.
+  void refuse(ErrorCode code, std::string why);
 
   SessionRegistry& registry_;
   const std::shared_ptr<Connection> connection_;
 
   RateLimit rate_;        // network thread
   bool refused_ = false;  // network thread: nothing more is read
+  // Posted, and not handled yet: the session thread may be busy for long.
+  std::atomic<int> waiting_messages_{0};
+  std::atomic<std::size_t> waiting_bytes_{0};
   LatestSlot<ReceivedPose> latest_pose_;
   std::weak_ptr<Client> client_;  // session thread
   std::atomic<bool> watching_{false};

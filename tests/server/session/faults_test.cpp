@@ -29,6 +29,28 @@ class Faults : public RegistryTest {
   }
 };
 
+TEST_F(Faults, MessagesWaitForASessionThreadThatIsBusyUpToABound) {
+  only_x264();
+  start();
+  const auto say_often = [this](int times, int padding) {
+    Visitor& visitor = join();
+    v1::ClientMessage message;
+    message.mutable_request_idr();
+    std::string bytes = message.SerializeAsString();
+    for (int i = 0; i < padding; ++i) bytes += "\xa0\x06\x01";  // field 100, that nobody knows
+    for (int i = 0; i < times; ++i)                             // io does not run meanwhile
+      visitor.listener->on_message(std::as_bytes(std::span(bytes)), {});
+    io.run_for(5ms);
+    move_until([&] { return visitor.connection->closed || !visitor.connection->frames.empty(); });
+    return visitor.connection->error ? visitor.connection->error->code()
+                                     : v1::Error::CODE_UNSPECIFIED;
+  };
+  EXPECT_EQ(say_often(1024, 0), v1::Error::CODE_UNSPECIFIED);
+  EXPECT_EQ(say_often(1025, 0), v1::Error::RATE_LIMITED);
+  EXPECT_EQ(say_often(16, 21'800), v1::Error::CODE_UNSPECIFIED);
+  EXPECT_EQ(say_often(17, 21'800), v1::Error::RATE_LIMITED);
+}
+
 TEST_F(Faults, AnEncoderThatFailsIsOpenedAnew) {
   only_x264();
   start();
