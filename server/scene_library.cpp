@@ -105,15 +105,11 @@ void SceneLibrary::pin(std::shared_ptr<const SceneEntry> entry) {
 std::vector<std::string> SceneLibrary::scene_ids() const {
   std::vector<std::string> ids;
   for (const auto& [id, book] : shelf_)
-    if (!gone(book)) ids.push_back(id);
+    if (!book.gone) ids.push_back(id);
   // The one that newcomers get is the first that they see.
   if (const auto it = std::ranges::find(ids, default_scene_); it != ids.end())
     std::rotate(ids.begin(), it, it + 1);
   return ids;
-}
-
-bool SceneLibrary::gone(const Book& book) const {
-  return !book.pinned && !ids_.contains(book.found.path);
 }
 
 /// The shelf is the only owner of what nobody uses. Sessions come to a scene on this thread alone,
@@ -167,7 +163,7 @@ void SceneLibrary::on_tick(TimePoint now) {
     if (!book.entry || book.pinned) continue;
     if (in_use(book))
       residency_.note_use(id, now);
-    else if (book.outdated)
+    else if (book.outdated || book.gone)
       outdated.push_back(id);
   }
   for (const std::string& id : outdated) release(id);
@@ -195,9 +191,15 @@ void SceneLibrary::release(const std::string& id) {
   residency_.drop(id);
   auto entry = std::exchange(book.entry, nullptr);
   book.outdated = false;
-  if (gone(book)) shelf_.erase(id);
+  if (book.gone) erase(id);
   publish();
   boost::asio::post(loader_, [entry = std::move(entry)]() mutable { entry.reset(); });
+}
+
+void SceneLibrary::erase(const std::string& id) {
+  ids_.erase(shelf_.at(id).found.path);
+  shelf_.erase(id);
+  if (default_scene_ == id && !shelf_.empty()) default_scene_ = shelf_.begin()->first;
 }
 
 std::shared_ptr<const SceneEntry> SceneLibrary::read(const std::string& id,
@@ -271,28 +273,24 @@ void SceneLibrary::start_scan(TimePoint now) {
 }
 
 void SceneLibrary::merge(std::vector<FoundScene> found) {
-  std::map<std::filesystem::path, std::string> ids;
+  for (auto& [id, book] : shelf_) book.gone = !book.pinned;
   for (FoundScene& scene : found) {
     const auto known = ids_.find(scene.path);
     const std::string id = known != ids_.end() ? known->second : new_id(to_utf8(scene.name));
-    ids[scene.path] = id;
-    ids_[scene.path] = id;  // taken, for new_id()
+    ids_[scene.path] = id;
     Book& book = shelf_[id];
+    book.gone = false;
     if (book.found.changed != scene.changed) {
       book.outdated = book.entry != nullptr;
       book.retry_at = {};
     }
     book.found = std::move(scene);
   }
-  for (const auto& [path, id] : ids_) {
-    if (ids.contains(path)) continue;
-    Book& book = shelf_.at(id);
-    book.outdated = true;  // released when it is in nobody's use
-    if (!book.entry && !residency_.awaited(id)) shelf_.erase(id);
-  }
-  ids_ = std::move(ids);
-  if (!default_scene_.empty() && !shelf_.contains(default_scene_) && !shelf_.empty())
-    default_scene_ = shelf_.begin()->first;
+  // Those in memory are released first, when they are in nobody's use.
+  std::vector<std::string> unused;
+  for (const auto& [id, book] : shelf_)
+    if (book.gone && !book.entry && !residency_.awaited(id)) unused.push_back(id);
+  for (const std::string& id : unused) erase(id);
   publish();
 }
 

@@ -66,7 +66,8 @@ class SceneLibrary final : public SceneSource {
     FoundScene found;                         // of --scene-folder; of --scene: name and size alone
     std::shared_ptr<const SceneEntry> entry;  // while in memory
     bool pinned = false;
-    bool outdated = false;  // the file is another one by now, or gone
+    bool outdated = false;  // the file is another one by now
+    bool gone = false;      // there is no file: nobody new is offered it
     TimePoint retry_at{};   // after a failure
   };
   struct Loaded {
@@ -77,11 +78,11 @@ class SceneLibrary final : public SceneSource {
   void pin(std::shared_ptr<const SceneEntry> entry);
   void open_folders();
   [[nodiscard]] static bool in_use(const Book& book);
-  /// Its file is not there any more.
-  [[nodiscard]] bool gone(const Book& book) const;
   [[nodiscard]] SceneResidency::InUse in_use() const;
   void start_next(TimePoint now);
   void release(const std::string& id);
+  /// Of a scene whose file is gone and that is in nobody's hands any more, nothing stays.
+  void erase(const std::string& id);
   [[nodiscard]] std::shared_ptr<const SceneEntry> read(const std::string& id,
                                                        const FoundScene& found) const;
   /// read(), with what it throws as `error`.
@@ -103,7 +104,7 @@ class SceneLibrary final : public SceneSource {
   const std::function<TimePoint()> clock_;
   SceneFolders folders_;  // on the loader's thread, once the constructor is through
   std::map<std::string, Book> shelf_;
-  std::map<std::filesystem::path, std::string> ids_;  // a scene keeps its id
+  std::map<std::filesystem::path, std::string> ids_;  // of all on the shelf: a scene keeps its id
   std::string default_scene_;
   SceneResidency residency_;
   double bytes_per_second_ = 100e6;  // of the last load

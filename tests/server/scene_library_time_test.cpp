@@ -164,5 +164,39 @@ TEST_F(SceneLibraryTime, FilesThatComeAndGoAreNoticed) {
   load("d");
 }
 
+TEST_F(SceneLibraryTime, AFileThatComesBackWhileItIsLookedAtIsTheSceneThatItWas) {
+  Entry seen = load("a");
+  std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  EXPECT_THAT(library_->scene_ids(), ElementsAre("city", "b", "c"));
+  tick(1s);
+  EXPECT_EQ(library_->in_memory("a"), seen) << "who looks at it goes on";
+  std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 4; });
+  EXPECT_THAT(library_->scene_ids(), ElementsAre("city", "a", "b", "c"));
+  seen.reset();
+  tick(1s);
+  EXPECT_TRUE(in_memory("a")) << "the same file: nothing is outdated";
+  std::filesystem::remove(folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  tick(1s);
+  EXPECT_FALSE(library_->has("a"));
+}
+
+TEST_F(SceneLibraryTime, AFileThatGoesBeforeItIsLoadedIsForgotten) {
+  EXPECT_TRUE(awaited("a"));
+  EXPECT_TRUE(awaited("b"));
+  std::filesystem::remove(folder_ / "b.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  run_until([&] {
+    tick(31s);
+    return !library_->has("b");
+  });
+}
+
 }  // namespace
 }  // namespace catgs::test
