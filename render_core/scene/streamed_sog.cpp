@@ -67,10 +67,9 @@ LodChoice choose(const LodTree& tree, const std::vector<int>& wanted) {
   return choice;
 }
 
-/// One of the SOGs that the tree refers to, opened.
+/// One of the SOGs that the tree refers to. Its file is closed again: a scene may have thousands.
 struct Part {
-  std::unique_ptr<ByteSource> archive;  // keeps a zip readable; null for folders
-  std::unique_ptr<FileSet> archive_files;
+  std::unique_ptr<FileSet> archive_files;  // unpacked; null for folders
   SogMeta meta;
   std::vector<SogRange> ranges;
 
@@ -82,8 +81,7 @@ struct Part {
 Part open_part(const FolderFiles& folder, const std::string& name) {
   Part part;
   if (name.ends_with(".sog")) {
-    part.archive = folder.open(name);
-    part.archive_files = std::make_unique<ZipFiles>(*part.archive);
+    part.archive_files = std::make_unique<ZipFiles>(*folder.open(name));
     part.meta = read_sog_meta(*part.archive_files, "meta.json");
   } else {
     part.meta = read_sog_meta(folder, name);

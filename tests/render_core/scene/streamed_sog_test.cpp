@@ -4,6 +4,7 @@
 
 #include "tests/render_core/scene/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/descriptor_limit.h"
 
 namespace catgs::test {
 namespace {
@@ -96,6 +97,19 @@ TEST_F(StreamedSogTest, BundledSogFilesAreRead) {
   write("fine.sog", zip(encode_sog(cloud, 2)));
   meta_["filenames"][0] = "fine.sog";
   EXPECT_LT(glm::distance(load(0).cloud.mean[599], cloud.mean[599]), 0.001f);
+}
+
+TEST_F(StreamedSogTest, ManyFilesAreNotOpenAtOnce) {
+  meta_ = {{"version", 1}, {"lodLevels", 1}};
+  for (int i = 0; i < 20; ++i) {
+    const std::string name = "part" + std::to_string(i) + ".sog";
+    write(name, zip(encode_sog(random_cloud(10, 0), 2)));
+    meta_["filenames"].push_back(name);
+    meta_["tree"]["children"].push_back({{"lods", {{"0", piece(i, 0, 10)}}}});
+  }
+  two_threads();  // before there is no room for what it opens
+  const DescriptorLimit limit(next_descriptor() + 4);
+  EXPECT_EQ(load().cloud.size(), 200u);
 }
 
 TEST_F(StreamedSogTest, ErrorsNameTheField) {
