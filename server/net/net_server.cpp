@@ -1,5 +1,6 @@
 #include "server/net/net_server.h"
 
+#include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
+#include "server/net/accept_gate.h"
 #include "server/net/certificate_watch.h"
 #include "server/net/listen_error.h"
 #include "server/net/lws_http.h"
@@ -43,6 +45,7 @@ struct WebsocketSlot {
 struct Service {
   std::shared_ptr<LwsWaker> waker = std::make_shared<LwsWaker>();
   std::vector<std::byte> scratch;  // outgoing bytes of the packet being written
+  AcceptGate gate;
 };
 
 Service& service_of(lws* wsi) {
@@ -130,8 +133,31 @@ int go_on_with_upload(lws* wsi, HttpSlot& slot, bool body_is_whole) {
   return finished ? finish_request(wsi, slot) : 0;
 }
 
+/// Before there is a lws of it. Operators and probes come in even where nobody else does; a proxy
+/// has one address for all its clients.
+int on_accept(lws* listener, int descriptor) {
+  const Site& site = site_of(listener);
+  if (!site.accept) return keep_reading;
+  std::array<char, 64> peer{};
+  lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
+  const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : peer.data();
+  const auto why =
+      service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
+  if (!why) return keep_reading;
+  site.on_refused(fmt::format("{}: {}", peer.data(), *why));
+  return close_connection;
+}
+
 int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
   switch (reason) {
+    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION:
+      return on_accept(wsi, static_cast<int>(reinterpret_cast<std::intptr_t>(in)));
+    case LWS_CALLBACK_WSI_CREATE:
+      service_of(wsi).gate.opened(wsi);
+      return 0;
+    case LWS_CALLBACK_WSI_DESTROY:
+      service_of(wsi).gate.closed(wsi);
+      return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
       return refuse_upgrade(wsi) ? close_connection : keep_reading;
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
@@ -337,6 +363,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   s.idle_policy.secs_since_valid_ping = ping_after_s;
   s.idle_policy.secs_since_valid_hangup = hang_up_after_s;
 
+  AcceptGate::raise_descriptor_limit();
   lws_context_creation_info info{};
   info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
   if (tls) info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;

@@ -20,6 +20,8 @@
 #include "server/scene_library.h"
 #include "server/schedule/frame_executor.h"
 #include "tests/render_core/scene/random_cloud.h"
+#include "tests/support/descriptor_limit.h"
+#include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -190,6 +192,41 @@ TEST(ServerFaults, ProbesNameTheThreadThatStandsStill) {
   EXPECT_EQ(http_get(server.port(), "/healthz").status, 503);
   stuck->release_thread();
   EXPECT_TRUE(eventually(healthy));
+}
+
+TEST(ServerFaults, KeepsDescriptorsForItsWorkWhenACrowdTakesTheRest) {
+  const RunningServer server;
+  WireClient visitor(server.port());
+  visitor.greet();
+  const auto refused = [&] { return metric(server, "catgs_requests_refused_total"); };
+  const auto answers = [&] {
+    RawSocket socket(server.port());
+    socket.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+    std::string received;
+    return socket.receive_until("200", received);
+  };
+  constexpr int others = 40;
+  const DescriptorLimit limit(next_descriptor() + others + 64);
+  for (int i = 0; i < 2 * others; ++i)
+    ASSERT_TRUE(eventually(answers)) << "those that are gone do not count";
+  const double refused_before = refused();
+  {
+    std::vector<RawSocket> crowd;
+    int served = 0;
+    for (int i = 0; i < others; ++i) {
+      crowd.emplace_back(server.port());
+      crowd.back().send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+      std::string received;
+      served += crowd.back().receive_until("200", received) ? 1 : 0;
+    }
+    // Each takes two: this process is its client, too.
+    EXPECT_GT(served, 0);
+    EXPECT_LE(served, others / 2);
+    EXPECT_EQ(refused() - refused_before, others - served) << "the admin port answers";
+    visitor.send_pose(1);
+    visitor.receive_frame();
+  }
+  EXPECT_TRUE(eventually(answers));
 }
 
 /// A library under --renderer auto whose first scene the processors render, and what it answers
