@@ -140,7 +140,7 @@ struct Server::State {
   void wait_for_signal();
   /// Readiness ends; after `wait` clients are told, and after `deadline` more they are closed.
   void begin_stop(std::chrono::milliseconds wait, std::chrono::milliseconds deadline);
-  /// Nothing can be rendered here any more: clients are told, and run() throws.
+  /// Nobody can be served here any more: clients are told, and run() throws.
   void give_up(const std::string& why);
   void drain(std::chrono::milliseconds deadline);
   /// Goes on with `then` when nobody is connected any more, and at the latest at `deadline`.
@@ -183,6 +183,9 @@ NetOptions Server::State::net_options() {
   options.on_refused = [this](const std::string& line) {
     metrics.requests_refused.Increment();
     log_refusal(line);
+  };
+  options.on_failed = [this] {
+    boost::asio::post(io, [this] { give_up("the network thread failed"); });
   };
   options.allowed_origins = config.allow_origins;
   options.embed_origins = config.embed_origins;
@@ -317,7 +320,9 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
     pools.render.emplace(device, std::make_shared<ThreadPool>(render_threads_per_gpu));
   if (!pools.render.empty()) options.devices = s.devices;
   options.cpus = s.pool->threads();
-  options.on_devices_lost = [&s](const std::string& why) { s.give_up(why); };
+  options.on_devices_lost = [&s](const std::string& why) {
+    s.give_up("no device renders any more: " + why);
+  };
   options.on_tick = [&s] { s.liveness.session_moved(); };
   std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(std::move(pools));
   if (parts.wrap) executor = parts.wrap(std::move(executor));
@@ -396,7 +401,7 @@ void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::mill
 
 void Server::State::give_up(const std::string& why) {
   if (stopping) return;
-  failure = "no device renders any more: " + why;
+  failure = why;
   spdlog::critical("{}; the process ends, for its supervisor to start it anew", failure);
   begin_stop(0ms, quick_stop_deadline);
 }

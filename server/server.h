@@ -31,8 +31,9 @@ class Server {
   /// Serves until SIGINT, SIGTERM or stop(): then readiness ends, clients are told, and run()
   /// returns when they have left, within two seconds; on SIGTERM --drain-wait and --drain-deadline
   /// give proxies and clients more time. A second signal ends the process at once. Where no device
-  /// renders any more, clients are told in the same way, and then it throws std::runtime_error.
-  /// Where a thread that serves visitors stalls for minutes, it ends the process with status 1.
+  /// renders any more or the network thread fails, clients are told in the same way, and then it
+  /// throws std::runtime_error. Where a thread that serves visitors stalls for minutes, it ends the
+  /// process with status 1.
   void run();
   /// Any thread.
   void stop();

@@ -298,6 +298,7 @@ struct NetServer::State {
   std::optional<CertificateWatch> certificates;
   int port = 0;
   int admin_port = 0;
+  std::function<void()> on_failed;
   std::atomic<bool> stopping{false};
   std::thread thread;
 
@@ -344,6 +345,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
     open_required_file("--tls-key", options.tls_key);
   }
   State& s = *state_;
+  s.on_failed = std::move(options.on_failed);
   s.site = {std::move(options.http),
             std::move(options.uploads),
             std::move(options.accept),
@@ -390,7 +392,10 @@ void NetServer::start() {
   State& s = *state_;
   s.thread = std::thread([&s] {
     run_promptly();
-    while (!s.stopping.load() && lws_service(s.context, 0) >= 0) {
+    while (!s.stopping.load()) {
+      if (lws_service(s.context, 0) >= 0) continue;
+      s.on_failed();
+      break;
     }
     s.service.waker->detach();
     s.certificates.reset();

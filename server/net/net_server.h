@@ -28,6 +28,8 @@ struct NetOptions {
   /// Of each request that is refused before anybody is asked for a session: whose, and why. Called
   /// on the network thread.
   std::function<void(const std::string& line)> on_refused = [](const auto&) {};
+  /// The network thread ends although nobody asked it to. Called on it.
+  std::function<void()> on_failed = [] {};
   std::string tls_certificate;  // PEM files; both or neither
   std::string tls_key;
 

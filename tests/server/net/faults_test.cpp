@@ -6,6 +6,7 @@
 
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,6 +25,20 @@
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+
+namespace {
+
+std::atomic<bool> network_fails{false};
+
+}  // namespace
+
+/// Stands before that of the shared library.
+struct lws_context;
+extern "C" int lws_service(lws_context* context, int timeout_ms) {
+  static const auto service =
+      reinterpret_cast<decltype(&lws_service)>(::dlsym(RTLD_NEXT, "lws_service"));
+  return network_fails ? -1 : service(context, timeout_ms);
+}
 
 namespace catgs::test {
 namespace {
@@ -227,6 +242,28 @@ TEST(ServerFaults, KeepsDescriptorsForItsWorkWhenACrowdTakesTheRest) {
     visitor.receive_frame();
   }
   EXPECT_TRUE(eventually(answers));
+}
+
+TEST(ServerFaults, EndsForItsSupervisorWhenTheNetworkThreadFails) {
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "off";
+  config.threads = 2;
+  Server server(config);
+  auto ended = std::async(std::launch::async, [&] { server.run(); });
+  const Stopped stopped(server);
+  RawSocket waker(server.port());
+  EXPECT_EQ(http_get(server.port(), "/healthz").status, 200);
+  network_fails = true;
+  waker.send("G");
+  try {
+    ended.get();
+    FAIL() << "run() returned as if somebody had asked for it";
+  } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
+    EXPECT_STREQ(failure.what(), "the network thread failed");
+  }
+  network_fails = false;
 }
 
 /// A library under --renderer auto whose first scene the processors render, and what it answers
