@@ -34,6 +34,9 @@ AdmissionBudget::Load AdmissionBudget::load(std::span<const SessionDemand> sessi
 bool AdmissionBudget::has_room(std::span<const SessionDemand> present,
                                const SessionDemand& newcomer) const {
   if (min_fps_ == 0 || present.empty()) return true;
+  if (std::ranges::none_of(present, [](const auto& s) { return s.frame_cost.has_value(); }))
+    return static_cast<double>(std::ranges::count_if(present, &SessionDemand::fresh)) <
+           (capacity_.gpus > 0 ? capacity_.gpus : capacity_.cpus);
   std::vector<SessionDemand> all(present.begin(), present.end());
   all.push_back(newcomer);
   const Load taken = load(all);

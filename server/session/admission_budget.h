@@ -11,6 +11,7 @@ struct SessionDemand {
   std::optional<SessionUsage::FrameCost> frame_cost;  // as measured
   double megapixels = 0;                              // of a frame
   int fps = 60;                                       // nominal
+  bool fresh = false;  // admitted lately: its cost is about to be known
 };
 
 /// Whether one more session leaves everybody a decent rate, judged by what the frames of the
@@ -26,7 +27,8 @@ class AdmissionBudget {
   AdmissionBudget(Capacity capacity, int min_fps) : capacity_(capacity), min_fps_(min_fps) {}
 
   /// A session without a measured cost is taken to cost the mean of the others by its pixels. With
-  /// nothing measured there is room; so there is for the first session, whatever it costs.
+  /// nothing measured there is room for a fresh one on each GPU, or on each processor where none
+  /// renders: others wait for what these are found to cost. For the first one there always is.
   [[nodiscard]] bool has_room(std::span<const SessionDemand> present,
                               const SessionDemand& newcomer) const;
 

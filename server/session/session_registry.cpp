@@ -14,6 +14,7 @@ namespace catgs {
 namespace {
 
 constexpr std::chrono::milliseconds tick_interval{250};
+constexpr std::chrono::seconds time_to_measure{3};  // who moves nothing for so long is at rest
 constexpr std::chrono::milliseconds queue_tell_interval{750};  // once a second, with the tick
 
 /// For people and logs: tells sessions apart, protects nothing.
@@ -230,12 +231,13 @@ bool SessionRegistry::has_place_for(const Client& client, const Hello& hello) co
 }
 
 std::vector<SessionDemand> SessionRegistry::demands() const {
+  const TimePoint now = Clock::now();
   std::vector<SessionDemand> demands;
   for (const auto& client : clients_) {
     if (!client->admitted_at()) continue;
     const Session& session = client->session();
-    demands.push_back(
-        {client->usage().frame_cost(), megapixels(session.moving_size_px()), session.fps()});
+    demands.push_back({client->usage().frame_cost(), megapixels(session.moving_size_px()),
+                       session.fps(), now - *client->admitted_at() < time_to_measure});
   }
   return demands;
 }

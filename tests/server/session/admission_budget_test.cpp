@@ -15,6 +15,7 @@ SessionDemand session(double cpu_s, double gpu_s = 0.0, double megapixels = 1.0,
 SessionDemand unknown(double megapixels = 1.0, int fps = 60) {
   return {std::nullopt, megapixels, fps};
 }
+SessionDemand fresh() { return {std::nullopt, 1.0, 60, true}; }
 
 TEST(AdmissionBudget, AdmitsWhileTheProcessorsKeepTheRate) {
   const AdmissionBudget budget({.cpus = 2}, 10);
@@ -48,6 +49,20 @@ TEST(AdmissionBudget, CountsThoseNotMeasuredYet) {
   EXPECT_TRUE(budget.has_room(std::vector{unknown(), unknown(), unknown()}, unknown()))
       << "nothing is known";
   EXPECT_FALSE(budget.has_room(std::vector{session(0.05), unknown()}, unknown()));
+}
+
+TEST(AdmissionBudget, ABurstWaitsForWhatTheFirstOnesCost) {
+  const AdmissionBudget processors({.cpus = 2}, 10);
+  EXPECT_TRUE(processors.has_room(std::vector{fresh()}, unknown()));
+  EXPECT_FALSE(processors.has_room(std::vector{fresh(), fresh()}, unknown()));
+  EXPECT_TRUE(processors.has_room(std::vector{fresh(), unknown()}, unknown()))
+      << "one that has shown nothing for long is at rest";
+  EXPECT_TRUE(processors.has_room(std::vector{fresh(), session(0.01)}, unknown()));
+  const AdmissionBudget gpu({.cpus = 16, .gpus = 1}, 10);
+  EXPECT_FALSE(gpu.has_room(std::vector{fresh()}, unknown()));
+  EXPECT_TRUE(gpu.has_room(std::vector{session(0.01, 0.01)}, unknown()));
+  const AdmissionBudget any({.cpus = 1}, 0);
+  EXPECT_TRUE(any.has_room(std::vector{fresh(), fresh()}, unknown()));
 }
 
 TEST(AdmissionBudget, TheScarcerOfProcessorsAndGpusDecides) {

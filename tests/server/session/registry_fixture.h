@@ -169,10 +169,10 @@ class PretendedEncoder final : public Encoder {
 
 class RegistryTest : public testing::Test {
  protected:
+  RegistryTest() { options.min_fps = 0; }
   void start(const EncoderAllocator::Policy& policy = {}) {
     options.devices = devices;
     options.encoders = policy;
-    options.min_fps = 0;
     const auto pool = std::make_shared<ThreadPool>(pool_threads);
     registry.emplace(
         io, options, std::make_shared<PoolExecutor>(PoolExecutor::Pools{pool}, encoder_factory()),

@@ -51,5 +51,22 @@ TEST_F(RegistryTest, OrWaitsForOneAsTheOperatorSays) {
   EXPECT_EQ(connection->welcome->config().encoder(), "h264_nvenc");
 }
 
+TEST_F(RegistryTest, ABurstWaitsForWhatTheFirstOnesCost) {
+  options.min_fps = 10;
+  options.cpus = 2;
+  start();
+  Visitor& first = join();
+  Visitor& second = join();
+  const Visitor& third = join();
+  EXPECT_TRUE(first.connection->welcome && second.connection->welcome);
+  EXPECT_TRUE(third.connection->waits);
+  EXPECT_FALSE(third.connection->welcome);
+  run_until([&] {
+    move(first);
+    return third.connection->welcome.has_value();
+  });
+  EXPECT_GE(first.connection->frames.size(), 8u) << "its frames were measured";
+}
+
 }  // namespace
 }  // namespace catgs::test
