@@ -12,7 +12,6 @@
 
 #include "render_core/error.h"
 #include "server/required_file.h"
-#include "server/signed_token.h"
 
 namespace catgs {
 namespace {
@@ -22,19 +21,18 @@ constexpr std::size_t min_key_bytes = 16;
 constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
 constexpr std::chrono::days longest_link{3650};
-constexpr std::string_view not_an_author =
-    "this link does not let you save: ask for one of role author";
 
 bool is_role(std::string_view role) {
   return role == "viewer" || role == "author" || role == "spectator" || role == "solo";
 }
 
 /// Why the role forbids it; nothing: it does not.
-std::optional<std::string> forbidden(std::string_view role, Use use) {
+Refusal forbidden(std::string_view role, Use use) {
   if (use == Use::own_session && role == "spectator")
     return "this link lets you watch others, not move by yourself";
   if (use == Use::watch && role == "solo") return "this link does not let you watch others";
-  if (use == Use::save && role != "author") return std::string(not_an_author);
+  if (use == Use::save && role != "author")
+    return "this link does not let you save: ask for one of role author";
   return std::nullopt;
 }
 
@@ -99,7 +97,8 @@ std::chrono::seconds parse_duration(std::string_view text) {
   return duration;
 }
 
-AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::path key_file)
+AccessControl::AccessControl(std::filesystem::path token_file,
+                             const std::filesystem::path& key_file)
     : token_file_(std::move(token_file)) {
   if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
   if (!token_file_.empty()) {
@@ -109,33 +108,41 @@ AccessControl::AccessControl(std::filesystem::path token_file, std::filesystem::
   }
 }
 
-std::optional<std::string> AccessControl::refusal(std::string_view token, std::string_view scene_id,
-                                                  std::int64_t now_unix_s, Use use) {
-  const std::lock_guard lock(mutex_);
-  if (use == Use::save && key_.empty())
-    return "nobody can save on this server: it was started without --token-key-file, which "
-           "links of role author are made with";
-  if (token_file_.empty() && key_.empty()) return std::nullopt;
+Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s) {
+  const bool has_authors = !key_.empty();
+  return [resolved = resolve(token, now_unix_s), has_authors](std::string_view scene_id,
+                                                              Use use) -> Refusal {
+    if (use == Use::save && !has_authors)
+      return "nobody can save on this server: it was started without --token-key-file, which "
+             "links of role author are made with";
+    if (const auto* refused = std::get_if<std::string>(&resolved)) return *refused;
+    const auto& grant = std::get<LinkGrant>(resolved);
+    if (!grant.scene_id.empty() && grant.scene_id != scene_id)
+      return "this link is for another scene";
+    return forbidden(grant.role, use);
+  };
+}
+
+std::variant<LinkGrant, std::string> AccessControl::resolve(std::string_view token,
+                                                            std::int64_t now_unix_s) {
+  const LinkGrant everything;  // that viewers may do
+  if (token_file_.empty() && key_.empty()) return everything;
   if (token.empty()) return "this server needs an access token: open the link you were given";
-  if (!token_file_.empty()) {
-    reload_when_changed();
-    if (is_static_token(token))
-      return use == Use::save ? std::optional<std::string>(not_an_author) : std::nullopt;
-  }
-  if (!key_.empty()) {
-    if (const auto grant = read_link_token(token, key_)) {
-      if (now_unix_s >= grant->expires_unix_s) return "this link has expired: ask for a new one";
-      if (!grant->scene_id.empty() && grant->scene_id != scene_id)
-        return "this link is for another scene";
-      return forbidden(grant->role, use);
-    }
+  if (is_static_token(token)) return everything;
+  if (const auto grant = key_.empty() ? std::nullopt : read_link_token(token, key_)) {
+    if (now_unix_s < grant->expires_unix_s) return *grant;
+    return "this link has expired: ask for a new one";
   }
   return "the access token is not valid here";
 }
 
-bool AccessControl::is_static_token(std::string_view token) const {
+bool AccessControl::is_static_token(std::string_view token) {
+  if (token_file_.empty()) return false;
+  const std::lock_guard lock(mutex_);
+  reload_when_changed();
+  const TokenDigest digest = digest_of(token);
   bool found = false;
-  for (const auto& known : tokens_) found |= equal_in_constant_time(known, token);
+  for (const TokenDigest& known : tokens_) found |= equal_in_constant_time(known, digest);
   return found;
 }
 
@@ -155,7 +162,7 @@ void AccessControl::reload_when_changed() {
 void AccessControl::read_token_file() {
   const std::string source = "--token-file " + token_file_.string();
   std::istringstream lines(read_text(token_file_, "--token-file"));
-  std::vector<std::string> tokens;
+  std::vector<TokenDigest> tokens;
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
@@ -166,7 +173,7 @@ void AccessControl::read_token_file() {
           fmt::format("{}:{}", source, number), {},
           fmt::format("a token has {} to {} characters", min_token_bytes, max_token_bytes),
           "make one: openssl rand -hex 16");
-    tokens.push_back(std::move(line));
+    tokens.push_back(digest_of(line));
   }
   if (tokens.empty())
     throw InputError(source, {}, "no token in it", "make one: openssl rand -hex 16");

@@ -6,9 +6,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "server/session/authorize.h"
+#include "server/signed_token.h"
 
 namespace catgs {
 
@@ -39,23 +41,24 @@ std::chrono::seconds parse_duration(std::string_view text);
 class AccessControl {
  public:
   /// Empty path: this kind of token is not used. Throws InputError when a file cannot be read.
-  AccessControl(std::filesystem::path token_file, std::filesystem::path key_file);
+  AccessControl(std::filesystem::path token_file, const std::filesystem::path& key_file);
 
-  /// Why `token` does not admit to the scene, for people; nothing: it does. The token file is read
-  /// again when it has changed; when that fails, its last good content stays in force.
-  std::optional<std::string> refusal(std::string_view token, std::string_view scene_id,
-                                     std::int64_t now_unix_s, Use use = Use::own_session);
+  /// What `token` admits to. The token file is read again when it has changed; when that fails, its
+  /// last good content stays in force.
+  Permit permit(std::string_view token, std::int64_t now_unix_s);
 
  private:
+  /// The grant of a token that is good, or why it is not.
+  std::variant<LinkGrant, std::string> resolve(std::string_view token, std::int64_t now_unix_s);
   void reload_when_changed();
   void read_token_file();
-  [[nodiscard]] bool is_static_token(std::string_view token) const;
+  bool is_static_token(std::string_view token);
 
   std::mutex mutex_;
   const std::filesystem::path token_file_;
   std::filesystem::file_time_type token_file_time_{};
-  std::vector<std::string> tokens_;
-  std::string key_;
+  std::vector<TokenDigest> tokens_;
+  std::string key_;  // not changed once constructed
 };
 
 }  // namespace catgs

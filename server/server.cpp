@@ -106,9 +106,13 @@ std::optional<std::string_view> scene_of(std::string_view path, std::string_view
 }
 
 /// The token of "Authorization: Bearer TOKEN"; empty: none.
-std::string bearer_token(std::string_view authorization) {
+std::string_view bearer_token(std::string_view authorization) {
   constexpr std::string_view scheme = "Bearer ";
-  return std::string(authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "");
+  return authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "";
+}
+
+HttpResponse unauthorized(std::string_view why) {
+  return text_response(401, fmt::format("401: {}\nSend it as Authorization: Bearer TOKEN\n", why));
 }
 
 }  // namespace
@@ -131,8 +135,12 @@ struct Server::State {
   [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
   std::string preview(const HttpRequest& request);
-  HttpResponse list_scenes(const std::string& token);
-  HttpResponse part_of_scene(std::string_view scene_id, ScenePart part, const std::string& token);
+  /// What the request's token admits to.
+  Permit permit_of(const HttpRequest& request) {
+    return access.permit(bearer_token(request.authorization), unix_now_s());
+  }
+  HttpResponse list_scenes(const Permit& permit);
+  HttpResponse part_of_scene(std::string_view scene_id, ScenePart part, const Permit& permit);
   /// Of "PUT /api/scenes/ID/sidecar".
   std::optional<HttpResponse> refuse_upload(const HttpRequest& request);
   HttpResponse respond_admin(const HttpRequest& request);
@@ -210,10 +218,10 @@ std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& r
 
 HttpResponse Server::State::respond(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
-  if (request.path == "/api/scenes") return list_scenes(bearer_token(request.authorization));
+  if (request.path == "/api/scenes") return list_scenes(permit_of(request));
   for (const ScenePart part : {ScenePart::tours, ScenePart::poster})
     if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
-      return part_of_scene(*id, part, bearer_token(request.authorization));
+      return part_of_scene(*id, part, permit_of(request));
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   if (!client.empty() && (request.path == "/" || request.path == "/index.html"))
     return client.respond_with_head(request, preview(request));
@@ -232,39 +240,37 @@ std::string Server::State::preview(const HttpRequest& request) {
           ? listing->begin()
           : std::ranges::find(*listing, std::string_view(*argument).substr(name.size()),
                               &SceneLibrary::Listing::id);
-  if (scene == listing->end() || access.refusal("", scene->id, unix_now_s(), Use::own_session))
+  if (scene == listing->end() || access.permit("", unix_now_s())(scene->id, Use::own_session))
     return {};
   return preview_elements(
       {request.site, scene->id, scene->title, scene->gaussians, scene->poster != nullptr});
 }
 
-/// What the token may see. Like hello, this never tells a stranger what is here.
-HttpResponse Server::State::list_scenes(const std::string& token) {
+/// What the permit shows. Like hello, this never tells a stranger what is here.
+HttpResponse Server::State::list_scenes(const Permit& permit) {
   auto list = nlohmann::json::array();
   std::string refusal;
   for (const auto listing = scenes->listing(); const auto& scene : *listing) {
-    if (const auto refused = access.refusal(token, scene.id, unix_now_s(), Use::list))
-      refusal = *refused;
+    if (auto refused = permit(scene.id, Use::list))
+      refusal = *std::move(refused);
     else
       list.push_back({{"id", scene.id},
                       {"title", scene.title},
                       {"gaussians", scene.gaussians},
                       {"loaded", scene.loaded}});
   }
-  if (list.empty())
-    return text_response(401, "401: " + refusal + "\nSend it as Authorization: Bearer TOKEN\n");
+  if (list.empty()) return unauthorized(refusal);
   return text_response(200, nlohmann::json{{"scenes", list}}.dump(), "application/json");
 }
 
 HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart part,
-                                          const std::string& token) {
-  if (const auto refused = access.refusal(token, scene_id, unix_now_s(), Use::list))
-    return text_response(401, "401: " + *refused + "\nSend it as Authorization: Bearer TOKEN\n");
+                                          const Permit& permit) {
+  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
   const auto listing = scenes->listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
   if (part == ScenePart::tours) {
-    const bool may_save = !access.refusal(token, scene_id, unix_now_s(), Use::save);
+    const bool may_save = !permit(scene_id, Use::save);
     return text_response(200,
                          fmt::format(R"({{"may_save":{},"document":{}}})", may_save, found->tours),
                          "application/json");
@@ -281,10 +287,9 @@ HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart p
 std::optional<HttpResponse> Server::State::refuse_upload(const HttpRequest& request) {
   const auto scene_id = scene_of(request.path, sidecar_part);
   if (!scene_id) return text_response(405, "405: only the sidecars of scenes are saved here\n");
-  const std::string token = bearer_token(request.authorization);
-  if (const auto refused = access.refusal(token, *scene_id, unix_now_s(), Use::list))
-    return text_response(401, "401: " + *refused + "\nSend it as Authorization: Bearer TOKEN\n");
-  if (const auto refused = access.refusal(token, *scene_id, unix_now_s(), Use::save))
+  const Permit permit = permit_of(request);
+  if (const auto refused = permit(*scene_id, Use::list)) return unauthorized(*refused);
+  if (const auto refused = permit(*scene_id, Use::save))
     return text_response(403, "403: " + *refused + "\n");
   if (std::ranges::count(*scenes->listing(), *scene_id, &SceneLibrary::Listing::id) == 0)
     return text_response(404, "404: there is no such scene here\n");
@@ -311,9 +316,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       s.metrics);
   s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
-  auto authorize = [&s](const std::string& token, const std::string& scene_id, Use use) {
-    return s.access.refusal(token, scene_id, unix_now_s(), use);
-  };
+  auto authorize = [&s](const std::string& token) { return s.access.permit(token, unix_now_s()); };
   RegistryOptions options = registry_options(s.config);
   PoolExecutor::Pools pools{s.pool};
   for (const auto& [device, views] : s.devices->views())

@@ -1,7 +1,6 @@
 #include "server/signed_token.h"
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 
 #include <openssl/crypto.h>
@@ -13,21 +12,13 @@
 namespace catgs {
 namespace {
 
-using Digest = std::array<unsigned char, SHA256_DIGEST_LENGTH>;
-
 const unsigned char* bytes_of(std::string_view text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
 
-Digest sha256(std::string_view text) {
-  Digest digest{};
-  SHA256(bytes_of(text), text.size(), digest.data());
-  return digest;
-}
-
 std::string hmac(std::string_view purpose, std::string_view payload, std::string_view key) {
   const std::string message = std::string(purpose).append("\n").append(payload);
-  Digest digest{};
+  TokenDigest digest{};
   unsigned int size = 0;
   HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), bytes_of(message), message.size(),
        digest.data(), &size);
@@ -62,10 +53,15 @@ std::optional<std::string> from_base64url(std::string_view text) {
 
 }  // namespace
 
-bool equal_in_constant_time(std::string_view a, std::string_view b) {
-  const Digest x = sha256(a);
-  const Digest y = sha256(b);
-  return CRYPTO_memcmp(x.data(), y.data(), x.size()) == 0;
+TokenDigest digest_of(std::string_view text) {
+  TokenDigest digest{};
+  static_assert(sizeof digest == SHA256_DIGEST_LENGTH);
+  SHA256(bytes_of(text), text.size(), digest.data());
+  return digest;
+}
+
+bool equal_in_constant_time(const TokenDigest& a, const TokenDigest& b) {
+  return CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 std::string sign_token(std::string_view purpose, std::string_view payload, std::string_view key) {
@@ -78,7 +74,8 @@ std::optional<std::string> read_signed_token(std::string_view purpose, std::stri
   if (dot == std::string_view::npos) return std::nullopt;
   auto payload = from_base64url(token.substr(0, dot));
   const auto mac = from_base64url(token.substr(dot + 1));
-  if (!payload || !mac || !equal_in_constant_time(*mac, hmac(purpose, *payload, key)))
+  if (!payload || !mac ||
+      !equal_in_constant_time(digest_of(*mac), digest_of(hmac(purpose, *payload, key))))
     return std::nullopt;
   return payload;
 }

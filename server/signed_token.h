@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,8 +15,10 @@ std::string sign_token(std::string_view purpose, std::string_view payload, std::
 std::optional<std::string> read_signed_token(std::string_view purpose, std::string_view token,
                                              std::string_view key);
 
-/// Compares digests, so that the time taken says nothing about where two texts differ.
-bool equal_in_constant_time(std::string_view a, std::string_view b);
+/// SHA-256. Digests are compared, so that the time taken says nothing about where two texts differ.
+using TokenDigest = std::array<unsigned char, 32>;
+TokenDigest digest_of(std::string_view text);
+bool equal_in_constant_time(const TokenDigest& a, const TokenDigest& b);
 
 /// 32 bytes from the system's random source. Throws std::runtime_error when it has none.
 std::string random_key();

@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace catgs {
 
@@ -14,8 +15,12 @@ enum class Use {
   save,         // write its sidecar
 };
 
-/// Why a token does not admit to it, for people; nothing: it does.
-using Authorize = std::function<std::optional<std::string>(const std::string& token,
-                                                           const std::string& scene_id, Use use)>;
+/// Why it is refused, for people; nothing: it is not.
+using Refusal = std::optional<std::string>;
+
+/// What a token admits to at the moment it was read. Checking a token takes its time, asking a
+/// Permit about scene after scene does not.
+using Permit = std::function<Refusal(std::string_view scene_id, Use use)>;
+using Authorize = std::function<Permit(const std::string& token)>;
 
 }  // namespace catgs

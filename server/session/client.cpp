@@ -150,15 +150,15 @@ void Client::resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admis
 }
 
 SceneAnswer Client::find_scene(const std::string& scene_id) {
-  if (const auto refusal = registry_.authorize_(token_, scene_id, Use::own_session))
+  if (const auto refusal = registry_.authorize_(token_)(scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
   return registry_.find_scene(scene_id, Clock::now());
 }
 
 std::vector<std::string> Client::scene_ids() {
-  std::vector<std::string> ids;
-  for (auto& id : registry_.scenes_.scene_ids())
-    if (!registry_.authorize_(token_, id, Use::own_session)) ids.push_back(std::move(id));
+  std::vector<std::string> ids = registry_.scenes_.scene_ids();
+  const Permit permit = registry_.authorize_(token_);
+  std::erase_if(ids, [&](const std::string& id) { return permit(id, Use::own_session); });
   return ids;
 }
 
@@ -170,7 +170,7 @@ void Client::sign(Welcome& welcome) {
   welcome.resume_token =
       tokens.resume_token(session_.id(), scene_id, registry_.options_.wall_clock_s());
   const bool shareable =
-      registry_.options_.max_spectators > 0 && !registry_.authorize_(token_, scene_id, Use::watch);
+      registry_.options_.max_spectators > 0 && !registry_.authorize_(token_)(scene_id, Use::watch);
   if (shareable) welcome.watch_token = tokens.watch_token(session_.id());
 }
 

@@ -143,7 +143,7 @@ void SessionRegistry::watch(const std::shared_ptr<Peer>& peer, Client& newcomer,
   if (!host || !host->session().resumable())
     return refuse(ErrorCode::session_ended, "the session of this link has ended");
   const Session& session = host->session();
-  if (const auto why = authorize_(hello.token, session.scene()->facts.scene_id, Use::watch))
+  if (const auto why = authorize_(hello.token)(session.scene()->facts.scene_id, Use::watch))
     return refuse(ErrorCode::unauthorized, *why);
   if (session.state() != Session::State::live)
     return refuse(ErrorCode::server_full, "the session of this link is about to start");
@@ -211,7 +211,7 @@ SceneAnswer SessionRegistry::find_scene(const std::string& scene_id, TimePoint n
 std::variant<std::string, ErrorMessage> SessionRegistry::choose(const Hello& hello) const {
   const std::string wanted = hello.scene_id.empty() ? scenes_.default_scene() : hello.scene_id;
   // The token first: a refusal does not depend on what is here.
-  if (const auto refusal = authorize_(hello.token, wanted, Use::own_session))
+  if (const auto refusal = authorize_(hello.token)(wanted, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, true};
   if (!scenes_.has(wanted))
     return ErrorMessage{ErrorCode::unknown_scene,

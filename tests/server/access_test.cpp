@@ -18,6 +18,10 @@ constexpr std::string_view key = "0123456789abcdef0123456789abcdef";
 
 class AccessTest : public testing::Test {
  protected:
+  static Refusal refusal(AccessControl& access, std::string_view token, std::string_view scene_id,
+                         std::int64_t now_unix_s, Use use = Use::own_session) {
+    return access.permit(token, now_unix_s)(scene_id, use);
+  }
   const test::TemporaryFolder folder;
 };
 
@@ -49,18 +53,18 @@ TEST_F(AccessTest, AChangedLinkIsNoLink) {
 TEST_F(AccessTest, LinksExpireAndBelongToAScene) {
   AccessControl access({}, folder.write("key", std::string(key) + "\n"));
   const std::string token = make_link_token({"city", "viewer", 1000}, key);
-  EXPECT_FALSE(access.refusal(token, "city", 999));
-  EXPECT_THAT(access.refusal(token, "city", 1000), Optional(HasSubstr("expired")));
-  EXPECT_THAT(access.refusal(token, "garden", 999), Optional(HasSubstr("another scene")));
-  EXPECT_FALSE(access.refusal(make_link_token({"", "viewer", 1000}, key), "garden", 999));
-  EXPECT_TRUE(access.refusal("", "city", 0));
-  EXPECT_TRUE(access.refusal("guess", "city", 0));
+  EXPECT_FALSE(refusal(access, token, "city", 999));
+  EXPECT_THAT(refusal(access, token, "city", 1000), Optional(HasSubstr("expired")));
+  EXPECT_THAT(refusal(access, token, "garden", 999), Optional(HasSubstr("another scene")));
+  EXPECT_FALSE(refusal(access, make_link_token({"", "viewer", 1000}, key), "garden", 999));
+  EXPECT_TRUE(refusal(access, "", "city", 0));
+  EXPECT_TRUE(refusal(access, "guess", "city", 0));
 }
 
 TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
   AccessControl access({}, folder.write("key", std::string(key) + "\n"));
   const auto may = [&](const char* role, Use use) {
-    return !access.refusal(make_link_token({"city", role, 1000}, key), "city", 0, use);
+    return !refusal(access, make_link_token({"city", role, 1000}, key), "city", 0, use);
   };
   for (const char* role : {"viewer", "author", "spectator", "solo"}) {
     EXPECT_TRUE(may(role, Use::list)) << role;
@@ -78,40 +82,51 @@ TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
 
 TEST_F(AccessTest, OnlyLinksMakeAuthors) {
   AccessControl open({}, {});
-  EXPECT_FALSE(open.refusal("", "city", 0));
-  EXPECT_THAT(open.refusal("", "city", 0, Use::save), Optional(HasSubstr("--token-key-file")));
+  EXPECT_FALSE(refusal(open, "", "city", 0));
+  EXPECT_THAT(refusal(open, "", "city", 0, Use::save), Optional(HasSubstr("--token-key-file")));
   AccessControl by_file(folder.write("tokens", "open-sesame\n"),
                         folder.write("key", std::string(key) + "\n"));
-  EXPECT_FALSE(by_file.refusal("open-sesame", "city", 0));
-  EXPECT_THAT(by_file.refusal("open-sesame", "city", 0, Use::save),
+  EXPECT_FALSE(refusal(by_file, "open-sesame", "city", 0));
+  EXPECT_THAT(refusal(by_file, "open-sesame", "city", 0, Use::save),
               Optional(HasSubstr("role author")));
   const std::string link = make_link_token({"city", "author", 1000}, key);
-  EXPECT_FALSE(by_file.refusal(link, "city", 999, Use::save));
-  EXPECT_TRUE(by_file.refusal(link, "city", 1000, Use::save)) << "expired";
-  EXPECT_TRUE(by_file.refusal(link, "garden", 999, Use::save)) << "another scene";
+  EXPECT_FALSE(refusal(by_file, link, "city", 999, Use::save));
+  EXPECT_TRUE(refusal(by_file, link, "city", 1000, Use::save)) << "expired";
+  EXPECT_TRUE(refusal(by_file, link, "garden", 999, Use::save)) << "another scene";
 }
 
 TEST_F(AccessTest, StaticTokensAreReadAgain) {
   const auto path = folder.write("tokens", "# first\nalpha-alpha\n");
   AccessControl access(path, {});
-  EXPECT_FALSE(access.refusal("alpha-alpha", "city", 0));
-  EXPECT_TRUE(access.refusal("alpha-alph", "city", 0));
-  EXPECT_TRUE(access.refusal("# first", "city", 0));
+  EXPECT_FALSE(refusal(access, "alpha-alpha", "city", 0));
+  EXPECT_TRUE(refusal(access, "alpha-alph", "city", 0));
+  EXPECT_TRUE(refusal(access, "# first", "city", 0));
 
   const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
   folder.write("tokens", "beta-beta\n");
   std::filesystem::last_write_time(path, later);
-  EXPECT_TRUE(access.refusal("alpha-alpha", "city", 0));
-  EXPECT_FALSE(access.refusal("beta-beta", "city", 0));
+  EXPECT_TRUE(refusal(access, "alpha-alpha", "city", 0));
+  EXPECT_FALSE(refusal(access, "beta-beta", "city", 0));
 
   folder.write("tokens", "x\n");  // too short: the good ones stay
   std::filesystem::last_write_time(path, later + std::chrono::seconds(2));
-  EXPECT_FALSE(access.refusal("beta-beta", "city", 0));
+  EXPECT_FALSE(refusal(access, "beta-beta", "city", 0));
+}
+
+TEST_F(AccessTest, APermitChecksItsTokenOnceForAllScenes) {
+  const auto path = folder.write("tokens", "alpha-alpha\n");
+  AccessControl access(path, {});
+  const Permit permit = access.permit("alpha-alpha", 0);
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  folder.write("tokens", "beta-beta\n");
+  std::filesystem::last_write_time(path, later);
+  EXPECT_FALSE(permit("city", Use::own_session)) << "nothing is read for another scene";
+  EXPECT_TRUE(refusal(access, "alpha-alpha", "city", 0)) << "the next request finds it gone";
 }
 
 TEST_F(AccessTest, WithoutFilesEverybodyMayEnter) {
   AccessControl access({}, {});
-  EXPECT_FALSE(access.refusal("", "city", 0));
+  EXPECT_FALSE(refusal(access, "", "city", 0));
 }
 
 TEST_F(AccessTest, FilesThatCannotBeReadAreNamedWithTheirFlag) {

@@ -10,6 +10,7 @@
 
 #include "render_core/error.h"
 #include "server/access.h"
+#include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tls.h"
@@ -136,6 +137,22 @@ TEST(ServerAccess, AdmitsByTokenAndNeverSaysIt) {
   WireClient guest(server.port());
   guest.greet(64, 64, v1::CODEC_H264, "open-sesame-1");
   EXPECT_THAT(http_get(server.admin_port(), "/api/sessions").body, Not(HasSubstr("sesame")));
+}
+
+TEST(ServerAccess, ARequestHasOneToken) {
+  const TemporaryFolder folder;
+  const auto token_file = folder.write("tokens", "open-sesame-1\n");
+  RunningServer server([&](ServerConfig& config) { config.token_file = token_file.string(); });
+  const auto status_with = [&](const std::string& headers) {
+    RawSocket socket(server.port());
+    socket.send("GET /api/scenes HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n");
+    std::string answer;
+    socket.receive_until("\r\n", answer);
+    return answer.substr(0, answer.find("\r\n"));
+  };
+  const std::string one = "Authorization: Bearer open-sesame-1\r\n";
+  EXPECT_THAT(status_with(one), HasSubstr(" 200 "));
+  EXPECT_THAT(status_with(one + one), HasSubstr(" 401 "));
 }
 
 TEST(ServerAccess, PreviewsTellWhatStrangersMaySee) {

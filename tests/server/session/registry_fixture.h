@@ -112,7 +112,7 @@ class PretendedRenderer final : public Renderer {
   const std::shared_ptr<DeviceSet> devices_;
 };
 
-/// One scene, always in memory.
+/// One scene, always in memory, by any name.
 class OneScene final : public SceneSource {
  public:
   explicit OneScene(std::shared_ptr<Renderer> renderer) {
@@ -120,12 +120,14 @@ class OneScene final : public SceneSource {
     scene_->facts.near_z = 0.2f;
   }
   [[nodiscard]] std::string default_scene() const override { return "scene"; }
-  [[nodiscard]] std::vector<std::string> scene_ids() const override { return {"scene"}; }
+  [[nodiscard]] std::vector<std::string> scene_ids() const override { return ids; }
   [[nodiscard]] bool has(const std::string&) const override { return true; }
   SceneAnswer want(const std::string&, TimePoint) override {
     return std::shared_ptr<const SceneEntry>(scene_);
   }
   void on_tick(TimePoint) override {}
+
+  std::vector<std::string> ids = {"scene"};
 
  private:
   std::shared_ptr<SceneEntry> scene_ = std::make_shared<SceneEntry>();
@@ -174,10 +176,9 @@ class RegistryTest : public testing::Test {
     options.devices = devices;
     options.encoders = policy;
     const auto pool = std::make_shared<ThreadPool>(pool_threads);
-    registry.emplace(
-        io, options, std::make_shared<PoolExecutor>(PoolExecutor::Pools{pool}, encoder_factory()),
-        scenes, encoders, [](const auto&, const auto&, Use) { return std::nullopt; },
-        SessionTokens("a key"), metrics);
+    registry.emplace(io, options,
+                     std::make_shared<PoolExecutor>(PoolExecutor::Pools{pool}, encoder_factory()),
+                     scenes, encoders, authorize, SessionTokens("a key"), metrics);
   }
   void TearDown() override {
     for (auto& client : clients) client.listener->on_close(true);
@@ -282,6 +283,7 @@ class RegistryTest : public testing::Test {
   int nvenc_limit = 100;
   int pool_threads = 2;
   RegistryOptions options;
+  Authorize authorize = [](const auto&) { return [](auto, Use) { return std::nullopt; }; };
   std::vector<EncoderChoice> encoders = {{EncoderKind::nvenc, Codec::h264, "h264_nvenc"},
                                          {EncoderKind::x264, Codec::h264, "libx264"}};
   boost::asio::io_context io;

@@ -68,5 +68,22 @@ TEST_F(RegistryTest, ABurstWaitsForWhatTheFirstOnesCost) {
   EXPECT_GE(first.connection->frames.size(), 8u) << "its frames were measured";
 }
 
+TEST_F(RegistryTest, ATokenIsCheckedAsOftenHoweverManyScenesThereAre) {
+  int checks = 0;
+  authorize = [&](const auto&) {
+    ++checks;
+    return [](auto scene_id, Use) {
+      return scene_id == "secret" ? Refusal("not for you") : std::nullopt;
+    };
+  };
+  start();
+  join();
+  const int for_one_scene = std::exchange(checks, 0);
+  scenes.ids.assign(1000, "another");
+  scenes.ids.emplace_back("secret");
+  EXPECT_EQ(join().connection->welcome->scene_ids_size(), 1000);
+  EXPECT_EQ(checks, for_one_scene);
+}
+
 }  // namespace
 }  // namespace catgs::test

@@ -60,7 +60,7 @@ class SpectatorHubTest : public testing::Test {
                            std::make_shared<PoolExecutor>(std::make_shared<ThreadPool>(1)),
                            scenes,
                            {EncoderChoice{}},
-                           [](const auto&, const auto&, Use) { return std::nullopt; },
+                           [](const auto&) { return [](auto, Use) { return std::nullopt; }; },
                            SessionTokens("a key"),
                            metrics};
   SpectatorHub hub{2};
