@@ -72,6 +72,7 @@ struct SessionPolicy {
   int refine_frames = 60;  // that sharpen a still picture at most, where the link is slow
   /// Between encoders that a client's settings ask for; the newest ones count.
   std::chrono::milliseconds settings_gap{250};
+  std::chrono::milliseconds select_gap{250};  // between scenes that it asks for; likewise
 };
 
 /// What a client's wishes come to within the server's limits, while the camera moves.
@@ -243,9 +244,11 @@ class Session {
   const TimePoint created_;
 
   Hello waiting_hello_;  // while queued
-  /// Not in memory yet: that of the waiting hello, or the one that a live client has selected.
+  /// Not in memory yet: that of the waiting hello, or the one that a live client has selected, too
+  /// soon after another one perhaps. Each tick asks for it.
   std::optional<std::string> awaited_scene_;
   TimePoint told_of_scene_{};
+  TimePoint selected_{};
   Admission admission_;
   glm::ivec2 viewport_px_{0};
   Settings settings_;

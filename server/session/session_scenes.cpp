@@ -15,10 +15,14 @@ void Session::enter_scene(std::shared_ptr<const SceneEntry> scene) {
 
 void Session::on(const SelectScene& select, TimePoint now) {
   note_activity(now);
-  this->select(select.scene_id, now);
+  if (now - selected_ < policy_.select_gap)
+    awaited_scene_ = select.scene_id;
+  else
+    this->select(select.scene_id, now);
 }
 
 void Session::select(const std::string& scene_id, TimePoint now) {
+  selected_ = now;
   auto found = host_.find_scene(scene_id);
   if (const auto* awaited = std::get_if<SceneAwaited>(&found))
     return await_scene(scene_id, *awaited, now);

@@ -22,7 +22,9 @@ struct FakeHost final : SessionHost {
 
   AdmissionAnswer admit(const Hello&) override { return admission; }
   bool scene_awaited = false;
+  int scenes_looked_for = 0;
   SceneAnswer find_scene(const std::string& id) override {
+    ++scenes_looked_for;
     if (scene_awaited) return SceneAwaited{5s};
     auto scene = std::make_shared<SceneEntry>();
     scene->facts.scene_id = id;

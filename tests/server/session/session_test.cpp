@@ -414,12 +414,31 @@ TEST_F(SessionTest, TheOldSceneIsShownWhileTheNextOneIsLoaded) {
   EXPECT_EQ(std::get<Welcome>(host.said.back()).scene.scene_id, "b");
 }
 
+TEST_F(SessionTest, WhoSelectsInQuickSuccessionGetsTheLastOneWithTheNextTick) {
+  greet();
+  session.on_message(SelectScene{"b"}, now);
+  open_stream();
+  for (int i = 0; i < 100; ++i) session.on_message(SelectScene{std::to_string(i)}, now += 1ms);
+  EXPECT_EQ(host.scenes_looked_for, 1);
+  session.on_tick(now += 150ms);
+  EXPECT_EQ(host.scenes_looked_for, 2);
+  EXPECT_EQ(session.scene()->facts.scene_id, "99");
+  session.on_message(SelectScene{"c"}, now);
+  EXPECT_EQ(host.scenes_looked_for, 2) << "too soon after the tick's";
+  open_stream();
+  session.on_tick(now += 250ms);
+  EXPECT_EQ(session.scene()->facts.scene_id, "c");
+  open_stream();
+  session.on_message(SelectScene{"d"}, now += 250ms);
+  EXPECT_EQ(session.scene()->facts.scene_id, "d") << "at once";
+}
+
 TEST_F(SessionTest, WhoLooksAtAnotherSceneMeanwhileWaitsNoMore) {
   greet();
   host.scene_awaited = true;
   session.on_message(SelectScene{"b"}, now);
   host.scene_awaited = false;
-  session.on_message(SelectScene{"c"}, now);
+  session.on_message(SelectScene{"c"}, now += 250ms);
   open_stream();
   for (int tick = 0; tick < 4; ++tick) session.on_tick(now += 250ms);
   EXPECT_EQ(host.opened.size(), 2u);
