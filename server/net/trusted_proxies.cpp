@@ -38,6 +38,14 @@ bool contains(const Network& network, const Address& address) {
 
 }  // namespace
 
+std::string limited_as(const std::string& text) {
+  constexpr unsigned short prefix_bits = 64;
+  const auto address = parse_address(text);
+  if (!address || address->is_v4()) return address ? address->to_string() : text;
+  const ip::address_v6 unscoped(address->to_v6().to_bytes());
+  return ip::make_network_v6(unscoped, prefix_bits).canonical().to_string();
+}
+
 TrustedProxies::TrustedProxies(const std::vector<std::string>& networks) {
   for (const std::string& text : networks) {
     const auto slash = text.find('/');

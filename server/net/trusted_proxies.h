@@ -11,6 +11,10 @@
 
 namespace catgs {
 
+/// Whom limits count an address for: an IPv4 address is somebody's, of IPv6 a network of 64 bits
+/// is, "2001:db8:1:2::/64". What is no address stays as it is.
+std::string limited_as(const std::string& address);
+
 /// Whose X-Forwarded-For is believed. Immutable.
 class TrustedProxies {
  public:

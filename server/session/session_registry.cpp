@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
 #include "server/session/log_session.h"
 
@@ -68,7 +69,7 @@ std::shared_ptr<ConnectionListener> SessionRegistry::accept(
 
 void SessionRegistry::add(const std::shared_ptr<Peer>& peer,
                           const std::shared_ptr<Client>& client) {
-  const std::string address = peer->connection().peer_address();
+  const std::string address = limited_as(peer->connection().peer_address());
   const int same_address = ++connections_by_address_[address];
   ++connections_;
   clients_.push_back(client);
@@ -86,9 +87,9 @@ void SessionRegistry::add(const std::shared_ptr<Peer>& peer,
         fmt::format("{} connections from {} already: close one first", same_address - 1, address));
 }
 
-void SessionRegistry::forget_connection(const std::string& address) {
+void SessionRegistry::forget_connection(const std::string& peer_address) {
   --connections_;
-  const auto it = connections_by_address_.find(address);
+  const auto it = connections_by_address_.find(limited_as(peer_address));
   if (--it->second == 0) connections_by_address_.erase(it);
 }
 
@@ -249,15 +250,15 @@ AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
     queue_.leave(id);
     return std::move(*error);
   }
+  const std::string address = limited_as(client.peer_address());
   const auto same_address = std::ranges::count_if(clients_, [&](const auto& c) {
-    return c->admitted_at() && c->peer_address() == client.peer_address();
+    return c->admitted_at() && limited_as(c->peer_address()) == address;
   });
   if (same_address >= options_.max_sessions_per_address) {
     queue_.leave(id);
-    return ErrorMessage{ErrorCode::server_full,
-                        fmt::format("{} sessions from {} already: close one first", same_address,
-                                    client.peer_address()),
-                        true};
+    return ErrorMessage{
+        ErrorCode::server_full,
+        fmt::format("{} sessions from {} already: close one first", same_address, address), true};
   }
   if (has_place_for(client, hello)) {
     // Who waits for a scene holds no place: it may come to nothing.

@@ -74,7 +74,7 @@ class SessionRegistry {
   friend class Client;
   friend class Peer;
   void add(const std::shared_ptr<Peer>& peer, const std::shared_ptr<Client>& client);
-  void forget_connection(const std::string& address);
+  void forget_connection(const std::string& peer_address);
   /// Leads to the session of a resume token, or begins the newcomer's.
   void on_hello(const std::shared_ptr<Peer>& peer, std::shared_ptr<Client> newcomer, Hello hello,
                 TimePoint now);
@@ -129,7 +129,7 @@ class SessionRegistry {
   bool stopped_ = false;
   bool draining_ = false;
   int connections_ = 0;
-  std::unordered_map<std::string, int> connections_by_address_;
+  std::unordered_map<std::string, int> connections_by_address_;  // by limited_as()
   std::uint32_t admitted_ = 0;
   int device_failures_ = 0;  // since a frame was rendered
   const AdmissionBudget budget_;

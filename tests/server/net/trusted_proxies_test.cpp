@@ -44,5 +44,15 @@ TEST(TrustedProxies, NamesWhatIsNoNetwork) {
   EXPECT_NO_THROW(TrustedProxies({"10.0.0.0/8", "10.1.2.3", "::1", "::/0"}));
 }
 
+TEST(TrustedProxies, LimitsCountNetworksOfIpv6) {
+  EXPECT_EQ(limited_as("2001:db8:1:2:3:4:5:6"), "2001:db8:1:2::/64");
+  EXPECT_EQ(limited_as("2001:db8:1:2::"), "2001:db8:1:2::/64");
+  EXPECT_NE(limited_as("2001:db8:1:3::"), limited_as("2001:db8:1:2::"));
+  EXPECT_EQ(limited_as("fe80::1%3"), "fe80::/64");
+  EXPECT_EQ(limited_as("::ffff:192.0.2.1"), "192.0.2.1");
+  EXPECT_EQ(limited_as("192.0.2.1"), "192.0.2.1");
+  EXPECT_EQ(limited_as("unknown"), "unknown");
+}
+
 }  // namespace
 }  // namespace catgs

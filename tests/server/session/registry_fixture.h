@@ -29,6 +29,7 @@ using namespace std::chrono_literals;
 /// A socket that is always read. Session thread only, but for queued frames.
 class OpenConnection final : public Connection {
  public:
+  explicit OpenConnection(std::string peer_address) : peer_address_(std::move(peer_address)) {}
   void send(std::vector<std::byte> message) override {
     v1::ServerMessage parsed;
     if (!parsed.ParseFromArray(message.data() + 1, static_cast<int>(message.size()) - 1))
@@ -45,7 +46,7 @@ class OpenConnection final : public Connection {
     return {};
   }
   void close(CloseCode code, std::string_view) override { closed = code; }
-  [[nodiscard]] std::string peer_address() const override { return "192.0.2.1"; }
+  [[nodiscard]] std::string peer_address() const override { return peer_address_; }
   [[nodiscard]] std::size_t queued_frames() const override { return 0; }
 
   std::optional<v1::Welcome> welcome;
@@ -56,6 +57,9 @@ class OpenConnection final : public Connection {
   int heartbeats = 0;
   std::vector<std::uint64_t> frames;
   int idrs = 0;
+
+ private:
+  const std::string peer_address_;
 };
 
 /// Two devices on which a frame takes as long as somebody says, and ends as somebody says.
@@ -207,8 +211,8 @@ class RegistryTest : public testing::Test {
     visitor.listener->on_message(std::as_bytes(std::span(bytes)), {});
   }
   /// A new visitor, who was welcomed, refused or waits.
-  Visitor& join(const std::string& resume_token = {}) {
-    auto connection = std::make_shared<OpenConnection>();
+  Visitor& join(const std::string& resume_token = {}, const std::string& from = "192.0.2.1") {
+    auto connection = std::make_shared<OpenConnection>(from);
     Visitor& visitor = clients.emplace_back(Visitor{connection, registry->accept(connection)});
     v1::ClientMessage message;
     v1::Hello& hello = *message.mutable_hello();

@@ -85,5 +85,22 @@ TEST_F(RegistryTest, ATokenIsCheckedAsOftenHoweverManyScenesThereAre) {
   EXPECT_EQ(checks, for_one_scene);
 }
 
+TEST_F(RegistryTest, AddressesOfOneNetworkOfIpv6ShareTheirLimit) {
+  options.max_sessions_per_address = 2;
+  start();
+  const auto admits = [&](const char* from) {
+    return join({}, from).connection->welcome.has_value();
+  };
+  EXPECT_TRUE(admits("2001:db8:1:2::1"));
+  EXPECT_TRUE(admits("2001:db8:1:2:ffff::2"));
+  ASSERT_FALSE(admits("2001:db8:1:2::3"));
+  EXPECT_THAT(clients.back().connection->error->message(),
+              testing::HasSubstr("from 2001:db8:1:2::/64 already"));
+  EXPECT_TRUE(admits("2001:db8:1:3::1")) << "a neighbour's";
+  for (const std::size_t index : {3u, 2u, 0u}) leave(index);
+  run_until([&] { return registry->connections() == 1; });
+  EXPECT_TRUE(admits("2001:db8:1:2::3")) << "who leaves is counted no more";
+}
+
 }  // namespace
 }  // namespace catgs::test
