@@ -118,7 +118,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, pool);
   if (!is_synthetic(spec)) {
     entry->sidecar = locate_scene(spec).hints.sidecar;
-    entry->tours = read_tours(entry->sidecar);
+    entry->tours = ToursAnswers(read_tours(entry->sidecar));
   }
   auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);

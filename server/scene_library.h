@@ -34,7 +34,7 @@ class SceneLibrary final : public SceneSource {
     std::string title;
     std::uint64_t gaussians = 0;
     bool loaded = false;
-    std::string tours = "{}";                     // of a loaded one; see tours.h
+    std::optional<ToursAnswers> tours{};          // of a loaded one
     std::shared_ptr<const std::string> poster{};  // of a loaded one; a JPEG file
   };
 

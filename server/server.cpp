@@ -111,6 +111,25 @@ std::string_view bearer_token(std::string_view authorization) {
   return authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "";
 }
 
+HttpResponse json_response(std::shared_ptr<const std::string> body) {
+  HttpResponse response;
+  response.content_type = "application/json";
+  response.body = std::move(body);
+  return response;
+}
+
+/// Of "GET /api/scenes".
+std::shared_ptr<const std::string> scene_list(
+    const std::vector<const SceneLibrary::Listing*>& scenes) {
+  auto list = nlohmann::json::array();
+  for (const auto* scene : scenes)
+    list.push_back({{"id", scene->id},
+                    {"title", scene->title},
+                    {"gaussians", scene->gaussians},
+                    {"loaded", scene->loaded}});
+  return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
+}
+
 HttpResponse unauthorized(std::string_view why) {
   return text_response(401, fmt::format("401: {}\nSend it as Authorization: Bearer TOKEN\n", why));
 }
@@ -168,6 +187,9 @@ struct Server::State {
   std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
   std::unique_ptr<SceneLibrary> scenes;
   std::unique_ptr<SidecarSaver> saver;
+  // The answer to who may see every scene of a listing. Network thread.
+  std::weak_ptr<const std::vector<SceneLibrary::Listing>> listed;
+  std::shared_ptr<const std::string> whole_list;
   std::vector<EncoderChoice> encoders;
   boost::asio::signal_set stop_signals;
   boost::asio::steady_timer drain_timer;
@@ -248,19 +270,22 @@ std::string Server::State::preview(const HttpRequest& request) {
 
 /// What the permit shows. Like hello, this never tells a stranger what is here.
 HttpResponse Server::State::list_scenes(const Permit& permit) {
-  auto list = nlohmann::json::array();
+  const auto listing = scenes->listing();
+  std::vector<const SceneLibrary::Listing*> shown;
   std::string refusal;
-  for (const auto listing = scenes->listing(); const auto& scene : *listing) {
+  for (const auto& scene : *listing) {
     if (auto refused = permit(scene.id, Use::list))
       refusal = *std::move(refused);
     else
-      list.push_back({{"id", scene.id},
-                      {"title", scene.title},
-                      {"gaussians", scene.gaussians},
-                      {"loaded", scene.loaded}});
+      shown.push_back(&scene);
   }
-  if (list.empty()) return unauthorized(refusal);
-  return text_response(200, nlohmann::json{{"scenes", list}}.dump(), "application/json");
+  if (shown.empty()) return unauthorized(refusal);
+  if (shown.size() < listing->size()) return json_response(scene_list(shown));
+  if (listed.lock() != listing) {
+    listed = listing;
+    whole_list = scene_list(shown);
+  }
+  return json_response(whole_list);
 }
 
 HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart part,
@@ -270,10 +295,8 @@ HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart p
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
   if (part == ScenePart::tours) {
-    const bool may_save = !permit(scene_id, Use::save);
-    return text_response(200,
-                         fmt::format(R"({{"may_save":{},"document":{}}})", may_save, found->tours),
-                         "application/json");
+    const ToursAnswers tours = found->tours.value_or(ToursAnswers());
+    return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
   }
   if (!found->poster)
     return text_response(404, "404: the scene has no poster, or waits for its first visit\n");

@@ -39,7 +39,7 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   scene->facts.limits_min = hints.limits.min;
   scene->facts.limits_max = hints.limits.max;
   scene->facts.focus = hints.focus;
-  scene->tours = tours_of(entry.sidecar, text);
+  scene->tours = ToursAnswers(tours_of(entry.sidecar, text));
   if (auto poster = make_poster(*scene->renderer, scene->facts)) scene->poster = std::move(poster);
   return scene;
 }

@@ -132,6 +132,15 @@ std::string tours_of(const std::filesystem::path& sidecar, const std::optional<s
   return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+ToursAnswers::ToursAnswers(std::string_view document) {
+  const auto answer = [&](bool may_save) {
+    return std::make_shared<const std::string>(
+        fmt::format(R"({{"may_save":{},"document":{}}})", may_save, document));
+  };
+  for_viewers = answer(false);
+  for_authors = answer(true);
+}
+
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar) {
   if (!is_file(sidecar)) return std::nullopt;
   const std::vector<std::byte> bytes = FileSource(sidecar).read_all(max_bytes);

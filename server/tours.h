@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +21,14 @@ namespace catgs {
 std::string read_tours(const std::filesystem::path& sidecar);
 /// The same where the sidecar has this text, or is not there.
 std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text);
+
+/// What pages get that ask for a scene's tours: {"may_save": …, "document": …}. Made once: it may
+/// be megabytes, and everybody may ask as often as they like.
+struct ToursAnswers {
+  explicit ToursAnswers(std::string_view document = "{}");
+  std::shared_ptr<const std::string> for_viewers;
+  std::shared_ptr<const std::string> for_authors;
+};
 
 /// What is there now; nothing: no sidecar. Tag, hints and tours of one text belong together.
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);

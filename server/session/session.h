@@ -27,6 +27,7 @@
 #include "server/session/rate_limit.h"
 #include "server/session/rest.h"
 #include "server/session/scene_source.h"
+#include "server/tours.h"
 
 namespace catgs {
 
@@ -36,8 +37,8 @@ struct SceneEntry {
   std::shared_ptr<Renderer> renderer;
   std::string renderer_text;  // description and reason, for people
   std::shared_ptr<const SurfacePoints> surface{};
-  std::filesystem::path sidecar{};              // where it is or would be; empty: nowhere
-  std::string tours = "{}";                     // for pages; see tours.h
+  std::filesystem::path sidecar{};  // where it is or would be; empty: nowhere
+  ToursAnswers tours{};
   std::shared_ptr<const std::string> poster{};  // a JPEG file; null: none
 
   [[nodiscard]] Picked seen_along(const Pick& ray) const {

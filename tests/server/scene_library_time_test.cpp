@@ -70,6 +70,18 @@ class SceneLibraryTime : public FolderTest {
   TimePoint now_ = TimePoint{} + 1h;  // passes by tick() alone
 };
 
+TEST_F(SceneLibraryTime, ListingsShareWhatPagesGetOfAScene) {
+  const auto tours_of_a = [&] {
+    const auto listing = library_->listing();
+    return std::ranges::find(*listing, "a", &SceneLibrary::Listing::id)->tours;
+  };
+  EXPECT_FALSE(tours_of_a());
+  const Entry a = load("a");
+  EXPECT_EQ(tours_of_a()->for_viewers, a->tours.for_viewers) << "the same, not one like it";
+  load("b");
+  EXPECT_EQ(tours_of_a()->for_authors, a->tours.for_authors);
+}
+
 TEST_F(SceneLibraryTime, OneIsLoadedAnotherWaitsAndTheThirdIsRefused) {
   EXPECT_TRUE(awaited("a"));
   EXPECT_TRUE(awaited("b"));

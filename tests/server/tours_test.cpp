@@ -47,6 +47,12 @@ TEST_F(Tours, OfATextAreThoseOfThatTextWhateverIsOnTheDisk) {
   EXPECT_TRUE(nlohmann::json::parse(tours_of(folder_ / "museum.json", {}))["tours"].is_null());
 }
 
+TEST_F(Tours, AreAnsweredWithWhetherTheyMayBeSaved) {
+  const ToursAnswers answers(R"({"tours":[]})");
+  EXPECT_EQ(*answers.for_viewers, R"({"may_save":false,"document":{"tours":[]}})");
+  EXPECT_EQ(*answers.for_authors, R"({"may_save":true,"document":{"tours":[]}})");
+}
+
 TEST_F(Tours, LeaveForeignAndBrokenSettingsAlone) {
   write("museum.settings.json", "{ broken");
   write("settings.json", R"({"editor.fontSize": 12})");
