@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -19,6 +20,16 @@ inline std::string printable(std::string_view text) {
       out.push_back(c);
   }
   return out;
+}
+
+/// At most `max_bytes` of UTF-8, whole characters.
+inline std::string shortened(std::string_view text, std::size_t max_bytes) {
+  const auto continues_character = [&](std::size_t i) {
+    return (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;
+  };
+  if (text.size() <= max_bytes) return std::string(text);
+  while (max_bytes > 0 && continues_character(max_bytes)) --max_bytes;
+  return std::string(text.substr(0, max_bytes));
 }
 
 }  // namespace catgs

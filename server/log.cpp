@@ -181,14 +181,15 @@ class PromptSink final : public spdlog::sinks::base_sink<std::mutex> {
 
 /// Leaves lines out where there are too many, and says how many: strangers can cause a line with
 /// each connection, and somebody pays for the disk. Refusals have a smaller share of their own: who
-/// is refused without end hides nothing else.
+/// is refused without end hides nothing else. Errors are few, and nothing hides them.
 class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
  public:
   explicit BoundedSink(std::shared_ptr<spdlog::sinks::sink> to) : to_(std::move(to)) {}
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    if (!(logs_refusal ? refusals_ : rate_).take(Clock::now())) {
+    const bool is_error = message.level >= spdlog::level::err;
+    if (!is_error && !(logs_refusal ? refusals_ : rate_).take(Clock::now())) {
       ++left_out_;
       ++lines_lost;
       return;

@@ -110,10 +110,10 @@ Metrics::Metrics()
       sessions_admitted(counter(registry_, "catgs_sessions_admitted_total", "Sessions admitted")),
       sessions_refused(counter(registry_, "catgs_sessions_refused_total",
                                "Sessions refused or closed for an error")),
-      requests_refused(
-          counter(registry_, "catgs_requests_refused_total",
-                  "Requests, websockets and uploads refused for their Host, Origin or token, and "
-                  "connections beyond what descriptors there are")),
+      requests_refused(counter(
+          registry_, "catgs_requests_refused_total",
+          "Requests, websockets and uploads refused for their Host, Origin, token or form, and "
+          "connections beyond what descriptors there are")),
       sessions_resumed(
           counter(registry_, "catgs_sessions_resumed_total", "Sessions whose client came back")),
       scenes_loaded(counter(registry_, "catgs_scenes_loaded_total",

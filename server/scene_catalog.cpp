@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/error.h"
+#include "render_core/printable.h"
 #include "render_core/scene/locate_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/scene/synth.h"
@@ -66,16 +67,6 @@ Scene load(const std::string& spec, const ServerConfig& config, LoadOptions opti
       options.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
   }
   return load_scene(spec, options);
-}
-
-/// At most `max_bytes` of UTF-8, whole characters.
-std::string shortened(const std::string& text, std::size_t max_bytes) {
-  const auto continues_character = [&](std::size_t i) {
-    return (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;
-  };
-  if (text.size() <= max_bytes) return text;
-  while (max_bytes > 0 && continues_character(max_bytes)) --max_bytes;
-  return text.substr(0, max_bytes);
 }
 
 SceneFacts facts_of(const Scene& scene, std::string id) {

@@ -4,10 +4,25 @@
 
 #include <fmt/format.h>
 
+#include "render_core/printable.h"
 #include "server/net/lws_http.h"
 
 namespace catgs {
 namespace {
+
+/// As much of what a stranger sent as a line of the log has room for.
+constexpr std::size_t max_quoted_bytes = 100;
+
+std::string quoted(const std::string& text) {
+  if (text.size() <= max_quoted_bytes) return text;
+  return shortened(text, max_quoted_bytes) + "...";
+}
+
+/// The first line of a refusal's text.
+std::string_view reason(const HttpResponse& refusal) {
+  const std::string_view text = *refusal.body;
+  return text.substr(0, text.find('\n'));
+}
 
 std::string peer_address_of(lws* wsi) {
   std::array<char, 64> name{};
@@ -42,13 +57,34 @@ void note_refused(lws* wsi, std::string_view why) {
   site_of(wsi).on_refused(fmt::format("{}: {}", client_address_of(wsi), why));
 }
 
+void note_refused_origin(lws* wsi, std::string_view what, const std::string& origin,
+                         const std::string& host) {
+  note_refused(wsi, fmt::format("{} refused: origin {} is not allowed at {} (--allow-origin)", what,
+                                quoted(origin), quoted(host)));
+}
+
+int refuse_request(lws* wsi, unsigned status, const char* why) {
+  note_refused(wsi, fmt::format("request refused: {}: {}", status, why));
+  lws_return_http_status(wsi, status, why);
+  return -1;
+}
+
 HttpResponse refuse_host(lws* wsi, const std::string& host) {
-  note_refused(
-      wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)", host));
+  note_refused(wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)",
+                                quoted(host)));
   return text_response(
       403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
                        "Open it as localhost, or start it with --allow-origin https://{0}\n",
                        host));
+}
+
+HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request) {
+  const Site& site = site_of(wsi);
+  if (!host_allowed(site, host)) return refuse_host(wsi, host);
+  HttpResponse response = site.http(request);
+  if (response.status == 401)
+    note_refused(wsi, fmt::format("request refused: {}", reason(response)));
+  return response;
 }
 
 std::optional<HttpResponse> refuse_upload(lws* wsi) {
@@ -57,16 +93,13 @@ std::optional<HttpResponse> refuse_upload(lws* wsi) {
   if (!host_allowed(site, host)) return refuse_host(wsi, host);
   const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
   if (!origin_allowed(origin, host, site.allowed_origins)) {
-    note_refused(wsi, fmt::format("upload refused: origin {} is not allowed at {} (--allow-origin)",
-                                  origin, host));
+    note_refused_origin(wsi, "upload", origin, host);
     return text_response(403, "403: pages of this origin may not save here\n");
   }
   const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   auto refusal = site.uploads.refusal({path, {}, false, authorization});
-  if (refusal)
-    note_refused(wsi, fmt::format("upload refused: {}",
-                                  refusal->body->substr(0, refusal->body->find('\n'))));
+  if (refusal) note_refused(wsi, fmt::format("upload refused: {}", reason(*refusal)));
   return refusal;
 }
 

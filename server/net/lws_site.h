@@ -40,7 +40,17 @@ bool host_allowed(const Site& site, const std::string& host);
 /// Tells Site::on_refused whose request is refused, and why.
 void note_refused(lws* wsi, std::string_view why);
 
+/// The same, of an upload or a websocket from another site's page.
+void note_refused_origin(lws* wsi, std::string_view what, const std::string& origin,
+                         const std::string& host);
+
+/// Answers a request that no handler is asked about. Nonzero: the connection closes.
+int refuse_request(lws* wsi, unsigned status, const char* why);
+
 HttpResponse refuse_host(lws* wsi, const std::string& host);
+
+/// Site::http's answer, if the host is allowed.
+HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request);
 
 /// Why nothing is taken from this upload; nothing: its body may come.
 std::optional<HttpResponse> refuse_upload(lws* wsi);

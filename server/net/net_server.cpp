@@ -80,42 +80,34 @@ int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   forget(slot);
   // libwebsockets knows no chunks and would take them for the next request.
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0) {
-    lws_return_http_status(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
-    return close_connection;
-  }
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
+    return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
   if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
-    if (is_pipelined(wsi)) {
-      lws_return_http_status(wsi, 400, "wait for the answer before you upload");
-      return close_connection;
-    }
+    if (is_pipelined(wsi)) return refuse_request(wsi, 400, "wait for the answer before you upload");
     slot.exchange = new LwsHttpExchange;
     const std::uint64_t bytes = body_length(wsi).value_or(0);
     if (bytes >= 1 && bytes <= max_upload_bytes)
       return slot.exchange->begin_upload(wsi, refuse_upload(wsi));
     const int status = bytes < 1 ? 411 : 413;
-    if (slot.exchange->refuse_body(
-            wsi, text_response(status, fmt::format("{}: {}\n", status, upload_length_rule)),
-            site.policy, service_of(wsi).scratch) != 0)
+    const std::string why = fmt::format("{}: {}", status, upload_length_rule);
+    note_refused(wsi, "upload refused: " + why);
+    if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"), site.policy,
+                                   service_of(wsi).scratch) != 0)
       return close_connection;
     const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
     return body_follows ? keep_reading : close_connection;
   }
-  if (!is_get_or_head(wsi)) {
-    lws_return_http_status(wsi, 405, "only GET and HEAD are served here");
-    return close_connection;
-  }
+  if (!is_get_or_head(wsi)) return refuse_request(wsi, 405, "only GET and HEAD are served here");
   // It means nothing, and libwebsockets would report it while the answer is on its way.
-  if (const auto bytes = body_length(wsi); bytes != 0) {
-    lws_return_http_status(wsi, bytes ? 413 : 400, "a GET needs no body");
-    return close_connection;
-  }
+  if (const auto bytes = body_length(wsi); bytes != 0)
+    return refuse_request(wsi, bytes ? 413 : 400, "a GET needs no body");
   slot.exchange = new LwsHttpExchange;
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-  const HttpHandler refuse = [&](const HttpRequest&) { return refuse_host(wsi, host); };
+  const HttpHandler handler = [&](const HttpRequest& request) {
+    return respond(wsi, host, request);
+  };
   bool finished = false;
-  if (slot.exchange->begin(wsi, host_allowed(site, host) ? site.http : refuse,
-                           site_address(wsi, host), site.policy, finished) != 0)
+  if (slot.exchange->begin(wsi, handler, site_address(wsi, host), site.policy, finished) != 0)
     return -1;
   if (finished) return finish_request(wsi, slot);
   lws_callback_on_writable(wsi);
@@ -159,7 +151,9 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       service_of(wsi).gate.closed(wsi);
       return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
-      return refuse_upgrade(wsi) ? close_connection : keep_reading;
+      if (!refuse_upgrade(wsi)) return keep_reading;
+      note_refused(wsi, "request refused: it wants another protocol than websocket");
+      return close_connection;
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
       return close_connection;
     case LWS_CALLBACK_HTTP:
@@ -184,8 +178,7 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       if (slot) forget(*slot);
       return 0;
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:  // a websocket that did not ask for catgs.v1
-      lws_return_http_status(wsi, 400, "ask for subprotocol catgs.v1");
-      return -1;
+      return refuse_request(wsi, 400, "ask for subprotocol catgs.v1");
     case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
       for (const auto& connection : service_of(wsi).waker->take()) connection->service_woken();
       return 0;
@@ -201,18 +194,14 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
       const Site& site = site_of(wsi);
       // libwebsockets takes any version of the protocol, and any method.
       if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
-          request_header(wsi, WSI_TOKEN_VERSION) != "13") {
-        lws_return_http_status(wsi, 400, "open websockets by GET, Sec-WebSocket-Version 13");
-        return -1;
-      }
+          request_header(wsi, WSI_TOKEN_VERSION) != "13")
+        return refuse_request(wsi, 400, "open websockets by GET, Sec-WebSocket-Version 13");
       const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
       const std::string host = request_header(wsi, WSI_TOKEN_HOST);
       if (site.accept && host_allowed(site, host) &&
           origin_allowed(origin, host, site.allowed_origins))
         return 0;
-      note_refused(wsi,
-                   fmt::format("websocket refused: origin {} is not allowed at {} (--allow-origin)",
-                               origin, host));
+      note_refused_origin(wsi, "websocket", origin, host);
       lws_return_http_status(wsi, 403, "this origin is not allowed");
       return -1;
     }
@@ -277,9 +266,10 @@ void forward_log(spdlog::level::level_enum level, std::string_view line) {
   spdlog::log(level, "libwebsockets: {}", line);
 }
 
-/// While its mistakes are reported by nobody else.
+/// While its mistakes are reported by nobody else. They are warnings: most are about what a
+/// stranger sent, and the log leaves no error out.
 void log_errors(int level, const char* line) {
-  forward_log(level == LLL_ERR ? spdlog::level::err : spdlog::level::debug, line);
+  forward_log(level == LLL_ERR ? spdlog::level::warn : spdlog::level::debug, line);
 }
 
 /// While they become an InputError.

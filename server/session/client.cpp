@@ -6,8 +6,10 @@
 
 #include <boost/asio/post.hpp>
 #include <boost/asio/prefer.hpp>
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "server/log.h"
 #include "server/net/wire.h"
 #include "server/session/log_session.h"
 #include "server/session/session_registry.h"
@@ -122,7 +124,11 @@ void Client::refuse(Peer& from, ErrorCode code, std::string_view why) {
 
 void Client::note_error(const std::string& address, const ErrorMessage& error) {
   const LogSession about(session_.id());
-  spdlog::warn("{}: {}", address, error.message);
+  const std::string line = fmt::format("{}: {}", address, error.message);
+  if (error.code == ErrorCode::internal || error.code == ErrorCode::render_failed)
+    spdlog::warn(line);
+  else
+    log_refusal(line);
   if (error.fatal) registry_.metrics_.sessions_refused.Increment();
 }
 

@@ -116,6 +116,15 @@ TEST(Log, WhoIsRefusedWithoutEndHidesNothingElse) {
   EXPECT_THAT(all, Contains(HasSubstr("lines were left out")));
 }
 
+TEST(Log, NoFloodHidesAnError) {
+  const auto all = lines_of("human", "info", [] {
+    for (int i = 0; i < 2000; ++i) spdlog::warn("one of many");
+    for (int i = 0; i < 200; ++i) log_refusal("of a stranger");
+    for (int i = 0; i < 1000; ++i) spdlog::error("grave");
+  });
+  EXPECT_EQ(std::ranges::count_if(all, [](auto& line) { return line.ends_with("grave"); }), 1000);
+}
+
 /// Standard error is `descriptor` while `log` logs.
 void with_standard_error(int descriptor, const std::function<void()>& log) {
   const int kept = ::dup(STDERR_FILENO);

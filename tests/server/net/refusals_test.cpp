@@ -9,13 +9,16 @@
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
+#include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
 namespace {
 
+using testing::AnyOf;
 using testing::HasSubstr;
+using testing::Not;
 
 class Refusals : public testing::Test {
  protected:
@@ -71,6 +74,43 @@ TEST_F(Refusals, OfHostsOriginsAndUploadsNameTheAddressBehindTheProxy) {
   EXPECT_THAT(lines, HasSubstr("198.51.100.4: upload refused: 401: "));
   EXPECT_THAT(lines, HasSubstr("127.0.0.1: request refused: ")) << "on the admin port";
   EXPECT_THAT(lines, Not(HasSubstr("sesame")));
+}
+
+TEST_F(Refusals, OfRequestsWithoutATokenOrInAFormThatIsNotTakenAreCounted) {
+  const int port = server_->port();
+  const std::string head = " HTTP/1.1\r\nHost: localhost\r\n";
+  const std::string sidecar = "PUT /api/scenes/city/sidecar" + head;
+  double refused = 0.0;
+  for (const auto& [request, status] : std::vector<std::pair<std::string, std::string>>{
+           {"GET /api/scenes" + head, " 401 "},
+           {"GET /api/scenes/city/tours" + head, " 401 "},
+           {"DELETE /" + head, " 405 "},
+           {"GET /" + head + "Content-Length: 5\r\n", " 413 "},
+           {"GET /" + head + "Content-Length: five\r\n", " 400 "},
+           {"POST /" + head + "Transfer-Encoding: chunked\r\n", " 411 "},
+           {sidecar + "Content-Length: 0\r\n", " 411 "},
+           {sidecar + "Content-Length: 99999999\r\n", " 413 "},
+           {"GET /" + head + "Connection: Upgrade\r\nUpgrade: h2c\r\n", " 400 "}}) {
+    RawSocket socket(port);
+    socket.send(request + "\r\n");
+    std::string answer;
+    EXPECT_TRUE(socket.receive_until("\r\n", answer)) << request;
+    EXPECT_THAT(answer.substr(0, answer.find("\r\n")), HasSubstr(status)) << request;
+    EXPECT_EQ(count("catgs_requests_refused_total"), ++refused) << request;
+  }
+  EXPECT_EQ(http_get(port, "/atlantis").status, 404);
+  EXPECT_EQ(count("catgs_requests_refused_total"), refused) << "not found is not refused";
+}
+
+TEST_F(Refusals, SayNotMoreThanALittleOfWhatTheStrangerSent) {
+  const std::string host(1000, 'h');
+  const std::string origin = "https://" + std::string(1000, 'o');
+  http_get(server_->port(), "/", {{"host", host}});
+  http_put(server_->port(), "/api/scenes/city/sidecar", "{}", {{"origin", origin}});
+  const std::string lines = log();
+  EXPECT_THAT(lines, HasSubstr(host.substr(0, 100) + "..."));
+  EXPECT_THAT(lines, HasSubstr(origin.substr(0, 100) + "..."));
+  EXPECT_THAT(lines, Not(AnyOf(HasSubstr(host.substr(0, 101)), HasSubstr(origin.substr(0, 101)))));
 }
 
 TEST_F(Refusals, OfMessagesNameTheAddress) {

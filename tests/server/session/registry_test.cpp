@@ -1,5 +1,10 @@
 // Who gets which device and which encoder.
 
+#include <sstream>
+
+#include <spdlog/spdlog.h>
+
+#include "server/log.h"
 #include "tests/server/session/registry_fixture.h"
 
 namespace catgs::test {
@@ -100,6 +105,29 @@ TEST_F(RegistryTest, AddressesOfOneNetworkOfIpv6ShareTheirLimit) {
   for (const std::size_t index : {3u, 2u, 0u}) leave(index);
   run_until([&] { return registry->connections() == 1; });
   EXPECT_TRUE(admits("2001:db8:1:2::3")) << "who leaves is counted no more";
+}
+
+TEST_F(RegistryTest, RefusalsAreThoseOfStrangersInTheLog) {
+  const auto before = spdlog::default_logger();
+  testing::internal::CaptureStderr();
+  set_up_log("human", "info");
+  start();
+  for (int i = 0; i < 2000; ++i) {
+    const auto stranger = registry->accept(std::make_shared<OpenConnection>("192.0.2.1"));
+    stranger->on_bad_message("binary messages only");
+    stranger->on_close(false);
+  }
+  run_until([&] { return metrics.sessions_refused.Value() == 2000.0; });
+  for (int i = 0; i < 300; ++i) spdlog::warn("of somebody else");
+  std::istringstream lines(testing::internal::GetCapturedStderr());
+  spdlog::drop("catgs-server");
+  spdlog::set_default_logger(before);
+  int refusals = 0, others = 0;
+  for (std::string line; std::getline(lines, line);)
+    ++(line.ends_with("of somebody else") ? others : refusals);
+  EXPECT_EQ(others, 300);
+  EXPECT_GE(refusals, 100);
+  EXPECT_LT(refusals, 1000);
 }
 
 }  // namespace
