@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <fmt/format.h>
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
@@ -51,6 +52,14 @@ std::optional<std::string> from_base64url(std::string_view text) {
   return out;
 }
 
+template <std::size_t count>
+std::array<unsigned char, count> random_bytes() {
+  std::array<unsigned char, count> bytes{};
+  if (RAND_bytes(bytes.data(), count) != 1)
+    throw std::runtime_error("the system has no random numbers");
+  return bytes;
+}
+
 }  // namespace
 
 TokenDigest digest_of(std::string_view text) {
@@ -81,10 +90,10 @@ std::optional<std::string> read_signed_token(std::string_view purpose, std::stri
 }
 
 std::string random_key() {
-  std::string key(32, '\0');
-  if (RAND_bytes(reinterpret_cast<unsigned char*>(key.data()), static_cast<int>(key.size())) != 1)
-    throw std::runtime_error("the system has no random numbers for a key");
-  return key;
+  const auto bytes = random_bytes<32>();
+  return {bytes.begin(), bytes.end()};
 }
+
+std::string random_id() { return fmt::format("{:02x}", fmt::join(random_bytes<16>(), "")); }
 
 }  // namespace catgs

@@ -22,5 +22,7 @@ bool equal_in_constant_time(const TokenDigest& a, const TokenDigest& b);
 
 /// 32 bytes from the system's random source. Throws std::runtime_error when it has none.
 std::string random_key();
+/// 128 bits of it, as hexadecimal digits: no two are alike, whichever server made them.
+std::string random_id();
 
 }  // namespace catgs

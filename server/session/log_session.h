@@ -8,10 +8,13 @@ namespace catgs {
 /// it into every line (server/log.cpp).
 inline thread_local std::string_view logged_session;
 
-/// Names it for a scope. `id` outlives the scope.
+/// Names it for a scope, by as much of its id as tells a server's sessions apart. `id` outlives the
+/// scope.
 class LogSession {
  public:
-  explicit LogSession(std::string_view id) : outer_(logged_session) { logged_session = id; }
+  explicit LogSession(std::string_view id) : outer_(logged_session) {
+    logged_session = id.substr(0, 8);
+  }
   ~LogSession() { logged_session = outer_; }
   LogSession(const LogSession&) = delete;
   LogSession& operator=(const LogSession&) = delete;

@@ -1,7 +1,6 @@
 #include "server/session/session_registry.h"
 
 #include <algorithm>
-#include <random>
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
 #include "server/session/log_session.h"
+#include "server/signed_token.h"
 
 namespace catgs {
 namespace {
@@ -17,12 +17,6 @@ namespace {
 constexpr std::chrono::milliseconds tick_interval{250};
 constexpr std::chrono::seconds time_to_measure{3};  // who moves nothing for so long is at rest
 constexpr std::chrono::milliseconds queue_tell_interval{750};  // once a second, with the tick
-
-/// For people and logs: tells sessions apart, protects nothing.
-std::string random_session_id() {
-  thread_local std::mt19937 engine{std::random_device{}()};
-  return fmt::format("{:08x}", engine());
-}
 
 double megapixels(glm::ivec2 size_px) { return 1e-6 * size_px.x * size_px.y; }
 
@@ -61,7 +55,7 @@ SessionRegistry::SessionRegistry(boost::asio::io_context& io, RegistryOptions op
 
 std::shared_ptr<ConnectionListener> SessionRegistry::accept(
     std::shared_ptr<Connection> connection) {
-  auto client = std::make_shared<Client>(*this, random_session_id(), connection->peer_address());
+  auto client = std::make_shared<Client>(*this, random_id(), connection->peer_address());
   auto peer = std::make_shared<Peer>(*this, std::move(connection));
   boost::asio::post(io_, [this, peer, client] { add(peer, client); });
   return peer;

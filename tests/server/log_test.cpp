@@ -49,7 +49,7 @@ std::vector<std::string> lines(std::string_view format) {
   return lines_of(format, "info", [] {
     spdlog::info("first");
     {
-      const LogSession about("1f2e3d4c");
+      const LogSession about("1f2e3d4c5b6a79880f1e2d3c4b5a6978");
       spdlog::warn("\xff \"quoted\"");
     }
     spdlog::info("last");

@@ -1,5 +1,6 @@
 // Who gets which device and which encoder.
 
+#include <set>
 #include <sstream>
 
 #include <spdlog/spdlog.h>
@@ -128,6 +129,14 @@ TEST_F(RegistryTest, RefusalsAreThoseOfStrangersInTheLog) {
   EXPECT_EQ(others, 300);
   EXPECT_GE(refusals, 100);
   EXPECT_LT(refusals, 1000);
+}
+
+TEST_F(RegistryTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
+  start();
+  std::set<std::string> ids;
+  for (int i = 0; i < 4; ++i) ids.insert(join().connection->welcome->session_id());
+  EXPECT_EQ(ids.size(), 4u);
+  EXPECT_THAT(ids, testing::Each(testing::MatchesRegex("[0-9a-f]{32}")));
 }
 
 }  // namespace
