@@ -64,6 +64,7 @@ bool origin_allowed(std::string_view origin, std::string_view host,
 bool is_loopback(std::string_view address) {
   if (address == "localhost") return true;
   const std::string text(address);
+  if (text.find('\0') != std::string::npos) return false;  // where inet_pton() stops to read
   in_addr v4{};
   in6_addr v6{};
   if (::inet_pton(AF_INET, text.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;

@@ -97,6 +97,16 @@ std::map<std::string, std::string> client_message_seeds() {
   return seeds;
 }
 
+/// Whether a Host header is one of a loopback address or of friend.example, whatever its port.
+bool means_this_machine(std::string_view host) {
+  if (host.starts_with('[')) host = host.substr(1, host.find(']') - 1);
+  const std::string_view name = host.substr(0, host.find(':'));
+  const bool is_ipv4 = name.find_first_not_of("0123456789.") == std::string_view::npos;
+  const bool is_ipv6 = host.find(':') < host.find_first_not_of("01:.");
+  return host.empty() || name == "friend.example" || name == "localhost" ||
+         (is_ipv4 && name.starts_with("127.")) || is_ipv6;
+}
+
 /// The lines of a request that decide something: path, Host, Origin, X-Forwarded-For.
 void parse_request(Bytes input) {
   static const test::TemporaryFolder folder;
@@ -125,7 +135,8 @@ void parse_request(Bytes input) {
   if (origin_allowed(origin, host, {"https://friend.example"}) && !origin.empty())
     require(origin == "https://friend.example" || (!host.empty() && origin.ends_with(host)),
             "an origin is listed or this host");
-  loopback_host_allowed(host, {"https://friend.example"});
+  require(means_this_machine(host) || !loopback_host_allowed(host, {"https://friend.example"}),
+          "no foreign name is answered on a loopback address");
 
   require(proxies.client_address("192.0.2.1", forwarded) == "192.0.2.1",
           "strangers are not believed");

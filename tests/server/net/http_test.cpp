@@ -64,6 +64,7 @@ TEST(LoopbackHost, LoopbackIsTheWholeNetwork127) {
     EXPECT_TRUE(is_loopback(address)) << address;
   for (const char* address : {"::", "0.0.0.0", "127.a.example", "10.0.0.1", "127", ""})
     EXPECT_FALSE(is_loopback(address)) << address;
+  EXPECT_FALSE(is_loopback({"127.0.0.1\0.evil.example", 23})) << "its end is not at the zero byte";
 }
 
 TEST(ContentSecurityPolicy, NamesWhoMayEmbed) {
