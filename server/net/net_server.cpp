@@ -132,7 +132,7 @@ int on_accept(lws* listener, int descriptor) {
   if (!site.accept) return keep_reading;
   std::array<char, 64> peer{};
   lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
-  const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : peer.data();
+  const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : limited_as(peer.data());
   const auto why =
       service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
   if (!why) return keep_reading;
