@@ -37,7 +37,7 @@ nlohmann::json sidecar_tours(const std::filesystem::path& sidecar, std::string_v
   const nlohmann::json document = read_json(file, max_bytes);
   const auto tours = JsonField(file.name(), document).find("tours");
   if (!tours) return nullptr;
-  static_cast<void>(tours->elements());  // an array, or it says so
+  static_cast<void>(tours->size());  // an array, or it says so
   return tours->value();
 }
 
@@ -97,10 +97,10 @@ void check_tour(const JsonField& tour) {
   check_text(tour.find("title"));
   if (const auto autoplay = tour.find("autoplay"); autoplay && !autoplay->value().is_boolean())
     autoplay->fail("is not true or false");
-  const auto stops = tour.at("stops").elements();
+  const JsonField stops = tour.at("stops");
   if (stops.size() > max_stops)
-    tour.at("stops").fail(fmt::format("has {} entries, at most {}", stops.size(), max_stops));
-  for (const JsonField& stop : stops) check_stop(stop);
+    stops.fail(fmt::format("has {} entries, at most {}", stops.size(), max_stops));
+  for (std::size_t i = 0; i < stops.size(); ++i) check_stop(stops[i]);
 }
 
 }  // namespace
@@ -109,11 +109,10 @@ Sidecar check_sent_sidecar(std::string_view json) {
   const MemorySource source("sidecar", std::as_bytes(std::span(json)));
   const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
   Sidecar sidecar = read_sidecar(source);
-  if (const auto field = JsonField(source.name(), document).find("tours")) {
-    const auto tours = field->elements();
-    if (tours.size() > max_tours)
-      field->fail(fmt::format("has {} entries, at most {}", tours.size(), max_tours));
-    for (const JsonField& tour : tours) check_tour(tour);
+  if (const auto tours = JsonField(source.name(), document).find("tours")) {
+    if (tours->size() > max_tours)
+      tours->fail(fmt::format("has {} entries, at most {}", tours->size(), max_tours));
+    for (std::size_t i = 0; i < tours->size(); ++i) check_tour((*tours)[i]);
   }
   return sidecar;
 }

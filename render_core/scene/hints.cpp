@@ -19,8 +19,8 @@ namespace catgs {
 
 namespace {
 
-constexpr std::uint64_t max_sidecar_bytes = 16 << 20;
-constexpr std::uint64_t max_cameras_bytes = 256 << 20;
+constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
+constexpr std::uint64_t max_cameras_bytes = 16 << 20;  // 10,000 cameras take 5 MiB
 
 glm::vec3 parse_up(const JsonField& field) {
   if (field.value().is_string()) {
@@ -66,11 +66,10 @@ Bounds parse_limits(const JsonField& field) {
 
 /// `rows`: 3 x 3 or 4 x 4 numbers; the rotation part must be one.
 glm::mat3 parse_rotation(const JsonField& rows, std::size_t size) {
-  const auto elements = rows.elements();
-  if (elements.size() != size) rows.fail(fmt::format("is not a {0}x{0} matrix", size));
+  if (rows.size() != size) rows.fail(fmt::format("is not a {0}x{0} matrix", size));
   glm::mat3 rotation;
   for (int r = 0; r < 3; ++r) {
-    const auto row = elements[static_cast<std::size_t>(r)].numbers(size);
+    const auto row = rows[static_cast<std::size_t>(r)].numbers(size);
     for (int c = 0; c < 3; ++c) rotation[c][r] = row[static_cast<std::size_t>(c)];
   }
   // A determinant of 1 alone may be a shear's, with numbers of any size.
@@ -190,23 +189,26 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
 std::vector<Pose> read_cameras_json(const ByteSource& file) {
   const nlohmann::json document = read_json(file, max_cameras_bytes);
   std::vector<Pose> poses;
-  for (const JsonField& camera : JsonField(file.name(), document).elements())
+  const JsonField cameras(file.name(), document);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const JsonField camera = cameras[i];
     poses.push_back({camera.at("position").place(),
                      glm::normalize(glm::quat_cast(parse_rotation(camera.at("rotation"), 3)))});
+  }
   return poses;
 }
 
 std::vector<Pose> read_transforms_json(const ByteSource& file) {
   const nlohmann::json document = read_json(file, max_cameras_bytes);
   std::vector<Pose> poses;
-  for (const JsonField& frame : JsonField(file.name(), document).at("frames").elements()) {
-    const JsonField matrix = frame.at("transform_matrix");
+  const JsonField frames = JsonField(file.name(), document).at("frames");
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const JsonField matrix = frames[i].at("transform_matrix");
     glm::mat3 rotation = parse_rotation(matrix, 4);
     rotation[1] = -rotation[1];  // OpenGL cameras: y up, z back
     rotation[2] = -rotation[2];
-    const auto rows = matrix.elements();
     glm::vec3 position;
-    for (int r = 0; r < 3; ++r) position[r] = rows[static_cast<std::size_t>(r)].numbers(4)[3];
+    for (int r = 0; r < 3; ++r) position[r] = matrix[static_cast<std::size_t>(r)].numbers(4)[3];
     poses.push_back({position, glm::normalize(glm::quat_cast(rotation))});
   }
   return poses;

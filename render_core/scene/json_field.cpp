@@ -13,9 +13,13 @@ namespace {
 
 /// Documents are copied and printed by recursion: one of a million brackets would end the stack.
 constexpr int max_depth = 256;
+/// Two bytes, `0,`, take sixteen in memory, empty brackets a hundred: those count twice.
+constexpr std::size_t max_values = std::size_t{1} << 20;
 
-void require_shallow(const ByteSource& file, std::string_view text) {
+/// Before any memory is taken for the document.
+void require_modest(const ByteSource& file, std::string_view text) {
   int depth = 0;
+  std::size_t values = 1;  // each but the first follows a comma or is the first in its brackets
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -25,12 +29,19 @@ void require_shallow(const ByteSource& file, std::string_view text) {
     } else if (c == '"') {
       in_string = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > max_depth)
-        throw InputError(file.name(), fmt::format("byte {}", i),
-                         fmt::format("is nested deeper than {}", max_depth));
+      ++depth;
+      ++values;
+    } else if (c == ',') {
+      ++values;
     } else if (c == ']' || c == '}') {
       --depth;
     }
+    if (depth > max_depth)
+      throw InputError(file.name(), fmt::format("byte {}", i),
+                       fmt::format("is nested deeper than {}", max_depth));
+    if (values > max_values)
+      throw InputError(file.name(), fmt::format("byte {}", i),
+                       fmt::format("more than {} values", max_values));
   }
 }
 
@@ -39,7 +50,7 @@ void require_shallow(const ByteSource& file, std::string_view text) {
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit) {
   const std::vector<std::byte> bytes = file.read_all(limit);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  require_shallow(file, text);
+  require_modest(file, text);
   try {
     return nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {
@@ -71,12 +82,13 @@ JsonField JsonField::at(std::string_view key) const {
   fail(fmt::format("'{}' is missing", key));
 }
 
-std::vector<JsonField> JsonField::elements() const {
+std::size_t JsonField::size() const {
   if (!value_->is_array()) fail("is not an array");
-  std::vector<JsonField> all;
-  for (std::size_t i = 0; i < value_->size(); ++i)
-    all.push_back(JsonField(file_, fmt::format("{}[{}]", path_, i), (*value_)[i]));
-  return all;
+  return value_->size();
+}
+
+JsonField JsonField::operator[](std::size_t index) const {
+  return JsonField(file_, fmt::format("{}[{}]", path_, index), value_->at(index));
 }
 
 float JsonField::number() const {
@@ -100,7 +112,7 @@ std::vector<float> JsonField::numbers(std::size_t expected_size) const {
   if (!value_->is_array() || value_->size() != expected_size)
     fail(fmt::format("is not an array of {} numbers", expected_size));
   std::vector<float> all;
-  for (const JsonField& element : elements()) all.push_back(element.number());
+  for (std::size_t i = 0; i < expected_size; ++i) all.push_back((*this)[i].number());
   return all;
 }
 

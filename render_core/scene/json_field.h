@@ -14,7 +14,7 @@
 namespace catgs {
 
 /// Parses a whole file as JSON. Throws InputError with the byte of a syntax error; files over
-/// `limit` bytes, and those nested deeper than 256, are refused.
+/// `limit` bytes, of more than 2^20 values or nested deeper than 256 are refused.
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit);
 
 /// `bytes` with U+FFFD for what is not UTF-8. File names may hold any bytes, JSON and the wire not.
@@ -31,7 +31,8 @@ class JsonField {
   [[nodiscard]] JsonField at(std::string_view key) const;
   /// Member `key`; empty when it is missing or null.
   [[nodiscard]] std::optional<JsonField> find(std::string_view key) const;
-  [[nodiscard]] std::vector<JsonField> elements() const;  // of an array
+  [[nodiscard]] std::size_t size() const;                       // of an array
+  [[nodiscard]] JsonField operator[](std::size_t index) const;  // of an array; below its size
 
   [[nodiscard]] float number() const;  // finite
   [[nodiscard]] std::uint64_t count() const;

@@ -31,28 +31,25 @@ SogMeta::Channel between(float min, float max) {
 
 /// An early writer left the first of its ascending values out; it continues the others' slope.
 SogMeta::Channel codebook(const JsonField& field) {
-  const std::vector<JsonField> elements = field.elements();
   SogMeta::Channel values{};
-  if (elements.size() != values.size()) field.fail("is not an array of 256 numbers");
-  const bool first_missing = elements[0].value().is_null();
-  for (std::size_t i = first_missing ? 1 : 0; i < values.size(); ++i)
-    values[i] = elements[i].number();
+  if (field.size() != values.size()) field.fail("is not an array of 256 numbers");
+  const bool first_missing = field[0].value().is_null();
+  for (std::size_t i = first_missing ? 1 : 0; i < values.size(); ++i) values[i] = field[i].number();
   if (first_missing) values[0] = values[1] + (values[1] - values[255]) / 255.0f;
   return values;
 }
 
 std::string image_name(const JsonField& meta, const char* attribute, std::size_t index,
                        std::size_t expected) {
-  const auto files = meta.at(attribute).at("files").elements();
-  if (files.size() != expected)
-    meta.at(attribute).at("files").fail(fmt::format("does not name {} images", expected));
+  const JsonField files = meta.at(attribute).at("files");
+  if (files.size() != expected) files.fail(fmt::format("does not name {} images", expected));
   return files[index].text();
 }
 
 void parse_version_1(const JsonField& meta, SogMeta& sog) {
-  const auto shape = meta.at("means").at("shape").elements();
-  if (shape.empty()) meta.at("means").at("shape").fail("is empty");
-  sog.count = shape.front().count();
+  const JsonField shape = meta.at("means").at("shape");
+  if (shape.size() == 0) shape.fail("is empty");
+  sog.count = shape[0].count();
   const auto min_scale = meta.at("scales").at("mins").vec3();
   const auto max_scale = meta.at("scales").at("maxs").vec3();
   const auto min_sh0 = meta.at("sh0").at("mins").numbers(4);

@@ -17,9 +17,9 @@ namespace catgs {
 
 namespace {
 
-constexpr std::uint64_t max_tree_bytes = 256 << 20;
+constexpr std::uint64_t max_tree_bytes = 32 << 20;  // 6 M Gaussians take 242 KB
 constexpr std::uint64_t max_levels = 16;
-constexpr std::size_t max_nodes = std::size_t{1} << 20;
+constexpr std::size_t max_nodes = std::size_t{1} << 16;
 constexpr int max_tree_depth = 64;
 
 LodPiece parse_piece(const JsonField& field, std::size_t file_count) {
@@ -41,6 +41,17 @@ std::vector<std::optional<LodPiece>> parse_node(const JsonField& lods, const Lod
     pieces[level] = parse_piece(lods.at(key), tree.files.size());
   }
   return pieces;
+}
+
+/// By recursion, which max_tree_depth bounds.
+void parse_tree(const JsonField& node, int depth, LodTree& tree) {
+  if (depth > max_tree_depth) node.fail(fmt::format("lies deeper than {}", max_tree_depth));
+  if (const auto lods = node.find("lods")) {
+    if (tree.nodes.size() == max_nodes) lods->fail(fmt::format("is node {}", max_nodes + 1));
+    tree.nodes.push_back(parse_node(*lods, tree));
+  }
+  if (const auto children = node.find("children"))
+    for (std::size_t i = 0; i < children->size(); ++i) parse_tree((*children)[i], depth + 1, tree);
 }
 
 /// Level of the node's piece that stands for `wanted`; -1 when the node is empty.
@@ -150,23 +161,10 @@ LodTree read_lod_tree(const ByteSource& file) {
   if (levels < 1 || levels > max_levels)
     meta.at("lodLevels").fail(fmt::format("is not in 1…{}", max_levels));
   tree.levels = static_cast<int>(levels);
-  for (const JsonField& name : meta.at("filenames").elements()) tree.files.push_back(name.text());
+  const JsonField names = meta.at("filenames");
+  for (std::size_t i = 0; i < names.size(); ++i) tree.files.push_back(names[i].text());
   if (const auto environment = meta.find("environment")) tree.environment = environment->text();
-
-  // Not by recursion: a tree from a file may be deeper than our stack.
-  std::vector<std::pair<JsonField, int>> pending = {{meta.at("tree"), 0}};
-  while (!pending.empty()) {
-    const auto [node, depth] = std::move(pending.back());
-    pending.pop_back();
-    if (depth > max_tree_depth) node.fail(fmt::format("lies deeper than {}", max_tree_depth));
-    if (const auto lods = node.find("lods")) {
-      if (tree.nodes.size() == max_nodes) lods->fail(fmt::format("is node {}", max_nodes + 1));
-      tree.nodes.push_back(parse_node(*lods, tree));
-    }
-    if (const auto children = node.find("children"))
-      for (JsonField& child : children->elements())
-        pending.emplace_back(std::move(child), depth + 1);
-  }
+  parse_tree(meta.at("tree"), 0, tree);
   return tree;
 }
 

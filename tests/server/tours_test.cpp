@@ -68,6 +68,22 @@ TEST_F(Tours, RefuseWhatIsNestedWithoutEnd) {
               ThrowsMessage<std::runtime_error>(HasSubstr("byte 265: is nested deeper than 256")));
 }
 
+TEST_F(Tours, AreRefusedBeyondFourMebibytes) {
+  const auto padded = [](std::size_t bytes, std::string text) {
+    text.resize(bytes, ' ');
+    return text;
+  };
+  write("museum.settings.json", padded(4 << 20, R"({"animTracks": 1})"));
+  EXPECT_FALSE(read()["settings"].is_null());
+  write("museum.settings.json", padded((4 << 20) + 1, R"({"animTracks": 1})"));
+  EXPECT_TRUE(read()["settings"].is_null());
+  write("museum.json", padded(4 << 20, R"({"tours": []})"));
+  EXPECT_FALSE(read()["tours"].is_null());
+  write("museum.json", padded((4 << 20) + 1, R"({"tours": []})"));
+  EXPECT_THAT([&] { read(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("at most 4194304 make sense")));
+}
+
 TEST_F(Tours, SayWhatIsWrongInASidecar) {
   write("museum.json", R"({"tours": {"title": "Hall"}})");
   EXPECT_THAT([&] { read_tours(folder_ / "museum.json"); },
@@ -115,19 +131,27 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   EXPECT_THAT(mistake(with_stop(R"(, "marker": [0, 0])")), HasSubstr("marker"));
   EXPECT_THAT(mistake(with_stop(R"(, "captoin": "x")")), HasSubstr("unknown field 'captoin'"));
   EXPECT_THAT(mistake(with_stop(R"(, "caption": 7)")), HasSubstr("caption: is not a text"));
-  EXPECT_THAT(mistake(with_stop(fmt::format(R"(, "caption": "{}")", std::string(16'001, 'x')))),
-              HasSubstr("caption: has more than"));
+  const auto caption = [](std::size_t bytes) {
+    return with_stop(fmt::format(R"(, "caption": "{}")", std::string(bytes, 'x')));
+  };
+  EXPECT_EQ(mistake(caption(16'000)), "");
+  EXPECT_THAT(mistake(caption(16'001)), HasSubstr("caption: has more than"));
   EXPECT_THAT(mistake(R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})"),
               HasSubstr("'orientation' is missing"));
-  std::string many = R"({"tours": [)";
-  for (int i = 0; i < 33; ++i) many += i == 0 ? R"({"stops": []})" : R"(, {"stops": []})";
-  EXPECT_THAT(mistake(many + "]}"), HasSubstr("tours: has 33 entries, at most 32"));
-  std::string stops(stop);
-  stops += "}";
-  for (int i = 0; i < 256; ++i) stops.append(", ").append(stop).append("}");
-  EXPECT_THAT(mistake(fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", stops)),
-              HasSubstr("tours[0].stops: has 257 entries, at most 256"));
-  EXPECT_NE(mistake(std::string(max_sent_sidecar_bytes, ' ') + "{}"), "") << "too large";
+  const auto tours = [](std::size_t count) {
+    const std::vector<std::string> all(count, R"({"stops": []})");
+    return fmt::format(R"({{"tours": [{}]}})", fmt::join(all, ","));
+  };
+  EXPECT_EQ(mistake(tours(32)), "");
+  EXPECT_THAT(mistake(tours(33)), HasSubstr("tours: has 33 entries, at most 32"));
+  const auto stops = [](std::size_t count) {
+    const std::vector<std::string> all(count, std::string(stop) + "}");
+    return fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", fmt::join(all, ","));
+  };
+  EXPECT_EQ(mistake(stops(256)), "");
+  EXPECT_THAT(mistake(stops(257)), HasSubstr("tours[0].stops: has 257 entries, at most 256"));
+  EXPECT_EQ(mistake(std::string((1 << 20) - 2, ' ') + "{}"), "");
+  EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "") << "too large";
 }
 
 }  // namespace

@@ -2,7 +2,10 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "render_core/scene/first_sight.h"
+#include "render_core/scene/json_field.h"
 #include "render_core/scene/robust_bounds.h"
 #include "render_core/scene/sog.h"
 #include "render_core/scene/streamed_sog.h"
@@ -285,15 +288,40 @@ TEST_F(JsonFiles, LargerThanTheirLimitAreRefused) {
     std::filesystem::resize_file(path, bytes);
     return input_error([&] { read(FileSource(path)); });
   };
+  const auto read_meta = [&](const ByteSource&) {
+    parse_sog_meta(FolderFiles(folder_.path()), "large.json");
+  };
+  const auto expect_limit = [&](std::uint64_t bytes, const auto& read) {
+    EXPECT_THAT(error(bytes, read), HasSubstr("is not valid JSON")) << "it was read";
+    EXPECT_THAT(error(bytes + 1, read), HasSubstr(fmt::format("at most {} make sense", bytes)));
+  };
   constexpr std::uint64_t mib = 1 << 20;
-  EXPECT_THAT(error(16 * mib + 1, read_sidecar), HasSubstr("at most 16777216 make sense"));
-  EXPECT_THAT(error(256 * mib + 1, read_cameras_json), HasSubstr("at most 268435456"));
-  EXPECT_THAT(error(256 * mib + 1, read_transforms_json), HasSubstr("at most 268435456"));
-  EXPECT_THAT(error(256 * mib + 1, read_lod_tree), HasSubstr("at most 268435456"));
-  EXPECT_THAT(
-      error(4 * mib + 1,
-            [&](const ByteSource&) { parse_sog_meta(FolderFiles(folder_.path()), "large.json"); }),
-      HasSubstr("at most 4194304"));
+  expect_limit(4 * mib, read_meta);
+  expect_limit(4 * mib, read_sidecar);
+  expect_limit(16 * mib, read_cameras_json);
+  expect_limit(16 * mib, read_transforms_json);
+  expect_limit(32 * mib, read_lod_tree);
+}
+
+TEST_F(JsonFiles, OfMoreValuesThanFitIntoMemoryAreRefused) {
+  const auto read = [](std::size_t zeros) {
+    std::string text = "[0";
+    for (std::size_t i = 1; i < zeros; ++i) text += ",0";
+    text += "]";
+    return read_json(MemorySource("many.json", bytes_of(text)), text.size()).size();
+  };
+  EXPECT_EQ(read((1 << 20) - 1), (1u << 20) - 1) << "and the array itself";
+  EXPECT_THAT(input_error([&] { read(1 << 20); }),
+              HasSubstr("many.json: byte 2097150: more than 1048576 values"));
+}
+
+TEST_F(JsonFiles, NestedDeeperThanTheStackMayTakeAreRefused) {
+  const auto read = [](std::size_t depth) {
+    const std::string text = std::string(depth, '[') + std::string(depth, ']');
+    return read_json(MemorySource("deep.json", bytes_of(text)), text.size());
+  };
+  EXPECT_NO_THROW(read(256));
+  EXPECT_THAT(input_error([&] { read(257); }), HasSubstr("byte 256: is nested deeper than 256"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "render_core/scene/streamed_sog.h"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/render_core/scene/encoders.h"
@@ -139,15 +140,31 @@ TEST_F(StreamedSogTest, ErrorsNameTheField) {
 }
 
 TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
-  const auto error_at = [](int depth) {
+  const auto read = [](int depth) {
     std::string text = R"({"lodLevels": 1, "filenames": [], "tree": )";
     for (int i = 0; i < depth; ++i) text += R"({"children":[)";
+    text += "{}";
     for (int i = 0; i < depth; ++i) text += "]}";
     const std::string document = text + "}";
-    return input_error([&] { read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))); });
+    return read_lod_tree(MemorySource("lod-meta.json", bytes_of(document)));
   };
-  EXPECT_THAT(error_at(100), HasSubstr("lies deeper than 64"));
-  EXPECT_THAT(error_at(200'000), HasSubstr("nested deeper than 256"));
+  EXPECT_NO_THROW(read(64));
+  EXPECT_THAT(input_error([&] { read(65); }), HasSubstr("lies deeper than 64"));
+  EXPECT_THAT(input_error([&] { read(200'000); }), HasSubstr("nested deeper than 256"));
+}
+
+TEST_F(StreamedSogTest, TooManyNodesOrLevelsAreRefused) {
+  const auto read = [](std::size_t nodes, int levels) {
+    const std::vector<std::string> all(nodes, R"({"lods":{}})");
+    const std::string document =
+        fmt::format(R"({{"lodLevels": {}, "filenames": [], "tree": {{"children": [{}]}}}})", levels,
+                    fmt::join(all, ","));
+    return read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))).nodes.size();
+  };
+  EXPECT_EQ(read(65'536, 16), 65'536u);
+  EXPECT_THAT(input_error([&] { read(65'537, 1); }),
+              HasSubstr("tree.children[65536].lods: is node 65537"));
+  EXPECT_THAT(input_error([&] { read(1, 17); }), HasSubstr("lodLevels: is not in 1…16"));
 }
 
 }  // namespace
