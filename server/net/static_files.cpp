@@ -85,12 +85,12 @@ StaticFiles::StaticFiles(const std::filesystem::path& folder) {
   std::size_t total = 0;
   for (const auto& entry : it) {
     if (!entry.is_regular_file()) continue;
-    std::string body = read_file(entry.path());
-    total += body.size();
+    total += entry.file_size();
     if (files_.size() >= max_files || total > max_total_bytes)
       throw InputError(
           source, {}, fmt::format("more than {} files or {} MiB", max_files, max_total_bytes >> 20),
           "this is not a built client");
+    std::string body = read_file(entry.path());
     const auto mime = mime_type_of(entry.path());
     const std::string name = (fs::path("/") / fs::relative(entry.path(), folder)).generic_string();
     File file;

@@ -159,5 +159,20 @@ TEST_F(AccessTest, NamesWhatIsWrong) {
   EXPECT_EQ(parse_duration("90s"), std::chrono::seconds(90));
 }
 
+TEST_F(AccessTest, TokensAndKeysHaveALength) {
+  const auto tokens = [this](std::size_t bytes) {
+    AccessControl(folder.write("tokens", std::string(bytes, 't')), {});
+  };
+  EXPECT_NO_THROW(tokens(8));
+  EXPECT_NO_THROW(tokens(512));
+  EXPECT_THROW(tokens(7), InputError);
+  EXPECT_THROW(tokens(513), InputError);
+  const auto key_of = [this](std::size_t bytes) {
+    return read_key_file("--token-key-file", folder.write("key", std::string(bytes, 'k')));
+  };
+  EXPECT_EQ(key_of(16).size(), 16u);
+  EXPECT_THROW(key_of(15), InputError);
+}
+
 }  // namespace
 }  // namespace catgs

@@ -179,6 +179,7 @@ TEST(CpuView, CountsThePairsOfTheReference) {
 }
 
 TEST(CpuView, ListMemoryIsBounded) {
+  EXPECT_EQ(ViewSettings{}.max_list_entries, 67'108'864u);
   const TestScene scene = test::small_scenes().front();
   for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla}) {
     const ViewSettings settings{.pipeline = pipeline, .max_list_entries = 1000};

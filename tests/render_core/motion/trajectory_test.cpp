@@ -66,7 +66,11 @@ TEST_F(TumFile, ErrorsNameTheLine) {
   EXPECT_THAT(error_of("1 0 0 -9e93 0 0 0 1\n"), HasSubstr("line 1: the position is out of range"));
   EXPECT_THAT(error_of("1e300 0 0 0 0 0 0 1\n"),
               HasSubstr("line 1: the time stamp is out of range"));
-  EXPECT_THAT(error_of(good + std::string(5000, ' ')), HasSubstr("line 2: longer than 1023 bytes"));
+  EXPECT_EQ(error_of(good + std::string(1023, ' ')), "no error");
+  EXPECT_THAT(error_of(good + std::string(1024, ' ')), HasSubstr("line 2: longer than 1023 bytes"));
+  EXPECT_EQ(error_of("9e9 1e9 -1e9 0 0 0 0 1\n"), "no error");
+  EXPECT_THAT(error_of("9.00001e9 0 0 0 0 0 0 1\n"), HasSubstr("the time stamp is out of range"));
+  EXPECT_THAT(error_of("1 0 1.00001e9 0 0 0 0 1\n"), HasSubstr("the position is out of range"));
   EXPECT_THAT(error_of("# nothing\n"), HasSubstr("holds no pose"));
   EXPECT_THAT([] { read_tum("/nonexistent/file.tum"); },
               ThrowsMessage<InputError>(HasSubstr("/nonexistent/file.tum: cannot be opened")));

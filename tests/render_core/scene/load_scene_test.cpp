@@ -3,6 +3,7 @@
 
 #include <sys/stat.h>
 
+#include "render_core/scene/format_limits.h"
 #include "render_core/scene/locate_scene.h"
 #include "render_core/scene/ply.h"
 #include "render_core/scene/prune.h"
@@ -193,6 +194,19 @@ TEST(Prune, KeepsTheMostImportantInTheirOrder) {
   EXPECT_EQ(cloud.mean, (std::vector{before.mean[0], before.mean[4]}));  // ties: the first stays
   EXPECT_EQ(cloud.sh_of(1)[3], before.sh_of(4)[3]);
   EXPECT_EQ(cloud.sh.size(), 8u);
+}
+
+TEST(FormatLimits, AreThoseOfTheSecurityPage) {
+  const MemorySource file("a.spz", {});
+  EXPECT_NO_THROW(require_count(file, "count", 268'435'456));
+  EXPECT_THAT(input_error([&] { require_count(file, "count", 268'435'457); }),
+              HasSubstr("at most 268435456"));
+  EXPECT_NO_THROW(require_plausible_count(file, "count", 1 << 20, 1, (1 << 20) / 256));
+  EXPECT_THAT(
+      input_error([&] { require_plausible_count(file, "count", 1 << 20, 1, (1 << 20) / 256 - 1); }),
+      HasSubstr("cannot be in 4095 compressed bytes"));
+  EXPECT_NO_THROW(require_plausible_count(file, "count", 65'536, 1, 0));
+  input_error([&] { require_plausible_count(file, "count", 65'537, 1, 0); });
 }
 
 }  // namespace

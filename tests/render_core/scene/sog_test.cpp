@@ -149,9 +149,35 @@ TEST(Sog, ArchivesThatGrowAreRefused) {
   const Files bomb = {{"meta.json", std::string(4 << 20, ' ')}};
   EXPECT_THAT(input_error([&] { parse(zip(bomb, true)); }),
               HasSubstr("entry meta.json: unpacks to more than a scene can hold"));
+  for (std::size_t bytes = (1 << 20) + 4096; bytes < (1 << 20) + 8192; bytes += 256) {
+    const std::string archive = zip({{"spaces", std::string(bytes, ' ')}}, true);
+    const MemorySource file("scene.sog", bytes_of(archive));
+    if (bytes <= 4 * archive.size() + 1'048'576)
+      EXPECT_NO_THROW(ZipFiles{file}) << bytes;
+    else
+      input_error([&] { ZipFiles{file}; });
+  }
   Files many;
-  for (int i = 0; i <= 4096; ++i) many[std::to_string(i)] = "";
+  for (int i = 0; i < 4096; ++i) many[std::to_string(i)] = "";
+  EXPECT_THAT(input_error([&] { parse(zip(many)); }), HasSubstr("entry meta.json: is missing"));
+  many["4096"] = "";
   EXPECT_THAT(input_error([&] { parse(zip(many)); }), HasSubstr("more than 4096 entries"));
+}
+
+TEST(Sog, ImagesHaveATexelPerGaussianAndNotManyMore) {
+  const Files files = encode_sog(random_cloud(300, 0), 2);
+  const auto parse_with = [&](std::size_t width, std::size_t height) {
+    Files with = files;
+    const std::string image = encode_webp(std::string(4 * width * height, '\0'),
+                                          static_cast<int>(width), static_cast<int>(height));
+    for (auto& [name, content] : with)
+      if (name != "meta.json") content = image;
+    return parse(zip(with));
+  };
+  EXPECT_NO_THROW(parse_with(300, 1));
+  EXPECT_THAT(input_error([&] { parse_with(299, 1); }), HasSubstr("299x1 texels"));
+  EXPECT_NO_THROW(parse_with(56, 1181)) << "2 x 300 + 65,536";
+  EXPECT_THAT(input_error([&] { parse_with(438, 151); }), HasSubstr("438x151 texels"));
 }
 
 /// A folder whose images become smaller once their sizes have been looked at.

@@ -97,5 +97,18 @@ TEST(StaticFiles, NamesAFolderThatIsNoClient) {
   EXPECT_THROW(StaticFiles(std::filesystem::path("/proc/self/fdinfo")), InputError);
 }
 
+TEST(StaticFiles, HaveANumberAndASize) {
+  const test::TemporaryFolder many;
+  many.write("index.html", "page");
+  for (int i = 1; i < 4096; ++i) many.write(std::to_string(i), "");
+  EXPECT_NO_THROW(StaticFiles(many.path()));
+  many.write("4096", "");
+  EXPECT_THROW(StaticFiles(many.path()), InputError);
+  const test::TemporaryFolder large;
+  const auto page = large.write("index.html", "");
+  std::filesystem::resize_file(page, 268'435'457);  // without a byte on the disk
+  EXPECT_THROW(StaticFiles(large.path()), InputError);
+}
+
 }  // namespace
 }  // namespace catgs

@@ -210,6 +210,88 @@ TEST(Wire, NamesTheFieldThatIsWrong) {
   }
 }
 
+TEST(Wire, TakesWhatIsWithinTheLimitsAndNothingBeyond) {
+  const auto expect_limit = [](const char* field, v1::ClientMessage message, auto set, auto taken,
+                               auto refused) {
+    set(message, taken);
+    EXPECT_EQ(complaint(message), "") << taken;
+    set(message, refused);
+    EXPECT_THAT(complaint(message), HasSubstr(field)) << refused;
+  };
+  const auto pose = [&](const char* field, auto set, auto taken, auto refused) {
+    expect_limit(
+        field, good_pose(), [&](auto& m, auto v) { set(*m.mutable_pose(), v); }, taken, refused);
+  };
+  const auto x = [](auto& p, float v) {
+    p.mutable_world_from_camera()->mutable_position()->set_x(v);
+  };
+  pose("pose.position.x", x, 1e9f, 1.00001e9f);
+  pose("pose.position.x", x, -1e9f, -1.00001e9f);
+  const auto time = [](auto& p, std::int64_t v) { p.set_client_time_us(v); };
+  pose("client_time_us", time, 9'007'199'254'740'992, 9'007'199'254'740'993);
+  pose("client_time_us", time, -9'007'199'254'740'992, -9'007'199'254'740'993);
+  const auto fov = [](auto& p, float v) { p.set_fov_y_rad(v); };
+  pose("fov_y_rad", fov, 0.1f, 0.0999f);
+  pose("fov_y_rad", fov, 2.8f, 2.8001f);
+
+  const auto hello = [&](const char* field, auto set, auto taken, auto refused) {
+    expect_limit(
+        field, good_hello(), [&](auto& m, auto v) { set(*m.mutable_hello(), v); }, taken, refused);
+  };
+  const auto width = [](auto& h, std::uint32_t v) { h.set_viewport_width_px(v); };
+  hello("hello.viewport_width_px", width, 16, 15);
+  hello("hello.viewport_width_px", width, 8192, 8193);
+  const auto height = [](auto& h, std::uint32_t v) { h.set_viewport_height_px(v); };
+  hello("hello.viewport_height_px", height, 16, 15);
+  hello("hello.viewport_height_px", height, 8192, 8193);
+  const auto ratio = [](auto& h, float v) { h.set_device_pixel_ratio(v); };
+  hello("hello.device_pixel_ratio", ratio, 0.25f, 0.24f);
+  hello("hello.device_pixel_ratio", ratio, 8.0f, 8.1f);
+  const auto decoders = [](auto& h, int count) {
+    h.clear_decoders();
+    for (int i = 0; i < count; ++i) h.add_decoders(v1::CODEC_H264);
+  };
+  hello("hello.decoders", decoders, 8, 9);
+  const auto of = [](int length) { return std::string(static_cast<std::size_t>(length), 'x'); };
+  hello(
+      "hello.scene_id", [&](auto& h, int n) { h.set_scene_id(of(n)); }, 128, 129);
+  hello(
+      "hello.token", [&](auto& h, int n) { h.set_token(of(n)); }, 512, 513);
+  hello(
+      "hello.watch", [&](auto& h, int n) { h.set_watch(of(n)); }, 512, 513);
+  const auto resume = [&](auto& h, int n) { h.mutable_resume()->set_token(of(n)); };
+  hello("hello.resume.token", resume, 512, 513);
+
+  const auto settings = [&](const char* field, auto set, auto taken, auto refused) {
+    expect_limit(
+        field, {}, [&](auto& m, auto v) { set(*m.mutable_settings(), v); }, taken, refused);
+  };
+  const auto sides = [](auto& s, std::uint32_t v) {
+    s.set_width_px(v);
+    s.set_height_px(v);
+  };
+  settings("settings.width_px", sides, 16, 15);
+  settings("settings.width_px", sides, 8192, 8193);
+  const auto fps = [](auto& s, std::uint32_t v) { s.set_max_fps(v); };
+  settings("settings.max_fps", fps, 1, 241);
+  settings("settings.max_fps", fps, 240, 241);
+  const auto rate = [](auto& s, std::uint32_t v) { s.set_max_bitrate_kbps(v); };
+  settings("settings.max_bitrate_kbps", rate, 100, 99);
+  settings("settings.max_bitrate_kbps", rate, 200'000, 200'001);
+}
+
+TEST(Wire, TakesMessagesOf64KiB) {
+  // A field of a later version: its number, the length of its text, the text.
+  const auto parsed_of = [](std::size_t bytes) {
+    std::string message = "\xa2\x06\xfb\xff\x03";
+    message.resize(bytes, 'x');
+    return wire::parse_client_message(std::as_bytes(std::span(message)));
+  };
+  EXPECT_TRUE(std::holds_alternative<ClientMessage>(parsed_of(65'536)));
+  const auto refused = parsed_of(65'537);
+  EXPECT_EQ(std::get<wire::ParseError>(refused).what, "message: 65537 bytes, at most 65536");
+}
+
 TEST(Wire, WhatProtobufSaysOfStrangersIsForWhoDebugs) {
   const auto before = spdlog::default_logger();
   std::ostringstream log;
@@ -260,7 +342,9 @@ TEST(Wire, PathsAreInTimeOrderAndBounded) {
   }
   EXPECT_THAT(complaint(message), HasSubstr("time order"));
   message.mutable_path()->clear_samples();
-  for (int i = 0; i < 257; ++i) *message.mutable_path()->add_samples() = good_pose().pose();
+  for (int i = 0; i < 256; ++i) *message.mutable_path()->add_samples() = good_pose().pose();
+  EXPECT_EQ(complaint(message), "");
+  *message.mutable_path()->add_samples() = good_pose().pose();
   EXPECT_THAT(complaint(message), HasSubstr("path.samples"));
 }
 

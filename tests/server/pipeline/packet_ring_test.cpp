@@ -70,6 +70,18 @@ TEST(PacketRing, RefusesTooManyMessages) {
   EXPECT_TRUE(ring.push(message(4)));
 }
 
+TEST(PacketRing, ForASocketIsBoundedInFramesBytesAndMessages) {
+  PacketRing ring;
+  for (std::uint64_t id = 1; id <= 8; ++id) EXPECT_THAT(ring.push(frame(id, id == 1)), IsEmpty());
+  EXPECT_THAT(ring.push(frame(9, false)), testing::SizeIs(9));
+  for (int i = 0; i < 64; ++i) EXPECT_TRUE(ring.push(message(i)));
+  EXPECT_FALSE(ring.push(message(64)));
+  PacketRing large;
+  EXPECT_THAT(large.push(frame(1, true, 5 << 20)), IsEmpty());
+  EXPECT_THAT(large.push(frame(2, false, 3 << 20)), IsEmpty());
+  EXPECT_THAT(large.push(frame(3, false, 1)), ElementsAre(1, 2, 3));
+}
+
 TEST(LatestSlot, TheNewestWins) {
   LatestSlot<int> slot;
   EXPECT_FALSE(slot.take());

@@ -2,6 +2,7 @@
 
 #include <set>
 #include <sstream>
+#include <thread>
 
 #include <spdlog/spdlog.h>
 
@@ -137,6 +138,36 @@ TEST_F(RegistryTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
   for (int i = 0; i < 4; ++i) ids.insert(join().connection->welcome->session_id());
   EXPECT_EQ(ids.size(), 4u);
   EXPECT_THAT(ids, testing::Each(testing::MatchesRegex("[0-9a-f]{32}")));
+}
+
+TEST_F(RegistryTest, TakesMessagesAtTheirRate) {
+  start();
+  const TimePoint start = Clock::now();
+  Visitor& visitor = clients.emplace_back(Visitor{
+      std::make_shared<OpenConnection>(), registry->accept(std::make_shared<OpenConnection>())});
+  for (int i = 0; i < 1200; ++i) move(visitor);
+  EXPECT_EQ(metrics.poses_received.Value(), 1200.0);
+  std::this_thread::sleep_for(250ms);
+  for (int i = 0; i < 2000; ++i) move(visitor);
+  const std::chrono::duration<double> elapsed = Clock::now() - start;
+  EXPECT_GE(metrics.poses_received.Value(), 1200 + 150);
+  EXPECT_LE(metrics.poses_received.Value(), 1201 + 600 * elapsed.count());
+}
+
+TEST_F(RegistryTest, RefusesConnectionsBeyondAllPlaces) {
+  options.max_sessions = 2;
+  options.max_spectators = 3;
+  options.max_queue = 4;
+  options.max_sessions_per_address = 1000;
+  start();
+  std::vector<std::shared_ptr<OpenConnection>> connections;
+  for (int i = 0; i < 2 * (1 + 3) + 4 + 64 + 1; ++i) {
+    connections.push_back(std::make_shared<OpenConnection>());
+    clients.emplace_back(Visitor{connections.back(), registry->accept(connections.back())});
+  }
+  run_until([&] { return connections.back()->closed.has_value(); });
+  EXPECT_EQ(connections.back()->error->code(), v1::Error::SERVER_FULL);
+  EXPECT_FALSE(connections[connections.size() - 2]->closed);
 }
 
 }  // namespace
