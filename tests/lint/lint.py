@@ -201,6 +201,45 @@ def link_findings(root: pathlib.Path, path: str, lines: list[str]) -> Iterator[s
                 yield f"{path}:{number}: links to {target}, which does not exist"
 
 
+UNITS = {"KiB": [1 << 10], "MiB": [1 << 20], "Mi": [1 << 20], "million": [10 ** 6],
+         "Mbit/s": [1000], "s": [1, 1000, 10 ** 6], "ms": [1]}
+
+
+def value_of(code: str, name: str) -> float | None:
+    """Of the constant, if it is a number."""
+    found = re.search(rf"\b{name}\b *(?:= *(?P<value>[^;]+);|{{(?P<braced>[^;{{}}]+)}};)", code)
+    if found is None:
+        return None
+    text = (found["value"] or found["braced"]).replace("'", "").replace("PIPE_BUF", "4096")
+    text = text.replace("LWS_US_PER_SEC", "1000000")
+    text = re.sub(r"std::\w+\{(\d+)\}", r"\1", text)
+    text = re.sub(r"(\d)[uf]\b", r"\1", text)
+    if not re.fullmatch(r"[\d.e+*<() ]+", text):
+        return None
+    return eval(text)  # of digits and operators
+
+
+def values_told(cell: str) -> set[float]:
+    """The numbers of a cell, in every unit that it names."""
+    cell = re.sub(r"`[^`]*`", "", cell).replace("a day", "86400").replace(",", "")
+    numbers = [float(base) ** int(power or 1)
+               for base, power in re.findall(r"(\d[\d.]*(?:e\d+)?)(?:\^(\d+))?", cell)]
+    factors = [1] + [factor for unit, all_of_it in UNITS.items()
+                     if re.search(rf"\d {unit}\b", cell) for factor in all_of_it]
+    told = {number * factor for number in numbers for factor in factors}
+    return told | {float(a) * float(b) for a, b in re.findall(r"(\d+) x (\d+)", cell)}
+
+
+def limit_findings(page: str, number: int, line: str, code: dict[str, str]) -> Iterator[str]:
+    """Constants of a row "| what | limit | places ..." that have another value than the limit."""
+    cells = line.split(" | ")
+    told = values_told(cells[1]) if len(cells) > 3 else set()
+    for path, name in re.findall(r"`([\w/]+\.(?:h|cpp)): (\w+)`", cells[2]) if told else ():
+        value = value_of(code.get(path, ""), name)
+        if value is not None and value not in told:
+            yield f"{page}:{number}: {name} of {path} is {value:g}, not {cells[1]}"
+
+
 def security_findings(page: str, lines: list[str], code: dict[str, str]) -> Iterator[str]:
     """Constants and tests named by the security page that are not there, as 'file:line: text'.
     `code`: what the sources hold, by path."""
@@ -212,6 +251,7 @@ def security_findings(page: str, lines: list[str], code: dict[str, str]) -> Iter
         for path, name in re.findall(r"`([\w/]+\.(?:h|cpp)): (\w+)`", line):
             if not re.search(rf"\b{name}\b", code.get(path, "")):
                 yield f"{page}:{number}: {path} has no {name}"
+        yield from limit_findings(page, number, line, code)
         for test in re.findall(r"`([A-Z]\w*\.(?:\w+|\*))`", line):
             if test not in tests and not (test.endswith(".*") and test[:-2] in suites):
                 yield f"{page}:{number}: there is no test {test}"

@@ -85,6 +85,20 @@ class RuleFindings(unittest.TestCase):
         gone = ["`server/a.h: max_b`", "`server/b.h: max_a`", "`A.IsGone`", "`B.*`"]
         self.assertEqual(len(list(lint.security_findings("S.md", gone, code))), len(gone))
 
+    def test_the_security_page_tells_the_values_of_constants(self):
+        def findings(told: str, definition: str) -> int:
+            row = f"| a | {told} | `a.h: max_a` | refused | |"
+            return len(list(lint.security_findings("S.md", [row], {"a.h": definition})))
+        for told, value in [("3", "3"), ("64 KiB", "64 * 1024"), ("4, 16 MiB", "16 << 20"),
+                            ("2^20", "std::size_t{1} << 20"), ("30 s", "30 * LWS_US_PER_SEC"),
+                            ("10 million", "10'000'000"), ("3840 x 2160", "3840 * 2160"),
+                            ("`--max-a`", "7"), ("7", "other(7)")]:
+            self.assertEqual(findings(told, f"constexpr int max_a = {value};"), 0, told)
+        self.assertEqual(findings("30 s", "milliseconds max_a{30'000};"), 0)
+        self.assertEqual(findings("3", "constexpr int max_a = 4;"), 1)
+        self.assertEqual(findings("64 KiB", "constexpr int max_a = 64 * 1024 + 1;"), 1)
+        self.assertEqual(findings("30 s", "milliseconds max_a{30'001};"), 1)
+
     def test_missing_tool_is_a_skip(self):
         result = subprocess.run([sys.executable, lint.__file__, "shell"], env={"PATH": "/nonexistent"},
                                 capture_output=True, text=True, check=False)
