@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <limits>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,6 +21,8 @@ namespace {
 
 constexpr std::uint64_t max_tree_bytes = 32 << 20;  // 6 M Gaussians take 242 KB
 constexpr std::uint64_t max_levels = 16;
+constexpr std::size_t max_files = std::size_t{1} << 16;
+constexpr std::size_t max_name_bytes = 4096;
 constexpr std::size_t max_nodes = std::size_t{1} << 16;
 constexpr int max_tree_depth = 64;
 
@@ -80,20 +84,20 @@ LodChoice choose(const LodTree& tree, const std::vector<int>& wanted) {
 
 /// One of the SOGs that the tree refers to. Its file is closed again: a scene may have thousands.
 struct Part {
-  std::unique_ptr<FileSet> archive_files;  // unpacked; null for folders
+  std::unique_ptr<FileSet> archive;  // unpacked; null for folders
   SogMeta meta;
   std::vector<SogRange> ranges;
 
   [[nodiscard]] const FileSet& files(const FileSet& folder) const {
-    return archive_files ? *archive_files : folder;
+    return archive ? *archive : folder;
   }
 };
 
-Part open_part(const FolderFiles& folder, const std::string& name) {
+Part open_part(const FileSet& folder, const std::string& name) {
   Part part;
   if (name.ends_with(".sog")) {
-    part.archive_files = std::make_unique<ZipFiles>(*folder.open(name));
-    part.meta = read_sog_meta(*part.archive_files, "meta.json");
+    part.archive = std::make_unique<ZipFiles>(*folder.open(name));
+    part.meta = read_sog_meta(*part.archive, "meta.json");
   } else {
     part.meta = read_sog_meta(folder, name);
   }
@@ -101,7 +105,7 @@ Part open_part(const FolderFiles& folder, const std::string& name) {
 }
 
 /// Files of the chosen pieces, with ranges that fill the cloud from 0 on.
-std::vector<Part> open_parts(const FolderFiles& folder, const LodTree& tree,
+std::vector<Part> open_parts(const FileSet& folder, const LodTree& tree,
                              std::vector<LodPiece> pieces, std::size_t& total) {
   std::stable_sort(pieces.begin(), pieces.end(), [](const LodPiece& a, const LodPiece& b) {
     return std::pair(a.file, a.offset) < std::pair(b.file, b.offset);
@@ -119,7 +123,7 @@ std::vector<Part> open_parts(const FolderFiles& folder, const LodTree& tree,
     Part& part = parts.back();
     if (piece.offset < end_of_last || piece.offset + piece.count > part.meta.count)
       throw InputError(
-          folder.path_of("lod-meta.json").string(), "tree",
+          tree.name, "tree",
           fmt::format("Gaussians {} to {} of {} overlap others or are not there", piece.offset,
                       piece.offset + piece.count, tree.files[piece.file]));
     part.ranges.push_back({piece.offset, piece.count, total});
@@ -129,21 +133,20 @@ std::vector<Part> open_parts(const FolderFiles& folder, const LodTree& tree,
   return parts;
 }
 
-LodChoice choose(const FolderFiles& folder, const LodTree& tree, std::optional<int> level,
-                 std::optional<std::size_t> budget, std::size_t environment_count) {
-  const std::string name = folder.path_of("lod-meta.json").string();
+LodChoice choose(const LodTree& tree, std::optional<int> level, std::optional<std::size_t> budget,
+                 std::size_t environment_count) {
   if (level && budget)
-    throw InputError(name, "", "a level and a Gaussian budget were both given", "give one");
+    throw InputError(tree.name, "", "a level and a Gaussian budget were both given", "give one");
   if (!budget) {
     if (level && (*level < 0 || *level >= tree.levels))
       throw InputError(
-          name, "level of detail",
+          tree.name, "level of detail",
           fmt::format("there is no level {}; 0 (finest) to {} are", *level, tree.levels - 1));
     return choose_level(tree, level.value_or(0));
   }
   const std::size_t room = *budget > environment_count ? *budget - environment_count : 0;
   if (auto choice = choose_within_budget(tree, room)) return *std::move(choice);
-  throw InputError(name, "Gaussian budget",
+  throw InputError(tree.name, "Gaussian budget",
                    fmt::format("{} is less than the {} of the coarsest level", *budget,
                                choose_level(tree, tree.levels - 1).count + environment_count),
                    "raise the budget");
@@ -155,6 +158,7 @@ LodTree read_lod_tree(const ByteSource& file) {
   const nlohmann::json document = read_json(file, max_tree_bytes);
   const JsonField meta(file.name(), document);
   LodTree tree;
+  tree.name = file.name();
   if (const auto version = meta.find("version"); version && version->count() != 1)
     version->fail("is not supported", "version 1 is");
   const std::uint64_t levels = meta.at("lodLevels").count();
@@ -162,8 +166,19 @@ LodTree read_lod_tree(const ByteSource& file) {
     meta.at("lodLevels").fail(fmt::format("is not in 1…{}", max_levels));
   tree.levels = static_cast<int>(levels);
   const JsonField names = meta.at("filenames");
-  for (std::size_t i = 0; i < names.size(); ++i) tree.files.push_back(names[i].text());
-  if (const auto environment = meta.find("environment")) tree.environment = environment->text();
+  if (names.size() > max_files) names.fail(fmt::format("has more than {} entries", max_files));
+  std::set<std::string> once;
+  const auto file_named_by = [&](const JsonField& field) {
+    const std::string name = field.text();
+    if (name.size() > max_name_bytes)
+      field.fail(fmt::format("has more than {} bytes", max_name_bytes));
+    if (!once.insert(std::filesystem::path(name).lexically_normal().string()).second)
+      field.fail("names a file a second time");
+    return name;
+  };
+  for (std::size_t i = 0; i < names.size(); ++i) tree.files.push_back(file_named_by(names[i]));
+  if (const auto environment = meta.find("environment"))
+    tree.environment = file_named_by(*environment);
   parse_tree(meta.at("tree"), 0, tree);
   return tree;
 }
@@ -203,24 +218,23 @@ std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t b
   return choose(tree, wanted);
 }
 
-std::size_t count_streamed_sog(const FolderFiles& folder, std::optional<int> level,
+std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget) {
   const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
   const std::size_t environment =
       tree.environment.empty() ? 0 : open_part(folder, tree.environment).meta.count;
-  return choose(folder, tree, level, budget, environment).count + environment;
+  return choose(tree, level, budget, environment).count + environment;
 }
 
-StreamedSog read_streamed_sog(const FolderFiles& folder, std::optional<int> level,
+StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context) {
   const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
   std::vector<Part> environment;
   if (!tree.environment.empty()) environment.push_back(open_part(folder, tree.environment));
   const std::size_t environment_count = environment.empty() ? 0 : environment[0].meta.count;
-  const LodChoice choice = choose(folder, tree, level, budget, environment_count);
+  const LodChoice choice = choose(tree, level, budget, environment_count);
 
-  if (choice.pieces.empty())
-    throw InputError(folder.path_of("lod-meta.json").string(), "tree", "has no levels of detail");
+  if (choice.pieces.empty()) throw InputError(tree.name, "tree", "has no levels of detail");
 
   std::size_t total = 0;
   std::vector<Part> parts = open_parts(folder, tree, choice.pieces, total);

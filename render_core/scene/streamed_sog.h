@@ -22,9 +22,11 @@ struct LodPiece {
 };
 
 struct LodTree {
+  std::string name;  // of the lod-meta.json, for error messages
   int levels = 0;
-  std::vector<std::string> files;  // names of meta.json (or .sog) files
-  std::string environment;         // drawn with every level; may be empty
+  /// Names of meta.json (or .sog) files, each once: else a small file could be taken without end.
+  std::vector<std::string> files;
+  std::string environment;  // drawn with every level; may be empty
   /// Per node its pieces by level, 0 the finest; a node may lack levels.
   std::vector<std::vector<std::optional<LodPiece>>> nodes;
 };
@@ -48,7 +50,7 @@ std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t b
 
 /// Gaussians that `level` or `budget` (see read_streamed_sog) choose, the environment among them.
 /// Reads lod-meta.json and the environment's meta data only. Throws InputError.
-std::size_t count_streamed_sog(const FolderFiles& folder, std::optional<int> level,
+std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget);
 
 struct StreamedSog {
@@ -59,7 +61,7 @@ struct StreamedSog {
 /// Loads the streamed SOG in `folder`; without `level` and `budget` the finest level. The
 /// environment counts towards the budget. Throws InputError, also when both are given, when there
 /// is no such level, and when the coarsest level exceeds the budget.
-StreamedSog read_streamed_sog(const FolderFiles& folder, std::optional<int> level,
+StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context);
 
 }  // namespace catgs

@@ -135,6 +135,10 @@ TEST_F(StreamedSogTest, ErrorsNameTheField) {
   EXPECT_THAT(error([&](Json& m) { first(m)["count"] = 101; }), HasSubstr("overlap"));
   EXPECT_THAT(error([](Json& m) { m["tree"] = Json::object(); }), HasSubstr("tree: has no levels"));
   EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "../x/meta.json"; }), HasSubstr("leads out"));
+  EXPECT_THAT(error([](Json& m) { m["filenames"][2] = "./fine//meta.json"; }),
+              HasSubstr("lod-meta.json: filenames[2]: names a file a second time"));
+  EXPECT_THAT(error([](Json& m) { m["environment"] = "fine/meta.json"; }),
+              HasSubstr("lod-meta.json: environment: names a file a second time"));
   EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "absent/meta.json"; }),
               AllOf(HasSubstr("absent"), HasSubstr("cannot be opened")));
 }
@@ -151,6 +155,22 @@ TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
   EXPECT_NO_THROW(read(64));
   EXPECT_THAT(input_error([&] { read(65); }), HasSubstr("lies deeper than 64"));
   EXPECT_THAT(input_error([&] { read(200'000); }), HasSubstr("nested deeper than 256"));
+}
+
+TEST_F(StreamedSogTest, TooManyFilesOrTooLongNamesAreRefused) {
+  const auto read = [](std::size_t files, std::size_t name_bytes) {
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < files; ++i) names.push_back(std::to_string(i));
+    names[0].resize(name_bytes, 'x');
+    const std::string document =
+        Json{{"lodLevels", 1}, {"filenames", names}, {"tree", Json::object()}}.dump();
+    return read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))).files.size();
+  };
+  EXPECT_EQ(read(65'536, 4096), 65'536u);
+  EXPECT_THAT(input_error([&] { read(65'537, 1); }),
+              HasSubstr("filenames: has more than 65536 entries"));
+  EXPECT_THAT(input_error([&] { read(1, 4097); }),
+              HasSubstr("filenames[0]: has more than 4096 bytes"));
 }
 
 TEST_F(StreamedSogTest, TooManyNodesOrLevelsAreRefused) {
