@@ -209,7 +209,7 @@ std::vector<Pose> read_transforms_json(const ByteSource& file) {
     rotation[2] = -rotation[2];
     glm::vec3 position;
     for (int r = 0; r < 3; ++r) position[r] = matrix[static_cast<std::size_t>(r)].numbers(4)[3];
-    poses.push_back({position, glm::normalize(glm::quat_cast(rotation))});
+    poses.push_back({matrix.as_place(position), glm::normalize(glm::quat_cast(rotation))});
   }
   return poses;
 }

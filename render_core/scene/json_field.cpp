@@ -121,8 +121,9 @@ glm::vec3 JsonField::vec3() const {
   return {v[0], v[1], v[2]};
 }
 
-glm::vec3 JsonField::place() const {
-  const glm::vec3 at = vec3();
+glm::vec3 JsonField::place() const { return as_place(vec3()); }
+
+glm::vec3 JsonField::as_place(const glm::vec3& at) const {
   for (int k = 0; k < 3; ++k)
     if (!(std::abs(at[k]) <= max_coordinate))
       fail(fmt::format("is no place in a scene: beyond {} units", max_coordinate));

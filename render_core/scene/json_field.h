@@ -40,6 +40,8 @@ class JsonField {
   [[nodiscard]] glm::vec3 vec3() const;
   /// Three coordinates, at most max_coordinate from the origin on each axis.
   [[nodiscard]] glm::vec3 place() const;
+  /// `at`, which this field holds in another form than place() reads.
+  [[nodiscard]] glm::vec3 as_place(const glm::vec3& at) const;
   [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
 
   [[nodiscard]] const nlohmann::json& value() const { return *value_; }

@@ -31,7 +31,7 @@ std::optional<SessionTokens::Resumed> SessionTokens::read_resume_token(
   if (id_end == std::string::npos || time_end == std::string::npos) return std::nullopt;
   std::int64_t issued_unix_s = 0;
   std::from_chars(payload->data() + id_end + 1, payload->data() + time_end, issued_unix_s);
-  if (now_unix_s - issued_unix_s > resume_valid_s) return std::nullopt;
+  if (issued_unix_s < now_unix_s - resume_valid_s) return std::nullopt;
   return Resumed{payload->substr(0, id_end), payload->substr(time_end + 1)};
 }
 

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -146,6 +147,10 @@ TEST_F(Colmap, MistakesNameTheirLine) {
   expect_error("images.txt: line 2: there is no camera 6");
   write(folder_ / "images.txt", "1 0 0 0 0 0 0 0 5 a.jpg\n\n");
   expect_error("its pose is not a rotation");
+  for (const char* infinite : {"1e308 0 0 0 0 0 0", "1 0 0 0 1e39 0 0"}) {
+    write(folder_ / "images.txt", fmt::format("1 {} 5 a.jpg\n\n", infinite));
+    expect_error("its pose is not a rotation");
+  }
   write(folder_ / "images.txt", "1 1 0 0 0 0 0 0 5\n\n");
   expect_error("is not an image");
   write(folder_ / "images.txt", "# none\n");
