@@ -96,15 +96,6 @@ constexpr std::string_view sidecar_part = "/sidecar";
 enum class ScenePart { tours, poster };
 constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
 
-/// The id in "/api/scenes/ID<what>".
-std::optional<std::string_view> scene_of(std::string_view path, std::string_view what) {
-  constexpr std::string_view folder = "/api/scenes/";
-  if (!path.starts_with(folder) || !path.ends_with(what) ||
-      path.size() <= folder.size() + what.size())
-    return std::nullopt;
-  return path.substr(folder.size(), path.size() - folder.size() - what.size());
-}
-
 /// The token of "Authorization: Bearer TOKEN"; empty: none.
 std::string_view bearer_token(std::string_view authorization) {
   constexpr std::string_view scheme = "Bearer ";

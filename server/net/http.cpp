@@ -107,6 +107,14 @@ bool loopback_host_allowed(std::string_view host, const std::vector<std::string>
          });
 }
 
+std::optional<std::string_view> scene_of(std::string_view path, std::string_view what) {
+  constexpr std::string_view folder = "/api/scenes/";
+  if (!path.starts_with(folder) || !path.ends_with(what) ||
+      path.size() <= folder.size() + what.size())
+    return std::nullopt;
+  return path.substr(folder.size(), path.size() - folder.size() - what.size());
+}
+
 std::string escape_html(std::string_view text) {
   std::string out;
   for (const char c : text) {

@@ -86,6 +86,9 @@ bool is_loopback(std::string_view address);
 /// names, for hosts of `allowed` origins (a proxy forwards them), and without a Host (no browser).
 bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed);
 
+/// The id in "/api/scenes/ID<what>".
+std::optional<std::string_view> scene_of(std::string_view path, std::string_view what);
+
 /// As text, or as an attribute in quotes, of an HTML page.
 std::string escape_html(std::string_view text);
 

@@ -19,9 +19,11 @@ namespace catgs::fuzz {
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
-      ply(),  compressed_ply(), splat(),          spz(),     sog(),   zip(),
-      webp(), lod_tree(),       sidecar(),        cameras(), tours(), sent_sidecar(),
-      tum(),  config(),         client_message(), http(),    token()};
+      ply(),         compressed_ply(), splat(),          spz(),          sog(),
+      zip(),         webp(),           lod_tree(),       streamed_sog(), sidecar(),
+      cameras(),     tours(),          sent_sidecar(),   tum(),          colmap(),
+      scene_size(),  config(),         client_message(), http(),         token(),
+      signed_token()};
   return all;
 }
 

@@ -47,15 +47,19 @@ Target sog();
 Target zip();
 Target webp();
 Target lod_tree();
+Target streamed_sog();
+Target scene_size();
 Target sidecar();
 Target cameras();
 Target tours();
 Target sent_sidecar();
 Target tum();
+Target colmap();
 Target config();
 Target client_message();
 Target http();
 Target token();
+Target signed_token();
 
 /// Ends the process with `what` unless `promise` holds: libFuzzer keeps the input.
 void require(bool promise, const char* what);

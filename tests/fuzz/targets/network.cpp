@@ -1,45 +1,103 @@
+#include <algorithm>
 #include <array>
-#include <cmath>
+#include <variant>
 
 #include "proto/catgs.pb.h"
 #include "server/access.h"
+#include "server/link_preview.h"
 #include "server/net/http.h"
 #include "server/net/static_files.h"
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
+#include "server/session/session_tokens.h"
+#include "server/signed_token.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::fuzz {
 namespace {
 
-void require_sound(const PoseSample& sample) {
-  const Pose& pose = sample.world_from_camera;
-  require(std::isfinite(glm::length(glm::dvec3(pose.position))), "positions are finite");
-  require(std::abs(glm::length(pose.orientation) - 1.0f) < 1e-3f, "orientations have length 1");
-  require(sample.fov_y_rad >= 0.1f && sample.fov_y_rad <= 2.8f, "fields of view are sane");
+/// Written so that a NaN is in no range.
+template <class T>
+bool in(T value, T low, T high) {
+  return value >= low && value <= high;
 }
 
-void require_sound(const ClientMessage& message) {
-  if (const auto* pose = std::get_if<PoseSample>(&message)) require_sound(*pose);
-  if (const auto* path = std::get_if<PosePath>(&message)) {
-    require(path->samples.size() <= 256, "paths have an end");
-    for (const PoseSample& sample : path->samples) require_sound(sample);
-  }
-  if (const auto* hello = std::get_if<Hello>(&message)) {
-    require(hello->viewport_px.x >= 16 && hello->viewport_px.x <= 8192, "pictures have sides");
-    require(hello->scene_id.find('\n') == std::string::npos, "texts have no control characters");
-    if (hello->resume_pose) require_sound(*hello->resume_pose);
-  }
-  if (const auto* pick = std::get_if<Pick>(&message))
-    require(std::abs(glm::length(pick->direction) - 1.0f) < 1e-3f, "directions have length 1");
+constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
+
+void require_place(const glm::vec3& v) {
+  require(in(v.x, -1e9f, 1e9f) && in(v.y, -1e9f, 1e9f) && in(v.z, -1e9f, 1e9f),
+          "places are within 1e9");
 }
+
+void require_text(const std::string& text, std::size_t max_bytes) {
+  require(text.size() <= max_bytes, "texts have an end");
+  for (const char c : text)
+    require(static_cast<unsigned char>(c) >= 0x20 && c != 0x7f, "texts print nothing else");
+}
+
+void require_size(const glm::ivec2& size_px) {
+  require(size_px == glm::ivec2(0) || (in(size_px.x, 16, 8192) && in(size_px.y, 16, 8192)),
+          "pictures have two sides or none");
+}
+
+void require_sound(const PoseSample& sample) {
+  const Pose& pose = sample.world_from_camera;
+  require_place(pose.position);
+  require(in(glm::length(pose.orientation), 0.999f, 1.001f), "orientations have length 1");
+  require(in(sample.fov_y_rad, 0.1f, 2.8f), "fields of view are sane");
+  require(in(sample.client_time_us, -max_time_us, max_time_us), "times are exact in a browser");
+}
+
+void require_sound(const PosePath& path) {
+  require(path.samples.size() <= 256, "paths have an end");
+  for (const PoseSample& sample : path.samples) require_sound(sample);
+  require(std::ranges::is_sorted(path.samples, {}, &PoseSample::client_time_us), "times in order");
+}
+
+void require_sound(const Settings& settings) {
+  require_size(settings.size_px);
+  require_size(settings.still_size_px);
+  require(in(settings.max_fps, 0, 240), "rates have an end");
+  require(settings.max_bitrate_kbps == 0 || in(settings.max_bitrate_kbps, 100, 200'000),
+          "bitrates are sane");
+}
+
+void require_sound(const Hello& hello) {
+  require(hello.viewport_px.x > 0, "viewports have sides");
+  require_size(hello.viewport_px);
+  require(in(hello.device_pixel_ratio, 0.25f, 8.0f), "pixels have a size");
+  require(hello.decoders.size() <= 8, "decoders are few");
+  require_text(hello.scene_id, 128);
+  require_text(hello.token, 512);
+  require_text(hello.resume_token, 512);
+  require_text(hello.watch_token, 512);
+  if (hello.resume_pose) require_sound(*hello.resume_pose);
+  require_sound(hello.resume_path);
+  require_sound(hello.settings);
+}
+
+void require_sound(const Ack& ack) {
+  for (const std::int64_t time_us : {ack.received_us, ack.decoded_us, ack.presented_us})
+    require(in(time_us, std::int64_t{0}, max_time_us), "times are exact in a browser");
+  require(ack.pose_age_us <= 10'000'000, "pictures are of the last ten seconds");
+}
+
+void require_sound(const SelectScene& wish) { require_text(wish.scene_id, 128); }
+
+void require_sound(const Pick& pick) {
+  require_place(pick.origin);
+  require(in(glm::length(pick.direction), 0.999f, 1.001f), "directions have length 1");
+}
+
+template <class Message>
+void require_sound(const Message&) {}  // nothing in it has a limit
 
 void parse_client_message(Bytes input) {
   const auto parsed = wire::parse_client_message(input);
   if (const auto* error = std::get_if<wire::ParseError>(&parsed))
     throw InputError("message", "", error->what);
-  require_sound(std::get<ClientMessage>(parsed));
+  std::visit([](const auto& message) { require_sound(message); }, std::get<ClientMessage>(parsed));
 }
 
 void fill(v1::PoseSample& pose, std::uint64_t id) {
@@ -107,7 +165,32 @@ bool means_this_machine(std::string_view host) {
          (is_ipv4 && name.starts_with("127.")) || is_ipv6;
 }
 
-/// The lines of a request that decide something: path, Host, Origin, X-Forwarded-For.
+/// What an upload asks of what is there.
+void check_precondition(const Precondition& asked) {
+  const std::string tag = etag_of("a tour");
+  if (asked.if_match.empty() && asked.if_none_match.empty())
+    require(asked.holds(tag) && asked.holds(""), "who asks nothing is refused nothing");
+  if (!asked.if_match.empty() && asked.holds(tag))
+    require(asked.if_match.find(tag) != std::string::npos ||
+                asked.if_match.find('*') != std::string::npos,
+            "nothing is replaced that was not named");
+  require(asked.if_match.empty() || !asked.holds(""), "what is gone matches nothing");
+  if (!asked.if_none_match.empty() && !asked.holds(tag))
+    require(!asked.if_match.empty() || asked.if_none_match.find(tag) != std::string::npos ||
+                asked.if_none_match.find('*') != std::string::npos,
+            "what is refused was named");
+}
+
+/// Elements of a page's head that hold texts of a scene.
+void check_preview(const std::string& title, const std::string& scene_id) {
+  const std::string head = preview_elements(
+      {.site = "https://a.example", .scene_id = scene_id, .title = title, .has_poster = true});
+  const auto count = [&](char c) { return std::ranges::count(head, c); };
+  require(count('<') == 7 && count('>') == 7 && count('"') == 28, "texts stay in their attributes");
+}
+
+/// The lines of a request that decide something: path, Host, Origin, X-Forwarded-For, If-Match and
+/// If-None-Match; and a scene's title, which is shown to who asks.
 void parse_request(Bytes input) {
   static const test::TemporaryFolder folder;
   static const StaticFiles files = [] {
@@ -118,14 +201,14 @@ void parse_request(Bytes input) {
   }();
   static const TrustedProxies proxies({"10.0.0.0/8", "2001:db8::/32"});
 
-  std::array<std::string, 4> lines;
+  std::array<std::string, 7> lines;
   std::string text = text_of(input);
   for (std::string& line : lines) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     line = text.substr(0, end);
     text.erase(0, end + 1);
   }
-  const auto& [path, host, origin, forwarded] = lines;
+  const auto& [path, host, origin, forwarded, if_match, if_none_match, title] = lines;
   const HttpResponse page = files.respond({path, "", false});
   require(page.status == 200 || page.status == 404, "found or not");
   require(page.status == 404 || *page.body != "secret", "nothing beside the client is served");
@@ -144,6 +227,12 @@ void parse_request(Bytes input) {
   require(client.find_first_not_of("0123456789abcdef:.%") == std::string::npos ||
               client.find('%') != std::string::npos,
           "clients have addresses");
+  check_precondition({if_match, if_none_match});
+  const auto scene = scene_of(path, "/tours");
+  if (scene)
+    require(path == "/api/scenes/" + std::string(*scene) + "/tours" && !scene->empty(),
+            "a path names one scene");
+  check_preview(title, std::string(scene.value_or(path)));
   if (page.status == 404 && forwarded.empty() && host.empty())
     throw InputError("request", "", "nothing in it");
 }
@@ -151,7 +240,9 @@ void parse_request(Bytes input) {
 std::map<std::string, std::string> request_seeds() {
   return {{"page", "/\nlocalhost:8080\nhttp://localhost:8080\n198.51.100.1"},
           {"asset", "/assets/a.js\n[::1]:8080\nhttps://friend.example\n198.51.100.1, 10.1.2.3"},
-          {"climb", "/assets/../../secret\n127.0.0.1\nnull\n[2001:db8::1]:4711,10.0.0.2:80"}};
+          {"climb", "/assets/../../secret\n127.0.0.1\nnull\n[2001:db8::1]:4711,10.0.0.2:80"},
+          {"upload", "/api/scenes/a b/tours\nlocalhost\n\n\n\"x\", " + etag_of("a tour") +
+                         "\n*\nThe \"Old\" <Town> & 'Port'"}};
 }
 
 const std::string link_key = "0123456789abcdef";
@@ -161,6 +252,33 @@ void parse_token(Bytes input) {
   const auto grant = read_link_token(token, link_key);
   if (!grant) throw InputError("token", "", "is not ours");
   require(grant->scene_id == "city" || grant->scene_id.empty(), "only what was signed is granted");
+}
+
+/// What is behind the signature, as if its key were known: of links, and of lost sessions.
+void parse_signed(Bytes input) {
+  const std::string payload = text_of(input);
+  const SessionTokens sessions(link_key);
+  const auto grant = read_link_token(sign_token("catgs-link-v1", payload, link_key), link_key);
+  if (grant)
+    require(grant->role == "viewer" || grant->role == "spectator" || grant->role == "author" ||
+                grant->role == "solo",
+            "roles are known ones");
+  constexpr std::int64_t now_s = 1'800'000'000;
+  const auto resumed =
+      sessions.read_resume_token(sign_token("catgs-resume-v1", payload, link_key), now_s);
+  if (resumed)
+    require(payload.starts_with(resumed->session_id + ":") &&
+                payload.ends_with(":" + resumed->scene_id),
+            "sessions are those of the token");
+  const std::string watch = sign_token("catgs-watch-v1", payload, link_key);
+  require(sessions.read_watch_token(watch) == payload, "what was signed is read");
+  if (!grant && !resumed) throw InputError("token", "", "has no meaning");
+}
+
+std::map<std::string, std::string> signed_seeds() {
+  return {{"link", "city\nviewer\n2000000000"},
+          {"resume", "12ab34cd:1800000000:old:town"},
+          {"long_ago", "12ab34cd:-9223372036854775808:city"}};
 }
 
 std::map<std::string, std::string> token_seeds() {
@@ -184,7 +302,8 @@ Target http() {
           .parse = parse_request,
           .seeds = request_seeds,
           .dictionary = {"/index.html", "/assets/", "..", "%2e", "%00", "://", "[::1]",
-                         "::ffff:", "10.0.0.1", "2001:db8::", "https://friend.example", ", "},
+                         "::ffff:", "10.0.0.1", "2001:db8::", "https://friend.example", ", ",
+                         "/api/scenes/", "/tours", "\"", "*", "W/", "&quot;"},
           .max_bytes = 512};
 }
 
@@ -194,6 +313,15 @@ Target token() {
           .seeds = token_seeds,
           .dictionary = {".", "=", "-", "_"},
           .max_bytes = 512};
+}
+
+Target signed_token() {
+  return {.name = "signed_token",
+          .parse = parse_signed,
+          .seeds = signed_seeds,
+          .dictionary = {"viewer", "spectator", "author", "\n", ":", "9223372036854775807",
+                         "-9223372036854775808"},
+          .max_bytes = 256};
 }
 
 }  // namespace catgs::fuzz

@@ -6,12 +6,14 @@
 #include <iterator>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "render_core/scene/file_set.h"
 #include "render_core/scene/sog_image.h"
+#include "render_core/scene/streamed_sog.h"
 #include "tests/fuzz/target.h"
 #include "tests/render_core/scene/encoders.h"
 #include "tests/render_core/scene/random_cloud.h"
@@ -85,9 +87,10 @@ void change_sog(const Material& from, std::string& text) {
     return std::next(map.begin(), static_cast<std::ptrdiff_t>(from.below(map.size())));
   };
   if (from.one_in(2)) {
-    const auto other = others.find("meta.json");
+    const std::string meta = files.contains("lod-meta.json") ? "lod-meta.json" : "meta.json";
+    const auto other = others.find(meta);
     const std::string piece = text_of(other == others.end() ? any(others)->second : other->second);
-    change_json({from.random, {&piece, 1}, from.words}, files["meta.json"]);
+    change_json({from.random, {&piece, 1}, from.words}, files[meta]);
     text = packed(files);
     return;
   }
@@ -116,6 +119,42 @@ void change_sog(const Material& from, std::string& text) {
 
 void parse_sog(Bytes input) {
   require_sound(read_sog(PackedFiles(input), "meta.json", one_thread()).cloud);
+}
+
+/// A folder with lod-meta.json and the SOGs that it takes its Gaussians from.
+void parse_streamed_sog(Bytes input) {
+  const PackedFiles files(input);
+  const LodTree tree = read_lod_tree(*files.open("lod-meta.json"));
+  bool read = false;
+  for (const std::optional<std::size_t> budget : {std::optional<std::size_t>(), {20}}) try {
+      const std::size_t count = count_streamed_sog(files, {}, budget);
+      require(!budget || count <= *budget, "a budget is kept");
+      const GaussianCloud cloud = read_streamed_sog(files, {}, budget, one_thread()).cloud;
+      require(cloud.size() == count, "as many are read as were counted");
+      require_sound(cloud);
+      read = true;
+    } catch (const InputError&) {
+    }
+  if (!read) throw InputError("input", "", "is no scene");
+}
+
+std::map<std::string, std::string> streamed_sog_seeds() {
+  const auto folder = [](std::string tree, const std::string& environment) {
+    std::map<std::string, std::string> files = {{"lod-meta.json", std::move(tree)}};
+    for (const auto& [name, content] : test::encode_sog(test::random_cloud(9, 1), 1))
+      files["a/" + name] = content;
+    files["b.sog"] = test::zip(test::encode_sog(test::random_cloud(4, 0), 1));
+    if (!environment.empty()) files[environment] = files["b.sog"];
+    return packed(files);
+  };
+  return {{"two_levels", folder(R"({"lodLevels":2,"filenames":["a/meta.json","b.sog"],"tree":{
+             "children":[{"lods":{"0":{"file":0,"offset":0,"count":5},"1":{"file":1,"offset":0,
+             "count":2}}},{"lods":{"0":{"file":0,"offset":5,"count":4},"1":{"file":1,"offset":2,
+             "count":2}}}]}})",
+                                "")},
+          {"environment", folder(R"({"lodLevels":1,"environment":"c.sog","filenames":
+             ["a/meta.json"],"tree":{"lods":{"0":{"file":0,"offset":2,"count":6}}}})",
+                                 "c.sog")}};
 }
 
 std::map<std::string, std::string> sog_seeds() {
@@ -172,6 +211,17 @@ Target sog() {
                          "means_l.webp",      "means_u.webp", "quats.webp",  "scales.webp",
                          "sh0.webp",          "RIFF",         "WEBPVP8L",    "shN_labels.webp",
                          "shN_centroids.webp"},
+          .change = change_sog,
+          .max_bytes = 16384};
+}
+
+Target streamed_sog() {
+  return {.name = "streamed_sog",
+          .parse = parse_streamed_sog,
+          .seeds = streamed_sog_seeds,
+          .dictionary = {"\"lodLevels\":", "\"filenames\":", "\"tree\":", "\"children\":",
+                         "\"lods\":", "\"file\":", "\"offset\":", "\"count\":", "\"environment\":",
+                         "lod-meta.json", "a/meta.json", "b.sog", "c.sog"},
           .change = change_sog,
           .max_bytes = 16384};
 }
