@@ -29,7 +29,8 @@ using namespace std::chrono_literals;
 /// A socket that is always read. Session thread only, but for queued frames.
 class OpenConnection final : public Connection {
  public:
-  explicit OpenConnection(std::string peer_address) : peer_address_(std::move(peer_address)) {}
+  explicit OpenConnection(std::string peer_address = "127.0.0.1")
+      : peer_address_(std::move(peer_address)) {}
   void send(std::vector<std::byte> message) override {
     v1::ServerMessage parsed;
     if (!parsed.ParseFromArray(message.data() + 1, static_cast<int>(message.size()) - 1))
