@@ -105,8 +105,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   Scene scene = load(spec, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->facts = facts_of(scene, id_of(scene.name));
-  ThreadPool pool(threads);
-  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, pool);
+  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
   if (!is_synthetic(spec)) {
     entry->sidecar = locate_scene(spec).hints.sidecar;
     entry->tours = ToursAnswers(read_tours(entry->sidecar));

@@ -10,7 +10,7 @@
 namespace catgs {
 namespace {
 
-/// As much of what a stranger sent as a line of the log has room for.
+/// As much of what a stranger sent as a line of the log, or of an answer, has room for.
 constexpr std::size_t max_quoted_bytes = 100;
 
 std::string quoted(const std::string& text) {
@@ -70,12 +70,13 @@ int refuse_request(lws* wsi, unsigned status, const char* why) {
 }
 
 HttpResponse refuse_host(lws* wsi, const std::string& host) {
-  note_refused(wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)",
-                                quoted(host)));
+  const std::string name = quoted(host);
+  note_refused(
+      wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)", name));
   return text_response(
       403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
                        "Open it as localhost, or start it with --allow-origin https://{0}\n",
-                       host));
+                       name));
 }
 
 HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request) {

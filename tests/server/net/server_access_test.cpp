@@ -83,6 +83,8 @@ TEST(ServerAccess, AnswersNoForeignNameOnALoopbackAddress) {
     const HttpReply refused = http_get(port, "/api/scenes", {{"host", "evil.example:8080"}});
     EXPECT_EQ(refused.status, 403);
     EXPECT_THAT(refused.body, HasSubstr("--allow-origin https://evil.example:8080"));
+    EXPECT_THAT(http_get(port, "/", {{"host", std::string(101, 'e')}}).body,
+                HasSubstr("https://" + std::string(100, 'e') + "...\n"));
   }
   EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "a.example"}}).status, 200);
   EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "localhost"}}).status, 200);
