@@ -1,11 +1,13 @@
 // catgs-server: renders 3D Gaussian Splatting scenes and streams them to browsers.
 
+#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <map>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -36,10 +38,12 @@ constexpr int exit_usage = 2;
 /// bound to the largest block that was ever freed, up to 32 MiB, and what visitors needed then
 /// stays with the process, between small blocks. Where one bound is set it no longer adapts the
 /// other, by which the ends of heaps go back: that stays wide enough for what frames allocate and
-/// free.
-void return_large_blocks() {
+/// free. No more heaps than threads that run at a time: glibc's eight for each processor fill for a
+/// quarter of an hour with what one could hold.
+void bound_heaps() {
   ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
+  ::mallopt(M_ARENA_MAX, static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
 }
 
 /// Flags as they were given, by setting name; applied after the file and the environment.
@@ -115,7 +119,7 @@ int serve(const CommandLine& line) {
 }
 
 int run(int argc, char** argv) {
-  return_large_blocks();
+  bound_heaps();
   CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
   app.set_version_flag("--version", build_version);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
