@@ -71,7 +71,7 @@ void SceneLibrary::open_folders() {
   merge(folders_.scan());
   next_scan_ = clock_() + scan_interval;
   spdlog::info("{} scenes in folders, loaded when somebody asks for them", ids_.size());
-  if (!default_scene_.empty()) return;
+  if (!preferred_scene_.empty()) return;
   if (shelf_.empty())
     throw InputError("--scene-folder " + config_.scene_folders.front(), {}, "holds no scene",
                      "put one there, or give --scene");
@@ -82,7 +82,7 @@ void SceneLibrary::open_folders() {
     throw InputError("--scene-memory", {}, refusal(wish, id, book).message);
   residency_.next(now, in_use());
   auto entry = read(id, book.found);
-  default_scene_ = id;
+  preferred_scene_ = id;
   on_loaded(id, {std::move(entry), {}}, now, clock_());
 }
 
@@ -93,7 +93,7 @@ SceneLibrary::~SceneLibrary() {
 
 void SceneLibrary::pin(std::shared_ptr<const SceneEntry> entry) {
   const std::string& id = entry->facts.scene_id;
-  if (default_scene_.empty()) default_scene_ = id;
+  if (preferred_scene_.empty()) preferred_scene_ = id;
   residency_.pin(id, entry->renderer->scene_bytes());
   Book& book = shelf_[id];
   book.found.name = entry->facts.title;
@@ -102,12 +102,19 @@ void SceneLibrary::pin(std::shared_ptr<const SceneEntry> entry) {
   book.entry = std::move(entry);
 }
 
+std::string SceneLibrary::default_scene() const {
+  const auto preferred = shelf_.find(preferred_scene_);
+  if (preferred != shelf_.end() && !preferred->second.gone) return preferred_scene_;
+  const auto other = std::ranges::find_if(shelf_, [](const auto& of) { return !of.second.gone; });
+  return other != shelf_.end() ? other->first : std::string();
+}
+
 std::vector<std::string> SceneLibrary::scene_ids() const {
   std::vector<std::string> ids;
   for (const auto& [id, book] : shelf_)
     if (!book.gone) ids.push_back(id);
   // The one that newcomers get is the first that they see.
-  if (const auto it = std::ranges::find(ids, default_scene_); it != ids.end())
+  if (const auto it = std::ranges::find(ids, default_scene()); it != ids.end())
     std::rotate(ids.begin(), it, it + 1);
   return ids;
 }
@@ -199,7 +206,6 @@ void SceneLibrary::release(const std::string& id) {
 void SceneLibrary::erase(const std::string& id) {
   ids_.erase(shelf_.at(id).found.path);
   shelf_.erase(id);
-  if (default_scene_ == id && !shelf_.empty()) default_scene_ = shelf_.begin()->first;
 }
 
 std::shared_ptr<const SceneEntry> SceneLibrary::read(const std::string& id,
@@ -320,7 +326,7 @@ void SceneLibrary::publish() {
 }
 
 std::string SceneLibrary::renderer_text() const {
-  return shelf_.at(default_scene_).entry->renderer_text;
+  return shelf_.at(preferred_scene_).entry->renderer_text;
 }
 
 std::shared_ptr<const std::vector<SceneLibrary::Listing>> SceneLibrary::listing() const {

@@ -44,7 +44,7 @@ class SceneLibrary final : public SceneSource {
                Metrics& metrics, std::function<TimePoint()> clock = Clock::now);
   ~SceneLibrary() override;  // waits for the part of a scene that is being read
 
-  [[nodiscard]] std::string default_scene() const override { return default_scene_; }
+  [[nodiscard]] std::string default_scene() const override;
   [[nodiscard]] std::vector<std::string> scene_ids() const override;
   [[nodiscard]] bool has(const std::string& id) const override { return shelf_.contains(id); }
   SceneAnswer want(const std::string& id, TimePoint now) override;
@@ -105,7 +105,7 @@ class SceneLibrary final : public SceneSource {
   SceneFolders folders_;  // on the loader's thread, once the constructor is through
   std::map<std::string, Book> shelf_;
   std::map<std::filesystem::path, std::string> ids_;  // of all on the shelf: a scene keeps its id
-  std::string default_scene_;
+  std::string preferred_scene_;  // the default one, while there is a file of it
   SceneResidency residency_;
   double bytes_per_second_ = 100e6;  // of the last load
   TimePoint next_scan_{};

@@ -270,7 +270,7 @@ HttpResponse Server::State::list_scenes(const Permit& permit) {
     else
       shown.push_back(&scene);
   }
-  if (shown.empty()) return unauthorized(refusal);
+  if (shown.empty() && !listing->empty()) return unauthorized(refusal);
   if (shown.size() < listing->size()) return json_response(scene_list(shown));
   if (listed.lock() != listing) {
     listed = listing;
@@ -286,7 +286,8 @@ HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart p
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
   if (part == ScenePart::tours) {
-    const ToursAnswers tours = found->tours.value_or(ToursAnswers());
+    static const ToursAnswers none;
+    const ToursAnswers& tours = found->tours ? *found->tours : none;
     return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
   }
   if (!found->poster)

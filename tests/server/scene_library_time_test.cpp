@@ -28,12 +28,14 @@ class SceneLibraryTime : public FolderTest {
     // 236 bytes each as decoded: 1.2 MB.
     for (const char* name : {"a.ply", "b.ply", "c.ply"})
       save_scene(random_cloud(5000, 3), folder_ / name);
-    ServerConfig config;
-    config.scenes = {"synth:city:1000"};
-    config.scene_folders = {folder_.path()};
-    config.scene_memory_mb = 3;
+    config_.scenes = {"synth:city:1000"};
+    config_.scene_folders = {folder_.path()};
+    config_.scene_memory_mb = 3;
+    start();
+  }
+  void start() {
     library_ = std::make_unique<SceneLibrary>(
-        config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
         [this] { return now_; });
   }
 
@@ -66,6 +68,7 @@ class SceneLibraryTime : public FolderTest {
 
   boost::asio::io_context io_;
   Metrics metrics_;
+  ServerConfig config_;
   std::unique_ptr<SceneLibrary> library_;
   TimePoint now_ = TimePoint{} + 1h;  // passes by tick() alone
 };
@@ -196,6 +199,23 @@ TEST_F(SceneLibraryTime, AFileThatComesBackWhileItIsLookedAtIsTheSceneThatItWas)
   run_until([&] { return library_->listing()->size() == 3; });
   tick(1s);
   EXPECT_FALSE(library_->has("a"));
+}
+
+TEST_F(SceneLibraryTime, NewcomersAreNotGivenASceneWhoseFileIsGone) {
+  config_.scenes.clear();
+  start();
+  const Entry seen = library_->in_memory("a");
+  EXPECT_EQ(library_->default_scene(), "a");
+  std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 2; });
+  EXPECT_TRUE(library_->has("a")) << "somebody looks at it";
+  EXPECT_EQ(library_->default_scene(), "b");
+  EXPECT_THAT(library_->scene_ids(), ElementsAre("b", "c"));
+  std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  EXPECT_EQ(library_->default_scene(), "a");
 }
 
 TEST_F(SceneLibraryTime, AFileThatGoesBeforeItIsLoadedIsForgotten) {
