@@ -31,16 +31,18 @@ AdmissionBudget::Load AdmissionBudget::load(std::span<const SessionDemand> sessi
           demand.gpu_seconds > 0 ? demand.gpu_seconds / capacity_.gpus : 0.0};
 }
 
-bool AdmissionBudget::has_room(std::span<const SessionDemand> present,
-                               const SessionDemand& newcomer) const {
-  if (min_fps_ == 0 || present.empty()) return true;
-  if (std::ranges::none_of(present, [](const auto& s) { return s.frame_cost.has_value(); }))
-    return static_cast<double>(std::ranges::count_if(present, &SessionDemand::fresh)) <
-           (capacity_.gpus > 0 ? capacity_.gpus : capacity_.cpus);
+Room AdmissionBudget::room(std::span<const SessionDemand> present,
+                           const SessionDemand& newcomer) const {
+  if (min_fps_ == 0 || present.empty()) return Room::yes;
+  if (std::ranges::none_of(present, [](const auto& s) { return s.frame_cost.has_value(); })) {
+    const auto fresh = static_cast<double>(std::ranges::count_if(present, &SessionDemand::fresh));
+    return fresh < (capacity_.gpus > 0 ? capacity_.gpus : capacity_.cpus) ? Room::yes
+                                                                          : Room::unknown;
+  }
   std::vector<SessionDemand> all(present.begin(), present.end());
   all.push_back(newcomer);
   const Load taken = load(all);
-  return taken.cpus <= 1.0 && taken.gpus <= 1.0;
+  return taken.cpus <= 1.0 && taken.gpus <= 1.0 ? Room::yes : Room::no;
 }
 
 int AdmissionBudget::seats(std::span<const SessionDemand> present, int max_sessions) const {

@@ -11,8 +11,11 @@ struct SessionDemand {
   std::optional<SessionUsage::FrameCost> frame_cost;  // as measured
   double megapixels = 0;                              // of a frame
   int fps = 60;                                       // nominal
-  bool fresh = false;  // admitted lately: its cost is about to be known
+  bool fresh = false;  // admitted lately and not at rest: its cost is about to be known
 };
+
+/// Whether there is room for one more session. Unknown: not before it is known what some cost.
+enum class Room { yes, no, unknown };
 
 /// Whether one more session leaves everybody a decent rate, judged by what the frames of the
 /// present ones were measured to cost. Processors and GPUs are counted apart. Pure.
@@ -29,8 +32,8 @@ class AdmissionBudget {
   /// A session without a measured cost is taken to cost the mean of the others by its pixels. With
   /// nothing measured there is room for a fresh one on each GPU, or on each processor where none
   /// renders: others wait for what these are found to cost. For the first one there always is.
-  [[nodiscard]] bool has_room(std::span<const SessionDemand> present,
-                              const SessionDemand& newcomer) const;
+  [[nodiscard]] Room room(std::span<const SessionDemand> present,
+                          const SessionDemand& newcomer) const;
 
   /// Of processors and GPUs, what the sessions take at the rate that everybody shall keep; 1: all.
   struct Load {

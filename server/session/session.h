@@ -185,6 +185,10 @@ class Session {
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
   [[nodiscard]] bool paused() const { return paused_; }
   [[nodiscard]] bool lost() const { return lost_at_.has_value(); }
+  /// It has had a picture, and its camera does not move.
+  [[nodiscard]] bool rests(TimePoint now) const {
+    return frames_sent_ > 0 && now >= rest_.begins();
+  }
   [[nodiscard]] const EncoderEffort& effort() const { return admission_.effort; }
   [[nodiscard]] EncoderKind encoder_kind() const { return admission_.encoder.kind; }
   /// Its stream is open, and somebody looks.

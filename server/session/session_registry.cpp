@@ -15,7 +15,7 @@ namespace catgs {
 namespace {
 
 constexpr std::chrono::milliseconds tick_interval{250};
-constexpr std::chrono::seconds time_to_measure{3};  // who moves nothing for so long is at rest
+constexpr std::chrono::seconds time_to_measure{3};             // at most, of one who moves
 constexpr std::chrono::milliseconds queue_tell_interval{750};  // once a second, with the tick
 
 double megapixels(glm::ivec2 size_px) { return 1e-6 * size_px.x * size_px.y; }
@@ -182,8 +182,12 @@ void SessionRegistry::admit_waiting(TimePoint now) {
   for (const auto& client : clients_)
     if (client->session().state() == Session::State::queued && !client->session().awaits_scene())
       if (const auto position = queue_.join(client->session().id()); position > 1)
-        client->session().on_queue_moved(
-            {*position, queue_.estimate(*position, static_cast<int>(admitted_))}, now);
+        client->session().on_queue_moved(place_in_queue(*position), now);
+}
+
+QueuePlace SessionRegistry::place_in_queue(int position) const {
+  return {position, measuring_ ? time_to_measure * position
+                               : queue_.estimate(position, static_cast<int>(admitted_))};
 }
 
 /// Once may be chance, as a driver that is just being reset; without a frame in between it is none.
@@ -218,11 +222,10 @@ std::variant<std::string, ErrorMessage> SessionRegistry::choose(const Hello& hel
   return wanted;
 }
 
-bool SessionRegistry::has_place_for(const Client& client, const Hello& hello) const {
-  if (draining_ || (!queue_.empty() && queue_.front() != client.session().id())) return false;
-  if (static_cast<int>(admitted_) >= options_.max_sessions) return false;
+Room SessionRegistry::room_for(const Hello& hello) const {
+  if (draining_ || static_cast<int>(admitted_) >= options_.max_sessions) return Room::no;
   const FlowWish wish = wish_within(options_.policy, hello.settings, hello.viewport_px);
-  return budget_.has_room(demands(), {std::nullopt, megapixels(wish.size_px), wish.fps});
+  return budget_.room(demands(), {std::nullopt, megapixels(wish.size_px), wish.fps});
 }
 
 std::vector<SessionDemand> SessionRegistry::demands() const {
@@ -231,8 +234,9 @@ std::vector<SessionDemand> SessionRegistry::demands() const {
   for (const auto& client : clients_) {
     if (!client->admitted_at()) continue;
     const Session& session = client->session();
-    demands.push_back({client->usage().frame_cost(), megapixels(session.moving_size_px()),
-                       session.fps(), now - *client->admitted_at() < time_to_measure});
+    const bool fresh = now - *client->admitted_at() < time_to_measure && !session.rests(now);
+    demands.push_back(
+        {client->usage().frame_cost(), megapixels(session.moving_size_px()), session.fps(), fresh});
   }
   return demands;
 }
@@ -254,7 +258,10 @@ AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
         ErrorCode::server_full,
         fmt::format("{} sessions from {} already: close one first", same_address, address), true};
   }
-  if (has_place_for(client, hello)) {
+  const bool its_turn = queue_.empty() || queue_.front() == id;
+  const Room room = its_turn ? room_for(hello) : Room::no;
+  if (its_turn) measuring_ = room == Room::unknown;
+  if (room == Room::yes) {
     // Who waits for a scene holds no place: it may come to nothing.
     auto scene = find_scene(std::get<std::string>(choice), Clock::now());
     if (!std::holds_alternative<std::shared_ptr<const SceneEntry>>(scene)) queue_.leave(id);
@@ -274,13 +281,16 @@ AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
     if (client.session().state() != Session::State::queued)
       spdlog::info("{} waits for a video encoder: all are taken", client.peer_address());
   }
-  if (const auto position = queue_.join(id))
-    return QueuePlace{*position, queue_.estimate(*position, static_cast<int>(admitted_))};
-  return ErrorMessage{ErrorCode::server_full,
-                      fmt::format("all {} places are taken, and {} wait for one: try again in a "
-                                  "minute",
-                                  admitted_, queue_.size()),
-                      true};
+  if (const auto position = queue_.join(id)) return place_in_queue(*position);
+  return ErrorMessage{
+      ErrorCode::server_full,
+      measuring_
+          ? fmt::format("it is being measured what sessions cost here, and {} wait for it: try "
+                        "again in {} s",
+                        queue_.size(), time_to_measure.count())
+          : fmt::format("all {} places are taken, and {} wait for one: try again in a minute",
+                        admitted_, queue_.size()),
+      true};
 }
 
 void SessionRegistry::give_frames() {
@@ -324,7 +334,7 @@ void SessionRegistry::tick() {
   charge_cpu(now);
   report_loads();
   control_effort(now);
-  if (now - queue_told_ >= queue_tell_interval) admit_waiting(now);
+  if (measuring_ || now - queue_told_ >= queue_tell_interval) admit_waiting(now);
   give_frames();
   publish();
   tick_timer_.expires_after(tick_interval);

@@ -87,7 +87,7 @@ class SessionRegistry {
   bool resume(const std::shared_ptr<Peer>& peer, Client& newcomer, Client& known,
               const Hello& hello, TimePoint now);
   AdmissionAnswer admit(Client& client, const Hello& hello);
-  [[nodiscard]] bool has_place_for(const Client& client, const Hello& hello) const;
+  [[nodiscard]] Room room_for(const Hello& hello) const;
   /// Of the admitted sessions, as measured.
   [[nodiscard]] std::vector<SessionDemand> demands() const;
   /// Shares the processor time since the last call out among the sessions.
@@ -103,6 +103,7 @@ class SessionRegistry {
   void on_view_refused(const std::string& why);
   /// Those next in the queue ask again; the others hear where they stand.
   void admit_waiting(TimePoint now);
+  [[nodiscard]] QueuePlace place_in_queue(int position) const;
   [[nodiscard]] std::shared_ptr<Client> find(std::string_view session_id) const;
   SceneAnswer find_scene(const std::string& scene_id, TimePoint now);
   /// Starts frames while a slot is free and a session is ready; sets the timer for the next one.
@@ -135,6 +136,7 @@ class SessionRegistry {
   const AdmissionBudget budget_;
   EffortControl effort_;
   AdmissionQueue queue_;
+  bool measuring_ = false;  // the next in the queue waits for what the present ones cost
   TimePoint queue_told_{};
   std::vector<FrameCandidate> candidates_;  // scratch of give_frames()
   std::vector<Client*> candidate_clients_;

@@ -23,58 +23,58 @@ TEST(AdmissionBudget, AdmitsWhileTheProcessorsKeepTheRate) {
   // 0.04 s x 10 Hz: five sessions fill two processors.
   for (int i = 0; i < 4; ++i) {
     present.push_back(session(0.04));
-    EXPECT_TRUE(budget.has_room(present, unknown())) << i;
+    EXPECT_EQ(budget.room(present, unknown()), Room::yes) << i;
   }
   present.push_back(session(0.04));
-  EXPECT_FALSE(budget.has_room(present, unknown()));
-  EXPECT_FALSE(budget.has_room(present, unknown(0.01)));
+  EXPECT_EQ(budget.room(present, unknown()), Room::no);
+  EXPECT_EQ(budget.room(present, unknown(0.01)), Room::no);
 }
 
 TEST(AdmissionBudget, TheFirstSessionAlwaysFindsRoom) {
   const AdmissionBudget budget({.cpus = 1}, 60);
-  EXPECT_TRUE(budget.has_room({}, unknown(8.0)));
-  EXPECT_FALSE(budget.has_room(std::vector{session(1.0)}, unknown()));
+  EXPECT_EQ(budget.room({}, unknown(8.0)), Room::yes);
+  EXPECT_EQ(budget.room(std::vector{session(1.0)}, unknown()), Room::no);
 }
 
 TEST(AdmissionBudget, JudgesNewcomersByTheirPixelsAndRate) {
   const AdmissionBudget budget({.cpus = 1}, 10);
   const std::vector present{session(0.05)};  // half the processor
-  EXPECT_TRUE(budget.has_room(present, unknown(1.0)));
-  EXPECT_FALSE(budget.has_room(present, unknown(1.1)));
-  EXPECT_TRUE(budget.has_room(present, unknown(2.0, 5))) << "who wants less gets in";
+  EXPECT_EQ(budget.room(present, unknown(1.0)), Room::yes);
+  EXPECT_EQ(budget.room(present, unknown(1.1)), Room::no);
+  EXPECT_EQ(budget.room(present, unknown(2.0, 5)), Room::yes) << "who wants less gets in";
 }
 
 TEST(AdmissionBudget, CountsThoseNotMeasuredYet) {
   const AdmissionBudget budget({.cpus = 1}, 10);
-  EXPECT_TRUE(budget.has_room(std::vector{unknown(), unknown(), unknown()}, unknown()))
+  EXPECT_EQ(budget.room(std::vector{unknown(), unknown(), unknown()}, unknown()), Room::yes)
       << "nothing is known";
-  EXPECT_FALSE(budget.has_room(std::vector{session(0.05), unknown()}, unknown()));
+  EXPECT_EQ(budget.room(std::vector{session(0.05), unknown()}, unknown()), Room::no);
 }
 
 TEST(AdmissionBudget, ABurstWaitsForWhatTheFirstOnesCost) {
   const AdmissionBudget processors({.cpus = 2}, 10);
-  EXPECT_TRUE(processors.has_room(std::vector{fresh()}, unknown()));
-  EXPECT_FALSE(processors.has_room(std::vector{fresh(), fresh()}, unknown()));
-  EXPECT_TRUE(processors.has_room(std::vector{fresh(), unknown()}, unknown()))
-      << "one that has shown nothing for long is at rest";
-  EXPECT_TRUE(processors.has_room(std::vector{fresh(), session(0.01)}, unknown()));
+  EXPECT_EQ(processors.room(std::vector{fresh()}, unknown()), Room::yes);
+  EXPECT_EQ(processors.room(std::vector{fresh(), fresh()}, unknown()), Room::unknown);
+  EXPECT_EQ(processors.room(std::vector{fresh(), unknown()}, unknown()), Room::yes)
+      << "one that is at rest";
+  EXPECT_EQ(processors.room(std::vector{fresh(), session(0.01)}, unknown()), Room::yes);
   const AdmissionBudget gpu({.cpus = 16, .gpus = 1}, 10);
-  EXPECT_FALSE(gpu.has_room(std::vector{fresh()}, unknown()));
-  EXPECT_TRUE(gpu.has_room(std::vector{session(0.01, 0.01)}, unknown()));
+  EXPECT_EQ(gpu.room(std::vector{fresh()}, unknown()), Room::unknown);
+  EXPECT_EQ(gpu.room(std::vector{session(0.01, 0.01)}, unknown()), Room::yes);
   const AdmissionBudget any({.cpus = 1}, 0);
-  EXPECT_TRUE(any.has_room(std::vector{fresh(), fresh()}, unknown()));
+  EXPECT_EQ(any.room(std::vector{fresh(), fresh()}, unknown()), Room::yes);
 }
 
 TEST(AdmissionBudget, TheScarcerOfProcessorsAndGpusDecides) {
   const AdmissionBudget budget({.cpus = 16, .gpus = 1}, 10);
-  EXPECT_TRUE(budget.has_room(std::vector{session(0.001, 0.04)}, unknown()));
-  EXPECT_FALSE(budget.has_room(std::vector{session(0.001, 0.06)}, unknown()));
-  EXPECT_FALSE(budget.has_room(std::vector{session(0.9, 0.001)}, unknown()));
+  EXPECT_EQ(budget.room(std::vector{session(0.001, 0.04)}, unknown()), Room::yes);
+  EXPECT_EQ(budget.room(std::vector{session(0.001, 0.06)}, unknown()), Room::no);
+  EXPECT_EQ(budget.room(std::vector{session(0.9, 0.001)}, unknown()), Room::no);
 }
 
 TEST(AdmissionBudget, CanBeSwitchedOff) {
   const AdmissionBudget budget({.cpus = 1}, 0);
-  EXPECT_TRUE(budget.has_room(std::vector{session(100.0)}, unknown()));
+  EXPECT_EQ(budget.room(std::vector{session(100.0)}, unknown()), Room::yes);
   EXPECT_EQ(budget.seats(std::vector{session(100.0)}, 16), 16);
 }
 

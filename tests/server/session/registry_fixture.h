@@ -40,6 +40,7 @@ class OpenConnection final : public Connection {
     if (parsed.has_error()) error = parsed.error();
     if (parsed.has_heartbeat()) ++heartbeats;
     waits = parsed.has_queue();
+    if (waits) estimate_s = parsed.queue().estimate_s();
   }
   std::vector<std::uint64_t> send(OutgoingFrame frame) override {
     frames.push_back(frame.ticket.frame_id);
@@ -55,6 +56,7 @@ class OpenConnection final : public Connection {
   std::optional<v1::Error> error;
   std::optional<CloseCode> closed;
   bool waits = false;
+  std::uint32_t estimate_s = 0;  // of a wait
   int heartbeats = 0;
   std::vector<std::uint64_t> frames;
   int idrs = 0;
@@ -232,8 +234,8 @@ class RegistryTest : public testing::Test {
     clients[index].listener->on_close(by_leaving);
     clients.erase(clients.begin() + static_cast<std::ptrdiff_t>(index));
   }
-  /// A step of the visitor: acknowledgements, and another pose.
-  static void move(Visitor& visitor) {
+  /// A step of the visitor: acknowledgements, and another pose, where the camera may rest.
+  static void move(Visitor& visitor, bool at_rest = false) {
     const auto& received = visitor.connection->frames;
     v1::ClientMessage message;
     for (; visitor.acknowledged < received.size(); ++visitor.acknowledged) {
@@ -243,6 +245,7 @@ class RegistryTest : public testing::Test {
     }
     v1::PoseSample& pose = *message.mutable_pose();
     pose.set_pose_id(++visitor.poses);
+    pose.set_at_rest(at_rest);
     pose.set_fov_y_rad(1.0f);
     pose.mutable_world_from_camera()->mutable_position()->set_x(static_cast<float>(visitor.poses));
     pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
