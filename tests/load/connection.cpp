@@ -120,6 +120,7 @@ void Connection::say_hello() {
     hello.mutable_resume()->set_token(state_.resume_token);
     if (state_.last_pose) *hello.mutable_resume()->mutable_pose() = *state_.last_pose;
   }
+  hello_us_ = now_us();
   say(message);
 }
 
@@ -266,7 +267,9 @@ void Connection::take_welcome(const v1::Welcome& welcome) {
   report_.server_version = welcome.server_version();
   decode_stage_.set_scene(welcome.scene());
   trajectory_ = settings_.make_trajectory(hints_of(welcome.scene()));
-  report_.stats.started(now_us());
+  const std::int64_t now = now_us();
+  report_.stats.admission.add(now - hello_us_);
+  report_.stats.started(now);
   welcomed_.cancel();
 }
 

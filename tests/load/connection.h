@@ -60,6 +60,7 @@ class Connection {
   DecodeStage decode_stage_;
   bool bye_said_ = false;
   std::shared_ptr<const Trajectory> trajectory_;
+  std::int64_t hello_us_ = 0;
   std::int64_t begin_us_ = 0;  // of the poses
   bool failed_ = false;
   End end_ = End::lost;

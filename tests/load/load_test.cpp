@@ -64,6 +64,7 @@ void expect_clean(const RunReport& run) {
     EXPECT_TRUE(stats.connected);
     EXPECT_EQ(stats.errors, 0u) << errors_of(run);
     EXPECT_EQ(stats.reconnects, 0u);
+    EXPECT_EQ(stats.admission.count(), 1u);
     EXPECT_GE(stats.frames, 5u);
     EXPECT_GE(stats.idrs, 1u);
     EXPECT_GT(stats.poses_sent, 30u);

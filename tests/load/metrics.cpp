@@ -15,6 +15,7 @@ namespace catgs::load {
 namespace {
 
 constexpr NamedHistogram histograms[] = {
+    {"admission", "hello -> welcome", &SessionStats::admission},
     {"pose_to_frame", "pose sent -> frame received", &SessionStats::pose_to_frame},
     {"pose_age", "age of the picture at each tick", &SessionStats::pose_age},
     {"frame_interval", "between frames", &SessionStats::frame_interval},
