@@ -6,22 +6,26 @@
           [--server-log FILE] [--out build/soak] [-- further arguments of catgs-load]
 
 Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose their sockets and
-resume, stand still; in each round one generator more is killed. Once a second the server's memory,
+resume, stand still; in each round one generator more is killed. Meanwhile strangers go round
+misdeeds.py and must be refused each time as is told there. Once a second the server's memory,
 descriptors and threads are read from /proc, every five seconds /metrics, and nvidia-smi where there
-is one. --out gets samples.jsonl, soak.json and soak.html.
+is one. --out gets samples.jsonl, misdeeds.txt, soak.json and soak.html.
 
 Without --attach it starts the catgs-server beside the program, and stops it at the end. With it the
-server is one that runs already, and stays; a later run with the same --out and the same process
-goes on where the last one ended and judges both together.
+server is one that runs already, on a loopback address and without tokens, and stays; a later run with
+the same --out and the same process goes on where the last one ended and judges both together.
 
 Flat: see soak_report.py. Errors: since the first of these runs the server's log must have no line of
-level warning or above, and no counter of NEVER may have moved; each round's requirements must hold,
-and when all clients have gone the server must have no sessions and no connections.
+level warning or above but those that the strangers caused, and these as often as they did; the
+counters of NEVER must have moved by what the strangers did and by nothing else; each stranger must
+have had the right answer and each round's requirements must hold, and when all clients have gone the
+server must have no sessions and no connections.
 
 Exit status: 0 flat and no error; 1 otherwise; 2 it could not be run.
 """
 
 import argparse
+import collections
 import json
 import pathlib
 import random
@@ -37,6 +41,7 @@ import urllib.error
 import urllib.request
 
 import soak_report
+from strangers import Strangers
 
 SCENARIO = pathlib.Path(__file__).parent / "scenarios" / "soak.toml"
 SCENES = {"park": 2, "square": 3}  # of the scenario, with their seeds
@@ -45,7 +50,7 @@ SETTLE_S = 40.0
 SAMPLE_S, SCRAPE_S = 1.0, 5.0
 ROUND_S = 300.0  # a round takes 50 s; one that hangs is ended
 
-# Counters that nothing here may move.
+# Counters that nobody but the strangers may move.
 NEVER = ("catgs_frames_failed_total", "catgs_bad_messages_total", "catgs_scene_loads_failed_total",
          "catgs_encoders_refused_total", "catgs_sessions_refused_total", "catgs_requests_refused_total",
          "catgs_streams_failed_total", "catgs_log_lines_lost_total")
@@ -79,9 +84,10 @@ def looked_at(metrics: dict[str, float]) -> dict[str, float]:
     return {name: metrics[name] for name in names}
 
 
-def moved(before: dict[str, float], after: dict[str, float]) -> list[str]:
-    """What is wrong with the counters of NEVER."""
-    return [f"{name} grew by {after[name] - before[name]:.0f}" for name in NEVER if after[name] != before[name]]
+def moved(before: dict[str, float], after: dict[str, float], caused: collections.Counter[str]) -> list[str]:
+    """What is wrong with the counters of NEVER. `caused`: by how much strangers moved them."""
+    return [f"{name} grew by {after[name] - before[name]:.0f}, and strangers caused {caused[name]}"
+            for name in NEVER if after[name] - before[name] != caused[name]]
 
 
 def device_mb() -> float | None:
@@ -165,19 +171,23 @@ class Sampler(threading.Thread):
         self.join()
 
 
-def bad_lines(text: str) -> list[str]:
-    """Of a log in either format: level warning and above."""
+def bad_lines(text: str, caused: collections.Counter[str]) -> list[str]:
+    """Of a log in either format: level warning and above. `caused`: warnings that have to be there, and
+    how often; those that lack are told, too."""
     bad = []
+    left = caused.copy()
     for line in text.splitlines():
+        level, message = "error", line  # no line of ours: a sanitizer's, a library's
         if line.startswith("{"):
-            level = json.loads(line)["level"]
-        elif match := re.match(r"[\d:.]+ (?:\x1b\[\S*?m)?(\w+)(?:\x1b\[m)? ", line):
-            level = match.group(1)
-        else:
-            level = "error"  # no line of ours: a sanitizer's, a library's
-        if level not in ("debug", "info"):
+            said = json.loads(line)
+            level, message = said["level"], said["message"]
+        elif match := re.match(r"[\d:.]+ (?:\x1b\[\S*?m)?(\w+)(?:\x1b\[m)? (?:session \w+: )?(.*)", line):
+            level, message = match.groups()
+        if level == "warning" and left[message] > 0:
+            left[message] -= 1
+        elif level not in ("debug", "info"):
             bad.append(line)
-    return bad
+    return bad + [f"{count} lines too few: {message}" for message, count in left.items() if count > 0]
 
 
 def make_scenes(program: pathlib.Path, folder: pathlib.Path) -> None:
@@ -233,38 +243,51 @@ def one_round(command: list[str], number: int, out: pathlib.Path, rest: list[str
     return [f"round {number}: {line}" for line in failed]
 
 
-def churn(arguments: argparse.Namespace, process: Process, sampler: Sampler, url: str,
-          before: dict[str, float]) -> tuple[int, list[str]]:
+def churn(arguments: argparse.Namespace, sampler: Sampler, strangers: Strangers, url: str) -> tuple[int, list[str]]:
     """Rounds until the time is over, and then silence until all that was kept for clients is gone."""
     errors: list[str] = []
+    process = sampler.process
     command = [str(arguments.program), "--url", url]
     end = time.monotonic() + 60.0 * arguments.minutes - SETTLE_S
     rounds = 0
-    while process.alive() and (rounds == 0 or time.monotonic() < end):
-        rounds += 1
-        errors += one_round(command, rounds, arguments.out, arguments.rest)
-        if process.alive():
-            print(f"round {rounds}: {json.dumps(process.sample())}", flush=True)
-    sampler.settling = True
-    time.sleep(SETTLE_S)
+    with strangers:
+        while process.alive() and (rounds == 0 or time.monotonic() < end):
+            rounds += 1
+            errors += one_round(command, rounds, arguments.out, arguments.rest)
+            if process.alive():
+                told = process.sample() | {"misdeeds": sum(strangers.done().values())}
+                print(f"round {rounds}: {json.dumps(told)}", flush=True)
+        sampler.settling = True
+        settled = time.monotonic() + SETTLE_S
+    time.sleep(max(0.0, settled - time.monotonic()))
+    return rounds, errors + strangers.errors()
+
+
+def look_after(process: Process, before: dict[str, float], caused: collections.Counter[str]) -> list[str]:
+    """What is left when all have gone, and what was counted wrongly."""
     if not process.alive():
-        return rounds, errors + ["the server has ended"]
+        return ["the server has ended"]
     metrics = process.metrics()
-    errors += [f"{name} is {metrics[name]:.0f} after all have gone" for name in ("catgs_sessions", "catgs_connections")
-               if metrics[name] != 0]
-    return rounds, errors + moved(before, metrics)
+    left = [f"{name} is {metrics[name]:.0f} after all have gone" for name in ("catgs_sessions", "catgs_connections")
+            if metrics[name] != 0]
+    return left + moved(before, metrics, caused)
 
 
 def begin(path: pathlib.Path, process: Process, log: pathlib.Path | None) -> dict:
     """The first line of the samples: what the process had behind it when the first run with it began.
-    Samples of another process are forgotten."""
+    Samples and misdeeds of another process are forgotten."""
     lines = path.read_text("utf-8").splitlines() if path.exists() else []
     first = json.loads(lines[0]) if lines else {}
     if (first.get("process"), first.get("begin_s")) != (process.folder.name, process.begin_s):
         first = {"process": process.folder.name, "begin_s": process.begin_s, "metrics": process.metrics(),
                  "log_bytes": log.stat().st_size if log else 0}
         path.write_text(json.dumps(first) + "\n", "utf-8")
+        misdeeds_of(path).unlink(missing_ok=True)
     return first
+
+
+def misdeeds_of(samples: pathlib.Path) -> pathlib.Path:
+    return samples.with_name("misdeeds.txt")
 
 
 def read_samples(path: pathlib.Path) -> list[dict[str, float]]:
@@ -285,10 +308,12 @@ def soak(arguments: argparse.Namespace) -> bool:
         process = Process(server.pid if server else arguments.attach, admin)
         samples_file = arguments.out / "samples.jsonl"
         first = begin(samples_file, process, log)
+        strangers = Strangers(url, misdeeds_of(samples_file))
         sampler = Sampler(process, samples_file)
         sampler.start()
         try:
-            rounds, errors = churn(arguments, process, sampler, url, first["metrics"])
+            rounds, errors = churn(arguments, sampler, strangers, url)
+            errors += look_after(process, first["metrics"], strangers.moves())
         finally:
             sampler.stop()
     finally:
@@ -300,9 +325,9 @@ def soak(arguments: argparse.Namespace) -> bool:
     if log:
         # All of it where the server is ours: what it said while it started counts.
         text = log.read_bytes()[0 if server else first["log_bytes"]:].decode("utf-8", "replace")
-        errors += [f"log: {line}" for line in bad_lines(text)]
+        errors += [f"log: {line}" for line in bad_lines(text, strangers.lines())]
     samples = read_samples(samples_file)
-    report = soak_report.judge(samples) | {"rounds": rounds, "errors": errors}
+    report = soak_report.judge(samples) | {"rounds": rounds, "errors": errors, "misdeeds": strangers.done()}
     (arguments.out / "soak.json").write_text(json.dumps(report, indent=2) + "\n", "utf-8")
     (arguments.out / "soak.html").write_text(soak_report.to_html(report, samples), "utf-8")
     print(soak_report.to_text(report))

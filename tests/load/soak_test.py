@@ -1,14 +1,19 @@
 #!/usr/bin/env python3
-"""soak.py's judgement, on samples and log lines that are made up."""
+"""soak.py's judgement, on samples and log lines that are made up, and its strangers, at a server that is."""
 
+import collections
 import math
 import pathlib
 import random
+import socketserver
 import tempfile
+import threading
 import unittest
 
+import misdeeds
 import soak
 import soak_report
+import strangers
 
 
 def samples(rss_of, minutes=60.0):
@@ -88,9 +93,21 @@ class Findings(unittest.TestCase):
             '{"time":"t","level":"warning","message":"odd"}\n'
             "12:00:00.000 info session 1f2e3d4c: fine\n"
             "12:00:00.000 error session 1f2e3d4c: bad\n"
-            "==1==ERROR: AddressSanitizer\n")
+            "==1==ERROR: AddressSanitizer\n", collections.Counter())
         self.assertEqual(bad, ['{"time":"t","level":"warning","message":"odd"}',
                                "12:00:00.000 error session 1f2e3d4c: bad", "==1==ERROR: AddressSanitizer"])
+
+    def test_warnings_that_strangers_caused_are_as_many_as_they_caused(self):
+        lines = ['{"time":"t","level":"warning","session":"1f2e3d4c","message":"127.0.0.1: refused"}',
+                 "12:00:00.000 warning session 1f2e3d4c: 127.0.0.1: refused",
+                 "12:00:00.000 \x1b[1;33mwarning\x1b[m 127.0.0.1: refused"]
+        caused = lambda times: collections.Counter({"127.0.0.1: refused": times})
+        of = lambda times, text=lines: soak.bad_lines("\n".join(text), caused(times))
+        self.assertEqual(of(3), [])
+        self.assertEqual(of(2), lines[2:], "one that nobody caused")
+        self.assertEqual(of(5), ["2 lines too few: 127.0.0.1: refused"])
+        for other in ("12:00:00.000 error 127.0.0.1: refused", "12:00:00.000 warning 127.0.0.1: refused, too"):
+            self.assertEqual(of(1, [other]), [other, "1 lines too few: 127.0.0.1: refused"])
 
     def test_labels_of_a_metric_are_summed(self):
         metrics = soak.parse_metrics('# HELP a b\na_total{by="x"} 1\na_total{by="y"} 2\nb 3.5e+01\n')
@@ -105,9 +122,21 @@ class Findings(unittest.TestCase):
 
     def test_counters_are_judged_from_where_the_soak_began(self):
         before = {name: 2.0 for name in soak.NEVER}
-        self.assertEqual(soak.moved(before, before), [])
+        nobody = collections.Counter()
+        self.assertEqual(soak.moved(before, before, nobody), [])
         after = before | {"catgs_log_lines_lost_total": 5.0}
-        self.assertEqual(soak.moved(before, after), ["catgs_log_lines_lost_total grew by 3"])
+        self.assertEqual(soak.moved(before, after, nobody),
+                         ["catgs_log_lines_lost_total grew by 3, and strangers caused 0"])
+
+    def test_counters_move_by_what_strangers_did_and_nothing_else(self):
+        before = {name: 2.0 for name in soak.NEVER}
+        after = before | {misdeeds.REQUESTS: 5.0}
+        self.assertEqual(soak.moved(before, after, collections.Counter({misdeeds.REQUESTS: 3})), [])
+        for caused in (2, 4):
+            self.assertEqual(soak.moved(before, after, collections.Counter({misdeeds.REQUESTS: caused})),
+                             [f"{misdeeds.REQUESTS} grew by 3, and strangers caused {caused}"])
+        for misdeed in misdeeds.MISDEEDS:
+            self.assertLessEqual(set(misdeed.moves), set(soak.NEVER), misdeed.name)
 
 
 class StandIn:
@@ -130,10 +159,64 @@ class Beginnings(unittest.TestCase):
             with path.open("a") as file:
                 file.write('{"at_s": 1}\n')
             log.write_text("old\nnew\n")
+            done = soak.misdeeds_of(path)
+            done.write_text("junk\n")
             self.assertEqual(soak.begin(path, StandIn(1, 4.0), log), first)
+            self.assertTrue(done.exists())
             self.assertEqual(soak.read_samples(path), [{"at_s": 1}])
             self.assertEqual(soak.begin(path, StandIn(2, 4.0), log)["log_bytes"], 8)
             self.assertEqual(soak.read_samples(path), [])
+            self.assertFalse(done.exists())
+
+
+class Door(socketserver.StreamRequestHandler):
+    """Refuses who asks, and lets the others stand."""
+
+    def handle(self):
+        if self.rfile.readline():
+            self.wfile.write(b"HTTP/1.1 403 Forbidden\r\n\r\n")
+
+
+class StrangersTest(unittest.TestCase):
+    """One round each."""
+
+    def go_round(self, path, sends, answer, patience_s=60.0):
+        deed = misdeeds.Misdeed("deed", sends, answer, "a line", (misdeeds.REQUESTS,))
+        with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Door) as server:
+            threading.Thread(target=server.serve_forever).start()
+            crowd = strangers.Strangers(f"ws://127.0.0.1:{server.server_address[1]}", path,
+                                        [deed, deed._replace(name="other")], patience_s)
+            crowd.stopped.set()
+            with crowd:
+                pass
+            server.shutdown()
+        return crowd
+
+    def test_what_they_did_is_counted_over_all_runs(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "misdeeds.txt"
+            for times in (1, 2):
+                crowd = self.go_round(path, b"GET /\r\n", rb"HTTP/1\.1 403 ")
+                self.assertEqual(crowd.errors(), [])
+                self.assertEqual(crowd.done(), {"deed": times})
+                self.assertEqual(crowd.lines(), {"a line": times})
+                self.assertEqual(crowd.moves(), {misdeeds.REQUESTS: times})
+
+    def test_a_wrong_answer_is_an_error_with_what_came(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "misdeeds.txt"
+            for wanted in (rb"HTTP/1\.1 404 ", misdeeds.NOTHING):
+                self.assertEqual(self.go_round(path, b"GET /\r\n", wanted).errors(),
+                                 [r"stranger, deed: was answered b'HTTP/1.1 403 Forbidden\r\n\r\n'"])
+
+    def test_who_is_not_hung_up_is_an_error(self):
+        with tempfile.TemporaryDirectory() as folder:
+            crowd = self.go_round(pathlib.Path(folder) / "misdeeds.txt", b"GET /", misdeeds.NOTHING, 0.0)
+            self.assertEqual(crowd.errors(), ["stranger, deed: was not hung up after 0 s: b''"])
+
+    def test_misdeeds_have_names_of_their_own(self):
+        names = [misdeed.name for misdeed in misdeeds.MISDEEDS]
+        self.assertEqual(len(set(names)), len(names))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,133 @@
+"""What strangers do to a server, for strangers.py.
+
+Each misdeed has the answer that it must get, the line that it writes into the log and the counters
+that it moves. They are those of a server that listens on a loopback address and asks for no tokens.
+tests/server/net tests each of them once, and many more.
+"""
+
+import itertools
+import re
+import struct
+from typing import NamedTuple
+
+REQUESTS, SESSIONS, MESSAGES = ("catgs_requests_refused_total", "catgs_sessions_refused_total",
+                                "catgs_bad_messages_total")
+TEXT, BINARY, CLOSE, PING = 0x81, 0x82, 0x88, 0x89  # first bytes of frames, RFC 6455
+BAD_MESSAGE, UNAUTHORIZED, UNKNOWN_SCENE = 1, 2, 3  # of proto/catgs.proto
+NOTHING = rb"\Z"
+SIDECAR = "/api/scenes/any/sidecar"
+
+
+class Misdeed(NamedTuple):
+    name: str
+    sends: bytes
+    answer: bytes  # a regular expression, of what comes before the server hangs up
+    line: str = ""
+    moves: tuple[str, ...] = ()
+    resets: bool = False  # does not wait for an answer
+
+
+def request(method: str, path: str = "/", headers: str = "", body: str = "", host: str = "localhost") -> bytes:
+    return f"{method} {path} HTTP/1.1\r\nHost: {host}\r\n{headers}\r\n{body}".encode()
+
+
+def upgrade(frames: bytes = b"", headers: str = "", version: int = 13) -> bytes:
+    return request("GET", headers="Connection: Upgrade\r\nUpgrade: websocket\r\n"
+                   f"Sec-WebSocket-Version: {version}\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+                   f"Sec-WebSocket-Protocol: catgs.v1\r\n{headers}") + frames
+
+
+def frame(first: int, payload: bytes, mask: bytes = b"\x12\x34\x56\x78") -> bytes:
+    """Of a client; with an empty mask of the server."""
+    size = len(payload)
+    head = (struct.pack(">B", size) if size < 126 else struct.pack(">BH", 126, size) if size < 1 << 16
+            else struct.pack(">BQ", 127, size))
+    head = bytes([first, head[0] | (0x80 if mask else 0)]) + head[1:] + mask
+    return head + (bytes(a ^ b for a, b in zip(payload, itertools.cycle(mask))) if mask else payload)
+
+
+def field(number: int, value: int | float | bytes | str) -> bytes:
+    """Of a protobuf message."""
+    def varint(rest: int) -> bytes:
+        return bytes([rest]) if rest < 128 else bytes([rest & 127 | 128]) + varint(rest >> 7)
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    if isinstance(value, float):
+        return varint(number << 3 | 5) + struct.pack("<f", value)
+    value = value.encode() if isinstance(value, str) else value
+    return varint(number << 3 | 2) + varint(len(value)) + value
+
+
+def hello(more: bytes, width_px: int = 64) -> bytes:
+    return field(1, field(1, 1) + field(3, width_px) + field(4, 64) + field(5, 1.0) + field(6, b"\1\2") + more)
+
+
+def refused(name: str, sends: bytes, status: int, why: str) -> Misdeed:
+    """A request, by the server: it counts and logs that."""
+    return Misdeed(name, sends, rb"HTTP/1\.[01] %d " % status, f"127.0.0.1: {why}", (REQUESTS,))
+
+
+def closed(name: str, frames: bytes, code: int, why: str, error: int | None = None, bad: bool = True) -> Misdeed:
+    """A websocket, by a close frame, which the message Error comes before."""
+    said = b"" if error is None else frame(
+        BINARY, b"\x01" + field(6, field(1, error) + field(2, why) + field(3, 1)), b"")
+    said += frame(CLOSE, struct.pack(">H", code) + why.encode(), b"")
+    return Misdeed(name, upgrade(frames), rb"HTTP/1\.1 101 .*" + re.escape(said), f"127.0.0.1: {why}",
+                   (SESSIONS, MESSAGES) if bad else (SESSIONS,))
+
+
+NO_HTTP = rb"HTTP/1\.0 403 "  # libwebsockets' own answer, which nothing counts
+NO_CLIENT_MESSAGE = "message: not a ClientMessage of catgs.v1"
+NO_AUTHORS = ("upload refused: 403: nobody can save on this server: it was started without --token-key-file, which "
+              "links of role author are made with")
+MISDEEDS = [
+    refused("foreign Host", request("GET", host="evil.example"), 403,
+            "request refused: this server is not known as evil.example (--allow-origin)"),
+    refused("websocket of a foreign Origin", upgrade(headers="Origin: https://evil.example\r\n"), 403,
+            "websocket refused: origin https://evil.example is not allowed at localhost (--allow-origin)"),
+    refused("websocket of version 7", upgrade(version=7), 400,
+            "request refused: 400: open websockets by GET, Sec-WebSocket-Version 13"),
+    refused("h2c", request("GET", headers="Connection: Upgrade\r\nUpgrade: h2c\r\n"), 400,
+            "request refused: it wants another protocol than websocket"),
+    refused("sidecar without a token", request("PUT", SIDECAR, "Content-Length: 2\r\n", "{}"), 403, NO_AUTHORS),
+    refused("sidecar of a foreign Origin", request("PUT", SIDECAR, "Content-Length: 2\r\nOrigin: null\r\n", "{}"), 403,
+            "upload refused: origin null is not allowed at localhost (--allow-origin)"),
+    refused("sidecar of 99 MB", request("PUT", SIDECAR, "Content-Length: 99999999\r\n", "{"), 413,
+            "upload refused: 413: a Content-Length of 1 to 1048576 is needed"),
+    Misdeed("sidecar that stays away", request("PUT", SIDECAR, "Content-Length: 99\r\n", "{"), NOTHING,
+            f"127.0.0.1: {NO_AUTHORS}", (REQUESTS,)),
+    refused("GET with a body", request("GET", headers="Content-Length: 5\r\n", body="hello"), 413,
+            "request refused: 413: a GET needs no body"),
+    refused("chunks", request("GET", headers="Transfer-Encoding: chunked\r\n", body="0\r\n\r\n"), 411,
+            "request refused: 411: Content-Length is needed, not Transfer-Encoding"),
+    refused("POST", request("POST"), 405, "request refused: 405: only GET and HEAD are served here"),
+    Misdeed("path that climbs", request("GET", "/../../etc/passwd"), rb"HTTP/1\.1 404 "),
+    Misdeed("encoded path that climbs", request("GET", "/%2e%2e%2f%2e%2e%2fetc%2fpasswd"), rb"HTTP/1\.1 404 "),
+    Misdeed("unknown method", request("NONSENSE"), NO_HTTP),
+    Misdeed("CONNECT", request("CONNECT"), NOTHING),
+    Misdeed("junk", bytes(range(128, 256)) * 8, NO_HTTP),
+    Misdeed("TLS", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(range(256)), NO_HTTP),
+    Misdeed("endless head", request("GET", headers=f"Cookie: {'c' * 5000}\r\n"), NOTHING,
+            "libwebsockets: Ran out of header data space"),
+    Misdeed("half a head", request("GET")[:30], NOTHING),
+    Misdeed("silence", b"", NOTHING),
+    closed("junk in a message", frame(BINARY, b"\xff" * 40), 1008, NO_CLIENT_MESSAGE, BAD_MESSAGE),
+    closed("frame without a mask", frame(BINARY, b"hello", b""), 1008, NO_CLIENT_MESSAGE, BAD_MESSAGE),
+    closed("field out of range", frame(BINARY, hello(b"", 1)), 1008,
+           "hello.viewport_width_px: 1 is not in 16…8192", BAD_MESSAGE),
+    closed("message over 64 KiB", frame(BINARY, b"x" * 65537), 1009, "message over 64 KiB"),
+    closed("text", frame(TEXT, b"hello"), 1003, "binary messages only"),
+    closed("Pause before Hello", frame(BINARY, field(8, b"")), 1008, "the first message has to be a hello",
+           BAD_MESSAGE, bad=False),
+    closed("no Hello", b"", 1008, "no hello within the time limit", BAD_MESSAGE, bad=False),
+    closed("unknown scene", frame(BINARY, hello(field(2, "atlantis"))), 1008, 'there is no scene "atlantis" here',
+           UNKNOWN_SCENE, bad=False),
+    closed("unsigned link to watch", frame(BINARY, hello(field(10, "nobody.signed.this"))), 1008,
+           "this link to watch a session is not valid here", UNAUTHORIZED, bad=False),
+    # A new session: the token does no harm.
+    Misdeed("unsigned resume token, Bye", upgrade(frame(BINARY, hello(field(8, field(1, "nobody.signed.this"))))
+                                                  + frame(BINARY, field(9, b""))),
+            rb"HTTP/1\.1 101 .*" + re.escape(frame(CLOSE, struct.pack(">H", 1000) + b"bye", b""))),
+    Misdeed("ping of 126 bytes", upgrade(frame(PING, b"p" * 126)), rb"HTTP/1\.1 101 .*\r\n\r\n\Z"),
+    Misdeed("upgrade and reset", upgrade(), NOTHING, resets=True),
+]

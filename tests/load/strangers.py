@@ -1,0 +1,140 @@
+"""Strangers who go round the misdeeds, one after the other, while soak.py churns its visitors.
+
+Whoever has done one says no more, and must be answered and hung up. For what a thousand of them
+leave behind: each counter and the log are compared with what was done.
+"""
+
+import collections
+import concurrent.futures
+import dataclasses
+import itertools
+import pathlib
+import re
+import socket
+import struct
+import threading
+import time
+import urllib.parse
+from typing import Callable
+
+from misdeeds import MISDEEDS, Misdeed
+
+PACE_S = 0.4  # the log takes ten lines a second about refusals: refusals_per_second in server/log.cpp
+# The longest of the server's limits is keep_alive_timeout_s, 15 s; compilers may run beside it.
+PATIENCE_S = 30.0
+RESET = struct.pack("ii", 1, 0)  # of SO_LINGER
+
+
+@dataclasses.dataclass
+class Stranger:
+    """Has done its misdeed."""
+
+    misdeed: Misdeed
+    connection: socket.socket
+    due_s: float
+    came: bytes = b""
+
+    def hung_up(self) -> bool:
+        """Takes what has come."""
+        try:
+            while chunk := self.connection.recv(1 << 16):
+                self.came += chunk
+        except BlockingIOError:
+            return False
+        except ConnectionResetError:
+            pass
+        return True
+
+    def wrong(self) -> str:
+        """Of what came until the end; empty: nothing is."""
+        return "" if re.match(self.misdeed.answer, self.came, re.DOTALL) else f"was answered {self.came[-300:]!r}"
+
+
+class Strangers:
+    """As a context: go round until it is left, which waits until all are hung up."""
+
+    def __init__(self, url: str, path: pathlib.Path, misdeeds: list[Misdeed] | None = None,
+                 patience_s: float = PATIENCE_S):
+        parts = urllib.parse.urlsplit(url)
+        self.address = (parts.hostname, parts.port)
+        self.path = path  # of the names of what was done to this process, by earlier runs too
+        self.misdeeds, self.patience_s = MISDEEDS if misdeeds is None else misdeeds, patience_s
+        self.there: list[Stranger] = []
+        self.wrong: dict[str, list[str]] = {}
+        self.stopped = threading.Event()
+        self.pool = concurrent.futures.ThreadPoolExecutor(1)
+        self.work: concurrent.futures.Future | None = None
+
+    def __enter__(self) -> "Strangers":
+        self.work = self.pool.submit(self._go_round)
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.stopped.set()
+        self.work.result()
+        self.pool.shutdown()
+
+    def errors(self) -> list[str]:
+        return [f"stranger, {name}: {what[0]}{f' ({len(what)} times)' if len(what) > 1 else ''}"
+                for name, what in self.wrong.items()]
+
+    def done(self) -> dict[str, int]:
+        """How often, by name."""
+        names = self.path.read_text("utf-8").splitlines() if self.path.exists() else []
+        return dict(collections.Counter(names))
+
+    def lines(self) -> collections.Counter[str]:
+        """That they make in the log."""
+        return self._effects(lambda misdeed: (misdeed.line,) if misdeed.line else ())
+
+    def moves(self) -> collections.Counter[str]:
+        """What they add to counters."""
+        return self._effects(lambda misdeed: misdeed.moves)
+
+    def _effects(self, of: Callable[[Misdeed], tuple[str, ...]]) -> collections.Counter[str]:
+        done = self.done()
+        effects: collections.Counter[str] = collections.Counter()
+        for misdeed in self.misdeeds:
+            effects.update({effect: done.get(misdeed.name, 0) for effect in of(misdeed)})
+        return effects
+
+    def _go_round(self) -> None:
+        for misdeed in itertools.cycle(self.misdeeds):
+            try:
+                self._do(misdeed)
+            except OSError as error:
+                self._complain(misdeed, str(error))
+            self._look()
+            if self.stopped.wait(PACE_S):
+                break
+        while self.there:
+            time.sleep(PACE_S)
+            self._look()
+
+    def _do(self, misdeed: Misdeed) -> None:
+        connection = socket.create_connection(self.address, timeout=10.0)
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(misdeed.name + "\n")
+        connection.sendall(misdeed.sends)
+        connection.setblocking(False)
+        if misdeed.resets:
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+            connection.close()
+        else:
+            self.there.append(Stranger(misdeed, connection, time.monotonic() + self.patience_s))
+
+    def _look(self) -> None:
+        for stranger in self.there[:]:
+            if stranger.hung_up():
+                what = stranger.wrong()
+            elif time.monotonic() > stranger.due_s:
+                what = f"was not hung up after {self.patience_s:.0f} s: {stranger.came[-300:]!r}"
+            else:
+                continue
+            stranger.connection.close()
+            self.there.remove(stranger)
+            if what:
+                self._complain(stranger.misdeed, what)
+
+    def _complain(self, misdeed: Misdeed, what: str) -> None:
+        self.wrong.setdefault(misdeed.name, []).append(what)
