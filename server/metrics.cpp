@@ -141,7 +141,7 @@ Metrics::Metrics()
       poses_superseded(counter(registry_, "catgs_poses_superseded_total",
                                "Pose samples replaced by a newer one before they were used")),
       bad_messages(
-          counter(registry_, "catgs_bad_messages_total", "Messages that closed their session")),
+          counter(registry_, "catgs_bad_messages_total", "Sessions that ended with BAD_MESSAGE")),
       list_entries_overflowed(counter(registry_, "catgs_list_entries_overflowed_total",
                                       "Tile list entries that found no memory")),
       queue_wait_seconds(stage(registry_, "queue_wait")),

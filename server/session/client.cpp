@@ -129,6 +129,7 @@ void Client::note_error(const std::string& address, const ErrorMessage& error) {
     spdlog::warn(line);
   else
     log_refusal(line);
+  if (error.code == ErrorCode::bad_message) registry_.metrics_.bad_messages.Increment();
   if (error.fatal) registry_.metrics_.sessions_refused.Increment();
 }
 

@@ -75,7 +75,6 @@ void Peer::refuse(ErrorCode code, std::string why) {
 
 void Peer::on_bad_message(std::string_view why) {
   if (refused_) return;
-  registry_.metrics_.bad_messages.Increment();
   refuse(ErrorCode::bad_message, std::string(why));
 }
 

@@ -121,8 +121,11 @@ TEST_F(Refusals, OfMessagesNameTheAddress) {
   };
   EXPECT_EQ(closed_after("hello", false), 1003);
   EXPECT_EQ(closed_after(std::string(70'000, 'x'), true), 1009);
-  EXPECT_TRUE(eventually([&] { return count("catgs_sessions_refused_total") == 2.0; }));
-  EXPECT_EQ(count("catgs_bad_messages_total"), 2.0);
+  v1::ClientMessage early;
+  early.mutable_pause();
+  EXPECT_EQ(closed_after(early.SerializeAsString(), true), 1008);
+  EXPECT_TRUE(eventually([&] { return count("catgs_sessions_refused_total") == 3.0; }));
+  EXPECT_EQ(count("catgs_bad_messages_total"), 3.0);
   const std::string lines = log();
   EXPECT_THAT(lines, HasSubstr("198.51.100.7: binary messages only"));
   EXPECT_THAT(lines, HasSubstr("198.51.100.7: message over 64 KiB"));
