@@ -127,6 +127,8 @@ int LwsWebsocket::service_receive(std::span<const std::byte> fragment) {
 }
 
 int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
+  // libwebsockets closes by itself what is no websocket any more; nothing goes out behind that.
+  if (lws_get_close_length(wsi_) > 0) return 0;
   std::optional<PacketRing::Packet> packet;
   std::optional<Closing> closing;
   bool more = false;

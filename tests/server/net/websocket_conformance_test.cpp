@@ -161,6 +161,19 @@ TEST_F(WebsocketConformance, NothingIsHeardAfterTheCloseFrame) {
   EXPECT_FALSE(socket.receive_until("city", received));
 }
 
+TEST_F(WebsocketConformance, NothingIsSaidBehindTheCloseFrame) {
+  RawSocket socket = open();
+  socket.send(client_frame(ws_fin | ws_binary, hello()));
+  EXPECT_TRUE(welcomed(socket));
+  socket.send(client_frame(0xc2, hello()));
+  std::string received;
+  socket.receive_until("nothing that is said", received);  // until it is closed
+  const std::size_t code = received.find("\x03\xea");      // 1002
+  ASSERT_NE(code, std::string::npos);
+  ASSERT_EQ(received[code - 2], '\x88');
+  EXPECT_EQ(received.size(), code + static_cast<std::size_t>(received[code - 1]));
+}
+
 TEST_F(WebsocketConformance, HandshakesWithoutTheirPartsAreRefused) {
   const auto refused = [](const std::string& from, const std::string& to) {
     std::string request = handshake(server->port());
