@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "render_core/error.h"
+#include "render_core/printable.h"
 
 namespace catgs {
 
@@ -74,8 +75,12 @@ std::vector<std::byte> unpack_entry(archive* zip, std::uint64_t limit, const Byt
 std::filesystem::path FolderFiles::path_of(const std::string& name) const {
   const std::filesystem::path relative(name);
   const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
-  if (name.empty() || relative.is_absolute() || leaves)
-    throw InputError(folder_.string(), "file name '" + name + "'", "leads out of the folder");
+  const auto refuse = [&](std::string_view what) {
+    throw InputError(folder_.string(), "file name '" + printable(name) + "'", what);
+  };
+  if (name.empty() || relative.is_absolute() || leaves) refuse("leads out of the folder");
+  // The system would take what is before it for the name.
+  if (name.find('\0') != std::string::npos) refuse("has a zero byte");
   return folder_ / relative;
 }
 

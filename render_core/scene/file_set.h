@@ -28,7 +28,8 @@ class FolderFiles final : public FileSet {
  public:
   explicit FolderFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
   [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override;
-  /// `name` below the folder. Throws InputError when it is absolute or contains "..".
+  /// `name` below the folder. Throws InputError when it is absolute or contains ".." or a zero
+  /// byte.
   [[nodiscard]] std::filesystem::path path_of(const std::string& name) const;
 
  private:

@@ -71,13 +71,16 @@ TEST_F(SogFolder, FilesAreFoundBesideTheMetaData) {
 }
 
 TEST_F(SogFolder, NamesCannotLeadOut) {
-  Files files = with_meta(encode_sog(random_cloud(100, 0), 2), [](nlohmann::json& meta) {
-    meta["quats"]["files"][0] = "../quats.webp";
-  });
+  const Files files = encode_sog(random_cloud(100, 0), 2);
   for (const auto& [name, content] : files) write(name, content);
-  EXPECT_THAT(
-      input_error([&] { read_sog(FolderFiles(folder_.path()), "meta.json", two_threads()); }),
-      HasSubstr("leads out of the folder"));
+  const auto error_with = [&](const std::string& quats) {
+    const auto name_it = [&](nlohmann::json& meta) { meta["quats"]["files"][0] = quats; };
+    write("meta.json", with_meta(files, name_it).at("meta.json"));
+    return input_error([&] { read_sog(FolderFiles(folder_.path()), "meta.json", two_threads()); });
+  };
+  EXPECT_THAT(error_with("../quats.webp"), HasSubstr("leads out of the folder"));
+  EXPECT_THAT(error_with(std::string("quats.webp\0001", 12)),
+              HasSubstr("file name 'quats.webp\\x001': has a zero byte"));
 }
 
 TEST(Sog, RangesAreDecodedToTheirPlaces) {
