@@ -16,8 +16,8 @@ inline constexpr std::uint64_t max_gaussians = std::uint64_t{1} << 28;
 void require_count(const ByteSource& file, std::string_view where, std::uint64_t count);
 
 /// The same for compressed files, where the count cannot be checked against the size: refuses what
-/// would have to be compressed more than max_compression : 1 (2^16 Gaussians are always allowed),
-/// so that a lying header can make us take no more than about 2,500 times the file's size.
+/// would have to be compressed more than max_compression : 1. 2^16 Gaussians are always allowed, so
+/// that a lying header can make us take no more than 15 MB or about 3,000 times the file's size.
 /// `plain_bytes`: what the file stores of a Gaussian, decompressed.
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
                              std::size_t plain_bytes, std::uint64_t compressed_bytes);

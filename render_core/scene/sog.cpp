@@ -81,7 +81,7 @@ void parse_version_2(const JsonField& meta, SogMeta& sog) {
 }
 
 /// Every image must have a texel per Gaussian and not many more, before any is decoded.
-void check_image_sizes(const FileSet& files, const SogMeta& sog, const std::string& meta_name) {
+void check_image_sizes(const FileSet& files, const SogMeta& sog, const ByteSource& meta_file) {
   std::uint64_t bytes = 0;
   const auto open = [&](const std::string& name) { return files.open(sog.folder + name); };
   std::vector<std::string> images = {sog.means_low, sog.means_high, sog.quats, sog.scales,
@@ -96,9 +96,7 @@ void check_image_sizes(const FileSet& files, const SogMeta& sog, const std::stri
           file->name(), "size",
           fmt::format("{}x{} texels for {} Gaussians", size.width, size.height, sog.count));
   }
-  constexpr std::size_t texel_bytes = 4;
-  require_plausible_count(*files.open(meta_name), "count", sog.count, texel_bytes * images.size(),
-                          bytes);
+  require_plausible_count(meta_file, "count", sog.count, sog_texel_bytes * images.size(), bytes);
 }
 
 /// The palette's image is 64 entries wide; version 1 does not state the degree otherwise.
@@ -224,12 +222,9 @@ struct Decoder {
   }
 };
 
-}  // namespace
-
-SogMeta parse_sog_meta(const FileSet& files, const std::string& name) {
-  const auto file = files.open(name);
-  const nlohmann::json document = read_json(*file, max_meta_bytes);
-  const JsonField meta(file->name(), document);
+SogMeta parse(const ByteSource& file, const std::string& name) {
+  const nlohmann::json document = read_json(file, max_meta_bytes);
+  const JsonField meta(file.name(), document);
   SogMeta sog;
   sog.folder = name.substr(0, name.rfind('/') + 1);
   const auto version = meta.find("version");
@@ -252,13 +247,20 @@ SogMeta parse_sog_meta(const FileSet& files, const std::string& name) {
     sog.centroids = image_name(meta, "shN", 0, 2);
     sog.labels = image_name(meta, "shN", 1, 2);
   }
-  require_count(*file, "count", sog.count);
+  require_count(file, "count", sog.count);
   return sog;
 }
 
+}  // namespace
+
+SogMeta parse_sog_meta(const FileSet& files, const std::string& name) {
+  return parse(*files.open(name), name);
+}
+
 SogMeta read_sog_meta(const FileSet& files, const std::string& name) {
-  SogMeta sog = parse_sog_meta(files, name);
-  check_image_sizes(files, sog, name);
+  const auto file = files.open(name);
+  SogMeta sog = parse(*file, name);
+  check_image_sizes(files, sog, *file);
   if (!sog.centroids.empty()) check_palette(files, sog);
   return sog;
 }

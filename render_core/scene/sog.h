@@ -18,6 +18,9 @@ namespace catgs {
 // per Gaussian, and meta.json. As a zip archive (.sog) or as a folder. Version 1 quantises between
 // limits, version 2 by codebooks; SH is a palette and a label per Gaussian.
 
+/// What every SOG stores of a Gaussian, decompressed: a texel in each of five images.
+inline constexpr std::size_t sog_texel_bytes = 4, sog_least_bytes = 5 * sog_texel_bytes;
+
 /// The checked content of meta.json.
 struct SogMeta {
   /// 256 values per channel: what a byte of a texel stands for.

@@ -82,6 +82,29 @@ LodChoice choose(const LodTree& tree, const std::vector<int>& wanted) {
   return choice;
 }
 
+/// The files of a scene while its parts are opened, each once: a few bytes that many parts share
+/// would be a scene of any size.
+class UnsharedFiles final : public FileSet {
+ public:
+  UnsharedFiles(const FileSet& folder, std::string scene)
+      : folder_(folder), scene_(std::move(scene)) {}
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
+    if (!names_.insert(std::filesystem::path(name).lexically_normal().string()).second)
+      throw InputError(scene_, "file " + name, "is used a second time",
+                       "give each SOG files of its own");
+    auto file = folder_.open(name);
+    bytes_ += file->size();
+    return file;
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  const FileSet& folder_;
+  const std::string scene_;
+  mutable std::set<std::string> names_;
+  mutable std::uint64_t bytes_ = 0;
+};
+
 /// One of the SOGs that the tree refers to. Its file is closed again: a scene may have thousands.
 struct Part {
   std::unique_ptr<FileSet> archive;  // unpacked; null for folders
@@ -167,13 +190,10 @@ LodTree read_lod_tree(const ByteSource& file) {
   tree.levels = static_cast<int>(levels);
   const JsonField names = meta.at("filenames");
   if (names.size() > max_files) names.fail(fmt::format("has more than {} entries", max_files));
-  std::set<std::string> once;
   const auto file_named_by = [&](const JsonField& field) {
-    const std::string name = field.text();
+    std::string name = field.text();
     if (name.size() > max_name_bytes)
       field.fail(fmt::format("has more than {} bytes", max_name_bytes));
-    if (!once.insert(std::filesystem::path(name).lexically_normal().string()).second)
-      field.fail("names a file a second time");
     return name;
   };
   for (std::size_t i = 0; i < names.size(); ++i) tree.files.push_back(file_named_by(names[i]));
@@ -229,21 +249,23 @@ std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
 StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context) {
   const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
+  const UnsharedFiles files(folder, tree.name);
   std::vector<Part> environment;
-  if (!tree.environment.empty()) environment.push_back(open_part(folder, tree.environment));
+  if (!tree.environment.empty()) environment.push_back(open_part(files, tree.environment));
   const std::size_t environment_count = environment.empty() ? 0 : environment[0].meta.count;
   const LodChoice choice = choose(tree, level, budget, environment_count);
 
   if (choice.pieces.empty()) throw InputError(tree.name, "tree", "has no levels of detail");
 
   std::size_t total = 0;
-  std::vector<Part> parts = open_parts(folder, tree, choice.pieces, total);
+  std::vector<Part> parts = open_parts(files, tree, choice.pieces, total);
   for (Part& part : environment) {
     part.ranges.push_back({0, part.meta.count, total});
     total += part.meta.count;
     parts.push_back(std::move(part));
   }
-  require_count(*folder.open("lod-meta.json"), "tree", total);
+  require_plausible_count(*folder.open("lod-meta.json"), "tree", total, sog_least_bytes,
+                          files.bytes());
 
   int degree = 0;
   for (const Part& part : parts) degree = std::max(degree, part.meta.sh_degree);

@@ -24,9 +24,8 @@ struct LodPiece {
 struct LodTree {
   std::string name;  // of the lod-meta.json, for error messages
   int levels = 0;
-  /// Names of meta.json (or .sog) files, each once: else a small file could be taken without end.
-  std::vector<std::string> files;
-  std::string environment;  // drawn with every level; may be empty
+  std::vector<std::string> files;  // names of meta.json or .sog files
+  std::string environment;         // drawn with every level; may be empty
   /// Per node its pieces by level, 0 the finest; a node may lack levels.
   std::vector<std::vector<std::optional<LodPiece>>> nodes;
 };
@@ -60,7 +59,7 @@ struct StreamedSog {
 
 /// Loads the streamed SOG in `folder`; without `level` and `budget` the finest level. The
 /// environment counts towards the budget. Throws InputError, also when both are given, when there
-/// is no such level, and when the coarsest level exceeds the budget.
+/// is no such level, when the coarsest level exceeds the budget, and when SOGs share a file.
 StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context);
 

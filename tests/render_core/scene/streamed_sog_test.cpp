@@ -135,12 +135,56 @@ TEST_F(StreamedSogTest, ErrorsNameTheField) {
   EXPECT_THAT(error([&](Json& m) { first(m)["count"] = 101; }), HasSubstr("overlap"));
   EXPECT_THAT(error([](Json& m) { m["tree"] = Json::object(); }), HasSubstr("tree: has no levels"));
   EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "../x/meta.json"; }), HasSubstr("leads out"));
-  EXPECT_THAT(error([](Json& m) { m["filenames"][2] = "./fine//meta.json"; }),
-              HasSubstr("lod-meta.json: filenames[2]: names a file a second time"));
-  EXPECT_THAT(error([](Json& m) { m["environment"] = "fine/meta.json"; }),
-              HasSubstr("lod-meta.json: environment: names a file a second time"));
   EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "absent/meta.json"; }),
               AllOf(HasSubstr("absent"), HasSubstr("cannot be opened")));
+}
+
+TEST_F(StreamedSogTest, PartsShareNoFile) {
+  const auto error_with = [&](const std::string& other, const std::string& environment = "") {
+    meta_ = {{"lodLevels", 1}, {"filenames", {"fine/meta.json", other}}};
+    if (!environment.empty()) meta_["environment"] = environment;
+    for (int file = 0; file < 2; ++file)
+      meta_["tree"]["children"].push_back({{"lods", {{"0", piece(file, 0, 10)}}}});
+    return input_error([&] { load(); });
+  };
+  EXPECT_THAT(error_with("./fine//meta.json"),
+              HasSubstr("lod-meta.json: file ./fine//meta.json: is used a second time"));
+  EXPECT_THAT(error_with("middle/meta.json", "fine/meta.json"),
+              HasSubstr("file fine/meta.json: is used a second time"));
+  const auto files = encode_sog(random_cloud(600, 2, 600), 2);
+  write("fine/other.json", files.at("meta.json"));
+  EXPECT_THAT(error_with("fine/other.json"),
+              HasSubstr("file fine/means_l.webp: is used a second time"));
+  Json shared = Json::parse(files.at("meta.json"));
+  for (const char* attribute : {"means", "scales", "quats", "sh0", "shN"})
+    for (Json& name : shared[attribute]["files"]) name = "other_" + name.get<std::string>();
+  shared["shN"]["files"][0] = "shN_centroids.webp";
+  for (const auto& [name, content] : files) write("fine/other_" + name, content);
+  write("fine/other.json", shared.dump());
+  EXPECT_THAT(error_with("fine/other.json"),
+              HasSubstr("file fine/shN_centroids.webp: is used a second time"));
+}
+
+/// A picture of one colour is a few bytes, so SOGs of 65,536 Gaussians are small.
+TEST_F(StreamedSogTest, ManySmallFilesMakeNoHugeScene) {
+  auto files = encode_sog(random_cloud(1, 0), 1);
+  Json sog = Json::parse(files.at("meta.json"));
+  sog["means"]["shape"][0] = 65'536;
+  files["meta.json"] = sog.dump();
+  const std::string image = encode_webp(std::string(4 * 65'536, '\0'), 256, 256);
+  for (auto& [name, content] : files)
+    if (name != "meta.json") content = image;
+  meta_ = {{"lodLevels", 1}};
+  const auto add_part = [&](int i) {
+    const std::string name = std::to_string(i);
+    for (const auto& [file, content] : files) write(name + "/" + file, content);
+    meta_["filenames"].push_back(name + "/meta.json");
+    meta_["tree"]["children"].push_back({{"lods", {{"0", piece(i, 0, 65'536)}}}});
+  };
+  add_part(0);
+  EXPECT_EQ(load().cloud.size(), 65'536u);
+  add_part(1);
+  EXPECT_THAT(input_error([&] { load(); }), HasSubstr("tree: 131072 Gaussians cannot be in"));
 }
 
 TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
