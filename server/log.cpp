@@ -169,7 +169,7 @@ class PromptSink final : public spdlog::sinks::base_sink<std::mutex> {
       if (line.size() <= max_line_bytes || kept == 0) return;
       const std::size_t excess = line.size() - max_line_bytes + mark.size();
       kept -= std::min(excess, (kept + 1) / 2);
-      text.assign(message.payload.data(), kept).append(mark);
+      text = shortened({message.payload.data(), message.payload.size()}, kept) + mark;
       cut.payload = text;
       line.resize(before);
     }
