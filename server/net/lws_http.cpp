@@ -9,7 +9,6 @@
 
 #include <linux/tcp.h>  // glibc's tcp_info lacks the newer fields
 #include <netinet/in.h>
-#include <strings.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
@@ -118,16 +117,6 @@ void note_answered(lws* wsi) {
 bool is_pipelined(lws* wsi) {
   const void* before = lws_get_opaque_user_data(wsi);
   return before && reinterpret_cast<std::uintptr_t>(before) == bytes_read(wsi) + 1;
-}
-
-bool refuse_upgrade(lws* wsi) {
-  // Not the callback's own text: what libwebsockets does not know it has answered already, and
-  // then the text may be gone.
-  const std::string protocol = request_header(wsi, WSI_TOKEN_UPGRADE);
-  if (::strcasecmp(protocol.c_str(), "websocket") == 0) return false;
-  if (::strcasecmp(protocol.c_str(), "h2c") == 0)
-    lws_return_http_status(wsi, 400, "HTTP/1.1 and websockets are spoken here, not h2c");
-  return true;
 }
 
 int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site,

@@ -85,8 +85,4 @@ void note_answered(lws* wsi);
 /// reads that in a loop that does not end when the body does.
 bool is_pipelined(lws* wsi);
 
-/// Answers a request for another protocol than websocket, and says whether it was one. h2c is
-/// another parser, without our time limits.
-bool refuse_upgrade(lws* wsi);
-
 }  // namespace catgs

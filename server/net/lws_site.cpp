@@ -2,7 +2,9 @@
 
 #include <array>
 
+#include <boost/beast/http/rfc7230.hpp>
 #include <fmt/format.h>
+#include <strings.h>
 
 #include "render_core/printable.h"
 #include "server/net/lws_http.h"
@@ -66,6 +68,21 @@ void note_refused_origin(lws* wsi, std::string_view what, const std::string& ori
 int refuse_request(lws* wsi, unsigned status, const char* why) {
   note_refused(wsi, fmt::format("request refused: {}: {}", status, why));
   lws_return_http_status(wsi, status, why);
+  return -1;
+}
+
+int confirm_upgrade(lws* wsi) {
+  // Not the callback's own text: what libwebsockets does not know it has answered already, and
+  // then the text may be gone.
+  const std::string protocol = request_header(wsi, WSI_TOKEN_UPGRADE);
+  if (::strcasecmp(protocol.c_str(), "websocket") == 0) {
+    const std::string connection = request_header(wsi, WSI_TOKEN_CONNECTION);
+    if (boost::beast::http::token_list(connection).exists("upgrade")) return 0;
+    return refuse_request(wsi, 400, "a websocket needs Connection: Upgrade, through proxies, too");
+  }
+  if (::strcasecmp(protocol.c_str(), "h2c") == 0)
+    return refuse_request(wsi, 400, "HTTP/1.1 and websockets are spoken here, not h2c");
+  note_refused(wsi, "request refused: it wants another protocol than websocket");
   return -1;
 }
 

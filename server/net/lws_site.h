@@ -47,6 +47,10 @@ void note_refused_origin(lws* wsi, std::string_view what, const std::string& ori
 /// Answers a request that no handler is asked about. Nonzero: the connection closes.
 int refuse_request(lws* wsi, unsigned status, const char* why);
 
+/// Of a request with an Upgrade header, the callback's result. h2c is another parser, without our
+/// time limits; a websocket's Connection header libwebsockets would refuse without an answer.
+int confirm_upgrade(lws* wsi);
+
 HttpResponse refuse_host(lws* wsi, const std::string& host);
 
 /// Site::http's answer, if the host is allowed.

@@ -151,10 +151,9 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       service_of(wsi).gate.closed(wsi);
       return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
-      if (!refuse_upgrade(wsi)) return keep_reading;
-      note_refused(wsi, "request refused: it wants another protocol than websocket");
-      return close_connection;
+      return confirm_upgrade(wsi);
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
+      note_refused(wsi, "request refused: this is no proxy");
       return close_connection;
     case LWS_CALLBACK_HTTP:
       return on_request(wsi, *slot);
@@ -261,19 +260,29 @@ const lws_protocols protocols[] = {
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
 
-void forward_log(spdlog::level::level_enum level, std::string_view line) {
-  while (line.ends_with('\n')) line.remove_suffix(1);
-  spdlog::log(level, "libwebsockets: {}", line);
-}
+/// Whose network thread this is; null: nobody's.
+thread_local const Site* served = nullptr;
 
-/// While its mistakes are reported by nobody else. They are warnings: most are about what a
-/// stranger sent, and the log leaves no error out.
-void log_errors(int level, const char* line) {
-  forward_log(level == LLL_ERR ? spdlog::level::warn : spdlog::level::debug, line);
+std::string_view without_line_end(std::string_view line) {
+  while (line.ends_with('\n')) line.remove_suffix(1);
+  return line;
 }
 
 /// While they become an InputError.
-void log_details(int, const char* line) { forward_log(spdlog::level::debug, line); }
+void log_details(int, const char* line) {
+  spdlog::debug("libwebsockets: {}", without_line_end(line));
+}
+
+/// While its errors are reported by nobody else. They are no errors of the server, which the log
+/// would never leave out: on the network thread most are about what a stranger sent.
+void log_errors(int level, const char* line) {
+  if (level != LLL_ERR) return log_details(level, line);
+  if (!served) return spdlog::warn("libwebsockets: {}", without_line_end(line));
+  guarded([&] {
+    served->on_refused(fmt::format("libwebsockets: {}", without_line_end(line)));
+    return 0;
+  });
+}
 
 constexpr int log_levels = LLL_ERR | LLL_WARN;
 
@@ -382,6 +391,7 @@ void NetServer::start() {
   State& s = *state_;
   s.thread = std::thread([&s] {
     run_promptly();
+    served = &s.site;
     while (!s.stopping.load()) {
       if (lws_service(s.context, 0) >= 0) continue;
       s.on_failed();

@@ -25,8 +25,9 @@ struct NetOptions {
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
-  /// Of each request that is refused before anybody is asked for a session: whose, and why. Called
-  /// on the network thread.
+  /// Of each request that is refused before anybody is asked for a session: whose, and why. Of what
+  /// libwebsockets refuses itself, the errors that it reports, which name nobody. Called on the
+  /// network thread.
   std::function<void(const std::string& line)> on_refused = [](const auto&) {};
   /// The network thread ends although nobody asked it to. Called on it.
   std::function<void()> on_failed = [] {};

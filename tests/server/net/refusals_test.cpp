@@ -90,7 +90,9 @@ TEST_F(Refusals, OfRequestsWithoutATokenOrInAFormThatIsNotTakenAreCounted) {
            {"POST /" + head + "Transfer-Encoding: chunked\r\n", " 411 "},
            {sidecar + "Content-Length: 0\r\n", " 411 "},
            {sidecar + "Content-Length: 99999999\r\n", " 413 "},
-           {"GET /" + head + "Connection: Upgrade\r\nUpgrade: h2c\r\n", " 400 "}}) {
+           {"GET /" + head + "Connection: Upgrade\r\nUpgrade: h2c\r\n", " 400 "},
+           {"GET /" + head + "Upgrade: websocket\r\n", " 400 "},
+           {"GET /" + head + "Connection: close\r\nUpgrade: websocket\r\n", " 400 "}}) {
     RawSocket socket(port);
     socket.send(request + "\r\n");
     std::string answer;
@@ -100,6 +102,29 @@ TEST_F(Refusals, OfRequestsWithoutATokenOrInAFormThatIsNotTakenAreCounted) {
   }
   EXPECT_EQ(http_get(port, "/atlantis").status, 404);
   EXPECT_EQ(count("catgs_requests_refused_total"), refused) << "not found is not refused";
+}
+
+/// It answers none of these, and each costs it a line of its own.
+TEST_F(Refusals, OfWhatLibwebsocketsRefusesItselfAreCounted) {
+  const std::string get = "GET / HTTP/1.1\r\nHost: localhost\r\n";
+  double refused = 0.0;
+  for (const std::string& headers :
+       {"Cookie: " + std::string(9000, 'c') + "\r\n",
+        "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Protocol: " +
+            std::string(200, 'p') + "\r\n"}) {
+    RawSocket socket(server_->port());
+    socket.send(get + headers + "\r\n");
+    EXPECT_TRUE(socket.closed_within(std::chrono::seconds(20))) << headers;
+    EXPECT_EQ(count("catgs_requests_refused_total"), ++refused) << headers;
+  }
+  RawSocket socket(server_->port());
+  socket.send("CONNECT / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_TRUE(socket.closed_within(std::chrono::seconds(20)));
+  EXPECT_EQ(count("catgs_requests_refused_total"), ++refused) << "CONNECT";
+  const std::string lines = log();
+  EXPECT_THAT(lines, HasSubstr("libwebsockets: Ran out of header data space"));
+  EXPECT_THAT(lines, HasSubstr("libwebsockets: lws_process_ws_upgrade: protocol list too long"));
+  EXPECT_THAT(lines, HasSubstr("127.0.0.1: request refused: this is no proxy"));
 }
 
 TEST_F(Refusals, SayNotMoreThanALittleOfWhatTheStrangerSent) {
