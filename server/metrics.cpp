@@ -113,7 +113,8 @@ Metrics::Metrics()
       requests_refused(counter(
           registry_, "catgs_requests_refused_total",
           "Requests, websockets and uploads refused for their Host, Origin, token or form, and "
-          "connections beyond what descriptors there are")),
+          "connections beyond what descriptors there are; not what libwebsockets answers with 403 "
+          "by itself, or hangs up on without an error")),
       sessions_resumed(
           counter(registry_, "catgs_sessions_resumed_total", "Sessions whose client came back")),
       scenes_loaded(counter(registry_, "catgs_scenes_loaded_total",
