@@ -23,13 +23,19 @@ void Liveness::session_moved() {
   session_moved_ = clock_();
 }
 
+Liveness::Frame::Frame(std::shared_ptr<Frames> all, const std::function<TimePoint()>& clock)
+    : all_(std::move(all)) {
+  const std::lock_guard lock(all_->mutex);
+  started_ = all_->started.insert(all_->started.end(), clock());
+}
+
+Liveness::Frame::~Frame() {
+  const std::lock_guard lock(all_->mutex);
+  all_->started.erase(started_);
+}
+
 std::shared_ptr<const void> Liveness::frame_started() {
-  const std::lock_guard lock(frames_->mutex);
-  const auto frame = frames_->started.insert(frames_->started.end(), clock_());
-  return {&*frame, [frames = frames_, frame](const void*) {
-            const std::lock_guard ended(frames->mutex);
-            frames->started.erase(frame);
-          }};
+  return std::make_shared<const Frame>(frames_, clock_);
 }
 
 std::array<Liveness::Loop, 2> Liveness::loops() const {

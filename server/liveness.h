@@ -39,6 +39,19 @@ class Liveness {
     std::list<TimePoint> started;  // oldest first
   };
 
+  /// One of them, while it lives.
+  class Frame {
+   public:
+    Frame(std::shared_ptr<Frames> all, const std::function<TimePoint()>& clock);
+    ~Frame();
+    Frame(const Frame&) = delete;
+    Frame& operator=(const Frame&) = delete;
+
+   private:
+    const std::shared_ptr<Frames> all_;
+    std::list<TimePoint>::iterator started_;
+  };
+
   const std::function<TimePoint()> clock_;
   mutable std::mutex mutex_;
   TimePoint session_moved_;

@@ -1,13 +1,32 @@
 #include "server/liveness.h"
 
 #include <atomic>
+#include <cstdlib>
 #include <future>
+#include <new>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "server/watchdog.h"
+
+namespace {
+
+/// How many more times this thread gets memory.
+thread_local int allocations_left = -1;  // negative: always
+
+}  // namespace
+
+void* operator new(std::size_t bytes) {
+  if (allocations_left == 0) throw std::bad_alloc();
+  if (allocations_left > 0) --allocations_left;
+  if (void* memory = std::malloc(bytes)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace catgs {
 namespace {
@@ -47,6 +66,27 @@ TEST_F(LivenessTest, TheOldestFrameUnderWayTells) {
   EXPECT_EQ(liveness.complaint(), "frames stalled for 31 s");
   second.reset();
   EXPECT_EQ(liveness.complaint(), "");
+}
+
+/// In a process of its own, which a mutex that is never let go would stop for good.
+TEST_F(LivenessTest, AFrameThatFindsNoMemoryIsForgotten) {
+  const auto start_frames = [&] {
+    ::alarm(20);
+    int failed = 0;
+    for (std::shared_ptr<const void> frame; !frame;) {
+      allocations_left = failed;
+      try {
+        frame = liveness.frame_started();
+      } catch (const std::bad_alloc&) {
+        ++failed;
+      }
+    }
+    allocations_left = -1;
+    now = 1h + 31s;
+    liveness.session_moved();
+    std::_Exit(failed > 0 && liveness.complaint().empty() ? 0 : 1);
+  };
+  EXPECT_EXIT(start_frames(), testing::ExitedWithCode(0), "");
 }
 
 TEST_F(LivenessTest, TheWatchdogGivesUpWhatStaysStalled) {
