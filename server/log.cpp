@@ -194,8 +194,9 @@ class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
       ++lines_lost;
       return;
     }
-    if (const auto count = std::exchange(left_out_, 0); count > 0) {
-      const LogsOwnLine own(fmt::format("{} lines were left out: there were too many", count));
+    if (left_out_ > 0 && notes_.take(Clock::now())) {
+      const LogsOwnLine own(
+          fmt::format("{} lines were left out: there were too many", std::exchange(left_out_, 0)));
       to_->log(own.message(message.logger_name));
     }
     to_->log(message);
@@ -210,10 +211,12 @@ class BoundedSink final : public spdlog::sinks::base_sink<std::mutex> {
   static constexpr double burst = 500.0;
   static constexpr double refusals_per_second = 10.0;
   static constexpr double refusal_burst = 100.0;
+  static constexpr double notes_per_second = 1.0;  // of how many were left out
 
   const std::shared_ptr<spdlog::sinks::sink> to_;
   RateLimit rate_{lines_per_second, burst, Clock::now()};
   RateLimit refusals_{refusals_per_second, refusal_burst, Clock::now()};
+  RateLimit notes_{notes_per_second, 1.0, Clock::now()};
   std::uint64_t left_out_ = 0;
 };
 

@@ -106,6 +106,21 @@ TEST(Log, TellsHowManyLinesItLeftOut) {
   EXPECT_EQ(lines_of("human", "debug", flood).size(), 20'001u);
 }
 
+TEST(Log, SaysHowManyItLeftOutOnceASecond) {
+  const auto before = std::chrono::steady_clock::now();
+  const auto all = lines_of("human", "info", [] {
+    for (int round = 0; round < 10; ++round) {
+      for (int i = 0; i < 1000; ++i) spdlog::warn("one of many");
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));  // room for one more, or two
+    }
+  });
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - before;
+  const auto notes = std::ranges::count_if(
+      all, [](auto& line) { return line.find("lines were left out") != std::string::npos; });
+  EXPECT_GE(notes, 1);
+  EXPECT_LE(static_cast<double>(notes), 1.0 + elapsed.count());
+}
+
 TEST(Log, WhoIsRefusedWithoutEndHidesNothingElse) {
   const std::uint64_t lost_before = log_lines_lost();
   const auto all = lines_of("human", "info", [] {
