@@ -10,9 +10,9 @@
 
 namespace catgs {
 
-/// Gives up a process whose threads have stalled, for supervisors that see it end but do not ask
-/// /healthz: systemd, Docker. It counts its own rounds and not the time, so that a process that was
-/// itself stopped for an hour has a minute to go on.
+/// Gives up a process whose threads have stalled, for supervisors that start anew only what has
+/// ended, whatever /healthz says: systemd, Docker. It counts its own rounds and not the time, so
+/// that a process that was itself stopped for an hour has a minute to go on.
 class Watchdog {
  public:
   static constexpr int rounds = 60;  // of a second, all of them with a complaint
