@@ -10,21 +10,25 @@ namespace catgs {
 namespace {
 
 // Container engines may allow a billion, and libwebsockets has tables of as many as are allowed.
-constexpr rlim_t most_descriptors = 65'536;
+constexpr std::uint64_t most_descriptors = 65'536;
 
 }  // namespace
+
+int AcceptGate::usable_descriptors(std::uint64_t allowed) {
+  return static_cast<int>(std::min(allowed, most_descriptors));
+}
 
 void AcceptGate::raise_descriptor_limit() {
   rlimit limit{};
   if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
-  limit.rlim_cur = std::min(limit.rlim_max, most_descriptors);
+  limit.rlim_cur = static_cast<rlim_t>(usable_descriptors(limit.rlim_max));
   ::setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 int AcceptGate::descriptor_limit() {
   rlimit limit{};
   ::getrlimit(RLIMIT_NOFILE, &limit);
-  return static_cast<int>(std::min(limit.rlim_cur, most_descriptors));
+  return usable_descriptors(limit.rlim_cur);
 }
 
 std::optional<std::string> AcceptGate::refusal(int descriptor, int limit,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -12,8 +13,9 @@ class AcceptGate {
  public:
   static constexpr int reserved_descriptors = 64;
 
-  /// Raises the limit of this process to what the system allows, up to what libwebsockets can keep
-  /// tables of.
+  /// Of as many as are allowed, those that libwebsockets can keep tables of.
+  [[nodiscard]] static int usable_descriptors(std::uint64_t allowed);
+  /// Raises the limit of this process to what is usable of what the system allows.
   static void raise_descriptor_limit();
   /// Of this process, now.
   [[nodiscard]] static int descriptor_limit();

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 namespace catgs {
 namespace {
@@ -16,6 +17,17 @@ TEST(AcceptGate, LeavesDescriptorsToTheRestOfTheServer) {
   EXPECT_FALSE(gate.refusal(1024 - 64 - 1, 1024, "192.0.2.1"));
   EXPECT_THAT(gate.refusal(1024 - 64, 1024, "192.0.2.2").value_or(""),
               HasSubstr("960 descriptors are taken"));
+}
+
+TEST(AcceptGate, UsesNoMoreDescriptorsThanThereAreTablesFor) {
+  EXPECT_EQ(AcceptGate::usable_descriptors(20'000), 20'000);
+  EXPECT_EQ(AcceptGate::usable_descriptors(1'000'000'000), 65'536);
+  EXPECT_EQ(AcceptGate::usable_descriptors(RLIM_INFINITY), 65'536);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  AcceptGate::raise_descriptor_limit();
+  EXPECT_EQ(AcceptGate::descriptor_limit(), AcceptGate::usable_descriptors(before.rlim_max));
+  ::setrlimit(RLIMIT_NOFILE, &before);
 }
 
 TEST(AcceptGate, OneAddressHasHalfOfThemAtMost) {
