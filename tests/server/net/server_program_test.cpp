@@ -17,6 +17,7 @@
 
 #include "render_core/scene/save_scene.h"
 #include "tests/render_core/scene/random_cloud.h"
+#include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -147,6 +148,21 @@ TEST(ServerProgram, WarningsAboutSettingsAreLinesOfTheLog) {
   EXPECT_THAT(program.log(), AllOf(StartsWith("{\"time\":"), HasSubstr("CATGS_MAX_SESSION")))
       << "standard output is a file of settings";
   EXPECT_EQ(program.exit_status(), 0);
+}
+
+/// libwebsockets has a line about each head that is too long.
+TEST(ServerProgram, LongHeadsAreAmongTheRefusalsOfItsLog) {
+  constexpr int heads = 400;  // fewer than all lines, more than refusals may have
+  Program program;
+  for (int i = 0; i < heads; ++i) {
+    RawSocket socket(program.port());
+    socket.send("GET / HTTP/1.1\r\nCookie: " + std::string(5000, 'c') + "\r\n\r\n");
+    EXPECT_TRUE(socket.closed_within(std::chrono::seconds(20)));
+  }
+  program.signal(SIGINT);
+  program.read_log("stopped");
+  EXPECT_THAT(program.log(), HasSubstr("libwebsockets: "));
+  EXPECT_THAT(program.log(), HasSubstr("lines were left out"));
 }
 
 TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
