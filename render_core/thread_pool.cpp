@@ -8,17 +8,12 @@
 #include <sched.h>
 
 namespace catgs {
-namespace {
 
-/// Those that this process may run on, not all of the machine: std::thread::hardware_concurrency()
-/// counts the latter with glibc 2.35 and later.
 int processors() {
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof(allowed), &allowed) == 0) return CPU_COUNT(&allowed);
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
-
-}  // namespace
 
 struct ThreadPool::Loop {
   Loop(std::size_t n, BodyRef f) : count(n), body(f) {}

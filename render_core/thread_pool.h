@@ -10,6 +10,10 @@
 
 namespace catgs {
 
+/// Those that this process may run on, not all of the machine: std::thread::hardware_concurrency()
+/// counts the latter with glibc 2.35 and later.
+int processors();
+
 /// Threads shared by rendering and encoding. Work is parallel across tasks first: a frame's inner
 /// loops (`parallel_for`) are helped only by workers that have nothing else to do, so that with as
 /// many sessions as threads each frame stays on its own core.

@@ -1,13 +1,11 @@
 // catgs-server: renders 3D Gaussian Splatting scenes and streams them to browsers.
 
-#include <algorithm>
 #include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <map>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -21,6 +19,7 @@
 #include "render_core/device_error.h"
 #include "render_core/error.h"
 #include "render_core/printable.h"
+#include "render_core/thread_pool.h"
 #include "server/commands.h"
 #include "server/config.h"
 #include "server/log.h"
@@ -38,12 +37,12 @@ constexpr int exit_usage = 2;
 /// bound to the largest block that was ever freed, up to 32 MiB, and what visitors needed then
 /// stays with the process, between small blocks. Where one bound is set it no longer adapts the
 /// other, by which the ends of heaps go back: that stays wide enough for what frames allocate and
-/// free. No more heaps than threads that run at a time: glibc's eight for each processor fill for a
-/// quarter of an hour with what one could hold.
+/// free. No more heaps than threads that run at a time: glibc's eight for each processor fill for
+/// long with what these could hold.
 void bound_heaps() {
   ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
-  ::mallopt(M_ARENA_MAX, static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+  ::mallopt(M_ARENA_MAX, processors());
 }
 
 /// Flags as they were given, by setting name; applied after the file and the environment.
