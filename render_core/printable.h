@@ -58,14 +58,15 @@ inline std::string printable(std::string_view text) {
   return out;
 }
 
-/// At most `max_bytes` of UTF-8, whole characters.
+/// At most `max_bytes`, of UTF-8 whole characters.
 inline std::string shortened(std::string_view text, std::size_t max_bytes) {
   const auto continues_character = [&](std::size_t i) {
     return (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;
   };
   if (text.size() <= max_bytes) return std::string(text);
-  while (max_bytes > 0 && continues_character(max_bytes)) --max_bytes;
-  return std::string(text.substr(0, max_bytes));
+  std::size_t end = max_bytes;
+  while (end > 0 && max_bytes - end < 3 && continues_character(end)) --end;
+  return std::string(text.substr(0, continues_character(end) ? max_bytes : end));
 }
 
 }  // namespace catgs

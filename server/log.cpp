@@ -43,9 +43,10 @@ class JsonFormatter final : public spdlog::formatter {
         {"level", std::string(level.data(), level.size())}};
     if (!logged_session.empty()) line["session"] = logged_session;
     line["message"] = std::string(message.payload.data(), message.payload.size());
-    // Text from clients may be no UTF-8.
+    // Text from clients may be no UTF-8, or move the cursor of who reads the lines on a terminal.
+    constexpr bool ascii = true;
     const std::string text =
-        line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+        line.dump(-1, ' ', ascii, nlohmann::ordered_json::error_handler_t::replace) + "\n";
     out.append(text.data(), text.data() + text.size());
   }
   [[nodiscard]] std::unique_ptr<formatter> clone() const override {

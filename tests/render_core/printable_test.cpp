@@ -43,6 +43,14 @@ TEST(Printable, WhatIsNotUtf8ComesOutByItsBytes) {
     EXPECT_EQ(printable(text), wanted);
 }
 
+TEST(Shortened, EndsWithAWholeCharacterWhereThereAreSome) {
+  EXPECT_EQ(shortened("ab\u20ac", 5), "ab\u20ac");
+  for (const std::size_t bytes : {2u, 3u, 4u}) EXPECT_EQ(shortened("ab\u20ac", bytes), "ab");
+  const std::string none(200, '\x80');
+  EXPECT_EQ(shortened("abc" + none, 100), "abc" + none.substr(0, 97));
+  EXPECT_EQ(shortened("abc", 0), "");
+}
+
 TEST(Printable, WhatWentThroughItStays) {
   std::string bytes;
   for (int first = 0; first < 256; ++first)
