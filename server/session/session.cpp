@@ -259,6 +259,7 @@ void Session::on_stream_opened(const StreamOpened& opened, TimePoint now) {
   config_.encoder = admission_.encoder.text;
   device_ = opened.device;
   state_ = State::live;
+  note_activity(now);
   encoded_as_.reset();
   stills_fail_ = false;
   idr_.begin();

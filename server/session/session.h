@@ -185,10 +185,10 @@ class Session {
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
   [[nodiscard]] bool paused() const { return paused_; }
   [[nodiscard]] bool lost() const { return lost_at_.has_value(); }
-  /// Its camera does not move, and that of a newcomer has had the time to begin.
+  /// Pictures can be seen, and for a while the camera has not moved.
   [[nodiscard]] bool rests(TimePoint now) const {
-    constexpr std::chrono::milliseconds to_begin{500};
-    return now >= rest_.begins() && (frames_sent_ > 0 || now - last_activity_ >= to_begin);
+    constexpr std::chrono::milliseconds a_while{500};
+    return state_ == State::live && now - last_activity_ >= a_while;
   }
   [[nodiscard]] const EncoderEffort& effort() const { return admission_.effort; }
   [[nodiscard]] EncoderKind encoder_kind() const { return admission_.encoder.kind; }

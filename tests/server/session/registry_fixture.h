@@ -234,8 +234,8 @@ class RegistryTest : public testing::Test {
     clients[index].listener->on_close(by_leaving);
     clients.erase(clients.begin() + static_cast<std::ptrdiff_t>(index));
   }
-  /// A step of the visitor: acknowledgements, and another pose, where the camera may rest.
-  static void move(Visitor& visitor, bool at_rest = false) {
+  /// A step of the visitor: acknowledgements, and another pose.
+  static void move(Visitor& visitor) {
     const auto& received = visitor.connection->frames;
     v1::ClientMessage message;
     for (; visitor.acknowledged < received.size(); ++visitor.acknowledged) {
@@ -245,7 +245,6 @@ class RegistryTest : public testing::Test {
     }
     v1::PoseSample& pose = *message.mutable_pose();
     pose.set_pose_id(++visitor.poses);
-    pose.set_at_rest(at_rest);
     pose.set_fov_y_rad(1.0f);
     pose.mutable_world_from_camera()->mutable_position()->set_x(static_cast<float>(visitor.poses));
     pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);

@@ -21,6 +21,23 @@ class SessionLife : public test::SessionTest {
   void resume() { session.on_resumed(resuming(), admission(), now); }
 };
 
+TEST_F(SessionLife, RestsWhenItsCameraHasNotMovedForAWhile) {
+  say_hello();
+  now += 10s;
+  EXPECT_FALSE(session.rests(now)) << "nobody sees anything yet";
+  open_stream();
+  now += 499ms;
+  EXPECT_FALSE(session.rests(now)) << "it may be about to begin";
+  now += 1ms;
+  EXPECT_TRUE(session.rests(now));
+  pose(1, 1.0f);
+  EXPECT_FALSE(session.rests(now));
+  now += 300ms;
+  pose(2, 1.0f);
+  now += 200ms;
+  EXPECT_TRUE(session.rests(now)) << "a pose that is the same is no motion";
+}
+
 TEST_F(SessionLife, WaitsForAPlaceAndSpeaksMeanwhile) {
   const AdmissionAnswer place = std::exchange(host.admission, QueuePlace{3, 40s});
   Hello hello = resuming();
