@@ -261,14 +261,14 @@ void Connection::take_message(const v1::ServerMessage& message) {
 }
 
 void Connection::take_welcome(const v1::Welcome& welcome) {
+  const std::int64_t now = now_us();
+  if (state_.resume_token.empty()) report_.stats.admission.add(now - hello_us_);
   state_.resume_token = welcome.resume_token();
   report_.renderer = welcome.renderer();
   report_.encoder = welcome.config().encoder();
   report_.server_version = welcome.server_version();
   decode_stage_.set_scene(welcome.scene());
   trajectory_ = settings_.make_trajectory(hints_of(welcome.scene()));
-  const std::int64_t now = now_us();
-  report_.stats.admission.add(now - hello_us_);
   report_.stats.started(now);
   welcomed_.cancel();
 }

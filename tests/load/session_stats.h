@@ -51,7 +51,7 @@ class SessionStats {
     return 1e-6 * static_cast<double>(end_us_ - start_us_);
   }
 
-  DurationHistogram admission;      // hello sent -> welcome: a place, and the scene in memory
+  DurationHistogram admission;      // first hello sent -> welcome: a place, the scene in memory
   DurationHistogram pose_to_frame;  // pose sent -> first frame that echoes it received
   DurationHistogram pose_age;       // at each nominal tick: age of the pose behind the newest frame
   DurationHistogram frame_interval;  // between receptions
