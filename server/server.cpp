@@ -263,14 +263,14 @@ std::string Server::State::preview(const HttpRequest& request) {
 HttpResponse Server::State::list_scenes(const Permit& permit) {
   const auto listing = scenes->listing();
   std::vector<const SceneLibrary::Listing*> shown;
-  std::string refusal;
+  Refusal refusal = listing->empty() ? permit({}, Use::list) : std::nullopt;
   for (const auto& scene : *listing) {
     if (auto refused = permit(scene.id, Use::list))
-      refusal = *std::move(refused);
+      refusal = std::move(refused);
     else
       shown.push_back(&scene);
   }
-  if (shown.empty() && !listing->empty()) return unauthorized(refusal);
+  if (shown.empty() && refusal) return unauthorized(*refusal);
   if (shown.size() < listing->size()) return json_response(scene_list(shown));
   if (listed.lock() != listing) {
     listed = listing;

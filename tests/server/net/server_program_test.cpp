@@ -151,20 +151,6 @@ TEST(ServerProgram, WarningsAboutSettingsAreLinesOfTheLog) {
 }
 
 /// libwebsockets has a line about each head that is too long.
-TEST(ServerProgram, LongHeadsAreAmongTheRefusalsOfItsLog) {
-  constexpr int heads = 400;  // fewer than all lines, more than refusals may have
-  Program program;
-  for (int i = 0; i < heads; ++i) {
-    RawSocket socket(program.port());
-    socket.send("GET / HTTP/1.1\r\nCookie: " + std::string(5000, 'c') + "\r\n\r\n");
-    EXPECT_TRUE(socket.closed_within(std::chrono::seconds(20)));
-  }
-  program.signal(SIGINT);
-  program.read_log("stopped");
-  EXPECT_THAT(program.log(), HasSubstr("libwebsockets: "));
-  EXPECT_THAT(program.log(), HasSubstr("lines were left out"));
-}
-
 TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
   Program program({"token"}, "--help");
   EXPECT_THAT(program.log(), HasSubstr("--token-key-file is required"));

@@ -170,6 +170,7 @@ TEST_F(WebsocketConformance, NothingIsSaidBehindTheCloseFrame) {
   socket.receive_until("nothing that is said", received);  // until it is closed
   const std::size_t code = received.find("\x03\xea");      // 1002
   ASSERT_NE(code, std::string::npos);
+  ASSERT_GE(code, 2u);
   ASSERT_EQ(received[code - 2], '\x88');
   EXPECT_EQ(received.size(), code + static_cast<std::size_t>(received[code - 1]));
 }
