@@ -11,10 +11,16 @@
 namespace catgs {
 namespace {
 
-/// "a.example:8080" or "[::1]:8080" without port and brackets.
+/// "a.example:8080" or "[::1]:8080" without port and brackets; of anything else nothing.
 std::string_view host_name(std::string_view authority) {
-  if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
-  return authority.substr(0, authority.rfind(':'));
+  const bool brackets = authority.starts_with('[');
+  const auto end = brackets ? authority.find(']') : std::min(authority.find(':'), authority.size());
+  if (end == authority.npos) return {};
+  const std::string_view port = authority.substr(brackets ? end + 1 : end);
+  if (!port.empty() &&
+      (port.front() != ':' || port.find_first_not_of("0123456789", 1) != port.npos))
+    return {};
+  return brackets ? authority.substr(1, end - 1) : authority.substr(0, end);
 }
 
 /// Does a header with a list of tags, or "*", name this one? No, where there is none.
@@ -103,7 +109,7 @@ void check_origin(std::string_view text, bool any_subdomain) {
 bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed) {
   const std::string_view name = host_name(host);
   return host.empty() || is_loopback(name) || std::ranges::any_of(allowed, [&](const auto& a) {
-           return a == "*" || host_name(authority_of(a)) == name;
+           return a == "*" || (!name.empty() && host_name(authority_of(a)) == name);
          });
 }
 

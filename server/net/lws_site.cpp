@@ -71,6 +71,15 @@ int refuse_request(lws* wsi, unsigned status, const char* why) {
   return -1;
 }
 
+const char* fault_of_head(lws* wsi) {
+  const std::string version = request_header(wsi, WSI_TOKEN_HTTP);
+  if (version != "HTTP/1.1" && version != "HTTP/1.0")
+    return "a request line ends with HTTP/1.1 or HTTP/1.0";
+  if (version == "HTTP/1.1" && request_header(wsi, WSI_TOKEN_HOST).empty())
+    return "HTTP/1.1 needs a Host";
+  return nullptr;
+}
+
 int confirm_upgrade(lws* wsi) {
   // Not the callback's own text: what libwebsockets does not know it has answered already, and
   // then the text may be gone.

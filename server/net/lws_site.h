@@ -47,6 +47,11 @@ void note_refused_origin(lws* wsi, std::string_view what, const std::string& ori
 /// Answers a request that no handler is asked about. Nonzero: the connection closes.
 int refuse_request(lws* wsi, unsigned status, const char* why);
 
+/// What is wrong with a head; null: nothing. libwebsockets decodes a path before it looks for the
+/// end of its line: by a %0a in it a page writes a header of its own in place of the version, or
+/// hides its Host.
+const char* fault_of_head(lws* wsi);
+
 /// Of a request with an Upgrade header, the callback's result. h2c is another parser, without our
 /// time limits; a websocket's Connection header libwebsockets would refuse without an answer.
 int confirm_upgrade(lws* wsi);

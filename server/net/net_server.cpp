@@ -79,6 +79,7 @@ int finish_request(lws* wsi, HttpSlot& slot) {
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   forget(slot);
+  if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
   // libwebsockets knows no chunks and would take them for the next request.
   if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
     return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
@@ -191,6 +192,7 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
   switch (reason) {
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
       const Site& site = site_of(wsi);
+      if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
       // libwebsockets takes any version of the protocol, and any method.
       if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
           request_header(wsi, WSI_TOKEN_VERSION) != "13")

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <regex>
 #include <variant>
 
 #include "proto/catgs.pb.h"
@@ -156,13 +157,9 @@ std::map<std::string, std::string> client_message_seeds() {
 }
 
 /// Whether a Host header is one of a loopback address or of friend.example, whatever its port.
-bool means_this_machine(std::string_view host) {
-  if (host.starts_with('[')) host = host.substr(1, host.find(']') - 1);
-  const std::string_view name = host.substr(0, host.find(':'));
-  const bool is_ipv4 = name.find_first_not_of("0123456789.") == std::string_view::npos;
-  const bool is_ipv6 = host.find(':') < host.find_first_not_of("01:.");
-  return host.empty() || name == "friend.example" || name == "localhost" ||
-         (is_ipv4 && name.starts_with("127.")) || is_ipv6;
+bool means_this_machine(const std::string& host) {
+  static const std::regex ours(R"((friend\.example|localhost|127\.[0-9.]+|\[[01:.]+\])(:[0-9]*)?)");
+  return host.empty() || std::regex_match(host, ours);
 }
 
 /// What an upload asks of what is there.

@@ -47,12 +47,13 @@ TEST(Precondition, IsAboutWhatIsThere) {
 }
 
 TEST(LoopbackHost, ForeignNamesAreRefusedUnlessListed) {
-  for (const char* host :
-       {"localhost", "localhost:8080", "127.0.0.1", "127.9.8.7:1", "[::1]", "[::1]:8080", ""})
+  for (const char* host : {"localhost", "localhost:", "localhost:8080", "127.0.0.1", "127.9.8.7:1",
+                           "[::1]", "[::1]:8080", ""})
     EXPECT_TRUE(loopback_host_allowed(host, {})) << host;
   for (const char* host :
        {"evil.example", "evil.example:8080", "127.evil.example", "localhost.evil",
-        "192.168.0.1:8080", "[2001:db8::1]:8080", "[::", ":8080"})
+        "192.168.0.1:8080", "[2001:db8::1]:8080", "[::", ":8080", "[::1", "[::1]evil.example",
+        "[::1].evil.example", "[::1] HTTP/1.1", "localhost:80.evil.example", "localhost:80:80"})
     EXPECT_FALSE(loopback_host_allowed(host, {"https://a.example"})) << host;
   EXPECT_TRUE(loopback_host_allowed("a.example", {"https://a.example"}));
   EXPECT_TRUE(loopback_host_allowed("a.example:8443", {"https://a.example"}));

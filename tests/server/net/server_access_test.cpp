@@ -5,6 +5,7 @@
 #include <thread>
 
 #include <boost/system/system_error.hpp>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,6 +19,7 @@
 namespace catgs::test {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -90,6 +92,19 @@ TEST(ServerAccess, AnswersNoForeignNameOnALoopbackAddress) {
   EXPECT_EQ(http_get(server.port(), "/api/scenes", {{"host", "localhost"}}).status, 200);
   const WireClient::Options rebound{"http://evil.example:8080", "catgs.v1", "evil.example:8080"};
   EXPECT_THROW(WireClient(server.port(), rebound), boost::system::system_error);
+}
+
+TEST(ServerAccess, NoPathHidesAForeignName) {
+  // libwebsockets decodes them before it looks for the end of the line.
+  RunningServer server([](ServerConfig&) {});
+  for (const int port : {server.port(), server.admin_port()})
+    for (const char* path : {"/healthz%0a%0a", "/healthz%0aHost:[::1]", "/healthz%0aHost:localhost",
+                             "/healthz%0d%0a%0d%0a", "/healthz%0d", "/healthz%0ahttp/1.1",
+                             "/healthz%0ahttp/1.1%20HTTP/1.0", "/healthz%0aHost:localhost%0a%0a"}) {
+      RawSocket socket(port);
+      socket.send(fmt::format("GET {} HTTP/1.1\r\nHost: evil.example\r\n\r\n", path));
+      EXPECT_THAT(socket.receive(300ms), Not(HasSubstr(" 200 "))) << path;
+    }
 }
 
 TEST(ServerAccess, LinksOpenTheirSceneOnly) {
