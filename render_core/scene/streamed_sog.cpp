@@ -29,7 +29,8 @@ constexpr int max_tree_depth = 64;
 LodPiece parse_piece(const JsonField& field, std::size_t file_count) {
   const LodPiece piece{field.at("file").count(), field.at("offset").count(),
                        field.at("count").count()};
-  if (piece.file >= file_count) field.at("file").fail(fmt::format("there are {}", file_count));
+  if (piece.file >= file_count)
+    field.at("file").fail(fmt::format("is {}, and there are {}", piece.file, file_count));
   if (piece.offset > max_gaussians || piece.count > max_gaussians) field.fail("is out of range");
   return piece;
 }

@@ -36,7 +36,7 @@ int bind_error(const Endpoint& endpoint) {
 
 }  // namespace
 
-void throw_listen_error(const Endpoint& endpoint, const char* flag, bool tls) {
+void throw_listen_error(const Endpoint& endpoint, const char* flag, const NetOptions* tls) {
   const std::string source = fmt::format("{} {}:{}", flag, endpoint.address, endpoint.port);
   switch (const int error = bind_error(endpoint)) {
     case EADDRINUSE:
@@ -49,10 +49,14 @@ void throw_listen_error(const Endpoint& endpoint, const char* flag, bool tls) {
       throw InputError(source, {}, "this user may not listen on a port below 1024",
                        "choose a higher one, or let a proxy or systemd listen there");
     case 0:
-      throw InputError(
-          source, {},
-          tls ? "certificate and key cannot be used together" : "libwebsockets cannot listen",
-          tls ? "check --tls-cert and --tls-key" : "--log-level debug says more");
+      if (tls)
+        throw InputError(
+            fmt::format("--tls-cert {} --tls-key {}", tls->tls_certificate, tls->tls_key), {},
+            "are no certificate and key, as PEM, that belong together",
+            fmt::format("these print the same of a pair: openssl x509 -noout -pubkey -in {}; "
+                        "openssl pkey -pubout -in {}",
+                        tls->tls_certificate, tls->tls_key));
+      throw InputError(source, {}, "libwebsockets cannot listen", "--log-level debug says more");
     default:
       throw InputError(source, {}, "cannot listen: " + std::generic_category().message(error));
   }

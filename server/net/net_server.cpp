@@ -332,7 +332,7 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   lws_set_log_level(log_levels, log_details);
   lws_vhost* made = lws_create_vhost(context, &info);
   lws_set_log_level(log_levels, log_errors);
-  if (!made) throw_listen_error(endpoint, flag, tls != nullptr);
+  if (!made) throw_listen_error(endpoint, flag, tls);
   return lws_get_vhost_listen_port(made);
 }
 

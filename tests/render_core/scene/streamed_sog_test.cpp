@@ -128,7 +128,7 @@ TEST_F(StreamedSogTest, ErrorsNameTheField) {
   EXPECT_THAT(error([](Json& m) { m["lodLevels"] = 0; }), HasSubstr("lodLevels"));
   EXPECT_THAT(error([](Json& m) { m["lodLevels"] = 2; }), HasSubstr("'2' is no level in 0…1"));
   EXPECT_THAT(error([&](Json& m) { first(m)["file"] = 3; }),
-              HasSubstr("tree.children[0].lods.0.file: there are 3"));
+              HasSubstr("tree.children[0].lods.0.file: is 3, and there are 3"));
   EXPECT_THAT(error([&](Json& m) { first(m)["count"] = -1; }),
               HasSubstr("tree.children[0].lods.0.count"));
   EXPECT_THAT(error([&](Json& m) { first(m)["offset"] = 601; }), HasSubstr("fine/meta.json"));

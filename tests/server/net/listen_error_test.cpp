@@ -10,6 +10,7 @@
 
 #include "render_core/error.h"
 #include "server/net/net_server.h"
+#include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
@@ -50,6 +51,20 @@ TEST_F(ListenErrorTest, NamesABusyPortAndWhatToDo) {
                                       HasSubstr("another program"),
                                       HasSubstr("choose another port"))));
   EXPECT_EQ(log_.str(), "") << "one error is enough";
+}
+
+TEST_F(ListenErrorTest, NamesFilesThatAreNoCertificateAndKey) {
+  const test::TemporaryFolder folder;
+  const auto listen_with = [&](const char* certificate, const char* key) {
+    NetOptions options;
+    options.tls_certificate = folder.write("cert.pem", certificate).string();
+    options.tls_key = folder.write("key.pem", key).string();
+    NetServer{std::move(options)};
+  };
+  EXPECT_THAT([&] { listen_with("no certificate\n", "no key\n"); },
+              ThrowsMessage<InputError>(
+                  AllOf(HasSubstr("--tls-cert " + (folder / "cert.pem").string()),
+                        HasSubstr("belong together"), HasSubstr("openssl pkey -pubout -in"))));
 }
 
 TEST_F(ListenErrorTest, NamesAnAddressOfAnotherMachine) {
