@@ -1,7 +1,7 @@
 """What the samples of a soak say: flat or not, and a page with plots.
 
 A quantity is flat when its lower envelope does not rise. Warm-up, the first quarter of the time and
-a quarter of an hour at most (so long the heaps of threads fill), and the silence after a run's last
+a quarter of an hour at most (so long heaps may fill), and the silence after a run's last
 round are left out. What is left, in a short run with some of the warm-up in it, is cut into
 twelve windows of as many samples, of which each gives its least value: what is still there when
 most visitors have just gone. Theil and Sen's slope through those, the median of the slopes of all
