@@ -185,7 +185,8 @@ class Session {
   [[nodiscard]] std::uint64_t bytes_sent() const { return bytes_sent_; }
   [[nodiscard]] bool paused() const { return paused_; }
   [[nodiscard]] bool lost() const { return lost_at_.has_value(); }
-  /// Pictures can be seen, and for a while the camera has not moved.
+  /// Pictures can be seen, and for a while the visitor has done nothing: longer than Rest asks for,
+  /// which decides about sharp pictures.
   [[nodiscard]] bool rests(TimePoint now) const {
     constexpr std::chrono::milliseconds a_while{500};
     return state_ == State::live && now - last_activity_ >= a_while;
