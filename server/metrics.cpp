@@ -185,14 +185,14 @@ void Metrics::set_encoder_sessions(const std::string& encoder, int count) {
 }
 
 void Metrics::observe_frame(const FrameTicket& ticket, TimePoint now) {
-  encode_wait_seconds.Observe(seconds(ticket.render_end, ticket.encode_start));
-  encode_seconds.Observe(seconds(ticket.encode_start, ticket.encode_end));
-  send_seconds.Observe(seconds(ticket.encode_end, now));
+  encode_wait_seconds.Observe(seconds(ticket.render->end, ticket.encode->start));
+  encode_seconds.Observe(seconds(ticket.encode->start, ticket.encode->end));
+  send_seconds.Observe(seconds(ticket.encode->end, now));
   if (ticket.still) return;  // late on purpose, of another size perhaps
   queue_wait_seconds.Observe(seconds(ticket.ready, ticket.started));
-  hand_off_seconds.Observe(seconds(ticket.started, ticket.render_start));
+  hand_off_seconds.Observe(seconds(ticket.started, ticket.render->start));
   (ticket.speculated ? render_sub_seconds : render_key_seconds)
-      .Observe(seconds(ticket.render_start, ticket.render_end));
+      .Observe(seconds(ticket.render->start, ticket.render->end));
   pose_to_frame_seconds.Observe(seconds(ticket.pose_received, now));
 }
 

@@ -319,10 +319,10 @@ v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   header.set_idr(ticket.idr);
   header.set_width_px(static_cast<std::uint32_t>(ticket.size_px.x));
   header.set_height_px(static_cast<std::uint32_t>(ticket.size_px.y));
-  header.set_wait_us(elapsed_us(ticket.pose_received, ticket.render_start));
-  header.set_render_us(elapsed_us(ticket.render_start, ticket.render_end));
-  header.set_encode_us(elapsed_us(ticket.render_end, ticket.encode_end));
-  header.set_send_wait_us(elapsed_us(ticket.encode_end, now));
+  header.set_wait_us(elapsed_us(ticket.pose_received, ticket.render->start));
+  header.set_render_us(elapsed_us(ticket.render->start, ticket.render->end));
+  header.set_encode_us(elapsed_us(ticket.render->end, ticket.encode->end));
+  header.set_send_wait_us(elapsed_us(ticket.encode->end, now));
   header.set_speculated(ticket.speculated);
   header.set_still(ticket.still);
   header.set_window(ticket.window);

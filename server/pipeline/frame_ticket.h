@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 
 #include <glm/vec2.hpp>
 
@@ -12,6 +13,12 @@ namespace catgs {
 
 using Clock = std::chrono::steady_clock;
 using TimePoint = Clock::time_point;
+
+/// When a stage worked on a frame.
+struct StageTime {
+  TimePoint start;
+  TimePoint end;
+};
 
 /// Identity and history of one frame, from the pose that asked for it to the socket.
 struct FrameTicket {
@@ -32,10 +39,10 @@ struct FrameTicket {
   TimePoint pose_received{};
   TimePoint ready{};    // the session could have started it, had its turn come
   TimePoint started{};  // handed to the executor
-  TimePoint render_start{};
-  TimePoint render_end{};
-  TimePoint encode_start{};
-  TimePoint encode_end{};
+  // Missing where the frame failed before the stage had ended. Of a refined frame, no time passed
+  // in rendering.
+  std::optional<StageTime> render{};
+  std::optional<StageTime> encode{};
 };
 
 /// An encoded frame on its way to the socket.

@@ -10,14 +10,15 @@ namespace catgs {
 /// thread-safe.
 class NextFrameCost {
  public:
+  /// Of a frame that was made.
   void add(const FrameTicket& ticket) {
-    const Clock::duration encode = ticket.encode_end - ticket.render_end;
+    const Clock::duration encode = ticket.encode->end - ticket.render->end;
     if (ticket.still) {
       if (ticket.refined) return add_to(refine_, encode);
-      return add_to(still_, ticket.encode_end - ticket.render_start);
+      return add_to(still_, ticket.encode->end - ticket.render->start);
     }
     add_to(encode_, encode);
-    add_to(ticket.speculated ? sub_ : key_, ticket.render_end - ticket.render_start);
+    add_to(ticket.speculated ? sub_ : key_, ticket.render->end - ticket.render->start);
     sub_frames_left_ = ticket.speculated ? sub_frames_left_ - 1 : static_cast<int>(ticket.window);
   }
 

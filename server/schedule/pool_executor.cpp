@@ -54,7 +54,7 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
 bool render_now(FrameJob& job, FrameResult& result) {
   FrameTicket& ticket = result.frame.ticket;
   ticket = job.ticket;
-  ticket.render_start = Clock::now();
+  const TimePoint start = Clock::now();
   if (!ticket.refined) {
     Stream& stream = *job.stream;
     const RenderStatus rendered = stream.view->render(job.request, stream.picture);
@@ -72,7 +72,7 @@ bool render_now(FrameJob& job, FrameResult& result) {
     ticket.speculated = result.stats.kind == FrameKind::sub;
     ticket.window = static_cast<std::uint32_t>(result.stats.window);
   }
-  ticket.render_end = Clock::now();
+  ticket.render = {start, Clock::now()};
   return true;
 }
 
@@ -90,12 +90,12 @@ Encoder* encoder_for(const FrameJob& job, const EncoderFactory& encoders, FrameR
 void encode_now(FrameJob& job, const EncoderFactory& encoders, FrameResult& result) {
   FrameTicket& ticket = result.frame.ticket;
   EncodedFrame encoded;
-  ticket.encode_start = Clock::now();
+  const TimePoint start = Clock::now();
   Encoder* const encoder = encoder_for(job, encoders, result);
   if (!encoder) return;
   encoder->set_rate(job.bitrate_kbps, job.real_fps);
   const EncodeStatus status = encoder->encode(job.stream->picture, job.force_idr, encoded);
-  ticket.encode_end = Clock::now();
+  ticket.encode = {start, Clock::now()};
   if (!status.ok) {
     result.message = status.message;
     result.fault = Fault::encoder_failed;

@@ -48,7 +48,8 @@ void SessionUsage::frame_ended(const FrameTicket& ticket, double device_seconds,
   if (const auto since = std::exchange(under_way_since_, std::nullopt))
     busy_seconds_ += seconds_between(*since, now);
   gpu_seconds_ += device_seconds;
-  const double encoding = seconds_between(ticket.encode_start, ticket.encode_end);
+  const double encoding =
+      ticket.encode ? seconds_between(ticket.encode->start, ticket.encode->end) : 0.0;
   encoding_seconds_ += encoding;
   if (encoding > 0 && !ticket.still)
     encode_seconds_ += encode_seconds_ == 0 ? encoding : (encoding - encode_seconds_) / 16.0;
@@ -62,11 +63,11 @@ void SessionUsage::add(SessionTime time, TimePoint from, TimePoint to) {
 }
 
 void SessionUsage::frame_sent(const FrameTicket& ticket, TimePoint now) {
-  add(SessionTime::send, ticket.encode_end, now);
-  add(SessionTime::encode, ticket.encode_start, ticket.encode_end);
+  add(SessionTime::send, ticket.encode->end, now);
+  add(SessionTime::encode, ticket.encode->start, ticket.encode->end);
   if (ticket.still) return;  // late on purpose, of another size perhaps
   add(SessionTime::queue_wait, ticket.ready, ticket.started);
-  add(SessionTime::render, ticket.render_start, ticket.render_end);
+  add(SessionTime::render, ticket.render->start, ticket.render->end);
   add(SessionTime::pose_to_frame, ticket.pose_received, now);
 }
 
@@ -99,6 +100,11 @@ std::optional<SessionUsage::FrameCost> SessionUsage::frame_cost() const {
   constexpr int enough_frames = 8;
   if (frames_measured_ < enough_frames) return std::nullopt;
   return cost_;
+}
+
+void SessionUsage::scale_frame_cost(double factor) {
+  cost_.cpu_seconds *= factor;
+  cost_.gpu_seconds *= factor;
 }
 
 std::optional<double> SessionUsage::gpu_load() const {

@@ -69,6 +69,8 @@ class SessionUsage {
     double gpu_seconds = 0;
   };
   [[nodiscard]] std::optional<FrameCost> frame_cost() const;
+  /// Its frames are expected to cost so many times what they did.
+  void scale_frame_cost(double factor);
   /// Share of a GPU's time that the session takes lately; nothing until some frames were measured.
   [[nodiscard]] std::optional<double> gpu_load() const;
   /// Share of the time lately in which its encoder is at work, and how long a frame takes it.

@@ -135,11 +135,11 @@ TEST(Wire, WritesTheGoldenFrame) {
   ticket.idr = true;
   ticket.size_px = {640, 360};
   ticket.pose_received = TimePoint{} + 1s;
-  ticket.render_start = ticket.pose_received + 400us;
-  ticket.render_end = ticket.render_start + 20ms;
-  ticket.encode_end = ticket.render_end + 3ms;
+  const TimePoint rendered = ticket.pose_received + 400us + 20ms;
+  ticket.render = {rendered - 20ms, rendered};
+  ticket.encode = {rendered, rendered + 3ms};
   std::vector<std::byte> packet;
-  wire::append_frame_header(ticket, ticket.encode_end + 50us, packet);
+  wire::append_frame_header(ticket, rendered + 3ms + 50us, packet);
   EXPECT_EQ(hex(packet) + "000000016742c01f", golden("server_frame"));
 }
 

@@ -97,7 +97,26 @@ TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
   EXPECT_NE(rendered_on, std::thread::id());
   EXPECT_NE(encoded_on, std::thread::id());
   EXPECT_NE(rendered_on, encoded_on);
-  EXPECT_LE(result.frame.ticket.render_end, result.frame.ticket.encode_start);
+  EXPECT_LE(result.frame.ticket.render->end, result.frame.ticket.encode->start);
+  executor.close(std::move(stream));
+}
+
+TEST(PoolExecutor, WithoutAnEncoderAFrameHasNoTimeOfEncoding) {
+  std::thread::id rendered_on;
+  PoolExecutor executor({std::make_shared<ThreadPool>(1)},
+                        [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
+                          throw std::runtime_error("the driver refuses another one");
+                        });
+  auto stream = std::make_shared<Stream>();
+  stream->view = std::make_unique<WatchedView>(&rendered_on);
+  std::promise<FrameResult> done;
+  FrameJob job;
+  job.stream = stream;
+  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
+  const FrameResult result = done.get_future().get();
+  EXPECT_EQ(result.fault, Fault::encoder_unavailable);
+  EXPECT_TRUE(result.frame.ticket.render);
+  EXPECT_FALSE(result.frame.ticket.encode);
   executor.close(std::move(stream));
 }
 

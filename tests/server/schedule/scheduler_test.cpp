@@ -162,8 +162,9 @@ TEST(NextFrameCost, TellsKeyFramesFromSubFrames) {
   EXPECT_TRUE(cost.key_is_next());
   FrameTicket ticket;
   const auto add = [&](Clock::duration render, Clock::duration encode) {
-    ticket.render_end = ticket.render_start + render;
-    ticket.encode_end = ticket.render_end + encode;
+    const TimePoint rendered = TimePoint{} + render;
+    ticket.render = {TimePoint{}, rendered};
+    ticket.encode = {rendered, rendered + encode};
     cost.add(ticket);
   };
   ticket.window = 2;

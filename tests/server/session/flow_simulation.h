@@ -200,6 +200,7 @@ class FlowSimulation {
     result.ok = true;
     result.frame.ticket = order_.ticket;
     result.frame.ticket.idr = order_.force_idr;
+    result.frame.ticket.render = result.frame.ticket.encode = {at(now_), at(now_)};
     result.frame.bitstream.resize(
         static_cast<std::size_t>(std::min(budget * (order_.force_idr ? 1.15 : fill), demand)) + 1);
     result.codec_string = "avc1.42C01F";

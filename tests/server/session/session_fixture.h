@@ -102,6 +102,7 @@ class SessionTest : public testing::Test {
     result.ok = true;
     result.frame.ticket = order.ticket;
     result.frame.ticket.idr = order.force_idr;
+    result.frame.ticket.render = result.frame.ticket.encode = {now, now};
     const std::size_t bytes = order.ticket.still ? still_bytes : 100;
     result.frame.bitstream.resize(bytes);
     result.codec_string = "avc1.42C01F";

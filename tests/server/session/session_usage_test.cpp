@@ -71,8 +71,7 @@ TEST_F(SessionUsageTest, KnowsWhatKeepsAGpuAndAnEncoderBusy) {
   const auto run = [&](double device_s, std::chrono::milliseconds encoding) {
     for (int i = 0; i < 80; ++i) {  // 20 s
       FrameTicket ticket;
-      ticket.encode_start = now;
-      ticket.encode_end = now + encoding;
+      ticket.encode = {now, now + encoding};
       usage.frame_ended(ticket, device_s, now);
       usage.charge_cpu(0.0, 0.25);
     }
@@ -86,6 +85,15 @@ TEST_F(SessionUsageTest, KnowsWhatKeepsAGpuAndAnEncoderBusy) {
   for (int i = 0; i < 80; ++i) usage.charge_cpu(0.0, 0.25);
   EXPECT_NEAR(*usage.gpu_load(), 0.0, 1e-3) << "it stands still";
   EXPECT_NEAR(usage.encode_seconds(), 0.01, 1e-4) << "what the next one will take";
+}
+
+TEST_F(SessionUsageTest, AFrameWhoseEncoderCannotBeOpenedTookNoEncodingTime) {
+  FrameTicket ticket;
+  ticket.render = {now - 5ms, now};
+  usage.frame_ended(ticket, 0.0, now);
+  usage.charge_cpu(0.01, 0.25);
+  EXPECT_EQ(usage.encoder_load(), 0.0);
+  EXPECT_EQ(usage.encode_seconds(), 0.0);
 }
 
 TEST_F(SessionUsageTest, AStillCountsAsSoManyFramesAsItHasPixels) {
@@ -106,10 +114,8 @@ TEST_F(SessionUsageTest, TimesOfStillsAreNoLatency) {
   ticket.pose_received = now;
   ticket.ready = now + 1ms;
   ticket.started = now + 3ms;
-  ticket.render_start = now + 4ms;
-  ticket.render_end = now + 9ms;
-  ticket.encode_start = now + 9ms;
-  ticket.encode_end = now + 11ms;
+  ticket.render = {now + 4ms, now + 9ms};
+  ticket.encode = {now + 9ms, now + 11ms};
   usage.frame_sent(ticket, now + 12ms);
   ticket.still = true;
   usage.frame_sent(ticket, now + 10s);
