@@ -6,22 +6,31 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "server/pipeline/frame_ticket.h"
 
 namespace catgs {
 
-/// Those who wait because all places are taken: first come, first served, and no more than a limit.
-/// Pure; not thread-safe.
+/// Those who wait because all places are taken, in the order in which they came, and no more than a
+/// limit. Pure; not thread-safe.
 class AdmissionQueue {
  public:
   explicit AdmissionQueue(int limit) : limit_(static_cast<std::size_t>(limit)) {}
 
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
   [[nodiscard]] std::size_t size() const { return waiting_.size(); }
-  [[nodiscard]] const std::string& front() const { return waiting_.front(); }
+  struct Waiting {
+    std::string session_id;
+    TimePoint since;
+  };
+  /// A copy, first come first: those who are asked may leave the queue.
+  [[nodiscard]] std::vector<Waiting> waiting() const { return {waiting_.begin(), waiting_.end()}; }
 
-  /// 1 for the first; nothing: the queue is full. Who waits already keeps the position.
-  std::optional<int> join(const std::string& session_id);
-  /// Gives up or was admitted; who does not wait does nothing.
+  /// Returns the position, 1 for the first, or nothing if the queue is full. A session that waits
+  /// already keeps its position.
+  std::optional<int> join(const std::string& session_id, TimePoint now);
+  /// The session gives up or was admitted. Nothing happens if it does not wait.
   void leave(std::string_view session_id);
 
   /// A session ended after this time: what estimates are made of.
@@ -32,7 +41,7 @@ class AdmissionQueue {
 
  private:
   const std::size_t limit_;
-  std::deque<std::string> waiting_;  // session ids
+  std::deque<Waiting> waiting_;
   // Of the last few dozens of sessions; a first guess until some have ended.
   std::chrono::duration<double> mean_lifetime_{std::chrono::minutes(5)};
 };

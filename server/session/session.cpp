@@ -1,6 +1,7 @@
 #include "server/session/session.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -199,7 +200,8 @@ void Session::follow_settings(TimePoint now) {
 }
 
 void Session::encode_as_wished() {
-  const FlowWish wish = wish_within(policy_, settings_, viewport_px_);
+  FlowWish wish = wish_within(policy_, settings_, viewport_px_);
+  wish.size_px = scaled_size(wish.size_px, std::sqrt(admission_.pixel_share));
   flow_.set_wish(wish);
   encoding_.size_px = scaled_size(wish.size_px, flow_.rung().scale);
   encoding_.fps = wish.fps;
@@ -324,6 +326,11 @@ void Session::on_tick(TimePoint now) {
 void Session::use_effort(const EncoderEffort& effort) {
   admission_.effort = effort;
   apply(effort, encoding_);
+}
+
+void Session::use_pixel_share(double share) {
+  admission_.pixel_share = share;
+  encode_as_wished();
 }
 
 void Session::drain(std::chrono::milliseconds deadline) {

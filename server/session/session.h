@@ -50,7 +50,8 @@ struct SceneEntry {
 struct Admission {
   std::shared_ptr<const SceneEntry> scene;
   EncoderChoice encoder;
-  EncoderEffort effort{};  // of libx264
+  EncoderEffort effort{};    // of libx264
+  double pixel_share = 1.0;  // of the wish for a moving camera; the server has no room for more
 };
 
 /// What a hello comes to.
@@ -64,6 +65,9 @@ struct SessionPolicy {
   std::chrono::milliseconds idle_timeout{15 * 60 * 1000};  // 0: never
   std::chrono::milliseconds idle_warning{30'000};          // before the timeout
   std::chrono::milliseconds resume_grace{30'000};  // a lost client may come back for so long
+  std::chrono::milliseconds longest_wait{10 * 60 * 1000};  // for a place
+  /// A client that has waited for so long is not overtaken any more by those who ask for less.
+  std::chrono::milliseconds overtaken_at_most{30'000};
   int default_fps = 60;
   int max_fps = 120;
   int default_bitrate_kbps = 8000;
@@ -141,6 +145,9 @@ class Session {
   void want_idr() { idr_.request(); }
   /// The encoder goes on with this one, from an IDR on.
   void use_effort(const EncoderEffort& effort);
+  /// Pictures of a moving camera have this share of the wished pixels from the next one on.
+  void use_pixel_share(double share);
+  [[nodiscard]] double pixel_share() const { return admission_.pixel_share; }
   /// What a client is told first. Only while live.
   [[nodiscard]] Welcome welcome();
   /// Closes the connection of a server that goes away.
@@ -151,6 +158,8 @@ class Session {
   }
   /// While queued for a place: there may be one now.
   void ask_again(TimePoint now);
+  /// While queued: what the client asked for, with the settings that it sent since.
+  [[nodiscard]] const Hello& waiting_hello() const { return waiting_hello_; }
   void on_disconnected() { state_ = State::closed; }
   /// The connection is gone without a farewell. After the grace the session closes.
   void on_lost(TimePoint now);

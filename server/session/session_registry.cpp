@@ -1,6 +1,7 @@
 #include "server/session/session_registry.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
@@ -8,6 +9,7 @@
 
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
+#include "server/session/frame_size.h"
 #include "server/session/log_session.h"
 #include "server/signed_token.h"
 
@@ -105,6 +107,8 @@ void SessionRegistry::on_hello(const std::shared_ptr<Peer>& peer, std::shared_pt
     }
   }
   newcomer->session().on_message(hello, now);
+  // It may ask for less than those who came before.
+  if (queue_.size() > 1) ask_waiting(now);
 }
 
 bool SessionRegistry::resume(const std::shared_ptr<Peer>& peer, Client& newcomer, Client& known,
@@ -171,18 +175,35 @@ void SessionRegistry::remove(const Client& client) {
   admit_waiting(now);
 }
 
-void SessionRegistry::admit_waiting(TimePoint now) {
-  while (!queue_.empty()) {
-    const std::string id = queue_.front();
+void SessionRegistry::ask_waiting(TimePoint now) {
+  measuring_ = false;
+  for (const auto& [id, since] : queue_.waiting()) {
+    Session& session = find(id)->session();
+    if (now - since >= options_.policy.longest_wait) {
+      queue_.leave(id);
+      session.fail(ErrorCode::server_full,
+                   fmt::format("no place came free within {} minutes: try again later",
+                               std::chrono::floor<std::chrono::minutes>(now - since).count()));
+      continue;
+    }
+    const Room room = offer_for(session.waiting_hello(), demands()).room;
+    measuring_ = room == Room::unknown;
+    if (measuring_ || (room == Room::no && now - since >= options_.policy.overtaken_at_most))
+      return;
+    if (room == Room::no) continue;
     // It leaves the queue, admitted or refused, or hears that it still has to wait.
-    find(id)->session().ask_again(now);
-    if (!queue_.empty() && queue_.front() == id) break;
+    turn_ = id;
+    session.ask_again(now);
+    turn_.clear();
   }
+}
+
+void SessionRegistry::admit_waiting(TimePoint now) {
+  ask_waiting(now);
   queue_told_ = now;
-  for (const auto& client : clients_)
-    if (client->session().state() == Session::State::queued && !client->session().awaits_scene())
-      if (const auto position = queue_.join(client->session().id()); position > 1)
-        client->session().on_queue_moved(place_in_queue(*position), now);
+  int position = 0;
+  for (const auto& [id, since] : queue_.waiting())
+    find(id)->session().on_queue_moved(place_in_queue(++position), now);
 }
 
 QueuePlace SessionRegistry::place_in_queue(int position) const {
@@ -222,23 +243,47 @@ std::variant<std::string, ErrorMessage> SessionRegistry::choose(const Hello& hel
   return wanted;
 }
 
-Room SessionRegistry::room_for(const Hello& hello) const {
-  if (draining_ || static_cast<int>(admitted_) >= options_.max_sessions) return Room::no;
+AdmissionBudget::Offer SessionRegistry::offer_for(const Hello& hello,
+                                                  std::span<const SessionDemand> present) const {
+  if (draining_ || static_cast<int>(admitted_) >= options_.max_sessions) return {Room::no};
   const FlowWish wish = wish_within(options_.policy, hello.settings, hello.viewport_px);
-  return budget_.room(demands(), {std::nullopt, megapixels(wish.size_px), wish.fps});
+  return budget_.offer(present, {std::nullopt, megapixels(wish.size_px), wish.fps});
+}
+
+std::vector<Client*> SessionRegistry::admitted_clients() const {
+  std::vector<Client*> admitted;
+  for (const auto& client : clients_)
+    if (client->admitted_at()) admitted.push_back(client.get());
+  return admitted;
 }
 
 std::vector<SessionDemand> SessionRegistry::demands() const {
   const TimePoint now = Clock::now();
   std::vector<SessionDemand> demands;
-  for (const auto& client : clients_) {
-    if (!client->admitted_at()) continue;
+  for (const Client* client : admitted_clients()) {
     const Session& session = client->session();
     const bool fresh = now - *client->admitted_at() < time_to_measure && !session.rests(now);
-    demands.push_back(
-        {client->usage().frame_cost(), megapixels(session.moving_size_px()), session.fps(), fresh});
+    demands.push_back({client->usage().frame_cost(), megapixels(session.moving_size_px()),
+                       session.fps(), fresh, session.pixel_share()});
   }
   return demands;
+}
+
+void SessionRegistry::set_pixel_share(Client& client, double share) {
+  Session& session = client.session();
+  const double work = frame_work(megapixels(session.moving_size_px()));
+  session.use_pixel_share(share);
+  const glm::ivec2 size_px = session.moving_size_px();
+  client.usage().scale_frame_cost(frame_work(megapixels(size_px)) / work);
+  const LogSession about(session.id());
+  spdlog::debug("its pictures are {}x{} from now on: there is room for {:.0f} % of their pixels",
+                size_px.x, size_px.y, 100.0 * share);
+}
+
+void SessionRegistry::grow_pictures() {
+  if (!queue_.empty()) return;
+  if (const auto growth = budget_.growth(demands()))
+    set_pixel_share(*admitted_clients()[growth->session], growth->pixel_share);
 }
 
 AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
@@ -258,10 +303,12 @@ AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
         ErrorCode::server_full,
         fmt::format("{} sessions from {} already: close one first", same_address, address), true};
   }
-  const bool its_turn = queue_.empty() || queue_.front() == id;
-  const Room room = its_turn ? room_for(hello) : Room::no;
-  if (its_turn) measuring_ = room == Room::unknown;
-  if (room == Room::yes) {
+  const bool its_turn = queue_.empty() || turn_ == id;
+  const auto present = admitted_clients();
+  const auto offer =
+      its_turn ? offer_for(hello, demands()) : AdmissionBudget::Offer{.room = Room::no};
+  if (its_turn) measuring_ = offer.room == Room::unknown;
+  if (offer.room == Room::yes) {
     // Who waits for a scene holds no place: it may come to nothing.
     auto scene = find_scene(std::get<std::string>(choice), Clock::now());
     if (!std::holds_alternative<std::shared_ptr<const SceneEntry>>(scene)) queue_.leave(id);
@@ -271,17 +318,22 @@ AdmissionAnswer SessionRegistry::admit(Client& client, const Hello& hello) {
       queue_.leave(id);
       ++admitted_;
       metrics_.sessions_admitted.Increment();
+      for (std::size_t i = 0; i < offer.kept.size(); ++i)
+        if (offer.kept[i] < 1.0)
+          set_pixel_share(*present[i], offer.kept[i] * present[i]->session().pixel_share());
       const glm::ivec2 size_px =
           wish_within(options_.policy, hello.settings, hello.viewport_px).size_px;
       Admission admission{std::get<0>(std::move(scene)), encoder->encoder,
-                          effort_.initial(static_cast<int>(admitted_), size_px)};
+                          effort_.initial(static_cast<int>(admitted_),
+                                          scaled_size(size_px, std::sqrt(offer.pixel_share))),
+                          offer.pixel_share};
       client.use_encoder(*std::move(encoder));
       return admission;
     }
     if (client.session().state() != Session::State::queued)
       spdlog::info("{} waits for a video encoder: all are taken", client.peer_address());
   }
-  if (const auto position = queue_.join(id)) return place_in_queue(*position);
+  if (const auto position = queue_.join(id, Clock::now())) return place_in_queue(*position);
   return ErrorMessage{
       ErrorCode::server_full,
       measuring_
@@ -334,6 +386,7 @@ void SessionRegistry::tick() {
   charge_cpu(now);
   report_loads();
   control_effort(now);
+  grow_pictures();
   if (measuring_ || now - queue_told_ >= queue_tell_interval) admit_waiting(now);
   give_frames();
   publish();

@@ -87,9 +87,15 @@ class SessionRegistry {
   bool resume(const std::shared_ptr<Peer>& peer, Client& newcomer, Client& known,
               const Hello& hello, TimePoint now);
   AdmissionAnswer admit(Client& client, const Hello& hello);
-  [[nodiscard]] Room room_for(const Hello& hello) const;
-  /// Of the admitted sessions, as measured.
+  /// What a client that says this hello would get, and what that asks of `present`.
+  [[nodiscard]] AdmissionBudget::Offer offer_for(const Hello& hello,
+                                                 std::span<const SessionDemand> present) const;
+  /// The admitted clients, and their demands as measured, in the same order.
+  [[nodiscard]] std::vector<Client*> admitted_clients() const;
   [[nodiscard]] std::vector<SessionDemand> demands() const;
+  void set_pixel_share(Client& client, double share);
+  /// Gives pixels back where there is room for them again.
+  void grow_pictures();
   /// Shares the processor time since the last call out among the sessions.
   void charge_cpu(TimePoint now);
   /// Tells the devices what they were measured to do.
@@ -101,7 +107,9 @@ class SessionRegistry {
   void on_device(bool failed) { device_failures_ = failed ? device_failures_ + 1 : 0; }
   /// Each device has failed to make a View. Memory that is short is another matter.
   void on_view_refused(const std::string& why);
-  /// Those next in the queue ask again; the others hear where they stand.
+  /// Those in the queue who would find room now ask again.
+  void ask_waiting(TimePoint now);
+  /// The same; the others hear where they stand.
   void admit_waiting(TimePoint now);
   [[nodiscard]] QueuePlace place_in_queue(int position) const;
   [[nodiscard]] std::shared_ptr<Client> find(std::string_view session_id) const;
@@ -136,6 +144,7 @@ class SessionRegistry {
   const AdmissionBudget budget_;
   EffortControl effort_;
   AdmissionQueue queue_;
+  std::string turn_;        // the session in the queue that is being asked
   bool measuring_ = false;  // the next in the queue waits for what the present ones cost
   TimePoint queue_told_{};
   std::vector<FrameCandidate> candidates_;  // scratch of give_frames()

@@ -7,24 +7,27 @@ namespace {
 
 using namespace std::chrono_literals;
 
+constexpr TimePoint now{};
+
 TEST(AdmissionQueue, FirstComeFirstServedUpToItsLimit) {
   AdmissionQueue queue(3);
-  EXPECT_EQ(queue.join("a"), 1);
-  EXPECT_EQ(queue.join("b"), 2);
-  EXPECT_EQ(queue.join("c"), 3);
-  EXPECT_EQ(queue.join("d"), std::nullopt) << "full";
-  EXPECT_EQ(queue.join("b"), 2) << "asking again moves nobody";
+  EXPECT_EQ(queue.join("a", now), 1);
+  EXPECT_EQ(queue.join("b", now), 2);
+  EXPECT_EQ(queue.join("c", now), 3);
+  EXPECT_EQ(queue.join("d", now), std::nullopt) << "full";
+  EXPECT_EQ(queue.join("b", now), 2) << "asking again moves nobody";
   queue.leave("nobody");
   queue.leave("a");
-  EXPECT_EQ(queue.front(), "b");
-  EXPECT_EQ(queue.join("d"), 3);
+  ASSERT_EQ(queue.waiting().size(), 2u);
+  EXPECT_EQ(queue.waiting().front().session_id, "b");
+  EXPECT_EQ(queue.join("d", now), 3);
   queue.leave("c");
-  EXPECT_EQ(queue.join("d"), 2) << "those behind move up";
+  EXPECT_EQ(queue.join("d", now), 2) << "those behind move up";
 }
 
 TEST(AdmissionQueue, NobodyWaitsWithoutRoom) {
   AdmissionQueue queue(0);
-  EXPECT_EQ(queue.join("a"), std::nullopt);
+  EXPECT_EQ(queue.join("a", now), std::nullopt);
   EXPECT_TRUE(queue.empty());
 }
 

@@ -214,7 +214,9 @@ class RegistryTest : public testing::Test {
     visitor.listener->on_message(std::as_bytes(std::span(bytes)), {});
   }
   /// A new visitor, who was welcomed, refused or waits.
-  Visitor& join(const std::string& resume_token = {}, const std::string& from = "192.0.2.1") {
+  Visitor& join(
+      const std::string& resume_token = {}, const std::string& from = "192.0.2.1",
+      const std::function<void(v1::Hello&)>& wish = [](v1::Hello&) {}) {
     auto connection = std::make_shared<OpenConnection>(from);
     Visitor& visitor = clients.emplace_back(Visitor{connection, registry->accept(connection)});
     v1::ClientMessage message;
@@ -225,6 +227,7 @@ class RegistryTest : public testing::Test {
     hello.set_device_pixel_ratio(1.0f);
     hello.add_decoders(v1::CODEC_H264);
     if (!resume_token.empty()) hello.mutable_resume()->set_token(resume_token);
+    wish(hello);
     say(visitor, message);
     run_until([&] { return connection->welcome || connection->waits || connection->closed; });
     return visitor;
