@@ -12,9 +12,9 @@
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
-#include "render_core/nearest_name.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
+#include "render_core/base/nearest_name.h"
 #include "server/net/http.h"
 #include "server/required_file.h"
 

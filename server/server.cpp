@@ -18,9 +18,9 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
-#include "render_core/thread_pool.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
 #include "server/access.h"
 #include "server/link_preview.h"
 #include "server/liveness.h"

@@ -5,17 +5,17 @@
 #include <optional>
 #include <vector>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/colour_cache.h"
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
 #include "render_core/cpu/tile_reach.h"
-#include "render_core/host_image.h"
+#include "render_core/image/host_image.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/motion/speculation_costs.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

@@ -1,15 +1,12 @@
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <optional>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
@@ -54,19 +51,5 @@ struct Scene {
   SanitizeReport report;
   std::vector<std::string> notes;  // for people: what was found beside the scene but not used
 };
-
-struct LoadOptions {
-  std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
-  std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
-  std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
-  int threads = 0;                                // 0: one per core
-};
-
-/// Reads any supported scene: .ply (original and compressed), .splat, .spz, .sog, a streamed or
-/// unpacked SOG folder (or its lod-meta.json, meta.json), a training output folder (its newest
-/// iteration), a folder with a single scene file. Files are told apart by content first. Throws
-/// InputError; one for an unknown format lists these. Memory peaks at the cloud and a few bytes per
-/// Gaussian.
-Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 
 }  // namespace catgs
