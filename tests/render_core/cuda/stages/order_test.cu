@@ -1,23 +1,15 @@
-// The stages that bring a sub-frame's lists into its depth order, on the list of one tile; needs a
-// device.
+// The stages that bring a sub-frame's lists into its depth order, on the list of one tile, against
+// the CPU core's sort of the same list.
 
-#include <algorithm>
-#include <cstdint>
 #include <numeric>
-#include <string>
 #include <tuple>
-#include <vector>
 
-#include <gtest/gtest.h>
-
-#include "render_core/cuda/cuda_renderer.h"
-#include "render_core/cuda/device_buffer.h"
+#include "render_core/cpu/list_sort.h"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/reorder.cuh"
-#include "render_core/cuda/sort.cuh"
-#include "render_core/cuda/stream.h"
+#include "tests/render_core/cuda/stages/stage.h"
 
-namespace catgs::cuda {
+namespace catgs::cuda::stages {
 namespace {
 
 using Slots = std::vector<std::uint32_t>;
@@ -47,14 +39,6 @@ struct TileList {
   Slots giants;
 };
 
-template <class T>
-PinnedBuffer<T> pinned(const std::vector<T>& values) {
-  PinnedBuffer<T> buffer;
-  buffer.reserve(std::max<std::size_t>(values.size(), 1));
-  std::copy(values.begin(), values.end(), buffer.get());
-  return buffer;
-}
-
 struct Drawn {
   Slots slots;
   std::uint32_t uncarried = 0;  // FrameCounts::uncarried_lists
@@ -75,20 +59,39 @@ Drawn put_in_order(const TileList& list) {
     runs.push_back({begin, end, begin > 0, end < list.ordered, 0});
   }
   counts.runs = static_cast<std::uint32_t>(runs.size());
-  const auto on_device = pinned<FrameCounts>({counts});
-  const auto range = pinned<uint2>({make_uint2(0, list.length)});
-  const auto ordered = pinned<std::uint32_t>({list.ordered});
-  const auto giant_set = pinned(bits), key = pinned(list.key), slot = pinned(list.slots());
-  const auto run = pinned(runs);
-  int processors = 0;
-  check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, 0), "device");
+  const auto on_device = upload(std::vector{counts});
+  const auto range = upload(std::vector{make_uint2(0, list.length)});
+  const auto ordered = upload(std::vector{list.ordered});
+  const auto giant_set = upload(bits), key = upload(list.key), slot = upload(list.slots());
+  const auto run = upload(runs);
   const Stream stream;
-  launch_giants({shape, giant_set.get(), range.get(), ordered.get(), key.get(), slot.get(),
-                 on_device.get(), processors},
+  launch_giants({.shape = shape,
+                 .bits = giant_set.get(),
+                 .range = range.get(),
+                 .ordered = ordered.get(),
+                 .depth_key = key.get(),
+                 .slot = slot.get(),
+                 .counts = on_device.get(),
+                 .processors = processors()},
                 stream.get());
-  launch_reorder({run.get(), on_device.get(), key.get(), slot.get(), processors}, stream.get());
-  check(cudaStreamSynchronize(stream.get()), "both stages");
-  return {{slot.get(), slot.get() + list.length}, on_device.get()->uncarried_lists};
+  launch_reorder({.runs = run.get(),
+                  .counts = on_device.get(),
+                  .depth_key = key.get(),
+                  .slot = slot.get(),
+                  .processors = processors()},
+                 stream.get());
+  return {fetch(slot.get(), list.length), fetch(on_device.get(), 1)[0].uncarried_lists};
+}
+
+/// The list as the CPU core sorts it: equal depths in the order of their slots.
+Slots on_cpu(const TileList& list) {
+  std::vector<DepthSlot> entries, scratch(list.length);
+  for (const std::uint32_t slot : list.slots()) entries.push_back({list.key[slot], slot});
+  sort_list_again(std::span(entries), std::span(scratch),
+                  [](const DepthSlot& a, const DepthSlot& b) { return a.value < b.value; });
+  Slots slots;
+  for (const DepthSlot& entry : entries) slots.push_back(entry.value);
+  return slots;
 }
 
 /// Those of a list that are not hidden, the first `count` of them.
@@ -98,11 +101,18 @@ Slots seen(const TileList& list, Slots slots, std::size_t count) {
   return slots;
 }
 
-class ListOrder : public testing::TestWithParam<std::tuple<std::uint32_t, bool>> {
+/// Compares the first `count` places of what is seen of both.
+void expect_same(const TileList& list, const Slots& drawn, const Slots& expected,
+                 std::size_t count) {
+  const Slots a = seen(list, drawn, count), b = seen(list, expected, count);
+  ASSERT_EQ(a.size(), b.size());
+  Mismatches places("giants, reorder: places of the list", 0.0);
+  for (std::size_t k = 0; k < a.size(); ++k) places.add(a[k] != b[k]);
+}
+
+class ListOrder : public StageTest,
+                  public testing::WithParamInterface<std::tuple<std::uint32_t, bool>> {
  protected:
-  void SetUp() override {
-    if (const std::string obstacle = cuda_obstacle(); !obstacle.empty()) GTEST_SKIP() << obstacle;
-  }
   /// In order as a whole, or to 7/10 in runs, of which the last is shorter.
   static TileList list() {
     const auto [length, whole] = GetParam();
@@ -127,10 +137,8 @@ TEST_P(ListOrder, GiantsComeToTheirDepths) {
       if (std::ranges::find(list.giants, slot) == list.giants.end()) list.key[slot] = 0;
   }
   const auto [drawn, uncarried] = put_in_order(list);
-  Slots expected = list.slots();
-  std::ranges::sort(expected, {}, [&](std::uint32_t slot) { return list.key[slot]; });
   const std::size_t front = area * 7 / 8 - std::min(area * 7 / 8, 2 * hidden);
-  EXPECT_EQ(seen(list, drawn, front), seen(list, expected, front));
+  expect_same(list, drawn, on_cpu(list), front);
   EXPECT_TRUE(std::ranges::is_permutation(drawn, list.slots()));
   EXPECT_EQ(uncarried, 0u);
 }
@@ -142,11 +150,11 @@ TEST_P(ListOrder, WhatIsInOrderStays) {
     if (slot < list.length) list.giants.push_back(slot);
   // Where runs end, some change places with what begins behind them.
   const std::size_t front = list.ordered < list.length ? list.ordered - 32 : list.length;
-  EXPECT_EQ(seen(list, put_in_order(list).slots, front), seen(list, list.slots(), front));
+  expect_same(list, put_in_order(list).slots, on_cpu(list), front);
   // All over the list.
   list.giants.clear();
   for (std::uint32_t slot = 0; slot < list.length; slot += 3) list.giants.push_back(slot);
-  EXPECT_EQ(seen(list, put_in_order(list).slots, front), seen(list, list.slots(), front));
+  expect_same(list, put_in_order(list).slots, on_cpu(list), front);
 }
 
 TEST_P(ListOrder, NothingIsLostWhereMoreGiantsMoveThanThereIsRoomFor) {
@@ -170,4 +178,4 @@ INSTANTIATE_TEST_SUITE_P(Lengths, ListOrder,
                                           testing::Bool()));
 
 }  // namespace
-}  // namespace catgs::cuda
+}  // namespace catgs::cuda::stages
