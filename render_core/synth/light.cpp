@@ -1,5 +1,6 @@
 #include "render_core/synth/light.h"
 
+#include "render_core/math/spherical_harmonics-inl.h"
 #include "render_core/synth/random.h"
 
 namespace catgs::synth {
@@ -66,7 +67,8 @@ Lobe fit_lobe(const glm::vec3& normal, bool two_sided, const Response& response)
     const bool seen = two_sided || glm::dot(view, normal) < 0.0f;
     const double weight = seen ? 1.0 : 0.05;
     const glm::vec3 value = seen ? response(view) : glm::vec3(0.0f);
-    const std::array<float, 16> basis = sh_basis(view);
+    float basis[16];
+    math::sh_basis<float>({view.x, view.y, view.z}, 3, basis);
     for (std::size_t j = 0; j < 16; ++j) {
       for (std::size_t k = 0; k <= j; ++k) a[j][k] += weight * basis[j] * basis[k];
       for (int c = 0; c < 3; ++c) b[j][static_cast<std::size_t>(c)] += weight * basis[j] * value[c];
@@ -83,27 +85,6 @@ Lobe fit_lobe(const glm::vec3& normal, bool two_sided, const Response& response)
 }
 
 }  // namespace
-
-std::array<float, 16> sh_basis(const glm::vec3& d) {
-  const float x = d.x, y = d.y, z = d.z;
-  const float xx = x * x, yy = y * y, zz = z * z;
-  return {0.28209479f,
-          -0.48860251f * y,
-          0.48860251f * z,
-          -0.48860251f * x,
-          1.09254843f * x * y,
-          -1.09254843f * y * z,
-          0.31539157f * (2.0f * zz - xx - yy),
-          -1.09254843f * x * z,
-          0.54627422f * (xx - yy),
-          -0.59004359f * y * (3.0f * xx - yy),
-          2.89061144f * x * y * z,
-          -0.45704580f * y * (4.0f * zz - xx - yy),
-          0.37317633f * z * (2.0f * zz - 3.0f * xx - 3.0f * yy),
-          -0.45704580f * x * (4.0f * zz - xx - yy),
-          1.44530572f * z * (xx - yy),
-          -0.59004359f * x * (xx - 3.0f * yy)};
-}
 
 glm::vec3 to_display(const glm::vec3& linear) {
   return {std::sqrt(filmic(linear.x)), std::sqrt(filmic(linear.y)), std::sqrt(filmic(linear.z))};

@@ -26,9 +26,6 @@ inline constexpr int gloss_count = 6;
 /// order and with the signs of the original 3DGS, to be added to a Gaussian's own.
 using Lobe = std::array<glm::vec3, 16>;
 
-/// The 16 basis functions in a direction (unit, from the camera to the Gaussian).
-std::array<float, 16> sh_basis(const glm::vec3& direction);
-
 /// A low sun, a sky around it, and how they make a colour. Radiances are linear; what `shade` and
 /// `sky` return is display-referred, in [0, 1]. World axes, y down.
 class Light {
