@@ -31,7 +31,7 @@ struct Bounds {
   glm::vec3 max{0.0f};
 };
 
-/// How to look at a scene the first time (DESIGN §6): from a sidecar, from the training's
+/// How to look at a scene the first time: from a sidecar, from the training's
 /// cameras.json, or estimated from the Gaussians.
 struct SceneHints {
   glm::vec3 up{0.0f, -1.0f, 0.0f};  // unit, world axes; y points down in 3DGS captures

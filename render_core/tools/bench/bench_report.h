@@ -22,9 +22,9 @@ struct BenchResult {
   [[nodiscard]] double ns_per_gaussian(const RenderSetup& setup) const;
 };
 
-/// The report of DESIGN §9. Fields that end in _key and _sub repeat one for key and sub-frames and
-/// are null where there are none. JSON has no infinity: null stands for the PSNR of identical
-/// pictures.
+/// The report of `catgs-render bench`. Fields that end in _key and _sub repeat one for key and
+/// sub-frames and are null where there are none. JSON has no infinity: null stands for the PSNR of
+/// identical pictures.
 nlohmann::ordered_json report_json(const RenderOptions& options, const RenderSetup& setup,
                                    const BenchResult& result);
 

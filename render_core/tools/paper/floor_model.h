@@ -34,18 +34,18 @@ struct StageWork {
   double evaluations = 0.0;
 };
 
-/// With V visible Gaussians, E list entries, R of them reached:
-///
-/// | stage   | key frame, exact                                   | sub-frame |
-/// |---------|----------------------------------------------------|--------------------------------|
-/// | project | bounds of the clusters; V (Gaussian + record +     | V (shape + cached colour + | |
-/// | depth key + tile count)                            | record + depth key)            | | bin |
-/// V (order + record) + E (tile + slot)               | -                              | | sort | a
-/// read and a write per pass: V (key + slot) 3, E   | R (slot, read and written, +   | |         |
-/// (tile + slot) per 8 bits of the tiles' number      | depth key)                     | | blend |
-/// R (slot + record) + the picture in floats          | the same                       |
-///
-/// A sub-frame without a colour cache reads whole Gaussians, and so cannot reach this floor.
+/// The bytes that a stage moves, with V visible Gaussians, E list entries, and R of them reached.
+/// A key frame, or a frame of the exact pipeline:
+///   project  bounds of the clusters; V (Gaussian + record + depth key + tile count)
+///   bin      V (order + record) + E (tile + slot)
+///   sort     a read and a write per pass: 3 passes of V (key + slot), and of E (tile + slot) a
+///            pass for each 8 bits of the tiles' number
+///   blend    R (slot + record) + the picture in floats
+/// A sub-frame, which bins nothing:
+///   project  V (shape + cached colour + record + depth key)
+///   sort     R (slot, read and written, + depth key)
+///   blend    as in a key frame
+/// A sub-frame without a colour cache reads whole Gaussians, so it cannot reach this floor.
 StageWork stage_work(Stage stage, FrameKind kind, const FrameWork& frame);
 
 /// Milliseconds that the work takes at these rates: memory and processors work at the same time.

@@ -29,6 +29,12 @@ void for_each_tick(const Trajectory& recorded, double rate_hz, const Visit& visi
 
 }  // namespace
 
+std::vector<ForecastModel> forecast_models() {
+  return {{.name = "Held", .holds = true},
+          {.name = "Constant velocity", .settings = {.min_confidence = 1.0}},
+          {.name = "MotionPredictor"}};
+}
+
 std::vector<Arrival> deliver(const Trajectory& recorded, const ForecastTrial& trial) {
   std::vector<Arrival> arrivals;
   SplitMix64 random(trial.seed);
@@ -50,18 +56,23 @@ std::vector<Arrival> deliver(const Trajectory& recorded, const ForecastTrial& tr
   return arrivals;
 }
 
-void replay(const Trajectory& recorded, const ForecastTrial& trial, Forecaster& forecaster,
+void replay(const Trajectory& recorded, const ForecastTrial& trial, const ForecastModel& model,
             const VisitForecast& visit) {
+  MotionPredictor predictor(model.settings);
+  TimedPose newest = recorded.front();
   const std::vector<Arrival> arrivals = deliver(recorded, trial);
   const std::int64_t first_us = recorded.front().time_us + settling_us;
   const std::int64_t last_us = recorded.back().time_us - std::ranges::max(trial.horizons_us);
   auto next = arrivals.begin();
   for_each_tick(recorded, trial.asked_hz, [&](std::int64_t now_us) {
-    for (; next != arrivals.end() && next->time_us <= now_us; ++next) forecaster.add(next->sample);
+    for (; next != arrivals.end() && next->time_us <= now_us; ++next) {
+      predictor.add(next->sample);
+      if (next->sample.time_us > newest.time_us) newest = next->sample;
+    }
     if (now_us < first_us || now_us > last_us) return;
     for (std::size_t h = 0; h < trial.horizons_us.size(); ++h) {
-      const std::optional<Pose> forecast = forecaster.at(now_us + trial.horizons_us[h]);
-      if (forecast) visit(now_us, h, *forecast);
+      const std::optional<Pose> forecast = predictor.at(now_us + trial.horizons_us[h]);
+      if (forecast) visit(now_us, h, model.holds ? newest.world_from_camera : *forecast);
     }
   });
 }
@@ -100,9 +111,9 @@ double forecast_error_deg(const Pose& truth, const Pose& forecast) {
 }
 
 std::vector<ForecastErrors> judge_forecasts(const Trajectory& recorded, const ForecastTrial& trial,
-                                            const Camera& lens, Forecaster& forecaster) {
+                                            const Camera& lens, const ForecastModel& model) {
   std::vector<ForecastErrors> errors(trial.horizons_us.size());
-  replay(recorded, trial, forecaster,
+  replay(recorded, trial, model,
          [&](std::int64_t now_us, std::size_t horizon, const Pose& forecast) {
            const Pose truth = interpolate(recorded, now_us + trial.horizons_us[horizon]);
            errors[horizon].px.push_back(forecast_error_px(lens, truth, forecast));

@@ -3,12 +3,23 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <span>
+#include <string>
 #include <vector>
 
-#include "render_core/tools/trace/forecast_models.h"
+#include "render_core/motion/predictor.h"
 
 namespace catgs {
+
+/// A way to forecast.
+struct ForecastModel {
+  std::string name;
+  PredictorSettings settings{};
+  bool holds = false;  // the newest sample's pose, whatever the settings
+};
+
+/// What `trace forecast` compares: no forecast, constant velocity (the paper's way), and what the
+/// server does.
+std::vector<ForecastModel> forecast_models();
 
 /// How a recorded motion reaches the one who forecasts, and what is asked.
 struct ForecastTrial {
@@ -31,11 +42,11 @@ struct Arrival {
 std::vector<Arrival> deliver(const Trajectory& recorded, const ForecastTrial& trial);
 
 /// Asks for forecasts from 0.5 s after the first sample on, as long as the recording tells what
-/// came true; before each, the forecaster is given what has arrived by then and nothing else. Calls
+/// came true; before each, the model is given what has arrived by then and nothing else. Calls
 /// visit(now_us, index of the horizon, forecast).
 using VisitForecast =
     std::function<void(std::int64_t now_us, std::size_t horizon, const Pose& forecast)>;
-void replay(const Trajectory& recorded, const ForecastTrial& trial, Forecaster& forecaster,
+void replay(const Trajectory& recorded, const ForecastTrial& trial, const ForecastModel& model,
             const VisitForecast& visit);
 
 /// How far the images of points from the forecast camera lie from their true ones, in pixels: the
@@ -53,6 +64,6 @@ struct ForecastErrors {
 
 /// The errors at each horizon.
 std::vector<ForecastErrors> judge_forecasts(const Trajectory& recorded, const ForecastTrial& trial,
-                                            const Camera& lens, Forecaster& forecaster);
+                                            const Camera& lens, const ForecastModel& model);
 
 }  // namespace catgs

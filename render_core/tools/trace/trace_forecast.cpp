@@ -66,7 +66,7 @@ Errors judge_models(const std::vector<ForecastModel>& models, const std::vector<
     ForecastTrial with_seed = trial;
     with_seed.seed += t;
     pool.parallel_for(models.size(), [&](std::size_t m) {
-      const auto errors = judge_forecasts(traces[t], with_seed, lens, *models[m].make());
+      const auto errors = judge_forecasts(traces[t], with_seed, lens, models[m]);
       for (std::size_t h = 0; h < errors.size(); ++h) {
         ForecastErrors& sum = all[m][h];
         sum.px.insert(sum.px.end(), errors[h].px.begin(), errors[h].px.end());

@@ -1,12 +1,8 @@
 // catgs-render trace windows: how long the windows of key frames are on recorded motion, by the
 // rules of motion/frame_groups.h alone, without a scene and without drawing anything.
-#include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -30,7 +26,6 @@ struct WindowsOptions {
   LensOptions lens{.size = "1920x1080", .focal_px = 1100.0f, .fov_y_deg = {}, .near_z = 0.2f};
   PipelineOptions pipeline;
   std::vector<std::string> variants;
-  bool ahead = false;
   std::string json;
 };
 
@@ -93,96 +88,17 @@ void add_groups(const Journey& journey, Groups& sum) {
   }
 }
 
-/// Groups whose key frames are cut in the background: while one is shown, the next one is cut for
-/// the frames behind it, from what is known when the shown one begins. Counts as key frames those
-/// that had to be waited for, because the camera was in neither.
-class GroupsAhead {
- public:
-  GroupsAhead(const Journey& journey, Groups& sum)
-      : journey_(journey), sum_(sum), predictor_(patient(journey.setup)) {}
-
-  void run() {
-    const RenderSetup& setup = journey_.setup;
-    std::size_t sample = 0;
-    for (std::size_t i = 0; i < setup.poses.size(); ++i) {
-      now_us_ = setup.poses[i].time_us;
-      for (; sample < setup.samples.size() && setup.samples[sample].time_us <= now_us_; ++sample) {
-        predictor_.add(setup.samples[sample]);
-      }
-      ++sum_.frames;
-      show(setup.request(i).camera);
-    }
-  }
-
- private:
-  /// Forecasts reach to the end of the next window.
-  static PredictorSettings patient(const RenderSetup& setup) {
-    PredictorSettings settings = setup.predictor;
-    const double frames = 2.0 * setup.view.speculation.initial_window;
-    settings.horizon_us =
-        std::max<std::int64_t>(settings.horizon_us, std::llround(1e6 * frames / setup.fps));
-    return settings;
-  }
-
-  void show(const Camera& now) {
-    if (holds(shown_, now)) return;
-    int frames = next_window_;  // of the group that begins here
-    if (holds(next_, now)) {
-      shown_ = std::move(next_);
-    } else {
-      ++sum_.keys;
-      const int window = cut(shown_, now, 0);
-      sum_.keys_without_window += window == 0 ? 1 : 0;
-      frames = window + 1;  // this one is shown itself
-    }
-    Camera then = now;
-    then.world_from_camera = at(frames);
-    next_window_ = cut(next_, then, frames);
-  }
-
-  /// Whether a group has lists for this frame; it is then drawn from them.
-  bool holds(std::optional<FrameGroups>& group, const Camera& now) const {
-    if (!group) return false;
-    const Forecast any{now.world_from_camera, 0};
-    return group->plan(now, any, journey_.depths).kind == FrameKind::sub;
-  }
-
-  /// A group that begins `frames` from now, as forecast, with the camera `key`; its window.
-  int cut(std::optional<FrameGroups>& group, const Camera& key, int frames) {
-    const SpeculationSettings& settings = journey_.setup.view.speculation;
-    const Forecast forecast{at(frames + settings.initial_window), settings.initial_window};
-    group.emplace(settings);
-    return group->plan(key, forecast, journey_.depths).window;
-  }
-
-  [[nodiscard]] Pose at(int frames) const {
-    return *predictor_.at(now_us_ + std::llround(1e6 * frames / journey_.setup.fps));
-  }
-
-  const Journey& journey_;
-  Groups& sum_;
-  MotionPredictor predictor_;
-  std::int64_t now_us_ = 0;
-  std::optional<FrameGroups> shown_, next_;
-  int next_window_ = 0;
-};
-
 PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajectory>& traces,
                          const std::vector<Rule>& all_rules, Progress& progress) {
   PaperTable table{
       .title = {},
-      .corner = options.ahead ? "Frames per key frame waited for" : "Frames per key frame",
+      .corner = "Frames per key frame",
       .columns = {},
       .rows = {},
       .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, depths "
                             "from {:g} to {:g}.",
                             traces.size(), options.lens.size, *options.lens.focal_px,
                             options.depths[0], options.depths[1])}};
-  if (options.ahead) {
-    table.notes.emplace_back(
-        "Key frames are cut while the window before theirs is shown: forecasts reach over two "
-        "windows. Waited for: where the camera is in neither.");
-  }
   for (const double rate_hz : options.rates_hz) {
     table.columns.push_back(fmt::format("{:g} Hz", rate_hz));
     table.columns.push_back(fmt::format("no window, {:g} Hz", rate_hz));
@@ -193,12 +109,7 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
     for (const double rate_hz : options.rates_hz) {
       Groups sum;
       for (const Trajectory& trace : traces) {
-        const Journey journey = make_journey(trace, rate_hz, options, pipeline);
-        if (options.ahead) {
-          GroupsAhead(journey, sum).run();
-        } else {
-          add_groups(journey, sum);
-        }
+        add_groups(make_journey(trace, rate_hz, options, pipeline), sum);
       }
       const auto keys = static_cast<double>(sum.keys);
       row.numbers.push_back({static_cast<double>(sum.frames) / keys, 2});
@@ -233,7 +144,6 @@ void windows(const WindowsOptions& options, bool quiet) {
                             {"focal_px", *options.lens.focal_px},
                             {"near", *options.lens.near_z},
                             {"depths", options.depths},
-                            {"ahead", options.ahead},
                             {"flags", flags},
                             {"table", to_json(table)}});
 }
@@ -269,8 +179,6 @@ void add_trace_windows_command(CLI::App& trace) {
       ->add_option("--variant", options->variants,
                    "A row more, by these flags of bench, like \"--window 16 --constant-velocity\"")
       ->allow_extra_args(false);
-  command->add_flag("--ahead", options->ahead,
-                    "As if key frames were cut in the background, a window ahead");
   command->add_option("--json", options->json, "Write the table here too; - prints JSON instead");
   command->callback([options, command] { windows(*options, is_quiet(*command)); });
 }

@@ -86,7 +86,7 @@ TEST_P(Forecasts, KnowOnlyThePast) {
     const auto until_now = [&](const Trajectory& path) {
       Known known;
       std::size_t later = 0;
-      replay(path, trial_, *model.make(), [&](std::int64_t time_us, std::size_t h, const Pose& p) {
+      replay(path, trial_, model, [&](std::int64_t time_us, std::size_t h, const Pose& p) {
         if (time_us <= now_us) known.emplace_back(time_us, h, p.position, p.orientation);
         later += time_us > now_us ? 1 : 0;
       });
@@ -102,7 +102,7 @@ TEST_P(Forecasts, KnowOnlyThePast) {
 TEST_P(Forecasts, OfAConstantMotionComeTrue) {
   for (const ForecastModel& model : forecast_models()) {
     SCOPED_TRACE(model.name);
-    const auto errors = judge_forecasts(gliding(), trial_, lens, *model.make());
+    const auto errors = judge_forecasts(gliding(), trial_, lens, model);
     ASSERT_EQ(errors.size(), 5u);
     for (const ForecastErrors& at_horizon : errors) EXPECT_GT(at_horizon.px.size(), 150u);
     const double px = mean(errors[4].px), deg = mean(errors[4].deg);  // at 100 ms
@@ -110,10 +110,8 @@ TEST_P(Forecasts, OfAConstantMotionComeTrue) {
       // At 57.3 degrees a second; the newest sample is some 10 to 30 ms old.
       EXPECT_GT(deg, 0.11 * 57.3);
       EXPECT_LT(deg, 0.13 * 57.3);
-    } else if (model.name.ends_with("damped")) {
-      EXPECT_GT(px, 10.0);
     } else {
-      EXPECT_LT(px, 3.0);  // One-Euro lags by that much
+      EXPECT_LT(px, 1.0);
     }
   }
 }
@@ -197,7 +195,7 @@ TEST(SharedTraces, MotionPredictorForeseesHeadsAsWellAsAny) {
     if (entry.path().extension() != ".tum") continue;
     const Trajectory recorded = read_tum(entry.path());
     for (const ForecastModel& model : forecast_models()) {
-      const auto errors = judge_forecasts(recorded, trial, lens, *model.make());
+      const auto errors = judge_forecasts(recorded, trial, lens, model);
       auto& sum = sums[model.name];
       sum.resize(errors.size());
       for (std::size_t h = 0; h < errors.size(); ++h) sum[h] += mean(errors[h].px);

@@ -65,26 +65,6 @@ TEST_F(TraceWindows, AreLongerForWhatIsFarAway) {
   EXPECT_NEAR(rows.at("The paper's rule").at("60 Hz").get<double>(), 5.0, 0.05);
 }
 
-TEST_F(TraceWindows, CutAheadNobodyWaitsForWhatIsForeseen) {
-  // The same glide, and one that turns back every half second, which no forecast knows.
-  Trajectory zigzag = glide(2400);
-  for (std::size_t i = 0; i < zigzag.size(); ++i) {
-    const std::size_t phase = i % 120;
-    zigzag[i].world_from_camera.position.x =
-        0.004f * static_cast<float>(phase < 60 ? phase : 120 - phase);
-  }
-  write_tum(folder_ / "zigzag.tum", zigzag);
-  const auto frames_per_key = [&](const std::string& trace) {
-    const auto outcome =
-        test::run("--quiet trace windows --trace " + path(trace) + " --fps 120 --ahead --json -");
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
-    const auto rows = nlohmann::json::parse(outcome.out).at("table").at("rows");
-    return rows.at("Grid turned with the camera").at("120 Hz").get<double>();
-  };
-  EXPECT_GT(frames_per_key("glide.tum"), 200.0);
-  EXPECT_LT(frames_per_key("zigzag.tum"), 60.0);  // 40 turns in 2400 frames
-}
-
 TEST_F(TraceWindows, NameMistakes) {
   const auto expect = [&](const std::string& arguments, const std::string& message) {
     const auto outcome = test::run("trace windows --trace " + arguments);
