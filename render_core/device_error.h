@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/renderer.h"
 
 namespace catgs {

@@ -1,14 +1,14 @@
 #include <string>
 #include <utility>
 
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/cpu_renderer.h"
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/device_error.h"
-#include "render_core/device_set.h"
-#include "render_core/error.h"
 #include "render_core/reference/reference.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 namespace {

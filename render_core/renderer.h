@@ -13,7 +13,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/scene/gaussian_cloud.h"
 

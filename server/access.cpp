@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/required_file.h"
 
 namespace catgs {

@@ -12,9 +12,9 @@
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
-#include "render_core/nearest_name.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
+#include "render_core/base/nearest_name.h"
 #include "server/net/http.h"
 #include "server/required_file.h"
 
@@ -199,10 +199,8 @@ std::vector<Setting> picture_settings() {
       choice<RendererKind>("renderer", "Core that renders", &C::renderer,
                            {{"auto", RendererKind::automatic},
                             {"cpu", RendererKind::cpu},
-                            {"cuda", RendererKind::cuda},
-                            {"reference", RendererKind::reference}}),
+                            {"cuda", RendererKind::cuda}}),
       device(),
-      text("simd", "TARGET", "SIMD target of the CPU core: auto, scalar, …", &C::simd),
       integer("threads", "N", "Threads that render and encode; 0: one per core", &C::threads, 0,
               1024),
       integer("lod", "N", "Streamed SOG: this level of detail, 0 is the finest; -1: by --budget",

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
 #include "server/config.h"
 #include "server/net/http.h"
 

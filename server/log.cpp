@@ -22,7 +22,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "render_core/printable.h"
+#include "render_core/base/printable.h"
 #include "server/session/log_session.h"
 #include "server/session/rate_limit.h"
 

@@ -14,12 +14,12 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "render_core/build_info.h"
-#include "render_core/command_line.h"
+#include "render_core/base/build_info.h"
+#include "render_core/base/command_line.h"
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/device_error.h"
-#include "render_core/error.h"
-#include "render_core/printable.h"
-#include "render_core/thread_pool.h"
 #include "server/commands.h"
 #include "server/config.h"
 #include "server/log.h"

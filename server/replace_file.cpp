@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs {
 

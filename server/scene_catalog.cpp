@@ -10,12 +10,13 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
-#include "render_core/printable.h"
-#include "render_core/scene/locate_scene.h"
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
-#include "render_core/scene/synth.h"
-#include "render_core/thread_pool.h"
+#include "render_core/synth/synth.h"
 #include "server/poster.h"
 #include "server/tours.h"
 

@@ -7,8 +7,8 @@
 
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
-#include "render_core/scene/locate_scene.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/files/locate_scene.h"
 
 namespace catgs {
 namespace {

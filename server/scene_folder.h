@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "render_core/scene/scene_size.h"
+#include "render_core/scene/files/scene_size.h"
 
 namespace catgs {
 

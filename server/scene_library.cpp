@@ -8,10 +8,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
-#include "render_core/scene/json_field.h"
-#include "render_core/thread_pool.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/formats/json_field.h"
 #include "server/scene_catalog.h"
 
 namespace catgs {

@@ -18,9 +18,9 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
-#include "render_core/thread_pool.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
 #include "server/access.h"
 #include "server/link_preview.h"
 #include "server/liveness.h"
@@ -327,8 +327,8 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
     : state_(std::make_unique<State>(config, parts)) {
   State& s = *state_;
   s.scenes = std::make_unique<SceneLibrary>(
-      s.config, RendererOptions{s.config.renderer, s.pool, s.config.simd, s.devices}, s.io,
-      s.metrics);
+      s.config, RendererOptions{.kind = s.config.renderer, .pool = s.pool, .devices = s.devices},
+      s.io, s.metrics);
   s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) { return s.access.permit(token, unix_now_s()); };

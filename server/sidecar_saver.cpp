@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/poster.h"
 #include "server/replace_file.h"
 #include "server/tours.h"

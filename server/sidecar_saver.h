@@ -8,7 +8,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/thread_pool.hpp>
 
-#include "render_core/scene/hints.h"
+#include "render_core/scene/files/hints.h"
 #include "server/net/http.h"
 #include "server/scene_library.h"
 

@@ -14,8 +14,8 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
-#include "render_core/scene/json_field.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/json_field.h"
 #include "server/net/http.h"
 
 namespace catgs {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "render_core/scene/hints.h"
+#include "render_core/scene/files/hints.h"
 
 namespace catgs {
 

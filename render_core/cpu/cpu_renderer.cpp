@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "render_core/base/error.h"
 #include "render_core/cpu/cpu_view.h"
-#include "render_core/error.h"
 
 namespace catgs {
 namespace {

@@ -3,8 +3,8 @@
 #include <memory>
 #include <string_view>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

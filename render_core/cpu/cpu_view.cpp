@@ -4,8 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <limits>
-#include <new>
-#include <string>
 #include <utility>
 
 #include "render_core/math/constants.h"
@@ -38,34 +36,22 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 }  // namespace
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
-    : scene_(std::move(scene)), settings_(settings), groups_(settings.speculation) {
+    : scene_(std::move(scene)), settings_(settings), driver_(settings) {
   if (settings.pipeline == Pipeline::catgs && settings.colour_cache)
     colours_.emplace(scene_->store.clusters().size());
 }
 
 RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noexcept {
-  RenderStatus status = check_request(request, settings_.format);
-  if (!status.ok()) return status;
-  try {
-    const FrameStats stats = draw(request);
-    frame = {settings_.format, MemorySpace::host, request.camera.size_px, image_.planes(), stats};
-  } catch (const std::bad_alloc&) {
-    groups_.forget();
-    costs_.forget();
-    reach_.forget();
-    return {RenderStatus::Code::out_of_memory,
-            "CPU core: no memory for " + std::to_string(clusters_.size()) + " clusters in view"};
-  }
-  return {};
+  return driver_.render(
+      request, frame, [&](const FramePlan& plan) { return draw(request, plan); },
+      [&] { reach_.forget(); });
 }
 
-FrameStats CpuView::draw(const FrameRequest& request) {
+FrameView CpuView::draw(const FrameRequest& request, FramePlan plan) {
   const Camera& camera = request.camera;
+  if (settings_.pipeline == Pipeline::catgs) widen_for_blocks(plan, settings_.speculation.grid);
   image_.resize(settings_.format, camera.size_px);
   FrameStats stats;
-  const FramePlan plan = this->plan(request);
-  stats.kind = plan.kind;
-  stats.window = plan.window;
   grid_ = plan.grid;
   blocks_.place(camera.size_px, plan);
   if (settings_.pipeline == Pipeline::catgs) reach_.begin(plan);
@@ -80,24 +66,10 @@ FrameStats CpuView::draw(const FrameRequest& request) {
   stats.blended_pairs = blend(request);
   clock.end(Stage::blend);
   summarise(stats);
-  if (settings_.speculation.cost_aware) costs_.note(plan.kind, plan.window, stats.total_ms());
-  return stats;
+  return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats};
 }
 
-/// What the frame's lists cover: its own image alone, unless they are for sub-frames too.
-FramePlan CpuView::plan(const FrameRequest& request) {
-  const Camera& camera = request.camera;
-  FramePlan plan;
-  plan.window_end = camera;
-  plan.grid = image_grid(camera.size_px);
-  plan.list_near_z = camera.near_z;
-  if (settings_.pipeline != Pipeline::catgs) return plan;
-  plan = groups_.plan(camera, costs_.pays() ? request.forecast : std::nullopt, depths_in_view_);
-  widen_for_blocks(plan, settings_.speculation.grid);
-  return plan;
-}
-
-void CpuView::summarise(FrameStats& stats) {
+void CpuView::summarise(FrameStats& stats) const {
   stats.nearest_depth = std::numeric_limits<float>::infinity();
   double inverse_depths = 0.0;
   std::uint64_t counted = 0;
@@ -110,7 +82,6 @@ void CpuView::summarise(FrameStats& stats) {
   }
   if (counted > 0)
     stats.mean_inverse_depth = static_cast<float>(inverse_depths / static_cast<double>(counted));
-  depths_in_view_ = {stats.nearest_depth, stats.mean_inverse_depth};
   stats.tasks = lists_.tiles();  // each in one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();

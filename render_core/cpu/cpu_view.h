@@ -5,17 +5,17 @@
 #include <optional>
 #include <vector>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/colour_cache.h"
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
 #include "render_core/cpu/tile_reach.h"
-#include "render_core/host_image.h"
+#include "render_core/frame_driver.h"
+#include "render_core/image/host_image.h"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/motion/speculation_costs.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 
@@ -37,8 +37,7 @@ class CpuView final : public View {
   std::size_t memory_bytes() const override;
 
  private:
-  FrameStats draw(const FrameRequest& request);
-  FramePlan plan(const FrameRequest& request);
+  FrameView draw(const FrameRequest& request, FramePlan plan);
   void draw_boxes(const Camera& camera, const FramePlan& plan, FrameStats& stats);
   void draw_key_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats);
   void draw_sub_lists(const Camera& camera, FrameStats& stats);
@@ -49,17 +48,15 @@ class CpuView final : public View {
   void sort_seen_lists(const Sort& sort);
   std::uint64_t blend(const FrameRequest& request);
   BlendResult blend_tile(const FrameRequest& request, std::size_t tile);
-  void summarise(FrameStats& stats);
+  void summarise(FrameStats& stats) const;
   [[nodiscard]] std::size_t segments() const;
   [[nodiscard]] SplatTable table(const FramePlan& plan) const;
   ClusterColours colours_of(std::uint32_t cluster, const Camera& camera);
 
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
-  FrameGroups groups_;
-  SpeculationCosts costs_;
-  SceneDepths depths_in_view_;  // of the last frame
-  TileGrid grid_;               // of the lists
+  FrameDriver driver_;
+  TileGrid grid_;  // of the lists
   HostImage image_;
   std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
   std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians

@@ -19,8 +19,8 @@
 
 #include <glm/common.hpp>
 
-#include "render_core/camera.h"
 #include "render_core/cpu/kernels.h"
+#include "render_core/math/camera.h"
 
 // This file is compiled once per instruction set: foreach_target.h includes it again for each.
 #undef HWY_TARGET_INCLUDE

@@ -10,10 +10,10 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "render_core/camera.h"
 #include "render_core/cpu/list_sort.h"
 #include "render_core/cpu/scene_store.h"
-#include "render_core/host_image.h"
+#include "render_core/image/host_image.h"
+#include "render_core/math/camera.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/renderer.h"
 

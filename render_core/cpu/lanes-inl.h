@@ -7,7 +7,7 @@
 
 #include <hwy/highway.h>
 
-#include "render_core/host_device.h"
+#include "render_core/base/host_device.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace catgs {

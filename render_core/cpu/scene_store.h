@@ -6,9 +6,9 @@
 
 #include <hwy/aligned_allocator.h>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/scene/clusters.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

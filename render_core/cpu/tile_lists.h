@@ -7,10 +7,10 @@
 
 #include <glm/vec2.hpp>
 
+#include "render_core/base/radix_sort.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/list_sort.h"
-#include "render_core/radix_sort.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

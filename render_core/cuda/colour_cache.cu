@@ -30,24 +30,12 @@ __global__ void __launch_bounds__(block_size) want_colours_kernel(const WantColo
 
 }  // namespace
 
-void ColourCache::reserve(const SceneArrays& scene) {
-  shaded_from.reserve(scene.cluster_count);
-  known.reserve(scene.cluster_count * words_per_cluster);
-  wanted.reserve(scene.cluster_count * words_per_cluster);
-  colour.reserve(scene.count);
-}
-
-void ColourCache::forget(cudaStream_t stream) const {
-  check(cudaMemsetAsync(shaded_from.get(), 0, shaded_from.bytes(), stream), "colour cache");
-  check(cudaMemsetAsync(known.get(), 0, known.bytes(), stream), "colour cache");
-}
-
-ColourArrays ColourCache::arrays() const {
-  return {shaded_from.get(), known.get(), wanted.get(), colour.get()};
-}
-
-std::size_t ColourCache::bytes() const {
-  return shaded_from.bytes() + known.bytes() + wanted.bytes() + colour.bytes();
+void forget_colours(const ColourArrays& colours, std::uint32_t cluster_count, cudaStream_t stream) {
+  const auto clear = [&](void* array, std::size_t bytes) {
+    check(cudaMemsetAsync(array, 0, bytes, stream), "colour cache");
+  };
+  clear(colours.shaded_from, cluster_count * sizeof(glm::vec3));
+  clear(colours.known, cluster_count * words_per_cluster * sizeof(std::uint32_t));
 }
 
 void launch_want_colours(const WantColoursParams& params, cudaStream_t stream) {

@@ -4,7 +4,6 @@
 
 #include <glm/vec3.hpp>
 
-#include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
 
@@ -19,19 +18,8 @@ struct ColourArrays {
   PackedColour* colour;    // [count]
 };
 
-/// Device memory of a ColourArrays.
-struct ColourCache {
-  DeviceBuffer<glm::vec3> shaded_from;
-  DeviceBuffer<std::uint32_t> known, wanted;
-  DeviceBuffer<PackedColour> colour;
-
-  /// Makes room; what is in it means nothing then. Throws CudaError.
-  void reserve(const SceneArrays& scene);
-  /// Nothing is known.
-  void forget(cudaStream_t stream) const;
-  [[nodiscard]] ColourArrays arrays() const;
-  [[nodiscard]] std::size_t bytes() const;
-};
+/// Marks all colours as unknown.
+void forget_colours(const ColourArrays& colours, std::uint32_t cluster_count, cudaStream_t stream);
 
 /// Decides which of the visible Gaussians a frame shades: those of clusters that the camera has
 /// moved too far beside, and those that were not visible when their cluster was shaded.

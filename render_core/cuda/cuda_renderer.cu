@@ -11,7 +11,7 @@
 
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/cuda/cuda_view.cuh"
-#include "render_core/place_view.h"
+#include "render_core/cuda/place_view.h"
 
 namespace catgs {
 namespace cuda {

@@ -3,10 +3,10 @@
 #include <memory>
 #include <string>
 
+#include "render_core/base/device_set.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/device_error.h"
-#include "render_core/device_set.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

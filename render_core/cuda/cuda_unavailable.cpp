@@ -1,5 +1,5 @@
+#include "render_core/base/error.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/error.h"
 
 // Stands in for the CUDA core in builds without nvcc.
 namespace catgs {

@@ -1,12 +1,11 @@
 #include <algorithm>
-#include <bit>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include "render_core/cuda/blend.cuh"
 #include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/cuda_view.cuh"
+#include "render_core/cuda/frame_output.cuh"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/pixel_runs.cuh"
 #include "render_core/cuda/project.cuh"
@@ -37,58 +36,43 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
                    const ViewSettings& settings)
     : scene_(std::move(scene)),
       device_(device),
-      settings_(settings),
-      room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
       processors_(processors_of(device)),
-      builder_(scene_->arrays(), processors_),
+      settings_(settings),
+      driver_(settings),
+      room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
+      builder_(scene_->arrays(), memory_, processors_),
       blend_warps_(blend_warps(processors_)),
-      groups_(settings.speculation) {
+      reach_(memory_.reach, memory_.other_reach) {
   // What does not depend on the image is the most of a small scene's View: a device that cannot
   // hold it should say so while there is a choice of devices. What is in view of a large scene only
   // the first frame tells.
   if (settings.pipeline == Pipeline::vanilla) return;
   const glm::ivec2 one_tile(tile_size_px);
   set_shape(one_tile, image_grid(one_tile));
-  reserve_all(Headroom::none);
+  reserve(Headroom::none);
   shape_ = {};
 }
 
 RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noexcept {
-  if (RenderStatus bad = check_request(request, settings_.format); !bad.ok()) return bad;
-  try {
-    check(cudaSetDevice(device_), "device");
-    FramePlan plan;
-    plan.window_end = request.camera;
-    plan.grid = image_grid(request.camera.size_px);
-    plan.list_near_z = request.camera.near_z;
-    if (settings_.pipeline == Pipeline::catgs)
-      plan = groups_.plan(request.camera, costs_.pays() ? request.forecast : std::nullopt, depths_);
-    if (settings_.pipeline == Pipeline::vanilla) {
-      draw_vanilla(request);
-    } else if (plan.kind == FrameKind::sub) {
-      if (!draw_sub(request, plan)) {
-        // Without a window: where one comes after the other, no frame after this is drawn in vain.
-        groups_.forget();
-        plan = groups_.plan(request.camera, std::nullopt, depths_);
-        draw_key(request, plan);
-      }
-    } else {
-      draw_key(request, plan);
-    }
-    frame = finished(plan, request.camera.near_z);
-    if (settings_.speculation.cost_aware)
-      costs_.note(plan.kind, plan.window, frame.stats.total_ms());
-    return {};
-  } catch (const std::exception& error) {
-    forget_frames();
-    return status_of(error);
+  return driver_.render(
+      request, frame, [&](const FramePlan& plan) { return draw(request, plan); },
+      [&] { forget_frames(); });
+}
+
+std::optional<FrameView> CudaView::draw(const FrameRequest& request, const FramePlan& plan) {
+  check(cudaSetDevice(device_), "device");
+  if (settings_.pipeline == Pipeline::vanilla) {
+    draw_vanilla(request);
+  } else if (plan.kind == FrameKind::key) {
+    draw_key(request, plan);
+  } else if (!draw_sub(request, plan)) {
+    return std::nullopt;
   }
+  return finished(plan.kind, request.camera.near_z);
 }
 
 /// After a failure: buffers that could not grow are gone, and with them what frames shared.
 void CudaView::forget_frames() {
-  groups_.forget();
-  costs_.forget();
   shape_ = {};
   reach_.forget();
   colours_known_ = false;
@@ -112,22 +96,21 @@ void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
   shape_.visible_bound = room.visible;
   shape_.list_bound = room.list_entries;
   shape_.slice_bound = std::min(room.slices, most_slices(shape_));
-  lists_.shape = shape_;
 }
 
 /// For the frame's shape, and with `headroom`, where lists need memory, for somewhat longer ones,
 /// so that they do not need it again and again. Throws CudaError.
-void CudaView::reserve_all(Headroom headroom) {
+void CudaView::reserve(Headroom headroom) {
   FrameShape roomy = shape_;
-  if (headroom == Headroom::some && !lists_.has_room(shape_)) {
+  if (headroom == Headroom::some && !memory_.holds_lists(shape_)) {
     const FrameSizes most = room_.limits();
     roomy.visible_bound = std::min(most.visible, shape_.visible_bound + shape_.visible_bound / 4);
     roomy.list_bound = std::min(most.list_entries, shape_.list_bound + shape_.list_bound / 4);
   }
-  lists_.reserve(roomy, scene_->arrays());
-  builder_.reserve(roomy, speculates(settings_));
-  memory_.reserve(roomy, scene_->arrays(), settings_);
-  reach_.reserve(roomy.tile_bound);
+  if (memory_.reserve({.shape = roomy, .scene = scene_->arrays(), .settings = settings_})) {
+    reach_.forget();
+    colours_known_ = false;
+  }
 }
 
 /// Sets the frame's shape and makes room for it; where the device has too little memory, without
@@ -138,13 +121,11 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   for (;;) {
     set_shape(size_px, grid);
     try {
-      reserve_all(headroom);
+      reserve(headroom);
       return;
     } catch (const CudaError& error) {
-      memory_ = {};
-      builder_.release();
-      lists_ = {};
-      reach_ = {};
+      memory_.release();
+      reach_.forget();
       colours_known_ = false;
       const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
       const bool had_headroom = std::exchange(headroom, Headroom::none) == Headroom::some;
@@ -183,55 +164,55 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
 /// Stages project, bin and most of sort of a key frame.
 void CudaView::list_tiles(const ListRequest& request) {
   const cudaStream_t stream = stream_.get();
-  builder_.cull(request, lists_, stream);
+  builder_.cull(request, shape_, stream);
   const ColourArrays colours = want_colours(request.cameras.now.single);
-  builder_.project(request, lists_, colours, stream);
+  builder_.project(request, shape_, colours, stream);
   times_.end(Stage::project, stream);
-  builder_.sort_by_depth(lists_, stream);
+  builder_.sort_by_depth(shape_, stream);
   times_.end_depth_sort(stream);
-  builder_.emit(request, lists_, stream);
+  builder_.emit(request, shape_, stream);
   times_.end(Stage::bin, stream);
-  builder_.sort_by_tile(lists_, stream);
+  builder_.sort_by_tile(shape_, stream);
 }
 
 /// False: a watched Gaussian came into view, and nothing was drawn.
 bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   const cudaStream_t stream = stream_.get();
-  FrameCounts* counts = lists_.counts.get();
+  const ViewMemory& m = memory_;
   times_.begin(stream);
   constexpr std::size_t kept = offsetof(FrameCounts, nearness);
-  check(cudaMemsetAsync(reinterpret_cast<std::byte*>(counts) + kept, 0, sizeof(FrameCounts) - kept,
-                        stream),
+  check(cudaMemsetAsync(reinterpret_cast<std::byte*>(m.counts.get()) + kept, 0,
+                        sizeof(FrameCounts) - kept, stream),
         "counts");
   const CameraPair now = make_camera_pair(request.camera);
   const float min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z);
   const ColourArrays colours = want_colours(now.single);
   const GiantSet giants = want_giants(plan);
-  launch_project({scene_->arrays(),
-                  {now, now.single, request.camera.near_z},
-                  picture_of(shape_),
-                  min_depth,
-                  counts,
-                  lists_.visible.get(),
-                  colours,
-                  builder_.records(),
-                  builder_.depth_keys(),
-                  nullptr,
-                  nullptr,
-                  nullptr,
-                  nullptr,
-                  giants},
+  launch_project({.scene = scene_->arrays(),
+                  .camera = {.now = now, .end = now.single, .near_z = request.camera.near_z},
+                  .shape = picture_of(shape_),
+                  .min_depth = min_depth,
+                  .counts = m.counts.get(),
+                  .visible = m.visible.get(),
+                  .colours = colours,
+                  .records = m.records.get(),
+                  .depth_key = m.depth.get(),
+                  .tile_count = nullptr,
+                  .spans = nullptr,
+                  .path = nullptr,
+                  .order = nullptr,
+                  .giants = giants},
                  Listing::none, stream);
   times_.end(Stage::project, stream);
   place_tiles(plan);
   times_.end(Stage::bin, stream);
   const bool reorders = settings_.order == BlendOrder::fresh;
-  split(reorders ? memory_.runs.get() : nullptr, reach_.last(shape_, true));
+  split(reorders ? m.runs.get() : nullptr, reach_.last(shape_, true));
   if (reorders) reorder(giants);
   times_.end(Stage::sort, stream);
   blend(request);
   deliver();
-  if (memory_.host_counts.get()->unlisted != 0) return false;
+  if (m.host_counts.get()->unlisted != 0) return false;
   reach_.keep(shape_, plan.list_from_frame);
   return true;
 }
@@ -248,20 +229,31 @@ GiantSet CudaView::want_giants(const FramePlan& plan) {
     check(cudaMemsetAsync(bits, 0, giant_words * sizeof(std::uint32_t), stream_.get()), "giants");
     seeks_giants_ = true;
   }
-  return {math::convert<float>(plan.list_from_frame), giant_variation(spread), bits};
+  return {.list_from_frame = math::convert<float>(plan.list_from_frame),
+          .least_variation = giant_variation(spread),
+          .bits = bits};
 }
 
 /// Brings the lists of a sub-frame into its own depth order.
 void CudaView::reorder(const GiantSet& giants) {
+  const ViewMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
-  FrameCounts* counts = lists_.counts.get();
-  const std::uint32_t* depth_keys = builder_.depth_keys();
-  std::uint32_t* slot = lists_.slot.get();
   if (giants.bits != nullptr)
-    launch_giants({shape_, giants.bits, lists_.range.get(), memory_.ordered.get(), depth_keys, slot,
-                   counts, processors_},
+    launch_giants({.shape = shape_,
+                   .bits = giants.bits,
+                   .range = m.range.get(),
+                   .ordered = m.ordered.get(),
+                   .depth_key = m.depth.get(),
+                   .slot = m.slot.get(),
+                   .counts = m.counts.get(),
+                   .processors = processors_},
                   stream);
-  launch_reorder({memory_.runs.get(), counts, depth_keys, slot, processors_}, stream);
+  launch_reorder({.runs = m.runs.get(),
+                  .counts = m.counts.get(),
+                  .depth_key = m.depth.get(),
+                  .slot = m.slot.get(),
+                  .processors = processors_},
+                 stream);
 }
 
 /// Says which pixels of a sub-frame belong to each tile of its key frame.
@@ -270,90 +262,131 @@ void CudaView::place_tiles(const FramePlan& plan) {
   shape_.shown_x_px = shape_.first_x_px - plan.shift_px.x;
   shape_.shown_y_px = shape_.first_y_px - plan.shift_px.y;
   if (!turned_) return;
-  launch_pixel_runs({shape_, math::convert<float>(plan.list_from_frame),
-                     math::convert<float>(math::inverse(plan.list_from_frame)),
-                     memory_.pixels.get(), memory_.pixel_count.get()},
+  launch_pixel_runs({.shape = shape_,
+                     .list_from_frame = math::convert<float>(plan.list_from_frame),
+                     .frame_from_list = math::convert<float>(math::inverse(plan.list_from_frame)),
+                     .pixels = memory_.pixels.get(),
+                     .pixel_count = memory_.pixel_count.get()},
                     stream_.get());
 }
 
 /// Decides which Gaussians in view are shaded for the camera.
 ColourArrays CudaView::want_colours(const math::CameraModel<float>& camera) {
-  const FrameMemory& m = memory_;
+  const ViewMemory& m = memory_;
   if (settings_.pipeline != Pipeline::catgs || !settings_.colour_cache) return {};
-  if (!colours_known_) m.colours.forget(stream_.get());
+  const ColourArrays colours = m.colour_arrays();
+  if (!colours_known_) forget_colours(colours, scene_->arrays().cluster_count, stream_.get());
   colours_known_ = true;
-  const ColourArrays colours = m.colours.arrays();
   const math::Vec3<float>& at = camera.position;
-  launch_want_colours({scene_->arrays(),
-                       {at.x, at.y, at.z},
-                       lists_.counts.get(),
-                       lists_.clusters.get(),
-                       lists_.cull_mask.get(),
-                       colours},
+  launch_want_colours({.scene = scene_->arrays(),
+                       .position = {at.x, at.y, at.z},
+                       .counts = m.counts.get(),
+                       .clusters = m.clusters.get(),
+                       .mask = m.cull_mask.get(),
+                       .colours = colours},
                       stream_.get());
   return colours;
 }
 
 void CudaView::draw_vanilla(const FrameRequest& request) {
   const glm::vec3& b = request.background;
+  const ViewMemory& m = memory_;
+  const FrameShape picture{.width_px = request.camera.size_px.x,
+                           .height_px = request.camera.size_px.y};
+  (void)memory_.reserve({.shape = picture, .scene = {}, .settings = settings_});
   set_shape(request.camera.size_px, image_grid(request.camera.size_px));
   shape_.list_bound = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
-  memory_.reserve_image(shape_, settings_);
-  lists_.counts.reserve(1);
   const cudaStream_t stream = stream_.get();
   times_.begin(stream);
-  FrameCounts* counts = lists_.counts.get();
-  check(cudaMemsetAsync(counts, 0, sizeof(FrameCounts), stream), "counts");
+  check(cudaMemsetAsync(m.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
   vanilla_.draw(
-      {&scene_->arrays(), make_camera_pair(request.camera), shape_, make_float3(b.x, b.y, b.z),
-       memory_.rgb.get(), counts, settings_.count_pairs},
+      {.scene = &scene_->arrays(),
+       .camera = make_camera_pair(request.camera),
+       .shape = shape_,
+       .background = make_float3(b.x, b.y, b.z),
+       .rgb = m.rgb.get(),
+       .counts = m.counts.get(),
+       .count_pairs = settings_.count_pairs},
       [this](Stage stage) { times_.end(stage, stream_.get()); }, stream);
   deliver();
 }
 
 /// Cuts the tiles into tasks, and into runs where the reorder stage follows.
 void CudaView::split(ReorderRun* runs, const LastReach& last) {
-  FrameMemory& m = memory_;
+  const ViewMemory& m = memory_;
   // What the last frame expected, in the mean; 0: not known.
   std::uint32_t mean = 0;
   if (const auto expected = m.host_counts.get()->expected_entries; last.reach && expected > 0)
     mean = std::max(1u, static_cast<std::uint32_t>(expected / shape_.tiles()));
-  launch_split(
-      {shape_, lists_.range.get(), last, reach_.current(), turned_ ? m.pixel_count.get() : nullptr,
-       m.tasks.get(), m.tile_slices.get(), m.queue.get(), runs, m.ordered.get(),
-       m.slice_transmittance.get(), lists_.counts.get(), mean, settings_.split_tasks},
-      stream_.get());
+  launch_split({.shape = shape_,
+                .range = m.range.get(),
+                .last = last,
+                .reach = reach_.current(),
+                .pixel_count = turned_ ? m.pixel_count.get() : nullptr,
+                .tasks = m.tasks.get(),
+                .tile_slices = m.tile_slices.get(),
+                .queue = m.queue.get(),
+                .runs = runs,
+                .ordered = m.ordered.get(),
+                .slice_transmittance = m.slice_transmittance.get(),
+                .counts = m.counts.get(),
+                .mean_list = mean,
+                .split = settings_.split_tasks},
+               stream_.get());
 }
 
 void CudaView::blend(const FrameRequest& request) {
-  FrameMemory& m = memory_;
+  const ViewMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
   const float3 background =
       make_float3(request.background.x, request.background.y, request.background.z);
   const PixelPlace* pixels = turned_ ? m.pixels.get() : nullptr;
   const std::uint32_t* pixel_count = turned_ ? m.pixel_count.get() : nullptr;
-  std::uint32_t* reach = reach_.current();
-  launch_blend({shape_, builder_.records(), lists_.slot.get(), m.tasks.get(), m.queue.get(),
-                background, m.rgb.get(), pixels, pixel_count, m.slice_pixels.get(),
-                m.consumed.get(), m.slice_transmittance.get(), reach, lists_.counts.get(),
-                settings_.count_pairs, blend_warps_},
+  launch_blend({.shape = shape_,
+                .records = m.records.get(),
+                .slot = m.slot.get(),
+                .tasks = m.tasks.get(),
+                .queue = m.queue.get(),
+                .background = background,
+                .rgb = m.rgb.get(),
+                .pixels = pixels,
+                .pixel_count = pixel_count,
+                .slice_pixels = m.slice_pixels.get(),
+                .consumed = m.consumed.get(),
+                .slice_transmittance = m.slice_transmittance.get(),
+                .reach = reach_.current(),
+                .counts = m.counts.get(),
+                .count_pairs = settings_.count_pairs,
+                .warps = blend_warps_},
                stream);
-  launch_composite(
-      {shape_, m.tasks.get(), m.tile_slices.get(), m.slice_pixels.get(), m.consumed.get(), pixels,
-       pixel_count, lists_.counts.get(), background, m.rgb.get(), reach},
-      stream);
+  launch_composite({.shape = shape_,
+                    .tasks = m.tasks.get(),
+                    .tile_slices = m.tile_slices.get(),
+                    .slice_pixels = m.slice_pixels.get(),
+                    .consumed = m.consumed.get(),
+                    .pixels = pixels,
+                    .pixel_count = pixel_count,
+                    .counts = m.counts.get(),
+                    .background = background,
+                    .rgb = m.rgb.get(),
+                    .reach = reach_.current()},
+                   stream);
   times_.end(Stage::blend, stream_.get());
 }
 
 /// Brings the picture where the View's settings want it, and waits for the frame.
 void CudaView::deliver() {
-  FrameMemory& m = memory_;
+  const ViewMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
   const std::size_t pixels = static_cast<std::size_t>(shape_.width_px) * shape_.height_px;
   if (settings_.format == PixelFormat::i420) {
-    launch_convert({shape_.width_px, shape_.height_px, m.rgb.get(), m.i420.get(),
-                    m.i420.get() + pixels, m.i420.get() + pixels + pixels / 4},
+    launch_convert({.width_px = shape_.width_px,
+                    .height_px = shape_.height_px,
+                    .rgb = m.rgb.get(),
+                    .luma = m.i420.get(),
+                    .cb = m.i420.get() + pixels,
+                    .cr = m.i420.get() + pixels + pixels / 4},
                    stream);
     check(cudaMemcpyAsync(m.host_image.get(), m.i420.get(), pixels + pixels / 2,
                           cudaMemcpyDeviceToHost, stream),
@@ -363,7 +396,7 @@ void CudaView::deliver() {
                           cudaMemcpyDeviceToHost, stream),
           "image copy");
   }
-  check(cudaMemcpyAsync(m.host_counts.get(), lists_.counts.get(), sizeof(FrameCounts),
+  check(cudaMemcpyAsync(m.host_counts.get(), m.counts.get(), sizeof(FrameCounts),
                         cudaMemcpyDeviceToHost, stream),
         "counts");
   times_.end(Stage::convert, stream_.get());
@@ -377,34 +410,17 @@ void CudaView::deliver() {
   }
 }
 
-std::size_t CudaView::memory_bytes() const {
-  return lists_.bytes() + builder_.bytes() + memory_.bytes() + reach_.bytes() + vanilla_.bytes();
-}
+std::size_t CudaView::memory_bytes() const { return memory_.bytes() + vanilla_.bytes(); }
 
 std::vector<std::uint32_t> CudaView::tile_loads() const {
   const bool vanilla = settings_.pipeline == Pipeline::vanilla;
-  const uint2* ranges = vanilla ? vanilla_.ranges() : lists_.range.get();
+  const uint2* ranges = vanilla ? vanilla_.ranges() : memory_.range.get();
   if (ranges == nullptr) return {};
-  std::vector<uint2> copy(shape_.tiles());
   check(cudaSetDevice(device_), "device");
-  check(cudaMemcpy(copy.data(), ranges, copy.size() * sizeof(uint2), cudaMemcpyDeviceToHost),
-        "tile loads");
-  std::vector<std::uint32_t> loads;
-  for (int y = 0; y < shape_.tiles_y; ++y) {
-    for (int x = 0; x < shape_.tiles_x; ++x) {
-      const int x_px = shape_.first_x_px + x * tile_size_px;
-      const int y_px = shape_.first_y_px + y * tile_size_px;
-      const uint2& range = copy[static_cast<std::size_t>(y * shape_.tiles_x + x)];
-      const bool in_image =
-          x_px >= 0 && y_px >= 0 && x_px < shape_.width_px && y_px < shape_.height_px;
-      if (in_image) loads.push_back(range.y - range.x);
-    }
-  }
-  return loads;
+  return cuda::tile_loads(shape_, ranges);
 }
 
-FrameView CudaView::finished(const FramePlan& plan, float near_z) {
-  const FrameCounts& counts = *memory_.host_counts.get();
+FrameView CudaView::finished(FrameKind kind, float near_z) {
   FrameView frame;
   frame.format = settings_.format;
   frame.size_px = {shape_.width_px, shape_.height_px};
@@ -422,28 +438,9 @@ FrameView CudaView::finished(const FramePlan& plan, float near_z) {
                          : reinterpret_cast<std::byte*>(memory_.rgb.get());
     frame.planes = {Plane{rgb, 3 * sizeof(float) * width}, Plane{}, Plane{}};
   }
-  FrameStats& stats = frame.stats;
-  stats.kind = plan.kind;
-  stats.window = plan.window;
-  stats.visible = counts.visible;
-  stats.list_entries = std::min(counts.list_entries, shape_.list_bound);
-  stats.overflowed_entries = counts.list_entries - stats.list_entries;
-  stats.list_max = counts.list_max;
-  for (const std::uint32_t queued : counts.queued) stats.tasks += queued;
-  stats.giants = counts.giants;
-  stats.uncarried_lists = counts.uncarried_lists;
-  stats.blended_pairs = counts.blended_pairs;
-  if (plan.kind == FrameKind::key)
-    stats.displacement_px = std::bit_cast<float>(counts.displacement);
-  stats.nearest_depth = counts.nearness == 0 ? std::numeric_limits<float>::infinity()
-                                             : std::bit_cast<float>(~counts.nearness);
-  if (counts.sampled > 0) {
-    const double inverse = static_cast<double>(counts.inverse_depths) / counts.sampled;
-    stats.mean_inverse_depth = static_cast<float>(inverse / (near_z * inverse_depth_scale));
-  }
-  depths_ = {stats.nearest_depth, stats.mean_inverse_depth};
-  times_.read(settings_.pipeline != Pipeline::vanilla && plan.kind == FrameKind::key,
-              stats.stage_ms);
+  frame.stats = frame_stats(*memory_.host_counts.get(), shape_, kind, near_z);
+  times_.read(settings_.pipeline != Pipeline::vanilla && kind == FrameKind::key,
+              frame.stats.stage_ms);
   return frame;
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "render_core/cuda/device_scene.cuh"
-#include "render_core/cuda/frame_memory.cuh"
 #include "render_core/cuda/frame_room.h"
 #include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/list_builder.cuh"
@@ -13,10 +13,9 @@
 #include "render_core/cuda/stage_times.h"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/vanilla.cuh"
-#include "render_core/motion/frame_groups.h"
-#include "render_core/motion/speculation_costs.h"
+#include "render_core/cuda/view_memory.cuh"
+#include "render_core/frame_driver.h"
 #include "render_core/renderer.h"
-#include "render_core/scene/clusters.h"
 
 namespace catgs::cuda {
 
@@ -34,9 +33,10 @@ class CudaView final : public View {
   void set_shape(glm::ivec2 size_px, const TileGrid& grid);
   void make_room(glm::ivec2 size_px, const TileGrid& grid);
   enum class Headroom { none, some };
-  void reserve_all(Headroom headroom);
+  void reserve(Headroom headroom);
   bool needs_more_room();
   void forget_frames();
+  [[nodiscard]] std::optional<FrameView> draw(const FrameRequest& request, const FramePlan& plan);
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   [[nodiscard]] bool draw_sub(const FrameRequest& request, const FramePlan& plan);
   void draw_vanilla(const FrameRequest& request);
@@ -48,31 +48,28 @@ class CudaView final : public View {
   void place_tiles(const FramePlan& plan);
   void blend(const FrameRequest& request);
   void deliver();
-  [[nodiscard]] FrameView finished(const FramePlan& plan, float near_z);
+  [[nodiscard]] FrameView finished(FrameKind kind, float near_z);
 
   std::shared_ptr<const DeviceScene> scene_;
   int device_;
+  int processors_;
   ViewSettings settings_;
   Stream stream_;
   Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame, to an encoder
   StageTimes times_;
+  FrameDriver driver_;
   FrameShape shape_;
   FrameRoom room_;
-  FrameMemory memory_;
-  VanillaPipeline vanilla_;
-  int processors_;
+  ViewMemory memory_;
   ListBuilder builder_;
+  VanillaPipeline vanilla_;
   int blend_warps_;
 
-  // What sub-frames take over.
-  FrameGroups groups_;
-  SpeculationCosts costs_;
-  TileLists lists_;
-  SceneDepths depths_;
-  bool turned_ = false;        // the frame's tiles are runs of pixels
-  bool seeks_giants_ = false;  // since some turn of this group
-  bool colours_known_ = false;
+  // What sub-frames take over, beside memory_.
   ReachHistory reach_;
+  bool turned_ = false;         // the frame's tiles are runs of pixels
+  bool seeks_giants_ = false;   // since some turn of this group
+  bool colours_known_ = false;  // those that memory_ says are
 };
 
 }  // namespace catgs::cuda

@@ -9,52 +9,73 @@
 
 namespace catgs::cuda {
 
-/// Owns `size()` elements of device memory (or, when `pinned`, of page-locked host memory). Grows
-/// by `reserve`, never shrinks, never keeps its contents when growing.
-template <class T, bool pinned = false>
-class Buffer {
+/// Owns bytes of device memory, or of page-locked host memory when `pinned`. Grows by `reserve`,
+/// never keeps its contents when growing.
+class RawBuffer {
  public:
-  Buffer() = default;
-  ~Buffer() { release(); }
-  Buffer(Buffer&& other) noexcept
-      : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
-  Buffer& operator=(Buffer&& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
+  explicit RawBuffer(bool pinned) : pinned_(pinned) {}
+  ~RawBuffer() { release(); }
+  RawBuffer(RawBuffer&& other) noexcept
+      : pinned_(other.pinned_),
+        data_(std::exchange(other.data_, nullptr)),
+        bytes_(std::exchange(other.bytes_, 0)) {}
+  RawBuffer& operator=(RawBuffer&& other) noexcept {
+    swap(other);
     return *this;
   }
 
-  /// Makes room for `count` elements; throws CudaError and is then empty.
-  void reserve(std::size_t count) {
-    if (count <= size_) return;
+  [[nodiscard]] bool pinned() const { return pinned_; }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+  /// Makes room for so many bytes; throws CudaError and is then empty.
+  void reserve_bytes(std::size_t bytes) {
+    if (bytes <= bytes_) return;
     release();
-    void* memory = nullptr;
-    if constexpr (pinned) {
-      check(cudaHostAlloc(&memory, count * sizeof(T), cudaHostAllocDefault), "pinned memory");
+    if (pinned_) {
+      check(cudaHostAlloc(&data_, bytes, cudaHostAllocDefault), "pinned memory");
     } else {
-      check(cudaMalloc(&memory, count * sizeof(T)), "device memory");
+      check(cudaMalloc(&data_, bytes), "device memory");
     }
-    data_ = static_cast<T*>(memory);
-    size_ = count;
+    bytes_ = bytes;
   }
 
-  [[nodiscard]] T* get() const { return data_; }
-  [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
-
- private:
   void release() noexcept {
-    if constexpr (pinned) {
+    if (pinned_) {
       (void)cudaFreeHost(data_);
     } else {
       (void)cudaFree(data_);
     }
     data_ = nullptr;
-    size_ = 0;
+    bytes_ = 0;
   }
 
-  T* data_ = nullptr;
-  std::size_t size_ = 0;
+ protected:
+  [[nodiscard]] void* data() const { return data_; }
+  void swap(RawBuffer& other) noexcept {
+    std::swap(pinned_, other.pinned_);
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+  }
+
+ private:
+  bool pinned_;
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+};
+
+/// A RawBuffer of `size()` elements.
+template <class T, bool is_pinned = false>
+class Buffer : public RawBuffer {
+ public:
+  Buffer() : RawBuffer(is_pinned) {}
+
+  /// Makes room for `count` elements; throws CudaError and is then empty.
+  void reserve(std::size_t count) { reserve_bytes(count * sizeof(T)); }
+
+  [[nodiscard]] T* get() const { return static_cast<T*>(data()); }
+  [[nodiscard]] std::size_t size() const { return bytes() / sizeof(T); }
+  /// Each takes over the memory of the other.
+  void swap(Buffer& other) noexcept { RawBuffer::swap(other); }
 };
 
 template <class T>

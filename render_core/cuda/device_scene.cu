@@ -48,12 +48,12 @@ DeviceScene::DeviceScene(const SceneSource& source) {
   // Copies from pageable memory may return before they end, and Views' streams do not wait for
   // them.
   check(cudaStreamSynchronize(cudaStreamLegacy), "scene upload");
-  arrays_ = {static_cast<std::uint32_t>(order.size()),
-             static_cast<std::uint32_t>(clusters),
-             cloud.sh_degree,
-             blocks_.get(),
-             units_.get(),
-             clusters_.get()};
+  arrays_ = {.count = static_cast<std::uint32_t>(order.size()),
+             .cluster_count = static_cast<std::uint32_t>(clusters),
+             .sh_degree = cloud.sh_degree,
+             .blocks = blocks_.get(),
+             .units = units_.get(),
+             .clusters = clusters_.get()};
 }
 
 }  // namespace catgs::cuda

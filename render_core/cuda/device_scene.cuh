@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/packed_gaussian.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs::cuda {
 

@@ -5,7 +5,7 @@
 #include <cuda_fp16.h>
 
 #include "render_core/math/ellipse-inl.h"
-#include "render_core/scene/format_limits.h"
+#include "render_core/scene/formats/format_limits.h"
 
 namespace catgs::cuda {
 

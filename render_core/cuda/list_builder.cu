@@ -18,28 +18,9 @@ bool is_narrow(const FrameShape& shape) {
 
 }  // namespace
 
-void TileLists::reserve(const FrameShape& shape_to_hold, const SceneArrays& scene) {
-  clusters.reserve(scene.cluster_count);
-  cull_mask.reserve(cull_words(scene.cluster_count));
-  visible.reserve(shape_to_hold.visible_bound);
-  range.reserve(shape_to_hold.tile_bound);
-  slot.reserve(shape_to_hold.list_bound);
-  counts.reserve(1);
-}
-
-bool TileLists::has_room(const FrameShape& wanted) const {
-  return wanted.visible_bound <= visible.size() && wanted.tile_bound <= range.size() &&
-         wanted.list_bound <= slot.size();
-}
-
-std::size_t TileLists::bytes() const {
-  return clusters.bytes() + cull_mask.bytes() + visible.bytes() + range.bytes() + slot.bytes() +
-         counts.bytes();
-}
-
 ListRequest::ListRequest(const Camera& camera, const FramePlan& plan,
                          const SpeculationSettings& settings)
-    : cameras{make_camera_pair(camera), {}, camera.near_z},
+    : cameras{.now = make_camera_pair(camera), .end = {}, .near_z = camera.near_z},
       culler(camera, plan),
       sweeps(plan.window > 0),
       min_depth(speculation_min_depth(settings, camera.near_z)) {
@@ -50,107 +31,109 @@ ListRequest::ListRequest(const Camera& camera, const FramePlan& plan,
                                        static_cast<float>(plan.trail_shift_px.y));
 }
 
-void ListBuilder::reserve(const FrameShape& shape, bool sweeps) {
-  Memory& m = memory_;
-  m.cull_seen.reserve(scene_.cluster_count);
-  m.cull_before.reserve(scene_.cluster_count);
-  m.records.reserve(shape.visible_bound);
-  m.spans.reserve(shape.visible_bound);
-  if (sweeps) m.path.reserve(shape.visible_bound);
-  m.tile_count.reserve(shape.visible_bound);
-  m.first.reserve(shape.visible_bound);
-  for (int i = 0; i < 2; ++i) {
-    m.depth[i].reserve(shape.visible_bound);
-    m.order[i].reserve(shape.visible_bound);
-    m.tile[i].reserve(shape.list_bound);
-  }
-  m.slot.reserve(shape.list_bound);
-  m.scratch.reserve(std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene_.cluster_count)));
-  m.counts.reserve(1);
-}
-
-std::size_t ListBuilder::bytes() const {
-  const Memory& m = memory_;
-  return m.cull_seen.bytes() + m.cull_before.bytes() + m.records.bytes() + m.spans.bytes() +
-         m.path.bytes() + m.tile_count.bytes() + m.first.bytes() + m.depth[0].bytes() +
-         m.depth[1].bytes() + m.order[0].bytes() + m.order[1].bytes() + m.tile[0].bytes() +
-         m.tile[1].bytes() + m.slot.bytes() + m.scratch.bytes();
-}
-
 SortScratch ListBuilder::scratch() const {
-  return {memory_.scratch.get(), memory_.scratch.bytes()};
+  return {.memory = memory_.scratch.get(), .bytes = memory_.scratch.bytes()};
 }
 
-void ListBuilder::cull(const ListRequest& request, TileLists& lists, cudaStream_t stream) {
-  check(cudaMemsetAsync(lists.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
-  *memory_.counts.get() = {};
-  launch_cull(
-      {scene_, request.culler, request.cameras, request.sweeps, lists.shape, lists.clusters.get(),
-       lists.cull_mask.get(), memory_.cull_seen.get(), memory_.cull_before.get(),
-       lists.visible.get(), lists.counts.get(), memory_.counts.get(), scratch(), processors_},
-      stream);
+void ListBuilder::cull(const ListRequest& request, const FrameShape& shape, cudaStream_t stream) {
+  const ViewMemory& m = memory_;
+  check(cudaMemsetAsync(m.counts.get(), 0, sizeof(FrameCounts), stream), "counts");
+  *m.list_counts.get() = {};
+  launch_cull({.scene = scene_,
+               .culler = request.culler,
+               .camera = request.cameras,
+               .sweeps = request.sweeps,
+               .shape = shape,
+               .clusters = m.clusters.get(),
+               .mask = m.cull_mask.get(),
+               .seen = m.cull_seen.get(),
+               .before = m.cull_before.get(),
+               .visible = m.visible.get(),
+               .counts = m.counts.get(),
+               .host_counts = m.list_counts.get(),
+               .scratch = scratch(),
+               .processors = processors_},
+              stream);
   check(cudaEventRecord(counted_.get(), stream), "visible Gaussians");
 }
 
-void ListBuilder::project(const ListRequest& request, TileLists& lists, const ColourArrays& colours,
-                          cudaStream_t stream) {
-  const Memory& m = memory_;
-  launch_project(
-      {scene_, request.cameras, lists.shape, request.min_depth, lists.counts.get(),
-       lists.visible.get(), colours, m.records.get(), m.depth[0].get(), m.tile_count.get(),
-       m.spans.get(), request.sweeps ? m.path.get() : nullptr, m.order[0].get()},
-      request.sweeps ? Listing::trails : Listing::ellipses, stream);
+void ListBuilder::project(const ListRequest& request, const FrameShape& shape,
+                          const ColourArrays& colours, cudaStream_t stream) {
+  const ViewMemory& m = memory_;
+  launch_project({.scene = scene_,
+                  .camera = request.cameras,
+                  .shape = shape,
+                  .min_depth = request.min_depth,
+                  .counts = m.counts.get(),
+                  .visible = m.visible.get(),
+                  .colours = colours,
+                  .records = m.records.get(),
+                  .depth_key = m.depth.get(),
+                  .tile_count = m.tile_count.get(),
+                  .spans = m.spans.get(),
+                  .path = request.sweeps ? m.path.get() : nullptr,
+                  .order = m.order.get()},
+                 request.sweeps ? Listing::trails : Listing::ellipses, stream);
 }
 
-void ListBuilder::sort_by_depth(const TileLists& lists, cudaStream_t stream) {
-  const Memory& m = memory_;
+void ListBuilder::sort_by_depth(const FrameShape& shape, cudaStream_t stream) {
+  const ViewMemory& m = memory_;
   check(cudaEventSynchronize(counted_.get()), "visible Gaussians");
-  visible_ = std::min(m.counts.get()->visible, lists.shape.visible_bound);
-  PingPong<std::uint32_t> depth{m.depth[0].get(), m.depth[1].get()};
-  PingPong<std::uint32_t> order{m.order[0].get(), m.order[1].get()};
+  visible_ = std::min(m.list_counts.get()->visible, shape.visible_bound);
+  PingPong<std::uint32_t> depth{.current = m.depth.get(), .other = m.other_depth.get()};
+  PingPong<std::uint32_t> order{.current = m.order.get(), .other = m.other_order.get()};
   cuda::sort_by_depth(visible_, depth, order, scratch(), stream);
   order_ = order.current;
 }
 
-void ListBuilder::emit(const ListRequest& request, TileLists& lists, cudaStream_t stream) {
-  if (is_narrow(lists.shape)) {
-    emit_as<std::uint16_t>(request, lists, stream);
+void ListBuilder::emit(const ListRequest& request, const FrameShape& shape, cudaStream_t stream) {
+  if (is_narrow(shape)) {
+    emit_as<std::uint16_t>(request, shape, stream);
   } else {
-    emit_as<std::uint32_t>(request, lists, stream);
+    emit_as<std::uint32_t>(request, shape, stream);
   }
 }
 
 template <class Tile>
-void ListBuilder::emit_as(const ListRequest& request, TileLists& lists, cudaStream_t stream) {
-  const Memory& m = memory_;
-  scan_tile_counts(visible_, lists.counts.get(), m.counts.get(), order_, m.tile_count.get(),
+void ListBuilder::emit_as(const ListRequest& request, const FrameShape& shape,
+                          cudaStream_t stream) {
+  const ViewMemory& m = memory_;
+  scan_tile_counts(visible_, m.counts.get(), m.list_counts.get(), order_, m.tile_count.get(),
                    m.first.get(), scratch(), stream);
   check(cudaEventRecord(counted_.get(), stream), "list entries");
-  launch_emit<Tile>({lists.shape, lists.counts.get(), m.records.get(), order_, m.first.get(),
-                     m.tile_count.get(), m.spans.get(), request.sweeps ? m.path.get() : nullptr,
-                     reinterpret_cast<Tile*>(m.tile[0].get()), m.slot.get()},
+  launch_emit<Tile>({.shape = shape,
+                     .counts = m.counts.get(),
+                     .records = m.records.get(),
+                     .order = order_,
+                     .first = m.first.get(),
+                     .tile_count = m.tile_count.get(),
+                     .spans = m.spans.get(),
+                     .path = request.sweeps ? m.path.get() : nullptr,
+                     .tile = reinterpret_cast<Tile*>(m.tile.get()),
+                     .slot = m.other_slot.get()},
                     stream);
 }
 
-void ListBuilder::sort_by_tile(TileLists& lists, cudaStream_t stream) {
-  if (is_narrow(lists.shape)) {
-    sort_as<std::uint16_t>(lists, stream);
+void ListBuilder::sort_by_tile(const FrameShape& shape, cudaStream_t stream) {
+  if (is_narrow(shape)) {
+    sort_as<std::uint16_t>(shape, stream);
   } else {
-    sort_as<std::uint32_t>(lists, stream);
+    sort_as<std::uint32_t>(shape, stream);
   }
 }
 
 template <class Tile>
-void ListBuilder::sort_as(TileLists& lists, cudaStream_t stream) {
-  Memory& m = memory_;
-  PingPong<Tile> tile{reinterpret_cast<Tile*>(m.tile[0].get()),
-                      reinterpret_cast<Tile*>(m.tile[1].get())};
-  PingPong<std::uint32_t> slot{m.slot.get(), lists.slot.get()};
+void ListBuilder::sort_as(const FrameShape& shape, cudaStream_t stream) {
+  ViewMemory& m = memory_;
+  PingPong<Tile> tile{.current = reinterpret_cast<Tile*>(m.tile.get()),
+                      .other = reinterpret_cast<Tile*>(m.other_tile.get())};
+  PingPong<std::uint32_t> slot{.current = m.other_slot.get(), .other = m.slot.get()};
   check(cudaEventSynchronize(counted_.get()), "list entries");
-  const std::uint32_t entries = std::min(m.counts.get()->list_entries, lists.shape.list_bound);
-  cuda::sort_by_tile(lists.shape, entries, tile, slot, scratch(), stream);
-  launch_ranges<Tile>({lists.shape, entries, tile.current, lists.range.get()}, stream);
-  if (slot.current == m.slot.get()) std::swap(m.slot, lists.slot);
+  const std::uint32_t entries = std::min(m.list_counts.get()->list_entries, shape.list_bound);
+  cuda::sort_by_tile(shape, entries, tile, slot, scratch(), stream);
+  launch_ranges<Tile>(
+      {.shape = shape, .entries = entries, .tile = tile.current, .range = m.range.get()}, stream);
+  if (slot.current == m.other_slot.get()) m.slot.swap(m.other_slot);
 }
 
 }  // namespace catgs::cuda

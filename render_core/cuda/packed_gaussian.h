@@ -11,7 +11,7 @@
 #include <glm/gtc/packing.hpp>
 #endif
 
-#include "render_core/host_device.h"
+#include "render_core/base/host_device.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/scene/clusters.h"
 #include "render_core/scene/gaussian_cloud.h"

@@ -2,17 +2,16 @@
 
 namespace catgs::cuda {
 
-void ReachHistory::reserve(std::uint32_t tiles) {
-  if (tiles > reach_[0].size()) forget();
-  for (auto& of_frame : reach_) of_frame.reserve(tiles);
-}
-
 LastReach ReachHistory::last(const FrameShape& shape, bool same_grid) const {
   if (!known_ || shape_.width_px != shape.width_px || shape_.height_px != shape.height_px)
     return {};
-  return {reach_[last_].get(), same_grid,         math::convert<float>(list_from_frame_),
-          shape_.first_x_px,   shape_.first_y_px, shape_.tiles_x,
-          shape_.tiles_y};
+  return {.reach = reach_[last_]->get(),
+          .same_grid = same_grid,
+          .list_from_frame = math::convert<float>(list_from_frame_),
+          .first_x_px = shape_.first_x_px,
+          .first_y_px = shape_.first_y_px,
+          .tiles_x = shape_.tiles_x,
+          .tiles_y = shape_.tiles_y};
 }
 
 void ReachHistory::keep(const FrameShape& shape, const Homography<double>& list_from_frame) {

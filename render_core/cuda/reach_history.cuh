@@ -9,22 +9,22 @@ namespace catgs::cuda {
 /// next frame expects.
 class ReachHistory {
  public:
-  /// Makes room for the tiles of a frame; what was known is forgotten where that takes new memory.
-  /// Throws CudaError.
-  void reserve(std::uint32_t tiles);
+  /// Two buffers, [tiles] each, which take turns and outlive the history.
+  ReachHistory(const DeviceBuffer<std::uint32_t>& a, const DeviceBuffer<std::uint32_t>& b)
+      : reach_{&a, &b} {}
+
   void forget() { known_ = false; }
-  [[nodiscard]] std::size_t bytes() const { return reach_[0].bytes() + reach_[1].bytes(); }
 
   /// Of the last frame, for one of this shape; nothing where the picture had another size.
   /// `same_grid`: both have the lists of one key frame.
   [[nodiscard]] LastReach last(const FrameShape& shape, bool same_grid) const;
   /// Where the frame that is being drawn writes its own, [tiles].
-  [[nodiscard]] std::uint32_t* current() const { return reach_[1 - last_].get(); }
+  [[nodiscard]] std::uint32_t* current() const { return reach_[1 - last_]->get(); }
   /// The frame is drawn: its pixels found their tiles by `list_from_frame`.
   void keep(const FrameShape& shape, const Homography<double>& list_from_frame);
 
  private:
-  DeviceBuffer<std::uint32_t> reach_[2];
+  const DeviceBuffer<std::uint32_t>* reach_[2];
   bool known_ = false;
   int last_ = 0;
   FrameShape shape_;

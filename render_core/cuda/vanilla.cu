@@ -147,51 +147,74 @@ __global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) 
 
 }  // namespace
 
-void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mark,
-                           cudaStream_t stream) {
+void VanillaPipeline::project(const Frame& f, cudaStream_t stream) {
+  const VanillaMemory& m = memory_;
   const std::uint32_t count = f.scene->count;
-  records_.reserve(count);
-  depth_.reserve(count);
-  box_.reserve(count);
-  tile_count_.reserve(count);
-  last_.reserve(count);
-  entries_.reserve(1);
-  range_.reserve(f.shape.tiles());
-  scratch_.reserve(sum_scratch_bytes(count));
   const std::uint32_t blocks = std::max(blocks_for(count, block_size), 1u);  // none in empty scenes
-  project_kernel<<<blocks, block_size, 0, stream>>>({*f.scene, f.camera, f.shape, records_.get(),
-                                                     depth_.get(), box_.get(), tile_count_.get(),
-                                                     f.counts});
+  project_kernel<<<blocks, block_size, 0, stream>>>({.scene = *f.scene,
+                                                     .camera = f.camera,
+                                                     .shape = f.shape,
+                                                     .records = m.records.get(),
+                                                     .depth = m.depth.get(),
+                                                     .box = m.box.get(),
+                                                     .tile_count = m.tile_count.get(),
+                                                     .counts = f.counts});
   check_launch("vanilla project");
-  mark(Stage::project);
+}
 
-  *entries_.get() = 0;
+/// List entries of the projected Gaussians, as many as there is room for.
+std::uint32_t VanillaPipeline::count_entries(const Frame& f, cudaStream_t stream) {
+  const VanillaMemory& m = memory_;
+  const std::uint32_t count = f.scene->count;
+  *m.entries.get() = 0;
   if (count > 0) {
-    sum_tile_counts(count, tile_count_.get(), last_.get(), {scratch_.get(), scratch_.bytes()},
-                    stream);
-    check(cudaMemcpyAsync(entries_.get(), last_.get() + (count - 1), sizeof(std::uint32_t),
+    sum_tile_counts(count, m.tile_count.get(), m.last.get(),
+                    {.memory = m.scratch.get(), .bytes = m.scratch.bytes()}, stream);
+    check(cudaMemcpyAsync(m.entries.get(), m.last.get() + (count - 1), sizeof(std::uint32_t),
                           cudaMemcpyDeviceToHost, stream),
           "list entries");
     check(cudaStreamSynchronize(stream), "vanilla project");
   }
-  const std::uint32_t entries = std::min(*entries_.get(), f.shape.list_bound);
-  for (int i = 0; i < 2; ++i) {
-    key_[i].reserve(entries);
-    slot_[i].reserve(entries);
-  }
-  emit_kernel<<<blocks, block_size, 0, stream>>>({count, f.shape, last_.get(), depth_.get(),
-                                                  box_.get(), key_[0].get(), slot_[0].get(),
-                                                  f.counts});
+  return std::min(*m.entries.get(), f.shape.list_bound);
+}
+
+void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mark,
+                           cudaStream_t stream) {
+  const VanillaMemory& m = memory_;
+  const std::uint32_t count = f.scene->count;
+  (void)memory_.reserve({.gaussians = count, .entries = 0, .shape = f.shape});
+  project(f, stream);
+  mark(Stage::project);
+
+  const std::uint32_t entries = count_entries(f, stream);
+  // The device has finished: rows that grow are in no use.
+  (void)memory_.reserve({.gaussians = count, .entries = entries, .shape = f.shape});
+  emit_kernel<<<std::max(blocks_for(count, block_size), 1u), block_size, 0, stream>>>(
+      {.count = count,
+       .shape = f.shape,
+       .last = m.last.get(),
+       .depth = m.depth.get(),
+       .box = m.box.get(),
+       .key = m.key.get(),
+       .slot = m.slot.get(),
+       .counts = f.counts});
   check_launch("vanilla emit");
   mark(Stage::bin);
 
-  PingPong<std::uint64_t> key{key_[0].get(), key_[1].get()};
-  PingPong<std::uint32_t> slot{slot_[0].get(), slot_[1].get()};
-  scratch_.reserve(key_sort_scratch_bytes(entries, f.shape));
-  sort_by_key(entries, f.shape, key, slot, {scratch_.get(), scratch_.bytes()}, stream);
-  const BlendParams blend{f.shape,      records_.get(), key.current, slot.current, range_.get(),
-                          f.background, f.rgb,          f.counts,    f.count_pairs};
-  check(cudaMemsetAsync(range_.get(), 0, f.shape.tiles() * sizeof(uint2), stream), "ranges");
+  PingPong<std::uint64_t> key{.current = m.key.get(), .other = m.other_key.get()};
+  PingPong<std::uint32_t> slot{.current = m.slot.get(), .other = m.other_slot.get()};
+  sort_by_key(entries, f.shape, key, slot, {.memory = m.scratch.get(), .bytes = m.scratch.bytes()},
+              stream);
+  const BlendParams blend{.shape = f.shape,
+                          .records = m.records.get(),
+                          .key = key.current,
+                          .slot = slot.current,
+                          .range = m.range.get(),
+                          .background = f.background,
+                          .rgb = f.rgb,
+                          .counts = f.counts,
+                          .count_pairs = f.count_pairs};
+  check(cudaMemsetAsync(m.range.get(), 0, f.shape.tiles() * sizeof(uint2), stream), "ranges");
   ranges_kernel<<<std::max(blocks_for(entries, block_size), 1u), block_size, 0, stream>>>(blend);
   check_launch("vanilla ranges");
   mark(Stage::sort);
@@ -199,12 +222,6 @@ void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mar
   blend_kernel<<<f.shape.tiles(), block_size, 0, stream>>>(blend);
   check_launch("vanilla blend");
   mark(Stage::blend);
-}
-
-std::size_t VanillaPipeline::bytes() const {
-  return records_.bytes() + depth_.bytes() + box_.bytes() + tile_count_.bytes() + last_.bytes() +
-         key_[0].bytes() + key_[1].bytes() + slot_[0].bytes() + slot_[1].bytes() + range_.bytes() +
-         scratch_.bytes();
 }
 
 }  // namespace catgs::cuda

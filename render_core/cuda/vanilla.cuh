@@ -1,12 +1,44 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 
-#include "render_core/cuda/device_buffer.h"
+#include "render_core/cuda/memory_table.h"
+#include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/renderer.h"
 
 namespace catgs::cuda {
+
+/// What the rows of VanillaMemory are sized by.
+struct VanillaSizes {
+  std::uint32_t gaussians;  // of the scene
+  std::uint32_t entries;    // of all tile lists
+  FrameShape shape;
+};
+
+struct VanillaMemory : MemoryTable<VanillaSizes> {
+  using S = const VanillaSizes&;
+
+  // Slot = scene index.
+  DeviceRow<SplatRecord> records{this, Life::frame, [](S s) { return s.gaussians; }};
+  DeviceRow<float> depth{this, Life::frame, [](S s) { return s.gaussians; }};
+  // Tiles [x, z) x [y, w).
+  DeviceRow<ushort4> box{this, Life::frame, [](S s) { return s.gaussians; }};
+  DeviceRow<std::uint32_t> tile_count{this, Life::frame, [](S s) { return s.gaussians; }};
+  DeviceRow<std::uint32_t> last{this, Life::frame, [](S s) { return s.gaussians; }};  // their sums
+  PinnedRow<std::uint32_t> entries{this, Life::frame, [](S) { return 1; }};  // the last of `last`
+  // By list entry. The sort changes between a row and the `other` one.
+  DeviceRow<std::uint64_t> key{this, Life::frame, [](S s) { return s.entries; }};
+  DeviceRow<std::uint64_t> other_key{this, Life::frame, [](S s) { return s.entries; }};
+  DeviceRow<std::uint32_t> slot{this, Life::frame, [](S s) { return s.entries; }};
+  DeviceRow<std::uint32_t> other_slot{this, Life::frame, [](S s) { return s.entries; }};
+  DeviceRow<uint2> range{this, Life::frame, [](S s) { return s.shape.tiles(); }};
+  DeviceRow<std::byte> scratch{this, Life::frame, [](S s) {
+                                 return std::max(sum_scratch_bytes(s.gaussians),
+                                                 key_sort_scratch_bytes(s.entries, s.shape));
+                               }};
+};
 
 /// The original 3DGS on the same records, as the baseline that speed-ups are measured against:
 /// every Gaussian is tested every frame, a box of three standard deviations decides its tiles, all
@@ -27,20 +59,14 @@ class VanillaPipeline {
   /// the original does, to sort as many. Throws CudaError.
   void draw(const Frame& frame, const std::function<void(Stage)>& mark, cudaStream_t stream);
   /// [tiles], device memory: {first, one past last} list entry of each tile of the last frame.
-  [[nodiscard]] const uint2* ranges() const { return range_.get(); }
-  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] const uint2* ranges() const { return memory_.range.get(); }
+  [[nodiscard]] std::size_t bytes() const { return memory_.bytes(); }
 
  private:
-  // Slot = scene index.
-  DeviceBuffer<SplatRecord> records_;
-  DeviceBuffer<float> depth_;
-  DeviceBuffer<ushort4> box_;                      // tiles [x, z) x [y, w)
-  DeviceBuffer<std::uint32_t> tile_count_, last_;  // `last_`: inclusive sums
-  PinnedBuffer<std::uint32_t> entries_;            // one: the last of `last_`
-  DeviceBuffer<std::uint64_t> key_[2];             // by list entry
-  DeviceBuffer<std::uint32_t> slot_[2];            // likewise
-  DeviceBuffer<uint2> range_;                      // [tiles]
-  DeviceBuffer<std::byte> scratch_;
+  void project(const Frame& frame, cudaStream_t stream);
+  [[nodiscard]] std::uint32_t count_entries(const Frame& frame, cudaStream_t stream);
+
+  VanillaMemory memory_;
 };
 
 }  // namespace catgs::cuda

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs {
 namespace {

@@ -5,7 +5,7 @@
 #define CATGS_MATH_CAMERA_INL_H
 #endif
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/math/constants.h"
 #include "render_core/math/number-inl.h"
 

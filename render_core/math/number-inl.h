@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "render_core/host_device.h"
+#include "render_core/base/host_device.h"
 #include "render_core/math/unit.h"
 
 CATGS_BEFORE_MATH();

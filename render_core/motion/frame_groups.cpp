@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/motion/tile_grid.h"
 
 namespace catgs {

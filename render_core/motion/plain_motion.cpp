@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/motion/portable.h"
 #include "render_core/motion/script_parts.h"
 

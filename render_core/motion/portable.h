@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "render_core/portable.h"
+#include "render_core/base/portable.h"
 
 namespace catgs {
 

@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/motion/portable.h"
 #include "render_core/motion/script_parts.h"
 

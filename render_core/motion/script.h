@@ -9,7 +9,7 @@
 
 namespace catgs {
 
-/// What a scripted pose stream is built from (DESIGN §9). Deterministic for (script, seed, scene
+/// What a scripted pose stream is built from. Deterministic for (script, seed, scene
 /// hints) on every machine.
 struct ScriptOptions {
   std::string script;  // orbit | walk | head | drone | still | tour:FILE

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/math/plane_maps.h"
 
 namespace catgs {

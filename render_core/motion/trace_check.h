@@ -7,9 +7,9 @@
 
 #include <glm/vec3.hpp>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/scene.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 
 namespace catgs {
 

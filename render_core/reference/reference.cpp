@@ -7,8 +7,8 @@
 #include <random>
 #include <utility>
 
-#include "render_core/error.h"
-#include "render_core/host_image.h"
+#include "render_core/base/error.h"
+#include "render_core/image/host_image.h"
 #include "render_core/math/blend-inl.h"
 #include "render_core/math/camera-inl.h"
 #include "render_core/math/colour-inl.h"

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

@@ -6,10 +6,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "render_core/base/radix_sort.h"
 #include "render_core/math/camera-inl.h"
 #include "render_core/math/constants.h"
 #include "render_core/math/ellipse-inl.h"
-#include "render_core/radix_sort.h"
 
 namespace catgs {
 namespace {

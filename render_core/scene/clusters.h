@@ -9,11 +9,11 @@
 
 #include <glm/vec3.hpp>
 
-#include "render_core/camera.h"
-#include "render_core/host_device.h"
+#include "render_core/base/host_device.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/math/camera.h"
 #include "render_core/math/constants.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/thread_pool.h"
 
 namespace catgs {
 

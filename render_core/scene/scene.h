@@ -1,15 +1,12 @@
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <optional>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
@@ -34,7 +31,7 @@ struct Bounds {
   glm::vec3 max{0.0f};
 };
 
-/// How to look at a scene the first time (DESIGN §6): from a sidecar, from the training's
+/// How to look at a scene the first time: from a sidecar, from the training's
 /// cameras.json, or estimated from the Gaussians.
 struct SceneHints {
   glm::vec3 up{0.0f, -1.0f, 0.0f};  // unit, world axes; y points down in 3DGS captures
@@ -54,19 +51,5 @@ struct Scene {
   SanitizeReport report;
   std::vector<std::string> notes;  // for people: what was found beside the scene but not used
 };
-
-struct LoadOptions {
-  std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
-  std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
-  std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
-  int threads = 0;                                // 0: one per core
-};
-
-/// Reads any supported scene: .ply (original and compressed), .splat, .spz, .sog, a streamed or
-/// unpacked SOG folder (or its lod-meta.json, meta.json), a training output folder (its newest
-/// iteration), a folder with a single scene file. Files are told apart by content first. Throws
-/// InputError; one for an unknown format lists these. Memory peaks at the cloud and a few bytes per
-/// Gaussian.
-Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 
 }  // namespace catgs

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "render_core/part_file.h"
+#include "render_core/base/part_file.h"
 
 namespace catgs {
 

@@ -5,10 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "render_core/build_info.h"
-#include "render_core/command_line.h"
-#include "render_core/error.h"
-#include "render_core/printable.h"
+#include "render_core/base/build_info.h"
+#include "render_core/base/command_line.h"
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
 #include "render_core/tools/commands.h"
 
 namespace catgs {

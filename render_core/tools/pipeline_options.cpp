@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/tools/parse_name.h"
 
 namespace catgs {

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/tools/parse_name.h"
 

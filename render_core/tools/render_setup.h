@@ -8,11 +8,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/scene.h"
-#include "render_core/thread_pool.h"
 #include "render_core/tools/pipeline_options.h"
 #include "render_core/tools/scene_options.h"
 

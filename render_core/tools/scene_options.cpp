@@ -7,8 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/renderer.h"
+#include "render_core/scene/files/load_scene.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {

@@ -7,7 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/scene/scene.h"
 
 namespace catgs {

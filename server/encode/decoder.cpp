@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/encode/libav.h"
 
 namespace catgs {

@@ -1,6 +1,6 @@
 #include "server/encode/encoder.h"
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/encode/encoder_input.h"
 #include "server/encode/h264_encoder.h"
 #include "server/encode/jpeg_encoder.h"

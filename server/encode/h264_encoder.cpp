@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/encode/encoder_input.h"
 #include "server/encode/h264_bitstream.h"
 #include "server/encode/h264_level.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/encode/encoder_input.h"
 #include "server/encode/jpeg_color.h"
 #include "server/encode/jpeg_rate.h"

@@ -12,7 +12,7 @@ extern "C" {
 #include <libavutil/log.h>
 }
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs::libav {
 

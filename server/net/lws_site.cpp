@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <strings.h>
 
-#include "render_core/printable.h"
+#include "render_core/base/printable.h"
 #include "server/net/lws_http.h"
 
 namespace catgs {

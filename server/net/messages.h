@@ -10,7 +10,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "server/encode/encoder.h"
 
 namespace catgs {

@@ -14,7 +14,7 @@
 #include <libwebsockets.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/net/accept_gate.h"
 #include "server/net/certificate_watch.h"
 #include "server/net/listen_error.h"

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs {
 namespace {

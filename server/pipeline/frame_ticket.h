@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "server/encode/encoder.h"
 
 namespace catgs {

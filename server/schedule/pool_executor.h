@@ -6,7 +6,7 @@
 #include <memory>
 #include <mutex>
 
-#include "render_core/thread_pool.h"
+#include "render_core/base/thread_pool.h"
 #include "server/schedule/frame_executor.h"
 
 namespace catgs {

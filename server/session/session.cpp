@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "render_core/build_info.h"
+#include "render_core/base/build_info.h"
 #include "server/net/wire.h"
 #include "server/session/frame_size.h"
 #include "server/session/same_view.h"

@@ -11,7 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "render_core/scene/surface_points.h"
+#include "render_core/scene/analysis/surface_points.h"
 #include "server/net/connection.h"
 #include "server/net/messages.h"
 #include "server/schedule/frame_executor.h"

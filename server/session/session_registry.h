@@ -11,7 +11,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
-#include "render_core/device_set.h"
+#include "render_core/base/device_set.h"
 #include "server/metrics.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"

@@ -1,7 +1,7 @@
-// Takes the place of render_core/thread_pool.cpp in the fuzzer: a worker starts when the machine
-// lets it, and what it ran by then would count as reached by the input of that moment, on one
-// machine and not on the next.
-#include "render_core/thread_pool.h"
+// Takes the place of render_core/base/thread_pool.cpp in the fuzzer: a worker starts when the
+// machine lets it, and what it ran by then would count as reached by the input of that moment, on
+// one machine and not on the next.
+#include "render_core/base/thread_pool.h"
 
 namespace catgs {
 

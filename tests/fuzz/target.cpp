@@ -12,7 +12,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "render_core/scene/sanitize.h"
+#include "render_core/scene/files/sanitize.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {

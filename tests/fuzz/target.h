@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "render_core/error.h"
-#include "render_core/scene/byte_source.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/scene/load_context.h"
 #include "tests/fuzz/mutate.h"
 
 namespace catgs::fuzz {

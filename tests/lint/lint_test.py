@@ -8,7 +8,7 @@ import unittest
 
 import lint
 
-CLEAN = ["#pragma once", "#include <vector>", '#include "render_core/camera.h"']
+CLEAN = ["#pragma once", "#include <vector>", '#include "render_core/math/camera.h"']
 
 
 class RuleFindings(unittest.TestCase):
@@ -33,10 +33,14 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("neither server nor wire", "render_core/cpu/a.cpp",
                         '#include "server/session/session.h"')
         self.expect_one("no network", "render_core/scene/a.cpp", "#include <libavcodec/avcodec.h>")
-        self.expect_one("under the renderers", "render_core/scene/a.cpp",
+        self.expect_one("does not lie above", "render_core/scene/a.cpp",
                         '#include "render_core/renderer.h"')
         self.expect_one("chooses a core", "server/main.cpp",
                         '#include "render_core/cpu/cpu_renderer.h"')
+        self.expect_one("does not lie above", "render_core/scene/formats/a.cpp",
+                        '#include "render_core/scene/analysis/a.h"')
+        self.expect_one("is not in LAYERS", "render_core/new/a.cpp", '#include "render_core/base/error.h"')
+        self.expect_one("scene_catalog.cpp alone", "server/main.cpp", '#include "render_core/synth/synth.h"')
         self.expect_one("speaks to the socket", "server/session/a.cpp",
                         "#include <libwebsockets.h>")
         self.expect_one("speaks protobuf", "server/session/a.cpp", '#include "catgs.pb.h"')

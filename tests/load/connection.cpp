@@ -7,7 +7,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/websocket/stream_base.hpp>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/load/pose_replay.h"
 #include "tests/load/waiting.h"
 

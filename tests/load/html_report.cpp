@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "render_core/build_info.h"
+#include "render_core/base/build_info.h"
 #include "server/net/http.h"
 #include "tests/load/svg_plot.h"
 

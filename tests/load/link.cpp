@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {

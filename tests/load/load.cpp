@@ -15,7 +15,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/tools/scene_options.h"
 #include "tests/load/link_proxy.h"

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/motion/trajectory.h"
 #include "tests/load/record.h"
 #include "tests/load/report.h"

@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
-#include "render_core/build_info.h"
-#include "render_core/command_line.h"
-#include "render_core/error.h"
-#include "render_core/printable.h"
+#include "render_core/base/build_info.h"
+#include "render_core/base/command_line.h"
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
 #include "render_core/tools/json_report.h"
 #include "tests/load/html_report.h"
 #include "tests/load/metrics.h"

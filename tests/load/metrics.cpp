@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/metrics/image_quality.h"
 #include "tests/load/options.h"
 #include "tests/load/units.h"

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/load/histogram.h"
 #include "tests/load/pose_replay.h"
 #include "tests/load/requirement.h"

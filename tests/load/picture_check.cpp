@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 #include "server/scene_catalog.h"
 
 namespace catgs::load {

@@ -11,7 +11,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <fmt/format.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/load/clock.h"
 #include "tests/load/link_proxy.h"
 #include "tests/load/pose_tap.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "server/encode/decoder.h"
 #include "tests/load/session_stats.h"
 #include "tests/load/time_series.h"

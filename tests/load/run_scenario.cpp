@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/load/load.h"
 #include "tests/load/picture_check.h"
 

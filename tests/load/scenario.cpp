@@ -9,8 +9,8 @@
 #include <fmt/ranges.h>
 #include <toml++/toml.h>
 
-#include "render_core/error.h"
-#include "render_core/nearest_name.h"
+#include "render_core/base/error.h"
+#include "render_core/base/nearest_name.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {

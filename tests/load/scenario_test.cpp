@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/load/html_report.h"
 #include "tests/load/picture_check.h"
 #include "tests/load/prometheus_text.h"

@@ -20,7 +20,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs::load {
 namespace {

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "proto/catgs.pb.h"
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 
 namespace catgs::load {
 

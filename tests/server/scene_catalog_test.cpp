@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "render_core/scene/save_scene.h"
-#include "render_core/thread_pool.h"
-#include "tests/render_core/scene/encoders.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {

@@ -2,8 +2,8 @@
 
 #include <chrono>
 
-#include "render_core/scene/save_scene.h"
-#include "tests/render_core/scene/encoders.h"
+#include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {

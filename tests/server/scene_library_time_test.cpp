@@ -6,8 +6,8 @@
 #include <future>
 #include <thread>
 
-#include "render_core/scene/save_scene.h"
-#include "render_core/thread_pool.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
 #include "server/metrics.h"
 #include "server/scene_library.h"
 #include "tests/render_core/scene/scene_test_support.h"

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/error.h"
-#include "render_core/scene/save_scene.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/files/save_scene.h"
 #include "server/net/http.h"
-#include "tests/render_core/scene/encoders.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {

@@ -13,12 +13,12 @@
 
 #include <gtest/gtest.h>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
 #include "render_core/renderer.h"
-#include "render_core/scene/synth.h"
-#include "render_core/thread_pool.h"
+#include "render_core/synth/synth.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"

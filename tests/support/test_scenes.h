@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "render_core/camera.h"
+#include "render_core/math/camera.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/gaussian_cloud.h"
 

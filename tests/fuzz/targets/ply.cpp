@@ -1,10 +1,10 @@
-#include "render_core/scene/ply.h"
+#include "render_core/scene/formats/ply.h"
 
 #include <sstream>
 
-#include "render_core/scene/compressed_ply.h"
+#include "render_core/scene/formats/compressed_ply.h"
 #include "tests/fuzz/target.h"
-#include "tests/render_core/scene/encoders.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/scene/hints.h"
-#include "render_core/scene/streamed_sog.h"
+#include "render_core/scene/files/hints.h"
+#include "render_core/scene/formats/streamed_sog.h"
 #include "server/tours.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"

@@ -1,14 +1,14 @@
-#include "render_core/scene/scene_size.h"
+#include "render_core/scene/files/scene_size.h"
 
 #include <sstream>
 
-#include "render_core/scene/compressed_ply.h"
-#include "render_core/scene/file_set.h"
-#include "render_core/scene/ply.h"
-#include "render_core/scene/sog.h"
-#include "render_core/scene/spz.h"
+#include "render_core/scene/formats/compressed_ply.h"
+#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/ply.h"
+#include "render_core/scene/formats/sog.h"
+#include "render_core/scene/formats/spz.h"
 #include "tests/fuzz/target.h"
-#include "tests/render_core/scene/encoders.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {

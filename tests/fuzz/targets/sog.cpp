@@ -1,4 +1,4 @@
-#include "render_core/scene/sog.h"
+#include "render_core/scene/formats/sog.h"
 
 #include <algorithm>
 #include <array>
@@ -11,11 +11,11 @@
 
 #include <fmt/format.h>
 
-#include "render_core/scene/file_set.h"
-#include "render_core/scene/sog_image.h"
-#include "render_core/scene/streamed_sog.h"
+#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/sog_image.h"
+#include "render_core/scene/formats/streamed_sog.h"
 #include "tests/fuzz/target.h"
-#include "tests/render_core/scene/encoders.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {

@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include "render_core/scene/decompress.h"
-#include "render_core/scene/splat.h"
-#include "render_core/scene/spz.h"
+#include "render_core/scene/formats/decompress.h"
+#include "render_core/scene/formats/splat.h"
+#include "render_core/scene/formats/spz.h"
 #include "tests/fuzz/target.h"
-#include "tests/render_core/scene/encoders.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "render_core/motion/trajectory.h"
-#include "render_core/scene/colmap.h"
+#include "render_core/scene/formats/colmap.h"
 #include "server/config.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"

@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/pixel_blocks.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
@@ -23,8 +24,7 @@
 #include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
 #include "render_core/motion/trajectory.h"
-#include "render_core/scene/synth.h"
-#include "render_core/thread_pool.h"
+#include "render_core/synth/synth.h"
 
 namespace catgs {
 namespace {

@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/error.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {

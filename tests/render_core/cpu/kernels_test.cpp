@@ -10,13 +10,13 @@
 
 #include <gtest/gtest.h>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
 #include "render_core/math/camera-inl.h"
 #include "render_core/math/ellipse-inl.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/math/spherical_harmonics-inl.h"
-#include "render_core/thread_pool.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {

@@ -6,10 +6,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <gtest/gtest.h>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/renderer.h"
-#include "render_core/thread_pool.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/catgs_view_tests.h"
 #include "tests/support/rendered.h"

@@ -13,10 +13,10 @@
 #include <cuda_runtime_api.h>
 #include <gtest/gtest.h>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/clusters.h"
-#include "render_core/thread_pool.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 

@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/device_set.h"
-#include "render_core/error.h"
+#include "render_core/base/device_set.h"
+#include "render_core/base/error.h"
 #include "tests/render_core/cuda/device.h"
 #include "tests/support/camera_moves.h"
 

@@ -12,16 +12,11 @@
 #include <gtest/gtest.h>
 
 #include "render_core/math/ellipse-inl.h"
+#include "tests/render_core/cuda/unpack.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs::cuda {
 namespace {
-
-struct Unpacked {
-  PackedGeometry geometry;
-  math::CovarianceFactor<float> factor;
-  std::vector<float> sh;  // without the first, coefficient-major RGB
-};
 
 class PackedScene {
  public:
@@ -34,23 +29,13 @@ class PackedScene {
 
   [[nodiscard]] const PackedCluster& packed() const { return packed_; }
 
-  [[nodiscard]] Unpacked operator[](std::uint32_t i) const {
-    std::vector<std::byte> record(static_cast<std::size_t>(packed_record_bytes(degree_)) + 4);
+  [[nodiscard]] test::Unpacked operator[](std::uint32_t i) const {
     for (int at = 0; at < packed_record_bytes(degree_);) {
       const int width = packed_plane_width(degree_, at);
       EXPECT_EQ(packed_offset(at, width, i) % width, 0u);  // a load of one word
-      std::memcpy(&record[at], &block_[packed_offset(at, width, i)], width);
       at += width;
     }
-    Unpacked out;
-    std::memcpy(&out.geometry, record.data(), sizeof(out.geometry));
-    out.factor = unpack_factor(out.geometry.factor, packed_.units.factor);
-    for (int b = 0; b < packed_sh_bytes(degree_); ++b) {
-      std::uint32_t word = 0;
-      std::memcpy(&word, &record[sizeof(PackedGeometry) + b / 4 * 4], sizeof(word));
-      out.sh.push_back(packed_sh(word, b % 4) * packed_.units.sh[sh_degree_of(1 + b / 3) - 1]);
-    }
-    return out;
+    return test::unpack(block_, packed_.units, degree_, i);
   }
 
  private:
@@ -82,7 +67,7 @@ void expect_close(const GaussianCloud& cloud) {
         largest_sh[sh_degree_of(k)] =
             std::max(largest_sh[sh_degree_of(k)], std::abs(cloud.sh_of(i)[k][c]));
   for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-    const Unpacked u = scene[i];
+    const test::Unpacked u = scene[i];
     for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(u.geometry.mean[axis], cloud.mean[i][axis]);
     EXPECT_NEAR(unpack_log2_opacity(u.geometry.log2_opacity), std::log2(cloud.opacity[i]), 6.2e-5);
     const std::uint16_t base[3] = {u.geometry.base_red, u.geometry.base_green,
@@ -107,12 +92,12 @@ TEST(PackedGaussian, IsWithinRoundingInEveryDegree) {
   for (int degree = 0; degree <= max_sh_degree; ++degree) {
     SCOPED_TRACE(degree);
     for (const std::size_t count : {1, 31, 77, 256})
-      expect_close(test::random_cloud(count, degree, 7 + count));
+      expect_close(catgs::test::random_cloud(count, degree, 7 + count));
   }
 }
 
 TEST(PackedGaussian, FaintOnesStayFaint) {
-  GaussianCloud cloud = test::random_cloud(4, 0, 6);
+  GaussianCloud cloud = catgs::test::random_cloud(4, 0, 6);
   cloud.opacity = {1e-38f, 0.0039f, 0.00393f, 0.99999f};  // 1/255 is between the middle ones
   const PackedScene scene(cloud);
   const auto reach = [&](std::uint32_t i) {
@@ -148,7 +133,7 @@ TEST(PackedGaussian, PlanesCoverTheBlockOnce) {
 
 // A grain beside a mountain keeps its shape, and so do clusters that are all tiny.
 TEST(PackedGaussian, KeepsShapesOfAllSizes) {
-  GaussianCloud cloud = test::random_cloud(256, 0, 1);
+  GaussianCloud cloud = catgs::test::random_cloud(256, 0, 1);
   for (const float largest : {1.0f, 1e6f}) {
     SCOPED_TRACE(largest);
     for (std::size_t i = 0; i < cloud.size(); ++i)
@@ -162,7 +147,7 @@ TEST(PackedGaussian, KeepsShapesOfAllSizes) {
 // The ends of a needle 100000 times as long as thick stay where they are: within 2^-13 of its
 // length.
 TEST(PackedGaussian, KeepsTheDirectionOfNeedles) {
-  GaussianCloud cloud = test::random_cloud(256, 0, 2);
+  GaussianCloud cloud = catgs::test::random_cloud(256, 0, 2);
   for (glm::vec3& scale : cloud.scale) scale = {1.0f, 1e-5f, 1e-5f};
   const PackedScene scene(cloud);
   for (std::uint32_t i = 0; i < cloud.size(); ++i) {
@@ -179,7 +164,7 @@ TEST(PackedGaussian, KeepsTheDirectionOfNeedles) {
 }
 
 TEST(PackedGaussian, HarmonicsOfOneColourNeedNoRange) {
-  GaussianCloud cloud = test::random_cloud(40, 3, 3);
+  GaussianCloud cloud = catgs::test::random_cloud(40, 3, 3);
   for (std::size_t i = 0; i < cloud.size(); ++i)
     for (int k = 1; k < cloud.sh_count(); ++k) cloud.sh[i * 16 + k] = glm::vec3(0.0f);
   const PackedScene scene(cloud);
@@ -189,11 +174,11 @@ TEST(PackedGaussian, HarmonicsOfOneColourNeedNoRange) {
 
 // Rounding must not shift a scene's colour: errors cancel.
 TEST(PackedGaussian, RoundsHarmonicsWithoutBias) {
-  const GaussianCloud cloud = test::random_cloud(256, 3, 4);
+  const GaussianCloud cloud = catgs::test::random_cloud(256, 3, 4);
   const PackedScene scene(cloud);
   double error = 0.0, magnitude = 0.0;
   for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-    const Unpacked u = scene[i];
+    const test::Unpacked u = scene[i];
     for (int b = 0; b < 45; ++b) {
       const double e = u.sh[b] - cloud.sh_of(i)[1 + b / 3][b % 3];
       error += e;
@@ -206,12 +191,12 @@ TEST(PackedGaussian, RoundsHarmonicsWithoutBias) {
 
 // Clusters are culled by bounds that hold for what is drawn.
 TEST(PackedGaussian, BoundsHoldForWhatIsPacked) {
-  GaussianCloud cloud = test::random_cloud(256, 0, 5);
+  GaussianCloud cloud = catgs::test::random_cloud(256, 0, 5);
   for (glm::vec3& scale : cloud.scale) scale.y = 1e-4f * scale.x;
   const PackedScene scene(cloud);
   const Cluster& bounds = scene.packed().bounds;
   for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-    const Unpacked u = scene[i];
+    const test::Unpacked u = scene[i];
     double variance = 0.0;
     for (const double entry : entries(u.factor)) variance += entry * entry;
     const double visible = 255.0 * std::exp2(unpack_log2_opacity(u.geometry.log2_opacity));

@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
-#include "render_core/host_image.h"
+#include "render_core/base/error.h"
+#include "render_core/image/host_image.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render_core/host_device.h"
+#include "render_core/base/host_device.h"
 #include "render_core/math/blend-inl.h"
 #include "render_core/math/camera-inl.h"
 #include "render_core/math/colour-inl.h"

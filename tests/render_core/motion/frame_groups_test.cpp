@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "render_core/math/homography-inl.h"
 
 namespace catgs {

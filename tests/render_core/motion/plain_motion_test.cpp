@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 
 namespace catgs {
 namespace {

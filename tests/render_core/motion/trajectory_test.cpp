@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {

@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "render_core/thread_pool.h"
+#include "render_core/base/thread_pool.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {

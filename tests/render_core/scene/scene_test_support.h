@@ -10,11 +10,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
-#include "render_core/scene/byte_source.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/ply.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/scene/load_context.h"
-#include "render_core/scene/ply.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/temporary_folder.h"
 

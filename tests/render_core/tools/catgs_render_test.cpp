@@ -13,7 +13,7 @@
 
 #include "render_core/image/png.h"
 #include "render_core/motion/trajectory.h"
-#include "render_core/scene/save_scene.h"
+#include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/tools/run_catgs_render.h"
 #include "tests/support/temporary_folder.h"
 

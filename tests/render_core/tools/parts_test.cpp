@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
-#include "render_core/tools/bench_measure.h"
-#include "render_core/tools/bench_quality.h"
+#include "render_core/base/error.h"
+#include "render_core/tools/bench/bench_measure.h"
+#include "render_core/tools/bench/bench_quality.h"
 #include "render_core/tools/pipeline_options.h"
 #include "render_core/tools/render_setup.h"
 #include "render_core/tools/scene_hash.h"

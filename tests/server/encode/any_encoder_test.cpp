@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/encode/decoder.h"
 #include "server/encode/encoder.h"
 #include "server/encode/test_picture.h"

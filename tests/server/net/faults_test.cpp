@@ -13,10 +13,10 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "render_core/base/device_set.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/device_set.h"
-#include "render_core/scene/save_scene.h"
-#include "render_core/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
 #include "server/log.h"
 #include "server/scene_library.h"
 #include "server/schedule/frame_executor.h"

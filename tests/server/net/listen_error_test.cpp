@@ -8,7 +8,7 @@
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/net/net_server.h"
 #include "tests/support/temporary_folder.h"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/scene/save_scene.h"
+#include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/support/server_client.h"
 

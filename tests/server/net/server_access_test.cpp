@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/error.h"
+#include "render_core/base/error.h"
 #include "server/access.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"

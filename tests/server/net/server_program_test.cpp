@@ -15,7 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "render_core/scene/save_scene.h"
+#include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"

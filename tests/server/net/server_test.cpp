@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/error.h"
-#include "render_core/scene/save_scene.h"
-#include "render_core/scene/synth.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/files/save_scene.h"
+#include "render_core/synth/synth.h"
 #include "server/encode/decoder.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"

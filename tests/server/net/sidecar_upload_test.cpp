@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/scene/save_scene.h"
-#include "render_core/scene/synth.h"
+#include "render_core/scene/files/save_scene.h"
+#include "render_core/synth/synth.h"
 #include "server/access.h"
 #include "server/net/http.h"
 #include "tests/support/raw_socket.h"

@@ -17,8 +17,8 @@
 #include <gtest/gtest.h>
 
 #include "proto/catgs.pb.h"
+#include "render_core/cuda/place_view.h"
 #include "render_core/device_error.h"
-#include "render_core/place_view.h"
 #include "server/schedule/pool_executor.h"
 #include "server/session/session_registry.h"
 

@@ -1,0 +1,109 @@
+#include "render_core/base/thread_pool.h"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <utility>
+
+#include <sched.h>
+
+namespace catgs {
+
+int processors() {
+  cpu_set_t allowed;
+  if (sched_getaffinity(0, sizeof(allowed), &allowed) == 0) return CPU_COUNT(&allowed);
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+struct ThreadPool::Loop {
+  Loop(std::size_t n, BodyRef f) : count(n), body(f) {}
+
+  const std::size_t count;
+  const BodyRef body;
+  std::atomic<std::size_t> next{0};
+  int helpers = 0;  // workers inside run(); guarded by the pool's mutex
+  std::condition_variable left;
+  std::exception_ptr failure;  // the first; guarded by the pool's mutex
+
+  void run(std::mutex& mutex) {
+    try {
+      for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i);
+    } catch (...) {
+      next.store(count, std::memory_order_relaxed);
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::current_exception();
+    }
+  }
+};
+
+ThreadPool::ThreadPool(int threads) : threads_(threads > 0 ? threads : processors()) {
+  workers_.reserve(static_cast<std::size_t>(threads_));
+  for (int i = 0; i < threads_; ++i)
+    workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+}
+
+ThreadPool::~ThreadPool() {
+  for (auto& worker : workers_) worker.request_stop();
+  wake_.notify_all();
+  workers_.clear();
+}
+
+void ThreadPool::submit(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back(std::move(task));
+  }
+  wake_.notify_one();
+}
+
+void ThreadPool::run_loop(std::size_t count, BodyRef body) {
+  if (threads_ == 1 || count <= 1) {
+    for (std::size_t i = 0; i < count; ++i) body(i);
+    return;
+  }
+  Loop loop(count, body);
+  {
+    const std::lock_guard lock(mutex_);
+    loops_.push_back(&loop);
+  }
+  wake_.notify_all();
+  loop.run(mutex_);
+  std::unique_lock lock(mutex_);
+  std::erase(loops_, &loop);
+  loop.left.wait(lock, [&] { return loop.helpers == 0; });
+  if (loop.failure) std::rethrow_exception(loop.failure);
+}
+
+ThreadPool::Loop* ThreadPool::loop_to_help() const {
+  // The caller of a loop works on it too, hence one helper fewer than threads.
+  const auto loop = std::find_if(loops_.begin(), loops_.end(),
+                                 [this](const Loop* l) { return l->helpers < threads_ - 1; });
+  return loop == loops_.end() ? nullptr : *loop;
+}
+
+void ThreadPool::work(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, stop, [this] { return !tasks_.empty() || loop_to_help() != nullptr; });
+    if (!tasks_.empty()) {
+      auto task = std::move(tasks_.front());
+      tasks_.pop_front();
+      lock.unlock();
+      task();
+      task = nullptr;
+      lock.lock();
+    } else if (Loop* loop = loop_to_help()) {
+      ++loop->helpers;
+      lock.unlock();
+      loop->run(mutex_);
+      lock.lock();
+      // Its indices are handed out: nobody else needs to look at it.
+      std::erase(loops_, loop);
+      if (--loop->helpers == 0) loop->left.notify_all();
+    } else if (stop.stop_requested()) {
+      return;
+    }
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/renderer.h"
+
+namespace catgs::cuda {
+
+/// What the counts of a finished frame say: all statistics but kind, window and times. `near_z`:
+/// that of the frame's camera.
+FrameStats frame_stats(const FrameCounts& counts, const FrameShape& shape, FrameKind kind,
+                       float near_z);
+
+/// As View::tile_loads(), on the current device. `ranges`: [tiles], device memory. Waits for the
+/// device; throws CudaError.
+std::vector<std::uint32_t> tile_loads(const FrameShape& shape, const uint2* ranges);
+
+}  // namespace catgs::cuda

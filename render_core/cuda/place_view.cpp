@@ -1,0 +1,29 @@
+#include "render_core/cuda/place_view.h"
+
+#include <optional>
+#include <utility>
+
+#include "render_core/device_error.h"
+
+namespace catgs {
+
+std::unique_ptr<View> place_view(
+    DeviceSet& set, std::vector<int> devices,
+    const std::function<std::unique_ptr<View>(DeviceSet::Place place)>& make) {
+  std::optional<DeviceError> full;
+  for (;;) {
+    DeviceSet::Place place = set.take(devices);
+    const int index = place.device();
+    try {
+      return make(std::move(place));
+    } catch (const DeviceError& error) {
+      if (error.status_code() == RenderStatus::Code::out_of_memory) full = error;
+      std::erase(devices, index);
+      if (!devices.empty()) continue;
+      if (full) throw DeviceError(*full);
+      throw;
+    }
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,26 @@
+#include <algorithm>
+
+#include "render_core/cuda/sort.cuh"
+#include "render_core/cuda/view_memory.cuh"
+
+namespace catgs::cuda {
+
+bool speculates(const ViewSettings& settings) {
+  return settings.pipeline == Pipeline::catgs && settings.speculation.initial_window > 0;
+}
+
+bool turns_tiles(const ViewSettings& settings) {
+  return speculates(settings) && settings.speculation.grid == GridKind::warp;
+}
+
+std::size_t ViewSizes::scratch_bytes() const {
+  if (shape.tiles() == 0) return 0;  // of a View without such lists
+  return std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene.cluster_count));
+}
+
+std::size_t ViewSizes::host_image_bytes() const {
+  if (makes_video()) return pixels() + pixels() / 2;
+  return settings.space == MemorySpace::host ? 3 * sizeof(float) * pixels() : 0;
+}
+
+}  // namespace catgs::cuda

@@ -1,0 +1,54 @@
+#include "render_core/frame_driver.h"
+
+#include <cassert>
+#include <exception>
+
+#include "render_core/device_error.h"
+
+namespace catgs {
+
+FrameDriver::FrameDriver(const ViewSettings& settings)
+    : settings_(settings), groups_(settings.speculation) {}
+
+RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, const Draw& draw,
+                                 const Forget& forget) noexcept {
+  if (RenderStatus bad = check_request(request, settings_.format); !bad.ok()) return bad;
+  try {
+    FramePlan plan = this->plan(request);
+    std::optional<FrameView> drawn = draw(plan);
+    if (!drawn) {
+      assert(plan.kind == FrameKind::sub);
+      // Without a window: where one comes after the other, no frame after this is drawn in vain.
+      groups_.forget();
+      plan = groups_.plan(request.camera, std::nullopt, depths_);
+      drawn = draw(plan);
+      assert(drawn);
+    }
+    drawn->stats.kind = plan.kind;
+    drawn->stats.window = plan.window;
+    depths_ = {drawn->stats.nearest_depth, drawn->stats.mean_inverse_depth};
+    if (settings_.speculation.cost_aware)
+      costs_.note(plan.kind, plan.window, drawn->stats.total_ms());
+    frame = *drawn;
+    return {};
+  } catch (const std::exception& error) {
+    groups_.forget();
+    costs_.forget();
+    forget();
+    return status_of(error);
+  }
+}
+
+/// What the lists of the frame cover: its own picture alone, unless they are for sub-frames too.
+FramePlan FrameDriver::plan(const FrameRequest& request) {
+  const Camera& camera = request.camera;
+  if (settings_.pipeline == Pipeline::catgs)
+    return groups_.plan(camera, costs_.pays() ? request.forecast : std::nullopt, depths_);
+  FramePlan plan;
+  plan.window_end = camera;
+  plan.grid = image_grid(camera.size_px);
+  plan.list_near_z = camera.near_z;
+  return plan;
+}
+
+}  // namespace catgs

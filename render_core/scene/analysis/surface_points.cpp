@@ -1,0 +1,106 @@
+#include "render_core/scene/analysis/surface_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render_core/scene/clusters.h"
+
+namespace catgs {
+namespace {
+
+/// Of a disc with the area that the Gaussian covers when it is seen from its broad side.
+float disc_radius(const glm::vec3& scale) {
+  const float smallest = std::min({scale.x, scale.y, scale.z});
+  const float product = scale.x * scale.y * scale.z;
+  return std::sqrt(product / std::max(smallest, 1e-12f));
+}
+
+/// Beyond so many standard deviations there is nothing to see.
+constexpr float reach = 3.0f;
+
+/// Where a ray comes nearest to a point: how far along it, and the squared distance there.
+struct Approach {
+  float along, beside2;
+};
+
+Approach approach(const glm::vec3& origin, const glm::vec3& direction, const glm::vec3& point) {
+  const glm::vec3 offset = point - origin;
+  const float along = glm::dot(offset, direction);
+  // Not as a difference of squares, which has lost its digits where the point is far.
+  const glm::vec3 beside = offset - along * direction;
+  return {along, glm::dot(beside, beside)};
+}
+
+}  // namespace
+
+SurfacePoints::SurfacePoints(const GaussianCloud& cloud, ThreadPool& pool, std::size_t max_points) {
+  const std::size_t step = std::max<std::size_t>(
+      1, (cloud.size() + max_points - 1) / std::max<std::size_t>(1, max_points));
+  const float growth = std::sqrt(static_cast<float>(step));  // of the discs that stand for `step`
+  // One out of each `step`, not always the same: many files are ordered row by row.
+  std::vector<std::size_t> chosen;
+  std::vector<glm::vec3> centres;
+  std::uint32_t lot = 1;
+  for (std::size_t first = 0; first < cloud.size(); first += step) {
+    lot = lot * 1664525u + 1013904223u;
+    chosen.push_back(std::min(first + (lot >> 8) % step, cloud.size() - 1));
+    centres.push_back(cloud.mean[chosen.back()]);
+  }
+  points_.reserve(chosen.size());
+  for (const std::uint32_t k : morton_order(centres, pool)) {
+    const std::size_t i = chosen[k];
+    points_.push_back({centres[k], growth * disc_radius(cloud.scale[i]), cloud.opacity[i]});
+  }
+  clusters_.resize(clusters_of(points_.size()));
+  for (std::size_t c = 0; c < clusters_.size(); ++c) clusters_[c] = around(points_of(c));
+}
+
+std::span<const SurfacePoints::Point> SurfacePoints::points_of(std::size_t cluster) const {
+  const std::size_t first = cluster * cluster_size;
+  return std::span(points_).subspan(first, std::min(cluster_size, points_.size() - first));
+}
+
+SurfacePoints::Ball SurfacePoints::around(std::span<const Point> points) {
+  glm::vec3 low = points.front().centre, high = low;
+  for (const Point& point : points) {
+    low = glm::min(low, point.centre);
+    high = glm::max(high, point.centre);
+  }
+  Ball ball{0.5f * (low + high)};
+  for (const Point& point : points)
+    ball.radius =
+        std::max(ball.radius, glm::distance(ball.centre, point.centre) + reach * point.sigma);
+  return ball;
+}
+
+std::optional<float> SurfacePoints::distance_along(const glm::vec3& origin,
+                                                   const glm::vec3& direction) const {
+  std::vector<std::pair<float, float>> stops;  // distance, alpha
+  for (std::size_t c = 0; c < clusters_.size(); ++c) {
+    const Ball& ball = clusters_[c];
+    const Approach passes = approach(origin, direction, ball.centre);
+    if (passes.along < -ball.radius || passes.beside2 > ball.radius * ball.radius) continue;
+    for (const Point& point : points_of(c)) {
+      const auto [along, beside2] = approach(origin, direction, point.centre);
+      const float sigma2 = point.sigma * point.sigma;
+      // Nobody points at what the camera stands in.
+      if (along <= point.sigma || beside2 > reach * reach * sigma2) continue;
+      stops.emplace_back(along, point.opacity * std::exp(-0.5f * beside2 / sigma2));
+    }
+  }
+  std::ranges::sort(stops);
+  float left = 1.0f;
+  for (const auto& [distance, alpha] : stops) {
+    left *= 1.0f - alpha;
+    if (left <= 0.5f) return distance;
+  }
+  return std::nullopt;
+}
+
+}  // namespace catgs

@@ -1,0 +1,76 @@
+#include "render_core/scene/analysis/voxel_grid.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/mat3x3.hpp>
+
+namespace catgs {
+
+namespace {
+
+constexpr std::size_t max_sample = std::size_t{1} << 19;
+constexpr float two_pi = 6.2831853f;
+
+}  // namespace
+
+VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const glm::vec3& centre, float half_size)
+    : corner_(centre - half_size),
+      cell_size_(2.0f * half_size / static_cast<float>(cells_per_side)),
+      depth_(static_cast<std::size_t>(cells_per_side) * cells_per_side * cells_per_side) {
+  const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_sample - 1) / max_sample);
+  for (std::size_t i = 0; i < cloud.size(); i += step)
+    add_gaussian(cloud, i, static_cast<float>(step));
+}
+
+/// A Gaussian stops opacity * 2 pi s t of the light (its integral over the plane of its two larger
+/// standard deviations). Those larger than a cell are spread over points of that plane.
+void VoxelGrid::add_gaussian(const GaussianCloud& cloud, std::size_t i, float weight) {
+  const glm::vec3& scale = cloud.scale[i];
+  std::array<int, 3> axes = {0, 1, 2};
+  std::sort(axes.begin(), axes.end(), [&](int a, int b) { return scale[a] > scale[b]; });
+  const glm::mat3 rotation = glm::mat3_cast(cloud.rotation[i]);
+  const glm::vec3 u = rotation[axes[0]] * scale[axes[0]], v = rotation[axes[1]] * scale[axes[1]];
+  const float area = cloud.opacity[i] * two_pi * scale[axes[0]] * scale[axes[1]] * weight;
+  const auto points = [&](float s) {
+    return static_cast<int>(std::clamp(std::ceil(2.0f * s / cell_size_), 1.0f, 8.0f));
+  };
+  const int rows = points(scale[axes[0]]), columns = points(scale[axes[1]]);
+  const auto place = [](int k, int n) {  // -1.5…1.5 standard deviations, evenly
+    return 1.5f * (static_cast<float>(2 * k + 1) / static_cast<float>(n) - 1.0f);
+  };
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column)
+      add(cloud.mean[i] + u * place(row, rows) + v * place(column, columns),
+          area / static_cast<float>(rows * columns));
+}
+
+const float* VoxelGrid::cell_at(const glm::vec3& position) const {
+  const glm::vec3 cell = (position - corner_) / cell_size_;
+  for (int k = 0; k < 3; ++k)
+    if (!(cell[k] >= 0.0f && cell[k] < static_cast<float>(cells_per_side))) return nullptr;
+  const glm::ivec3 c(cell);
+  return depth_.data() + (c.z * cells_per_side + c.y) * cells_per_side + c.x;
+}
+
+void VoxelGrid::add(const glm::vec3& position, float area) {
+  if (const float* cell = cell_at(position))
+    depth_[static_cast<std::size_t>(cell - depth_.data())] += area / (cell_size_ * cell_size_);
+}
+
+float VoxelGrid::depth_at(const glm::vec3& position) const {
+  const float* cell = cell_at(position);
+  return cell ? *cell : 0.0f;
+}
+
+float VoxelGrid::depth_around(const glm::vec3& position) const {
+  float sum = 0.0f;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z) sum += depth_at(position + cell_size_ * glm::vec3(x, y, z));
+  return sum;
+}
+
+}  // namespace catgs

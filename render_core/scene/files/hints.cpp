@@ -1,0 +1,233 @@
+#include "render_core/scene/files/hints.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/analysis/first_sight.h"
+#include "render_core/scene/formats/json_field.h"
+
+namespace catgs {
+
+namespace {
+
+constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
+constexpr std::uint64_t max_cameras_bytes = 16 << 20;  // 10,000 cameras take 5 MiB
+
+glm::vec3 parse_up(const JsonField& field) {
+  if (field.value().is_string()) {
+    const std::string name = field.text();
+    const std::string_view axis = name.size() == 2 && (name[0] == '+' || name[0] == '-')
+                                      ? std::string_view(name).substr(1)
+                                      : std::string_view(name);
+    const std::size_t k = axis.size() == 1 ? std::string_view("xyz").find(axis) : 3;
+    if (k >= 3) field.fail("is no axis", "write \"-y\", \"+z\", … or [x, y, z]");
+    glm::vec3 up(0.0f);
+    up[static_cast<int>(k)] = name[0] == '-' ? -1.0f : 1.0f;
+    return up;
+  }
+  const glm::dvec3 up = field.vec3();  // squares of large floats are no floats
+  if (glm::length(up) < 1e-6) field.fail("has no direction");
+  return glm::normalize(up);
+}
+
+Sidecar::StartPose parse_start_pose(const JsonField& field) {
+  Sidecar::StartPose pose;
+  pose.position = field.at("position").place();
+  const auto orientation = field.find("orientation");
+  if (const auto target = field.find("look_at")) {
+    if (orientation) field.fail("has both 'look_at' and 'orientation'", "keep one");
+    pose.look_at = target->place();
+    if (*pose.look_at == pose.position) target->fail("is the position itself");
+  } else {
+    const std::vector<float> q = field.at("orientation").numbers(4);
+    pose.orientation = glm::quat(q[3], q[0], q[1], q[2]);
+    if (std::abs(glm::length(pose.orientation) - 1.0f) > 0.01f)
+      orientation->fail("is no unit quaternion x, y, z, w");
+    pose.orientation = glm::normalize(pose.orientation);
+  }
+  return pose;
+}
+
+Bounds parse_limits(const JsonField& field) {
+  const Bounds limits{field.at("min").place(), field.at("max").place()};
+  for (int k = 0; k < 3; ++k)
+    if (!(limits.min[k] < limits.max[k])) field.fail("'min' is not below 'max' on every axis");
+  return limits;
+}
+
+/// `rows`: 3 x 3 or 4 x 4 numbers; the rotation part must be one.
+glm::mat3 parse_rotation(const JsonField& rows, std::size_t size) {
+  if (rows.size() != size) rows.fail(fmt::format("is not a {0}x{0} matrix", size));
+  glm::mat3 rotation;
+  for (int r = 0; r < 3; ++r) {
+    const auto row = rows[static_cast<std::size_t>(r)].numbers(size);
+    for (int c = 0; c < 3; ++c) rotation[c][r] = row[static_cast<std::size_t>(c)];
+  }
+  // A determinant of 1 alone may be a shear's, with numbers of any size.
+  bool is_rotation = std::abs(glm::determinant(rotation) - 1.0f) < 0.05f;
+  for (int c = 0; c < 3; ++c)
+    is_rotation = is_rotation && std::abs(glm::length(rotation[c]) - 1.0f) < 0.05f;
+  if (!is_rotation) rows.fail("is no rotation");
+  return rotation;
+}
+
+struct CameraFile {
+  std::string source;
+  std::vector<Pose> poses;
+};
+
+CameraFile find_cameras(const HintFiles& files, std::vector<std::string>& notes) {
+  const auto try_file = [&](const std::filesystem::path& path, auto read) -> CameraFile {
+    std::error_code error;
+    if (path.empty() || !std::filesystem::is_regular_file(path, error)) return {};
+    try {
+      return {path.filename().string(), read(FileSource(path))};
+    } catch (const InputError& e) {
+      notes.push_back(fmt::format("not used: {}", e.what()));
+      return {};
+    }
+  };
+  CameraFile cameras = try_file(files.cameras, read_cameras_json);
+  if (cameras.poses.empty()) cameras = try_file(files.transforms, read_transforms_json);
+  return cameras;
+}
+
+/// Mean of the cameras' up; empty where they cancel out, as for a drone that looks straight down.
+std::optional<glm::vec3> mean_up(const std::vector<Pose>& poses) {
+  glm::vec3 sum(0.0f);
+  for (const Pose& pose : poses) sum += pose.orientation * glm::vec3(0.0f, -1.0f, 0.0f);
+  if (glm::length(sum) < 0.2f * static_cast<float>(poses.size()) || poses.empty())
+    return std::nullopt;
+  return glm::normalize(sum);
+}
+
+void use_cameras(const CameraFile& cameras, SceneHints& hints) {
+  const Pose& first = cameras.poses.front();
+  const glm::vec3 forward = first.orientation * glm::vec3(0.0f, 0.0f, 1.0f);
+  const float ahead = glm::dot(hints.focus - first.position, forward);
+  const float scene_size = glm::distance(hints.limits.min, hints.limits.max);
+  hints.focus = first.position + forward * std::max(ahead, 0.02f * scene_size);
+  hints.start_pose = look_at(first.position, hints.focus, hints.up);
+  Bounds box{first.position, first.position};
+  for (const Pose& pose : cameras.poses) {
+    box.min = glm::min(box.min, pose.position);
+    box.max = glm::max(box.max, pose.position);
+  }
+  const float margin = std::max(0.5f * glm::distance(box.min, box.max), hints.near_z);
+  hints.limits = {box.min - margin, box.max + margin};
+  hints.source = cameras.source;
+}
+
+}  // namespace
+
+Sidecar read_sidecar(const ByteSource& file) {
+  const nlohmann::json document = read_json(file, max_sidecar_bytes);
+  const JsonField root(file.name(), document);
+  if (!document.is_object()) root.fail("is not a JSON object");
+  static constexpr std::array known = {"up", "start_pose", "near", "limits", "focus", "tours"};
+  for (const auto& [key, value] : document.items())
+    if (std::find(known.begin(), known.end(), key) == known.end())
+      root.fail(fmt::format("unknown field '{}'", key),
+                fmt::format("known are {}", fmt::join(known, ", ")));
+
+  Sidecar sidecar;
+  if (const auto up = root.find("up")) sidecar.up = parse_up(*up);
+  if (const auto pose = root.find("start_pose")) sidecar.start_pose = parse_start_pose(*pose);
+  if (const auto near = root.find("near")) {
+    sidecar.near_z = near->number();
+    if (*sidecar.near_z <= 0.0f) near->fail("is not positive");
+    if (*sidecar.near_z > max_coordinate)
+      near->fail(fmt::format("is beyond {} units", max_coordinate));
+  }
+  if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits);
+  if (const auto focus = root.find("focus")) sidecar.focus = focus->place();
+  return sidecar;
+}
+
+void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints) {
+  if (sidecar.up) hints.up = *sidecar.up;
+  if (sidecar.near_z) hints.near_z = *sidecar.near_z;
+  if (sidecar.limits) hints.limits = *sidecar.limits;
+  if (sidecar.focus) hints.focus = *sidecar.focus;
+  if (const auto& start = sidecar.start_pose) {
+    hints.start_pose = start->look_at ? look_at(start->position, *start->look_at, hints.up)
+                                      : Pose{start->position, start->orientation};
+    if (start->look_at && !sidecar.focus) hints.focus = *start->look_at;
+  }
+  hints.source = fmt::format("sidecar {}", name);
+}
+
+std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
+  return std::filesystem::path(scene_file).replace_extension(".json");
+}
+
+void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
+  const auto triple = [](const glm::vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
+  const glm::quat& q = hints.start_pose.orientation;
+  const nlohmann::ordered_json document = {
+      {"up", triple(hints.up)},
+      {"start_pose",
+       {{"position", triple(hints.start_pose.position)}, {"orientation", {q.x, q.y, q.z, q.w}}}},
+      {"near", hints.near_z},
+      {"limits", {{"min", triple(hints.limits.min)}, {"max", triple(hints.limits.max)}}},
+      {"focus", triple(hints.focus)}};
+  std::ofstream file(path);
+  file << document.dump(2) << '\n';
+  file.close();
+  if (!file.good()) throw InputError(path.string(), "", "cannot be written");
+}
+
+std::vector<Pose> read_cameras_json(const ByteSource& file) {
+  const nlohmann::json document = read_json(file, max_cameras_bytes);
+  std::vector<Pose> poses;
+  const JsonField cameras(file.name(), document);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const JsonField camera = cameras[i];
+    poses.push_back({camera.at("position").place(),
+                     glm::normalize(glm::quat_cast(parse_rotation(camera.at("rotation"), 3)))});
+  }
+  return poses;
+}
+
+std::vector<Pose> read_transforms_json(const ByteSource& file) {
+  const nlohmann::json document = read_json(file, max_cameras_bytes);
+  std::vector<Pose> poses;
+  const JsonField frames = JsonField(file.name(), document).at("frames");
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const JsonField matrix = frames[i].at("transform_matrix");
+    glm::mat3 rotation = parse_rotation(matrix, 4);
+    rotation[1] = -rotation[1];  // OpenGL cameras: y up, z back
+    rotation[2] = -rotation[2];
+    glm::vec3 position;
+    for (int r = 0; r < 3; ++r) position[r] = matrix[static_cast<std::size_t>(r)].numbers(4)[3];
+    poses.push_back({matrix.as_place(position), glm::normalize(glm::quat_cast(rotation))});
+  }
+  return poses;
+}
+
+SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
+                      std::vector<std::string>& notes) {
+  std::error_code error;
+  std::optional<Sidecar> sidecar;
+  if (!files.sidecar.empty() && std::filesystem::is_regular_file(files.sidecar, error))
+    sidecar = read_sidecar(FileSource(files.sidecar));
+  const CameraFile cameras = find_cameras(files, notes);
+
+  std::optional<glm::vec3> up = mean_up(cameras.poses);
+  if (sidecar && sidecar->up) up = sidecar->up;
+  SceneHints hints = up ? estimate_hints(cloud, *up) : estimate_hints(cloud);
+  if (!cameras.poses.empty()) use_cameras(cameras, hints);
+  if (sidecar) use_sidecar(*sidecar, files.sidecar.filename().string(), hints);
+  return hints;
+}
+
+}  // namespace catgs

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render_core/math/camera.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/scene.h"
+
+namespace catgs {
+
+/// What somebody wrote down about a scene in `<scene>.json`. All fields are optional:
+///
+///   "up":         "-y", "+z", … or [x, y, z]
+///   "start_pose": {"position": [x, y, z], "look_at": [x, y, z]}
+///                 or {"position": [x, y, z], "orientation": [qx, qy, qz, qw]}
+///   "near":       world units
+///   "limits":     {"min": [x, y, z], "max": [x, y, z]}
+///   "focus":      [x, y, z]
+///   "tours":      for pages, see web_client/README.md
+struct Sidecar {
+  struct StartPose {
+    glm::vec3 position{0.0f};
+    std::optional<glm::vec3> look_at;
+    glm::quat orientation{1.0f, 0.0f, 0.0f, 0.0f};  // when look_at is not given
+  };
+  std::optional<glm::vec3> up;  // unit
+  std::optional<StartPose> start_pose;
+  std::optional<float> near_z;
+  std::optional<Bounds> limits;
+  std::optional<glm::vec3> focus;
+};
+
+/// Throws InputError naming the field, also for fields that are not known.
+Sidecar read_sidecar(const ByteSource& file);
+
+/// Puts the sidecar's fields in the place of those hints. `name`: of its file.
+void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints);
+
+/// Where the sidecar of a scene file is: "city.ply" -> "city.json".
+std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
+
+/// Writes all of the hints as a sidecar. Throws InputError when that fails.
+void write_sidecar(const SceneHints& hints, const std::filesystem::path& path);
+
+/// Poses of a training's cameras.json (array of position, 3x3 rotation from camera axes).
+std::vector<Pose> read_cameras_json(const ByteSource& file);
+
+/// Poses of a transforms.json (frames with a 4x4 world-from-camera matrix, OpenGL axes).
+std::vector<Pose> read_transforms_json(const ByteSource& file);
+
+/// Where hints may be found; empty paths are not looked at.
+struct HintFiles {
+  std::filesystem::path sidecar;
+  std::filesystem::path cameras;
+  std::filesystem::path transforms;
+};
+
+/// The sidecar's fields first, then what follows from the training cameras (first camera, their
+/// mean up, the box around them grown by half its diagonal), then estimate_hints. A sidecar with a
+/// mistake throws InputError; unusable camera files, which nobody wrote for us, only add a note.
+SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
+                      std::vector<std::string>& notes);
+
+}  // namespace catgs

@@ -1,0 +1,98 @@
+#include "render_core/scene/files/load_scene.h"
+
+#include <array>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/sanitize.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/compressed_ply.h"
+#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/ply.h"
+#include "render_core/scene/formats/sog.h"
+#include "render_core/scene/formats/splat.h"
+#include "render_core/scene/formats/spz.h"
+#include "render_core/scene/formats/streamed_sog.h"
+#include "render_core/scene/scene.h"
+
+namespace catgs {
+
+namespace {
+
+struct Decoded {
+  std::string format;
+  GaussianCloud cloud;
+};
+
+Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
+  const PlyHeader header = read_ply_header(file);
+  if (is_compressed_ply(header))
+    return {"compressed ply", read_compressed_ply(file, header, context)};
+  return {"3DGS ply", read_ply(file, header, context)};
+}
+
+/// Files are told apart by their first bytes; .splat has none of its own and goes by its name.
+Decoded read_file(const std::filesystem::path& path, const LoadContext& context) {
+  const FileSource file(path);
+  std::array<char, 4> magic{};
+  const auto start = std::span(magic).first(std::min<std::uint64_t>(4, file.size()));
+  file.read(0, std::as_writable_bytes(start));
+  const std::string_view begins(start.data(), start.size());
+  if (begins.starts_with("ply")) return read_any_ply(file, context);
+  if (begins == "PK\x03\x04") {
+    SogFile sog = read_sog(ZipFiles(file), "meta.json", context);
+    return {fmt::format("sog v{} (zip)", sog.version), std::move(sog.cloud)};
+  }
+  if (is_spz(file)) {
+    SpzFile spz = read_spz(file, context);
+    return {fmt::format("spz v{}", spz.version), std::move(spz.cloud)};
+  }
+  if (path.extension() == ".splat") return {"splat", read_splat(file, context)};
+  throw InputError(path.string(), "", "is no scene of a known format", supported_scenes);
+}
+
+Decoded read_location(const SceneLocation& location, const LoadOptions& options,
+                      const LoadContext& context) {
+  if (location.kind == SceneLocation::Kind::file) return read_file(location.path, context);
+  const FolderFiles folder(location.path);
+  if (location.kind == SceneLocation::Kind::sog_folder) {
+    SogFile sog = read_sog(folder, "meta.json", context);
+    return {fmt::format("sog v{} (folder)", sog.version), std::move(sog.cloud)};
+  }
+  StreamedSog sog = read_streamed_sog(folder, options.lod, options.gaussian_budget, context);
+  return {fmt::format("streamed sog ({})", sog.detail), std::move(sog.cloud)};
+}
+
+}  // namespace
+
+Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) {
+  ThreadPool pool(options.threads);
+  const LoadContext context(pool, options.progress);
+  const SceneLocation location = locate_scene(path);
+  const bool streamed = location.kind == SceneLocation::Kind::streamed_sog_folder;
+  if (!streamed && (options.lod || options.gaussian_budget))
+    throw InputError(path.string(), "", "has no levels of detail to choose from",
+                     "levels and budgets are for streamed SOG folders");
+
+  Scene scene;
+  scene.name = to_utf8(location.name);
+  Decoded decoded = read_location(location, options, context.part(0.0, 0.9));
+  scene.format = std::move(decoded.format);
+  scene.cloud = std::move(decoded.cloud);
+  scene.report = sanitize(scene.cloud, context.part(0.9, 1.0));
+  if (scene.cloud.empty())
+    throw InputError(path.string(), "",
+                     fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
+  scene.hints = find_hints(scene.cloud, location.hints, scene.notes);
+  context.report(1.0);
+  return scene;
+}
+
+}  // namespace catgs

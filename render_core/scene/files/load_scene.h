@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "render_core/scene/scene.h"
+
+namespace catgs {
+
+struct LoadOptions {
+  std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
+  std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
+  std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
+  int threads = 0;                                // 0: one per core
+};
+
+/// Reads any supported scene: .ply (original and compressed), .splat, .spz, .sog, a streamed or
+/// unpacked SOG folder (or its lod-meta.json, meta.json), a training output folder (its newest
+/// iteration), a folder with a single scene file. Files are told apart by content first. Throws
+/// InputError; one for an unknown format lists these. Memory peaks at the cloud and a few bytes per
+/// Gaussian.
+Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
+
+}  // namespace catgs

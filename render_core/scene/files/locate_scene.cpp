@@ -1,0 +1,120 @@
+#include "render_core/scene/files/locate_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+
+namespace catgs {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view iteration_prefix = "iteration_";
+constexpr std::array scene_extensions = {".ply", ".splat", ".spz", ".sog"};
+
+std::optional<std::uint64_t> iteration_number(const fs::path& folder) {
+  const std::string name = folder.filename().string();
+  if (!name.starts_with(iteration_prefix)) return std::nullopt;
+  std::uint64_t number = 0;
+  const char* first = name.data() + iteration_prefix.size();
+  const auto [end, error] = std::from_chars(first, name.data() + name.size(), number);
+  if (error != std::errc{} || end != name.data() + name.size()) return std::nullopt;
+  return number;
+}
+
+/// `…/point_cloud/iteration_N/point_cloud.ply` of the highest N that has one.
+std::optional<fs::path> newest_iteration(const fs::path& training) {
+  std::error_code error;
+  std::optional<std::pair<std::uint64_t, fs::path>> newest;
+  for (const auto& entry : fs::directory_iterator(training / "point_cloud", error)) {
+    const auto number = iteration_number(entry.path());
+    const fs::path ply = entry.path() / "point_cloud.ply";
+    if (number && (!newest || *number > newest->first) && fs::is_regular_file(ply, error))
+      newest = {*number, ply};
+  }
+  if (!newest) return std::nullopt;
+  return newest->second;
+}
+
+/// The training output folder that a point cloud lies in, if any.
+std::optional<fs::path> training_of(const fs::path& file) {
+  const fs::path iteration = file.parent_path(), clouds = iteration.parent_path();
+  if (!iteration_number(iteration) || clouds.filename() != "point_cloud") return std::nullopt;
+  return clouds.parent_path();
+}
+
+/// The only scene file directly in the folder.
+fs::path single_scene_file(const fs::path& folder) {
+  std::vector<std::string> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string extension = entry.path().extension().string();
+    if (std::find(scene_extensions.begin(), scene_extensions.end(), extension) !=
+            scene_extensions.end() &&
+        entry.is_regular_file())
+      found.push_back(entry.path().filename().string());
+  }
+  if (found.empty()) throw InputError(folder.string(), "", "holds no scene", supported_scenes);
+  std::sort(found.begin(), found.end());
+  if (found.size() > 1)
+    throw InputError(
+        folder.string(), "",
+        fmt::format("holds {} scenes: {}{}", found.size(),
+                    fmt::join(found.begin(),
+                              found.begin() + std::min<std::ptrdiff_t>(4, std::ssize(found)), ", "),
+                    found.size() > 4 ? ", …" : ""),
+        "name one of them");
+  return folder / found.front();
+}
+
+SceneLocation at_file(const fs::path& file) {
+  SceneLocation location;
+  location.path = file;
+  const auto training = training_of(file);
+  const fs::path folder = training.value_or(file.parent_path());
+  location.name = training ? training->filename().string() : file.stem().string();
+  location.hints.sidecar = sidecar_of(file);
+  location.hints.cameras = folder / "cameras.json";
+  location.hints.transforms = folder / "transforms.json";
+  return location;
+}
+
+SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
+  SceneLocation location;
+  location.kind = kind;
+  location.path = folder;
+  location.name = folder.filename().string();
+  location.hints.sidecar = folder.parent_path() / (location.name + ".json");
+  return location;
+}
+
+}  // namespace
+
+SceneLocation locate_scene(const fs::path& given) {
+  std::error_code error;
+  fs::path path = fs::absolute(given, error).lexically_normal();  // so that "." has a name
+  if (!path.has_filename()) path = path.parent_path();
+  if (!fs::exists(path, error)) throw InputError(given.string(), "", "does not exist");
+  const std::string file_name = path.filename().string();
+  if (file_name == "lod-meta.json" || file_name == "meta.json") path = path.parent_path();
+  if (!fs::is_directory(path, error)) return at_file(given);
+
+  if (fs::exists(path / "lod-meta.json", error))
+    return at_folder(SceneLocation::Kind::streamed_sog_folder, path);
+  if (fs::exists(path / "meta.json", error))
+    return at_folder(SceneLocation::Kind::sog_folder, path);
+  if (const auto ply = newest_iteration(path)) {
+    SceneLocation location = at_file(*ply);
+    location.hints.sidecar = path.parent_path() / (location.name + ".json");
+    return location;
+  }
+  return at_file(single_scene_file(path));
+}
+
+}  // namespace catgs

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "render_core/scene/files/hints.h"
+
+namespace catgs {
+
+/// For error messages.
+inline constexpr std::string_view supported_scenes =
+    "supported: .ply (3DGS or compressed), .splat, .spz, .sog, a folder with lod-meta.json "
+    "(streamed "
+    "SOG) or meta.json (SOG), a training output folder";
+
+/// What a path given by a user means.
+struct SceneLocation {
+  enum class Kind { file, sog_folder, streamed_sog_folder };
+  Kind kind = Kind::file;
+  std::filesystem::path path;  // of the file or the folder
+  std::string name;            // for people
+  HintFiles hints;
+};
+
+/// Resolves files, SOG folders (also by their meta.json or lod-meta.json), training output folders
+/// (newest iteration) and folders with a single scene file. Throws InputError.
+SceneLocation locate_scene(const std::filesystem::path& path);
+
+}  // namespace catgs

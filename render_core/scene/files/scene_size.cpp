@@ -1,0 +1,78 @@
+#include "render_core/scene/files/scene_size.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/compressed_ply.h"
+#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/ply_header.h"
+#include "render_core/scene/formats/sog.h"
+#include "render_core/scene/formats/spz.h"
+#include "render_core/scene/formats/streamed_sog.h"
+
+namespace catgs {
+
+namespace {
+
+SceneSize size_of_ply(const ByteSource& file) {
+  const PlyHeader header = read_ply_header(file);
+  const PlyElement* vertex = header.find("vertex");
+  if (!vertex) throw InputError(file.name(), "element vertex", "is missing");
+  require_count(file, "element vertex", vertex->count);
+  if (header.encoding != PlyEncoding::ascii && !vertex->has_list)
+    require_rows_in_file(file, *vertex);
+  const PlyElement* sh = is_compressed_ply(header) ? header.find("sh") : vertex;
+  if (!sh) return {vertex->count, 0};
+  const auto rest = std::ranges::count_if(sh->properties, [](const PlyProperty& property) {
+    return property.name.starts_with("f_rest_");
+  });
+  return {vertex->count, std::max(0, sh_degree_of_rest(static_cast<std::size_t>(rest) / 3))};
+}
+
+SceneSize size_of_sog(const FileSet& files) {
+  const SogMeta meta = parse_sog_meta(files, "meta.json");
+  const bool only_images_tell = !meta.centroids.empty() && meta.sh_degree == 0;
+  return {meta.count, only_images_tell ? max_sh_degree : meta.sh_degree};
+}
+
+SceneSize size_of_file(const std::filesystem::path& path) {
+  constexpr std::uint64_t splat_bytes = 32;
+  const FileSource file(path);
+  std::array<char, 4> magic{};
+  const auto start = std::span(magic).first(std::min<std::uint64_t>(4, file.size()));
+  file.read(0, std::as_writable_bytes(start));
+  const std::string_view begins(start.data(), start.size());
+  if (begins.starts_with("ply")) return size_of_ply(file);
+  if (begins == "PK\x03\x04") return size_of_sog(ZipFiles(file, "meta.json"));
+  if (is_spz(file)) {
+    const SpzSize size = read_spz_size(file);
+    return {size.count, size.sh_degree};
+  }
+  if (path.extension() == ".splat") return {file.size() / splat_bytes, 0};
+  throw InputError(path.string(), "", "is no scene of a known format", supported_scenes);
+}
+
+}  // namespace
+
+std::uint64_t SceneSize::bytes() const { return GaussianCloud::bytes(gaussians, sh_degree); }
+
+SceneSize read_scene_size(const std::filesystem::path& path, const LoadOptions& options) {
+  const SceneLocation location = locate_scene(path);
+  SceneSize size;
+  if (location.kind == SceneLocation::Kind::file)
+    size = size_of_file(location.path);
+  else if (location.kind == SceneLocation::Kind::sog_folder)
+    size = size_of_sog(FolderFiles(location.path));
+  else
+    size = {count_streamed_sog(FolderFiles(location.path), options.lod, options.gaussian_budget),
+            max_sh_degree};
+  size.sh_degree = std::min(size.sh_degree, max_sh_degree);
+  return size;
+}
+
+}  // namespace catgs

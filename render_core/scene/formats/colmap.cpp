@@ -1,0 +1,244 @@
+#include "render_core/scene/formats/colmap.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <sstream>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/byte_source.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::uint64_t max_file_bytes = std::uint64_t{8} << 30;
+constexpr std::size_t max_name_bytes = 4096;
+constexpr int max_side_px = 1 << 20;
+using Cameras = std::map<std::uint32_t, Camera>;
+
+/// COLMAP's camera models without distortion, by its numbers and names.
+struct Model {
+  int id;
+  std::string_view name;
+  std::size_t parameters;  // f, cx, cy or fx, fy, cx, cy
+};
+constexpr std::array<Model, 2> models = {{{0, "SIMPLE_PINHOLE", 3}, {1, "PINHOLE", 4}}};
+
+[[noreturn]] void refuse_model(const std::string& file, const std::string& where,
+                               const std::string& model) {
+  throw InputError(file, where, fmt::format("model {} is not a pinhole camera", model),
+                   "colmap image_undistorter makes pinhole pictures");
+}
+
+Camera make_camera_of(const std::string& file, const std::string& where, std::uint64_t width,
+                      std::uint64_t height, std::span<const double> parameters) {
+  const bool one_focal = parameters.size() == models[0].parameters;
+  Camera camera;
+  camera.size_px = {static_cast<int>(std::min<std::uint64_t>(width, max_side_px + 1)),
+                    static_cast<int>(std::min<std::uint64_t>(height, max_side_px + 1))};
+  camera.focal_px = {parameters[0], parameters[one_focal ? 0 : 1]};
+  camera.principal_point_px = {parameters[one_focal ? 1 : 2], parameters[one_focal ? 2 : 3]};
+  const bool sized = width > 0 && height > 0 && width <= max_side_px && height <= max_side_px;
+  const bool positive = camera.focal_px.x > 0.0f && camera.focal_px.y > 0.0f;
+  if (!sized || !positive || !std::ranges::all_of(parameters, [](double p) {
+        return std::isfinite(static_cast<float>(p));
+      })) {
+    throw InputError(file, where, "has no usable size, focal length or principal point");
+  }
+  return camera;
+}
+
+/// COLMAP stores camera_from_world: rotation w, x, y, z and translation.
+ColmapImage make_image(const std::string& file, const std::string& where, std::string name,
+                       const std::array<double, 7>& pose, const Cameras& cameras,
+                       std::uint32_t camera_id) {
+  const auto camera = cameras.find(camera_id);
+  if (camera == cameras.end()) {
+    throw InputError(file, where, fmt::format("there is no camera {}", camera_id));
+  }
+  const glm::dquat rotation(pose[0], pose[1], pose[2], pose[3]);
+  const double norm = glm::length(rotation);
+  const bool turns = norm > 1e-6 && norm < 1e6;  // squares of larger numbers are infinite
+  const auto is_place = [](double p) { return std::abs(p) <= max_coordinate; };
+  if (!turns || !std::all_of(pose.begin() + 4, pose.end(), is_place)) {
+    throw InputError(file, where, "its pose is not a rotation and a translation");
+  }
+  const glm::dquat world_from_camera = glm::conjugate(rotation / norm);
+  ColmapImage image{std::move(name), camera->second};
+  image.camera.world_from_camera = {
+      glm::vec3(-(world_from_camera * glm::dvec3(pose[4], pose[5], pose[6]))),
+      glm::quat(world_from_camera)};
+  return image;
+}
+
+/// Reads values one behind the other; the source throws where the file ends.
+class BinaryReader {
+ public:
+  explicit BinaryReader(const std::filesystem::path& path) : file_(path) {}
+
+  template <class T>
+  T next() {
+    std::array<std::byte, sizeof(T)> bytes;
+    file_.read(offset_, bytes);
+    offset_ += bytes.size();
+    return load_as<T>(bytes.data());
+  }
+  std::string next_name() {
+    std::string name;
+    for (char c = next<char>(); c != '\0'; c = next<char>()) {
+      if (name.size() == max_name_bytes) throw InputError(file_.name(), where(), "endless name");
+      name += c;
+    }
+    return name;
+  }
+  /// Over `count` records; what lies beyond the end is found out by the next read.
+  void skip(std::uint64_t count, std::uint64_t record_bytes) {
+    if (count > (file_.size() - offset_) / record_bytes) {
+      throw InputError(file_.name(), where(), fmt::format("{} points do not fit the file", count));
+    }
+    offset_ += count * record_bytes;
+  }
+  [[nodiscard]] std::string where() const { return fmt::format("byte {}", offset_); }
+  [[nodiscard]] const std::string& name() const { return file_.name(); }
+
+ private:
+  FileSource file_;
+  std::uint64_t offset_ = 0;
+};
+
+Cameras read_binary_cameras(const std::filesystem::path& path) {
+  BinaryReader file(path);
+  Cameras cameras;
+  const auto count = file.next<std::uint64_t>();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::string where = file.where();
+    const auto id = file.next<std::uint32_t>();
+    const auto model_id = file.next<std::int32_t>();
+    const auto width = file.next<std::uint64_t>(), height = file.next<std::uint64_t>();
+    const auto model = std::ranges::find(models, model_id, &Model::id);
+    if (model == models.end()) refuse_model(file.name(), where, std::to_string(model_id));
+    std::array<double, 4> parameters{};
+    const auto used = std::span(parameters).first(model->parameters);
+    for (double& parameter : used) parameter = file.next<double>();
+    cameras[id] = make_camera_of(file.name(), where, width, height, used);
+  }
+  return cameras;
+}
+
+std::vector<ColmapImage> read_binary_images(const std::filesystem::path& path,
+                                            const Cameras& cameras) {
+  constexpr std::uint64_t point_bytes = 24;  // x, y and the number of a 3D point
+  BinaryReader file(path);
+  std::vector<ColmapImage> images;
+  const auto count = file.next<std::uint64_t>();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::string where = file.where();
+    (void)file.next<std::uint32_t>();  // its number
+    std::array<double, 7> pose;
+    for (double& value : pose) value = file.next<double>();
+    const auto camera_id = file.next<std::uint32_t>();
+    images.push_back(make_image(file.name(), where, file.next_name(), pose, cameras, camera_id));
+    file.skip(file.next<std::uint64_t>(), point_bytes);
+  }
+  return images;
+}
+
+/// The lines of a text file, without comments, with their numbers.
+struct Line {
+  std::size_t number;
+  std::string text;
+};
+std::vector<Line> read_lines(const std::filesystem::path& path) {
+  const FileSource file(path);
+  const std::vector<std::byte> bytes = file.read_all(max_file_bytes);
+  std::istringstream stream(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  std::vector<Line> lines;
+  std::string text;
+  for (std::size_t number = 1; std::getline(stream, text); ++number) {
+    if (!text.empty() && text.back() == '\r') text.pop_back();
+    if (!text.starts_with('#')) lines.push_back({number, text});
+  }
+  return lines;
+}
+
+std::string where_of(const Line& line) { return fmt::format("line {}", line.number); }
+
+Cameras read_text_cameras(const std::filesystem::path& path) {
+  Cameras cameras;
+  for (const Line& line : read_lines(path)) {
+    if (line.text.empty()) continue;
+    std::istringstream fields(line.text);
+    std::uint32_t id = 0;
+    std::string model_name;
+    std::uint64_t width = 0, height = 0;
+    fields >> id >> model_name >> width >> height;
+    const auto model = std::ranges::find(models, model_name, &Model::name);
+    if (fields && model == models.end()) refuse_model(path.string(), where_of(line), model_name);
+    std::array<double, 4> parameters{};
+    const auto used = std::span(parameters).first(fields ? model->parameters : 0);
+    for (double& parameter : used) fields >> parameter;
+    if (!fields) {
+      throw InputError(path.string(), where_of(line), "is not a camera",
+                       "CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
+    }
+    cameras[id] = make_camera_of(path.string(), where_of(line), width, height, used);
+  }
+  return cameras;
+}
+
+std::vector<ColmapImage> read_text_images(const std::filesystem::path& path,
+                                          const Cameras& cameras) {
+  const std::vector<Line> lines = read_lines(path);
+  std::vector<ColmapImage> images;
+  // Every second line lists points, which may be none.
+  for (std::size_t i = 0; i < lines.size(); i += 2) {
+    if (lines[i].text.empty() && i + 1 >= lines.size()) break;
+    std::istringstream fields(lines[i].text);
+    std::uint32_t id = 0, camera_id = 0;
+    std::array<double, 7> pose{};
+    fields >> id;
+    for (double& value : pose) fields >> value;
+    std::string name;
+    fields >> camera_id >> std::ws;
+    if (!std::getline(fields, name) || name.empty()) {
+      throw InputError(path.string(), where_of(lines[i]), "is not an image",
+                       "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points");
+    }
+    images.push_back(
+        make_image(path.string(), where_of(lines[i]), std::move(name), pose, cameras, camera_id));
+  }
+  return images;
+}
+
+}  // namespace
+
+std::vector<ColmapImage> read_colmap(const std::filesystem::path& folder) {
+  std::vector<ColmapImage> images;
+  bool found = false;
+  for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
+    std::error_code error;
+    if (std::filesystem::exists(model / "images.bin", error)) {
+      images = read_binary_images(model / "images.bin", read_binary_cameras(model / "cameras.bin"));
+      found = true;
+    } else if (std::filesystem::exists(model / "images.txt", error)) {
+      images = read_text_images(model / "images.txt", read_text_cameras(model / "cameras.txt"));
+      found = true;
+    }
+    if (found) break;
+  }
+  if (!found) {
+    throw InputError(folder.string(), "", "has no COLMAP reconstruction",
+                     "sparse/0 with images.bin and cameras.bin, or the same as .txt");
+  }
+  if (images.empty()) throw InputError(folder.string(), "", "its reconstruction has no images");
+  std::ranges::sort(images, {}, &ColmapImage::name);
+  return images;
+}
+
+}  // namespace catgs

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render_core/scene/formats/byte_source.h"
+
+namespace catgs {
+
+/// The files that a scene made of several consists of, by their names in its meta data.
+class FileSet {
+ public:
+  FileSet() = default;
+  virtual ~FileSet() = default;
+  FileSet(const FileSet&) = delete;
+  FileSet& operator=(const FileSet&) = delete;
+
+  /// Throws InputError when there is no such file. The source must not outlive the set.
+  [[nodiscard]] virtual std::unique_ptr<ByteSource> open(const std::string& name) const = 0;
+};
+
+/// Files below a folder. Names that lead out of it are refused: they come from untrusted files.
+class FolderFiles final : public FileSet {
+ public:
+  explicit FolderFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override;
+  /// `name` below the folder. Throws InputError when it is absolute or contains ".." or a zero
+  /// byte.
+  [[nodiscard]] std::filesystem::path path_of(const std::string& name) const;
+
+ private:
+  std::filesystem::path folder_;
+};
+
+/// The entries of a zip archive, unpacked into memory. An archive may grow to at most four times
+/// its size, and has at most 4,096 entries: scene archives hold images, which hardly compress.
+class ZipFiles final : public FileSet {
+ public:
+  /// `only`: the one entry to unpack; empty: all. Throws InputError.
+  explicit ZipFiles(const ByteSource& archive, std::string_view only = {});
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override;
+
+ private:
+  std::string name_;
+  std::map<std::string, std::vector<std::byte>> entries_;
+};
+
+}  // namespace catgs

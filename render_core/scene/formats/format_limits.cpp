@@ -1,0 +1,34 @@
+#include "render_core/scene/formats/format_limits.h"
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+
+namespace catgs {
+
+void require_count(const ByteSource& file, std::string_view where, std::uint64_t count) {
+  if (count == 0) throw InputError(file.name(), where, "there are no Gaussians");
+  if (count > max_gaussians)
+    throw InputError(
+        file.name(), where,
+        fmt::format("{} Gaussians announced, at most {} are supported", count, max_gaussians),
+        "the header is wrong, or split the scene");
+}
+
+void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
+                             std::size_t plain_bytes, std::uint64_t compressed_bytes) {
+  require_count(file, where, count);
+  if (count > (1 << 16) && count * plain_bytes / max_compression > compressed_bytes)
+    throw InputError(
+        file.name(), where,
+        fmt::format("{} Gaussians cannot be in {} compressed bytes", count, compressed_bytes),
+        "the file is cut off or its header is wrong");
+}
+
+int sh_degree_of_rest(std::size_t coefficients) {
+  for (int degree = 0; degree <= 4; ++degree)
+    if (coefficients + 1 == static_cast<std::size_t>((degree + 1) * (degree + 1))) return degree;
+  return -1;
+}
+
+}  // namespace catgs

@@ -1,0 +1,133 @@
+#include "render_core/scene/formats/json_field.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/math/camera.h"
+
+namespace catgs {
+
+namespace {
+
+/// Documents are copied and printed by recursion: one of a million brackets would end the stack.
+constexpr int max_depth = 256;
+/// Two bytes, `0,`, take sixteen in memory, empty brackets a hundred: those count twice.
+constexpr std::size_t max_values = std::size_t{1} << 20;
+
+/// Before any memory is taken for the document.
+void require_modest(const ByteSource& file, std::string_view text) {
+  int depth = 0;
+  std::size_t values = 1;  // each but the first follows a comma or is the first in its brackets
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') ++i;
+      in_string = c != '"';
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '[' || c == '{') {
+      ++depth;
+      ++values;
+    } else if (c == ',') {
+      ++values;
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+    if (depth > max_depth)
+      throw InputError(file.name(), fmt::format("byte {}", i),
+                       fmt::format("is nested deeper than {}", max_depth));
+    if (values > max_values)
+      throw InputError(file.name(), fmt::format("byte {}", i),
+                       fmt::format("more than {} values", max_values));
+  }
+}
+
+}  // namespace
+
+nlohmann::json read_json(const ByteSource& file, std::uint64_t limit) {
+  const std::vector<std::byte> bytes = file.read_all(limit);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  require_modest(file, text);
+  try {
+    return nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
+    throw InputError(file.name(), fmt::format("byte {}", error.byte), "is not valid JSON");
+  } catch (const nlohmann::json::out_of_range& error) {
+    throw InputError(file.name(), "", fmt::format("holds a number out of range: {}", error.what()));
+  }
+}
+
+std::string to_utf8(const std::string& bytes) {
+  using nlohmann::json;
+  return json::parse(json(bytes).dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+void JsonField::fail(std::string_view what, std::string_view remedy) const {
+  throw InputError(file_, path_, what, remedy);
+}
+
+std::optional<JsonField> JsonField::find(std::string_view key) const {
+  if (!value_->is_object()) fail("is not an object");
+  const auto found = value_->find(key);
+  if (found == value_->end() || found->is_null()) return std::nullopt;
+  return JsonField(file_, path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key),
+                   *found);
+}
+
+JsonField JsonField::at(std::string_view key) const {
+  if (auto member = find(key)) return *std::move(member);
+  fail(fmt::format("'{}' is missing", key));
+}
+
+std::size_t JsonField::size() const {
+  if (!value_->is_array()) fail("is not an array");
+  return value_->size();
+}
+
+JsonField JsonField::operator[](std::size_t index) const {
+  return JsonField(file_, fmt::format("{}[{}]", path_, index), value_->at(index));
+}
+
+float JsonField::number() const {
+  if (!value_->is_number()) fail("is not a number");
+  const auto number = static_cast<float>(value_->get<double>());
+  if (!std::isfinite(number)) fail("is out of range");
+  return number;
+}
+
+std::uint64_t JsonField::count() const {
+  if (!value_->is_number_unsigned()) fail("is not a count");
+  return value_->get<std::uint64_t>();
+}
+
+std::string JsonField::text() const {
+  if (!value_->is_string()) fail("is not a text");
+  return value_->get<std::string>();
+}
+
+std::vector<float> JsonField::numbers(std::size_t expected_size) const {
+  if (!value_->is_array() || value_->size() != expected_size)
+    fail(fmt::format("is not an array of {} numbers", expected_size));
+  std::vector<float> all;
+  for (std::size_t i = 0; i < expected_size; ++i) all.push_back((*this)[i].number());
+  return all;
+}
+
+glm::vec3 JsonField::vec3() const {
+  const std::vector<float> v = numbers(3);
+  return {v[0], v[1], v[2]};
+}
+
+glm::vec3 JsonField::place() const { return as_place(vec3()); }
+
+glm::vec3 JsonField::as_place(const glm::vec3& at) const {
+  for (int k = 0; k < 3; ++k)
+    if (!(std::abs(at[k]) <= max_coordinate))
+      fail(fmt::format("is no place in a scene: beyond {} units", max_coordinate));
+  return at;
+}
+
+}  // namespace catgs

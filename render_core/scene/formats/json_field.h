@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <glm/vec3.hpp>
+#include <nlohmann/json.hpp>
+
+#include "render_core/scene/formats/byte_source.h"
+
+namespace catgs {
+
+/// Parses a whole file as JSON. Throws InputError with the byte of a syntax error; files over
+/// `limit` bytes, of more than 2^20 values or nested deeper than 256 are refused.
+nlohmann::json read_json(const ByteSource& file, std::uint64_t limit);
+
+/// `bytes` with U+FFFD for what is not UTF-8. File names may hold any bytes, JSON and the wire not.
+std::string to_utf8(const std::string& bytes);
+
+/// A value in a JSON document together with its place there, so that every complaint names file and
+/// field: "scene.json: limits.min[2]: is not a number". Borrows the document.
+class JsonField {
+ public:
+  JsonField(std::string file, const nlohmann::json& value)
+      : JsonField(std::move(file), "", value) {}
+
+  /// Member `key`, which must exist and not be null.
+  [[nodiscard]] JsonField at(std::string_view key) const;
+  /// Member `key`; empty when it is missing or null.
+  [[nodiscard]] std::optional<JsonField> find(std::string_view key) const;
+  [[nodiscard]] std::size_t size() const;                       // of an array
+  [[nodiscard]] JsonField operator[](std::size_t index) const;  // of an array; below its size
+
+  [[nodiscard]] float number() const;  // finite
+  [[nodiscard]] std::uint64_t count() const;
+  [[nodiscard]] std::string text() const;
+  [[nodiscard]] glm::vec3 vec3() const;
+  /// Three coordinates, at most max_coordinate from the origin on each axis.
+  [[nodiscard]] glm::vec3 place() const;
+  /// `at`, which this field holds in another form than place() reads.
+  [[nodiscard]] glm::vec3 as_place(const glm::vec3& at) const;
+  [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
+
+  [[nodiscard]] const nlohmann::json& value() const { return *value_; }
+  [[noreturn]] void fail(std::string_view what, std::string_view remedy = {}) const;
+
+ private:
+  JsonField(std::string file, std::string path, const nlohmann::json& value)
+      : file_(std::move(file)), path_(std::move(path)), value_(&value) {}
+
+  std::string file_, path_;
+  const nlohmann::json* value_;
+};
+
+}  // namespace catgs

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <utility>
+
+#include "render_core/base/thread_pool.h"
+
+namespace catgs {
+
+/// What every reader is given besides its bytes: threads, and somebody to tell about progress.
+class LoadContext {
+ public:
+  explicit LoadContext(ThreadPool& pool, std::function<void(double)> progress = {})
+      : pool_(pool), progress_(std::move(progress)) {}
+
+  /// Calls body(begin, end) for consecutive ranges of at most `block` of the indices [0, count),
+  /// on several threads, and reports progress as they end. Unlike ThreadPool::parallel_for, `body`
+  /// may throw: what the first failing range threw is rethrown here, the other ranges having ended
+  /// or been skipped.
+  void for_blocks(std::size_t count, std::size_t block,
+                  const std::function<void(std::size_t begin, std::size_t end)>& body) const;
+
+  /// `fraction` in 0…1 of this context's share of the work. Call from the loading thread.
+  void report(double fraction) const {
+    if (progress_) progress_(fraction);
+  }
+
+  /// A context whose progress is the part [from, to] of this one's.
+  [[nodiscard]] LoadContext part(double from, double to) const;
+
+ private:
+  ThreadPool& pool_;
+  std::function<void(double)> progress_;
+};
+
+}  // namespace catgs

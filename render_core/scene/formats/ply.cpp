@@ -1,0 +1,297 @@
+#include "render_core/scene/formats/ply.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstddef>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/activations.h"
+#include "render_core/scene/formats/format_limits.h"
+
+namespace catgs {
+
+namespace {
+
+constexpr int max_rest = 3 * (sh_coefficient_count(max_sh_degree) - 1);
+
+/// One Gaussian as the file stores it, in one order whatever the file's.
+struct Row {
+  std::array<float, 3> mean, dc, log_scale;
+  std::array<float, 4> rotation;  // w, x, y, z
+  float opacity_logit;
+  std::array<float, max_rest> rest;  // channel-major: all of red, all of green, all of blue
+};
+static_assert(sizeof(Row) == sizeof(float) * (14 + max_rest));
+constexpr std::size_t row_fields = sizeof(Row) / sizeof(float);
+
+/// Where a field of Row comes from.
+struct Field {
+  std::size_t destination;  // float of Row
+  std::size_t property;     // of the element
+};
+
+struct Layout {
+  int sh_degree = 0;
+  std::vector<Field> fields;
+};
+
+std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
+                             const std::string& name) {
+  const PlyProperty* property = vertex.find(name);
+  if (!property)
+    throw InputError(file.name(), "property " + name, "is missing in element vertex",
+                     "only Gaussian Splatting point clouds can be rendered");
+  if (property->is_list)
+    throw InputError(file.name(), "property " + name, "is a list where a number is expected");
+  return static_cast<std::size_t>(property - vertex.properties.data());
+}
+
+Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
+  const auto is_rest = [](const PlyProperty& p) { return p.name.starts_with("f_rest_"); };
+  const auto rest = static_cast<std::size_t>(
+      std::count_if(vertex.properties.begin(), vertex.properties.end(), is_rest));
+  const int file_degree = rest % 3 == 0 ? sh_degree_of_rest(rest / 3) : -1;
+  if (file_degree < 0)
+    throw InputError(file.name(), "property f_rest_*",
+                     fmt::format("{} of them; SH of degree 0, 1, 2, 3 has 0, 9, 24, 45", rest));
+
+  Layout layout;
+  layout.sh_degree = std::min(file_degree, max_sh_degree);
+  const auto add = [&](std::size_t destination, const std::string& name) {
+    layout.fields.push_back({destination, require_property(file, vertex, name)});
+  };
+  const auto at = [](std::size_t offset_bytes) { return offset_bytes / sizeof(float); };
+  for (std::size_t k = 0; k < 3; ++k) {
+    add(at(offsetof(Row, mean)) + k, std::string(1, "xyz"[k]));
+    add(at(offsetof(Row, dc)) + k, fmt::format("f_dc_{}", k));
+    add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
+  }
+  for (std::size_t k = 0; k < 4; ++k)
+    add(at(offsetof(Row, rotation)) + k, fmt::format("rot_{}", k));
+  add(at(offsetof(Row, opacity_logit)), "opacity");
+  const std::size_t kept = sh_coefficient_count(layout.sh_degree) - 1;
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    for (std::size_t k = 0; k < kept; ++k)
+      add(at(offsetof(Row, rest)) + channel * kept + k,
+          fmt::format("f_rest_{}", channel * (rest / 3) + k));
+  return layout;
+}
+
+void store(const Row& row, GaussianCloud& cloud, std::size_t i) {
+  cloud.mean[i] = {row.mean[0], row.mean[1], row.mean[2]};
+  cloud.rotation[i] =
+      unit(glm::quat(row.rotation[0], row.rotation[1], row.rotation[2], row.rotation[3]));
+  cloud.scale[i] = exp(glm::vec3(row.log_scale[0], row.log_scale[1], row.log_scale[2]));
+  cloud.opacity[i] = opacity_from_logit(row.opacity_logit);
+  const std::size_t rest = cloud.sh_count() - 1;
+  glm::vec3* sh = cloud.sh.data() + i * cloud.sh_count();
+  sh[0] = {row.dc[0], row.dc[1], row.dc[2]};
+  for (std::size_t k = 0; k < rest; ++k)
+    sh[1 + k] = {row.rest[k], row.rest[rest + k], row.rest[2 * rest + k]};
+}
+
+template <class T>
+float load_big_endian(const std::byte* from) {
+  std::array<std::byte, sizeof(T)> swapped;
+  std::reverse_copy(from, from + sizeof(T), swapped.begin());
+  return static_cast<float>(std::bit_cast<T>(swapped));
+}
+
+float load_scalar(const std::byte* from, PlyType type, bool big_endian) {
+  const auto load = [&]<class T>(T) {
+    return big_endian ? load_big_endian<T>(from) : static_cast<float>(load_as<T>(from));
+  };
+  switch (type) {
+    case PlyType::i8:
+      return load(std::int8_t{});
+    case PlyType::u8:
+      return load(std::uint8_t{});
+    case PlyType::i16:
+      return load(std::int16_t{});
+    case PlyType::u16:
+      return load(std::uint16_t{});
+    case PlyType::i32:
+      return load(std::int32_t{});
+    case PlyType::u32:
+      return load(std::uint32_t{});
+    case PlyType::f32:
+      return load(float{});
+    case PlyType::f64:
+      return load(double{});
+  }
+  return 0.0f;
+}
+
+/// Rows per block: about 128 KiB, so that a block stays in the second-level cache.
+std::size_t block_rows(std::size_t row_bytes) {
+  return std::max<std::size_t>(1, 128 * 1024 / std::max<std::size_t>(1, row_bytes));
+}
+
+void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout& layout,
+                 bool big_endian, GaussianCloud& cloud, const LoadContext& context) {
+  const bool plain =
+      !big_endian && std::all_of(layout.fields.begin(), layout.fields.end(), [&](const Field& f) {
+        return vertex.properties[f.property].type == PlyType::f32;
+      });
+  const auto decode_row = [&](const std::byte* from, float* row) {
+    for (const Field& f : layout.fields) {
+      const PlyProperty& p = vertex.properties[f.property];
+      row[f.destination] = plain ? load_as<float>(from + p.offset)
+                                 : load_scalar(from + p.offset, p.type, big_endian);
+    }
+  };
+  context.for_blocks(cloud.size(), block_rows(vertex.row_bytes),
+                     [&](std::size_t begin, std::size_t end) {
+                       std::vector<std::byte> bytes((end - begin) * vertex.row_bytes);
+                       file.read(vertex.data_offset + begin * vertex.row_bytes, bytes);
+                       std::array<float, row_fields> fields{};
+                       for (std::size_t i = begin; i < end; ++i) {
+                         decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
+                         store(std::bit_cast<Row>(fields), cloud, i);
+                       }
+                     });
+}
+
+/// Numbers of an ASCII file, one after the other, read through a bounded buffer.
+class AsciiNumbers {
+ public:
+  AsciiNumbers(const ByteSource& file, std::uint64_t offset) : file_(file), next_read_(offset) {}
+
+  float next() {
+    while (at_ < end_ || next_read_ < file_.size()) {
+      if (end_ - at_ < max_token) refill();
+      while (at_ < end_ && is_space(buffer_[at_])) ++at_;
+      if (end_ - at_ >= max_token || next_read_ == file_.size()) break;
+    }
+    double value = 0.0;
+    const char* buffer_end = buffer_.data() + end_;
+    const auto [last, error] = std::from_chars(buffer_.data() + at_, buffer_end, value);
+    if (error == std::errc::invalid_argument || (last != buffer_end && !is_space(*last)))
+      throw InputError(file_.name(), fmt::format("byte {}", next_read_ - (end_ - at_)),
+                       at_ == end_ ? "the file ends inside the data" : "not a number");
+    at_ = static_cast<std::size_t>(last - buffer_.data());
+    return static_cast<float>(value);
+  }
+
+ private:
+  static constexpr std::size_t max_token = 128;
+  static bool is_space(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
+
+  void refill() {
+    std::copy(buffer_.begin() + at_, buffer_.begin() + end_, buffer_.begin());
+    end_ -= at_;
+    at_ = 0;
+    const auto more = std::min<std::uint64_t>(buffer_.size() - end_, file_.size() - next_read_);
+    file_.read(next_read_, std::as_writable_bytes(std::span(buffer_).subspan(end_, more)));
+    next_read_ += more;
+    end_ += more;
+  }
+
+  const ByteSource& file_;
+  std::uint64_t next_read_;
+  std::vector<char> buffer_ = std::vector<char>(256 * 1024);
+  std::size_t at_ = 0, end_ = 0;
+};
+
+void read_ascii(const ByteSource& file, const PlyHeader& header, const PlyElement& vertex,
+                const Layout& layout, GaussianCloud& cloud, const LoadContext& context) {
+  AsciiNumbers numbers(file, header.bytes);
+  for (const PlyElement& before : header.elements) {
+    if (&before == &vertex) break;
+    if (before.has_list)
+      throw InputError(file.name(), "element " + before.name,
+                       "has a list property and stands before element vertex");
+    for (std::uint64_t n = before.count * before.properties.size(); n > 0; --n) numbers.next();
+  }
+  std::vector<float> values(vertex.properties.size());
+  std::array<float, row_fields> fields{};
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    for (float& value : values) value = numbers.next();
+    for (const Field& f : layout.fields) fields[f.destination] = values[f.property];
+    store(std::bit_cast<Row>(fields), cloud, i);
+    if (i % 65536 == 0) context.report(static_cast<double>(i) / static_cast<double>(cloud.size()));
+  }
+}
+
+/// An ASCII row takes at least two bytes per value.
+void require_ascii_rows(const ByteSource& file, const PlyHeader& header, const PlyElement& vertex) {
+  const std::uint64_t least = 2 * vertex.properties.size();
+  require_count(file, "element vertex", vertex.count);
+  if (vertex.has_list) throw InputError(file.name(), "element vertex", "has a list property");
+  if (vertex.count > (file.size() - header.bytes + 1) / least)
+    throw InputError(file.name(), fmt::format("byte {}", file.size()),
+                     fmt::format("the file ends here and is too short for the {} vertices that its "
+                                 "header announces",
+                                 vertex.count));
+}
+
+}  // namespace
+
+GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header,
+                       const LoadContext& context) {
+  const PlyElement* vertex = header.find("vertex");
+  if (!vertex) throw InputError(file.name(), "header", "there is no element vertex");
+  const Layout layout = find_fields(file, *vertex);
+  const bool ascii = header.encoding == PlyEncoding::ascii;
+  if (ascii)
+    require_ascii_rows(file, header, *vertex);
+  else
+    require_rows_in_file(file, *vertex);
+
+  GaussianCloud cloud;
+  cloud.resize(vertex->count, layout.sh_degree);
+  if (ascii)
+    read_ascii(file, header, *vertex, layout, cloud, context);
+  else
+    read_binary(file, *vertex, layout, header.encoding == PlyEncoding::binary_big_endian, cloud,
+                context);
+  return cloud;
+}
+
+void write_ply(const GaussianCloud& cloud, std::ostream& to) {
+  const std::size_t rest = cloud.sh_count() - 1;
+  std::string header =
+      fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", cloud.size());
+  const auto property = [&](std::string_view name) {
+    header.append("property float ").append(name).append("\n");
+  };
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
+    property(name);
+  for (std::size_t k = 0; k < 3 * rest; ++k) property(fmt::format("f_rest_{}", k));
+  for (const char* name :
+       {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+    property(name);
+  to << header << "end_header\n";
+
+  const std::size_t row_floats = 17 + 3 * rest;
+  const std::size_t rows = block_rows(row_floats * sizeof(float));
+  std::vector<float> block(rows * row_floats);
+  for (std::size_t begin = 0; begin < cloud.size(); begin += rows) {
+    const std::size_t end = std::min(cloud.size(), begin + rows);
+    float* out = block.data();
+    for (std::size_t i = begin; i < end; ++i) {
+      const glm::vec3 *sh = cloud.sh_of(i), log_scale = log(cloud.scale[i]);
+      const glm::quat& q = cloud.rotation[i];
+      for (int k = 0; k < 3; ++k) *out++ = cloud.mean[i][k];
+      for (int k = 0; k < 3; ++k) *out++ = 0.0f;
+      for (int k = 0; k < 3; ++k) *out++ = sh[0][k];
+      for (int channel = 0; channel < 3; ++channel)
+        for (std::size_t k = 0; k < rest; ++k) *out++ = sh[1 + k][channel];
+      *out++ = logit(cloud.opacity[i]);
+      for (int k = 0; k < 3; ++k) *out++ = log_scale[k];
+      for (const float component : {q.w, q.x, q.y, q.z}) *out++ = component;
+    }
+    to.write(reinterpret_cast<const char*>(block.data()),
+             static_cast<std::streamsize>((end - begin) * row_floats * sizeof(float)));
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <iosfwd>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/ply_header.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs {
+
+/// Reads the point cloud that the original 3DGS training writes: element `vertex` with x y z,
+/// f_dc_0…2, f_rest_* (0, 9, 24, 45 or 72 of them, channel-major), opacity (logit), scale_0…2
+/// (logarithms) and rot_0…3 (w, x, y, z). Any order, any scalar type, any encoding; normals, other
+/// properties and other elements are ignored, SH above degree 3 is cut off.
+/// The result is not sanitized. Throws InputError.
+GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header, const LoadContext& context);
+
+/// Writes the original's layout: binary little-endian, all float, zero normals. Means, unit
+/// rotations and SH are kept bit for bit, scales to 1e-6 (relative), opacities to 1e-7 (absolute).
+void write_ply(const GaussianCloud& cloud, std::ostream& to);
+
+}  // namespace catgs

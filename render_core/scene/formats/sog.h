@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs {
+
+// PlayCanvas' SOG ("spatially ordered Gaussians"): one lossless WebP image per attribute, a texel
+// per Gaussian, and meta.json. As a zip archive (.sog) or as a folder. Version 1 quantises between
+// limits, version 2 by codebooks; SH is a palette and a label per Gaussian.
+
+/// What every SOG stores of a Gaussian, decompressed: a texel in each of five images.
+inline constexpr std::size_t sog_texel_bytes = 4, sog_least_bytes = 5 * sog_texel_bytes;
+
+/// The checked content of meta.json.
+struct SogMeta {
+  /// 256 values per channel: what a byte of a texel stands for.
+  using Channel = std::array<float, 256>;
+
+  int version = 2;
+  std::string folder;  // where the images are, "" or ending in "/"
+  std::uint64_t count = 0;
+  int sh_degree = 0;
+  glm::vec3 min_log_mean{0.0f}, max_log_mean{0.0f};  // of sign(x) ln(|x| + 1)
+  std::array<Channel, 3> log_scale{}, sh0{};
+  Channel opacity{};
+  Channel sh_rest{};
+  std::uint64_t palette_size = 0;
+  std::string means_low, means_high, quats, scales, sh0_image, centroids, labels;
+};
+
+/// Reads and checks `name` (…/meta.json) alone: no image is opened. Throws InputError naming the
+/// field.
+SogMeta parse_sog_meta(const FileSet& files, const std::string& name);
+
+/// The same, and the sizes of the images; only they tell the SH degree of version 1.
+SogMeta read_sog_meta(const FileSet& files, const std::string& name);
+
+/// Gaussians [begin, begin + count) of a SOG that go to `destination` in the cloud.
+struct SogRange {
+  std::size_t begin = 0;
+  std::size_t count = 0;
+  std::size_t destination = 0;
+};
+
+/// Decodes ranges into a cloud that has room for them; coefficients above the SOG's degree stay as
+/// they are. One image per thread is in memory at a time. Throws InputError.
+void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRange> ranges,
+                GaussianCloud& cloud, const LoadContext& context);
+
+struct SogFile {
+  int version = 0;
+  GaussianCloud cloud;  // not sanitized
+};
+
+/// Reads the whole SOG whose meta data is `meta_name`. Throws InputError.
+SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadContext& context);
+
+}  // namespace catgs

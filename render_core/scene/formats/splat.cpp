@@ -1,0 +1,81 @@
+#include "render_core/scene/formats/splat.h"
+
+#include <algorithm>
+#include <array>
+#include <ostream>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/activations.h"
+#include "render_core/scene/formats/format_limits.h"
+
+namespace catgs {
+
+namespace {
+
+struct SplatRow {
+  std::array<float, 3> mean, scale;
+  std::array<unsigned char, 4> rgba, rotation;  // rotation: w, x, y, z
+};
+static_assert(sizeof(SplatRow) == 32);
+
+constexpr std::size_t block_rows = 4096;  // 128 KiB
+
+void store(const SplatRow& row, GaussianCloud& cloud, std::size_t i) {
+  const auto component = [&](std::size_t k) {
+    return (static_cast<float>(row.rotation[k]) - 128.0f) / 128.0f;
+  };
+  const auto sh = [&](std::size_t k) {
+    return sh_from_colour(static_cast<float>(row.rgba[k]) / 255.0f);
+  };
+  cloud.mean[i] = {row.mean[0], row.mean[1], row.mean[2]};
+  cloud.scale[i] = {row.scale[0], row.scale[1], row.scale[2]};
+  cloud.rotation[i] = unit(glm::quat(component(0), component(1), component(2), component(3)));
+  cloud.opacity[i] = opacity_from_byte(row.rgba[3]);
+  cloud.sh[i] = {sh(0), sh(1), sh(2)};
+}
+
+}  // namespace
+
+GaussianCloud read_splat(const ByteSource& file, const LoadContext& context) {
+  if (file.size() % sizeof(SplatRow) != 0)
+    throw InputError(file.name(), fmt::format("byte {}", file.size()),
+                     "the size of a .splat file is a multiple of 32 bytes",
+                     "the file is cut off or of another format");
+  const std::uint64_t count = file.size() / sizeof(SplatRow);
+  require_count(file, "", count);
+  GaussianCloud cloud;
+  cloud.resize(count, 0);
+  context.for_blocks(count, block_rows, [&](std::size_t begin, std::size_t end) {
+    std::vector<SplatRow> rows(end - begin);
+    file.read(begin * sizeof(SplatRow), std::as_writable_bytes(std::span(rows)));
+    for (std::size_t i = begin; i < end; ++i) store(rows[i - begin], cloud, i);
+  });
+  return cloud;
+}
+
+void write_splat(const GaussianCloud& cloud, std::ostream& to) {
+  std::vector<SplatRow> rows;
+  for (std::size_t begin = 0; begin < cloud.size(); begin += block_rows) {
+    const std::size_t end = std::min(cloud.size(), begin + block_rows);
+    rows.clear();
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto colour = [&](int k) {
+        return to_byte(255.0f * colour_from_sh(cloud.sh_of(i)[0][k]));
+      };
+      const auto component = [](float v) { return to_byte(128.0f * v + 128.0f); };
+      const glm::quat& q = cloud.rotation[i];
+      const glm::vec3 &m = cloud.mean[i], &s = cloud.scale[i];
+      rows.push_back({{m.x, m.y, m.z},
+                      {s.x, s.y, s.z},
+                      {colour(0), colour(1), colour(2), to_byte(255.0f * cloud.opacity[i])},
+                      {component(q.w), component(q.x), component(q.y), component(q.z)}});
+    }
+    to.write(reinterpret_cast<const char*>(rows.data()),
+             static_cast<std::streamsize>(rows.size() * sizeof(SplatRow)));
+  }
+}
+
+}  // namespace catgs

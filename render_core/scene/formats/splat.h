@@ -1,0 +1,21 @@
+#pragma once
+
+#include <iosfwd>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs {
+
+// The .splat format of antimatter15/splat: 32 bytes per Gaussian and nothing else. Mean and scale
+// as floats, colour and opacity as 4 bytes, the quaternion w, x, y, z as bytes around 128.
+
+/// Not sanitized. Throws InputError when the size is no multiple of 32 bytes.
+GaussianCloud read_splat(const ByteSource& file, const LoadContext& context);
+
+/// Colours lose what lies outside [0, 1] and everything view-dependent. Errors: colour and opacity
+/// 0.5/255, each quaternion component 0.5/128.
+void write_splat(const GaussianCloud& cloud, std::ostream& to);
+
+}  // namespace catgs

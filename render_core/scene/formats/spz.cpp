@@ -1,0 +1,300 @@
+#include "render_core/scene/formats/spz.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <fmt/format.h>
+#include <glm/gtc/packing.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/activations.h"
+#include "render_core/scene/formats/axes.h"
+#include "render_core/scene/formats/decompress.h"
+#include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/spz_format.h"
+
+namespace catgs {
+
+namespace {
+
+using namespace spz;
+
+constexpr std::size_t max_extension_bytes = 64 * 1024;
+
+struct Header {
+  std::uint32_t version = 0;
+  std::uint32_t count = 0;
+  int sh_degree = 0;
+  int fractional_bits = 0;
+  bool has_extensions = false;
+};
+
+/// One attribute of all Gaussians: bytes per Gaussian in the file, and how to take them over.
+struct Attribute {
+  const char* name;
+  std::size_t bytes;
+  std::function<void(const std::byte* from, GaussianCloud& cloud, std::size_t i)> store;
+};
+
+std::uint8_t byte_at(const std::byte* from, std::size_t at) {
+  return std::to_integer<std::uint8_t>(from[at]);
+}
+
+float fixed24(const std::byte* from, float unit_length) {
+  const std::uint32_t bits = std::uint32_t{byte_at(from, 0)} << 8 |
+                             std::uint32_t{byte_at(from, 1)} << 16 |
+                             std::uint32_t{byte_at(from, 2)} << 24;
+  return static_cast<float>(static_cast<std::int32_t>(bits) >> 8) * unit_length;
+}
+
+Attribute position_attribute(const Header& header) {
+  if (header.version == 1)
+    return {"positions", 6, [](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+              for (int k = 0; k < 3; ++k)
+                cloud.mean[i][k] = glm::unpackHalf1x16(load_as<std::uint16_t>(from + 2 * k));
+            }};
+  const float unit_length = std::ldexp(1.0f, -header.fractional_bits);
+  return {"positions", 9, [=](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+            for (int k = 0; k < 3; ++k) cloud.mean[i][k] = fixed24(from + 3 * k, unit_length);
+          }};
+}
+
+/// Versions 1 and 2: x, y, z as bytes around 127.5, w from the unit length and not negative.
+glm::quat first_three(const std::byte* from) {
+  glm::vec3 v;
+  for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(byte_at(from, k)) / 127.5f - 1.0f;
+  return {std::sqrt(std::max(0.0f, 1.0f - glm::dot(v, v))), v.x, v.y, v.z};
+}
+
+/// From version 3 on: two bits name the largest of x, y, z, w, which is not negative and not
+/// stored; the others, last one in the lowest bits, are a sign and 9 bits up to sqrt(1/2).
+glm::quat smallest_three(const std::byte* from) {
+  auto bits = load_as<std::uint32_t>(from);
+  const int largest = static_cast<int>(bits >> 30);
+  std::array<float, 4> xyzw{};
+  float squares = 0.0f;
+  for (int k = 3; k >= 0; --k) {
+    if (k == largest) continue;
+    const float value = static_cast<float>(bits & max_magnitude) * magnitude_unit;
+    xyzw[static_cast<std::size_t>(k)] = bits & (max_magnitude + 1) ? -value : value;
+    squares += value * value;
+    bits >>= 10;
+  }
+  xyzw[static_cast<std::size_t>(largest)] = std::sqrt(std::max(0.0f, 1.0f - squares));
+  return {xyzw[3], xyzw[0], xyzw[1], xyzw[2]};
+}
+
+Attribute rotation_attribute(const Header& header) {
+  const bool old = header.version < 3;
+  return {"rotations", old ? 3u : 4u,
+          [=](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+            cloud.rotation[i] = unit(old ? first_three(from) : smallest_three(from));
+          }};
+}
+
+/// The attributes in the order of the file.
+std::vector<Attribute> attributes(const Header& header) {
+  std::vector<Attribute> all;
+  all.push_back(position_attribute(header));
+  all.push_back({"alphas", 1, [](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+                   cloud.opacity[i] = opacity_from_byte(byte_at(from, 0));
+                 }});
+  all.push_back({"colors", 3, [](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+                   glm::vec3& sh = cloud.sh[i * cloud.sh_count()];
+                   for (int k = 0; k < 3; ++k)
+                     sh[k] = (static_cast<float>(byte_at(from, k)) / 255.0f - 0.5f) / colour_scale;
+                 }});
+  all.push_back({"scales", 3, [](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+                   for (int k = 0; k < 3; ++k)
+                     cloud.scale[i][k] =
+                         std::exp(static_cast<float>(byte_at(from, k)) / 16.0f - 10.0f);
+                 }});
+  all.push_back(rotation_attribute(header));
+  const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(header.sh_degree)) - 1;
+  if (rest > 0)
+    all.push_back({"sh", 3 * rest, [](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
+                     glm::vec3* sh = cloud.sh.data() + i * cloud.sh_count();
+                     for (int k = 1; k < cloud.sh_count(); ++k, from += 3)
+                       for (int c = 0; c < 3; ++c)
+                         sh[k][c] = (static_cast<float>(byte_at(from, c)) - 128.0f) / 128.0f;
+                   }});
+  return all;
+}
+
+constexpr std::size_t block_bytes = 128 * 1024;
+
+void read_attribute(ByteStream& stream, const Attribute& attribute, GaussianCloud& cloud,
+                    const std::function<void()>& after_block) {
+  const std::size_t rows = std::max<std::size_t>(1, block_bytes / attribute.bytes);
+  std::vector<std::byte> block(rows * attribute.bytes);
+  for (std::size_t begin = 0; begin < cloud.size(); begin += rows) {
+    const std::size_t end = std::min(cloud.size(), begin + rows);
+    stream.read(std::span(block).first((end - begin) * attribute.bytes));
+    for (std::size_t i = begin; i < end; ++i)
+      attribute.store(block.data() + (i - begin) * attribute.bytes, cloud, i);
+    after_block();
+  }
+}
+
+[[noreturn]] void fail(const ByteSource& file, std::string_view where, std::string_view what) {
+  throw InputError(file.name(), where, what, "not an .spz file, or a damaged one");
+}
+
+Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
+  Header header;
+  header.version = load_as<std::uint32_t>(bytes.data() + 4);
+  header.count = load_as<std::uint32_t>(bytes.data() + 8);
+  header.sh_degree = byte_at(bytes.data(), 12);
+  header.fractional_bits = byte_at(bytes.data(), 13);
+  header.has_extensions = byte_at(bytes.data(), 14) & extensions_flag;
+  if (load_as<std::uint32_t>(bytes.data()) != magic) fail(file, "magic", "is not 'NGSP'");
+  if (header.version < 1 || header.version > 4)
+    throw InputError(file.name(), "version",
+                     fmt::format("{} is not supported; 1 to 4 are", header.version));
+  if (header.sh_degree > 4)
+    fail(file, "shDegree", fmt::format("{} is not in 0…4", header.sh_degree));
+  if (header.fractional_bits > 23)
+    fail(file, "fractionalBits", fmt::format("{} is not in 0…23", header.fractional_bits));
+  std::size_t plain_bytes = 0;
+  for (const Attribute& attribute : attributes(header)) plain_bytes += attribute.bytes;
+  require_plausible_count(file, "numPoints", header.count, plain_bytes, file.size());
+  return header;
+}
+
+/// The axes that the extension records (u32 type, u32 length, payload) name, or the usual ones.
+AxisFlip axes_of(const ByteSource& file, std::span<const std::byte> extensions) {
+  while (extensions.size() >= 8) {
+    const auto type = load_as<std::uint32_t>(extensions.data());
+    const auto length = load_as<std::uint32_t>(extensions.data() + 4);
+    extensions = extensions.subspan(8);
+    if (length > extensions.size())
+      fail(file, fmt::format("extension {:#x}", type), "is longer than the space for extensions");
+    const auto system = length >= 4 ? load_as<std::uint32_t>(extensions.data()) : 0;
+    extensions = extensions.subspan(length);
+    if (type != coordinate_system_extension || system == 0) continue;  // 0: unspecified
+    if (system > 8)
+      throw InputError(file.name(), "extension SPZ_ADOBE_coordinate_system",
+                       fmt::format("coordinate system {} is not supported", system),
+                       "store the scene with its y axis up or down");
+    return AxisFlip(signs_to_right_down_front(system));
+  }
+  return AxisFlip(right_up_back);
+}
+
+void apply(const AxisFlip& flip, GaussianCloud& cloud, const LoadContext& context) {
+  const std::size_t sh_count = cloud.sh_count();
+  context.for_blocks(cloud.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      cloud.mean[i] = flip.mean(cloud.mean[i]);
+      cloud.rotation[i] = flip.rotation(cloud.rotation[i]);
+      for (std::size_t k = 1; k < sh_count; ++k) cloud.sh[i * sh_count + k] *= flip.sh(k);
+    }
+  });
+}
+
+GaussianCloud make_cloud(const Header& header) {
+  GaussianCloud cloud;
+  cloud.resize(header.count, std::min(header.sh_degree, max_sh_degree));
+  return cloud;
+}
+
+/// Versions 1 to 3: one gzip stream, and only its end tells the axes.
+SpzFile read_gzip(const ByteSource& file, const LoadContext& context) {
+  const auto stream = open_gzip(file);
+  std::array<std::byte, gzip_header_bytes> start;
+  stream->read(start);
+  const Header header = parse_header(file, start);
+  if (header.version > 3) fail(file, "version", "4 in a gzip stream");
+
+  SpzFile result{static_cast<int>(header.version), make_cloud(header)};
+  const LoadContext decoding = context.part(0.0, 0.9);
+  for (const Attribute& attribute : attributes(header))
+    read_attribute(*stream, attribute, result.cloud, [&] {
+      decoding.report(static_cast<double>(stream->consumed()) / static_cast<double>(file.size()));
+    });
+  std::vector<std::byte> extensions(header.has_extensions ? max_extension_bytes : 0);
+  const auto stored = std::span(extensions).first(stream->read_up_to(extensions));
+  apply(axes_of(file, stored), result.cloud, context.part(0.9, 1.0));
+  return result;
+}
+
+/// Version 4: header, extensions, a table of (compressed, plain) sizes, one zstd stream per
+/// attribute.
+SpzFile read_plain(const ByteSource& file, const LoadContext& context) {
+  std::array<std::byte, plain_header_bytes> start;
+  file.read(0, start);
+  const Header header = parse_header(file, start);
+  if (header.version < 4)
+    fail(file, "version", fmt::format("{} outside of a gzip stream", header.version));
+  const std::size_t stream_count = byte_at(start.data(), 15);
+  const auto table_offset = load_as<std::uint32_t>(start.data() + 16);
+  const std::vector<Attribute> all = attributes(header);
+  if (stream_count != all.size())
+    fail(file, "numStreams", fmt::format("{} where {} are expected", stream_count, all.size()));
+  if (table_offset < plain_header_bytes || table_offset - plain_header_bytes > max_extension_bytes)
+    fail(file, "tocByteOffset", fmt::format("{} is out of range", table_offset));
+
+  std::vector<std::byte> extensions(table_offset - plain_header_bytes);
+  file.read(plain_header_bytes, extensions);
+  const AxisFlip flip = header.has_extensions ? axes_of(file, extensions) : AxisFlip(right_up_back);
+
+  std::vector<std::array<std::uint64_t, 2>> sizes(all.size());
+  file.read(table_offset, std::as_writable_bytes(std::span(sizes)));
+  std::vector<std::uint64_t> offsets;
+  std::uint64_t offset = table_offset + std::span(sizes).size_bytes();
+  for (std::size_t a = 0; a < all.size(); ++a) {
+    const auto [compressed, plain] = sizes[a];
+    if (plain != std::uint64_t{header.count} * all[a].bytes || compressed > file.size() - offset)
+      fail(file, fmt::format("size of the {} stream", all[a].name),
+           fmt::format("{} bytes for {} are not possible", compressed, plain));
+    offsets.push_back(offset);
+    offset += compressed;
+  }
+
+  SpzFile result{static_cast<int>(header.version), make_cloud(header)};
+  context.part(0.0, 0.9).for_blocks(all.size(), 1, [&](std::size_t a, std::size_t) {
+    read_attribute(*open_zstd(file, offsets[a], sizes[a][0]), all[a], result.cloud, [] {});
+  });
+  apply(flip, result.cloud, context.part(0.9, 1.0));
+  return result;
+}
+
+}  // namespace
+
+namespace {
+
+bool is_gzip(const ByteSource& file) {
+  std::array<std::byte, 2> start;
+  file.read(0, start);
+  return load_as<std::uint16_t>(start.data()) == 0x8b1f;
+}
+
+}  // namespace
+
+bool is_spz(const ByteSource& file) {
+  if (file.size() < 4) return false;
+  std::array<std::byte, 4> start;
+  file.read(0, start);
+  return load_as<std::uint32_t>(start.data()) == magic ||
+         load_as<std::uint16_t>(start.data()) == 0x8b1f;
+}
+
+SpzSize read_spz_size(const ByteSource& file) {
+  std::array<std::byte, plain_header_bytes> start;
+  if (is_gzip(file))
+    open_gzip(file)->read(std::span(start).first(gzip_header_bytes));
+  else
+    file.read(0, start);
+  const Header header = parse_header(file, start);
+  return {header.count, header.sh_degree};
+}
+
+SpzFile read_spz(const ByteSource& file, const LoadContext& context) {
+  return is_gzip(file) ? read_gzip(file, context) : read_plain(file, context);
+}
+
+}  // namespace catgs

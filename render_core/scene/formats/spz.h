@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/gaussian_cloud.h"
+
+namespace catgs {
+
+// Niantic's .spz: attributes one after the other, quantised to bytes. Versions 1 (half-float
+// positions) to 3 are one gzip stream; version 4 has a plain header and one zstd stream per
+// attribute. By its specification the axes are right, up, back unless an extension says otherwise;
+// files written by tools that did not convert come out upside down, and a sidecar's "up" puts that
+// right.
+
+struct SpzFile {
+  int version = 0;
+  GaussianCloud cloud;  // not sanitized; SH above degree 3 is cut off
+};
+
+/// Whether the file begins like an .spz: gzip or the plain header of version 4.
+bool is_spz(const ByteSource& file);
+
+/// What the header says; the SH degree is that of the file. Throws InputError.
+struct SpzSize {
+  std::uint64_t count = 0;
+  int sh_degree = 0;
+};
+SpzSize read_spz_size(const ByteSource& file);
+
+/// Throws InputError.
+SpzFile read_spz(const ByteSource& file, const LoadContext& context);
+
+/// Writes version 3, which every reader in use knows. Positions get as many fractional bits as the
+/// largest coordinate leaves room for, at most 16. Errors: position 2^-(bits + 1); log scale 1/32
+/// inside [-10, 5.9]; opacity 0.5/255; constant SH 0.5 / (0.15 * 255) inside ±3.3; SH of degree 1
+/// 1/32 and above 1/16, inside [-1, 1); quaternion components 0.5 sqrt(1/2) / 511.
+/// Throws InputError when a coordinate is over 2^23.
+void write_spz(const GaussianCloud& cloud, std::ostream& to);
+
+}  // namespace catgs

@@ -1,0 +1,289 @@
+#include "render_core/scene/formats/streamed_sog.h"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/sog.h"
+
+namespace catgs {
+
+namespace {
+
+constexpr std::uint64_t max_tree_bytes = 32 << 20;  // 6 M Gaussians take 242 KB
+constexpr std::uint64_t max_levels = 16;
+constexpr std::size_t max_files = std::size_t{1} << 16;
+constexpr std::size_t max_name_bytes = 4096;
+constexpr std::size_t max_nodes = std::size_t{1} << 16;
+constexpr int max_tree_depth = 64;
+
+LodPiece parse_piece(const JsonField& field, std::size_t file_count) {
+  const LodPiece piece{field.at("file").count(), field.at("offset").count(),
+                       field.at("count").count()};
+  if (piece.file >= file_count)
+    field.at("file").fail(fmt::format("is {}, and there are {}", piece.file, file_count));
+  if (piece.offset > max_gaussians || piece.count > max_gaussians) field.fail("is out of range");
+  return piece;
+}
+
+std::vector<std::optional<LodPiece>> parse_node(const JsonField& lods, const LodTree& tree) {
+  std::vector<std::optional<LodPiece>> pieces(static_cast<std::size_t>(tree.levels));
+  if (!lods.value().is_object()) lods.fail("is not an object");
+  for (const auto& [key, value] : lods.value().items()) {
+    std::size_t level = 0;
+    const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), level);
+    if (error != std::errc{} || end != key.data() + key.size() || level >= pieces.size())
+      lods.fail(fmt::format("'{}' is no level in 0…{}", key, tree.levels - 1));
+    pieces[level] = parse_piece(lods.at(key), tree.files.size());
+  }
+  return pieces;
+}
+
+/// By recursion, which max_tree_depth bounds.
+void parse_tree(const JsonField& node, int depth, LodTree& tree) {
+  if (depth > max_tree_depth) node.fail(fmt::format("lies deeper than {}", max_tree_depth));
+  if (const auto lods = node.find("lods")) {
+    if (tree.nodes.size() == max_nodes) lods->fail(fmt::format("is node {}", max_nodes + 1));
+    tree.nodes.push_back(parse_node(*lods, tree));
+  }
+  if (const auto children = node.find("children"))
+    for (std::size_t i = 0; i < children->size(); ++i) parse_tree((*children)[i], depth + 1, tree);
+}
+
+/// Level of the node's piece that stands for `wanted`; -1 when the node is empty.
+int level_for(const std::vector<std::optional<LodPiece>>& node, int wanted) {
+  const int levels = static_cast<int>(node.size());
+  for (int level = wanted; level < levels; ++level)
+    if (node[static_cast<std::size_t>(level)]) return level;
+  for (int level = wanted - 1; level >= 0; --level)
+    if (node[static_cast<std::size_t>(level)]) return level;
+  return -1;
+}
+
+LodChoice choose(const LodTree& tree, const std::vector<int>& wanted) {
+  LodChoice choice;
+  choice.finest = std::numeric_limits<int>::max();
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    const int level = level_for(tree.nodes[n], wanted[n]);
+    if (level < 0) continue;
+    choice.pieces.push_back(*tree.nodes[n][static_cast<std::size_t>(level)]);
+    choice.count += choice.pieces.back().count;
+    choice.finest = std::min(choice.finest, level);
+    choice.coarsest = std::max(choice.coarsest, level);
+  }
+  return choice;
+}
+
+/// The files of a scene while its parts are opened, each once: a few bytes that many parts share
+/// would be a scene of any size.
+class UnsharedFiles final : public FileSet {
+ public:
+  UnsharedFiles(const FileSet& folder, std::string scene)
+      : folder_(folder), scene_(std::move(scene)) {}
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
+    if (!names_.insert(std::filesystem::path(name).lexically_normal().string()).second)
+      throw InputError(scene_, "file " + name, "is used a second time",
+                       "give each SOG files of its own");
+    auto file = folder_.open(name);
+    bytes_ += file->size();
+    return file;
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  const FileSet& folder_;
+  const std::string scene_;
+  mutable std::set<std::string> names_;
+  mutable std::uint64_t bytes_ = 0;
+};
+
+/// One of the SOGs that the tree refers to. Its file is closed again: a scene may have thousands.
+struct Part {
+  std::unique_ptr<FileSet> archive;  // unpacked; null for folders
+  SogMeta meta;
+  std::vector<SogRange> ranges;
+
+  [[nodiscard]] const FileSet& files(const FileSet& folder) const {
+    return archive ? *archive : folder;
+  }
+};
+
+Part open_part(const FileSet& folder, const std::string& name) {
+  Part part;
+  if (name.ends_with(".sog")) {
+    part.archive = std::make_unique<ZipFiles>(*folder.open(name));
+    part.meta = read_sog_meta(*part.archive, "meta.json");
+  } else {
+    part.meta = read_sog_meta(folder, name);
+  }
+  return part;
+}
+
+/// Files of the chosen pieces, with ranges that fill the cloud from 0 on.
+std::vector<Part> open_parts(const FileSet& folder, const LodTree& tree,
+                             std::vector<LodPiece> pieces, std::size_t& total) {
+  std::stable_sort(pieces.begin(), pieces.end(), [](const LodPiece& a, const LodPiece& b) {
+    return std::pair(a.file, a.offset) < std::pair(b.file, b.offset);
+  });
+  std::vector<Part> parts;
+  std::optional<std::size_t> open_file;
+  std::size_t end_of_last = 0;
+  for (const LodPiece& piece : pieces) {
+    if (piece.count == 0) continue;
+    if (open_file != piece.file) {
+      parts.push_back(open_part(folder, tree.files[piece.file]));
+      open_file = piece.file;
+      end_of_last = 0;
+    }
+    Part& part = parts.back();
+    if (piece.offset < end_of_last || piece.offset + piece.count > part.meta.count)
+      throw InputError(
+          tree.name, "tree",
+          fmt::format("Gaussians {} to {} of {} overlap others or are not there", piece.offset,
+                      piece.offset + piece.count, tree.files[piece.file]));
+    part.ranges.push_back({piece.offset, piece.count, total});
+    end_of_last = piece.offset + piece.count;
+    total += piece.count;
+  }
+  return parts;
+}
+
+LodChoice choose(const LodTree& tree, std::optional<int> level, std::optional<std::size_t> budget,
+                 std::size_t environment_count) {
+  if (level && budget)
+    throw InputError(tree.name, "", "a level and a Gaussian budget were both given", "give one");
+  if (!budget) {
+    if (level && (*level < 0 || *level >= tree.levels))
+      throw InputError(
+          tree.name, "level of detail",
+          fmt::format("there is no level {}; 0 (finest) to {} are", *level, tree.levels - 1));
+    return choose_level(tree, level.value_or(0));
+  }
+  const std::size_t room = *budget > environment_count ? *budget - environment_count : 0;
+  if (auto choice = choose_within_budget(tree, room)) return *std::move(choice);
+  throw InputError(tree.name, "Gaussian budget",
+                   fmt::format("{} is less than the {} of the coarsest level", *budget,
+                               choose_level(tree, tree.levels - 1).count + environment_count),
+                   "raise the budget");
+}
+
+}  // namespace
+
+LodTree read_lod_tree(const ByteSource& file) {
+  const nlohmann::json document = read_json(file, max_tree_bytes);
+  const JsonField meta(file.name(), document);
+  LodTree tree;
+  tree.name = file.name();
+  if (const auto version = meta.find("version"); version && version->count() != 1)
+    version->fail("is not supported", "version 1 is");
+  const std::uint64_t levels = meta.at("lodLevels").count();
+  if (levels < 1 || levels > max_levels)
+    meta.at("lodLevels").fail(fmt::format("is not in 1…{}", max_levels));
+  tree.levels = static_cast<int>(levels);
+  const JsonField names = meta.at("filenames");
+  if (names.size() > max_files) names.fail(fmt::format("has more than {} entries", max_files));
+  const auto file_named_by = [&](const JsonField& field) {
+    std::string name = field.text();
+    if (name.size() > max_name_bytes)
+      field.fail(fmt::format("has more than {} bytes", max_name_bytes));
+    return name;
+  };
+  for (std::size_t i = 0; i < names.size(); ++i) tree.files.push_back(file_named_by(names[i]));
+  if (const auto environment = meta.find("environment"))
+    tree.environment = file_named_by(*environment);
+  parse_tree(meta.at("tree"), 0, tree);
+  return tree;
+}
+
+LodChoice choose_level(const LodTree& tree, int level) {
+  return choose(tree, std::vector<int>(tree.nodes.size(), level));
+}
+
+std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t budget) {
+  int level = tree.levels - 1;
+  LodChoice choice = choose_level(tree, level);
+  if (choice.count > budget) return std::nullopt;
+  for (; level > 0; --level) {
+    LodChoice finer = choose_level(tree, level - 1);
+    if (finer.count > budget) break;
+    choice = std::move(finer);
+  }
+  if (level == 0) return choice;
+
+  std::vector<std::pair<std::size_t, std::size_t>> costs;  // additional Gaussians, node
+  const auto count_at = [&](std::size_t n, int wanted) {
+    const int found = level_for(tree.nodes[n], wanted);
+    return found < 0 ? 0 : tree.nodes[n][static_cast<std::size_t>(found)]->count;
+  };
+  for (std::size_t n = 0; n < tree.nodes.size(); ++n) {
+    const std::size_t now = count_at(n, level), then = count_at(n, level - 1);
+    costs.emplace_back(then > now ? then - now : 0, n);
+  }
+  std::sort(costs.begin(), costs.end());
+  std::vector<int> wanted(tree.nodes.size(), level);
+  std::size_t room = budget - choice.count;
+  for (const auto& [cost, n] : costs) {
+    if (cost > room) break;
+    room -= cost;
+    wanted[n] = level - 1;
+  }
+  return choose(tree, wanted);
+}
+
+std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
+                               std::optional<std::size_t> budget) {
+  const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
+  const std::size_t environment =
+      tree.environment.empty() ? 0 : open_part(folder, tree.environment).meta.count;
+  return choose(tree, level, budget, environment).count + environment;
+}
+
+StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
+                              std::optional<std::size_t> budget, const LoadContext& context) {
+  const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
+  const UnsharedFiles files(folder, tree.name);
+  std::vector<Part> environment;
+  if (!tree.environment.empty()) environment.push_back(open_part(files, tree.environment));
+  const std::size_t environment_count = environment.empty() ? 0 : environment[0].meta.count;
+  const LodChoice choice = choose(tree, level, budget, environment_count);
+
+  if (choice.pieces.empty()) throw InputError(tree.name, "tree", "has no levels of detail");
+
+  std::size_t total = 0;
+  std::vector<Part> parts = open_parts(files, tree, choice.pieces, total);
+  for (Part& part : environment) {
+    part.ranges.push_back({0, part.meta.count, total});
+    total += part.meta.count;
+    parts.push_back(std::move(part));
+  }
+  require_plausible_count(*folder.open("lod-meta.json"), "tree", total, sog_least_bytes,
+                          files.bytes());
+
+  int degree = 0;
+  for (const Part& part : parts) degree = std::max(degree, part.meta.sh_degree);
+  StreamedSog result;
+  result.detail = choice.finest == choice.coarsest
+                      ? fmt::format("level {} of 0…{}", choice.finest, tree.levels - 1)
+                      : fmt::format("levels {} and {} of 0…{}", choice.finest, choice.coarsest,
+                                    tree.levels - 1);
+  result.cloud.resize(total, degree);
+  std::size_t done = 0;
+  for (const Part& part : parts) {
+    const double from = static_cast<double>(done) / static_cast<double>(total);
+    for (const SogRange& range : part.ranges) done += range.count;
+    decode_sog(part.files(folder), part.meta, part.ranges, result.cloud,
+               context.part(from, static_cast<double>(done) / static_cast<double>(total)));
+  }
+  return result;
+}
+
+}  // namespace catgs

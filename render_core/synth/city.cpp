@@ -1,0 +1,170 @@
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "render_core/scene/analysis/first_sight.h"
+#include "render_core/synth/backdrop.h"
+#include "render_core/synth/city_houses.h"
+#include "render_core/synth/city_park.h"
+#include "render_core/synth/city_plan.h"
+#include "render_core/synth/city_props.h"
+#include "render_core/synth/city_streets.h"
+#include "render_core/synth/plants.h"
+#include "render_core/synth/scenes.h"
+
+namespace catgs::synth {
+namespace {
+
+// Weights are Gaussians at full density, which a city has from this size on: a larger one spreads
+// further and keeps the same Gaussians in its middle; a smaller one is both smaller and coarser.
+constexpr std::size_t full_density_count = 1'000'000;
+
+/// Gaussians of the sky, the hills and the skyline: a few thousand show them, more sharpen them.
+std::size_t backdrop_count(std::size_t count) {
+  return std::min<std::size_t>(count * 3 / 20, 4'500) +
+         std::min(count, full_density_count) * 7 / 200;
+}
+
+struct Cell {
+  int column;
+  int row;
+  float distance;  // of its middle from the city's centre
+  double weight;
+};
+
+/// Everything of one cell of the plan: its block and the streets west and south of it.
+void paint_cell(Painter& painter, const Block& block, float haze) {
+  paint_streets(painter, block, haze);
+  paint_lot(painter, block, haze);
+  for (const Building& b : block.buildings)
+    paint_building(painter, b, detail_at(b.base.middle()), haze);
+  for (const Tree& tree : block.trees) {
+    if (!painter.measuring()) {
+      const float r = 1.6f * tree.crown;
+      painter.shadows().focus({at(tree.place.x - r, tree.height + 2.0f * r, tree.place.y - r),
+                               at(tree.place.x + r, 0, tree.place.y + r)});
+    }
+    Random random(tree.key);
+    const glm::vec3 leaves = leaf_albedo(random);
+    paint_tree(painter, at(tree.place.x, 0, tree.place.y), tree.height, tree.crown, leaves, haze,
+               110.0 * tree.crown * tree.crown * detail_at(tree.place), tree.key);
+  }
+  paint_props(painter, block, haze);
+  const glm::vec2 corner = block.lot.min - 10.0f;
+  paint_floaters(painter, at(corner.x, 26.0f, corner.y),
+                 at(corner.x + block_pitch_m, 0.3f, corner.y + block_pitch_m),
+                 0.015 * painter.measured(), child(block.key, 90));
+}
+
+double measure_cell(std::uint64_t seed, const Light& light, int column, int row) {
+  Shadows none(light.to_sun());
+  Painter painter(light, none);
+  paint_cell(painter, plan_block(seed, column, row), 0.0f);
+  return painter.measured();
+}
+
+/// Cells from the centre outwards until their weights reach `target`; at least those around the
+/// first crossings, whatever their density.
+std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double target,
+                               ThreadPool& pool) {
+  std::vector<Cell> chosen;
+  double sum = 0.0;
+  float done = 0.0f;  // all cells nearer than this are chosen
+  constexpr std::size_t fewest = 8;
+  while (sum < target || chosen.size() < fewest) {
+    const float ring = done + std::max(block_pitch_m, 0.5f * done);
+    std::vector<Cell> cells;
+    const int reach = static_cast<int>(ring / block_pitch_m) + 2;
+    for (int column = -reach; column <= reach; ++column) {
+      for (int row = -reach; row <= reach; ++row) {
+        const glm::vec2 middle = (glm::vec2(column, row) + 0.5f) * block_pitch_m;
+        const float distance = glm::length(middle - city_centre);
+        if (distance >= done && distance < ring) cells.push_back({column, row, distance, 0.0});
+      }
+    }
+    std::sort(cells.begin(), cells.end(), [](const Cell& a, const Cell& b) {
+      return std::tie(a.distance, a.column, a.row) < std::tie(b.distance, b.column, b.row);
+    });
+    pool.parallel_for(cells.size(), [&](std::size_t i) {
+      cells[i].weight = measure_cell(seed, light, cells[i].column, cells[i].row);
+    });
+    for (const Cell& cell : cells) {
+      if (sum >= target && chosen.size() >= fewest) break;
+      chosen.push_back(cell);
+      sum += cell.weight;
+    }
+    done = ring;
+  }
+  return chosen;
+}
+
+}  // namespace
+
+Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
+  const Light light(glm::normalize(glm::vec3(-0.88f, -0.41f, -0.20f)), child(seed, 1));
+  const std::size_t reference = std::min(count, full_density_count);
+  const std::size_t backdrop = backdrop_count(count);
+  const std::size_t in_cells = count - backdrop;
+  // Below full density the area shrinks with the count to the power 3/4, the density by the rest.
+  const double fill = std::sqrt(std::sqrt(static_cast<double>(reference) / full_density_count));
+  const double target = static_cast<double>(in_cells) / fill;
+  const std::vector<Cell> cells = choose_cells(seed, light, target, pool);
+  double total = 0.0;
+  for (const Cell& cell : cells) total += cell.weight;
+  const double density = count < full_density_count ? static_cast<double>(in_cells) / total : 1.0;
+
+  Scene scene;
+  scene.cloud.resize(count, max_sh_degree);
+  std::vector<std::size_t> first(cells.size() + 1, 0);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    sum += cells[i].weight;
+    first[i + 1] = std::min(in_cells, static_cast<std::size_t>(sum * density));
+  }
+  first.back() = in_cells;
+  const float radius = cells.back().distance + 0.5f * block_pitch_m;
+  pool.parallel_for(cells.size() + 1, [&](std::size_t i) {
+    Shadows shadows(light.to_sun());
+    if (i == cells.size()) {
+      const auto paint = [&](Painter& p) {
+        const glm::vec2 centre = city_centre;
+        const float sky = std::max(900.0f, 4.0f * radius);
+        paint_sky(p, centre, sky, 0.55, child(seed, 2));
+        // From within the outermost cells: their ring has gaps.
+        paint_horizon(p, centre, std::max(0.55f * radius, radius - 1.2f * block_pitch_m), sky,
+                      {0.22f, 0.21f, 0.17f}, 0.18, child(seed, 3));
+        paint_skyline(p, centre, radius + 40.0f, 2.2f * radius + 150.0f, 0.27, child(seed, 4));
+      };
+      Painter painter(light, shadows, scene.cloud, in_cells, backdrop, 1.0);
+      const std::size_t n = painter.take(1.0);
+      painter.divide(n, paint);
+      return;
+    }
+    const Cell& cell = cells[i];
+    for (int dc = -2; dc <= 1; ++dc) {  // the sun stands to the west and south
+      for (int dr = -2; dr <= 1; ++dr)
+        add_shadows(plan_block(seed, cell.column + dc, cell.row + dr), shadows);
+    }
+    const glm::vec2 corner = glm::vec2(cell.column, cell.row) * block_pitch_m;
+    shadows.keep({at(corner.x - 15.0f, 100.0f, corner.y - 15.0f),
+                  at(corner.x + block_pitch_m, 0.0f, corner.y + block_pitch_m)});
+    const float haze = 0.30f * smooth_step(0.4f, 1.0f, cell.distance / std::max(radius, 220.0f));
+    Painter painter(light, shadows, scene.cloud, first[i], first[i + 1] - first[i], cell.weight);
+    paint_cell(painter, plan_block(seed, cell.column, cell.row), haze);
+  });
+
+  scene.name = "city";
+  scene.format = "procedural";
+  scene.hints.start_pose =
+      look_at(at(start_place.x, 11.0f, start_place.y), at(-8.0f, 4.0f, 40.0f), up);
+  scene.hints.near_z = 0.2f;
+  scene.hints.limits = {at(city_centre.x - radius, 90.0f, city_centre.y - radius),
+                        at(city_centre.x + radius, 0.5f, city_centre.y + radius)};
+  // On the view axis, over the middle of the crossing: an orbit stays between the houses.
+  scene.hints.focus = at(-0.4f, 7.0f, -2.7f);
+  scene.hints.source = "procedural";
+  return scene;
+}
+
+}  // namespace catgs::synth

@@ -1,0 +1,194 @@
+#include "render_core/tools/bench/bench_measure.h"
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/tools/frame_feed.h"
+
+namespace catgs {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_between(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double, std::milli>(to - from).count();
+}
+
+/// One pass over the path, with a View that is warm.
+std::vector<Measurement::Frame> time_path(const RenderSetup& setup, const ViewSettings& settings,
+                                          View& view, const ProgressReport& report) {
+  FrameFeed feed(setup, settings);
+  std::vector<Measurement::Frame> frames;
+  frames.reserve(setup.poses.size());
+  auto last = Clock::now();
+  for (std::size_t i = 0; i < setup.poses.size(); ++i) {
+    FrameView frame;
+    render_or_throw(view, feed.next(), frame);
+    const auto now = Clock::now();
+    frames.push_back({ms_between(last, now), frame.stats, i == 0});
+    last = now;
+    report(static_cast<double>(i + 1) / static_cast<double>(setup.poses.size()));
+  }
+  return frames;
+}
+
+/// Calls body(i) for every i in [0, count): the first on this thread, each other on its own. Throws
+/// what one of them threw, when all have ended.
+template <class Body>
+void side_by_side(std::size_t count, const Body& body) {
+  std::vector<std::future<void>> others;
+  for (std::size_t i = 1; i < count; ++i) {
+    others.push_back(std::async(std::launch::async, [&body, i] { body(i); }));
+  }
+  body(0);
+  for (std::future<void>& other : others) other.get();
+}
+
+template <class Visit>
+void for_each_frame(const Measurement& measurement, Measurement::Kind kind, const Visit& visit) {
+  for (const Measurement::Frame& frame : measurement.frames) {
+    if (!kind || frame.stats.kind == *kind) visit(frame);
+  }
+}
+
+}  // namespace
+
+double Measurement::fps() const {
+  return wall_ms > 0.0 ? 1000.0 * static_cast<double>(frames.size()) / wall_ms : 0.0;
+}
+
+std::vector<double> Measurement::frame_ms(Kind kind) const {
+  std::vector<double> times;
+  for_each_frame(*this, kind, [&](const Frame& frame) { times.push_back(frame.ms); });
+  return times;
+}
+
+double Measurement::mean_stage_ms(Stage stage, Kind kind) const {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for_each_frame(*this, kind, [&](const Frame& frame) {
+    sum += frame.stats.stage_ms[static_cast<std::size_t>(stage)];
+    ++count;
+  });
+  return count == 0 ? 0.0 : sum / static_cast<double>(count);
+}
+
+ListLength Measurement::list_length(Kind kind) const {
+  ListLength length;
+  std::size_t count = 0;
+  for_each_frame(*this, kind, [&](const Frame& frame) {
+    length.mean += static_cast<double>(frame.stats.list_entries);
+    length.visible_mean += static_cast<double>(frame.stats.visible);
+    length.max = std::max(length.max, frame.stats.list_entries);
+    length.tile_max = std::max(length.tile_max, frame.stats.list_max);
+    length.overflowed += frame.stats.overflowed_entries;
+    length.giants_max = std::max(length.giants_max, frame.stats.giants);
+    length.uncarried += frame.stats.uncarried_lists;
+    ++count;
+  });
+  length.mean /= static_cast<double>(std::max<std::size_t>(count, 1));
+  length.visible_mean /= static_cast<double>(std::max<std::size_t>(count, 1));
+  return length;
+}
+
+std::map<int, std::size_t> Measurement::window_histogram() const {
+  std::map<int, std::size_t> histogram;
+  for_each_frame(*this, FrameKind::key,
+                 [&](const Frame& frame) { ++histogram[frame.stats.window]; });
+  return histogram;
+}
+
+double Measurement::frames_per_key() const {
+  const std::size_t keys = frame_ms(FrameKind::key).size();
+  return keys == 0 ? 0.0 : static_cast<double>(frames.size()) / static_cast<double>(keys);
+}
+
+double Measurement::keys_without_window() const {
+  const std::map<int, std::size_t> windows = window_histogram();
+  const auto none = windows.find(0);
+  const std::size_t keys = frame_ms(FrameKind::key).size();
+  return none == windows.end() ? 0.0
+                               : static_cast<double>(none->second) / static_cast<double>(keys);
+}
+
+std::size_t Measurement::windows_cut() const {
+  std::size_t cut = 0;
+  int missing = 0;  // sub-frames that the group still promised
+  for (const Frame& frame : frames) {
+    if (frame.stats.kind == FrameKind::key) {
+      cut += missing > 0 && !frame.first ? 1 : 0;
+      missing = frame.stats.window;
+    } else {
+      --missing;
+    }
+  }
+  return cut;
+}
+
+std::size_t warmup_frames(std::optional<std::size_t> asked, const RenderSetup& setup) {
+  const std::size_t most = setup.poses.size();
+  if (asked && *asked > most) {
+    throw InputError("--warmup", "", fmt::format("{} frames of a path of {}", *asked, most),
+                     "the path's first frames warm up: at most all of them");
+  }
+  return std::min(asked.value_or(default_warmup), most);
+}
+
+Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t warmup,
+                    const ProgressReport& report, std::size_t views) {
+  settings.format = PixelFormat::rgb_f32;
+  settings.space = MemorySpace::device;
+  std::vector<std::unique_ptr<View>> warm(views);
+  side_by_side(views, [&](std::size_t v) {
+    warm[v] = setup.made.renderer->make_view(settings);
+    FrameView frame;
+    FrameFeed feed(setup, settings);
+    for (std::size_t i = 0; i < warmup; ++i) {
+      render_or_throw(*warm[v], feed.next(), frame);
+    }
+  });
+
+  std::vector<std::vector<Measurement::Frame>> passes(views);
+  const auto start = Clock::now();
+  side_by_side(views, [&](std::size_t v) {
+    passes[v] = time_path(
+        setup, settings, *warm[v], v == 0 ? report : [](double) {});
+  });
+  Measurement measurement;
+  measurement.wall_ms = ms_between(start, Clock::now());
+  for (std::size_t v = 0; v < views; ++v) {
+    measurement.frames.insert(measurement.frames.end(), passes[v].begin(), passes[v].end());
+    measurement.view_bytes = std::max(measurement.view_bytes, warm[v]->memory_bytes());
+  }
+  return measurement;
+}
+
+PairCost count_pairs(const RenderSetup& setup, ViewSettings settings,
+                     const Measurement& measurement) {
+  constexpr std::size_t max_counted_frames = 8;
+  settings.count_pairs = true;
+  const auto view = setup.made.renderer->make_view(settings);
+  const std::size_t counted = std::min(max_counted_frames, setup.poses.size());
+  double pairs = 0.0;
+  double blend_ms = 0.0;
+  for (std::size_t k = 0; k < counted; ++k) {
+    const std::size_t i = k * setup.poses.size() / counted;
+    FrameView frame;
+    render_or_throw(*view, setup.request(i), frame);
+    pairs += static_cast<double>(frame.stats.blended_pairs);
+    blend_ms += measurement.frames[i].stats.stage_ms[static_cast<std::size_t>(Stage::blend)];
+  }
+  PairCost cost;
+  if (pairs > 0.0) {
+    cost.pairs_per_frame = pairs / static_cast<double>(counted);
+    cost.ns_per_pair = 1e6 * blend_ms / pairs;
+  }
+  return cost;
+}
+
+}  // namespace catgs

@@ -1,0 +1,264 @@
+#include "render_core/tools/bench/bench_report.h"
+
+#include <algorithm>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "render_core/base/build_info.h"
+#include "render_core/metrics/summary.h"
+#include "render_core/tools/scene_hash.h"
+
+namespace catgs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json to_json(const Summary& summary) {
+  if (summary.count == 0) return nullptr;
+  return {{"mean", summary.mean},
+          {"p50", summary.p50},
+          {"p95", summary.p95},
+          {"p99", summary.p99},
+          {"max", summary.max}};
+}
+
+Json to_json(const QualityTally& tally, bool whole_images) {
+  if (tally.frames() == 0) return nullptr;
+  Json json = {{"frames", tally.frames()},
+               {"psnr_db", {{"mean", tally.mean_psnr()}, {"min", tally.min_psnr()}}},
+               {"worst_frame", tally.worst_frame()}};
+  if (whole_images) {
+    json["ssim"] = {{"mean", tally.mean_ssim()}, {"min", tally.min_ssim()}};
+    json["worst_block_psnr_db"] = tally.worst_block_psnr();
+    json["worst_block_frame"] = tally.worst_block_frame();
+    json["block_0_1_percent_psnr_db"] = tally.block_0_1_percent_psnr();
+  }
+  return json;
+}
+
+Json to_json(const QualityReport& quality) {
+  Json json = {{"against", quality.against},
+               {"key", to_json(quality.key, quality.whole_images)},
+               {"sub", to_json(quality.sub, quality.whole_images)},
+               {"see_through", nullptr},
+               {"pop", nullptr}};
+  if (quality.see_through.count > 0) {
+    json["see_through"] = {{"mean", quality.see_through.mean()}, {"max", quality.see_through.max}};
+  }
+  if (quality.pop.count > 0) {
+    json["pop"] = {{"switches", quality.pop.count},
+                   {"mean", quality.pop.mean()},
+                   {"max", quality.pop.max},
+                   {"worst_frame", quality.worst_pop_frame},
+                   {"allowed", max_pop},
+                   {"over", quality.pops}};
+  }
+  return json;
+}
+
+Json stages_json(const Measurement& measurement, Measurement::Kind kind) {
+  Json stages;
+  for (std::size_t i = 0; i < stage_count; ++i) {
+    stages[std::string(stage_names[i])] = measurement.mean_stage_ms(static_cast<Stage>(i), kind);
+  }
+  return stages;
+}
+
+Json lists_json(const Measurement& measurement, Measurement::Kind kind) {
+  const ListLength lists = measurement.list_length(kind);
+  return {{"mean", lists.mean}, {"max", lists.max}, {"tile_max", lists.tile_max}};
+}
+
+/// Adds frame_ms, stage_ms and list_length of frames of a kind.
+void add_times(Json& json, const Measurement& measurement, Measurement::Kind kind,
+               const std::string& suffix) {
+  const std::vector<double> times = measurement.frame_ms(kind);
+  json["frame_ms" + suffix] = to_json(summarize(times));
+  json["stage_ms" + suffix] = times.empty() ? Json() : stages_json(measurement, kind);
+  json["list_length" + suffix] = times.empty() ? Json() : lists_json(measurement, kind);
+}
+
+Json settings_json(const RenderOptions& options, const RenderSetup& setup,
+                   const BenchResult& result) {
+  Json json;
+  if (options.trace.empty()) {
+    const ScriptOptions script = script_options(options);
+    json["script"] = script.script;
+    json["seed"] = script.seed;
+    json["duration_s"] = script.duration_s;
+  } else {
+    json["trace"] = options.trace;
+    json["anchor"] = options.anchor;
+  }
+  json["fps"] = setup.fps;
+  json["frames"] = {setup.first, setup.first + setup.poses.size()};
+  json["size_px"] = {setup.camera.size_px.x, setup.camera.size_px.y};
+  json["focal_px"] = setup.camera.focal_px.x;
+  json["near"] = setup.camera.near_z;
+  const ViewSettings& settings = result.settings;
+  json["pipeline"] = pipeline_name(settings.pipeline);
+  if (settings.pipeline == Pipeline::catgs) {
+    const SpeculationSettings& speculation = settings.speculation;
+    json["window"] = speculation.initial_window;
+    json["max_trail_px"] = speculation.max_trail_px;
+    json["min_depth"] = speculation_min_depth(speculation, setup.camera.near_z);
+    json["max_deviation_px"] = speculation.max_deviation_px;
+    json["grid"] = grid_name(speculation.grid);
+    json["guard_px"] = speculation.guard_px;
+    json["cost_aware"] = speculation.cost_aware;
+    json["order"] = settings.order == BlendOrder::fresh ? "fresh" : "key";
+    json["colour_cache"] = settings.colour_cache;
+    json["constant_velocity"] = options.pipeline.constant_velocity;
+  }
+  json["split_tasks"] = settings.split_tasks;
+  json["simd"] = options.simd;
+  json["threads"] = setup.pool->threads();
+  json["warmup"] = result.warmup;
+  json["views"] = result.views;
+  return json;
+}
+
+void print_times(std::string_view name, const Measurement& measurement, Measurement::Kind kind) {
+  const Summary times = summarize(measurement.frame_ms(kind));
+  fmt::print("{:<14}{:.2f} mean, {:.2f} p50, {:.2f} p95, {:.2f} p99, {:.2f} max", name, times.mean,
+             times.p50, times.p95, times.p99, times.max);
+  for (std::size_t i = 0; i < stage_count; ++i) {
+    fmt::print("{}{} {:.2f}", i == 0 ? "; " : ", ", stage_names[i],
+               measurement.mean_stage_ms(static_cast<Stage>(i), kind));
+  }
+  fmt::print("\n");
+}
+
+void print_groups(const Measurement& measurement) {
+  const std::size_t keys = measurement.frame_ms(FrameKind::key).size();
+  const std::size_t subs = measurement.frame_ms(FrameKind::sub).size();
+  fmt::print(
+      "{:<14}{} key frames, {} sub-frames: {:.2f} frames per key frame, {:.0f} % of the keys "
+      "without a window; windows",
+      "groups", keys, subs, measurement.frames_per_key(),
+      100.0 * measurement.keys_without_window());
+  for (const auto& [window, count] : measurement.window_histogram()) {
+    fmt::print(" {}: {}", window, count);
+  }
+  fmt::print("; {} left early\n", measurement.windows_cut());
+}
+
+void print_quality(std::string_view kind, const QualityReport& report, const QualityTally& tally) {
+  if (tally.frames() == 0) return;
+  fmt::print("{:<14}{:.2f} dB mean, {:.2f} dB worst frame ({})", fmt::format("{} frames", kind),
+             tally.mean_psnr(), tally.min_psnr(), tally.worst_frame());
+  if (report.whole_images) {
+    fmt::print(
+        ", {:.2f} dB worst block ({}), {:.2f} dB 0.1 % block; SSIM {:.5f} mean, {:.5f} worst",
+        tally.worst_block_psnr(), tally.worst_block_frame(), tally.block_0_1_percent_psnr(),
+        tally.mean_ssim(), tally.min_ssim());
+  }
+  fmt::print("\n");
+}
+
+void print_quality(const QualityReport& quality) {
+  fmt::print("{:<14}against {}\n", "quality", quality.against);
+  print_quality("key", quality, quality.key);
+  print_quality("sub", quality, quality.sub);
+  if (quality.see_through.count > 0) {
+    fmt::print("{:<14}{:.1f} % of the pixels on average, {:.1f} % at most\n", "see-through",
+               100.0 * quality.see_through.mean(), 100.0 * quality.see_through.max);
+  }
+  if (quality.pop.count > 0) {
+    fmt::print(
+        "{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} key switches (frame {}), {} over 1/255\n",
+        "pop", 255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
+        quality.worst_pop_frame, quality.pops);
+  }
+}
+
+}  // namespace
+
+double BenchResult::ns_per_gaussian(const RenderSetup& setup) const {
+  const double ms = measurement.mean_stage_ms(Stage::project) +
+                    measurement.mean_stage_ms(Stage::bin) + measurement.mean_stage_ms(Stage::sort);
+  return 1e6 * ms / static_cast<double>(std::max<std::size_t>(setup.cloud->size(), 1));
+}
+
+Json report_json(const RenderOptions& options, const RenderSetup& setup,
+                 const BenchResult& result) {
+  const Measurement& measurement = result.measurement;
+  const ListLength lists = measurement.list_length();
+  Json windows = Json::object();
+  for (const auto& [window, count] : measurement.window_histogram()) {
+    windows[std::to_string(window)] = count;
+  }
+  Json json = {{"version", build_version},
+               {"commit", build_commit},
+               {"device", setup.made.renderer->description()},
+               {"device_reason", setup.made.reason},
+               {"scene",
+                {{"name", setup.scene.name},
+                 {"format", setup.scene.format},
+                 {"gaussians", setup.cloud->size()},
+                 {"sh_degree", setup.cloud->sh_degree},
+                 {"hash", fmt::format("{:016x}", scene_hash(*setup.cloud))}}},
+               {"settings", settings_json(options, setup, result)},
+               {"fps_mean", measurement.fps()},
+               {"flatness", flatness(measurement.frame_ms())}};
+  add_times(json, measurement, std::nullopt, "");
+  add_times(json, measurement, FrameKind::key, "_key");
+  add_times(json, measurement, FrameKind::sub, "_sub");
+  json["visible_mean"] = lists.visible_mean;
+  json["overflowed_entries"] = lists.overflowed;
+  json["giants_max"] = lists.giants_max;
+  json["uncarried_lists"] = lists.uncarried;
+  json["key_frames"] = measurement.frame_ms(FrameKind::key).size();
+  json["sub_frames"] = measurement.frame_ms(FrameKind::sub).size();
+  json["frames_per_key"] = measurement.frames_per_key();
+  json["keys_without_window"] = measurement.keys_without_window();
+  json["window_histogram"] = windows;
+  json["windows_cut"] = measurement.windows_cut();
+  json["ns_per_gaussian"] = result.ns_per_gaussian(setup);
+  json["ns_per_blended_pair"] = result.pair_cost.ns_per_pair;
+  json["blended_pairs_mean"] = result.pair_cost.pairs_per_frame;
+  json["scene_bytes"] = setup.made.renderer->scene_bytes();
+  json["view_bytes"] = measurement.view_bytes;
+  json["device_bytes"] = setup.made.renderer->scene_bytes() + measurement.view_bytes;
+  json["quality"] = result.quality ? to_json(*result.quality) : Json();
+  return json;
+}
+
+void print_report(const RenderSetup& setup, const BenchResult& result) {
+  const Measurement& measurement = result.measurement;
+  const ListLength lists = measurement.list_length();
+  const bool groups = result.settings.pipeline == Pipeline::catgs;
+  fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.cloud->size(),
+             setup.cloud->sh_degree, setup.camera.size_px.x, setup.camera.size_px.y,
+             pipeline_name(result.settings.pipeline));
+  fmt::print("{} ({})\n", setup.made.renderer->description(), setup.made.reason);
+  const std::string of_views = result.views > 1 ? fmt::format(" of {} views", result.views) : "";
+  fmt::print("{:<14}{:.1f} fps over {} frames{}; flatness {:.2f}\n", "speed", measurement.fps(),
+             measurement.frames.size(), of_views, flatness(measurement.frame_ms()));
+  print_times("frame ms", measurement, std::nullopt);
+  if (groups) {
+    print_times("key frame ms", measurement, FrameKind::key);
+    print_times("sub-frame ms", measurement, FrameKind::sub);
+    print_groups(measurement);
+  }
+  fmt::print("{:<14}{:.0f} visible, {:.0f} list entries ({} in the longest tile), {:.0f} pairs\n",
+             "mean frame", lists.visible_mean, lists.mean, lists.tile_max,
+             result.pair_cost.pairs_per_frame);
+  fmt::print("{:<14}{:.2f} ns per Gaussian before the blend, {:.3f} ns per blended pair\n", "cost",
+             result.ns_per_gaussian(setup), result.pair_cost.ns_per_pair);
+  fmt::print("{:<14}{:.1f} MB scene, {:.1f} MB view\n", "memory",
+             1e-6 * static_cast<double>(setup.made.renderer->scene_bytes()),
+             1e-6 * static_cast<double>(measurement.view_bytes));
+  if (lists.overflowed > 0) {
+    fmt::print("{:<14}{} list entries found no memory and were not drawn\n", "OVERFLOW",
+               lists.overflowed);
+  }
+  if (lists.uncarried > 0) {
+    fmt::print("{:<14}{} lists had more giants (up to {} in view) than can be carried\n", "ORDER",
+               lists.uncarried, lists.giants_max);
+  }
+  if (result.quality) print_quality(*result.quality);
+}
+
+}  // namespace catgs

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render_core/tools/bench/bench_measure.h"
+#include "render_core/tools/paper/floor_model.h"
+#include "render_core/tools/render_setup.h"
+
+namespace catgs {
+
+struct PaperOptions {
+  RenderOptions render;                         // its scene and path are those of the cases
+  std::vector<std::vector<std::string>> cases;  // scene, traces…
+  std::vector<std::string> images;              // COLMAP folders, one per case, or none at all
+  double image_rate_hz = 30.0;                  // photographs per second
+  std::optional<std::size_t> warmup;            // as warmup_frames() takes it
+  std::size_t every = 10;                       // quality and tiles look at one frame in so many
+  std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
+  std::vector<std::string> variants;  // flags of more rows of ablation
+  DeviceRates rates;                  // of floor
+};
+
+/// A renderer that the tables compare: a pipeline, and the flags by which `bench` would be told to
+/// do without a part of it.
+struct Variant {
+  std::string name;
+  Pipeline pipeline = Pipeline::catgs;
+  std::string flags{};
+};
+
+namespace variants {
+inline const Variant vanilla{"3DGS", Pipeline::vanilla};
+inline const Variant exact{"Exact", Pipeline::exact};  // precise culling alone
+inline const Variant ours{"Ours"};
+inline const Variant without_cache{"Ours-w/o cache", Pipeline::catgs, "--no-cache"};
+}  // namespace variants
+
+/// Ours with one part at a time taken away, and with the flags of `--variant`. A new part is a line
+/// here.
+std::vector<Variant> ablations(const PaperOptions& options);
+
+/// A scene and its traces, loaded, and what was measured on it so far: several tables use the same
+/// runs.
+class PaperCase {
+ public:
+  /// Case `index` of the options, which must outlive it. Throws InputError.
+  PaperCase(const PaperOptions& options, std::size_t index, std::string label, bool quiet);
+
+  /// The same case with the most important share of its Gaussians only (scene/prune.h).
+  [[nodiscard]] PaperCase pruned(double keep_fraction) const;
+
+  [[nodiscard]] const std::string& label() const { return label_; }
+  [[nodiscard]] const PaperOptions& options() const { return *options_; }
+  /// The scene; its path is one of the traces inside for_each_trace(), else undefined.
+  [[nodiscard]] const RenderSetup& setup() const { return setup_; }
+  /// COLMAP folder; "" without one.
+  [[nodiscard]] std::string images() const;
+
+  [[nodiscard]] ViewSettings settings(const Variant& variant) const;
+
+  /// One measurement per trace; of a variant, measured when first asked for. An InputError says
+  /// which one the core does not render.
+  const std::vector<Measurement>& runs(const Variant& variant);
+  std::vector<Measurement> runs(const ViewSettings& settings, std::string_view name);
+
+  /// What a trace is called in tables.
+  [[nodiscard]] std::string trace_name(std::size_t trace) const;
+
+  /// Calls visit(index of the trace, progress) with setup() on each trace in turn; `doing` is what
+  /// the terminal shows.
+  using Visit = std::function<void(std::size_t trace, const ProgressReport& report)>;
+  void for_each_trace(std::string_view doing, const Visit& visit);
+
+  /// How forecasts are made in what is measured from now on.
+  void predict_by(const PredictorSettings& settings) { setup_.predictor = settings; }
+
+  /// Puts setup() on a path of the caller's.
+  void follow(Trajectory samples, Trajectory poses, double fps);
+
+  [[nodiscard]] bool quiet() const { return quiet_; }
+
+ private:
+  PaperCase(const PaperCase& whole, RenderSetup setup);
+  [[nodiscard]] PipelineOptions pipeline_options(const Variant& variant) const;
+
+  const PaperOptions* options_;
+  std::size_t index_;
+  std::string label_;
+  bool quiet_;
+  RenderSetup setup_;
+  std::map<std::string, std::vector<Measurement>> runs_;  // by the variant's name
+};
+
+/// All traces as one: the same queries, over all frames.
+Measurement pooled(const std::vector<Measurement>& runs);
+
+/// A column's name per case: the scene's, with its traces where that alone would not tell them
+/// apart.
+std::vector<std::string> case_labels(const std::vector<std::vector<std::string>>& cases);
+
+/// Whether a trace of any case is a script.
+bool has_script(const PaperOptions& options);
+
+/// Finds mistakes in the options before a large scene is read: counts, files that are not there.
+/// Throws InputError.
+void check(const PaperOptions& options);
+
+}  // namespace catgs

@@ -1,0 +1,324 @@
+// catgs-render paper: the tables and figures of the paper, for any scenes and traces.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/base/build_info.h"
+#include "render_core/base/error.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/json_report.h"
+#include "render_core/tools/paper/paper_tables.h"
+#include "render_core/tools/scene_hash.h"
+
+namespace catgs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct PaperCommand {
+  PaperOptions options;
+  std::vector<std::string> tables;
+  std::string baseline;
+  std::string json;
+};
+
+std::vector<PaperTable> side_by_side(std::vector<PaperTable> of_scenes) {
+  return {joined(of_scenes)};
+}
+
+std::vector<PaperTable> one_each(std::vector<PaperTable> of_scenes) { return of_scenes; }
+
+std::vector<PaperTable> mean_first(std::vector<PaperTable> of_scenes) {
+  if (of_scenes.size() > 1) of_scenes.insert(of_scenes.begin(), averaged(of_scenes));
+  return of_scenes;
+}
+
+/// The first column of all scenes side by side, which the first note explains; then all of each.
+std::vector<PaperTable> first_column_first(std::vector<PaperTable> of_scenes) {
+  std::vector<PaperTable> first = of_scenes;
+  for (PaperTable& table : first) {
+    table.corner = table.columns.front();
+    table.columns = {std::exchange(table.title, {})};
+    table.notes.resize(1);
+    for (PaperTable::Row& row : table.rows) row.numbers.resize(1);
+  }
+  of_scenes.insert(of_scenes.begin(), joined(first));
+  return of_scenes;
+}
+
+/// Side by side, and behind them what grows over the first scene.
+std::vector<PaperTable> growing(std::vector<PaperTable> of_scenes) {
+  PaperTable all = joined(of_scenes);
+  const std::vector<PaperTable::Row> rows = all.rows;
+  for (const PaperTable::Row& row : rows) {
+    if (!row.name.starts_with("In view") && !row.name.ends_with("frame ms")) continue;
+    PaperTable::Row& growth = all.rows.emplace_back(
+        PaperTable::Row{row.name.substr(0, row.name.rfind(' ')) + " over the first", {}});
+    for (const Number& number : row.numbers) {
+      growth.numbers.push_back({number.value / row.numbers.front().value, 3, "×"});
+    }
+  }
+  return {all};
+}
+
+std::vector<const PaperTableKind*> chosen_kinds(const std::vector<std::string>& names) {
+  std::vector<const PaperTableKind*> kinds;
+  for (const PaperTableKind& kind : paper_table_kinds()) {
+    const bool all = std::ranges::find(names, "all") != names.end();
+    if ((all && kind.of_the_paper) || std::ranges::find(names, kind.name) != names.end())
+      kinds.push_back(&kind);
+  }
+  return kinds;
+}
+
+/// Rows of fps_table(), whose columns are `labels`.
+Json read_baseline(const std::string& path, const std::vector<std::string>& labels) {
+  std::ifstream file(path);
+  if (!file) throw InputError(path, "", "cannot be read");
+  Json baseline;
+  try {
+    baseline = Json::parse(file);
+  } catch (const Json::parse_error& error) {
+    throw InputError(path, fmt::format("byte {}", error.byte), "is not JSON");
+  }
+  PaperTable unmeasured;  // a mistake shows before anything is measured
+  unmeasured.columns = labels;
+  unmeasured.rows = {{"", std::vector<Number>(labels.size())}};
+  add_rows(unmeasured, 0, baseline, path);
+  return baseline;
+}
+
+/// Ours over the fastest of the rows that `baseline` names, where they have a number.
+void add_lead(PaperTable& fps, const Json& baseline) {
+  PaperTable::Row lead{"Ours over the best of these", {}};
+  for (std::size_t c = 0; c < fps.columns.size(); ++c) {
+    double best = Number::nothing, ours = Number::nothing;
+    for (const PaperTable::Row& row : fps.rows) {
+      if (row.name == variants::ours.name) ours = row.numbers[c].value;
+      if (baseline.contains(row.name)) best = std::fmax(best, row.numbers[c].value);
+    }
+    lead.numbers.push_back({ours / best, 2, "×"});
+  }
+  fps.rows.push_back(std::move(lead));
+}
+
+/// Options of some tables alone. Without these they would change nothing, unnoticed.
+void refuse_unused(const CLI::App& app, const std::vector<const PaperTableKind*>& kinds) {
+  struct Use {
+    const char* option;
+    std::vector<std::string_view> tables;
+  };
+  static const std::array<Use, 9> uses = {{{"--baseline", {"fps"}},
+                                           {"--images", {"quality"}},
+                                           {"--image-rate", {"quality"}},
+                                           {"--keep-fraction", {"pruned"}},
+                                           {"--variant", {"ablation"}},
+                                           {"--every", {"quality", "tiles", "traces"}},
+                                           {"--dram-bytes-per-s", {"floor"}},
+                                           {"--warp-instructions-per-s", {"floor"}},
+                                           {"--instructions-per-evaluation", {"floor"}}}};
+  for (const Use& use : uses) {
+    const bool used = std::ranges::any_of(kinds, [&](const PaperTableKind* kind) {
+      return std::ranges::find(use.tables, kind->name) != use.tables.end();
+    });
+    if (used || app.count(use.option) == 0) continue;
+    throw InputError(use.option, "", "means nothing to the tables that were asked for",
+                     fmt::format("it is of --table {}", fmt::join(use.tables, ", ")));
+  }
+}
+
+/// Every table follows traces but that of photographs.
+void require_traces(const PaperOptions& options, const std::vector<std::string>& labels,
+                    const std::vector<const PaperTableKind*>& kinds) {
+  for (const PaperTableKind* kind : kinds) {
+    if (kind->name == "quality" && !options.images.empty()) continue;
+    for (std::size_t i = 0; i < options.cases.size(); ++i) {
+      if (options.cases[i].size() > 1) continue;
+      throw InputError("--case", labels[i], "has no trace", "name one or more behind the scene");
+    }
+  }
+}
+
+Json case_json(const PaperCase& scene, const std::vector<std::string>& files) {
+  const RenderSetup& setup = scene.setup();
+  return {{"name", scene.label()},
+          {"scene", setup.scene.name},
+          {"gaussians", setup.cloud->size()},
+          {"sh_degree", setup.cloud->sh_degree},
+          {"hash", fmt::format("{:016x}", scene_hash(*setup.cloud))},
+          {"traces", std::vector<std::string>(files.begin() + 1, files.end())},
+          {"device", setup.made.renderer->description()},
+          {"near", setup.camera.near_z}};
+}
+
+Json settings_json(const PaperCase& scene) {
+  const RenderSetup& setup = scene.setup();
+  const SpeculationSettings& speculation = setup.view.speculation;
+  const bool scripted = has_script(scene.options());
+  const ScriptOptions script = script_options(scene.options().render);
+  return {{"size_px", {setup.camera.size_px.x, setup.camera.size_px.y}},
+          {"focal_px", setup.camera.focal_px.x},
+          {"fps", scene.options().render.fps ? Json(*scene.options().render.fps) : Json()},
+          {"seed", scripted ? Json(script.seed) : Json()},
+          {"duration_s", scripted ? Json(script.duration_s) : Json()},
+          {"anchor", scene.options().render.anchor},
+          {"frames", scene.options().render.frames},
+          {"window", speculation.initial_window},
+          {"max_trail_px", speculation.max_trail_px},
+          {"min_depth", speculation.min_depth},
+          {"max_deviation_px", speculation.max_deviation_px},
+          {"grid", grid_name(speculation.grid)},
+          {"guard_px", speculation.guard_px},
+          {"cost_aware", speculation.cost_aware},
+          {"order", setup.view.order == BlendOrder::fresh ? "fresh" : "key"},
+          {"warmup", scene.options().warmup.value_or(default_warmup)},
+          {"every", scene.options().every}};
+}
+
+/// What a table that is copied elsewhere should not be without.
+std::string provenance(const Json& report) {
+  const Json& settings = report["settings"];
+  return fmt::format("{}x{}, focal length {} px, {}; version {}, commit {}.\n",
+                     settings["size_px"][0].get<int>(), settings["size_px"][1].get<int>(),
+                     settings["focal_px"].get<float>(),
+                     report["cases"][0]["device"].get<std::string>(), build_version, build_commit);
+}
+
+void paper(const PaperCommand& command, const CLI::App& app) {
+  const PaperOptions& options = command.options;
+  const bool quiet = is_quiet(app);
+  const auto kinds = chosen_kinds(command.tables);
+  refuse_unused(app, kinds);
+  check(options);
+  const std::vector<std::string> labels = case_labels(options.cases);
+  require_traces(options, labels, kinds);
+  check_json(command.json);
+  const Json baseline = command.baseline.empty() ? Json() : read_baseline(command.baseline, labels);
+  Json report = {{"version", build_version}, {"commit", build_commit}, {"cases", Json::array()}};
+  std::vector<std::vector<PaperTable>> parts(kinds.size());  // [kind][case]
+  for (std::size_t i = 0; i < options.cases.size(); ++i) {
+    PaperCase scene(options, i, labels[i], quiet);
+    if (!quiet) {
+      fmt::print(stderr, "{}: {} ({})\n", scene.label(), scene.setup().made.renderer->description(),
+                 scene.setup().made.reason);
+    }
+    report["cases"].push_back(case_json(scene, options.cases[i]));
+    report["settings"] = settings_json(scene);
+    for (std::size_t k = 0; k < kinds.size(); ++k) {
+      parts[k].push_back(kinds[k]->measure(scene));
+    }
+  }
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    const PaperTableKind& kind = *kinds[k];
+    std::vector<PaperTable> tables = kind.combine(std::move(parts[k]));
+    if (!baseline.is_null() && kind.name == "fps") {
+      add_rows(tables[0], fps_baseline_row, baseline, command.baseline);
+      add_lead(tables[0], baseline);
+    }
+    if (command.json != "-") fmt::print("{}## {}\n\n", k == 0 ? "" : "\n", kind.about);
+    Json& json = report["tables"][std::string(kind.name)] = Json::array();
+    for (std::size_t t = 0; t < tables.size(); ++t) {
+      if (command.json != "-") fmt::print("{}{}", t == 0 ? "" : "\n", markdown(tables[t]));
+      json.push_back(to_json(tables[t]));
+    }
+  }
+  if (command.json != "-") fmt::print("\n{}", provenance(report));
+  if (!command.json.empty()) write_json(command.json, report);
+}
+
+void add_device_rates(CLI::App& command, DeviceRates& rates) {
+  const auto add = [&](const char* name, double& rate, const char* what) {
+    command.add_option(name, rate, what)->check(CLI::PositiveNumber)->capture_default_str();
+  };
+  add("--dram-bytes-per-s", rates.dram_bytes_per_s, "floor: what the device's memory moves (H200)");
+  add("--warp-instructions-per-s", rates.warp_instructions_per_s,
+      "floor: what its processors issue (H200)");
+  add("--instructions-per-evaluation", rates.instructions_per_evaluation,
+      "floor: for a list entry on a warp's pixels");
+}
+
+}  // namespace
+
+std::span<const PaperTableKind> paper_table_kinds() {
+  static constexpr std::array<PaperTableKind, 11> kinds = {
+      {{"fps", "Average frame rate", fps_table, side_by_side, true},
+       {"quality", "Render quality", quality_table, side_by_side, true},
+       {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first, true},
+       {"stages", "Acceleration of the stages over 3DGS", stages_table, mean_first, true},
+       {"list", "Length of the tile lists", list_table, side_by_side, true},
+       {"window", "Impact of the window", window_table, one_each, true},
+       {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side, true},
+       {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side, true},
+       {"traces", "Each trace by itself", traces_table, one_each, false},
+       {"scaling", "One view of scenes of several sizes", scaling_table, growing, false},
+       {"floor", "Stages beside what their bytes and evaluations allow", floor_table, one_each,
+        false}}};
+  return kinds;
+}
+
+void add_paper_command(CLI::App& app) {
+  auto command = std::make_shared<PaperCommand>();
+  PaperOptions& options = command->options;
+  CLI::App* paper_app = app.add_subcommand(
+      "paper", "Prints the tables of the paper, as Markdown, for any scenes and traces");
+  std::vector<std::string> names;
+  for (const PaperTableKind& kind : paper_table_kinds()) names.emplace_back(kind.name);
+  names.emplace_back("all");
+  paper_app
+      ->add_option("--table", command->tables,
+                   "One or more, separated by commas; all: those of the paper")
+      ->required()
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(names));
+  paper_app
+      ->add_option("--case", options.cases,
+                   "A scene and behind it its traces: TUM files or scripts (orbit, walk, head, "
+                   "drone, still, tour:FILE). Repeated, it adds a column for each scene")
+      ->required()
+      ->type_name("SCENE TRACE...");
+  auto* images = paper_app->add_option(
+      "--images", options.images,
+      "quality: a COLMAP folder per case; compares with its photographs (PNG)");
+  paper_app
+      ->add_option("--image-rate", options.image_rate_hz,
+                   "Photographs per second of the video that they are from")
+      ->needs(images)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  paper_app->add_option(
+      "--baseline", command->baseline,
+      "fps: rows measured elsewhere, JSON {\"FlashGS\": {\"city\": 120.5}}, and ours "
+      "over the best of them");
+  paper_app
+      ->add_option("--keep-fraction", options.keep_fractions,
+                   "pruned: shares of the Gaussians (1,0.5,0.25)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  paper_app
+      ->add_option("--variant", options.variants,
+                   "ablation: a row more, of ours with these flags of bench, like \"--window 8\"")
+      ->allow_extra_args(false);
+  add_device_rates(*paper_app, options.rates);
+  paper_app->add_flag("--anchor", options.render.anchor,
+                      "Move the traces to the start pose of their scene");
+  add_frame_options(*paper_app, options.render);
+  add_speculation_options(*paper_app, options.render.pipeline);
+  paper_app->add_option("--warmup", options.warmup,
+                        fmt::format("Frames rendered before measuring ({})", default_warmup));
+  paper_app
+      ->add_option("--every", options.every,
+                   "quality, tiles, traces: look at one frame in N of a trace")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  paper_app->add_option("--json", command->json,
+                        "Write the tables here too; - prints JSON instead");
+  paper_app->callback([command, paper_app] { paper(*command, *paper_app); });
+}
+
+}  // namespace catgs

@@ -1,0 +1,196 @@
+// The paper's table about quality: key frames and sub-frames against the exact pipeline, or against
+// the photographs that the scene was made from.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/image/png.h"
+#include "render_core/scene/formats/colmap.h"
+#include "render_core/tools/frame_feed.h"
+#include "render_core/tools/paper/paper_tables.h"
+#include "render_core/tools/progress.h"
+
+namespace catgs {
+namespace {
+
+PaperTable::Row quality_row(std::string name, const QualityTally& tally) {
+  if (tally.frames() == 0) return {std::move(name), std::vector<Number>(3)};
+  return {std::move(name), {{tally.mean_psnr(), 2}, {tally.mean_ssim(), 4}, {tally.min_psnr(), 2}}};
+}
+
+std::vector<std::string> quality_columns(const std::string& label) {
+  return {label + " PSNR", label + " SSIM", label + " worst PSNR"};
+}
+
+std::filesystem::path find_photo(const std::filesystem::path& folder, const std::string& name) {
+  std::filesystem::path file = folder / "images" / name;
+  std::error_code error;
+  if (file.extension() == ".png" && std::filesystem::exists(file, error)) return file;
+  const std::filesystem::path png = std::filesystem::path(file).replace_extension(".png");
+  if (std::filesystem::exists(png, error)) return png;
+  throw InputError(png.string(), "", "does not exist",
+                   "photographs are read as PNG; convert others, with their names but for the end");
+}
+
+/// The camera for a picture that was scaled since COLMAP saw it.
+Camera scaled_to(const Camera& camera, glm::ivec2 size_px) {
+  Camera scaled = camera;
+  const glm::vec2 factor = glm::vec2(size_px) / glm::vec2(camera.size_px);
+  scaled.size_px = size_px;
+  scaled.focal_px *= factor;
+  scaled.principal_point_px *= factor;
+  return scaled;
+}
+
+/// Renders the camera path through the poses of the photographs and judges what it shows there.
+class PhotoJudge {
+ public:
+  explicit PhotoJudge(PaperCase& scene)
+      : scene_(scene),
+        folder_(scene.images()),
+        images_(read_colmap(folder_)),
+        pool_(*scene.setup().pool) {
+    for (Row& row : rows_) {
+      row.view = scene.setup().made.renderer->make_view(scene.settings(row.variant));
+    }
+  }
+
+  /// Frames from one photograph to the next; the poses in between are interpolated, but forecasts
+  /// know the poses of the photographs passed so far only.
+  int follow_path() {
+    const PaperOptions& options = scene_.options();
+    const double rate_hz = options.render.fps.value_or(120.0);
+    const int steps = std::max(1, static_cast<int>(std::lround(rate_hz / options.image_rate_hz)));
+    Trajectory samples, poses;
+    for (std::size_t k = 0; k < images_.size(); ++k) {
+      const double seconds = static_cast<double>(k) / options.image_rate_hz;
+      samples.push_back({std::llround(1e6 * seconds), images_[k].camera.world_from_camera});
+      for (int step = k == 0 ? steps : 1; step <= steps; ++step) {
+        const std::int64_t before_us = k == 0 ? 0 : samples[k - 1].time_us;
+        const std::int64_t time_us = before_us + (samples[k].time_us - before_us) * step / steps;
+        poses.push_back({time_us, interpolate(samples, time_us)});
+      }
+    }
+    scene_.follow(std::move(samples), std::move(poses), options.image_rate_hz * steps);
+    return steps;
+  }
+
+  void run() {
+    const int steps = follow_path();
+    FrameFeed feed(scene_.setup(), scene_.settings(variants::ours));
+    Progress progress(scene_.label() + ": photographs", scene_.quiet());
+    for (std::size_t k = 0; k < images_.size(); ++k) {
+      const bool judged = k % scene_.options().every == 0;
+      const Image photo = read_png(find_photo(folder_, images_[k].name));
+      const Camera camera = scaled_to(images_[k].camera, photo.size_px);
+      FrameView frame;
+      for (int step = k == 0 ? steps : 1; step <= steps; ++step) {
+        FrameRequest request = feed.next();
+        request.camera = with_pose(camera, request.camera.world_from_camera);
+        render_or_throw(*sub_.view, request, frame);
+      }
+      if (judged && frame.stats.kind == FrameKind::sub) sub_.picture = copy_image(frame);
+      if (judged) judge(k, photo, camera);
+      progress.update(static_cast<double>(k + 1) / static_cast<double>(images_.size()));
+    }
+  }
+
+  [[nodiscard]] PaperTable table() const {
+    PaperTable table{.title = {},
+                     .corner = {},
+                     .columns = quality_columns(scene_.label()),
+                     .rows = {},
+                     .notes = {fmt::format("{}: against {} of {} photographs; {} of them were "
+                                           "reached by a sub-frame at {:g} photographs a second.",
+                                           scene_.label(), rows_[0].tally.frames(), images_.size(),
+                                           sub_.tally.frames(), scene_.options().image_rate_hz)}};
+    for (const Row& row : rows_) table.rows.push_back(quality_row(row.name, row.tally));
+    return table;
+  }
+
+ private:
+  struct Row {
+    std::string name;
+    Variant variant;
+    QualityTally tally{};
+    std::unique_ptr<View> view{};
+    Image picture{};  // to be judged, if any
+  };
+
+  [[nodiscard]] Camera with_pose(Camera camera, const Pose& world_from_camera) const {
+    camera.world_from_camera = world_from_camera;
+    camera.near_z = scene_.setup().camera.near_z;
+    return camera;
+  }
+
+  /// The sub-frame, if there was one, and a frame of each other kind at the same pose.
+  void judge(std::size_t photo_index, const Image& photo, const Camera& camera) {
+    for (Row& row : rows_) {
+      if (&row == &sub_) continue;
+      FrameRequest request;  // without a forecast a frame of ours is a key frame
+      request.camera = with_pose(camera, camera.world_from_camera);
+      FrameView frame;
+      render_or_throw(*row.view, request, frame);
+      row.picture = copy_image(frame);
+    }
+    std::array<ImageQuality, 4> quality;
+    pool_.parallel_for(rows_.size(), [&](std::size_t i) {
+      if (!rows_[i].picture.rgb.empty()) quality[i] = compare_images(rows_[i].picture, photo);
+    });
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      if (!rows_[i].picture.rgb.empty()) rows_[i].tally.add(quality[i], photo_index);
+      rows_[i].picture = {};
+    }
+  }
+
+  PaperCase& scene_;
+  std::filesystem::path folder_;
+  std::vector<ColmapImage> images_;
+  ThreadPool& pool_;
+  std::array<Row, 4> rows_ = {{{"3DGS", variants::vanilla},
+                               {"Exact", variants::exact},
+                               {"Ours-key", variants::ours},
+                               {"Ours-sub", variants::ours}}};
+  Row& sub_ = rows_.back();
+};
+
+PaperTable quality_by_exact(PaperCase& scene) {
+  QualityTally vanilla, key, sub;
+  const auto judge_variant = [&](const Variant& variant, const auto& take) {
+    scene.for_each_trace(
+        fmt::format("quality of {}", variant.name), [&](std::size_t, const ProgressReport& report) {
+          take(judge(scene.setup(), scene.settings(variant), scene.options().every, report));
+        });
+  };
+  judge_variant(variants::vanilla, [&](const QualityReport& report) { vanilla.add(report.key); });
+  judge_variant(variants::ours, [&](const QualityReport& report) {
+    key.add(report.key);
+    sub.add(report.sub);
+  });
+  return {
+      .title = {},
+      .corner = {},
+      .columns = quality_columns(scene.label()),
+      .rows = {quality_row("3DGS", vanilla), quality_row("Ours-key", key),
+               quality_row("Ours-sub", sub)},
+      .notes = {fmt::format("Against the exact pipeline at the same poses, one frame in {}. "
+                            "PSNR (dB) of the mean squared error over the frames; ∞: identical.",
+                            scene.options().every)}};
+}
+
+}  // namespace
+
+PaperTable quality_table(PaperCase& scene) {
+  if (scene.images().empty()) return quality_by_exact(scene);
+  PhotoJudge judge(scene);
+  judge.run();
+  return judge.table();
+}
+
+}  // namespace catgs

@@ -1,0 +1,73 @@
+// catgs-render convert: a scene in, another format out.
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
+#include "render_core/scene/files/hints.h"
+#include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/prune.h"
+#include "render_core/scene/scene.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/scene_options.h"
+
+namespace catgs {
+namespace {
+
+struct ConvertOptions {
+  SceneOptions in;
+  std::string out;
+  double keep_fraction = 1.0;
+  int threads = 0;
+};
+
+/// Estimated hints can be estimated again; others would be lost with the files they came from.
+void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
+  if (hints.source == "estimated") return;
+  const auto sidecar = sidecar_of(out);
+  if (std::error_code error; std::filesystem::exists(sidecar, error)) {
+    fmt::print(stderr, "note: {} exists and was left as it is\n", sidecar.string());
+    return;
+  }
+  write_sidecar(hints, sidecar);
+  fmt::print("{}: first sight, from {}\n", sidecar.string(), hints.source);
+}
+
+void convert(const ConvertOptions& options, bool quiet) {
+  if (!(options.keep_fraction > 0.0 && options.keep_fraction <= 1.0))
+    throw InputError("--keep-fraction", "",
+                     fmt::format("{} is not in (0, 1]", options.keep_fraction));
+  Scene scene = load_scene(options.in, options.threads, quiet);
+  const std::size_t loaded = scene.cloud.size();
+  keep_most_important(scene.cloud, options.keep_fraction);
+  save_scene(scene.cloud, options.out);
+  fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
+             scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),
+             scene.format);
+  if (scene.report.dropped > 0)
+    fmt::print("{} could not be drawn and were dropped (catgs-render info says why)\n",
+               scene.report.dropped);
+  if (scene.cloud.size() < loaded)
+    fmt::print("{} of least importance were pruned\n", loaded - scene.cloud.size());
+  for (const std::string& note : scene.notes) fmt::print(stderr, "note: {}\n", printable(note));
+  write_hints_beside(scene.hints, options.out);
+}
+
+}  // namespace
+
+void add_convert_command(CLI::App& app) {
+  auto options = std::make_shared<ConvertOptions>();
+  CLI::App* command = app.add_subcommand("convert", "Converts a scene to .ply, .splat or .spz");
+  add_scene_options(*command, options->in, "in");
+  command->add_option("out", options->out, "File to write: .ply, .splat or .spz")->required();
+  command
+      ->add_option("--keep-fraction", options->keep_fraction,
+                   "Keep this share of the Gaussians, by opacity times mean projected area")
+      ->capture_default_str();
+  command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
+  command->callback([options, command] { convert(*options, is_quiet(*command)); });
+}
+
+}  // namespace catgs

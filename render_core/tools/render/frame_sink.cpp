@@ -1,0 +1,104 @@
+#include "render_core/tools/render/frame_sink.h"
+
+#include <cmath>
+#include <fstream>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/image/png.h"
+
+namespace catgs {
+namespace {
+
+class PngSink final : public FrameSink {
+ public:
+  explicit PngSink(std::filesystem::path path) : path_(std::move(path)) {}
+
+  PixelFormat format() const override { return PixelFormat::rgb_f32; }
+  void write(const FrameView& frame) override { write_png(path_, copy_image(frame)); }
+  void finish() override {}
+
+ private:
+  std::filesystem::path path_;
+};
+
+class PngFolderSink final : public FrameSink {
+ public:
+  explicit PngFolderSink(const FrameSinkSettings& settings)
+      : folder_(settings.path), number_(settings.first_frame) {
+    std::error_code error;
+    std::filesystem::create_directories(folder_, error);
+    if (error) throw InputError(folder_.string(), "", error.message(), "a folder is needed");
+  }
+
+  PixelFormat format() const override { return PixelFormat::rgb_f32; }
+  void write(const FrameView& frame) override {
+    write_png(folder_ / fmt::format("frame_{:06}.png", number_++), copy_image(frame));
+  }
+  void finish() override {}
+
+ private:
+  std::filesystem::path folder_;
+  std::size_t number_;
+};
+
+/// Uncompressed video. Its header has no field for the colour matrix; by custom readers take the
+/// size for it. Range and chroma position are written.
+class Y4mSink final : public FrameSink {
+ public:
+  explicit Y4mSink(const FrameSinkSettings& settings)
+      : path_(settings.path), file_(settings.path, std::ios::binary) {
+    file_ << fmt::format("YUV4MPEG2 W{} H{} F{}:1000 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n",
+                         settings.size_px.x, settings.size_px.y,
+                         std::llround(settings.fps * 1000.0));
+    check();
+  }
+
+  PixelFormat format() const override { return PixelFormat::i420; }
+  void write(const FrameView& frame) override {
+    file_ << "FRAME\n";
+    for (int plane = 0; plane < 3; ++plane) {
+      const glm::ivec2 size = plane == 0 ? frame.size_px : frame.size_px / 2;
+      for (int y = 0; y < size.y; ++y) {
+        const std::byte* row = frame.planes[plane].data +
+                               frame.planes[plane].stride_bytes * static_cast<std::size_t>(y);
+        file_.write(reinterpret_cast<const char*>(row), size.x);
+      }
+    }
+    check();
+  }
+  void finish() override {
+    file_.close();
+    check();
+  }
+
+ private:
+  void check() const {
+    if (!file_) throw InputError(path_.string(), "", "cannot be written", "is there room?");
+  }
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings) {
+  const std::string extension = settings.path.extension().string();
+  if (extension == ".png") return std::make_unique<PngSink>(settings.path);
+  if (extension == ".y4m" || extension == ".mp4") {
+    if (settings.size_px.x % 2 != 0 || settings.size_px.y % 2 != 0) {
+      throw InputError("--size", "", "a video needs even sides");
+    }
+    if (extension == ".mp4") return make_mp4_sink(settings);
+    return std::make_unique<Y4mSink>(settings);
+  }
+  if (!extension.empty() && !std::filesystem::is_directory(settings.path)) {
+    throw InputError(settings.path.string(), "", "unknown kind of output",
+                     "a folder, or a file .png, .y4m or .mp4");
+  }
+  return std::make_unique<PngFolderSink>(settings);
+}
+
+}  // namespace catgs

@@ -1,0 +1,160 @@
+// catgs-render info: what a scene holds and how it will be seen.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+
+#include "render_core/scene/analysis/robust_bounds.h"
+#include "render_core/scene/scene.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/json_report.h"
+#include "render_core/tools/scene_options.h"
+
+namespace catgs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct InfoOptions {
+  SceneOptions scene;
+  int threads = 0;
+  bool json = false;
+};
+
+Json triple(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
+/// Quantiles of value(i) over an even sample of the Gaussians.
+template <class Value>
+Json quantiles(const GaussianCloud& cloud, const Value& value) {
+  constexpr std::size_t max_sample = 1 << 20;
+  const std::size_t step = (cloud.size() + max_sample - 1) / max_sample;
+  std::vector<float> values;
+  for (std::size_t i = 0; i < cloud.size(); i += step) values.push_back(value(i));
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) {
+    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+  };
+  return {{"p5", at(0.05)}, {"p50", at(0.5)}, {"p95", at(0.95)}, {"max", values.back()}};
+}
+
+Json describe(const Scene& scene, double load_ms) {
+  const GaussianCloud& cloud = scene.cloud;
+  const Bounds bounds = robust_bounds(cloud).value_or(Bounds{});
+  const SanitizeReport& report = scene.report;
+  const SceneHints& hints = scene.hints;
+  const glm::quat& q = hints.start_pose.orientation;
+  const auto largest = [&](std::size_t i) {
+    return std::max({cloud.scale[i].x, cloud.scale[i].y, cloud.scale[i].z});
+  };
+  const auto smallest = [&](std::size_t i) {
+    return std::min({cloud.scale[i].x, cloud.scale[i].y, cloud.scale[i].z});
+  };
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return {{"name", scene.name},
+          {"format", scene.format},
+          {"gaussians", cloud.size()},
+          {"sh_degree", cloud.sh_degree},
+          {"bytes", cloud.bytes()},
+          {"robust_bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
+          {"opacity", quantiles(cloud, [&](std::size_t i) { return cloud.opacity[i]; })},
+          {"largest_scale", quantiles(cloud, largest)},
+          {"flatness", quantiles(cloud, [&](std::size_t i) { return largest(i) / smallest(i); })},
+          {"sanitize",
+           {{"read", report.read},
+            {"dropped", report.dropped},
+            {"not_finite", report.not_finite},
+            {"invisible", report.invisible},
+            {"absurd", report.absurd},
+            {"repaired", report.repaired},
+            {"zero_rotations", report.zero_rotations},
+            {"clamped", report.clamped},
+            {"zeroed_sh", report.zeroed_sh}}},
+          {"hints",
+           {{"source", hints.source},
+            {"up", triple(hints.up)},
+            {"start_position", triple(hints.start_pose.position)},
+            {"start_orientation_xyzw", {q.x, q.y, q.z, q.w}},
+            {"focus", triple(hints.focus)},
+            {"near", hints.near_z},
+            {"limits", {{"min", triple(hints.limits.min)}, {"max", triple(hints.limits.max)}}}}},
+          {"notes", scene.notes},
+          {"load_ms", load_ms},
+          {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+}
+
+std::string point(const Json& v) {
+  return fmt::format("{:.4g} {:.4g} {:.4g}", v[0].get<double>(), v[1].get<double>(),
+                     v[2].get<double>());
+}
+
+std::string spread(const Json& q) {
+  return fmt::format("{:.3g} … {:.3g} … {:.3g}, at most {:.3g}", q["p5"].get<double>(),
+                     q["p50"].get<double>(), q["p95"].get<double>(), q["max"].get<double>());
+}
+
+void print_text(const Json& info) {
+  const auto line = [](std::string_view label, const std::string& value) {
+    fmt::print("{:<16}{}\n", label, value);
+  };
+  const auto count = [](const Json& n) { return n.get<std::size_t>(); };
+  const double bytes = info["bytes"].get<double>(), peak = info["peak_rss_bytes"].get<double>();
+  const Json &report = info["sanitize"], &hints = info["hints"];
+  line("scene", info["name"].get<std::string>());
+  line("format", info["format"].get<std::string>());
+  line("Gaussians", fmt::format("{}, SH degree {}, {:.1f} MB", count(info["gaussians"]),
+                                info["sh_degree"].get<int>(), 1e-6 * bytes));
+  line("5–95 % bounds", fmt::format("{}  to  {}", point(info["robust_bounds"]["min"]),
+                                    point(info["robust_bounds"]["max"])));
+  line("opacity", spread(info["opacity"]) + "  (5, 50, 95 %)");
+  line("largest scale", spread(info["largest_scale"]));
+  line("flatness", spread(info["flatness"]) + "  (largest / smallest scale)");
+  line("dropped",
+       fmt::format("{} of {}: {} not finite, {} invisible, {} absurd", count(report["dropped"]),
+                   count(report["read"]), count(report["not_finite"]), count(report["invisible"]),
+                   count(report["absurd"])));
+  line("repaired", fmt::format("{}: {} zero rotations, {} clamped, {} with bad SH",
+                               count(report["repaired"]), count(report["zero_rotations"]),
+                               count(report["clamped"]), count(report["zeroed_sh"])));
+  line("first sight", hints["source"].get<std::string>());
+  line("  up", point(hints["up"]));
+  line("  start",
+       fmt::format("{}  looking at  {}", point(hints["start_position"]), point(hints["focus"])));
+  line("  near plane", fmt::format("{:.4g}", hints["near"].get<double>()));
+  line("  limits",
+       fmt::format("{}  to  {}", point(hints["limits"]["min"]), point(hints["limits"]["max"])));
+  for (const Json& note : info["notes"]) line("note", note.get<std::string>());
+  line("loaded in", fmt::format("{:.0f} ms, peak memory {:.1f} MB ({:.2f} x the scene)",
+                                info["load_ms"].get<double>(), 1e-6 * peak, peak / bytes));
+}
+
+void info(const InfoOptions& options, bool quiet) {
+  const auto start = std::chrono::steady_clock::now();
+  const Scene scene = load_scene(options.scene, options.threads, quiet);
+  const std::chrono::duration<double, std::milli> load_ms =
+      std::chrono::steady_clock::now() - start;
+  const Json description = describe(scene, load_ms.count());
+  if (options.json)
+    write_json("-", description);
+  else
+    print_text(description);
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& app) {
+  auto options = std::make_shared<InfoOptions>();
+  CLI::App* command =
+      app.add_subcommand("info", "Describes a scene: content, defects, first sight");
+  add_scene_options(*command, options->scene);
+  command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
+  command->add_flag("--json", options->json, "As JSON, lengths in world units");
+  command->callback([options, command] { info(*options, is_quiet(*command)); });
+}
+
+}  // namespace catgs

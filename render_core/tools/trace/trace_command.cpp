@@ -1,0 +1,191 @@
+// catgs-render trace: makes pose streams, and checks that they are fit to measure with.
+#include <functional>
+#include <memory>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/motion/anchor.h"
+#include "render_core/motion/plain_motion.h"
+#include "render_core/motion/script.h"
+#include "render_core/motion/trace_check.h"
+#include "render_core/scene/analysis/robust_bounds.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/scene_options.h"
+
+namespace catgs {
+namespace {
+
+/// What the subcommands have in common.
+struct TraceOptions {
+  SceneOptions scene;
+  LensOptions lens{.size = "1920x1080", .focal_px = {}, .fov_y_deg = {}, .near_z = {}};
+  bool force = false;
+  std::string out;
+};
+
+void add_trace_options(CLI::App& command, TraceOptions& options) {
+  add_scene_options(command, options.scene);
+  add_lens_options(command, options.lens);
+  command.add_flag("--force", options.force,
+                   "Write the trace although it is unfit to measure with");
+  command.add_option("--out", options.out, "TUM file to write")->required();
+}
+
+struct LoadedScene {
+  Scene scene;
+  Bounds bounds;  // 5-95 %
+};
+
+LoadedScene load_for_trace(const TraceOptions& options, bool quiet) {
+  (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
+  LoadedScene loaded{load_scene(options.scene, 0, quiet), {}};
+  loaded.bounds = robust_bounds(loaded.scene.cloud).value_or(Bounds{});
+  return loaded;
+}
+
+TraceCheck check(const TraceOptions& options, const LoadedScene& loaded,
+                 const Trajectory& trajectory) {
+  ThreadPool pool;
+  return check_trace(trajectory, loaded.scene.cloud.mean, loaded.bounds,
+                     make_lens(options.lens, loaded.scene.hints.near_z), pool);
+}
+
+void write_checked(const TraceOptions& options, const LoadedScene& loaded,
+                   const Trajectory& trajectory, bool quiet) {
+  const TraceCheck result = check(options, loaded, trajectory);
+  if (!result.valid() && !options.force) {
+    throw CheckFailed(
+        fmt::format("{}: not written: {}; --force writes it", options.out, result.complaint()));
+  }
+  write_tum(options.out, trajectory);
+  if (!result.valid()) {
+    fmt::print(stderr, "catgs-render: {}: {}\n", options.out, result.complaint());
+  } else if (!quiet) {
+    fmt::print("{}: {} frames, {:.1f} % of them see enough, all inside of the scene\n", options.out,
+               result.frames, 100.0 * result.seeing_frames);
+  }
+}
+
+void add_script(CLI::App& trace) {
+  struct Options {
+    SceneOptions scene;
+    ScriptOptions script;
+    std::string out;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = trace.add_subcommand("script", "Writes a scripted trace for a scene");
+  add_scene_options(*command, options->scene);
+  command
+      ->add_option("--script", options->script.script,
+                   "orbit, walk, head, drone, still or tour:FILE (a TUM file of keyframes)")
+      ->required();
+  command->add_option("--seed", options->script.seed, "Same seed, same trace")
+      ->capture_default_str();
+  command->add_option("--duration", options->script.duration_s, "Seconds")->capture_default_str();
+  command->add_option("--fps", options->script.rate_hz, "Poses per second")->capture_default_str();
+  command->add_option("--out", options->out, "TUM file to write")->required();
+  command->callback([options, command] {
+    const Scene scene = load_scene(options->scene, 0, is_quiet(*command));
+    write_tum(options->out, make_script(options->script, scene.hints));
+  });
+}
+
+void add_anchor(CLI::App& trace) {
+  struct Options : TraceOptions {
+    std::string trace;
+    std::optional<double> rate_hz;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = trace.add_subcommand(
+      "anchor", "Moves a recorded trace to a scene's start pose, upright and with its heading");
+  add_trace_options(*command, *options);
+  command->add_option("--trace", options->trace, "TUM file to read, up is -y")->required();
+  command->add_option("--fps", options->rate_hz, "Resample (default: the samples as recorded)")
+      ->check(CLI::Range(1.0, 1000.0));
+  command->callback([options, command] {
+    const bool quiet = is_quiet(*command);
+    const Trajectory recorded = read_tum(options->trace);
+    const LoadedScene loaded = load_for_trace(*options, quiet);
+    const Trajectory moved = anchored(recorded, loaded.scene.hints);
+    write_checked(*options, loaded, options->rate_hz ? resample(moved, *options->rate_hz) : moved,
+                  quiet);
+  });
+}
+
+struct MotionCommand {
+  const char* name;
+  const char* description;
+  MotionKind kind;
+  double default_speed;  // as given on the command line
+};
+
+void add_motion(CLI::App& trace, const MotionCommand& how) {
+  struct Options : TraceOptions {
+    PlainMotion motion;
+  };
+  auto options = std::make_shared<Options>();
+  options->motion.kind = how.kind;
+  options->motion.speed = how.default_speed;
+  CLI::App* command = trace.add_subcommand(how.name, how.description);
+  add_trace_options(*command, *options);
+  const bool straight = how.kind == MotionKind::pan || how.kind == MotionKind::zoom;
+  command
+      ->add_option("--speed", options->motion.speed,
+                   straight ? "World units per second" : "Degrees per second")
+      ->capture_default_str();
+  if (straight) {
+    command->add_option("--reach", options->motion.reach,
+                        "Farthest from the start, world units (default: the scene's bounds)");
+  }
+  command->add_option("--duration", options->motion.duration_s, "Seconds")->capture_default_str();
+  command->add_option("--fps", options->motion.rate_hz, "Poses per second")->capture_default_str();
+  command->callback([options, command, straight] {
+    const bool quiet = is_quiet(*command);
+    const LoadedScene loaded = load_for_trace(*options, quiet);
+    PlainMotion motion = options->motion;
+    if (!straight) motion.speed *= std::numbers::pi / 180.0;
+    write_checked(*options, loaded, make_plain_motion(motion, loaded.scene.hints, loaded.bounds),
+                  quiet);
+  });
+}
+
+void add_check(CLI::App& trace) {
+  struct Options : TraceOptions {
+    std::string trace;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = trace.add_subcommand("check", "Says whether a trace is fit to measure with");
+  add_scene_options(*command, options->scene);
+  add_lens_options(*command, options->lens);
+  command->add_option("--trace", options->trace, "TUM file to read")->required();
+  command->callback([options, command] {
+    const Trajectory trajectory = read_tum(options->trace);
+    const LoadedScene loaded = load_for_trace(*options, is_quiet(*command));
+    const TraceCheck result = check(*options, loaded, trajectory);
+    if (!result.valid()) {
+      throw CheckFailed(fmt::format("{}: {}", options->trace, result.complaint()));
+    }
+    fmt::print("{}: {} frames, {:.1f} % of them see enough, all inside of the scene\n",
+               options->trace, result.frames, 100.0 * result.seeing_frames);
+  });
+}
+
+}  // namespace
+
+void add_trace_command(CLI::App& app) {
+  CLI::App* trace = app.add_subcommand("trace", "Makes and checks camera traces (TUM files)");
+  trace->require_subcommand(1);
+  add_anchor(*trace);
+  add_motion(*trace, {"orbit", "Around the scene's focus", MotionKind::orbit, 20.0});
+  add_motion(*trace, {"pan", "Sideways, to and fro", MotionKind::pan, 1.0});
+  add_motion(*trace, {"zoom", "Along the view, to and fro", MotionKind::zoom, 1.0});
+  add_motion(*trace, {"rotate", "On the spot", MotionKind::rotate, 30.0});
+  add_script(*trace);
+  add_check(*trace);
+  add_trace_forecast_command(*trace);
+  add_trace_windows_command(*trace);
+}
+
+}  // namespace catgs

@@ -1,0 +1,94 @@
+#include "render_core/base/part_file.h"
+
+#include <iterator>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// What is wrong with the file; empty: nothing.
+std::string complaint(const fs::path& path) {
+  try {
+    check_writable(path);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+class PartFileTest : public testing::Test {
+ protected:
+  std::ptrdiff_t files() const {
+    return std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator());
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(PartFileTest, TakesTheOldFilesPlaceWhenItIsFinished) {
+  const fs::path path = folder_.write("report", "old");
+  {
+    PartFile file(path);
+    file.stream() << "new";
+    EXPECT_EQ(content(path), "old");
+    file.finish();
+    EXPECT_EQ(content(path), "new");
+  }
+  EXPECT_EQ(content(path), "new");
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(PartFileTest, LeavesTheOldFileWhereItIsNotFinished) {
+  const fs::path path = folder_.write("report", "old");
+  { PartFile(path).stream() << "half"; }
+  EXPECT_EQ(content(path), "old");
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(PartFileTest, LeavesSymbolicLinksAsTheyAre) {
+  const fs::path path = folder_.write("report", "old");
+  fs::create_symlink(path, folder_ / "link");
+  PartFile file(folder_ / "link");
+  file.stream() << "new";
+  file.finish();
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(content(path), "new");
+}
+
+TEST_F(PartFileTest, TakesNoDevicesPlace) {
+  PartFile file("/dev/null");
+  file.stream() << "new";
+  file.finish();
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  PartFile full("/dev/full");
+  full.stream() << "new";
+  EXPECT_THROW(full.finish(), InputError);
+}
+
+TEST_F(PartFileTest, IsTriedBeforehandWithoutATrace) {
+  EXPECT_EQ(complaint(folder_ / "report"), "");
+  EXPECT_EQ(files(), 0);
+  EXPECT_EQ(complaint(folder_.write("report", "old")), "");
+  EXPECT_EQ(content(folder_ / "report"), "old");
+  EXPECT_EQ(files(), 1);
+  const std::string remedy = " (does the folder exist, and is there space?)";
+  const fs::path nowhere = folder_ / "no/report";
+  EXPECT_EQ(complaint(nowhere), nowhere.string() + ": cannot be written" + remedy);
+  EXPECT_EQ(complaint(folder_.path()), folder_.path().string() + ": is a folder" + remedy);
+  EXPECT_EQ(complaint("/dev/null"), "");
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,64 @@
+#include "render_core/base/printable.h"
+
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+TEST(Printable, ControlCharactersComeOutByTheirBytes) {
+  EXPECT_EQ(printable({"a\0\t\n\x1b[2J\x7f", 9}), R"(a\x00\x09\x0a\x1b[2J\x7f)");
+  // U+009B begins what ESC [ begins, where a terminal knows it.
+  EXPECT_EQ(printable("\xc2\x80 \xc2\x9b"
+                      "2J \xc2\x9f"),
+            R"(\xc2\x80 \xc2\x9b2J \xc2\x9f)");
+}
+
+TEST(Printable, LettersStay) {
+  const std::string first_and_last =
+      " ~ \xc2\xa0 \xdf\xbf \xe0\xa0\x80 \xed\x9f\xbf \xee\x80\x80 \xef\xbf\xbf "
+      "\xf0\x90\x80\x80 \xf4\x8f\xbf\xbf";
+  EXPECT_EQ(printable(first_and_last), first_and_last);
+  EXPECT_EQ(printable("Gärten, 庭園, 🌳"), "Gärten, 庭園, 🌳");
+}
+
+TEST(Printable, WhatIsNotUtf8ComesOutByItsBytes) {
+  for (const auto& [text, wanted] : {
+           std::pair{"\x9b", R"(\x9b)"},
+           {"\xff", R"(\xff)"},
+           {"a\xc3", R"(a\xc3)"},
+           {"\xe2\x82", R"(\xe2\x82)"},
+           {"\xc3(", R"(\xc3()"},
+           {"\xe2\x82z", R"(\xe2\x82z)"},
+           {"\xc1\x9b", R"(\xc1\x9b)"},                  // too long for U+005B
+           {"\xe0\x82\x9b", R"(\xe0\x82\x9b)"},          // too long for U+009B
+           {"\xf0\x80\x82\x9b", R"(\xf0\x80\x82\x9b)"},  // the same
+           {"\xed\xa0\x80", R"(\xed\xa0\x80)"},          // surrogate
+           {"\xf4\x90\x80\x80", R"(\xf4\x90\x80\x80)"},  // U+110000
+           {"\xf8\x88\x80\x80\x80", R"(\xf8\x88\x80\x80\x80)"},
+           {"\xe2\xc3\xbc", "\\xe2\u00fc"},  // a letter after half a character
+       })
+    EXPECT_EQ(printable(text), wanted);
+}
+
+TEST(Shortened, EndsWithAWholeCharacterWhereThereAreSome) {
+  EXPECT_EQ(shortened("ab\u20ac", 5), "ab\u20ac");
+  for (const std::size_t bytes : {2u, 3u, 4u}) EXPECT_EQ(shortened("ab\u20ac", bytes), "ab");
+  const std::string none(200, '\x80');
+  EXPECT_EQ(shortened("abc" + none, 100), "abc" + none.substr(0, 97));
+  EXPECT_EQ(shortened("abc", 0), "");
+}
+
+TEST(Printable, WhatWentThroughItStays) {
+  std::string bytes;
+  for (int first = 0; first < 256; ++first)
+    for (int second = 0; second < 256; ++second)
+      bytes.append(1, static_cast<char>(first)).append(1, static_cast<char>(second));
+  const std::string once = printable(bytes);
+  EXPECT_EQ(printable(once), once);
+}
+
+}  // namespace
+}  // namespace catgs

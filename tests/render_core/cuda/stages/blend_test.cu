@@ -1,0 +1,315 @@
+// Blending, against the CPU core's kernel on the same splats and lists; folding slices and
+// conversion to video, against the formulas on the host.
+
+#include <random>
+
+#include "render_core/cuda/convert.cuh"
+#include "render_core/cuda/pixel_runs.cuh"
+#include "render_core/cuda/split.cuh"
+#include "render_core/math/colour-inl.h"
+#include "render_core/math/ellipse-inl.h"
+#include "tests/render_core/cuda/stages/stage.h"
+
+namespace catgs::cuda::stages {
+namespace {
+
+constexpr glm::ivec2 size_px{90, 60};  // parts of the last tiles lie outside
+constexpr glm::vec3 background(0.2f, 0.5f, 0.1f);
+
+/// Splats on a picture, nearest first, and the list of each tile: those that reach one of its
+/// pixels.
+class BlendStage : public StageTest {
+ protected:
+  BlendStage() : grid_(image_grid(size_px)), shape_(picture_shape(size_px, grid_)) {
+    std::mt19937_64 random(31);
+    const auto uniform = [&](double low, double high) {
+      return static_cast<float>(low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53);
+    };
+    for (std::uint32_t i = 0; i < 1500; ++i) {
+      catgs::Splat s{};
+      s.centre_x = uniform(-10, 100);
+      s.centre_y = uniform(-10, 70);
+      s.whitening_xx = 1.0f / uniform(0.6, 9.0);
+      s.whitening_yy = 1.0f / uniform(0.6, 9.0);
+      s.whitening_xy = uniform(-0.5, 0.5) * std::min(s.whitening_xx, s.whitening_yy);
+      s.log2_opacity = std::log2(uniform(0.01, 0.6));
+      // What halves hold as it is.
+      s.red = static_cast<float>(random() % 129) / 128.0f;
+      s.green = static_cast<float>(random() % 129) / 128.0f;
+      s.blue = static_cast<float>(random() % 129) / 128.0f;
+      s.original_index = i;
+      splats_.push_back(s);
+      SplatRecord record{};
+      record.centre_px = make_float2(s.centre_x, s.centre_y);
+      record.whitening = {s.whitening_xx, s.whitening_xy, s.whitening_yy};
+      record.log2_opacity = s.log2_opacity;
+      record.colour = {__floats2half2_rn(s.red, s.green), __float2half_rn(s.blue),
+                       __float2half_rn(0.0f)};
+      records_.push_back(record);
+    }
+    for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
+      const auto first = static_cast<std::uint32_t>(slots_.size());
+      for (std::uint32_t i = 0; i < splats_.size(); ++i)
+        if (reaches(splats_[i], t)) slots_.push_back(i);
+      ranges_.push_back(make_uint2(first, static_cast<std::uint32_t>(slots_.size())));
+    }
+    shape_.list_bound = static_cast<std::uint32_t>(slots_.size());
+  }
+
+  [[nodiscard]] glm::ivec2 corner_of(std::uint32_t tile) const {
+    return tile_size_px * glm::ivec2(static_cast<int>(tile) % grid_.tiles.x,
+                                     static_cast<int>(tile) / grid_.tiles.x);
+  }
+
+  [[nodiscard]] bool reaches(const catgs::Splat& s, std::uint32_t tile) const {
+    const math::Whitening<double> w{s.whitening_xx, s.whitening_xy, s.whitening_yy};
+    const glm::ivec2 corner = corner_of(tile);
+    for (int y = corner.y; y < corner.y + tile_size_px; ++y)
+      for (int x = corner.x; x < corner.x + tile_size_px; ++x)
+        if (s.log2_opacity -
+                math::whitened_square<double>(w, {x + 0.5 - s.centre_x, y + 0.5 - s.centre_y}) >=
+            log2_alpha_min)
+          return true;
+    return false;
+  }
+
+  /// The CPU core's picture; `looked_at`: entries of each tile's list.
+  std::vector<float> on_cpu(std::vector<std::size_t>& looked_at) const {
+    HostImage image;
+    image.resize(PixelFormat::rgb_f32, size_px);
+    for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
+      std::vector<DepthSlot> list;
+      for (std::uint32_t k = ranges_[t].x; k < ranges_[t].y; ++k) list.push_back({k, slots_[k]});
+      const glm::ivec2 corner = corner_of(t), end = glm::min(corner + tile_size_px, size_px);
+      std::vector<PixelBlock> blocks;
+      for (int y = corner.y; y < end.y; y += block_side_px)
+        for (int x = corner.x; x < end.x; x += block_side_px)
+          blocks.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)});
+      const BlendResult result = simd_kernels().front().blend_blocks({.splats = splats_.data(),
+                                                                      .list = list,
+                                                                      .blocks = blocks,
+                                                                      .background = background,
+                                                                      .cull_blocks = true,
+                                                                      .count_pairs = false,
+                                                                      .image = &image});
+      looked_at.push_back(result.looked_at);
+    }
+    std::vector<float> rgb;
+    for (int y = 0; y < size_px.y; ++y)
+      rgb.insert(rgb.end(), image.rgb_row(y), image.rgb_row(y) + 3 * size_px.x);
+    return rgb;
+  }
+
+  /// The device's picture, of tiles in one task each; by runs of their pixels when `turned`.
+  std::vector<float> on_device(bool turned, std::vector<std::uint32_t>& reached) {
+    shape_.tile_parts = turned ? most_run_parts : parts_per_tile;
+    const std::uint32_t tiles = shape_.tiles();
+    std::vector<BlendTask> whole;
+    std::vector<std::uint32_t> numbers;
+    for (std::uint32_t t = 0; t < tiles; ++t) {
+      whole.push_back({t, ranges_[t].x, ranges_[t].y, 0, 1});
+      numbers.push_back(t);
+    }
+    numbers.resize(queue_bound(shape_));
+    FrameCounts counts;
+    counts.queued[0] = tiles;
+    const auto record = upload(records_);
+    const auto slot = upload(slots_), queue = upload(numbers);
+    const auto reach = upload(std::vector<std::uint32_t>(tiles));
+    const auto task = upload(whole);
+    const auto on_device = upload(std::vector{counts});
+    const auto rgb =
+        upload(std::vector<float>(3 * static_cast<std::size_t>(size_px.x * size_px.y), -1.0f));
+    const auto pixels = upload(std::vector<PixelPlace>(std::size_t{tiles} * run_bound_px(shape_)));
+    const auto pixel_count = upload(std::vector<std::uint32_t>(tiles));
+    const Stream stream;
+    if (turned)
+      launch_pixel_runs({.shape = shape_,
+                         .list_from_frame = {},
+                         .frame_from_list = {},
+                         .pixels = pixels.get(),
+                         .pixel_count = pixel_count.get()},
+                        stream.get());
+    launch_blend({.shape = shape_,
+                  .records = record.get(),
+                  .slot = slot.get(),
+                  .tasks = task.get(),
+                  .queue = queue.get(),
+                  .background = make_float3(background.x, background.y, background.z),
+                  .rgb = rgb.get(),
+                  .pixels = turned ? pixels.get() : nullptr,
+                  .pixel_count = turned ? pixel_count.get() : nullptr,
+                  .slice_pixels = nullptr,
+                  .consumed = nullptr,
+                  .slice_transmittance = nullptr,
+                  .reach = reach.get(),
+                  .counts = on_device.get(),
+                  .count_pairs = false,
+                  .warps = blend_warps(processors())},
+                 stream.get());
+    reached = fetch(reach.get(), tiles);
+    return fetch(rgb.get(), rgb.size());
+  }
+
+  TileGrid grid_;
+  FrameShape shape_;
+  std::vector<catgs::Splat> splats_;
+  std::vector<SplatRecord> records_;
+  std::vector<std::uint32_t> slots_;
+  std::vector<uint2> ranges_;
+};
+
+TEST_F(BlendStage, IsTheCpuCoresButForTheRestOfARound) {
+  std::vector<std::size_t> looked_at;
+  const std::vector<float> expected = on_cpu(looked_at);
+  for (const bool turned : {false, true}) {
+    SCOPED_TRACE(turned ? "runs of pixels" : "squares");
+    std::vector<std::uint32_t> reached;
+    const std::vector<float> drawn = on_device(turned, reached);
+    // A finished pixel sees at most transmittance_min / (1 - alpha_max) of what lies behind it.
+    Difference colour("blend: colour", 0.0101);
+    for (std::size_t i = 0; i < drawn.size(); ++i) colour.add(drawn[i] - expected[i]);
+    Difference quality("blend: dB below 60", 0.0);
+    quality.add(std::max(0.0, 60.0 - catgs::test::psnr_db(drawn, expected)));
+    // Entries come in groups of 64, of which the last two are on their way when the tile is
+    // finished.
+    Mismatches reach("blend: tiles that looked at less of their list", 0.05);
+    for (std::size_t t = 0; t < looked_at.size(); ++t) {
+      EXPECT_LE(reached[t], ranges_[t].y - ranges_[t].x);
+      reach.add(reached[t] + 64 < looked_at[t]);
+    }
+  }
+}
+
+class CompositeStage : public StageTest {};
+
+TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
+  FrameShape shape = picture_shape(size_px, image_grid(size_px));
+  const std::uint32_t tiles = shape.tiles();
+  std::mt19937_64 random(41);
+  const auto uniform = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+  std::vector<uint2> of_tile;
+  std::vector<BlendTask> tasks(tiles);
+  std::uint32_t slices = 0;
+  for (std::uint32_t t = 0; t < tiles; ++t) {
+    const auto count = t % 5 == 1 ? 0u : 2u + static_cast<std::uint32_t>(random() % 6);
+    of_tile.push_back(make_uint2(slices, count));
+    for (std::uint32_t s = 0; s < count; ++s)
+      tasks.push_back({t, 1000 * t + 100 * s, 1000 * t + 100 * (s + 1),
+                       static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(count)});
+    slices += count;
+  }
+  shape.slice_bound = slices;
+  constexpr std::size_t tile_pixels = tile_size_px * tile_size_px;
+  std::vector<float4> of_slice;
+  std::vector<std::uint32_t> looked_at;
+  for (std::uint32_t s = 0; s < slices; ++s) {
+    for (std::size_t k = 0; k < tile_pixels; ++k) {
+      const bool finished = random() % 4 == 0;
+      const float transmittance = finished ? -0.001f : 0.05f + 0.9f * uniform();
+      of_slice.push_back(make_float4(uniform(), uniform(), uniform(), transmittance));
+    }
+    for (int part = 0; part < parts_per_tile; ++part)
+      looked_at.push_back(tasks[tiles + s].first + static_cast<std::uint32_t>(random() % 100));
+  }
+  const auto slice = upload(of_tile);
+  const auto task = upload(tasks);
+  const auto pixels = upload(of_slice);
+  const auto consumed = upload(looked_at);
+  const auto counts = upload(std::vector<FrameCounts>(1));
+  const auto reach = upload(std::vector<std::uint32_t>(tiles, 12345));
+  const auto rgb =
+      upload(std::vector<float>(3 * static_cast<std::size_t>(size_px.x * size_px.y), -1.0f));
+  const Stream stream;
+  launch_composite({.shape = shape,
+                    .tasks = task.get(),
+                    .tile_slices = slice.get(),
+                    .slice_pixels = pixels.get(),
+                    .consumed = consumed.get(),
+                    .pixels = nullptr,
+                    .pixel_count = nullptr,
+                    .counts = counts.get(),
+                    .background = make_float3(background.x, background.y, background.z),
+                    .rgb = rgb.get(),
+                    .reach = reach.get()},
+                   stream.get());
+  const std::vector<float> drawn = fetch(rgb.get(), rgb.size());
+  const std::vector<std::uint32_t> reached = fetch(reach.get(), tiles);
+
+  Difference colour("composite: colour", 1e-5);
+  Mismatches reaches("composite: reach of tiles", 0.0);
+  for (std::uint32_t t = 0; t < tiles; ++t) {
+    std::uint32_t farthest = 0;
+    for (int k = 0; k < static_cast<int>(tile_pixels); ++k) {
+      const int in_x = k % tile_size_px, in_y = k / tile_size_px;
+      const int x = static_cast<int>(t) % shape.tiles_x * tile_size_px + in_x;
+      const int y = static_cast<int>(t) / shape.tiles_x * tile_size_px + in_y;
+      const int part = in_y / part_size_px * 2 + in_x / part_size_px;
+      glm::dvec3 sum(0.0);
+      double transmittance = 1.0;
+      for (std::uint32_t s = of_tile[t].x; s < of_tile[t].x + of_tile[t].y; ++s) {
+        const float4& p = of_slice[s * tile_pixels + static_cast<std::size_t>(k)];
+        sum += transmittance * glm::dvec3(p.x, p.y, p.z);
+        transmittance *= std::abs(p.w);
+        farthest = std::max(farthest, looked_at[s * parts_per_tile + static_cast<unsigned>(part)]);
+        if (std::signbit(p.w) || transmittance < transmittance_min) break;
+      }
+      if (x >= size_px.x || y >= size_px.y) continue;
+      const float* pixel = &drawn[3 * static_cast<std::size_t>(y * size_px.x + x)];
+      for (int c = 0; c < 3; ++c)
+        colour.add(of_tile[t].y == 0
+                       ? pixel[c] + 1.0f  // nothing was written
+                       : pixel[c] - std::clamp(sum[c] + transmittance * background[c], 0.0, 1.0));
+    }
+    reaches.add(reached[t] !=
+                (of_tile[t].y == 0 ? 12345u : farthest - tasks[tiles + of_tile[t].x].first));
+  }
+}
+
+class ConvertStage : public StageTest {};
+
+TEST_F(ConvertStage, MakesTheCodesOfTheFormulas) {
+  constexpr int width = 130, height = 66;
+  std::mt19937_64 random(51);
+  std::vector<float> colours(3 * width * height);
+  for (float& c : colours) c = static_cast<float>(random() >> 40) * 0x1p-24f;
+  const auto rgb = upload(colours);
+  constexpr std::size_t pixels = width * height;
+  const auto codes = upload(std::vector<std::uint8_t>(pixels + pixels / 2));
+  const Stream stream;
+  launch_convert({.width_px = width,
+                  .height_px = height,
+                  .rgb = rgb.get(),
+                  .luma = codes.get(),
+                  .cb = codes.get() + pixels,
+                  .cr = codes.get() + pixels + pixels / 4},
+                 stream.get());
+  const std::vector<std::uint8_t> drawn = fetch(codes.get(), pixels + pixels / 2);
+  const auto colour = [&](int x, int y) {
+    const float* c = &colours[3 * static_cast<std::size_t>(y * width + x)];
+    return math::Vec3<double>{c[0], c[1], c[2]};
+  };
+  Difference code("convert: codes beyond rounding", 1e-3);
+  const auto add = [&](std::uint8_t found, double exact) {
+    code.add(std::max(0.0, std::abs(found - exact) - 0.5));
+  };
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      add(drawn[static_cast<std::size_t>(y * width + x)], math::luma_code(colour(x, y)));
+  for (int y = 0; y < height; y += 2) {
+    for (int x = 0; x < width; x += 2) {
+      math::Vec3<double> mean{0.0, 0.0, 0.0};
+      for (int j = 0; j < 4; ++j) {
+        const auto c = colour(x + j % 2, y + j / 2);
+        mean = {mean.x + 0.25 * c.x, mean.y + 0.25 * c.y, mean.z + 0.25 * c.z};
+      }
+      const auto chroma = math::chroma_codes<double>(mean);
+      const std::size_t at = pixels + static_cast<std::size_t>(y / 2 * (width / 2) + x / 2);
+      add(drawn[at], chroma.x);
+      add(drawn[at + pixels / 4], chroma.y);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace catgs::cuda::stages

@@ -1,0 +1,221 @@
+// The stages that make lists: the two sorts and the scan against the standard library's, entries
+// against the CPU core's lists and against every pixel.
+
+#include <numeric>
+#include <random>
+#include <set>
+
+#include "render_core/cuda/bin.cuh"
+#include "render_core/math/ellipse-inl.h"
+#include "tests/render_core/cuda/stages/stage.h"
+
+namespace catgs::cuda::stages {
+namespace {
+
+using Numbers = std::vector<std::uint32_t>;
+
+Numbers random_numbers(std::size_t count, std::uint32_t below, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Numbers numbers(count);
+  for (std::uint32_t& number : numbers) number = static_cast<std::uint32_t>(random() % below);
+  return numbers;
+}
+
+Numbers counting(std::size_t count) {
+  Numbers numbers(count);
+  std::iota(numbers.begin(), numbers.end(), 0u);
+  return numbers;
+}
+
+/// Scratch for the sorts of so many splats and entries.
+DeviceBuffer<std::byte> scratch_for(const FrameShape& shape) {
+  DeviceBuffer<std::byte> scratch;
+  scratch.reserve(sort_scratch_bytes(shape));
+  return scratch;
+}
+
+class SortStage : public StageTest {};
+
+TEST_F(SortStage, OrdersSplatsByDepthAsAStableSort) {
+  constexpr std::uint32_t count = 30'000;
+  const FrameShape shape{.tiles_x = 4, .tiles_y = 4, .visible_bound = count, .list_bound = 1};
+  // Few depths, so that many are equal; their lowest bits say nothing.
+  Numbers keys = random_numbers(count, 5000, 1);
+  for (std::uint32_t& key : keys) key = key << depth_bits_below | key % 16;
+  keys[7] = most_depth_key;
+  const auto key = upload(keys), other_key = upload(keys);
+  const auto slot = upload(counting(count)), other_slot = upload(Numbers(count));
+  const auto scratch = scratch_for(shape);
+  const Stream stream;
+  PingPong<std::uint32_t> depth{.current = key.get(), .other = other_key.get()};
+  PingPong<std::uint32_t> order{.current = slot.get(), .other = other_slot.get()};
+  sort_by_depth(count, depth, order, {.memory = scratch.get(), .bytes = scratch.bytes()},
+                stream.get());
+  Numbers expected = counting(count);
+  std::ranges::stable_sort(expected, {},
+                           [&](std::uint32_t i) { return keys[i] >> depth_bits_below; });
+  const Numbers drawn = fetch(order.current, count);
+  Mismatches places("sort: places in depth order", 0.0);
+  for (std::uint32_t k = 0; k < count; ++k) places.add(drawn[k] != expected[k]);
+}
+
+TEST_F(SortStage, SumsTileCountsInDepthOrder) {
+  constexpr std::uint32_t count = 30'000;
+  const FrameShape shape{.tiles_x = 4, .tiles_y = 4, .visible_bound = count, .list_bound = 1};
+  for (const bool saturates : {false, true}) {
+    Numbers tile_counts = random_numbers(count, 40, 2);
+    if (saturates) tile_counts[100] = tile_counts[200] = list_entries_limit - 1;
+    Numbers order = counting(count);
+    std::ranges::shuffle(order, std::mt19937_64(3));
+    const auto counted = upload(tile_counts), ordered = upload(order);
+    const auto sums = upload(Numbers(count));
+    const auto scratch = scratch_for(shape);
+    const auto counts = upload(std::vector<FrameCounts>(1));
+    PinnedBuffer<HostCounts> host_counts;
+    host_counts.reserve(1);
+    const Stream stream;
+    scan_tile_counts(count, counts.get(), host_counts.get(), ordered.get(), counted.get(),
+                     sums.get(), {.memory = scratch.get(), .bytes = scratch.bytes()}, stream.get());
+    const Numbers first = fetch(sums.get(), count);
+    Mismatches starts("scan: where entries begin", 0.0);
+    std::uint64_t sum = 0;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      starts.add(first[k] != sum);
+      sum = std::min<std::uint64_t>(sum + tile_counts[order[k]], list_entries_limit);
+    }
+    EXPECT_EQ(fetch(counts.get(), 1)[0].list_entries, sum);
+    EXPECT_EQ(host_counts.get()->list_entries, sum);
+  }
+}
+
+template <class Tile>
+void expect_sorted_by_tile(glm::ivec2 tiles, cudaStream_t stream) {
+  constexpr std::uint32_t count = 50'000;
+  const FrameShape shape{
+      .tiles_x = tiles.x, .tiles_y = tiles.y, .visible_bound = 1, .list_bound = count};
+  const Numbers numbers = random_numbers(count, shape.tiles() + 1, 4);  // the last: padding
+  const std::vector<Tile> tile_of(numbers.begin(), numbers.end());
+  const auto key = upload(tile_of), other_key = upload(tile_of);
+  const auto slot = upload(counting(count)), other_slot = upload(Numbers(count));
+  const auto range = upload(std::vector<uint2>(shape.tiles(), make_uint2(1, 2)));
+  const auto scratch = scratch_for(shape);
+  PingPong<Tile> tile{.current = key.get(), .other = other_key.get()};
+  PingPong<std::uint32_t> slots{.current = slot.get(), .other = other_slot.get()};
+  sort_by_tile(shape, count, tile, slots, {.memory = scratch.get(), .bytes = scratch.bytes()},
+               stream);
+  launch_ranges<Tile>(
+      {.shape = shape, .entries = count, .tile = tile.current, .range = range.get()}, stream);
+  Numbers expected = counting(count);
+  std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return numbers[i]; });
+  const Numbers drawn = fetch(slots.current, count);
+  Mismatches places("sort: places in order of tiles", 0.0);
+  for (std::uint32_t k = 0; k < count; ++k) places.add(drawn[k] != expected[k]);
+
+  const std::vector<uint2> ranges = fetch(range.get(), shape.tiles());
+  Mismatches found("ranges: of tiles", 0.0);
+  for (std::uint32_t t = 0; t < shape.tiles(); ++t) {
+    const auto same = [&](std::uint32_t i) { return numbers[i]; };
+    const auto of_tile = std::ranges::equal_range(expected, t, {}, same);
+    const auto first = static_cast<std::uint32_t>(of_tile.begin() - expected.begin());
+    const auto last = static_cast<std::uint32_t>(of_tile.end() - expected.begin());
+    found.add(first == last ? ranges[t].x != ranges[t].y
+                            : ranges[t].x != first || ranges[t].y != last);
+  }
+}
+
+TEST_F(SortStage, OrdersEntriesByTileAsAStableSortAndFindsTheirRanges) {
+  const Stream stream;
+  expect_sorted_by_tile<std::uint16_t>({40, 25}, stream.get());
+  expect_sorted_by_tile<std::uint16_t>({255, 257}, stream.get());  // 65,535: all bits
+  expect_sorted_by_tile<std::uint32_t>({300, 250}, stream.get());
+}
+
+using Entry = std::pair<std::uint32_t, std::uint32_t>;  // tile, index in the cloud
+
+/// The CPU core's lists of the splats that it has in view, but for those in `left_out`.
+std::set<Entry> cpu_entries(const StagedLists& lists, const TileGrid& grid,
+                            const std::vector<bool>& left_out) {
+  std::set<Entry> entries;
+  for (const auto& found : lists.on_cpu()) {
+    if (!found || left_out[found->splat.original_index]) continue;
+    if (found->splat.growth_px > max_image_side_px) continue;  // it is in all lists here
+    std::vector<TileRun> runs;
+    const catgs::SplatPath path = found->path.value_or(catgs::SplatPath{});
+    simd_kernels().front().list_tiles({.splats = std::span(&found->splat, 1),
+                                       .paths = found->path ? &path : nullptr,
+                                       .first_slot = 0,
+                                       .first_px = grid.first_px},
+                                      runs);
+    for (const TileRun& run : runs)
+      for (std::uint32_t column = run.begin; column < run.end; ++column)
+        entries.emplace(run.row * static_cast<std::uint32_t>(grid.tiles.x) + column,
+                        found->splat.original_index);
+  }
+  return entries;
+}
+
+/// Whether a splat as it is now reaches a pixel of the tile, in double precision.
+bool reaches(const SplatRecord& splat, const FrameShape& shape, std::uint32_t tile) {
+  const math::Whitening<double> w{splat.whitening.xx, splat.whitening.xy, splat.whitening.yy};
+  const int left = shape.first_x_px + static_cast<int>(tile) % shape.tiles_x * tile_size_px;
+  const int top = shape.first_y_px + static_cast<int>(tile) / shape.tiles_x * tile_size_px;
+  for (int y = std::max(top, 0); y < std::min(top + tile_size_px, shape.height_px); ++y)
+    for (int x = std::max(left, 0); x < std::min(left + tile_size_px, shape.width_px); ++x)
+      if (splat.log2_opacity - math::whitened_square<double>(
+                                   w, {x + 0.5 - splat.centre_px.x, y + 0.5 - splat.centre_px.y}) >=
+          log2_alpha_min + 1e-4)
+        return true;
+  return false;
+}
+
+class EmitStage : public ListStage {};
+
+TEST_P(EmitStage, ListsWhatTheCpuCoreListsAndMissesNoPixel) {
+  const StagedCase staged(GetParam(), 3000, {160, 96});
+  const StagedScene scene(staged.cloud);
+  StagedLists lists(scene, staged.camera, staged.plan, staged.settings);
+  lists.cull();
+  lists.project();
+  const ViewMemory& m = lists.memory();
+  const std::uint32_t seen = lists.counts().visible;
+  const auto keys = fetch(m.depth.get(), seen), visible = fetch(m.visible.get(), seen);
+  const auto records = fetch(m.records.get(), seen);
+  lists.sort_by_depth();
+  lists.emit();
+  const FrameCounts counts = lists.counts();
+  ASSERT_LE(counts.list_entries, lists.shape().list_bound);
+  const auto tiles =
+      fetch(reinterpret_cast<const std::uint16_t*>(m.tile.get()), counts.list_entries);
+  const auto slots = fetch(m.other_slot.get(), counts.list_entries);
+
+  std::vector<bool> watched(scene.cloud.size());
+  for (const std::uint32_t v : visible)
+    if ((v & watched_bit) != 0) watched[scene.order[v & ~watched_bit]] = true;
+  std::set<Entry> listed, of_slots;
+  std::uint32_t depth = 0;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    EXPECT_GE(keys[slots[k]] >> depth_bits_below, depth);  // in depth order
+    depth = keys[slots[k]] >> depth_bits_below;
+    if (tiles[k] == lists.shape().tiles()) continue;  // counted by a hair
+    const std::uint32_t index = scene.order[visible[slots[k]] & ~watched_bit];
+    EXPECT_TRUE(listed.emplace(tiles[k], index).second) << "listed twice";
+    of_slots.emplace(tiles[k], slots[k]);
+  }
+  const std::set<Entry> expected = cpu_entries(lists, staged.plan.grid, watched);
+  {
+    // Each core widens outlines by its own allowance for rounding.
+    Mismatches missing("emit: entries of the CPU core that are missing", 0.01);
+    for (const Entry& entry : expected) missing.add(!listed.contains(entry));
+    Mismatches added("emit: entries that the CPU core does not have", 0.05);
+    for (const Entry& entry : listed) added.add(!expected.contains(entry));
+  }
+  Mismatches missed("emit: tiles with a pixel that a splat reaches and no entry of it", 0.0);
+  for (std::uint32_t slot = 0; slot < seen; ++slot)
+    for (std::uint32_t t = 0; t < lists.shape().tiles(); ++t)
+      if (reaches(records[slot], lists.shape(), t)) missed.add(!of_slots.contains({t, slot}));
+}
+
+INSTANTIATE_TEST_SUITE_P(, EmitStage, testing::Values(Listed::now, Listed::window), name_of);
+
+}  // namespace
+}  // namespace catgs::cuda::stages

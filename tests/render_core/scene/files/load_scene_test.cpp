@@ -1,0 +1,215 @@
+#include "render_core/scene/files/load_scene.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <sys/stat.h>
+
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/ply.h"
+#include "render_core/scene/prune.h"
+#include "render_core/scene/scene.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class LoadScene : public FolderTest {};
+
+TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {
+  const GaussianCloud cloud = random_cloud(5000, 3);
+  save_scene(cloud, folder_ / "room.ply");
+  std::vector<double> progress;
+  LoadOptions options;
+  options.progress = [&](double fraction) { progress.push_back(fraction); };
+  const Scene scene = load_scene(folder_ / "room.ply", options);
+  EXPECT_EQ(scene.name, "room");
+  EXPECT_EQ(scene.cloud.mean, cloud.mean);
+  EXPECT_EQ(scene.cloud.sh, cloud.sh);
+  EXPECT_EQ(scene.report.read, 5000u);
+  EXPECT_EQ(scene.hints.source, "estimated");
+  ASSERT_FALSE(progress.empty());
+  EXPECT_TRUE(std::is_sorted(progress.begin(), progress.end()));
+  EXPECT_EQ(progress.back(), 1.0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "room.ply.part"));
+}
+
+TEST_F(LoadScene, AFileThatIsCutOffWhileItIsReadIsRefused) {
+  const auto cut_off_at_the_first_piece = [&](const std::filesystem::path& path) {
+    LoadOptions options;
+    options.threads = 1;
+    options.progress = [&](double) { std::filesystem::resize_file(path, 1000); };
+    return input_error([&] { load_scene(path, options); });
+  };
+  const GaussianCloud cloud = random_cloud(200'000, 0);
+  for (const auto& path : {folder_ / "room.ply", folder_ / "room.splat"}) {
+    save_scene(cloud, path);
+    EXPECT_THAT(cut_off_at_the_first_piece(path),
+                AllOf(HasSubstr(path.filename().string()), HasSubstr("byte "),
+                      HasSubstr("the file became shorter while it was read")));
+  }
+}
+
+TEST_F(LoadScene, NamesAreUtf8WhateverTheFileIsCalled) {
+  save_scene(random_cloud(10, 0), folder_ / "caf\xe9\xff.ply");
+  EXPECT_EQ(load_scene(folder_ / "caf\xe9\xff.ply").name, "caf\ufffd\ufffd");
+  save_scene(random_cloud(10, 0), folder_ / "caf\u00e9 \"1\".ply");
+  EXPECT_EQ(load_scene(folder_ / "caf\u00e9 \"1\".ply").name, "caf\u00e9 \"1\"");
+}
+
+TEST_F(LoadScene, FilesAreToldApartByContent) {
+  const GaussianCloud cloud = random_cloud(300, 1);
+  const auto format_of = [&](const std::string& name, const std::string& content) {
+    const Scene scene = load_scene(write(name, content));
+    EXPECT_EQ(scene.cloud.size(), 300u) << name;
+    return scene.format;
+  };
+  EXPECT_EQ(format_of("a.bin", ply_bytes(cloud)), "3DGS ply");
+  EXPECT_EQ(format_of("b.ply", encode_compressed_ply(cloud, true)), "compressed ply");
+  for (const int version : {1, 2, 3, 4})
+    EXPECT_EQ(format_of("c.ply", encode_spz(cloud, {.version = version})),
+              "spz v" + std::to_string(version));
+  EXPECT_EQ(format_of("d.ply", zip(encode_sog(cloud, 1))), "sog v1 (zip)");
+  EXPECT_EQ(format_of("e.sog", zip(encode_sog(cloud, 2))), "sog v2 (zip)");
+  save_scene(cloud, folder_ / "f.splat");
+  EXPECT_EQ(load_scene(folder_ / "f.splat").format, "splat");
+  save_scene(cloud, folder_ / "g.spz");
+  EXPECT_EQ(load_scene(folder_ / "g.spz").format, "spz v3");
+}
+
+TEST_F(LoadScene, FoldersAreRecognisedByWhatTheyHold) {
+  const GaussianCloud cloud = random_cloud(300, 1);
+  for (const auto& [name, content] : encode_sog(cloud, 2)) write("museum/" + name, content);
+  for (const char* path : {"museum", "museum/", "museum/meta.json"}) {
+    const Scene scene = load_scene(folder_ / path);
+    EXPECT_EQ(scene.format, "sog v2 (folder)");
+    EXPECT_EQ(scene.name, "museum");
+  }
+  write("single/only.ply", ply_bytes(cloud));
+  write("single/readme.txt", "");
+  EXPECT_EQ(load_scene(folder_ / "single").name, "only");
+  write("single/second.splat", "");
+  EXPECT_THAT(input_error([&] { load_scene(folder_ / "single"); }),
+              AllOf(HasSubstr("only.ply, second.splat"), HasSubstr("name one")));
+  write("empty/readme.txt", "");
+  EXPECT_THAT(input_error([&] { load_scene(folder_ / "empty"); }),
+              AllOf(HasSubstr("holds no scene"), HasSubstr("lod-meta.json")));
+}
+
+TEST_F(LoadScene, TrainingOutputGivesTheNewestIterationAndItsCameras) {
+  const auto ply = [&](const std::string& iteration, std::size_t count) {
+    write("garden/point_cloud/iteration_" + iteration + "/point_cloud.ply",
+          ply_bytes(random_cloud(count, 0)));
+  };
+  ply("7000", 70);
+  ply("30000", 300);
+  ply("best", 9);
+  std::filesystem::create_directories(folder_ / "garden/point_cloud/iteration_40000");
+  write("garden/cameras.json", R"([{"position": [0, 0, -9],
+        "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}])");
+  for (const char* path : {"garden", "garden/point_cloud/iteration_30000/point_cloud.ply"}) {
+    const Scene scene = load_scene(folder_ / path);
+    EXPECT_EQ(scene.name, "garden");
+    EXPECT_EQ(scene.cloud.size(), 300u);
+    EXPECT_EQ(scene.hints.source, "cameras.json");
+    EXPECT_EQ(scene.hints.start_pose.position, glm::vec3(0, 0, -9));
+  }
+  write("garden.json", R"({"near": 0.125})");
+  EXPECT_EQ(load_scene(folder_ / "garden").hints.near_z, 0.125f);
+}
+
+TEST_F(LoadScene, SidecarsAreFoundBesideFilesAndFolders) {
+  write("room.ply", ply_bytes(random_cloud(30, 0)));
+  write("room.json", R"({"up": "+z"})");
+  EXPECT_EQ(load_scene(folder_ / "room.ply").hints.source, "sidecar room.json");
+  for (const auto& [name, content] : encode_sog(random_cloud(300, 0), 2))
+    write("museum/" + name, content);
+  write("museum.json", R"({"up": "+z"})");
+  EXPECT_EQ(load_scene(folder_ / "museum").hints.up, glm::vec3(0, 0, 1));
+}
+
+TEST_F(LoadScene, UnknownFilesAreRefusedWithTheListOfFormats) {
+  const auto path = write("notes.txt", "no scene");
+  EXPECT_THAT(input_error([&] { load_scene(path); }),
+              AllOf(HasSubstr("notes.txt"), HasSubstr("supported: .ply"), HasSubstr(".sog")));
+  EXPECT_THAT(input_error([&] { load_scene(write("empty.ply", "")); }), HasSubstr("supported"));
+  EXPECT_THAT(input_error([&] { load_scene(folder_ / "absent.ply"); }),
+              HasSubstr("does not exist"));
+  LoadOptions level;
+  level.lod = 1;
+  EXPECT_THAT(
+      input_error([&] { load_scene(write("a.ply", ply_bytes(random_cloud(3, 0))), level); }),
+      HasSubstr("no levels of detail"));
+}
+
+TEST_F(LoadScene, NamedPipesDoNotHang) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.ply").c_str(), 0600), 0);
+  EXPECT_THAT(input_error([&] { load_scene(folder_ / "pipe.ply"); }),
+              HasSubstr("not a regular file"));
+}
+
+TEST_F(LoadScene, CloudsWithNothingToDrawAreRefused) {
+  GaussianCloud cloud = random_cloud(30, 0);
+  for (float& opacity : cloud.opacity) opacity = 1e-4f;
+  EXPECT_THAT(input_error([&] { load_scene(write("a.ply", ply_bytes(cloud))); }),
+              HasSubstr("none of its 30 Gaussians can be drawn"));
+}
+
+TEST_F(LoadScene, SavingNamesUnknownExtensionsAndMissingFolders) {
+  const GaussianCloud cloud = random_cloud(3, 0);
+  EXPECT_THAT(input_error([&] { save_scene(cloud, folder_ / "a.obj"); }), HasSubstr("'.obj'"));
+  EXPECT_THAT(input_error([&] { save_scene(cloud, folder_ / "no" / "a.ply"); }),
+              HasSubstr("cannot be written"));
+}
+
+TEST_F(LoadScene, FailedSavingLeavesNothingBehind) {
+  GaussianCloud cloud = random_cloud(3, 0);
+  cloud.mean[0].x = 1e20f;  // .spz cannot hold it
+  write("a.spz", "older");
+  EXPECT_THAT(input_error([&] { save_scene(cloud, folder_ / "a.spz"); }), HasSubstr("a.spz"));
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "a.spz"), 5u);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.spz.part"));
+}
+
+TEST(Prune, KeepsTheMostImportantInTheirOrder) {
+  GaussianCloud cloud = random_cloud(5, 1);
+  for (std::size_t i = 0; i < 5; ++i) {
+    cloud.opacity[i] = 0.5f;
+    cloud.scale[i] = glm::vec3(0.1f);
+  }
+  cloud.scale[1] = glm::vec3(0.1f, 0.1f, 1e-6f);  // flat: one of three shadows is left
+  cloud.opacity[3] = 0.1f;                        // weaker still
+  cloud.opacity[4] = 0.9f;
+  const GaussianCloud before = cloud;
+  keep_most_important(cloud, 1.0);
+  EXPECT_EQ(cloud.size(), 5u);
+  keep_most_important(cloud, 0.79);
+  EXPECT_EQ(cloud.mean,
+            (std::vector{before.mean[0], before.mean[1], before.mean[2], before.mean[4]}));
+  keep_most_important(cloud, 0.5);
+  EXPECT_EQ(cloud.mean, (std::vector{before.mean[0], before.mean[4]}));  // ties: the first stays
+  EXPECT_EQ(cloud.sh_of(1)[3], before.sh_of(4)[3]);
+  EXPECT_EQ(cloud.sh.size(), 8u);
+}
+
+TEST(FormatLimits, AreThoseOfTheSecurityPage) {
+  const MemorySource file("a.spz", {});
+  EXPECT_NO_THROW(require_count(file, "count", 268'435'456));
+  EXPECT_THAT(input_error([&] { require_count(file, "count", 268'435'457); }),
+              HasSubstr("at most 268435456"));
+  EXPECT_NO_THROW(require_plausible_count(file, "count", 1 << 20, 1, (1 << 20) / 256));
+  EXPECT_THAT(
+      input_error([&] { require_plausible_count(file, "count", 1 << 20, 1, (1 << 20) / 256 - 1); }),
+      HasSubstr("cannot be in 4095 compressed bytes"));
+  EXPECT_NO_THROW(require_plausible_count(file, "count", 65'536, 1, 0));
+  input_error([&] { require_plausible_count(file, "count", 65'537, 1, 0); });
+}
+
+}  // namespace
+}  // namespace catgs::test

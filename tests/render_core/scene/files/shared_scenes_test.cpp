@@ -1,0 +1,79 @@
+// Real files from the shared folder; skipped where it is absent.
+#include <cstdlib>
+#include <tuple>
+
+#include "render_core/scene/analysis/first_sight.h"
+#include "render_core/scene/analysis/voxel_grid.h"
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/scene.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+class SharedScenes : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const char* set = std::getenv("CATGS_SHARED_DIR");
+    scenes_ = std::filesystem::path(set ? set : CATGS_SOURCE_DIR "/../shared") / "scenes";
+    if (!std::filesystem::is_directory(scenes_))
+      GTEST_SKIP() << "no folder " << scenes_ << "; set CATGS_SHARED_DIR";
+  }
+
+  static void expect_sound(const Scene& scene) {
+    const Bounds& limits = scene.hints.limits;
+    const glm::vec3& eye = scene.hints.start_pose.position;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_LT(limits.min[k], eye[k]);
+      EXPECT_GT(limits.max[k], eye[k]);
+    }
+    const VoxelGrid grid(scene.cloud, eye, 0.25f * glm::distance(limits.min, limits.max));
+    EXPECT_LT(grid.depth_around(eye), 0.2f) << "the first pose is inside of something";
+  }
+
+  std::filesystem::path scenes_;
+};
+
+TEST_F(SharedScenes, SogVersion2Zip) {
+  const Scene scene = load_scene(scenes_ / "skull.sog");
+  EXPECT_EQ(scene.format, "sog v2 (zip)");
+  EXPECT_EQ(scene.report.read, 94936u);
+  EXPECT_EQ(scene.cloud.sh_degree, 3);
+  expect_sound(scene);
+}
+
+TEST_F(SharedScenes, CompressedPly) {
+  const Scene scene = load_scene(scenes_ / "guitar.compressed.ply");
+  EXPECT_EQ(scene.format, "compressed ply");
+  EXPECT_EQ(scene.report.read, 90854u);
+  EXPECT_EQ(scene.cloud.sh_degree, 0);
+  expect_sound(scene);
+}
+
+TEST_F(SharedScenes, StreamedSogLevels) {
+  const std::array<std::size_t, 7> counts = {500000, 250000, 125000, 31000, 8406, 3000, 1873};
+  for (int level = 0; level < 7; ++level) {
+    LoadOptions options;
+    options.lod = level;
+    const Scene scene = load_scene(scenes_ / "playbot", options);
+    EXPECT_EQ(scene.report.read, counts[static_cast<std::size_t>(level)]) << "level " << level;
+    EXPECT_EQ(scene.cloud.sh_degree, 2);
+    expect_sound(scene);
+  }
+  EXPECT_EQ(load_scene(scenes_ / "playbot").report.read, 500000u);
+  EXPECT_EQ(load_scene(scenes_ / "playbot" / "lod-meta.json").report.read, 500000u);
+  EXPECT_EQ(load_scene(scenes_ / "playbot" / "3_0").report.read, 31000u);
+}
+
+TEST_F(SharedScenes, StreamedSogBudgets) {
+  const std::array<std::tuple<std::size_t, std::size_t>, 4> cases = {
+      {{1873, 1873}, {18000, 8406}, {20000, 19632}, {1000000, 500000}}};
+  for (const auto& [budget, loaded] : cases) {
+    LoadOptions options;
+    options.gaussian_budget = budget;
+    EXPECT_EQ(load_scene(scenes_ / "playbot", options).report.read, loaded);
+  }
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,81 @@
+#include "render_core/scene/formats/compressed_ply.h"
+
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+GaussianCloud parse(const std::string& bytes) {
+  const MemorySource file("scene.ply", bytes_of(bytes));
+  const PlyHeader header = read_ply_header(file);
+  EXPECT_TRUE(is_compressed_ply(header));
+  return read_compressed_ply(file, header, two_threads());
+}
+
+std::string replaced(std::string bytes, const std::string& from, const std::string& to) {
+  return bytes.replace(bytes.find(from), from.size(), to);
+}
+
+struct Case {
+  int sh_degree;
+  bool colour_limits;
+};
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << "sh " << c.sh_degree << (c.colour_limits ? ", limits" : ", no limits");
+}
+
+class CompressedPly : public ::testing::TestWithParam<Case> {};
+
+TEST_P(CompressedPly, IsRead) {
+  GaussianCloud cloud = random_cloud(10000, GetParam().sh_degree);  // the last chunk is not full
+  if (!GetParam().colour_limits)
+    for (glm::vec3& sh : cloud.sh) sh = glm::clamp(sh, -1.77f, 1.77f);  // colours in [0, 1]
+  // Half a step of what chunks of means within ±13, log scales within -4 ± 5 and constant SH
+  // within ±1.5 can span; the sh bytes have steps of 1/32 and stand for their middles.
+  const Tolerance tolerance = {.mean = 0.0127f,
+                               .log_scale = 0.0049f,
+                               .rotation_rad = smallest_three_angle(0.5f * 1.41422f / 1023),
+                               .opacity = 0.00197f,
+                               .sh0 = GetParam().colour_limits ? 0.0059f : 0.00696f,
+                               .sh1 = 0.0157f,
+                               .sh_rest = 0.0157f};
+  expect_near(cloud, parse(encode_compressed_ply(cloud, GetParam().colour_limits)), tolerance);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ply, CompressedPly,
+                         ::testing::Values(Case{0, false}, Case{0, true}, Case{1, true},
+                                           Case{2, true}, Case{3, true}));
+
+TEST(CompressedPlyErrors, NameElementAndProperty) {
+  const std::string bytes = encode_compressed_ply(random_cloud(300, 1), true);
+  EXPECT_THAT(
+      input_error([&] { parse(replaced(bytes, "float min_scale_y", "float min_scale_q")); }),
+      HasSubstr("element chunk property min_scale_y"));
+  EXPECT_THAT(
+      input_error([&] { parse(replaced(bytes, "uint packed_scale", "float packed_scale")); }),
+      HasSubstr("element vertex property packed_scale"));
+  EXPECT_THAT(input_error([&] { parse(replaced(bytes, "chunk 2", "chunk 1")); }),
+              HasSubstr("element chunk"));
+  EXPECT_THAT(input_error([&] { parse(replaced(bytes, "sh 300", "sh 299")); }),
+              HasSubstr("element sh"));
+  EXPECT_THAT(input_error([&] { parse(replaced(bytes, "vertex 300", "vertex 400")); }),
+              HasSubstr("the file ends here"));
+  EXPECT_THAT(input_error([&] { parse(replaced(bytes, "little", "big")); }),
+              HasSubstr("binary_little_endian"));
+  EXPECT_THAT(
+      input_error([&] { parse(replaced(bytes, "vertex 300", "vertex 18446744073709551615")); }),
+      HasSubstr("element vertex"));
+}
+
+TEST(CompressedPlyErrors, CutOffFilesAreRefusedAtEveryLength) {
+  const std::string bytes = encode_compressed_ply(random_cloud(20, 1), true);
+  for (std::size_t length = bytes.find("end_header") + 11; length < bytes.size(); ++length)
+    EXPECT_THAT(input_error([&] { parse(bytes.substr(0, length)); }), HasSubstr("scene.ply"))
+        << "cut at byte " << length;
+}
+
+}  // namespace
+}  // namespace catgs::test

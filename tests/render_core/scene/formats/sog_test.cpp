@@ -1,0 +1,232 @@
+#include "render_core/scene/formats/sog.h"
+
+#include <atomic>
+#include <memory>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+using Files = std::map<std::string, std::string>;
+
+SogFile parse(const std::string& archive) {
+  return read_sog(ZipFiles(MemorySource("scene.sog", bytes_of(archive))), "meta.json",
+                  two_threads());
+}
+
+Files with_meta(Files files, const std::function<void(nlohmann::json&)>& change) {
+  auto meta = nlohmann::json::parse(files.at("meta.json"));
+  change(meta);
+  files["meta.json"] = meta.dump();
+  return files;
+}
+
+/// Steps of 1/65535 of the logarithmic means and of 1/255 of everything else, over the ranges of
+/// random_cloud: means ±13, log scales -4 ± 5, SH ±1.5 and ±1.2.
+Tolerance steps(int version) {
+  return {.mean = 0.0006f,
+          .log_scale = 0.0196f,
+          .rotation_rad = smallest_three_angle(0.5f * 1.41422f / 255),
+          .opacity = version == 1 ? 0.0046f : 0.00197f,
+          .sh0 = 0.0060f,
+          .sh1 = 0.0048f,
+          .sh_rest = 0.0048f};
+}
+
+struct Case {
+  int version, sh_degree;
+};
+
+class SogVersions : public ::testing::TestWithParam<Case> {};
+
+TEST_P(SogVersions, AreReadFromArchivesAndFolders) {
+  const auto [version, degree] = GetParam();
+  const GaussianCloud cloud = random_cloud(5001, degree);
+  const Files files = encode_sog(cloud, version);
+  for (const bool deflated : {false, true}) {
+    const SogFile sog = parse(zip(files, deflated));
+    EXPECT_EQ(sog.version, version);
+    expect_near(cloud, sog.cloud, steps(version));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sog, SogVersions,
+                         ::testing::Values(Case{1, 0}, Case{1, 1}, Case{1, 2}, Case{1, 3},
+                                           Case{2, 0}, Case{2, 1}, Case{2, 2}, Case{2, 3}));
+
+class SogFolder : public FolderTest {};
+
+TEST_F(SogFolder, FilesAreFoundBesideTheMetaData) {
+  const GaussianCloud cloud = random_cloud(100, 1);
+  for (const auto& [name, content] : encode_sog(cloud, 2)) write("part/" + name, content);
+  const SogFile sog = read_sog(FolderFiles(folder_.path()), "part/meta.json", two_threads());
+  expect_near(cloud, sog.cloud, steps(2));
+}
+
+TEST_F(SogFolder, NamesCannotLeadOut) {
+  const Files files = encode_sog(random_cloud(100, 0), 2);
+  for (const auto& [name, content] : files) write(name, content);
+  const auto error_with = [&](const std::string& quats) {
+    const auto name_it = [&](nlohmann::json& meta) { meta["quats"]["files"][0] = quats; };
+    write("meta.json", with_meta(files, name_it).at("meta.json"));
+    return input_error([&] { read_sog(FolderFiles(folder_.path()), "meta.json", two_threads()); });
+  };
+  EXPECT_THAT(error_with("../quats.webp"), HasSubstr("leads out of the folder"));
+  EXPECT_THAT(error_with(std::string("quats.webp\0001", 12)),
+              HasSubstr("file name 'quats.webp\\x001': has a zero byte"));
+}
+
+TEST(Sog, RangesAreDecodedToTheirPlaces) {
+  const GaussianCloud cloud = random_cloud(1000, 1);
+  const std::string archive = zip(encode_sog(cloud, 2));
+  const MemorySource source("scene.sog", bytes_of(archive));
+  const ZipFiles files(source);
+  const SogMeta meta = read_sog_meta(files, "meta.json");
+  GaussianCloud read;
+  read.resize(30, 2);  // degree 2: the SOG's coefficients of degree 1 go before zeros
+  const std::array ranges = {SogRange{500, 10, 20}, SogRange{0, 20, 0}};
+  decode_sog(files, meta, ranges, read, two_threads());
+  for (std::size_t i = 0; i < 30; ++i) {
+    const std::size_t from = i < 20 ? i : 480 + i;
+    EXPECT_LT(glm::distance(read.mean[i], cloud.mean[from]), 0.001f);
+    EXPECT_LT(glm::distance(read.sh_of(i)[3], cloud.sh_of(from)[3]), 0.01f);
+    EXPECT_EQ(read.sh_of(i)[4], glm::vec3(0.0f));
+  }
+}
+
+TEST(Sog, AMissingFirstCodebookValueIsContinued) {
+  const GaussianCloud cloud = random_cloud(500, 1);
+  const Files files = with_meta(encode_sog(cloud, 2), [](nlohmann::json& meta) {
+    for (const char* attribute : {"scales", "sh0", "shN"}) meta[attribute]["codebook"][0] = nullptr;
+  });
+  expect_near(cloud, parse(zip(files)).cloud, steps(2));
+}
+
+TEST(Sog, ErrorsNameTheField) {
+  const Files files = encode_sog(random_cloud(300, 1), 2);
+  const auto error = [&](const std::function<void(nlohmann::json&)>& change) {
+    return input_error([&] { parse(zip(with_meta(files, change))); });
+  };
+  using Json = nlohmann::json;
+  EXPECT_THAT(error([](Json& m) { m["version"] = 3; }),
+              HasSubstr("scene.sog/meta.json: version: is not supported"));
+  EXPECT_THAT(error([](Json& m) { m.erase("count"); }), HasSubstr("'count' is missing"));
+  EXPECT_THAT(error([](Json& m) { m["count"] = -4; }), HasSubstr("count: is not a count"));
+  EXPECT_THAT(error([](Json& m) { m["means"]["mins"] = {1, 2}; }), HasSubstr("means.mins"));
+  EXPECT_THAT(error([](Json& m) { m["means"]["maxs"][1] = "a"; }), HasSubstr("means.maxs[1]"));
+  EXPECT_THAT(error([](Json& m) { m["scales"]["codebook"].erase(3); }),
+              HasSubstr("scales.codebook"));
+  EXPECT_THAT(error([](Json& m) { m["sh0"]["files"] = Json::array(); }), HasSubstr("sh0.files"));
+  EXPECT_THAT(error([](Json& m) { m["shN"]["bands"] = 4; }), HasSubstr("shN.bands"));
+  EXPECT_THAT(error([](Json& m) { m["shN"]["bands"] = 2; }), HasSubstr("shN_centroids.webp"));
+  EXPECT_THAT(error([](Json& m) { m["quats"]["files"][0] = "nowhere.webp"; }),
+              HasSubstr("entry nowhere.webp: is missing"));
+}
+
+TEST(Sog, LyingSizesAreRefusedBeforeMemoryIsTaken) {
+  Files files = encode_sog(random_cloud(300, 0), 2);
+  for (const std::uint64_t count :
+       {std::uint64_t{0}, std::uint64_t{1000}, std::uint64_t{200'000'000}, ~std::uint64_t{0}})
+    input_error([&] {
+      parse(zip(with_meta(files, [&](nlohmann::json& meta) { meta["count"] = count; })));
+    });
+  // A picture of one colour is a few bytes however large it is.
+  const std::string bomb = encode_webp(std::string(4 * 4096 * 2048, '\0'), 4096, 2048);
+  for (auto& [name, content] : files)
+    if (name != "meta.json") content = bomb;
+  EXPECT_THAT(input_error([&] { parse(zip(files)); }), HasSubstr("4096x2048 texels"));
+  EXPECT_THAT(input_error([&] {
+                parse(zip(with_meta(files, [](nlohmann::json& m) { m["count"] = 8'000'000; })));
+              }),
+              HasSubstr("cannot be in"));
+}
+
+TEST(Sog, ArchivesThatGrowAreRefused) {
+  const Files bomb = {{"meta.json", std::string(4 << 20, ' ')}};
+  EXPECT_THAT(input_error([&] { parse(zip(bomb, true)); }),
+              HasSubstr("entry meta.json: unpacks to more than a scene can hold"));
+  for (std::size_t bytes = (1 << 20) + 4096; bytes < (1 << 20) + 8192; bytes += 256) {
+    const std::string archive = zip({{"spaces", std::string(bytes, ' ')}}, true);
+    const MemorySource file("scene.sog", bytes_of(archive));
+    if (bytes <= 4 * archive.size() + 1'048'576)
+      EXPECT_NO_THROW(ZipFiles{file}) << bytes;
+    else
+      input_error([&] { ZipFiles{file}; });
+  }
+  Files many;
+  for (int i = 0; i < 4096; ++i) many[std::to_string(i)] = "";
+  EXPECT_THAT(input_error([&] { parse(zip(many)); }), HasSubstr("entry meta.json: is missing"));
+  many["4096"] = "";
+  EXPECT_THAT(input_error([&] { parse(zip(many)); }), HasSubstr("more than 4096 entries"));
+}
+
+TEST(Sog, ImagesHaveATexelPerGaussianAndNotManyMore) {
+  const Files files = encode_sog(random_cloud(300, 0), 2);
+  const auto parse_with = [&](std::size_t width, std::size_t height) {
+    Files with = files;
+    const std::string image = encode_webp(std::string(4 * width * height, '\0'),
+                                          static_cast<int>(width), static_cast<int>(height));
+    for (auto& [name, content] : with)
+      if (name != "meta.json") content = image;
+    return parse(zip(with));
+  };
+  EXPECT_NO_THROW(parse_with(300, 1));
+  EXPECT_THAT(input_error([&] { parse_with(299, 1); }), HasSubstr("299x1 texels"));
+  EXPECT_NO_THROW(parse_with(56, 1181)) << "2 x 300 + 65,536";
+  EXPECT_THAT(input_error([&] { parse_with(438, 151); }), HasSubstr("438x151 texels"));
+}
+
+/// A folder whose images become smaller once their sizes have been looked at.
+class ShrinkingFolder final : public FileSet {
+ public:
+  ShrinkingFolder(Files files, std::string name, std::string then)
+      : files_(std::move(files)), name_(std::move(name)), then_(std::move(then)) {}
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
+    const bool replaced = name == name_ && opened_.exchange(true);
+    return std::make_unique<MemorySource>(name, bytes_of(replaced ? then_ : files_.at(name)));
+  }
+
+ private:
+  const Files files_;
+  const std::string name_, then_;
+  mutable std::atomic<bool> opened_{false};
+};
+
+TEST(Sog, ImagesReplacedWhileTheyAreReadAreRefused) {
+  const Files files = encode_sog(random_cloud(300, 1), 2);
+  const std::string small = encode_webp(std::string(4 * 4, '\0'), 2, 2);
+  for (const auto& [name, content] : files) {
+    if (name == "meta.json") continue;
+    const ShrinkingFolder folder(files, name, small);
+    EXPECT_THAT(input_error([&] { read_sog(folder, "meta.json", two_threads()); }),
+                HasSubstr(name + ": size: the image was replaced"));
+  }
+}
+
+TEST(Sog, DamagedFilesAreRefused) {
+  const Files files = encode_sog(random_cloud(300, 1), 2);
+  for (const auto& [name, content] : files) {
+    Files cut = files;
+    cut[name] = content.substr(0, content.size() / 2);
+    EXPECT_THAT(input_error([&] { parse(zip(cut)); }), HasSubstr("scene.sog")) << name;
+    cut[name] = "garbage";
+    EXPECT_THAT(input_error([&] { parse(zip(cut)); }), HasSubstr(name)) << name;
+  }
+  Files lossy = files;
+  lossy["quats.webp"] = encode_webp(std::string(4 * 20 * 16, 'q'), 20, 16, false);
+  EXPECT_THAT(input_error([&] { parse(zip(lossy)); }),
+              AllOf(HasSubstr("quats.webp"), HasSubstr("lossless")));
+  const std::string archive = zip(files);
+  for (const std::size_t length : {4, 100, 5000})
+    EXPECT_THAT(input_error([&] { parse(archive.substr(0, length)); }), HasSubstr("scene.sog"));
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,163 @@
+#include "render_core/scene/formats/spz.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "render_core/scene/formats/format_limits.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+SpzFile parse(const std::string& bytes) {
+  return read_spz(MemorySource("scene.spz", bytes_of(bytes)), two_threads());
+}
+
+/// Values inside the ranges that the format holds.
+GaussianCloud storable_cloud(std::size_t count, int sh_degree) {
+  GaussianCloud cloud = random_cloud(count, sh_degree);
+  for (glm::vec3& sh : cloud.sh) sh = glm::clamp(sh, -0.99f, 0.99f);
+  return cloud;
+}
+
+// Half a step each: scales 1/16, opacities 1/255, constant SH 1/(0.15 * 255), SH 1/128.
+constexpr Tolerance byte_steps = {.mean = 0.000123f,
+                                  .log_scale = 0.03126f,
+                                  .rotation_rad = smallest_three_angle(0.5f * 0.70711f / 511),
+                                  .opacity = 0.00197f,
+                                  .sh0 = 0.01308f,
+                                  .sh1 = 0.00391f,
+                                  .sh_rest = 0.00391f};
+
+struct Case {
+  int version, sh_degree;
+};
+
+class SpzVersions : public ::testing::TestWithParam<Case> {};
+
+TEST_P(SpzVersions, AreReadAndTurnedToRightDownFront) {
+  const GaussianCloud cloud = storable_cloud(5000, GetParam().sh_degree);
+  const SpzFile spz = parse(encode_spz(cloud, {.version = GetParam().version}));
+  EXPECT_EQ(spz.version, GetParam().version);
+  Tolerance tolerance = byte_steps;
+  // Version 1 has half floats: 11 bits of at most 16; below 3, w follows from three bytes and is
+  // worst where it is small.
+  if (GetParam().version == 1) tolerance.mean = 0.004f;
+  if (GetParam().version < 3) tolerance.rotation_rad = 0.25f;
+  expect_near(cloud, spz.cloud, tolerance);
+}
+
+INSTANTIATE_TEST_SUITE_P(Spz, SpzVersions,
+                         ::testing::Values(Case{1, 0}, Case{1, 3}, Case{2, 0}, Case{2, 1},
+                                           Case{2, 3}, Case{3, 0}, Case{3, 1}, Case{3, 2},
+                                           Case{3, 3}, Case{4, 0}, Case{4, 2}, Case{4, 3}));
+
+class SpzDegrees : public ::testing::TestWithParam<int> {};
+
+TEST_P(SpzDegrees, RoundTripErrorsAreThoseStated) {
+  const GaussianCloud cloud = storable_cloud(20000, GetParam());
+  std::ostringstream out;
+  write_spz(cloud, out);
+  const SpzFile spz = parse(out.str());
+  EXPECT_EQ(spz.version, 3);
+  Tolerance tolerance = byte_steps;
+  tolerance.mean = std::ldexp(1.0f, -17);
+  tolerance.sh1 = 1.0f / 32 + 1e-6f;
+  tolerance.sh_rest = 1.0f / 16 + 1e-6f;
+  expect_near(cloud, spz.cloud, tolerance);
+}
+
+INSTANTIATE_TEST_SUITE_P(Spz, SpzDegrees, ::testing::Values(0, 1, 2, 3));
+
+TEST(Spz, LargeScenesKeepTheirExtentWithFewerFractionalBits) {
+  GaussianCloud cloud = random_cloud(1000, 0);
+  cloud.mean[7] = glm::vec3(100000.0f, -1.0f, 5.0f);
+  std::ostringstream out;
+  write_spz(cloud, out);
+  const GaussianCloud read = parse(out.str()).cloud;
+  EXPECT_NEAR(read.mean[7].x, 100000.0f, 1.0f / 128);
+  cloud.mean[7].x = 1e7f;
+  EXPECT_THAT(input_error([&] { write_spz(cloud, out); }), HasSubstr("does not fit"));
+}
+
+TEST(Spz, TheAxesExtensionIsObeyed) {
+  const GaussianCloud cloud = storable_cloud(300, 3);
+  for (const int version : {3, 4}) {
+    SpzStyle style{.version = version, .coordinate_system = 6};  // right, down, front
+    expect_near(cloud, parse(encode_spz(cloud, style)).cloud, byte_steps);
+    style.coordinate_system = 5;  // left, down, front: x turned around
+    const GaussianCloud turned = parse(encode_spz(cloud, style)).cloud;
+    EXPECT_NEAR(turned.mean[0].x, -cloud.mean[0].x, 0.001f);
+    EXPECT_NEAR(turned.mean[0].y, cloud.mean[0].y, 0.001f);
+    style.coordinate_system = 9;  // left, front, down
+    EXPECT_THAT(input_error([&] { parse(encode_spz(cloud, style)); }),
+                HasSubstr("coordinate system 9"));
+  }
+}
+
+TEST(Spz, ShOfDegreeFourIsCutToThree) {
+  const GaussianCloud cloud = storable_cloud(300, 3);
+  for (const int version : {3, 4})
+    expect_near(cloud, parse(encode_spz(cloud, {.version = version, .extra_sh_degree = 4})).cloud,
+                byte_steps);
+}
+
+TEST(Spz, CutOffFilesAreRefusedAtEveryLength) {
+  const GaussianCloud cloud = storable_cloud(20, 1);
+  for (const int version : {2, 4}) {
+    const std::string bytes = encode_spz(cloud, {.version = version});
+    for (std::size_t length = 2; length < bytes.size() - 8; ++length)  // gzip ends with a checksum
+      EXPECT_THAT(input_error([&] { parse(bytes.substr(0, length)); }), HasSubstr("scene.spz"))
+          << "version " << version << " cut at byte " << length;
+  }
+}
+
+TEST(Spz, LyingHeadersAreRefusedBeforeMemoryIsTaken) {
+  const GaussianCloud cloud = storable_cloud(20, 0);
+  const auto with = [&](int version, std::size_t at, const std::string& bytes) {
+    std::string spz = encode_spz(cloud, {.version = 4});
+    spz[4] = static_cast<char>(version);
+    spz.replace(at, bytes.size(), bytes);
+    return version < 4 ? gzip(spz) : spz;
+  };
+  EXPECT_THAT(input_error([&] { parse(with(4, 8, "\xff\xff\xff\x0f")); }),
+              AllOf(HasSubstr("numPoints"), HasSubstr("compressed bytes")));
+  EXPECT_THAT(input_error([&] { parse(with(3, 8, "\xff\xff\xff\x0f")); }), HasSubstr("numPoints"));
+  EXPECT_THAT(input_error([&] { parse(with(3, 8, "\xff\xff\xff\xff")); }), HasSubstr("numPoints"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 8, std::string("\x15\0\0\0", 4))); }),
+              HasSubstr("size of the positions stream"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 12, "\x05")); }), HasSubstr("shDegree"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 13, "\x20")); }), HasSubstr("fractionalBits"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 15, "\x07")); }), HasSubstr("numStreams"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 16, "\xff\xff\xff\x7f")); }),
+              HasSubstr("tocByteOffset"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 32, "\xff\xff\xff\xff\xff\xff")); }),
+              HasSubstr("size of the positions stream"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 0, "NGSX")); }), HasSubstr("magic"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 4, "\x09")); }), HasSubstr("version: 9"));
+  EXPECT_THAT(input_error([&] { parse(with(4, 4, "\x03")); }), HasSubstr("version"));
+}
+
+TEST(Spz, HarmonicsCountInWhatAHeaderCanClaim) {
+  // 65 bytes each: a claim that 20 bytes each would still allow.
+  std::string spz = encode_spz(storable_cloud(2000, 3), {.version = 4});
+  const auto claimed = static_cast<std::uint32_t>(spz.size() * max_compression / 40);
+  ASSERT_GT(claimed, 1u << 16);
+  std::memcpy(spz.data() + 8, &claimed, sizeof claimed);
+  EXPECT_THAT(input_error([&] { parse(spz); }),
+              AllOf(HasSubstr("numPoints"), HasSubstr("compressed bytes")));
+}
+
+TEST(Spz, DamagedStreamsNameTheByte) {
+  std::string spz = encode_spz(storable_cloud(2000, 1), {.version = 3});
+  for (std::size_t at = 200; at < 260; ++at) spz[at] = static_cast<char>(~spz[at]);
+  EXPECT_THAT(input_error([&] { parse(spz); }), HasSubstr("scene.spz: byte"));
+}
+
+}  // namespace
+}  // namespace catgs::test

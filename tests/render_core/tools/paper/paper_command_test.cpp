@@ -1,0 +1,449 @@
+// catgs-render paper on small scenes: rows and columns of each table, and values that follow from
+// what the pipelines are.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/image/png.h"
+#include "render_core/motion/trajectory.h"
+#include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/tools/run_catgs_render.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_scenes.h"
+
+namespace catgs {
+namespace {
+
+using test::Outcome;
+using test::run;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using Json = nlohmann::ordered_json;
+
+/// A camera that glides sideways past random Gaussians at 120 Hz.
+Trajectory glide(std::size_t frames) {
+  Trajectory path;
+  for (std::size_t i = 0; i < frames; ++i) {
+    const auto time = static_cast<std::int64_t>(i) * 1'000'000 / 120;
+    path.push_back({time, {glm::vec3(0.004f * static_cast<float>(i), 0, 0), {1, 0, 0, 0}}});
+  }
+  return path;
+}
+
+class Paper : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    save_scene(test::random_cloud(2000, 1, 7), folder_ / "cloud.ply");
+    save_scene(test::random_cloud(500, 0, 8), folder_ / "mist.ply");
+    write_tum(folder_ / "glide.tum", glide(40));
+  }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  Outcome paper(const std::string& arguments) const {
+    return run(fmt::format("--quiet paper --size 96x64 --near 0.2 --renderer cpu {}", arguments));
+  }
+  std::string cloud_case() const {
+    return fmt::format("--case {} {}", path("cloud.ply"), path("glide.tum"));
+  }
+  std::string both_cases() const {
+    return fmt::format("{} --case {} {}", cloud_case(), path("mist.ply"), path("glide.tum"));
+  }
+
+  /// The tables as JSON; both scenes.
+  Json tables(const std::string& name, const std::string& more = {}) const {
+    const Outcome outcome =
+        paper(fmt::format("--table {} {} {} --json -", name, both_cases(), more));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+    return Json::parse(outcome.out).at("tables").at(name);
+  }
+
+  static std::vector<std::string> names(const Json& object) {
+    std::vector<std::string> names;
+    for (const auto& [name, value] : object.items()) names.push_back(name);
+    return names;
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(Paper, FpsHasAColumnPerScene) {
+  std::ofstream(path("flash.json")) << R"({"FlashGS": {"cloud": 123.5}, "Slow": {"cloud": 2}})";
+  const Json rows = tables("fps", "--baseline " + path("flash.json")).at(0).at("rows");
+  EXPECT_THAT(names(rows), ElementsAre("Model size", "3DGS", "FlashGS", "Slow", "Exact", "Ours-w/o",
+                                       "Ours", "Ours over 3DGS", "Ours over the best of these"));
+  for (const auto& [name, row] : rows.items())
+    EXPECT_THAT(names(row), ElementsAre("cloud", "mist"));
+  EXPECT_EQ(rows.at("Model size").at("mist"), 500);
+  EXPECT_EQ(rows.at("FlashGS").at("cloud"), 123.5);
+  EXPECT_TRUE(rows.at("FlashGS").at("mist").is_null());
+  const Json& lead = rows.at("Ours over the best of these");
+  EXPECT_DOUBLE_EQ(lead.at("cloud").get<double>(),
+                   rows.at("Ours").at("cloud").get<double>() / 123.5);
+  EXPECT_TRUE(lead.at("mist").is_null());
+  EXPECT_DOUBLE_EQ(
+      rows.at("Ours over 3DGS").at("cloud").get<double>(),
+      rows.at("Ours").at("cloud").get<double>() / rows.at("3DGS").at("cloud").get<double>());
+}
+
+TEST_F(Paper, PrintsMarkdownAndWritesJson) {
+  const Outcome outcome =
+      paper(fmt::format("--table list,ablation {} --json {}", both_cases(), path("tables.json")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, StartsWith("## Impact of the major mechanisms\n\n"
+                                      "| Average FPS | cloud | mist |\n|---|---:|---:|\n"
+                                      "| Ours-Full | "));
+  EXPECT_THAT(outcome.out, HasSubstr("| List length (10³) | cloud | mist |\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("\n96x64, focal length "));
+  std::ifstream file(path("tables.json"));
+  const Json json = Json::parse(file);
+  EXPECT_THAT(names(json.at("tables")), ElementsAre("ablation", "list"));
+  EXPECT_EQ(json.at("cases").at(0).at("gaussians"), 2000);
+  EXPECT_EQ(json.at("settings").at("size_px"), (Json{96, 64}));
+  EXPECT_TRUE(json.at("settings").at("seed").is_null());
+}
+
+TEST_F(Paper, TheReportHoldsTheScriptsSeedAndDuration) {
+  const Outcome outcome =
+      paper(fmt::format("--table list {} head --seed 3 --duration 0.1 --json -", cloud_case()));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Json settings = Json::parse(outcome.out).at("settings");
+  EXPECT_EQ(settings.at("seed"), 3);
+  EXPECT_EQ(settings.at("duration_s"), 0.1);
+  EXPECT_EQ(settings.at("warmup"), 10);
+}
+
+TEST_F(Paper, OptionsOfScriptsAreRefusedWithoutOne) {
+  const Outcome outcome = paper(fmt::format("--table list {} --seed 3", cloud_case()));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, HasSubstr("--seed: means nothing to a recorded trace"));
+}
+
+TEST_F(Paper, OptionsThatWouldChangeNothingAreRefused) {
+  const auto complaint = [&](const std::string& arguments) {
+    const Outcome outcome = paper(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.out;
+  };
+  for (const char* option :
+       {"--baseline x", "--images x", "--keep-fraction 1", "--variant '--window 2'", "--every 2",
+        "--images x --image-rate 5", "--dram-bytes-per-s 1"}) {
+    EXPECT_THAT(complaint(fmt::format("--table list {} {}", cloud_case(), option)),
+                HasSubstr("means nothing to the tables that were asked for (it is of --table"))
+        << option;
+  }
+  EXPECT_THAT(complaint(fmt::format("--table quality {} --image-rate 5", cloud_case())),
+              HasSubstr("--image-rate requires --images"));
+  EXPECT_THAT(complaint(fmt::format("--table list {} --warmup 41", cloud_case())),
+              HasSubstr("--warmup: 41 frames of a path of 40"));
+}
+
+TEST_F(Paper, TheGuardIsOfTheRowsThatHaveOne) {
+  const Outcome outcome = paper(fmt::format("--table ablation {} --guard-px 1", cloud_case()));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Outcome refused =
+      paper(fmt::format("--table ablation {} --variant '--grid shift --guard-px 1'", cloud_case()));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.out, HasSubstr("--guard-px: means nothing to the shift grid"));
+}
+
+TEST_F(Paper, AblationTakesOnePartAwayAtATime) {
+  const Json ablation =
+      tables("ablation", "--window 6 --variant '--window 2' --variant '--order key --no-split'");
+  ASSERT_EQ(ablation.size(), 3u);  // both scenes, then each
+  const Json& fps = ablation.at(0).at("rows");
+  EXPECT_THAT(
+      names(fps),
+      ElementsAre("Ours-Full", "Ours-w/o cache", "Ours-w/o split", "Ours-w/o grid that turns",
+                  "Ours-w/o grid that moves", "Ours-w/o colour cache", "Ours-w/o fresh order",
+                  "Ours-w/o doubt", "Ours --window 2", "Ours --order key --no-split"));
+  EXPECT_THAT(names(fps.at("Ours-Full")), ElementsAre("cloud", "mist"));
+  const Json& rows = ablation.at(1).at("rows");
+  EXPECT_EQ(ablation.at(1).at("title"), "cloud");
+  EXPECT_EQ(rows.at("Ours-Full").at("Average FPS"), fps.at("Ours-Full").at("cloud"));
+  EXPECT_EQ(rows.at("Ours-Full").at("of Full"), 1.0);
+  EXPECT_EQ(rows.at("Ours-w/o cache").at("Frames per key"), 1.0);
+  EXPECT_EQ(rows.at("Ours-w/o cache").at("Keys without window"), 100.0);
+  EXPECT_TRUE(rows.at("Ours-w/o cache").at("Sub-frame ms").is_null());
+  // Of 40 frames two know no motion yet; then come groups of 7, or of 3.
+  EXPECT_DOUBLE_EQ(rows.at("Ours-Full").at("Frames per key").get<double>(), 40.0 / 8);
+  EXPECT_DOUBLE_EQ(rows.at("Ours --window 2").at("Frames per key").get<double>(), 40.0 / 15);
+  EXPECT_EQ(rows.at("Ours --order key --no-split").at("Frames per key"),
+            rows.at("Ours-Full").at("Frames per key"));
+}
+
+TEST_F(Paper, ListsGrowFromExactToTheBoxes) {
+  const Json rows = tables("list").at(0).at("rows");
+  EXPECT_THAT(names(rows),
+              ElementsAre("3DGS", "Exact", "Ours-key", "Ours-sub", "Ours-key over Exact"));
+  for (const char* scene : {"cloud", "mist"}) {
+    const double exact = rows.at("Exact").at(scene).get<double>();
+    EXPECT_GT(exact, 0.0);
+    EXPECT_LT(exact, rows.at("3DGS").at(scene).get<double>());
+    EXPECT_GT(rows.at("Ours-key over Exact").at(scene).get<double>(), 1.0);
+    EXPECT_FALSE(rows.at("Ours-sub").at(scene).is_null());
+  }
+}
+
+TEST_F(Paper, LongerWindowsHaveLongerTrailsAndLists) {
+  const Json windows = tables("window");
+  ASSERT_EQ(windows.size(), 2u);
+  EXPECT_EQ(windows.at(0).at("title"), "cloud");
+  const Json& rows = windows.at(0).at("rows");
+  const Json& growth = rows.at("Over Exact");
+  const Json& trail = rows.at("Mean trail (px)");
+  EXPECT_THAT(names(growth), ElementsAre("Exact", "None", "W-1", "W-2", "W-4", "W-8", "W-16"));
+  EXPECT_EQ(growth.at("None"), 1.0);
+  const std::vector<std::string> columns = {"W-1", "W-2", "W-4", "W-8"};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const double before = i == 0 ? 1.0 : growth.at(columns[i - 1]).get<double>();
+    EXPECT_GT(growth.at(columns[i]).get<double>(), before) << columns[i];
+    // At 0.004 units a frame a trail is proportional to the window, but for who is in the picture.
+    const double unit = trail.at("W-1").get<double>();
+    EXPECT_NEAR(trail.at(columns[i]).get<double>() / unit, 1 << i, 0.02 * (1 << i)) << columns[i];
+  }
+}
+
+TEST_F(Paper, TracesStandByThemselvesAndTogether) {
+  write_tum(folder_ / "brief.tum", glide(20));
+  const Outcome outcome = paper(
+      fmt::format("--table traces {} {} --every 2 --json -", cloud_case(), path("brief.tum")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Json table = Json::parse(outcome.out).at("tables").at("traces").at(0);
+  const Json& rows = table.at("rows");
+  EXPECT_THAT(names(rows), ElementsAre("glide", "brief", "All"));
+  const auto value = [&](const char* trace, const char* column) {
+    return rows.at(trace).at(column).get<double>();
+  };
+  EXPECT_DOUBLE_EQ(value("glide", "Frames per key"), 40.0 / 10);  // 2 keys, then groups of 5
+  EXPECT_DOUBLE_EQ(value("brief", "Frames per key"), 20.0 / 6);
+  EXPECT_DOUBLE_EQ(value("All", "Frames per key"), 60.0 / 16);
+  EXPECT_DOUBLE_EQ(value("All", "Keys without window"), 100.0 * 4 / 16);
+  EXPECT_NEAR(value("glide", "Ours over Exact"),
+              value("glide", "Ours FPS") / value("glide", "Exact FPS"), 1e-9);
+  for (const char* column : {"Worst sub dB", "Worst block dB", "0.1 % block dB"}) {
+    EXPECT_EQ(value("All", column), std::min(value("glide", column), value("brief", column)));
+  }
+  EXPECT_EQ(value("All", "Pop (1/255)"),
+            std::max(value("glide", "Pop (1/255)"), value("brief", "Pop (1/255)")));
+  EXPECT_GE(value("All", "Sub mean dB"), value("All", "Worst sub dB"));
+  EXPECT_EQ(table.at("notes").at(1), "glide: key frames by window 0: 2, 4: 8.");
+}
+
+TEST_F(Paper, ScalingComparesWithTheFirstScene) {
+  const Json tables_of = tables("scaling");
+  ASSERT_EQ(tables_of.size(), 1u);
+  const Json& rows = tables_of.at(0).at("rows");
+  const auto value = [&](const char* row, const char* scene) {
+    return rows.at(row).at(scene).get<double>();
+  };
+  EXPECT_EQ(value("Gaussians (10³)", "cloud"), 2.0);
+  EXPECT_EQ(value("Gaussians (10³)", "mist"), 0.5);
+  EXPECT_EQ(value("In view over the first", "cloud"), 1.0);
+  EXPECT_NEAR(value("In view over the first", "mist"),
+              value("In view (10³)", "mist") / value("In view (10³)", "cloud"), 1e-9);
+  for (const char* row : {"Key frame", "Sub-frame"}) {
+    EXPECT_NEAR(value(fmt::format("{} over the first", row).c_str(), "mist"),
+                value(fmt::format("{} ms", row).c_str(), "mist") /
+                    value(fmt::format("{} ms", row).c_str(), "cloud"),
+                1e-9);
+  }
+  EXPECT_NEAR(value("Scene bytes per Gaussian", "cloud") * 2e-3, value("Scene MB", "cloud"), 1e-9);
+  EXPECT_GT(value("View MB", "mist"), 0.0);
+}
+
+TEST_F(Paper, FloorHoldsTheStagesAgainstTheirWork) {
+  const Json floor = tables("floor", "--warp-instructions-per-s 1e9");
+  ASSERT_EQ(floor.size(), 2u);
+  const Json& rows = floor.at(0).at("rows");
+  EXPECT_THAT(names(rows),
+              ElementsAre("Exact project", "Exact bin", "Exact sort", "Exact blend", "Exact",
+                          "Key frame project", "Key frame bin", "Key frame sort", "Key frame blend",
+                          "Key frame", "Sub-frame project", "Sub-frame bin", "Sub-frame sort",
+                          "Sub-frame blend", "Sub-frame"));
+  const auto value = [&](const char* row, const char* column) {
+    return rows.at(row).at(column).get<double>();
+  };
+  EXPECT_GT(value("Exact blend", "Evaluations (10⁶)"), 0.0);
+  EXPECT_NEAR(value("Exact blend", "ms of evaluations"),
+              16.0 * value("Exact blend", "Evaluations (10⁶)"), 1e-9);
+  EXPECT_EQ(value("Exact blend", "Floor ms"), value("Exact blend", "ms of evaluations"));
+  EXPECT_EQ(value("Exact sort", "Floor ms"), value("Exact sort", "ms of bytes"));
+  EXPECT_LT(value("Sub-frame project", "MB"), value("Exact project", "MB"));
+  EXPECT_NEAR(value("Exact", "Measured over floor"),
+              value("Exact", "Measured ms") / value("Exact", "Floor ms"), 1e-9);
+}
+
+TEST_F(Paper, QualityAgainstExactIsBestForKeyFrames) {
+  const Json rows = tables("quality", "--every 2").at(0).at("rows");
+  EXPECT_THAT(names(rows), ElementsAre("3DGS", "Ours-key", "Ours-sub"));
+  EXPECT_THAT(names(rows.at("3DGS")), ElementsAre("cloud PSNR", "cloud SSIM", "cloud worst PSNR",
+                                                  "mist PSNR", "mist SSIM", "mist worst PSNR"));
+  const auto psnr = [&](const char* row) {
+    const Json& value = rows.at(row).at("cloud PSNR");
+    return value.is_null() ? 1e3 : value.get<double>();
+  };
+  EXPECT_GE(psnr("Ours-key"), 75.0);  // colours are kept while they hold
+  EXPECT_GE(psnr("Ours-sub"), 50.0);
+  EXPECT_LT(psnr("3DGS"), psnr("Ours-key"));
+}
+
+TEST_F(Paper, StagesAreSpeedUpsOver3dgs) {
+  const Json stages = tables("stages");
+  ASSERT_EQ(stages.size(), 3u);  // the mean, then each scene
+  EXPECT_THAT(stages.at(0).at("title").get<std::string>(), HasSubstr("2 scenes"));
+  for (const Json& table : stages) {
+    const Json& rows = table.at("rows");
+    EXPECT_THAT(names(rows), ElementsAre("3DGS", "Exact", "Ours-key", "Ours-sub"));
+    EXPECT_THAT(names(rows.at("Ours-sub")),
+                ElementsAre("Pre-processing", "Sorting", "Tile Identify", "Rasterization"));
+    EXPECT_DOUBLE_EQ(rows.at("3DGS").at("Sorting").get<double>(), 1.0);
+    EXPECT_GT(rows.at("Ours-sub").at("Rasterization").get<double>(), 0.0);
+  }
+}
+
+TEST_F(Paper, TilesAddUpToTheLists) {
+  const Json rows = tables("tiles", "--every 1").at(0).at("rows");
+  const Json lists = tables("list").at(0).at("rows");
+  EXPECT_EQ(rows.at("Tiles").at("cloud Exact"), 6 * 4);
+  EXPECT_NEAR(rows.at("Mean list").at("cloud Exact").get<double>() * 6 * 4,
+              1000.0 * lists.at("Exact").at("cloud").get<double>(), 1e-6);
+  EXPECT_NEAR(rows.at("Mean list").at("cloud 3DGS").get<double>() * 6 * 4,
+              1000.0 * lists.at("3DGS").at("cloud").get<double>(), 1e-6);
+  for (const char* column : {"cloud 3DGS", "cloud Exact", "mist 3DGS", "mist Exact"}) {
+    const auto value = [&](const char* row) { return rows.at(row).at(column).get<double>(); };
+    EXPECT_LE(value("50 % of the tiles hold at most"), value("90 %"));
+    EXPECT_LE(value("99 %"), value("Longest list"));
+    EXPECT_GE(value("Share of the busiest 10 %"), 100.0 * 3 / 24);  // 3 of 24 tiles, if all equal
+    EXPECT_LE(value("Share of the busiest 10 %"), 100.0);
+  }
+}
+
+TEST_F(Paper, PrunedKeepsTheShares) {
+  const Json rows = tables("pruned", "--keep-fraction 1,0.25").at(0).at("rows");
+  EXPECT_THAT(names(rows), ElementsAre("Size (10³)", "3DGS", "Exact", "Ours"));
+  EXPECT_THAT(names(rows.at("Ours")),
+              ElementsAre("cloud 100 %", "cloud 25 %", "mist 100 %", "mist 25 %"));
+  EXPECT_DOUBLE_EQ(rows.at("Size (10³)").at("cloud 100 %").get<double>(), 2.0);
+  EXPECT_DOUBLE_EQ(rows.at("Size (10³)").at("cloud 25 %").get<double>(), 0.5);
+}
+
+/// Photographs of the cloud made by the exact pipeline, with a COLMAP reconstruction of their
+/// cameras.
+class PaperPhotographs : public Paper {
+ protected:
+  static constexpr std::size_t photos = 6;
+
+  void SetUp() override {
+    Paper::SetUp();
+    std::filesystem::create_directories(folder_ / "photos/images");
+    std::filesystem::create_directories(folder_ / "photos/sparse/0");
+    const Outcome outcome =
+        run(fmt::format("--quiet frames {} --size 96x64 --focal-px 80 --near 0.2 --renderer cpu "
+                        "--trace {} --frames :{} --out {}",
+                        path("cloud.ply"), path("glide.tum"), photos, path("photos/images")));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+    std::ofstream(path("photos/sparse/0/cameras.txt"))
+        << "# cameras\n7 PINHOLE 96 64 80 80 48 32\n";
+    std::ofstream images(path("photos/sparse/0/images.txt"));
+    for (std::size_t i = photos; i-- > 0;) {  // in any order
+      images << fmt::format("{} 1 0 0 0 {} 0 0 7 frame_{:06}.jpg\n\n", i + 1,
+                            -0.004 * static_cast<double>(i), i);
+    }
+  }
+
+  std::string arguments() const {
+    return fmt::format("--table quality --case {} --images {} --image-rate 30 --every 1 --json -",
+                       path("cloud.ply"), path("photos"));
+  }
+};
+
+TEST_F(PaperPhotographs, AreMetByKeyFramesAndSubFrames) {
+  const Outcome outcome = paper(arguments());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  const Json table = Json::parse(outcome.out).at("tables").at("quality").at(0);
+  EXPECT_THAT(names(table.at("rows")), ElementsAre("3DGS", "Exact", "Ours-key", "Ours-sub"));
+  // Bound by the 8 bits of the photographs: uniform rounding is 58.9 dB.
+  for (const char* row : {"Exact", "Ours-key", "Ours-sub"}) {
+    EXPECT_GE(table.at("rows").at(row).at("cloud PSNR").get<double>(), 50.0) << row;
+    EXPECT_LE(table.at("rows").at(row).at("cloud PSNR").get<double>(), 65.0) << row;
+  }
+  EXPECT_THAT(table.at("notes").at(0).get<std::string>(), HasSubstr("against 6 of 6 photographs"));
+}
+
+TEST_F(PaperPhotographs, HaveToBePng) {
+  std::filesystem::remove(folder_ / "photos/images/frame_000003.png");
+  const Outcome outcome = paper(arguments());
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, HasSubstr("frame_000003.png: does not exist (photographs are read as"));
+}
+
+TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {
+  const auto expect = [](const Outcome& outcome, const std::string& message) {
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    EXPECT_THAT(outcome.out, HasSubstr(message));
+  };
+  expect(paper(cloud_case()), "--table is required");
+  expect(paper("--table fps"), "--case is required");
+  expect(paper("--table speed " + cloud_case()), "speed not in");
+  expect(paper("--table fps --case " + path("none.ply")), "none.ply: does not exist");
+  std::ofstream(path("none.ply")) << "no scene";
+  expect(paper("--table fps --case " + path("none.ply")),
+         "catgs-render: --case: none: has no trace");
+  expect(paper(fmt::format("--table quality {} --images /nofolder", cloud_case())),
+         "/nofolder: does not exist (--images takes the folder of a COLMAP reconstruction)");
+  expect(paper(fmt::format("--table fps --case {} none.tum", path("cloud.ply"))),
+         "none.tum: does not exist");
+  expect(paper(fmt::format("--table quality {} --images {} {}", cloud_case(), path(""), path(""))),
+         "--images: 2 folders for 1 scenes");
+  expect(paper(fmt::format("--table quality {} --images {}", cloud_case(), path(""))),
+         "has no COLMAP reconstruction");
+  expect(paper(fmt::format("--table pruned --keep-fraction 0 {}", cloud_case())),
+         "--keep-fraction: 0 is not in (0, 1]");
+  expect(paper(fmt::format("--table ablation {} --variant '--windows 2'", cloud_case())),
+         "--variant: --windows 2: ");
+  expect(paper(fmt::format("--table ablation {} --variant '--pipeline exact'", cloud_case())),
+         "is not of the catgs pipeline");
+  expect(paper(fmt::format("--table ablation {} --variant '--window 99'", cloud_case())),
+         "--window: is out of range");
+}
+
+TEST_F(Paper, OutputsAndBaselineAreReadBeforeAnythingIsLoaded) {
+  std::ofstream(path("none.ply")) << "no scene";
+  const std::string fps =
+      fmt::format("--table fps --case {} {} ", path("none.ply"), path("glide.tum"));
+  const auto complaint = [&](const std::string& more) {
+    const Outcome outcome = paper(fps + more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.out;
+    return outcome.out;
+  };
+  EXPECT_THAT(complaint(""), HasSubstr("none.ply: "));
+  const std::string nowhere = path("no/tables.json");
+  EXPECT_THAT(complaint("--json " + nowhere), HasSubstr(nowhere + ": cannot be written"));
+  const auto baseline = [&](const char* text) {
+    std::ofstream(path("bad.json")) << text;
+    return complaint("--baseline " + path("bad.json"));
+  };
+  EXPECT_THAT(baseline(R"({"FlashGS": {"clod": 1}})"),
+              HasSubstr("FlashGS: has none of the columns (they are called none)"));
+  EXPECT_THAT(baseline(R"({"FlashGS": {"none": "fast"}})"),
+              HasSubstr("is not a number everywhere"));
+  EXPECT_THAT(baseline("{"), HasSubstr("is not JSON"));
+
+  std::ofstream(path("tables.json")) << "old";
+  EXPECT_THAT(complaint("--json " + path("tables.json")), HasSubstr("none.ply: "));
+  std::string kept;
+  std::ifstream(path("tables.json")) >> kept;
+  EXPECT_EQ(kept, "old");
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,110 @@
+#include "render_core/tools/render/frame_sink.h"
+
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "render_core/image/host_image.h"
+#include "render_core/image/png.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using ::testing::ThrowsMessage;
+
+class FrameSinkTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<FrameSink> sink(const std::string& name, glm::ivec2 size_px = {16, 8}) const {
+    return make_frame_sink(
+        {.path = folder_ / name, .size_px = size_px, .fps = 29.97, .first_frame = 7});
+  }
+  std::string bytes_of(const std::string& name) const {
+    std::ifstream file(folder_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+FrameView grey_frame(HostImage& image, PixelFormat format, glm::ivec2 size_px) {
+  image.resize(format, size_px);
+  for (int y = 0; y < size_px.y; ++y) {
+    if (format == PixelFormat::rgb_f32) {
+      std::fill_n(image.rgb_row(y), size_px.x * 3, 0.5f);
+    } else {
+      std::fill_n(image.byte_row(0, y), size_px.x, std::uint8_t{126});
+      if (y % 2 != 0) continue;
+      std::fill_n(image.byte_row(1, y / 2), size_px.x / 2, std::uint8_t{1});
+      std::fill_n(image.byte_row(2, y / 2), size_px.x / 2, std::uint8_t{2});
+    }
+  }
+  FrameView frame;
+  frame.format = format;
+  frame.size_px = size_px;
+  frame.planes = image.planes();
+  return frame;
+}
+
+TEST_F(FrameSinkTest, AFolderGetsNumberedPictures) {
+  const auto folder = sink("new/pictures");
+  HostImage image;
+  const FrameView frame = grey_frame(image, folder->format(), {16, 8});
+  folder->write(frame);
+  folder->write(frame);
+  folder->finish();
+  EXPECT_EQ(read_png(folder_ / "new/pictures/frame_000007.png").size_px, glm::ivec2(16, 8));
+  EXPECT_NEAR(read_png(folder_ / "new/pictures/frame_000008.png").rgb[0], 0.5f, 0.003f);
+}
+
+TEST_F(FrameSinkTest, Y4mIsTaggedAndComplete) {
+  const auto video = sink("a.y4m");
+  ASSERT_EQ(video->format(), PixelFormat::i420);
+  HostImage image;
+  const FrameView frame = grey_frame(image, PixelFormat::i420, {16, 8});
+  video->write(frame);
+  video->write(frame);
+  video->finish();
+  const std::string header = "YUV4MPEG2 W16 H8 F29970:1000 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
+  const std::string picture =
+      "FRAME\n" + std::string(128, 126) + std::string(32, 1) + std::string(32, 2);
+  EXPECT_EQ(bytes_of("a.y4m"), header + picture + picture);
+}
+
+TEST_F(FrameSinkTest, Mp4IsCompleteOrRefused) {
+  std::unique_ptr<FrameSink> video;
+  try {
+    video = sink("a.mp4");
+  } catch (const InputError& error) {
+    GTEST_SKIP() << error.what();
+  }
+  HostImage image;
+  for (int i = 0; i < 5; ++i) video->write(grey_frame(image, PixelFormat::i420, {16, 8}));
+  video->finish();
+  const std::string bytes = bytes_of("a.mp4");
+  EXPECT_THAT(bytes.substr(4), StartsWith("ftyp"));
+  EXPECT_THAT(bytes, HasSubstr("avcC"));
+  EXPECT_THAT(bytes, HasSubstr("colrnclx"));
+}
+
+TEST_F(FrameSinkTest, RefusesWhatItCannotWrite) {
+  EXPECT_THAT(
+      [&] {
+        sink("a.y4m", {15, 8});
+      },
+      ThrowsMessage<InputError>(HasSubstr("a video needs even sides")));
+  EXPECT_THAT([&] { sink("a.gif"); },
+              ThrowsMessage<InputError>(HasSubstr("unknown kind of output")));
+  EXPECT_THROW(sink("no_such_folder/a.y4m"), InputError);
+  folder_.write("file", "in the way");
+  EXPECT_THROW(sink("file/pictures"), InputError);
+}
+
+}  // namespace
+}  // namespace catgs
