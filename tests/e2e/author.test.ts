@@ -1,9 +1,9 @@
 // Making a tour in the browser, and saving it to the real server.
 import { mkdirSync, readFileSync, rmSync, unlinkSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Pose } from '#client/camera/eye';
 import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import {

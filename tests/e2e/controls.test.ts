@@ -1,8 +1,8 @@
 // Each control by each input device, against a server that follows a script.
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, CDPSession, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
-import { rotate, sub, conjugate, type Vec3 } from '#client/camera/vector';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import { rotate, sub, conjugate, type Vec3 } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
 import { launch_browser, new_page, type WatchedPage } from './support/browser';
 import { pose_of, settle } from './support/camera';
 import { start_fake_server, type FakeServer } from './support/fake_server';

@@ -2,10 +2,10 @@
 // belong? The canvas is compared with what catgs-render draws for the camera of that moment.
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, beforeAll, expect, it } from 'vitest';
 import type { Browser, Page } from 'playwright-core';
-import { angle_between } from '#client/camera/flight';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, beforeAll, expect, it } from 'vitest';
+import { angle_between } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
 import { choose_full_size, launch_browser, new_page } from './support/browser';
 import { start_delay_proxy, type DelayProxy } from './support/delay_proxy';
 import { read_png, type Picture } from './support/pictures';

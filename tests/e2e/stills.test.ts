@@ -1,10 +1,10 @@
 // What the visitor sees is what catgs-render renders: through encoder, wire, decoder and canvas.
 import { readdirSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
-import { axis_angle, multiply } from '#client/camera/vector';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { axis_angle, multiply } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
 import { choose_full_size, keep_screenshot, launch_browser, new_page } from './support/browser';
 import {
   coverage,

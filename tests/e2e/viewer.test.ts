@@ -2,9 +2,9 @@
 import { execFileSync } from 'node:child_process';
 import { cpSync, mkdtempSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Pose } from '#client/camera/eye';
 import type { StatsSnapshot } from '#client/stats/metrics';
 import {
   choose_full_size,

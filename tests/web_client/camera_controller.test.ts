@@ -1,7 +1,4 @@
 import { describe, expect, it } from 'vitest';
-import { CameraController, type CameraMode, type SceneSetup } from '#client/camera/camera_controller';
-import { no_axes, type Axes } from '#client/camera/movement';
-import { same_view } from '#client/camera/same_view';
 import {
   axis_angle,
   cross,
@@ -14,7 +11,12 @@ import {
   sub,
   type Quat,
   type Vec3,
-} from '#client/camera/vector';
+} from '#client/base/vector';
+import { CameraController } from '#client/camera/camera_controller';
+import type { CameraMode } from '#client/camera/mode';
+import { no_axes, type Axes } from '#client/camera/movement';
+import { same_view } from '#client/camera/same_view';
+import type { SceneSetup } from '#client/camera/scene_setup';
 
 const scene: SceneSetup = {
   up: [0, -1, 0],

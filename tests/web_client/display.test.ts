@@ -1,9 +1,10 @@
 import { beforeEach, describe, expect, it } from 'vitest';
+import { axis_angle, identity, type Quat } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
 import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
 import type { Placing, Presenter } from '#client/present/presenter';
-import { axis_angle, identity, type Quat } from '#client/camera/vector';
-import { warped, widened_fov, type Eye } from '#client/present/warp';
+import { warped, widened_fov } from '#client/present/warp';
 
 const at = (yaw: number): Eye => {
   const orientation: Quat = yaw === 0 ? identity : axis_angle([0, -1, 0], yaw);

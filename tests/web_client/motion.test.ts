@@ -1,14 +1,23 @@
 // Ways of the camera that are known beforehand, walking, and what goes on after a gesture.
 import { describe, expect, it } from 'vitest';
-import { CameraController, type SceneSetup } from '#client/camera/camera_controller';
-import { angle_between, glide, glide_time_s } from '#client/camera/flight';
+import {
+  angle_between,
+  axis_angle,
+  identity,
+  look_at,
+  rotate,
+  slerp,
+  type Vec3,
+} from '#client/base/vector';
+import { CameraController } from '#client/camera/camera_controller';
+import type { Eye } from '#client/camera/eye';
+import { glide, glide_time_s } from '#client/camera/flight';
+import { Inertia } from '#client/camera/inertia';
 import { no_axes, sum_of, type Axes } from '#client/camera/movement';
 import { place_of, ray_through } from '#client/camera/ray';
-import { axis_angle, identity, look_at, rotate, slerp, type Vec3 } from '#client/camera/vector';
+import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
-import { Inertia } from '#client/input/inertia';
 import { DoubleTap } from '#client/input/pointers';
-import type { Eye } from '#client/present/warp';
 
 const scene: SceneSetup = {
   up: [0, -1, 0],

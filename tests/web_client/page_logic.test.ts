@@ -1,12 +1,12 @@
 // The parts of the page that decide something.
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
-import { Settling } from '#client/automation';
 import { AutoHeight } from '#client/session/auto_height';
 import { QualityChoice } from '#client/session/quality';
 import { scene_address } from '#client/session/scenes';
 import { take_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
+import { Settling } from '#client/ui/automation';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
 import { Error_Code } from '#client/wire/wire';
 import { with_texts } from '../../web_client/page_texts';

@@ -1,10 +1,10 @@
 import { create } from '@bufbuild/protobuf';
 import { describe, expect, it } from 'vitest';
+import { percentile, TimeWindow } from '#client/base/time_window';
 import type { Frame } from '#client/decode/picture';
 import { StatsHistory } from '#client/stats/history';
 import { Metrics } from '#client/stats/metrics';
 import { PoseAge } from '#client/stats/pose_age';
-import { percentile, TimeWindow } from '#client/stats/window';
 import { rest_note, row_texts, slowest_stage, stats_rows } from '#client/ui/stats_panel';
 import { FrameHeaderSchema } from '#client/wire/wire';
 

@@ -1,8 +1,7 @@
 import { describe, expect, it } from 'vitest';
-import { angle_between, type Flight } from '#client/camera/flight';
-import { identity, look_at, rotate, type Vec3 } from '#client/camera/vector';
-import type { Eye } from '#client/present/warp';
-import type { PathSample } from '#client/session/messages';
+import { angle_between, identity, look_at, rotate, type Vec3 } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
+import type { Flight, PathSample } from '#client/camera/flight';
 import { film_flight, type Film } from '#client/tour/camera_spline';
 import { read_document } from '#client/tour/load';
 import { TourPlayer, type TourState } from '#client/tour/player';

@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
-import { axis_angle, identity, multiply, type Vec3 } from '#client/camera/vector';
-import { angle_between } from '#client/camera/flight';
+import { axis_angle, identity, multiply, angle_between, type Vec3 } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
 import { place_of } from '#client/camera/ray';
-import { reach, uncovered_share, warp_matrix, warped, widened_fov, type Eye } from '#client/present/warp';
 import { TurnForecast } from '#client/present/turn_forecast';
+import { reach, uncovered_share, warp_matrix, warped, widened_fov } from '#client/present/warp';
 import { WarpPolicy } from '#client/present/warp_policy';
 
 const aspect = 16 / 9;

@@ -1,6 +1,6 @@
 // The camera of the page under test.
 import type { Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import type { Pose } from '#client/camera/eye';
 
 /** Also of a document whose script has not run yet: a link has just been followed. */
 export const settle = (page: Page): Promise<void> =>

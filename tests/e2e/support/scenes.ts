@@ -2,7 +2,7 @@
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import type { Pose } from '#client/camera/camera_controller';
+import type { Pose } from '#client/camera/eye';
 
 /** A folder of its own, and what removes it. */
 export function scratch_folder(): { folder: string; remove: () => void } {

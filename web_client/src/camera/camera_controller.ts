@@ -1,7 +1,4 @@
 // The viewer's own camera: what gestures and held keys do to a pose. Pure: no DOM, no clock.
-import type { Eye } from '../present/warp';
-import { glide, glide_time_s, type Flight } from './flight';
-import { is_held, no_axes, type Axes, type Gesture } from './movement';
 import {
   add,
   axis_angle,
@@ -20,26 +17,12 @@ import {
   unit,
   type Quat,
   type Vec3,
-} from './vector';
-
-export const camera_modes = ['orbit', 'fly', 'walk'] as const;
-export type CameraMode = (typeof camera_modes)[number];
-
-export interface Pose {
-  readonly position: Vec3;
-  readonly orientation: Quat;
-}
-
-/** What the camera needs to know of a scene. World units. */
-export interface SceneSetup {
-  readonly up: Vec3;
-  readonly start_pose: Pose;
-  readonly focus: Vec3;
-  readonly limits_min: Vec3;
-  readonly limits_max: Vec3;
-  readonly near_z: number;
-  readonly start_fov_y_rad?: number;
-}
+} from '../base/vector';
+import { limited_fov, type Eye, type Pose } from './eye';
+import { glide, glide_time_s, type Flight } from './flight';
+import type { CameraMode } from './mode';
+import { is_held, no_axes, type Axes, type Gesture } from './movement';
+import type { SceneSetup } from './scene_setup';
 
 const steepest_rad = (88 * Math.PI) / 180; // at 90 degrees "up" has no direction in the image
 const orbit_rad_per_height = Math.PI;
@@ -49,7 +32,6 @@ const fast_factor = 4;
 const speed_share = { orbit: 0.6, fly: 0.6, walk: 0.25 } as const; // of the scene's scale, a second
 const level_time_s = 0.25;
 const rest_threshold = 1e-4;
-const fov_range_rad = [0.1, 2.8] as const; // the wire's
 export const default_fov_y_rad = (60 * Math.PI) / 180;
 
 /** Movement that was asked for and not made yet. */
@@ -115,7 +97,7 @@ export class CameraController {
   }
 
   set fov_y_rad(value: number) {
-    this.fov_y_rad_ = Math.min(Math.max(value, fov_range_rad[0]), fov_range_rad[1]);
+    this.fov_y_rad_ = limited_fov(value);
   }
 
   load(scene: SceneSetup): void {

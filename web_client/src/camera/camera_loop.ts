@@ -1,7 +1,7 @@
-import type { Clock } from '../session/clock';
-import type { Inertia } from '../input/inertia';
-import type { CameraSample } from '../present/warp';
+import type { Clock } from '../base/clock';
 import type { CameraController } from './camera_controller';
+import type { CameraSample } from './eye';
+import type { Inertia } from './inertia';
 import { is_held, type Axes } from './movement';
 
 const longest_step_s = 0.1; // a page that was held up does not leap

@@ -1,11 +1,17 @@
 // Ways of the camera that are known beforehand. Pure.
-import { length, scale, add, slerp, sub, type Quat } from './vector';
-import type { Eye } from '../present/warp';
+import { add, angle_between, length, scale, slerp, sub } from '../base/vector';
+import type { Eye } from './eye';
 
 export interface Flight {
   readonly duration_s: number;
   /** `time_s` in 0…duration. */
   at(time_s: number): Eye;
+}
+
+/** Where the camera will be on its way. */
+export interface PathSample {
+  readonly time_us: number;
+  readonly eye: Eye;
 }
 
 /** 0…1, at rest at both ends, without a jerk. */
@@ -37,9 +43,4 @@ export function glide_time_s(from: Eye, to: Eye, reach: number): number {
   const turn_s = angle_between(from.orientation, to.orientation) / comfortable_rad_per_s;
   const way_s = length(sub(to.position, from.position)) / (reach * comfortable_reach_per_s);
   return Math.min(time_range_s[1], Math.max(time_range_s[0], turn_s, way_s));
-}
-
-export function angle_between(a: Quat, b: Quat): number {
-  const cosine = Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
-  return 2 * Math.acos(Math.min(1, cosine));
 }

@@ -1,7 +1,11 @@
 // Between places in the view and directions in the scene. Pure.
-import type { Eye } from '../present/warp';
-import type { Ray } from '../session/messages';
-import { conjugate, normalize, rotate, sub, forward, type Vec3 } from './vector';
+import { conjugate, normalize, rotate, sub, forward, type Vec3 } from '../base/vector';
+import type { Eye } from './eye';
+
+export interface Ray {
+  readonly origin: Vec3;
+  readonly direction: Vec3;
+}
 
 /** `x`, `y`: shares of the view's width and height, y down. */
 export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray {

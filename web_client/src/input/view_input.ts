@@ -1,6 +1,6 @@
 // Binds pointers, wheel and keyboard of the view to gestures and held keys.
+import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
-import type { Inertia } from './inertia';
 import { HeldKeys } from './keyboard';
 import { DoubleTap, Pointers, wheel_gesture, type PointerSample } from './pointers';
 

@@ -1,17 +1,10 @@
 // What the canvas shows: the newest picture, placed as the newest camera of this page sees it, at
 // the rate of the display.
+import type { CameraSample, Eye } from '../camera/eye';
 import type { Picture } from '../decode/picture';
 import type { Pixels, Placing, Presenter } from './presenter';
 import { TurnForecast } from './turn_forecast';
-import {
-  reach,
-  uncovered_share,
-  warp_matrix,
-  type CameraSample,
-  type Eye,
-  type Matrix3,
-  type Sides,
-} from './warp';
+import { reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
 import { WarpPolicy, type WarpMode } from './warp_policy';
 
 export interface DisplayEnvironment {

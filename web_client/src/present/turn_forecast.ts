@@ -1,8 +1,7 @@
 // How far the view will have turned from a picture by the time the next one takes its place. Pure.
-import { angle_between } from '../camera/flight';
-import { slerp, type Quat } from '../camera/vector';
-import { percentile, TimeWindow } from '../stats/window';
-import type { CameraSample, Eye } from './warp';
+import { percentile, TimeWindow } from '../base/time_window';
+import { angle_between, slerp, type Quat } from '../base/vector';
+import type { CameraSample, Eye } from '../camera/eye';
 
 const rate_span_us = 80_000; // a turn is measured over this long
 const lag_span_us = 10e6;

@@ -1,23 +1,6 @@
 // Shows a picture as a camera sees it that has moved on since it was rendered. Pure.
-import { conjugate, multiply, rotate, scale, sub, type Quat, type Vec3 } from '../camera/vector';
-
-/** A pinhole camera; axes x right, y down, z forward. */
-export interface Eye {
-  readonly position: Vec3;
-  readonly orientation: Quat;
-  readonly fov_y_rad: number;
-}
-
-/** The newest local camera. */
-export interface CameraSample {
-  readonly pose_id: number;
-  readonly time_us: number;
-  readonly eye: Eye;
-  /** Of what the visitor looks at, along the view axis; Infinity: unknown. World units. */
-  readonly distance: number;
-  /** The newest sample once more: nothing moves the camera. */
-  readonly at_rest?: boolean;
-}
+import { conjugate, multiply, rotate, scale, sub, type Vec3 } from '../base/vector';
+import { limited_fov, type Eye } from '../camera/eye';
 
 /** Column-major, for homogeneous coordinates (x, y, 1); x and y are -1…1 across an image, y down. */
 export type Matrix3 = Float32Array;
@@ -101,5 +84,5 @@ export function uncovered_share(m: Matrix3, columns = 64, rows = 36): number {
 
 /** Field of view whose image plane is `factor` times as large; within the wire's limits. */
 export function widened_fov(fov_y_rad: number, factor: number): number {
-  return Math.min(2.8, Math.max(0.1, 2 * Math.atan(Math.tan(fov_y_rad / 2) * factor)));
+  return limited_fov(2 * Math.atan(Math.tan(fov_y_rad / 2) * factor));
 }

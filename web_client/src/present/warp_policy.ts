@@ -1,5 +1,5 @@
 // Whether warping helps, and how much more than the view has to be rendered for it. Pure.
-import { percentile, TimeWindow } from '../stats/window';
+import { percentile, TimeWindow } from '../base/time_window';
 import { text } from '../text';
 import type { Sides } from './warp';
 

@@ -1,6 +1,6 @@
-import { add, scale, type Vec3 } from '../camera/vector';
-import type { Timers } from './clock';
-import type { Ray } from './messages';
+import type { Timers } from '../base/clock';
+import { add, scale, type Vec3 } from '../base/vector';
+import type { Ray } from '../camera/ray';
 
 const patience_ms = 2000; // the server does not answer more than a few a second
 

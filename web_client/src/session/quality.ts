@@ -1,5 +1,16 @@
 import { AutoHeight } from './auto_height';
-import type { Quality } from './messages';
+
+export interface View {
+  readonly width_px: number; // device pixels
+  readonly height_px: number;
+  readonly device_pixel_ratio: number;
+}
+
+export interface Quality {
+  readonly height_px: number; // while the camera moves; 0: the view's
+  readonly still_height_px: number; // when it rests; 0: the view's
+  readonly max_fps: number; // 0: the server's default
+}
 
 /** Lines of the picture, 0 for those of the view, or how to find them. */
 export type PictureSize = number | 'auto' | 'sharp' | 'smooth';

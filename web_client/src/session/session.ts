@@ -1,5 +1,6 @@
 // The life of a session: hello, welcome, frames, heartbeat, errors, drain, reconnect. It knows
 // neither WebSocket nor wall clock, so that tests drive it with fakes.
+import type { Clock, Timers } from '../base/clock';
 import type { OpenSocket, Socket } from '../transport/socket';
 import {
   decode_server_message,
@@ -21,7 +22,6 @@ import {
   type Error as ServerError,
 } from '../wire/wire';
 import { backoff_ms } from './backoff';
-import type { Clock, Timers } from './clock';
 import type { SessionState, WaitCause } from './state';
 
 /** What hello says, besides the things that the session itself knows. */

@@ -1,8 +1,8 @@
 // What the stats overlay, the automation surface and the tests read. Pure: fed with events.
+import { percentile, sum, TimeWindow } from '../base/time_window';
 import type { Frame } from '../decode/picture';
 import type { Stats, StreamConfig } from '../wire/wire';
 import { PoseAge } from './pose_age';
-import { percentile, sum, TimeWindow } from './window';
 
 export interface Percentiles {
   readonly p50: number;

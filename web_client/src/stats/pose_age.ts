@@ -1,4 +1,4 @@
-import { TimeWindow } from './window';
+import { TimeWindow } from '../base/time_window';
 
 const history_limit = 256;
 const most_ticks = 1000;

@@ -1,6 +1,6 @@
 // A camera film: values at times, and smooth curves in between. Pure.
+import { look_at, type Vec3 } from '../base/vector';
 import type { Flight } from '../camera/flight';
-import { look_at, type Vec3 } from '../camera/vector';
 
 /** Where a camera is, what it looks at, and its vertical field of view. */
 export interface Shot {

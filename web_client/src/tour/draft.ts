@@ -1,6 +1,6 @@
 // A tour while its author works on it, and the sidecar that comes of it. Pure.
-import type { SceneSetup } from '../camera/camera_controller';
-import type { Eye } from '../present/warp';
+import type { Eye } from '../camera/eye';
+import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
 
 export class TourDraft {

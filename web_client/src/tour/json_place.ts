@@ -1,4 +1,4 @@
-import type { Vec3 } from '../camera/vector';
+import type { Vec3 } from '../base/vector';
 
 /** A value in a document that people wrote, with its place for complaints: "tours[0].title: …". */
 export class JsonPlace {

@@ -1,5 +1,5 @@
-import type { Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import type { Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 

@@ -1,8 +1,7 @@
 // Leads a visitor through a tour. It knows no page and no clock: tests drive it with fakes.
-import { glide, glide_time_s, type Flight } from '../camera/flight';
-import type { Eye } from '../present/warp';
-import type { Timers } from '../session/clock';
-import type { PathSample } from '../session/messages';
+import type { Timers } from '../base/clock';
+import type { Eye } from '../camera/eye';
+import { glide, glide_time_s, type Flight, type PathSample } from '../camera/flight';
 import { stay_of, type Stop, type Tour } from './tour';
 
 export interface Guided {

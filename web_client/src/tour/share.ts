@@ -1,7 +1,7 @@
 // Links that lead back to a view: the fragment of the address, which no server ever sees. Pure.
-import { camera_modes, type CameraMode } from '../camera/camera_controller';
-import { unit } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import { unit } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import { camera_modes, type CameraMode } from '../camera/mode';
 
 export interface SharedView {
   readonly eye: Eye | undefined;

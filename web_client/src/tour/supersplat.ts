@@ -1,6 +1,6 @@
 // Reads the settings.json of the SuperSplat viewer, version 2: cameras, animTracks, annotations.
-import { look_at, type Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import { look_at, type Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import { film_flight, type Shot } from './camera_spline';
 import { JsonPlace } from './json_place';
 import type { Stop, Tour } from './tour';

@@ -1,7 +1,7 @@
 // Tours through a scene: stops to go to, or a way to be led along. Pure.
+import { look_at, unit, type Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
-import { look_at, unit, type Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
 import { JsonPlace } from './json_place';
 
 export interface Stop {

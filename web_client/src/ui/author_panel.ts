@@ -1,12 +1,12 @@
-import type { SceneSetup } from '../camera/camera_controller';
-import type { Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import type { Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import type { SceneSetup } from '../camera/scene_setup';
+import { text } from '../text';
 import { TourDraft } from '../tour/draft';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
-import { text } from '../text';
 
 export interface AuthorTools {
   eye(): Eye;

@@ -1,9 +1,9 @@
 // Lets the page that shows this one in a frame drive it. Which pages may is the server's decision
 // (--embed-origin): browsers refuse to load this page in anybody else's frame, so the parent window
 // is one of them.
+import { unit } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import { JsonPlace } from '../tour/json_place';
-import type { Eye } from '../present/warp';
-import { unit } from '../camera/vector';
 
 export interface EmbedTarget {
   eye(): Eye;

@@ -1,18 +1,18 @@
 // Everything that leads through a scene: tours, shared views, the page around this one.
+import { browser_timers, type Clock } from '../base/clock';
+import type { Vec3 } from '../base/vector';
 import type { CameraController } from '../camera/camera_controller';
 import type { CameraLoop } from '../camera/camera_loop';
+import type { Eye } from '../camera/eye';
 import type { GamepadAction } from '../input/gamepad';
-import type { Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
-import type { WorkerClient } from '../session/client';
-import { browser_timers, type Clock } from '../session/clock';
+import { text } from '../text';
 import { fetch_tours, read_document } from '../tour/load';
 import { TourPlayer, type TourState } from '../tour/player';
 import { read_shared, share_address } from '../tour/share';
+import type { WorkerClient } from '../worker/client';
 import { AuthorPanel } from './author_panel';
 import { EmbedApi } from './embed';
 import { SharePanel } from './share_panel';
-import { text } from '../text';
 import { TourView } from './tour_view';
 
 export interface GuideParts {

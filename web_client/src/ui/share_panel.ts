@@ -1,7 +1,7 @@
-import type { Snapshot } from '../session/messages';
-import { embed_code, frame_sites } from '../tour/share';
-import { by_id } from './dom';
 import { text as words } from '../text';
+import { embed_code, frame_sites } from '../tour/share';
+import type { Snapshot } from '../worker/messages';
+import { by_id } from './dom';
 
 export interface ShareSource {
   address(): string;

@@ -1,9 +1,9 @@
 import { StatsHistory } from '../stats/history';
 import type { StatsReport, StatsSnapshot } from '../stats/metrics';
+import { text } from '../text';
 import { by_id } from './dom';
 import { save_file } from './share_panel';
 import type { StatsCharts } from './stats_charts';
-import { text } from '../text';
 
 /** What the server said of itself, and how this page shows pictures. */
 export interface Facts {

@@ -1,9 +1,9 @@
-import type { CameraMode } from '../camera/camera_controller';
+import type { CameraMode } from '../camera/mode';
+import { is_typing } from '../input/view_input';
 import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
-import { is_typing } from '../input/view_input';
-import { by_id } from './dom';
 import { text } from '../text';
+import { by_id } from './dom';
 
 export interface ToolbarListener {
   toggle_mode(): void;

@@ -1,10 +1,10 @@
+import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
-import type { Eye } from '../present/warp';
+import { is_typing } from '../input/view_input';
+import { text } from '../text';
 import type { TourPlayer, TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import { is_typing } from '../input/view_input';
 import { by_id } from './dom';
-import { text } from '../text';
 
 /** Caption and buttons of the tour, its keys, and the hotspots in the picture. */
 export class TourView {

@@ -1,33 +1,31 @@
 // The page: puts camera, input, worker and controls together.
-import { Settling, type Automation } from '../automation';
-import {
-  camera_modes,
-  CameraController,
-  type Pose,
-} from '../camera/camera_controller';
+import { local_storage, session_storage } from '../base/browser_storage';
+import { browser_timers, clock_from } from '../base/clock';
+import type { Vec3 } from '../base/vector';
+import { CameraController } from '../camera/camera_controller';
+import { CameraLoop } from '../camera/camera_loop';
+import type { Pose } from '../camera/eye';
+import { Inertia } from '../camera/inertia';
+import { camera_modes } from '../camera/mode';
 import { is_held, sum_of, type Axes } from '../camera/movement';
 import { ray_through } from '../camera/ray';
-import type { Vec3 } from '../camera/vector';
 import { same_angle_rad, same_view } from '../camera/same_view';
-import { CameraLoop } from '../camera/camera_loop';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
-import { Inertia } from '../input/inertia';
 import { bind_view_input } from '../input/view_input';
 import type { PresenterChoice } from '../present/make_presenter';
-import { local_storage, session_storage } from '../session/browser_storage';
-import { WorkerClient } from '../session/client';
-import { browser_timers, clock_from } from '../session/clock';
-import type { FromWorker, View } from '../session/messages';
+import { scene_setup } from '../session/camera_messages';
 import { Picks } from '../session/picks';
-import { QualityChoice } from '../session/quality';
-import { scene_setup } from '../session/scene_setup';
-import type { SessionState } from '../session/state';
+import { QualityChoice, type View } from '../session/quality';
 import { list_scenes } from '../session/scenes';
+import type { SessionState } from '../session/state';
 import { remember_token, take_token } from '../session/token';
 import { text } from '../text';
 import { Error_Code, type StreamConfig, type Welcome } from '../wire/wire';
+import { WorkerClient } from '../worker/client';
+import type { FromWorker } from '../worker/messages';
+import { Settling, type Automation } from './automation';
 import type { CardView } from './card';
 import { by_id } from './dom';
 import { Guide } from './guide';

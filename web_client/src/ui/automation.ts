@@ -1,7 +1,7 @@
 // window.catgs: a small surface for tests and for pages that drive the viewer (README.md).
-import type { Pose } from './camera/camera_controller';
-import type { Snapshot } from './session/messages';
-import type { StatsSnapshot } from './stats/metrics';
+import type { Pose } from '../camera/eye';
+import type { StatsSnapshot } from '../stats/metrics';
+import type { Snapshot } from '../worker/messages';
 
 export interface Automation {
   /** Puts the camera there. Camera axes: x right, y down, z forward; quaternion x, y, z, w. */

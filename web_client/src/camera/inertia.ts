@@ -1,4 +1,4 @@
-import type { Gesture } from '../camera/movement';
+import type { Gesture } from './movement';
 
 interface Moved {
   readonly time_ms: number;

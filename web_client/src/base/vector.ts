@@ -56,6 +56,12 @@ export function rotate(q: Quat, v: Vec3): Vec3 {
 
 export const conjugate = (q: Quat): Quat => [-q[0], -q[1], -q[2], q[3]];
 
+/** Of the turn between two orientations, rad. */
+export function angle_between(a: Quat, b: Quat): number {
+  const cosine = Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+  return 2 * Math.acos(Math.min(1, cosine));
+}
+
 /** Constant angular rate from `a` (share 0) to `b` (share 1), the short way round. */
 export function slerp(a: Quat, b: Quat, share: number): Quat {
   const cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];

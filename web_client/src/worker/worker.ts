@@ -1,28 +1,20 @@
 // The worker: everything between socket and canvas, so that a busy page delays no picture.
-import type { Vec3 } from '../camera/vector';
+import { browser_timers, clock_from } from '../base/clock';
+import type { CameraSample, Eye } from '../camera/eye';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
-import {
-  available_codecs,
-  make_decoder,
-  type MadeDecoder,
-} from '../decode/make_decoder';
+import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make_decoder';
 import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
-import { widened_fov, type CameraSample, type Eye, type Sides } from '../present/warp';
+import { widened_fov, type Sides } from '../present/warp';
+import { eye_of, pose_message, wire_vector } from '../session/camera_messages';
+import type { Quality, View } from '../session/quality';
+import { Session } from '../session/session';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import {
-  Codec,
-  type FrameHeader,
-  type PoseInit,
-  type SettingsInit,
-  type StreamConfig,
-} from '../wire/wire';
-import { browser_timers, clock_from } from './clock';
-import type { FromWorker, Quality, ToWorker, View } from './messages';
-import { Session } from './session';
+import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
+import type { FromWorker, ToWorker } from './messages';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
 
@@ -298,29 +290,3 @@ function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
 
 /** Within the limits of the wire, and even: 4:2:0 video has no odd sides. */
 const frame_side = (px: number): number => Math.min(8192, Math.max(16, Math.round(px / 2) * 2));
-
-function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest = false): PoseInit {
-  const [x, y, z, w] = eye.orientation;
-  return {
-    poseId: BigInt(pose_id),
-    clientTimeUs: BigInt(Math.round(time_us)),
-    worldFromCamera: {
-      position: wire_vector(eye.position),
-      orientation: { x, y, z, w },
-    },
-    fovYRad: eye.fov_y_rad,
-    atRest: at_rest,
-  };
-}
-
-const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
-
-function eye_of(pose: FrameHeader['renderPose'], fov_y_rad: number): Eye {
-  const p = pose?.position;
-  const q = pose?.orientation;
-  return {
-    position: [p?.x ?? 0, p?.y ?? 0, p?.z ?? 0],
-    orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
-    fov_y_rad,
-  };
-}

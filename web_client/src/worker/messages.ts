@@ -1,37 +1,16 @@
 // What page and worker say to each other. Structured clones: plain data only.
-import type { Pose } from '../camera/camera_controller';
-import type { Vec3 } from '../camera/vector';
+import type { Pose, CameraSample } from '../camera/eye';
+import type { PathSample } from '../camera/flight';
+import type { Ray } from '../camera/ray';
 import type { DecoderRung } from '../decode/ladder';
-import type { PresenterChoice } from '../present/make_presenter';
 import type { ShownView } from '../present/display';
-import type { CameraSample, Eye, Sides } from '../present/warp';
+import type { PresenterChoice } from '../present/make_presenter';
+import type { Sides } from '../present/warp';
 import type { WarpMode } from '../present/warp_policy';
+import type { Quality, View } from '../session/quality';
+import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
-import type { SessionState } from './state';
-
-export interface View {
-  readonly width_px: number; // device pixels
-  readonly height_px: number;
-  readonly device_pixel_ratio: number;
-}
-
-export interface Quality {
-  readonly height_px: number; // while the camera moves; 0: the view's
-  readonly still_height_px: number; // when it rests; 0: the view's
-  readonly max_fps: number; // 0: the server's default
-}
-
-/** Where the camera of a tour will be. */
-export interface PathSample {
-  readonly time_us: number;
-  readonly eye: Eye;
-}
-
-export interface Ray {
-  readonly origin: Vec3;
-  readonly direction: Vec3;
-}
 
 export interface Snapshot {
   /** Of the newest picture. */
