@@ -84,9 +84,9 @@ describe('walking', () => {
   it('goes to a place that was pointed at, up to a step before it', () => {
     const made = camera('walk');
     made.focus_on([6, 0, -5]);
-    expect(made.in_flight).toBe(true);
+    expect(made.at_rest).toBe(false);
     hold(made, {}, 10);
-    expect(made.in_flight).toBe(false);
+    expect(made.at_rest).toBe(true);
     const [x, y, z] = made.pose.position;
     expect(y).toBeCloseTo(-1.7, 6);
     expect(z).toBeCloseTo(-5, 6);
