@@ -25,10 +25,6 @@ class FakeDecoder implements Decoder {
     return goes_on;
   }
 
-  queue_length(): number {
-    return this.frames.length;
-  }
-
   close(): void {
     this.closed = true;
     for (const frame of this.frames.splice(0)) {

@@ -11,7 +11,6 @@ class FakeChunk {
 /** The browser's decoder as far as ours uses it; it refuses chunks once it is closed. */
 class FakeVideoDecoder {
   state = 'unconfigured';
-  readonly decodeQueueSize = 0;
 
   constructor(readonly init: VideoDecoderInit) {
     made.push(this);

@@ -196,7 +196,6 @@ export class FramePipeline {
       presentedUs: BigInt(presented_us),
       dropped: presented_us === 0,
       poseAgeUs: presented_us === 0 ? 0 : Math.min(Math.max(age_us, 0), 0xffffffff),
-      decoderQueue: this.decoder_?.queue_length() ?? 0,
     });
   }
 }

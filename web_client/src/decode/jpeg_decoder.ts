@@ -24,10 +24,6 @@ export class JpegDecoder implements Decoder {
     return config.codec === Codec.MJPEG;
   }
 
-  queue_length(): number {
-    return this.current_ ? 1 : 0;
-  }
-
   close(): void {
     this.next_.clear();
     const current = this.current_;

@@ -32,8 +32,6 @@ export interface Decoder {
    * cannot: then it is as before.
    */
   reconfigure(config: StreamConfig): boolean;
-  /** Frames waiting in the decoder. */
-  queue_length(): number;
   /** Every frame inside is skipped, at once; no event follows. */
   close(): void;
 }

@@ -67,10 +67,6 @@ export class WebCodecsDecoder implements Decoder {
     return true;
   }
 
-  queue_length(): number {
-    return this.decoder_.decodeQueueSize;
-  }
-
   close(): void {
     for (const frame of this.inside_.values()) this.events_.skipped(frame);
     this.inside_.clear();

@@ -3,7 +3,6 @@ import { AutoHeight } from './auto_height';
 export interface View {
   readonly width_px: number; // device pixels
   readonly height_px: number;
-  readonly device_pixel_ratio: number;
 }
 
 export interface Quality {

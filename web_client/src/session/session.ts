@@ -131,12 +131,11 @@ export class Session {
     this.send({ case: 'requestIdr', value: {} });
   }
 
-  set_viewport(width_px: number, height_px: number, device_pixel_ratio: number): void {
+  set_viewport(width_px: number, height_px: number): void {
     this.greeting_ = {
       ...this.greeting_,
       viewportWidthPx: width_px,
       viewportHeightPx: height_px,
-      devicePixelRatio: device_pixel_ratio,
     };
   }
 

@@ -407,7 +407,6 @@ export class Viewer {
     return {
       width_px: Math.max(16, Math.round(this.view_.clientWidth * ratio)),
       height_px: Math.max(16, Math.round(this.view_.clientHeight * ratio)),
-      device_pixel_ratio: ratio,
     };
   }
 

@@ -164,7 +164,6 @@ class Client {
   }
 
   private make_session(start: Start): Session {
-    const [viewportWidthPx, viewportHeightPx, devicePixelRatio] = viewport(start.view);
     return new Session(
       {
         open: open_web_socket(endpoint_of(start.url)),
@@ -192,9 +191,8 @@ class Client {
       },
       {
         sceneId: start.scene_id,
-        viewportWidthPx,
-        viewportHeightPx,
-        devicePixelRatio,
+        viewportWidthPx: start.view.width_px,
+        viewportHeightPx: start.view.height_px,
         decoders: available_codecs(start.rung),
         token: start.token,
         settings: settings(start.view, start.quality, this.display_.overscan),
@@ -212,7 +210,7 @@ class Client {
 
   /** Sizes and fields of view go together. */
   private send_sizes(): void {
-    this.session_.set_viewport(...viewport(this.view_));
+    this.session_.set_viewport(this.view_.width_px, this.view_.height_px);
     this.session_.send_settings(settings(this.view_, this.quality_, this.display_.overscan));
     this.tell_presenter();
   }
@@ -265,10 +263,6 @@ class Client {
       [picture.rgba.buffer],
     );
   }
-}
-
-function viewport(view: View): [width_px: number, height_px: number, ratio: number] {
-  return [view.width_px, view.height_px, view.device_pixel_ratio];
 }
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
