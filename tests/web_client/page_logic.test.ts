@@ -4,7 +4,7 @@ import { describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
 import { QualityChoice } from '#client/session/quality';
 import { scene_address } from '#client/session/scenes';
-import { take_token } from '#client/session/token';
+import { AccessToken } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { Settling } from '#client/ui/automation';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
@@ -23,17 +23,22 @@ describe('access token', () => {
       },
     };
     const href = 'http://host/page?scene=city#token=a%2Bb&pose=1';
-    expect(take_token({ href }, history, storage)).toBe('a+b');
+    expect(new AccessToken({ href }, history, storage).value).toBe('a+b');
     expect(shown).toBe('http://host/page?scene=city#pose=1');
-    expect(take_token({ href: 'http://host/page' }, history, storage)).toBe('a+b');
-    expect(take_token({ href: 'http://host/page#token=c' }, history, storage)).toBe('c');
+    const next = new AccessToken({ href: 'http://host/page' }, history, storage);
+    expect(next.value).toBe('a+b');
+    next.value = 'typed';
+    expect(new AccessToken({ href: 'http://host/page' }, history, storage).value).toBe('typed');
+    const other = new AccessToken({ href: 'http://host/page#token=c' }, history, storage);
+    expect(other.value).toBe('c');
     expect(shown).toBe('http://host/page');
   });
 
   it('works without storage', () => {
     const history = { state: null, replaceState: () => undefined };
-    expect(take_token({ href: 'http://host/' }, history, undefined)).toBe('');
-    expect(take_token({ href: 'http://host/#token=x' }, history, undefined)).toBe('x');
+    const token_of = (href: string): string => new AccessToken({ href }, history, undefined).value;
+    expect(token_of('http://host/')).toBe('');
+    expect(token_of('http://host/#token=x')).toBe('x');
   });
 });
 

@@ -5,7 +5,7 @@ import type { Frame } from '#client/decode/picture';
 import { StatsHistory } from '#client/stats/history';
 import { Metrics } from '#client/stats/metrics';
 import { PoseAge } from '#client/stats/pose_age';
-import { rest_note, row_texts, slowest_stage, stats_rows } from '#client/ui/stats_panel';
+import { rest_note, row_texts, slowest_stage, stats_rows } from '#client/ui/stats_rows';
 import { FrameHeaderSchema } from '#client/wire/wire';
 
 const ms = 1000;

@@ -1,17 +1,15 @@
-import { broken_card, unsupported_card } from './ui/wording';
 import { CardView } from './ui/card';
-import { Viewer } from './ui/viewer';
+import type { SessionStatus } from './ui/session_status';
+import { mount_viewer } from './ui/viewer';
+import { broken_card, unsupported_card } from './ui/wording';
 
 function main(): void {
-  const card = new CardView({
-    retry: () => viewer?.retry(),
-    token: (token) => viewer?.use_token(token),
-  });
+  const card = new CardView();
+  let status: SessionStatus | undefined;
   const broken = (message: string): void => {
-    if (viewer) viewer.break_off(message);
+    if (status) status.break_off(message);
     else card.show(broken_card(message));
   };
-  let viewer: Viewer | undefined;
   window.addEventListener('error', (event) => {
     // Not an error: a size changed again within one frame, and is reported in the next.
     if (!event.message.startsWith('ResizeObserver loop')) broken(event.message);
@@ -20,7 +18,7 @@ function main(): void {
 
   const unsupported = unsupported_card(globalThis);
   if (unsupported) card.show(unsupported);
-  else viewer = new Viewer(card);
+  else status = mount_viewer(card);
 }
 
 main();

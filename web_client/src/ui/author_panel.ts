@@ -5,8 +5,7 @@ import { text } from '../text';
 import { TourDraft } from '../tour/draft';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
-import { by_id } from './dom';
-import { save_file } from './share_panel';
+import { by_id, on_click, save_file } from './dom';
 
 export interface AuthorTools {
   eye(): Eye;
@@ -42,19 +41,17 @@ export class AuthorPanel {
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
-    const click = (id: string, action: () => void): void =>
-      by_id(id, HTMLButtonElement).addEventListener('click', action);
-    click('author-add', () => void this.add());
-    click('author-start', () => {
+    on_click('author-add', () => void this.add());
+    on_click('author-start', () => {
       this.draft_.start = tools_.eye();
       tools_.start_at(tools_.eye());
       this.changes_ += 1;
       this.done_.textContent = text.author.start_set;
     });
-    click('author-preview', () => tools_.preview());
-    click('author-save', () => void this.save(this.made_from_));
-    click('author-replace', () => void this.save(this.theirs_));
-    click('author-download', () => this.download());
+    on_click('author-preview', () => tools_.preview());
+    on_click('author-save', () => void this.save(this.made_from_));
+    on_click('author-replace', () => void this.save(this.theirs_));
+    on_click('author-download', () => this.download());
     this.title_.addEventListener('input', () => {
       this.draft_.title = this.title_.value;
       this.told();

@@ -1,7 +1,12 @@
 // window.catgs: a small surface for tests and for pages that drive the viewer (README.md).
+import { browser_timers, type Clock } from '../base/clock';
+import type { CameraController } from '../camera/camera_controller';
 import type { Pose } from '../camera/eye';
+import { same_angle_rad, same_view } from '../camera/same_view';
 import type { StatsSnapshot } from '../stats/metrics';
-import type { Snapshot } from '../worker/messages';
+import type { WorkerClient } from '../worker/client';
+import type { FromWorker, Snapshot } from '../worker/messages';
+import type { Navigation } from './navigation';
 
 export interface Automation {
   /** Puts the camera there. Camera axes: x right, y down, z forward; quaternion x, y, z, w. */
@@ -19,6 +24,8 @@ declare global {
     catgs?: Automation;
   }
 }
+
+type Shown = Extract<FromWorker, { kind: 'presented' }>;
 
 // The server refines a still picture with a few more frames and then says nothing; it takes no
 // longer between two of them than this, or than a few of the intervals seen so far.
@@ -65,4 +72,50 @@ export class Settling {
     }
     this.cancel_ = this.after_(left_ms, () => this.look());
   }
+}
+
+/** What `window.catgs` is on a page with these parts. */
+export function make_automation(
+  worker: WorkerClient,
+  { camera, loop, changed }: Navigation,
+  clock: Clock,
+): Automation {
+  let shown: Shown | undefined;
+  const settling = new Settling(
+    () => shown !== undefined && !loop.pending && shows_camera(shown, camera, loop.pose_id),
+    () => clock.now_us() / 1000,
+    (delay_ms, action) => browser_timers.after(delay_ms, action),
+  );
+  worker.on('presented', (message) => {
+    shown = message;
+    settling.presented();
+  });
+  return {
+    setPose: (pose, fov_y_rad) => {
+      camera.jump(pose);
+      if (fov_y_rad !== undefined) camera.fov_y_rad = fov_y_rad;
+      changed.emit();
+      loop.sample();
+    },
+    pose: () => camera.pose,
+    settled: () => settling.wait(),
+    snapshot: async () => {
+      const snapshot = await worker.snapshot();
+      if (!snapshot) throw new Error('no picture has been shown yet');
+      return snapshot;
+    },
+    stats: () => worker.stats(),
+  };
+}
+
+/**
+ * The server renders nothing anew for a pose that shows the same picture, so that its number may
+ * never come back.
+ */
+function shows_camera(shown: Shown, camera: CameraController, newest_pose_id: number): boolean {
+  if (shown.pose_id >= newest_pose_id) return true;
+  return (
+    Math.abs(shown.fov_y_rad - camera.fov_y_rad) < same_angle_rad &&
+    same_view(shown.pose, camera.pose, camera.scene?.near_z ?? 0)
+  );
 }

@@ -1,7 +1,7 @@
 import { text as words } from '../text';
 import { embed_code, frame_sites } from '../tour/share';
 import type { Snapshot } from '../worker/messages';
-import { by_id } from './dom';
+import { by_id, save_file } from './dom';
 
 export interface ShareSource {
   address(): string;
@@ -77,12 +77,4 @@ export class SharePanel {
     const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
     if (blob) save_file(blob, `${this.source_.name()}.png`);
   }
-}
-
-export function save_file(blob: Blob, name: string): void {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
