@@ -39,6 +39,20 @@ class IncludeRule(NamedTuple):
     reason: str
 
 
+# Folders, and files without their ending, from the ground up. A file includes its own folder and lower lines, so
+# that no folders include each other in a cycle.
+LAYERS = {name: rank for rank, line in enumerate([
+    "web_client/src/base web_client/src/text web_client/src/wire",
+    "web_client/src/camera web_client/src/decode web_client/src/transport",
+    "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour",
+    "web_client/src/worker",
+    "web_client/src/ui",
+    "web_client/src/ui/viewer",
+    "web_client/src/main",
+]) for name in line.split()}
+LAYERED = re.compile(r"^web_client/src/(?!wire/generated/)")
+
+
 INCLUDE_RULES = [
     IncludeRule(r"^render_core/", r"^(server|proto|tests|deploy)/|^catgs\.pb\.h$",
                 "render_core knows neither server nor wire"),
@@ -64,6 +78,8 @@ INCLUDE_RULES = [
 IMPORT_RULES = [
     IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|/generated/",
                 "src/wire alone speaks protobuf"),
+    IncludeRule(r"^web_client/src/ui/", r"^\.\./(transport/|worker/worker$|session/session$)",
+                "the page speaks to the worker through worker/client"),
 ]
 
 class BannedCall(NamedTuple):
@@ -165,6 +181,23 @@ def function_findings(path: str, lines: list[str]) -> Iterator[str]:
             yield f"{path}:{begin}: {name} fits {MAX_FUNCTION_LINES} lines again: take it out of LONGER_FUNCTIONS"
 
 
+def layer_of(path: str) -> str:
+    stem = path.rsplit(".", 1)[0]
+    return stem if stem in LAYERS else os.path.dirname(path)
+
+
+def layer_findings(path: str, number: int, target: str) -> Iterator[str]:
+    """What is wrong with an #include or import of `target` in line `number` of `path`, by LAYERS."""
+    if target.startswith("."):
+        target = os.path.normpath(os.path.join(os.path.dirname(path), target))
+    own, other = layer_of(path), layer_of(target)
+    if LAYERED.search(path) and LAYERED.search(target) and own != other:
+        if unknown := [layer for layer in (own, other) if layer not in LAYERS]:
+            yield f"{path}:{number}: {unknown[0]} is not in LAYERS of lint.py"
+        elif LAYERS[own] <= LAYERS[other]:
+            yield f"{path}:{number}: includes {target}: {own} does not lie above {other}"
+
+
 def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
     """Findings of `rules` for one file, as 'file:line: text'."""
     limit = LONGER_FILES.get(path, MAX_LINES)
@@ -188,6 +221,8 @@ def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
             if re.search(call.pattern, code):
                 yield f"{path}:{number}: {code.strip()}: {call.reason}"
         target = pattern.search(line)
+        if target:
+            yield from layer_findings(path, number, target.group(1))
         for rule in rules if target else []:
             if re.search(rule.forbidden, target.group(1)):
                 yield f"{path}:{number}: includes {target.group(1)}: {rule.reason}"
