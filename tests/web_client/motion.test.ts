@@ -241,7 +241,6 @@ describe('a gamepad', () => {
   const pad = (axes: number[], pressed: Record<number, number> = {}) => ({
     axes,
     connected: true,
-    mapping: 'standard' as const,
     buttons: Array.from({ length: 16 }, (_, i) => ({
       value: pressed[i] ?? 0,
       pressed: (pressed[i] ?? 0) > 0.5,

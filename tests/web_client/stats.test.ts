@@ -104,7 +104,6 @@ describe('metrics', () => {
       window: 4,
       speculated: pose_id % 2n === 0n,
     }),
-    bytes: 1000,
     received_us,
     decoded_us: received_us + 2 * ms,
   });
@@ -184,7 +183,6 @@ describe('statistics panel', () => {
       encodeUs: 36_000,
       sendWaitUs: 5000,
     }),
-    bytes: 1000,
     received_us: 210 * ms,
     decoded_us: 212 * ms,
   };

@@ -83,7 +83,7 @@ function decode(...ids: bigint[]): void {
   for (const id of ids) {
     const header = create(FrameHeaderSchema, { frameId: id, idr: id === 1n });
     const payload = new Uint8Array(1);
-    const frame: EncodedFrame = { header, payload, bytes: 1, received_us: 0, decoded_us: 0 };
+    const frame: EncodedFrame = { header, payload, received_us: 0, decoded_us: 0 };
     decoder.decode(frame);
   }
 }

@@ -15,7 +15,7 @@ export interface PathSample {
 }
 
 /** 0…1, at rest at both ends, without a jerk. */
-export function eased(share: number): number {
+function eased(share: number): number {
   const s = Math.min(1, Math.max(0, share));
   return s * s * s * (s * (6 * s - 15) + 10);
 }

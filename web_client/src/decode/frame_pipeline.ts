@@ -67,7 +67,7 @@ export class FramePipeline {
 
   push(header: FrameHeader, payload: Uint8Array): void {
     const received_us = this.env_.now_us();
-    const frame = { header, payload, bytes: payload.length, received_us, decoded_us: 0 };
+    const frame = { header, payload, received_us, decoded_us: 0 };
     if (this.needs_key_ && !header.idr) {
       this.drop(frame);
       return;

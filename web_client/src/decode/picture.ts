@@ -6,7 +6,6 @@ export type Picture = VideoFrame | ImageBitmap;
 /** One frame on its way through the client. Times in microseconds of the page's clock. */
 export interface Frame {
   readonly header: FrameHeader;
-  readonly bytes: number;
   readonly received_us: number;
   decoded_us: number; // 0 until decoded
 }

@@ -3,7 +3,7 @@ import { no_axes, type Axes } from '../camera/movement';
 
 export type GamepadAction = 'next' | 'previous' | 'play' | 'reset' | 'mode';
 
-type Pad = Pick<Gamepad, 'axes' | 'buttons' | 'connected' | 'mapping'>;
+type Pad = Pick<Gamepad, 'axes' | 'buttons' | 'connected'>;
 
 const dead_zone = 0.15;
 const poll_ms = 50; // while nothing is held: a press is heard soon enough

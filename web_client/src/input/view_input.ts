@@ -4,7 +4,7 @@ import type { Gesture } from '../camera/movement';
 import { HeldKeys } from './keyboard';
 import { DoubleTap, Pointers, wheel_gesture, type PointerSample } from './pointers';
 
-export interface ViewInputListener {
+interface ViewInputListener {
   gesture(gesture: Gesture): void;
   keys_changed(): void;
   /** No pointer is down any more, and nothing glides on. */

@@ -7,7 +7,7 @@ import { TurnForecast } from './turn_forecast';
 import { reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
 import { WarpPolicy, type WarpMode } from './warp_policy';
 
-export interface DisplayEnvironment {
+interface DisplayEnvironment {
   now_us: () => number;
   on_refresh: (draw: () => void) => void;
   /** Pictures of another size are wanted. */

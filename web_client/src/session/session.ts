@@ -25,9 +25,9 @@ import { backoff_ms } from './backoff';
 import type { SessionState, WaitCause } from './state';
 
 /** What hello says, besides the things that the session itself knows. */
-export type Greeting = Omit<HelloInit, '$typeName' | 'version' | 'resume'>;
+type Greeting = Omit<HelloInit, '$typeName' | 'version' | 'resume'>;
 
-export interface SessionListener {
+interface SessionListener {
   state(state: SessionState): void;
   welcome(welcome: Welcome): void;
   /** Before the first frame it describes. The frame after it is an IDR. */
@@ -41,7 +41,7 @@ export interface SessionListener {
   notice(message: string): void;
 }
 
-export interface SessionEnvironment {
+interface SessionEnvironment {
   open: OpenSocket;
   clock: Clock;
   timers: Timers;

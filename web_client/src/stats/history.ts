@@ -1,6 +1,6 @@
 import type { StatsSnapshot } from './metrics';
 
-export interface Sample {
+interface Sample {
   readonly time_s: number; // since the first one
   readonly stats: StatsSnapshot;
 }

@@ -4,7 +4,7 @@ import type { Frame } from '../decode/picture';
 import type { Stats, StreamConfig } from '../wire/wire';
 import { PoseAge } from './pose_age';
 
-export interface Percentiles {
+interface Percentiles {
   readonly p50: number;
   readonly p95: number;
 }
@@ -38,8 +38,6 @@ export interface StatsSnapshot extends Motion {
   readonly frames_shown: number; // since the page was opened
   readonly frames_dropped: number; // never shown by this client
   readonly packets_dropped: number; // never sent by the server
-  readonly server_fps: number;
-  readonly sessions: number;
 }
 
 /** What is measured now, and what was when the camera moved last. */
@@ -69,7 +67,7 @@ export class Metrics {
   private frames_shown_ = 0;
   private frames_dropped_ = 0;
   private size_px_: readonly [number, number] = [0, 0];
-  private server_: Stats | undefined;
+  private packets_dropped_ = 0;
 
   configured(config: StreamConfig): void {
     this.pose_age_.set_rate(config.fps);
@@ -115,7 +113,7 @@ export class Metrics {
   }
 
   server_said(stats: Stats): void {
-    this.server_ = stats;
+    this.packets_dropped_ = stats.droppedPackets;
   }
 
   snapshot(now_us: number): StatsReport {
@@ -128,9 +126,7 @@ export class Metrics {
       height_px: this.size_px_[1],
       frames_shown: this.frames_shown_,
       frames_dropped: this.frames_dropped_,
-      packets_dropped: this.server_?.droppedPackets ?? 0,
-      server_fps: this.server_?.fps ?? NaN,
-      sessions: this.server_?.sessions ?? 0,
+      packets_dropped: this.packets_dropped_,
       last_motion: this.motion((window) => window.newest()),
     };
   }

@@ -12,7 +12,7 @@ const most_ticks = 1000;
 export class PoseAge {
   private readonly ages_us_: TimeWindow;
   private sent_: { id: bigint; time_us: number }[] = [];
-  private shown_: { id: bigint; time_us: number } | undefined;
+  private shown_us_: number | undefined; // sample time of the pose behind the shown picture
   private next_tick_us_ = 0;
 
   constructor(
@@ -33,7 +33,7 @@ export class PoseAge {
 
   shown(id: bigint, time_us: number, now_us: number): void {
     this.advance(now_us);
-    this.shown_ = { id, time_us };
+    this.shown_us_ = time_us;
     this.sent_ = this.sent_.filter((pose) => pose.id > id);
   }
 
@@ -50,12 +50,12 @@ export class PoseAge {
   /** Adds the ticks since the last call; the shown picture was the same at all of them. */
   private advance(now_us: number): void {
     const newer = this.sent_[0];
-    if (!this.shown_ || !newer) {
+    if (this.shown_us_ === undefined || !newer) {
       this.next_tick_us_ = now_us;
       return;
     }
     // The shown pose was right until just before the first newer sample.
-    const right_until_us = Math.max(this.shown_.time_us, newer.time_us - this.tick_us_);
+    const right_until_us = Math.max(this.shown_us_, newer.time_us - this.tick_us_);
     const first = Math.max(this.next_tick_us_, newer.time_us, now_us - most_ticks * this.tick_us_);
     let tick_us = first;
     for (; tick_us <= now_us; tick_us += this.tick_us_) {

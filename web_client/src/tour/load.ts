@@ -3,14 +3,14 @@ import type { Eye } from '../camera/eye';
 import { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 
-export interface SceneTours {
+interface SceneTours {
   readonly tours: readonly Tour[];
   readonly start: Eye | undefined;
   /** What could not be read, for the author. */
   readonly problems: readonly string[];
 }
 
-export interface TourDocument {
+interface TourDocument {
   readonly tours?: unknown;
   readonly settings?: unknown;
   /** Of the sidecar; null: there is none. */

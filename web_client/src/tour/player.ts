@@ -4,14 +4,14 @@ import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight, type PathSample } from '../camera/flight';
 import { stay_of, type Stop, type Tour } from './tour';
 
-export interface Guided {
+interface Guided {
   readonly eye: Eye;
   readonly reach: number;
   fly(way: Flight, ended: (arrived: boolean) => void): void;
   stop_flight(): void;
 }
 
-export interface TourEnvironment {
+interface TourEnvironment {
   readonly camera: Guided;
   readonly timers: Timers;
   now_us(): number;
@@ -60,10 +60,6 @@ export class TourPlayer {
       this.play();
     }
     this.tell();
-  }
-
-  get tours(): readonly Tour[] {
-    return this.tours_;
   }
 
   get state(): TourState {

@@ -5,7 +5,7 @@ import { film_flight, type Shot } from './camera_spline';
 import { JsonPlace } from './json_place';
 import type { Stop, Tour } from './tour';
 
-export interface ImportedTours {
+interface ImportedTours {
   readonly tours: readonly Tour[];
   /** Where a visit begins. */
   readonly start: Eye | undefined;

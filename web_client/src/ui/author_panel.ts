@@ -7,7 +7,7 @@ import { save_sidecar, type SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
 import { by_id, on_click, save_file } from './dom';
 
-export interface AuthorTools {
+interface AuthorTools {
   eye(): Eye;
   scene(): SceneSetup | undefined;
   scene_id(): string;

@@ -8,7 +8,7 @@ import type { WorkerClient } from '../worker/client';
 import type { FromWorker, Snapshot } from '../worker/messages';
 import type { Navigation } from './navigation';
 
-export interface Automation {
+interface Automation {
   /** Puts the camera there. Camera axes: x right, y down, z forward; quaternion x, y, z, w. */
   setPose(pose: Pose, fovYRad?: number): void;
   pose(): Pose;

@@ -5,7 +5,7 @@ import { unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { JsonPlace } from '../tour/json_place';
 
-export interface EmbedTarget {
+interface EmbedTarget {
   eye(): Eye;
   set_eye(eye: Eye): void;
   go_to(stop_index: number): void;
@@ -17,7 +17,7 @@ export interface EmbedTarget {
 }
 
 /** Said to the parent, once it has said hello. */
-export type EmbedNews =
+type EmbedNews =
   | { readonly catgs: 'ready'; readonly scene: string; readonly stops: readonly string[] }
   | { readonly catgs: 'stop'; readonly stop: number | null; readonly playing: boolean }
   | { readonly catgs: 'pose'; readonly position: readonly number[]; readonly orientation: readonly number[]; readonly fov_deg: number };

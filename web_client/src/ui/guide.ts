@@ -16,7 +16,7 @@ import { SharePanel } from './share_panel';
 import type { Toolbar } from './toolbar';
 import { TourView } from './tour_view';
 
-export interface GuideParts {
+interface GuideParts {
   readonly view: HTMLElement;
   readonly clock: Clock;
   readonly worker: WorkerClient;

@@ -3,7 +3,7 @@ import { embed_code, frame_sites } from '../tour/share';
 import type { Snapshot } from '../worker/messages';
 import { by_id, save_file } from './dom';
 
-export interface ShareSource {
+interface ShareSource {
   address(): string;
   snapshot(): Promise<Snapshot | undefined>;
   /** For file names. */

@@ -36,7 +36,7 @@ export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
 export type AckInit = MessageInitShape<typeof AckSchema>;
 export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 
-export type Incoming =
+type Incoming =
   | { kind: 'message'; body: ServerBody }
   /** `payload` is a view into the received buffer, not a copy. */
   | { kind: 'frame'; header: FrameHeader; payload: Uint8Array }
