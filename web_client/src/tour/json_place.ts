@@ -1,4 +1,5 @@
 import type { Vec3 } from '../base/vector';
+import { max_text_characters } from './limits';
 
 /** A value in a document that people wrote, with its place for complaints: "tours[0].title: …". */
 export class JsonPlace {
@@ -29,9 +30,10 @@ export class JsonPlace {
     return this.value_.map((value, i) => new JsonPlace(`${this.place_}[${i}]`, value));
   }
 
-  text(most = 4000): string {
+  /** Cut off where it is too long. */
+  text(): string {
     if (typeof this.value_ !== 'string') this.fail('is not a text');
-    return this.value_.slice(0, most);
+    return this.value_.slice(0, max_text_characters);
   }
 
   truth(): boolean {

@@ -1,5 +1,5 @@
 // Saves a scene's sidecar to the server, which takes it from authors.
-const most_bytes = 1 << 20; // the server takes no more
+import { max_sidecar_bytes } from './limits';
 
 /** The tag of a sidecar; null: there is none; undefined: the server does not tell. */
 export type SidecarTag = string | null | undefined;
@@ -20,8 +20,8 @@ export async function save_sidecar(
   unreachable: string,
 ): Promise<SaveResult> {
   const body = new Blob([sidecar], { type: 'application/json' });
-  if (body.size > most_bytes)
-    return { kind: 'refused', why: `${body.size} bytes are too many, ${most_bytes} fit` };
+  if (body.size > max_sidecar_bytes)
+    return { kind: 'refused', why: `${body.size} bytes are too many, ${max_sidecar_bytes} fit` };
   const address = new URL(`./api/scenes/${encodeURIComponent(scene_id)}/sidecar`, page_url);
   const headers: Record<string, string> = { authorization: `Bearer ${token}` };
   if (made_from === null) headers['if-none-match'] = '*';

@@ -3,6 +3,7 @@ import { look_at, unit, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { JsonPlace } from './json_place';
+import { max_stops, max_tours } from './limits';
 
 export interface Stop {
   readonly title: string;
@@ -23,9 +24,6 @@ export interface Tour {
   readonly starts_itself: boolean;
 }
 
-const most_tours = 32;
-const most_stops = 256;
-
 /** How long somebody needs to look around and to read. */
 export function stay_of(stop: Stop): number {
   return stop.stay_s ?? 3 + 0.06 * (stop.caption.length + stop.title.length);
@@ -36,11 +34,11 @@ export function stay_of(stop: Stop): number {
  * that say nothing.
  */
 export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
-  return new JsonPlace('tours', document).elements(most_tours).map((tour) => ({
+  return new JsonPlace('tours', document).elements(max_tours).map((tour) => ({
     title: tour.find('title')?.text() ?? '',
     stops: tour
       .at('stops')
-      .elements(most_stops)
+      .elements(max_stops)
       .map((stop) => read_stop(stop, up, fov_y_rad)),
     way: undefined,
     starts_itself: tour.find('autoplay')?.truth() ?? false,

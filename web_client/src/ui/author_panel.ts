@@ -3,6 +3,7 @@ import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import { text } from '../text';
 import { TourDraft } from '../tour/draft';
+import { max_text_characters } from '../tour/limits';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
 import { by_id, on_click, save_file } from './dom';
@@ -161,7 +162,7 @@ export class AuthorPanel {
         const caption = document.createElement('textarea');
         caption.value = stop.caption;
         caption.rows = 2;
-        caption.maxLength = 4000;
+        caption.maxLength = max_text_characters;
         caption.placeholder = text.author.caption_here;
         caption.setAttribute('aria-label', text.author.caption(i + 1));
         caption.addEventListener('input', () => this.change(i, { caption: caption.value }));

@@ -4,6 +4,7 @@
 import { unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { JsonPlace } from '../tour/json_place';
+import { max_stops } from '../tour/limits';
 
 interface EmbedTarget {
   eye(): Eye;
@@ -56,7 +57,7 @@ export class EmbedApi {
         if (this.ready_) this.say(this.ready_);
         break;
       case 'stop':
-        this.target_.go_to(message.at('stop').number(0, 255));
+        this.target_.go_to(message.at('stop').number(0, max_stops - 1));
         break;
       case 'pose':
         this.set_pose(message);
