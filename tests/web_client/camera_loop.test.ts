@@ -1,4 +1,4 @@
-// Which samples leave the page, and when.
+// The samples that leave the page.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { identity } from '#client/base/vector';
 import { CameraController } from '#client/camera/camera_controller';

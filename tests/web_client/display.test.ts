@@ -103,7 +103,7 @@ describe('the display', () => {
       const picture_eye = at_time(s - lag_s);
       const eye = { ...picture_eye, fov_y_rad: widened_fov(1, display.overscan.y) };
       await display.draw(picture, eye, 640 * display.overscan.x, 360 * display.overscan.y);
-      // Twelve pictures are looked at before anything is asked for.
+      // The policy looks at twelve pictures before it asks for anything.
       if (i > 20) expect(display.read()!.view.uncovered).toBeLessThanOrEqual(0.01);
     }
     expect(display.overscan.x).toBeGreaterThanOrEqual(1.26);

@@ -1,4 +1,4 @@
-// Ways of the camera that are known beforehand, walking, and what goes on after a gesture.
+// Walking, flights, and the glide after a gesture.
 import { describe, expect, it } from 'vitest';
 import {
   angle_between,

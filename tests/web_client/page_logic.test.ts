@@ -1,4 +1,4 @@
-// The parts of the page that decide something.
+// The logic of the page.
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
@@ -222,7 +222,7 @@ describe('the texts of the page', () => {
     const between = [...body.replace(/<kbd[^]*?<\/kbd>/g, '').matchAll(/>([^<]+)</g)];
     const texts = [...attributes, ...between].map(([, found]) => found!.trim());
     expect(texts.length).toBeGreaterThan(60);
-    // A sign is no text: the cross of a button, the comma between two keys.
+    // Signs are no texts, such as the cross of a button or the comma between two keys.
     const loose = texts.filter((found) => /[a-z]{2}/i.test(found.replace(/\{\{[\w.]+\}\}|&#\d+;/g, '')));
     expect(loose).toEqual([]);
   });

@@ -118,7 +118,7 @@ describe("the SuperSplat viewer's settings.json", () => {
       ['', 2, false],
       ['cameraAnim', 0, true],
     ]);
-    // That viewer has the scene upside down: x and y change their signs.
+    // SuperSplat turns the scene upside down, so x and y change their signs.
     expect_vec(start!.position, [-2, -1.5, -4]);
     const view = rotate(start!.orientation, [0, 0, 1]);
     const to_target = [2, 1.5 - 1, 4].map((v) => v / Math.hypot(2, 0.5, 4));

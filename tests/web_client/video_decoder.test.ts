@@ -8,7 +8,7 @@ class FakeChunk {
   constructor(readonly init: EncodedVideoChunkInit) {}
 }
 
-/** The browser's decoder as far as ours uses it; it refuses chunks once it is closed. */
+/** The part of VideoDecoder that our decoder uses. It refuses chunks once it is closed. */
 class FakeVideoDecoder {
   state = 'unconfigured';
 
@@ -29,7 +29,7 @@ class FakeVideoDecoder {
     this.state = 'closed';
   }
 
-  /** As browsers do it: a decoder that fails is closed when they say so. */
+  /** Fails like browsers do: the decoder is closed before the error event. */
   fail(): void {
     this.close();
     this.init.error(new DOMException('broken', 'EncodingError'));

@@ -16,7 +16,7 @@ const eye = (change: Partial<Eye> = {}): Eye => ({
   ...change,
 });
 
-/** Where a point of the scene is in the image of an eye, -1…1. */
+/** Place of a point of the scene in the image of an eye, -1…1. */
 function seen(point: Vec3, by: Eye): readonly [number, number] {
   const [x, y] = place_of(point, by, aspect)!;
   return [2 * x - 1, 2 * y - 1];
@@ -156,7 +156,7 @@ describe('the policy of warping', () => {
     expect(policy.overscan).toEqual({ x: 1.12, y: 1 });
     move(policy, 3, 500, 3, 3);
     expect(policy.overscan).toEqual({ x: 1.6, y: 1.26 });
-    expect(1.6 * 1.26).toBeLessThan(2.1); // pixels that a server has to draw, by those of the view
+    expect(1.6 * 1.26).toBeLessThan(2.1); // pixels to draw over pixels of the view
   });
 
   it('is off where drawing takes too long, unless somebody wants it', () => {

@@ -11,7 +11,7 @@ function main(): void {
     else card.show(broken_card(message));
   };
   window.addEventListener('error', (event) => {
-    // Not an error: a size changed again within one frame, and is reported in the next.
+    // This is no error: a size changed twice within one frame, and the next frame reports it.
     if (!event.message.startsWith('ResizeObserver loop')) broken(event.message);
   });
   window.addEventListener('unhandledrejection', (event) => broken(String(event.reason)));

@@ -38,7 +38,7 @@ export class CameraController {
   private scene_: SceneSetup | undefined;
   private flight_: { way: Flight; time_s: number; ended: (arrived: boolean) => void } | undefined;
 
-  /** Time constant of the glide after a gesture; 0 for people who asked for reduced motion. */
+  /** Time constant of the glide after a gesture. 0 turns it off, for people who asked for reduced motion. */
   set smoothing_s(time_s: number) {
     this.smoothing_.time_s = time_s;
   }
@@ -94,13 +94,13 @@ export class CameraController {
     this.fov_y_rad = this.scene_?.start_fov_y_rad ?? default_fov_y_rad;
   }
 
-  /** Another start, kept for reset(). The camera stays where it is. */
+  /** Sets another start for reset(). The camera stays where it is. */
   start_at(eye: Eye): void {
     if (!this.scene_) return;
     this.scene_ = { ...this.scene_, start_pose: eye, start_fov_y_rad: eye.fov_y_rad };
   }
 
-  /** Moves along a way; any other movement ends it. `ended` hears whether the camera arrived. */
+  /** Follows a flight until it ends or the visitor moves. `ended` hears whether the camera arrived. */
   fly(way: Flight, ended: (arrived: boolean) => void = () => undefined): void {
     this.end_flight(false);
     this.smoothing_.clear();
@@ -111,7 +111,7 @@ export class CameraController {
     this.end_flight(false);
   }
 
-  /** Turns to a point of the scene and comes nearer. */
+  /** Flies to where the mode looks at this point of the scene from. */
   focus_on(point: Vec3, at_once = false): void {
     const to = this.controller.approach(point);
     const ended = (arrived: boolean): void => {
@@ -120,7 +120,7 @@ export class CameraController {
     this.fly(glide(this.eye, to, at_once ? 0 : glide_time_s(this.eye, to, this.reach)), ended);
   }
 
-  /** Puts the camera somewhere; limits are the caller's business. */
+  /** Puts the camera somewhere. The caller answers for the limits. */
   jump(pose: Pose): void {
     this.end_flight(false);
     this.rig_.pose = { position: pose.position, orientation: unit(pose.orientation) };
@@ -134,7 +134,7 @@ export class CameraController {
     this.controller.begin();
   }
 
-  /** For captures that came upside down. */
+  /** Turns the scene over, for captures that are upside down. */
   flip_up(): void {
     this.rig_.flip_up();
   }
@@ -221,7 +221,7 @@ export class CameraController {
     const elevation = Math.asin(Math.min(1, Math.max(-1, dot(this.rig_.view, this.up))));
     const target = Math.min(Math.max(elevation + pitch, -steepest_rad), steepest_rad);
     const allowed = target - elevation;
-    // Beyond the limit (a start pose that looks straight down) only the way back is open.
+    // A start pose may look straight down, beyond the limit. From there only the way back is open.
     if (allowed * pitch <= 0) return;
     this.controller.turn(axis_angle(rotate(this.pose.orientation, right), allowed));
   }

@@ -21,7 +21,7 @@ import { limited_fov, type Eye, type Pose } from './eye';
 import type { SceneSetup } from './scene_setup';
 
 const nowhere: Vec3 = [Infinity, Infinity, Infinity];
-const steepest_level_rad = (85 * Math.PI) / 180; // nearer to up or down the horizon means nothing
+const steepest_level_rad = (85 * Math.PI) / 180; // a steeper view shows no horizon
 export const default_fov_y_rad = (60 * Math.PI) / 180;
 
 export class CameraRig {
@@ -60,19 +60,19 @@ export class CameraRig {
     const to_focus = length(sub(scene.focus, start.position));
     this.reach = Math.max(to_focus, this.nearest * 2);
     if (to_focus < this.nearest) this.focus = this.ahead(this.reach);
-    // The start is inside by definition; a scene without limits has min = max.
+    // The limits always contain the start. A scene without limits has min = max.
     const unlimited = scene.limits_max.every((v, i) => v <= scene.limits_min[i]!);
     this.min_ = unlimited ? scale(nowhere, -1) : min(scene.limits_min, start.position);
     this.max_ = unlimited ? nowhere : max(scene.limits_max, start.position);
   }
 
-  /** From the eye to the focus, or the scene's scale where panning by that would stand still. */
+  /** From the eye to the focus; the scene's scale where the focus is too near to pan by. */
   distance(): number {
     const along = dot(sub(this.focus, this.pose.position), this.view);
     return along > this.nearest ? along : this.reach;
   }
 
-  /** The focus moves to the middle of the view, as far away as it was. */
+  /** Moves the focus to the middle of the view, at the same distance. */
   refocus(): void {
     this.focus = this.ahead(this.distance());
   }
@@ -85,7 +85,7 @@ export class CameraRig {
     return p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9);
   }
 
-  /** Without its part along up. */
+  /** Removes the part along up. */
   on_ground(v: Vec3): Vec3 {
     return sub(v, scale(this.up, dot(v, this.up)));
   }
@@ -119,7 +119,7 @@ export class CameraRig {
     this.pose = { position, orientation: multiply(axis_angle(this.view, Math.PI), orientation) };
   }
 
-  /** Nearer to the point by a third, looking at it. */
+  /** Looks at the point from a third nearer. */
   facing(point: Vec3): Eye {
     const away = sub(this.pose.position, point);
     const distance = Math.max(length(away), 1e-9);

@@ -1,4 +1,4 @@
-// The camera as data: what every part of the client that speaks of cameras uses.
+// Cameras as data. Every part of the client that handles cameras uses these types.
 import type { Quat, Vec3 } from '../base/vector';
 
 /** Camera axes: x right, y down, z forward. World units. */
@@ -12,18 +12,18 @@ export interface Eye extends Pose {
   readonly fov_y_rad: number;
 }
 
-/** The camera of this page at one time. */
+/** This page's camera at one time. */
 export interface CameraSample {
   readonly pose_id: number;
   readonly time_us: number;
   readonly eye: Eye;
   /** From the eye to what the visitor looks at, along the view axis. World units; Infinity: unknown. */
   readonly distance: number;
-  /** Marks the repeated last sample of a movement: nothing moves the camera any more. */
+  /** True in the repeated last sample of a movement: nothing moves the camera any more. */
   readonly at_rest?: boolean;
 }
 
-/** Fields of view that the wire takes. */
+/** Range of the wire (proto/catgs.proto). */
 const fov_range_rad = [0.1, 2.8] as const;
 
 export const limited_fov = (fov_y_rad: number): number =>

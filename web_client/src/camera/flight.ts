@@ -1,10 +1,10 @@
-// Ways of the camera that are known beforehand. Pure.
+// Camera movements that are known in advance. Pure.
 import { add, angle_between, length, scale, slerp, sub } from '../base/vector';
 import type { Eye } from './eye';
 
 export interface Flight {
   readonly duration_s: number;
-  /** `time_s` in 0…duration. */
+  /** The camera at `time_s`, which is in 0…duration. */
   at(time_s: number): Eye;
 }
 
@@ -14,7 +14,7 @@ export interface PathSample {
   readonly eye: Eye;
 }
 
-/** 0…1, at rest at both ends, without a jerk. */
+/** Maps 0…1 to 0…1 with zero velocity and acceleration at both ends (Perlin's smootherstep). */
 function eased(share: number): number {
   const s = Math.min(1, Math.max(0, share));
   return s * s * s * (s * (6 * s - 15) + 10);
@@ -38,7 +38,7 @@ const comfortable_rad_per_s = 0.7;
 const comfortable_reach_per_s = 0.5;
 const time_range_s = [0.6, 6] as const;
 
-/** How long a comfortable glide takes; `reach`: the scale of the scene to a visitor. */
+/** Duration of a comfortable glide. `reach`: the scene's scale to a visitor, world units. */
 export function glide_time_s(from: Eye, to: Eye, reach: number): number {
   const turn_s = angle_between(from.orientation, to.orientation) / comfortable_rad_per_s;
   const way_s = length(sub(to.position, from.position)) / (reach * comfortable_reach_per_s);

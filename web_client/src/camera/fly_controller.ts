@@ -21,7 +21,7 @@ export class FlyController implements ModeController {
   }
 
   begin(): void {
-    // It flies on from where it is.
+    // Nothing to prepare: the camera flies on from where it is.
   }
 
   turn(by: Quat): void {

@@ -4,9 +4,9 @@ import type { Eye } from './eye';
 export const camera_modes = ['orbit', 'fly', 'walk'] as const;
 export type CameraMode = (typeof camera_modes)[number];
 
-/** How a camera moves in one mode. A controller moves the rig that it was made for, within its limits. */
+/** Moves a camera in one mode. A controller acts on the rig that it was made for, within its limits. */
 export interface ModeController {
-  /** Of held keys, in scene scales (CameraRig.reach) a second. */
+  /** Speed of held keys, in scene scales (CameraRig.reach) a second. */
   readonly speed: number;
   /** Turn for a drag across the view's height, rad. Negative: the camera circles. Keys turn the same way. */
   readonly drag_rad: number;
@@ -17,7 +17,7 @@ export interface ModeController {
   /** The visitor chose this mode. */
   begin(): void;
   turn(by: Quat): void;
-  /** The part of a movement, climbing aside, that the mode allows. World axes and units. */
+  /** The part of a movement that the mode allows; climbing is added after it. World axes and units. */
   allowed(movement: Vec3): Vec3;
   /** `steps`: notches of a wheel, > 0 towards the scene. */
   dolly(steps: number): void;

@@ -35,7 +35,7 @@ export class OrbitController implements ModeController {
     return movement;
   }
 
-  /** Towards the focus and never through it. */
+  /** Moves towards the focus, never through it. */
   dolly(steps: number): void {
     const { pose, focus, nearest } = this.rig_;
     const offset = sub(pose.position, focus);

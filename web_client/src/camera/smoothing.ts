@@ -12,11 +12,11 @@ interface Movement {
 const none: Movement = { yaw: 0, pitch: 0, pan: [0, 0, 0], climb: 0, dolly: 0 };
 const rest_threshold = 1e-4;
 
-/** Movement that was asked for and is made bit by bit, so that the camera glides. Pure. */
+/** Hands out the movement that visitors ask for bit by bit, so that the camera glides. Pure. */
 export class Smoothing {
   private left_ = none;
 
-  /** Time constant of the glide; 0: all is made at once. */
+  /** Time constant of the glide; 0: all movement is due at once. */
   time_s = 0.05;
 
   ask(more: Partial<Movement>): void {
@@ -40,7 +40,7 @@ export class Smoothing {
     return yaw === 0 && pitch === 0 && dolly === 0 && climb === 0 && length(pan) === 0;
   }
 
-  /** What is due after `dt_s`: all, once it is too little to be seen. `reach`: the scene's scale. */
+  /** Movement due after `dt_s`. What is too small to see is due at once. `reach`: the scene's scale. */
   take(dt_s: number, reach: number): Movement {
     const { left_: left } = this;
     const seen =

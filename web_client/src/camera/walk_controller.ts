@@ -4,7 +4,7 @@ import { FlyController } from './fly_controller';
 
 const step_before = 0.1; // of the scene's scale: a visitor stands before what they pointed at
 
-/** The camera looks around as in flight, and keeps its height. */
+/** The camera looks around as in flight and keeps its height. */
 export class WalkController extends FlyController {
   override readonly speed = 0.25;
 
@@ -17,7 +17,7 @@ export class WalkController extends FlyController {
     return this.rig.on_ground(movement);
   }
 
-  /** A step before the point, at the height of now, turned towards it. */
+  /** Stops a step before the point, at the present height, and faces it. */
   override approach(point: Vec3): Eye {
     const { rig } = this;
     const way = rig.on_ground(sub(point, rig.pose.position));

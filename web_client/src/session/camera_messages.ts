@@ -1,4 +1,4 @@
-// The camera and its scene in the words of the wire, and back.
+// Converts cameras and scenes between the client and the wire.
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
@@ -23,7 +23,7 @@ export function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest
 
 export const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
 
-// Fields that a server leaves out are the wire's zeros; the camera needs a usable pose and scene.
+// Fields that a server leaves out read as zeros. The defaults here make a usable pose and scene of them.
 const vec3 = (v: WireVector | undefined): Vec3 => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
 
 export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {

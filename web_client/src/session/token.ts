@@ -1,12 +1,12 @@
 const storage_key = 'catgs.token';
 
-/** What this visitor shows to the server; '' for nothing. This tab remembers it. */
+/** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
   private value_: string;
 
   /**
-   * Takes the token out of the URL's fragment, so that neither the address bar nor the history nor a
-   * copied link shows it. Fragments never reach a server or its logs.
+   * Moves the token out of the URL's fragment, so that the address bar, the history and copied links do
+   * not show it. Fragments never reach a server or its logs.
    */
   constructor(
     location: Pick<Location, 'href'>,

@@ -1,4 +1,4 @@
-// A tour while its author works on it, and the sidecar that comes of it. Pure.
+// A tour that an author is editing, and the sidecar made from it. Pure.
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
@@ -7,11 +7,11 @@ export class TourDraft {
   private stops_: readonly Stop[] = [];
   title = '';
   starts_itself = false;
-  /** Where visits begin; undefined: where the scene says. */
+  /** Where visits begin; undefined: at the start of the scene. */
   start: Eye | undefined;
-  private others_: readonly Tour[] = []; // of the scene; kept as they are
+  private others_: readonly Tour[] = []; // other tours of the scene, kept as they are
 
-  /** The first tour that has stops is the one that is worked on. */
+  /** Edits the first tour that has stops. */
   load(tours: readonly Tour[]): void {
     const edited = tours.find(({ way }) => way === undefined);
     this.title = edited?.title ?? '';
@@ -43,7 +43,7 @@ export class TourDraft {
     this.stops_ = this.stops_.map((stop, i) => (i === index ? { ...stop, ...change } : stop));
   }
 
-  /** Changes places with the neighbour; `by` is 1 or -1. */
+  /** Swaps a stop with its neighbour. `by`: 1 or -1. */
   move(index: number, by: number): void {
     const [stop, neighbour] = [this.stops_[index], this.stops_[index + by]];
     if (!stop || !neighbour) return;
@@ -52,7 +52,7 @@ export class TourDraft {
     );
   }
 
-  /** All of `<scene>.json`: what the scene said of itself, and the tours. */
+  /** The whole of `<scene>.json`: the facts of the scene and the tours. */
   sidecar(scene: SceneSetup): object {
     const start = this.start ?? scene.start_pose;
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);

@@ -12,18 +12,18 @@ interface AuthorTools {
   eye(): Eye;
   scene(): SceneSetup | undefined;
   scene_id(): string;
-  /** What is in the middle of the view. */
+  /** The point in the middle of the view; undefined: nothing is there. */
   place_ahead(): Promise<Vec3 | undefined>;
   /** The tours have changed. */
   changed(tours: readonly Tour[]): void;
   go_to(stop_index: number): void;
-  /** Plays what there is so far. */
+  /** Plays the tour as it is so far. */
   preview(): void;
-  /** From now on visits of this page begin there. */
+  /** Sets where visits begin, for this page. */
   start_at(eye: Eye): void;
 }
 
-/** Where a tour is made: `?author` in the address. */
+/** The editor of tours: `?author` in the address. */
 export class AuthorPanel {
   private readonly draft_ = new TourDraft();
   private readonly list_ = by_id('author-stops', HTMLOListElement);
@@ -35,8 +35,8 @@ export class AuthorPanel {
   private readonly done_ = by_id('author-done', HTMLOutputElement);
   private token_: string | undefined;
   private made_from_: SidecarTag;
-  private theirs_: SidecarTag; // somebody else's, saved meanwhile
-  private open_ = 0; // the stop of which all is shown
+  private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
+  private open_ = 0; // index of the stop that is shown with all its fields
   private changes_ = 0;
   private saved_changes_ = 0;
 
@@ -67,8 +67,8 @@ export class AuthorPanel {
   }
 
   /**
-   * `token`: the server takes the sidecar from who has it; undefined: from nobody here.
-   * `made_from`: the sidecar that has these tours.
+   * `token`: lets its holder save the sidecar; undefined: this visitor may not save.
+   * `made_from`: the tag of the sidecar with these tours.
    */
   load(tours: readonly Tour[], token: string | undefined, made_from: SidecarTag): void {
     this.token_ = token;
@@ -195,7 +195,7 @@ export class AuthorPanel {
 
   private change(index: number, change: { title?: string; caption?: string }): void {
     this.draft_.change(index, change);
-    this.told(); // the fields stay as they are, with their focus
+    this.told(); // does not rebuild the fields, so that they keep their focus
   }
 
   private async view_here(index: number): Promise<void> {

@@ -1,4 +1,4 @@
-// window.catgs: a small surface for tests and for pages that drive the viewer (README.md).
+// window.catgs: a small interface for tests and for pages that drive the viewer (README.md).
 import { browser_timers, type Clock } from '../base/clock';
 import type { CameraController } from '../camera/camera_controller';
 import type { Pose } from '../camera/eye';
@@ -14,7 +14,7 @@ interface Automation {
   pose(): Pose;
   /** Resolves when the newest pose is shown and its picture has been refined. */
   settled(): Promise<void>;
-  /** RGBA pixels of the shown picture at its native size, with the frame's header. */
+  /** RGBA pixels of the shown picture at its native size, with the header of its frame. */
   snapshot(): Promise<Snapshot>;
   stats(): Promise<StatsSnapshot>;
 }
@@ -27,19 +27,19 @@ declare global {
 
 type Shown = Extract<FromWorker, { kind: 'presented' }>;
 
-// The server refines a still picture with a few more frames and then says nothing; it takes no
-// longer between two of them than this, or than a few of the intervals seen so far.
+// The server refines a still picture with a few more frames and then falls silent. The time between two
+// of them is at most this, or a few of the intervals seen so far.
 const least_quiet_ms = 400;
 const quiet_intervals = 4;
 
-/** Knows when the picture has come to rest. */
+/** Resolves promises when the picture has come to rest. */
 export class Settling {
   private last_shown_ms_ = 0;
   private interval_ms_ = 0;
   private waiting_: (() => void)[] = [];
   private cancel_: () => void = () => undefined;
 
-  /** `is_current`: the shown picture is the one of the camera as it is. */
+  /** `is_current`: whether the shown picture is that of the present camera. */
   constructor(
     private readonly is_current_: () => boolean,
     private readonly now_ms_: () => number,
@@ -74,7 +74,7 @@ export class Settling {
   }
 }
 
-/** What `window.catgs` is on a page with these parts. */
+/** Makes `window.catgs` for a page with these parts. */
 export function make_automation(
   worker: WorkerClient,
   { camera, loop, changed }: Navigation,
@@ -109,8 +109,8 @@ export function make_automation(
 }
 
 /**
- * The server renders nothing anew for a pose that shows the same picture, so that its number may
- * never come back.
+ * Whether the shown picture is that of the present camera. The server does not render a pose again that
+ * gives the same picture, so the id of the newest pose may never come back.
  */
 function shows_camera(shown: Shown, camera: CameraController, newest_pose_id: number): boolean {
   if (shown.pose_id >= newest_pose_id) return true;

@@ -4,7 +4,7 @@ import { by_id } from './dom';
 import { show_scene_links } from './scene_links';
 import type { Card } from './wording';
 
-/** The one place where the page says what is going on when the picture does not. */
+/** The card over the picture: what is going on while no picture says it. */
 export class CardView {
   readonly retried = new Signal();
   readonly token_given = new Signal<string>();

@@ -1,6 +1,5 @@
-// Lets the page that shows this one in a frame drive it. Which pages may is the server's decision
-// (--embed-origin): browsers refuse to load this page in anybody else's frame, so the parent window
-// is one of them.
+// Lets the page that shows this one in a frame drive it. The server names the pages that may do so
+// (--embed-origin). Browsers do not load this page in other frames, so the parent window is one of them.
 import { unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { JsonPlace } from '../tour/json_place';
@@ -17,14 +16,14 @@ interface EmbedTarget {
   reset(): void;
 }
 
-/** Said to the parent, once it has said hello. */
+/** Messages to the parent, sent once it has said hello. */
 type EmbedNews =
   | { readonly catgs: 'ready'; readonly scene: string; readonly stops: readonly string[] }
   | { readonly catgs: 'stop'; readonly stop: number | null; readonly playing: boolean }
   | { readonly catgs: 'pose'; readonly position: readonly number[]; readonly orientation: readonly number[]; readonly fov_deg: number };
 
 export class EmbedApi {
-  private origin_: string | undefined; // of the parent, once it spoke
+  private origin_: string | undefined; // origin of the parent, once it has spoken
   private ready_: EmbedNews | undefined;
 
   constructor(
@@ -50,7 +49,7 @@ export class EmbedApi {
 
   private heard(message: JsonPlace, origin: string): void {
     const command = message.find('catgs')?.text();
-    if (command === undefined) return; // meant for something else
+    if (command === undefined) return; // the message is for something else
     this.origin_ = origin;
     switch (command) {
       case 'hello':

@@ -1,4 +1,4 @@
-// Everything that leads through a scene: tours, shared views, the page around this one.
+// Leads visitors through a scene: tours, shared views, and the page around this one.
 import { browser_timers, type Clock } from '../base/clock';
 import type { Eye } from '../camera/eye';
 import type { AccessToken } from '../session/token';
@@ -116,7 +116,7 @@ export class Guide {
     });
   }
 
-  /** The scene has told where its camera starts: its tours come, and a shared view is taken. */
+  /** A scene was entered: takes the shared view of the address and loads the tours. */
   private async enter(scene_id: string): Promise<void> {
     const { navigation, view, notice, toolbar } = this.parts_;
     const token = this.parts_.token.value;
@@ -124,7 +124,7 @@ export class Guide {
     const shared = read_shared(location.href);
     if (shared.eye) this.apply_shared();
     const { document, may_save } = await fetch_tours(location.href, token, scene_id);
-    if (load !== this.loads_) return; // another scene was entered meanwhile
+    if (load !== this.loads_) return; // the visitor entered another scene meanwhile
     const { camera } = navigation;
     const aspect = view.clientWidth / Math.max(1, view.clientHeight);
     const { tours, start, problems } = read_document(document, camera.up, camera.fov_y_rad, aspect);
@@ -135,7 +135,7 @@ export class Guide {
     }
     this.tour_view_.show_tours(tours);
     this.author_?.load(tours, may_save ? token : undefined, document.etag);
-    // A link to a view or a stop is not led away from there, and neither is an author.
+    // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const stays =
       shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
     this.player_.load(

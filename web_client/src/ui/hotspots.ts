@@ -7,7 +7,7 @@ import type { WorkerClient } from '../worker/client';
 import { by_id } from './dom';
 import type { Navigation } from './navigation';
 
-/** The stops of a tour in the picture: buttons where the scene has them. */
+/** Shows the stops of a tour as buttons in the picture. */
 export class Hotspots {
   private readonly host_ = by_id('hotspots', HTMLElement);
   private tour_: Tour | undefined;
@@ -25,7 +25,7 @@ export class Hotspots {
       // A label may hide what is behind it (WCAG 1.4.13).
       if (code === 'Escape') this.host_.classList.add('labels-dismissed');
     });
-    // They keep to what is shown: a warped picture to the camera, any other to its own pose.
+    // A warped picture shows the newest camera, any other picture its own pose. Hotspots follow that.
     worker.on('presenter', ({ warps }) => {
       this.warps_ = warps;
     });
@@ -38,7 +38,7 @@ export class Hotspots {
     });
   }
 
-  /** `eye`: where the scene is seen from. */
+  /** `eye`: the camera of the view. */
   show({ tour, stop }: TourState, eye: Eye): void {
     if (tour !== this.tour_) this.show_tour(tour);
     for (const { stop: other, button } of this.spots_) {
@@ -84,7 +84,7 @@ export class Hotspots {
   }
 }
 
-/** Title and caption, shown to who points at the hotspot or goes to it by keys. */
+/** Title and caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
 function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLElement {
   const label = document.createElement('span');
   label.className = 'hotspot-label';
@@ -93,7 +93,7 @@ function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLEle
   name.textContent = stop.title || text.tour.stop_numbered(index + 1);
   label.append(name);
   if (stop.caption) {
-    // It describes the button, whose name is the title alone.
+    // The title alone is the name of the button; the caption describes it.
     const caption = document.createElement('span');
     caption.className = 'hotspot-caption';
     caption.id = `hotspot-caption-${index}`;

@@ -1,4 +1,4 @@
-// How a visitor moves through the scene: pointers, keys, sticks, places pointed at, and flights.
+// Moves the visitor through the scene: by pointers, keys, sticks, places pointed at, and flights.
 import { browser_timers, type Clock } from '../base/clock';
 import { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
@@ -20,11 +20,11 @@ import type { WorkerClient } from '../worker/client';
 export class Navigation {
   readonly camera = new CameraController();
   readonly loop: CameraLoop;
-  /** The visitor is in another scene than before. */
+  /** The visitor has entered another scene. */
   readonly entered = new Signal<{ scene: SceneFacts; scene_ids: readonly string[] }>();
-  /** A gesture, a key or a stick moves the camera from here on. */
+  /** The visitor has begun to move the camera by a gesture, a key or a stick. */
   readonly taken_over = new Signal();
-  /** Mode or field of view may be others now. */
+  /** The mode or the field of view may have changed. */
   readonly changed = new Signal();
   readonly sampled = new Signal<CameraSample>();
   readonly pad_pressed = new Signal<GamepadAction>();
@@ -53,13 +53,13 @@ export class Navigation {
     worker.on('welcome', ({ welcome }) => this.welcomed(welcome));
     worker.on('picked', ({ id, distance }) => this.picks_.answered(id, distance));
     worker.on('presenter', ({ overscan }) => {
-      // The newest picture has another field of view: a sample makes the server draw it anew.
+      // Pictures need another field of view from now on. A new sample makes the server render one.
       if (overscan.y !== this.overscan_.y || overscan.x !== this.overscan_.x) this.loop.changed();
       this.overscan_ = overscan;
     });
   }
 
-  /** '' before the first one. */
+  /** Id of the scene; '' before the first one. */
   get scene_id(): string {
     return this.scene_id_ ?? '';
   }
@@ -113,7 +113,7 @@ export class Navigation {
     this.set_mode(camera_modes[next % camera_modes.length]!);
   }
 
-  /** What is in the middle of the view; undefined: nothing. */
+  /** The point in the middle of the view; undefined: nothing is there. */
   place_ahead(): Promise<Vec3 | undefined> {
     return this.place_at(0.5, 0.5);
   }
@@ -150,7 +150,7 @@ export class Navigation {
     this.loop.wake();
   }
 
-  /** The camera was put somewhere else. */
+  /** Something other than a gesture has moved the camera. */
   private moved(): void {
     this.changed.emit();
     this.loop.changed();
@@ -165,7 +165,7 @@ export class Navigation {
     this.entered.emit({ scene, scene_ids: sceneIds });
   }
 
-  /** The camera turns to what is there, unless the visitor pointed elsewhere meanwhile. */
+  /** Turns the camera to what is there, unless the visitor pointed elsewhere meanwhile. */
   private async point_at(x: number, y: number): Promise<void> {
     const pointed = ++this.pointed_;
     const place = await this.place_at(x, y);
@@ -174,7 +174,7 @@ export class Navigation {
     this.loop.wake();
   }
 
-  /** Of the scene, at shares of the view's width and height. */
+  /** Point of the scene. `x`, `y`: shares of the view's width and height, y down. */
   private place_at(x: number, y: number): Promise<Vec3 | undefined> {
     const aspect = this.view_.clientWidth / Math.max(1, this.view_.clientHeight);
     return this.picks_.at(ray_through(this.eye, x, y, aspect));

@@ -1,6 +1,6 @@
 import type { WorkerClient } from '../worker/client';
 
-/** Tells the worker when the page is hidden, has its network back, or goes. */
+/** Tells the worker when the page is hidden, is online again, or closes. */
 export function bind_page_events(worker: WorkerClient): void {
   let waits = false;
   worker.on('state', ({ state }) => {

@@ -7,7 +7,7 @@ import type { StreamSize } from './stream_size';
 
 const degrees = 180 / Math.PI;
 
-/** Size and rate of pictures, smooth turning and field of view. */
+/** The panel for size and rate of pictures, smooth turning and field of view. */
 export class QualityPanel {
   private readonly fov_ = by_id('view-fov', HTMLInputElement);
   private readonly fov_value_ = by_id('view-fov-value', HTMLElement);

@@ -9,7 +9,7 @@ import { broken_card, card_for } from './wording';
 
 const first_card_after_ms = 300; // a fast connection shows its picture without a flash of cards
 
-/** Says how the session stands, and takes what the visitor answers. */
+/** Shows the state of the session on the card, and passes on the visitor's answers. */
 export class SessionStatus {
   private state_: SessionState = { phase: 'connecting', attempt: 0 };
   private has_picture_ = false;
@@ -37,7 +37,7 @@ export class SessionStatus {
     setTimeout(() => this.show(), first_card_after_ms);
   }
 
-  /** For good: something broke, and the card that says so must stay. */
+  /** Ends the session for good. The card with the error stays. */
   break_off(message: string): void {
     this.broken_ = true;
     this.worker_.post({ kind: 'stop' });
@@ -58,7 +58,7 @@ export class SessionStatus {
     document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
   }
 
-  /** Without a welcome nobody has said which scenes there are. */
+  /** Asks for the list of scenes, because no welcome has brought it. */
   private async offer_scenes(): Promise<void> {
     this.scene_ids_ = await list_scenes(location.href, this.token_.value);
     this.show();

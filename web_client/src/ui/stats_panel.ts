@@ -9,7 +9,7 @@ import type { Toolbar } from './toolbar';
 
 const interval_ms = 250;
 
-/** What the server said of itself, and how this page shows pictures. */
+/** Facts about the server, and how this page shows pictures. */
 interface Facts {
   readonly renderer: string;
   readonly encoder: string;
@@ -84,7 +84,7 @@ export class StatsPanel {
   }
 
   private show(report: StatsReport): void {
-    const { last_motion, ...stats } = report; // an earlier sample of the history has that
+    const { last_motion, ...stats } = report; // earlier samples of the history have it
     this.history_.add(stats, performance.now());
     const note = rest_note(report);
     this.rest_.hidden = note === '';
@@ -101,7 +101,7 @@ export class StatsPanel {
     if (!this.opened_) void this.load_charts();
   }
 
-  /** Most visitors never look: the plots come when somebody does. */
+  /** Loads the plots on first use, because most visitors never look. */
   private async load_charts(): Promise<void> {
     this.opened_ = true;
     try {

@@ -1,4 +1,4 @@
-// What the statistics overlay says. Pure.
+// Texts of the statistics overlay. Pure.
 import type { StatsReport, StatsSnapshot } from '../stats/metrics';
 import { text } from '../text';
 
@@ -13,7 +13,7 @@ interface Row {
 
 const nothing = '–';
 
-/** `digits` behind the point, and one dash for all values when one was not measured. */
+/** Formats with `digits` decimals. Gives one dash for all values when one of them was not measured. */
 function measured(values: readonly number[], digits: number, unit: string): string {
   if (!values.every(Number.isFinite)) return nothing;
   return `${values.map((v) => v.toFixed(digits)).join(' / ')} ${unit}`;
@@ -26,7 +26,7 @@ const stage_row = (stage: Stage): Row => ({
   stage,
 });
 
-/** Where most of a frame's time goes; undefined before anything was measured. */
+/** The stage that takes most of a frame's time; undefined before a measurement. */
 export function slowest_stage(stages_ms: StatsSnapshot['stages_ms']): Stage | undefined {
   const stages = Object.keys(stages_ms) as Stage[];
   return stages
@@ -34,7 +34,7 @@ export function slowest_stage(stages_ms: StatsSnapshot['stages_ms']): Stage | un
     .sort((a, b) => stages_ms[b] - stages_ms[a])[0];
 }
 
-/** A dash before anything was shown. */
+/** Gives a dash before the first picture. */
 const once_shown =
   (value: (stats: StatsSnapshot) => string) =>
   (stats: StatsSnapshot): string =>
@@ -71,7 +71,7 @@ export const stats_rows: readonly Row[] = [
   },
 ];
 
-/** What the rows say: at rest nothing is measured, and what was measured last stays to be read. */
+/** Texts of the rows. Nothing is measured at rest, so rows keep the last measured values. */
 export function row_texts(stats: StatsReport): { readonly text: string; readonly kept: boolean }[] {
   return stats_rows.map((row) => {
     const now = row.text(stats);
@@ -81,7 +81,7 @@ export function row_texts(stats: StatsReport): { readonly text: string; readonly
   });
 }
 
-/** Why some rows are paler, or have nothing; empty while the camera moves. */
+/** Says why some rows are paler or empty; empty while the camera moves. */
 export function rest_note({ frames_shown, stages_ms, last_motion }: StatsReport): string {
   if (frames_shown === 0 || Number.isFinite(stages_ms.render)) return '';
   return Number.isFinite(last_motion.stages_ms.render) ? text.stats.at_rest : text.stats.not_moved;

@@ -5,7 +5,7 @@ import type { WorkerClient } from '../worker/client';
 const resize_quiet_ms = 200;
 const look_interval_ms = 1000;
 
-/** Asks for pictures as large as the view, the visitor's choice and the server's speed make them. */
+/** Asks the server for picture sizes that suit the view, the visitor's choice and the server's speed. */
 export class StreamSize {
   private readonly choice_ = new QualityChoice();
   private is_live_ = false;

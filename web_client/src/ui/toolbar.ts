@@ -8,12 +8,12 @@ import type { Navigation } from './navigation';
 const panels = ['quality', 'stats', 'share', 'author', 'help'] as const;
 type Panel = (typeof panels)[number];
 
-// Here one panel leaves little of the picture to see.
+// Screens on which one panel covers most of the picture.
 const small_screen = '(max-width: 800px), (max-height: 500px)';
-// Here a panel hides the tour's card: tour.css has the same.
+// Screens on which a panel hides the tour's card. tour.css has the same.
 const no_room_for_card = '(max-width: 1100px), (max-height: 500px)';
 
-/** Buttons, their panels and their keys. */
+/** The buttons, their panels and their keys. */
 export class Toolbar {
   readonly panel_shown = new Signal<{ panel: Panel; shown: boolean }>();
   private readonly bar_ = by_id('toolbar', HTMLElement);
@@ -37,7 +37,7 @@ export class Toolbar {
     this.set_active(true);
   }
 
-  /** Off while there is nothing to control: a card then says why. */
+  /** Turns the toolbar off while there is nothing to control. A card then says why. */
   set_active(active: boolean): void {
     this.bar_.inert = !active;
     if (!active) this.close_all();
@@ -47,7 +47,7 @@ export class Toolbar {
     if (!this.is_open(panel)) this.toggle(panel);
   }
 
-  /** For the picture and the tour's card, where panels would hide them. */
+  /** Closes panels where they hide the picture or the tour's card. */
   make_room(): void {
     if (matchMedia(no_room_for_card).matches) this.close_all();
   }
@@ -74,7 +74,7 @@ export class Toolbar {
     if (open) this.close_beside(panel);
   }
 
-  /** Closes what would lie under this panel, and on a small screen all else. */
+  /** Closes panels under this one, and all others on a small screen. */
   private close_beside(panel: Panel): void {
     const rect = element_of(panel).getBoundingClientRect();
     for (const other of panels) {
@@ -112,7 +112,7 @@ function overlap(a: DOMRect, b: DOMRect): boolean {
   return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 }
 
-/** Lets panels.css show that a panel goes on below: phones show no scroll bars. */
+/** Lets panels.css show that a panel scrolls further, because phones show no scroll bars. */
 function hint_at_more(panel: HTMLElement): void {
   const look = (): void => {
     const below_px = panel.scrollHeight - panel.clientHeight - panel.scrollTop;

@@ -4,7 +4,7 @@ import type { TourPlayer, TourState } from '../tour/player';
 import type { Tour } from '../tour/tour';
 import { by_id, on_click } from './dom';
 
-/** Caption and buttons of the tour, and its keys. */
+/** The card of a tour: caption, buttons and keys. */
 export class TourView {
   private readonly card_ = by_id('tour', HTMLElement);
   private readonly choice_ = by_id('tour-choice', HTMLSelectElement);

@@ -1,4 +1,4 @@
-// Makes the parts of the page and starts the worker. Parts hear from each other by themselves.
+// Makes the parts of the page and starts the worker. Parts listen to each other without passing through here.
 import { local_storage, session_storage } from '../base/browser_storage';
 import { clock_from } from '../base/clock';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
@@ -23,7 +23,7 @@ import { StreamSize } from './stream_size';
 import { Toolbar } from './toolbar';
 import { jpeg_reason } from './wording';
 
-/** Returns the part that can say that the page is broken. */
+/** Returns the part that shows fatal errors of the page. */
 export function mount_viewer(card: CardView): SessionStatus {
   const wishes = new URLSearchParams(location.search);
   const view = by_id('view', HTMLElement);
@@ -31,7 +31,7 @@ export function mount_viewer(card: CardView): SessionStatus {
   const token = new AccessToken(location, history, session_storage());
   const reduced_motion = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const rung = remembered_rung(local_storage(), navigator.userAgent, Date.now());
-  // In another page's frame: nothing but the picture, and the tour where there is one.
+  // `?ui=0`, for frames of other pages: nothing but the picture and the tour.
   document.body.classList.toggle('bare', wishes.get('ui') === '0');
 
   const worker = new WorkerClient();
@@ -79,6 +79,6 @@ export function mount_viewer(card: CardView): SessionStatus {
   return status;
 }
 
-/** `?presenter=webgl2` and `?presenter=2d` override the choice by what the GPU can do. */
+/** `?presenter=webgl2` and `?presenter=2d` override the page's own choice. */
 const presenter_choice = (wanted: string | null): PresenterChoice =>
   wanted === 'webgl2' || wanted === '2d' ? wanted : 'auto';

@@ -23,7 +23,7 @@ export class WorkerClient {
       else this.signals_.get(data.kind)?.emit(data);
     };
     this.worker_.onerror = (event) => {
-      // A worker that could not be loaded at all says nothing more than that.
+      // The event has no message when the worker could not be loaded at all.
       const message = event.message || 'the worker could not be loaded';
       this.signals_.get('broken')?.emit({ kind: 'broken', message });
     };

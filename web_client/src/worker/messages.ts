@@ -1,4 +1,4 @@
-// What page and worker say to each other. Structured clones: plain data only.
+// Messages between page and worker. They are structured clones, so they hold plain data only.
 import type { Pose, CameraSample } from '../camera/eye';
 import type { PathSample } from '../camera/flight';
 import type { Ray } from '../camera/ray';
@@ -13,9 +13,9 @@ import type { StatsReport } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
 
 export interface Snapshot {
-  /** Of the newest picture. */
+  /** Header of the newest picture. */
   readonly header: FrameHeader;
-  /** What the canvas shows: that picture, warped to where the camera was when it was drawn. */
+  /** Camera of the canvas: the picture is warped to where the camera was when it was drawn. */
   readonly view: ShownView;
   readonly width_px: number;
   readonly height_px: number;
@@ -52,12 +52,12 @@ export type FromWorker =
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
   | { kind: 'presenter'; description: string; warps: boolean; overscan: Sides }
-  /** `rung` has proved to be where decoding works here. */
+  /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
-  /** The answer to a pick; undefined: nothing is there. */
+  /** Answers a pick. `distance`: undefined where nothing is there. */
   | { kind: 'picked'; id: number; distance: number | undefined }
   | { kind: 'notice'; message: string }
-  /** The decoders are at their end: the stream is asked for as JPEG pictures. */
+  /** No video decoder is left. The worker asks for JPEG pictures instead. */
   | { kind: 'fallback'; message: string }
   | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }
   | { kind: 'stats'; request: number; stats: StatsReport }

@@ -1,4 +1,4 @@
-// The worker: everything between socket and canvas, so that a busy page delays no picture.
+// The worker does everything between socket and canvas, so that a busy page delays no picture.
 import { browser_timers, clock_from } from '../base/clock';
 import type { CameraSample, Eye } from '../camera/eye';
 import { FramePipeline } from '../decode/frame_pipeline';
@@ -27,7 +27,7 @@ const scope = self as unknown as {
 
 let client: Client | undefined;
 
-// Uncaught exceptions reach the page as the worker's error event; rejections do not.
+// The page sees uncaught exceptions as the worker's error event, but no rejections.
 scope.onunhandledrejection = ({ reason }) => {
   scope.postMessage({ kind: 'broken', message: String(reason) });
 };
@@ -55,8 +55,8 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
-  private first_rung_: DecoderRung = 'prefer-hardware'; // of the stream that runs
-  private rung_: DecoderRung; // where the next decoder begins on the ladder
+  private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
+  private rung_: DecoderRung; // where the next stream begins on the ladder
 
   constructor(start: Start) {
     this.clock_ = clock_from(start.page_origin_ms);
@@ -208,7 +208,7 @@ class Client {
     );
   }
 
-  /** Sizes and fields of view go together. */
+  /** Frame sizes and fields of view change together, with the overscan. */
   private send_sizes(): void {
     this.session_.set_viewport(this.view_.width_px, this.view_.height_px);
     this.session_.send_settings(settings(this.view_, this.quality_, this.display_.overscan));
@@ -228,7 +228,7 @@ class Client {
     });
   }
 
-  /** What failed is not tried again: the next stream begins with what worked. */
+  /** Decoders that failed are not tried again. The next stream begins with the one that worked. */
   private async make_decoder(
     config: StreamConfig,
     failures: number,
@@ -267,7 +267,7 @@ class Client {
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
 
-/** Frame sizes: the chosen heights or the view's, in the view's shape, with overscan. */
+/** Frame sizes: the chosen heights or those of the view, in the view's aspect, with overscan. */
 function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
   const width_px = (height_px: number): number =>
     frame_side(height_px * aspect_of(view) * overscan.x);
@@ -282,5 +282,5 @@ function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
   };
 }
 
-/** Within the limits of the wire, and even: 4:2:0 video has no odd sides. */
+/** Limits a side to the range of the wire and makes it even, because 4:2:0 video has no odd sides. */
 const frame_side = (px: number): number => Math.min(8192, Math.max(16, Math.round(px / 2) * 2));
