@@ -22,7 +22,7 @@ namespace catgs {
 namespace {
 
 constexpr std::uint64_t max_bytes = 4 << 20;
-// Those of web_client/src/tour/tour.ts, which reads what is sent here.
+// web_client/src/tour/limits.ts has the same; tests/web_client/tours.test.ts compares them.
 constexpr std::size_t max_tours = 32;
 constexpr std::size_t max_stops = 256;
 constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters

@@ -1,5 +1,5 @@
-// Puts the texts of src/text.ts into index.html, where {{page.view}} names one. At build time: what
-// must be readable without a script is, and the page does not change while it loads.
+// Puts the texts of src/text.ts into index.html, where {{page.view}} names one. The build does this, so
+// that the texts are readable without a script and the page does not change while it loads.
 import { text } from './src/text';
 
 function text_called(key: string): string {

@@ -1,7 +1,7 @@
 import { defineConfig, loadEnv } from 'vite';
 import { with_texts } from './page_texts';
 
-/** What is used here of Node.js's http.IncomingMessage. */
+/** The part of http.IncomingMessage (Node.js) that this file uses. */
 interface Request {
   readonly url?: string | undefined;
   readonly headers: { readonly upgrade?: string | undefined };
@@ -10,8 +10,8 @@ interface Request {
 export default defineConfig(({ mode }) => {
   const target = loadEnv(mode, '.', 'CATGS_')['CATGS_SERVER_URL'] ?? 'http://127.0.0.1:8080';
   return {
-    // The server's Content-Security-Policy allows files of its own only: nothing is inlined, and
-    // paths are relative so that the page works below any prefix of a reverse proxy.
+    // Nothing is inlined, because the server's Content-Security-Policy allows its own files only.
+    // Paths are relative, so that the page works below any prefix of a reverse proxy.
     base: './',
     plugins: [{ name: 'page-texts', transformIndexHtml: { order: 'pre', handler: with_texts } }],
     build: {
@@ -22,11 +22,11 @@ export default defineConfig(({ mode }) => {
       reportCompressedSize: false,
     },
     worker: { format: 'es' },
-    // `npm run dev`: pages from here, all else from a catgs-server.
+    // `npm run dev` serves the page from here and all else from a catgs-server.
     server: {
       proxy: {
         '/api': { target },
-        // The client's socket is at '/' like the page, which stays here; Vite's is at '/?token=…'.
+        // The client's socket is at '/', like the page that Vite serves. Vite's own is at '/?token=…'.
         '^/$': {
           target,
           ws: true,

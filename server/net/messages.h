@@ -45,7 +45,6 @@ struct Hello {
   std::uint32_t version = 0;
   std::string scene_id;
   glm::ivec2 viewport_px{0};
-  float device_pixel_ratio = 1.0f;
   std::vector<Codec> decoders;  // best first
   std::string token;
   std::string resume_token;
@@ -62,7 +61,6 @@ struct Ack {
   std::int64_t presented_us = 0;
   bool dropped = false;
   std::uint32_t pose_age_us = 0;
-  std::uint32_t decoder_queue = 0;
 };
 
 struct SelectScene {

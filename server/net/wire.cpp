@@ -132,8 +132,6 @@ Hello parse(const v1::Hello& message) {
       static_cast<int>(checked("hello.viewport_width_px", message.viewport_width_px(), 16u, 8192u)),
       static_cast<int>(
           checked("hello.viewport_height_px", message.viewport_height_px(), 16u, 8192u))};
-  hello.device_pixel_ratio =
-      checked("hello.device_pixel_ratio", message.device_pixel_ratio(), 0.25f, 8.0f);
   checked("hello.decoders count", message.decoders_size(), 0, max_decoders);
   for (const int codec : message.decoders()) {
     if (codec == v1::CODEC_H264) hello.decoders.push_back(Codec::h264);
@@ -159,7 +157,6 @@ Ack parse(const v1::Ack& message) {
   ack.presented_us = time("ack.presented_us", message.presented_us());
   ack.dropped = message.dropped();
   ack.pose_age_us = std::min(message.pose_age_us(), max_pose_age_us);
-  ack.decoder_queue = message.decoder_queue();
   return ack;
 }
 

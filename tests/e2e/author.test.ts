@@ -1,9 +1,9 @@
 // Making a tour in the browser, and saving it to the real server.
 import { mkdirSync, readFileSync, rmSync, unlinkSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Pose } from '#client/camera/eye';
 import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import {
@@ -27,7 +27,7 @@ const open_pages: WatchedPage[] = [];
 
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '100000');
-  unlinkSync(sidecar); // that of a scene that was made
+  unlinkSync(sidecar); // the sidecar of the scene that was just made
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   browser = await launch_browser();
   workshop = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
@@ -43,7 +43,7 @@ afterAll(async () => {
   remove();
 });
 
-/** By a link of the role. */
+/** Opens the page by a link of the role. */
 async function open_as(
   role: string,
   query = '',
@@ -57,7 +57,7 @@ async function open_as(
 }
 
 describe('an author', () => {
-  /** Two stops, the second one made first in the order; visits begin at it. */
+  /** Makes two stops, moves the second one to the front, and lets visits begin there. */
   async function make_tour(page: Page): Promise<Pose> {
     await page.getByRole('region', { name: 'Make a tour' }).waitFor();
     const start = await pose_of(page);
@@ -104,7 +104,7 @@ describe('an author', () => {
     expect(distance(start, await pose_of(visitor.page))).toBeLessThan(1e-3);
     expect(visitor.errors).toEqual([]);
 
-    // What the server refuses is said in its words, and the work is not lost.
+    // The page shows the server's reason for a refusal, and keeps the work.
     const in_the_way = path.join(folder, '.mine.json.new');
     mkdirSync(in_the_way);
     await page.getByLabel('Title of stop 2').focus();

@@ -1,8 +1,8 @@
 // Each control by each input device, against a server that follows a script.
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, CDPSession, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
-import { rotate, sub, conjugate, type Vec3 } from '#client/camera/vector';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import { rotate, sub, conjugate, type Vec3 } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
 import { launch_browser, new_page, type WatchedPage } from './support/browser';
 import { pose_of, settle } from './support/camera';
 import { start_fake_server, type FakeServer } from './support/fake_server';
@@ -36,9 +36,9 @@ async function open(touch = false): Promise<Page> {
 }
 
 interface Change {
-  /** In the axes of the camera before: x right, y down, z forward. */
+  /** In the camera axes before the movement: x right, y down, z forward. */
   readonly moved: Vec3;
-  /** Where the camera's axis went, in the same axes. */
+  /** The new view axis, in the same axes. */
   readonly axis: Vec3;
 }
 
@@ -136,7 +136,7 @@ describe('the mouse', () => {
       await page.mouse.move(320, 180);
       await page.mouse.down({ button });
       await page.mouse.move(400, 180, { steps: 5 });
-      await page.waitForTimeout(300); // a hand that rests lets go without a glide
+      await page.waitForTimeout(300); // a hand that rests before it lets go starts no glide
       await page.mouse.up({ button });
     };
     const orbited = await change_by(page, drag('left'));

@@ -1,4 +1,4 @@
-// The page as `npm run dev` serves it: from Vite, with the session's socket handed on to a server.
+// The page as `npm run dev` serves it: Vite serves the files and passes the socket on to a server.
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { afterAll, beforeAll, expect, it } from 'vitest';

@@ -1,5 +1,5 @@
-// A server of two behind HAProxy is told to end: its visitor goes to the other one over a second
-// connection, and sees nothing of it.
+// One of two servers behind HAProxy is told to end. Its visitor moves to the other one over a second
+// connection and does not notice.
 import { writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { afterAll, beforeAll, expect, it } from 'vitest';
@@ -21,7 +21,7 @@ beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '30000');
   const key_file = path.join(folder, 'key');
   writeFileSync(key_file, 'k'.repeat(32), { mode: 0o600 });
-  // As the runbook asks: longer than the proxy takes to see /readyz fail.
+  // The runbook asks for longer than the proxy takes to see /readyz fail.
   const options = [
     ...['--resume-key-file', key_file, '--trusted-proxy', '127.0.0.1'],
     ...['--drain-wait', '4', '--drain-deadline', '20'],
@@ -38,7 +38,7 @@ afterAll(async () => {
   remove();
 });
 
-/** Watches each of the page's own frames: the longest time without a new picture, and what was said. */
+/** Watches every refresh of the page. Keeps the longest time without a new picture, and the messages. */
 function watch_pictures(page: Page): Promise<void> {
   return page.evaluate(() => {
     const seen = { shown: 0, changed_at: performance.now(), longest_ms: 0, cards: 0 };

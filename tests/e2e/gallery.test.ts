@@ -1,5 +1,5 @@
-// Every state of the page as a picture, for people to look at: desktop, phone, light and dark. What a
-// machine can tell is asked: all is inside the window, and nothing lies on the buttons.
+// Keeps every state of the page as a picture for people to look at: desktop, phone, light and dark. It
+// also checks that everything is inside the window and that nothing covers the buttons.
 import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import { Error_Code } from '#client/wire/wire';
@@ -29,7 +29,7 @@ const refused = (code: Error_Code, message: string): Script =>
   at_hello({ case: 'error', value: { code, message, fatal: true } });
 
 interface State {
-  readonly script?: Script; // a stream
+  readonly script?: Script; // undefined: a stream
   readonly query?: string;
   readonly reach: (page: Page, server: FakeServer) => Promise<void>;
 }
@@ -115,7 +115,7 @@ const states: Readonly<Record<string, State>> = {
   },
 };
 
-/** Of what is shown above the picture: what leaves the window, and what lies on the toolbar. */
+/** Elements above the picture that leave the window or cover the toolbar. */
 const misplaced = (page: Page): Promise<string[]> =>
   page.evaluate(() => {
     const bar = document.getElementById('toolbar')!.getBoundingClientRect();

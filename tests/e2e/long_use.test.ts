@@ -1,6 +1,6 @@
-// Memory of the page and of its worker while somebody uses it: half a minute of it in every test run,
-// CATGS_USE_MINUTES=10 for more. What V8 uses in all also has compiled code in it, which comes and goes
-// with what runs often; what scripts hold has not, and must not grow.
+// Memory of the page and its worker while somebody uses them. Every test run takes half a minute;
+// CATGS_USE_MINUTES=10 takes more. V8's total includes compiled code, which comes and goes. The memory
+// that scripts hold must not grow.
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import type { Browser, Page, Worker } from 'playwright-core';
 import { launch_browser, new_page } from './support/browser';
@@ -20,8 +20,8 @@ import { start_server, stop_servers, type RunningServer } from './support/progra
 const minutes = Number(process.env['CATGS_USE_MINUTES'] ?? '0.5');
 const looks = Math.max(6, Math.ceil(minutes));
 
-// Half a minute shows some 700 pictures, ten minutes twenty times as many, so that this is a hundred
-// bytes a picture in the one and five in the other. Statistics of two minutes take half of it.
+// Half a minute shows some 700 pictures and ten minutes twenty times as many. So this is a hundred bytes
+// a picture in half a minute and five in ten. The statistics of two minutes take half of it.
 const most_growth_bytes = 64_000;
 
 let browser: Browser;
@@ -37,7 +37,7 @@ afterAll(async () => {
   await stop_servers();
 });
 
-/** Turns, flies, opens and closes what there is, changes size: once at least. Returns how often. */
+/** Turns, flies, opens and closes every panel, and changes the size, at least once. Returns how often. */
 async function use(page: Page, duration_ms: number): Promise<number> {
   const end_ms = Date.now() + duration_ms;
   let round = 0;
@@ -86,7 +86,7 @@ async function count_made(worker: Worker): Promise<() => Promise<Made>> {
   return () => worker.evaluate(() => (globalThis as unknown as { made: Made }).made);
 }
 
-/** A heap, looked at now and then. */
+/** A heap that is measured now and then. */
 class Watched {
   private readonly used_: number[] = [];
   private readonly held_: Held[] = [];
@@ -128,10 +128,10 @@ it(
       worker: new Watched('worker', await heap_of_worker(devtools)),
     };
     const made = await count_made(page.workers()[0]!);
-    await use(page, 5000); // what is made once is made
+    await use(page, 5000); // lets the page make what it makes once
     let rounds = 0;
     for (let i = 0; i < looks; ++i) {
-      // The time of looking is none of use, however long a busy machine takes for it.
+      // The time of a measurement does not count as use, however long a busy machine takes.
       rounds += await use(page, (minutes * 60_000) / looks);
       for (const heap of Object.values(heaps)) await heap.look();
     }
@@ -139,8 +139,8 @@ it(
       console.log(heap.report());
       expect(heap.growth_bytes(), heap.report()).toBeLessThan(most_growth_bytes);
     }
-    // Pictures changed their size at each stop: the decoder was told, not replaced. A connection that a
-    // busy machine lost needs one.
+    // Pictures changed their size at each stop, and the same decoder went on. A connection that a busy
+    // machine lost needs a new one.
     const { VideoDecoder: decoders, WebSocket: connections } = await made();
     console.log(`${rounds} rounds of use; made anew: ${decoders} decoders, ${connections} connections`);
     expect(decoders).toBeLessThanOrEqual(connections);

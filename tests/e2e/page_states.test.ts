@@ -1,4 +1,4 @@
-// What the page says and does in each situation, against a server that follows a script.
+// The page in each situation, against a server that follows a script.
 import { readdir, readFile } from 'node:fs/promises';
 import path from 'node:path';
 import { gzipSync } from 'node:zlib';
@@ -101,7 +101,7 @@ describe('page', () => {
     const { page } = await new_page(browser);
     await page.goto(server.url);
     await page.evaluate(() => {
-      // Thrown from here it would come muted ("Script error."), as from another site.
+      // An error thrown from here would come muted ("Script error."), like one from another site.
       window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' }));
     });
     await page.getByText('This page ran into an error').waitFor();
@@ -121,7 +121,7 @@ describe('page', () => {
     await page.goto(`${server.url}#token=wrong`);
     await page.getByText('Access token needed').waitFor();
     await keep_screenshot(page, 'fake-token');
-    // Nothing to control yet: neither the buttons nor their keys.
+    // There is nothing to control yet, so neither buttons nor keys work.
     await page.keyboard.press('KeyH');
     expect(await page.locator('#help-panel').isHidden()).toBe(true);
     expect(await page.locator('#toolbar').getAttribute('inert')).not.toBeNull();

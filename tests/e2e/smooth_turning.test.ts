@@ -1,11 +1,11 @@
-// Frames as they are really shown while the camera turns, over a slow link: are things where they
-// belong? The canvas is compared with what catgs-render draws for the camera of that moment.
+// Checks that things are where they belong while the camera turns over a slow link. It compares the canvas
+// with what catgs-render draws for the camera of that moment.
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, beforeAll, expect, it } from 'vitest';
 import type { Browser, Page } from 'playwright-core';
-import { angle_between } from '#client/camera/flight';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, beforeAll, expect, it } from 'vitest';
+import { angle_between } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
 import { choose_full_size, launch_browser, new_page } from './support/browser';
 import { start_delay_proxy, type DelayProxy } from './support/delay_proxy';
 import { read_png, type Picture } from './support/pictures';
@@ -38,7 +38,7 @@ afterAll(async () => {
 
 interface Capture {
   readonly picture: Picture;
-  readonly drawn: Pose; // the camera as which the canvas was drawn
+  readonly drawn: Pose; // the camera with which the canvas was drawn
   readonly now: Pose; // where the camera was when the canvas was read
   readonly fov_y_rad: number;
   readonly uncovered: number;
@@ -61,7 +61,7 @@ async function open(warp: 'on' | 'off'): Promise<Page> {
   return page;
 }
 
-/** Turns to and fro, and reads the canvas now and then in the middle of a sweep. */
+/** Turns to and fro, and reads the canvas in the middle of some sweeps. */
 async function captures_while_turning(page: Page, count: number): Promise<Capture[]> {
   const raw = await page.evaluate(
     async ([rate, wanted]) => {
@@ -112,7 +112,7 @@ async function captures_while_turning(page: Page, count: number): Promise<Captur
   }));
 }
 
-/** Median shift of blocks between a capture and what belongs there. */
+/** Median shift of blocks between a capture and its reference. */
 async function error_px(page: Page, name: string, shot: Capture, at: Pose): Promise<number> {
   const out = path.join(folder, name);
   mkdirSync(out, { recursive: true });
@@ -154,7 +154,7 @@ it('things stay where they are while the camera turns over a slow link', async (
   );
   expect(errors.every(Number.isFinite)).toBe(true);
   expect(median(errors)).toBeLessThanOrEqual(1);
-  // The largest overscan reaches this far; a machine that is busier lags more, and shows it above.
+  // The largest overscan reaches this far. A busier machine lags more, and the figures above show it.
   const reached = captures.filter(({ lag_deg }) => lag_deg < 10);
   expect(Math.max(0, ...reached.map((shot) => shot.uncovered))).toBeLessThanOrEqual(0.01);
 });

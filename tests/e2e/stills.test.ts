@@ -1,10 +1,10 @@
-// What the visitor sees is what catgs-render renders: through encoder, wire, decoder and canvas.
+// Visitors see what catgs-render renders, after encoder, wire, decoder and canvas.
 import { readdirSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
-import { axis_angle, multiply } from '#client/camera/vector';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import { axis_angle, multiply } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
 import { choose_full_size, keep_screenshot, launch_browser, new_page } from './support/browser';
 import {
   coverage,
@@ -33,7 +33,7 @@ afterAll(async () => {
   remove();
 });
 
-/** A page that shows pictures of its own size. */
+/** A page with pictures of the size of its view. */
 async function open(url: string): Promise<Page> {
   const { page } = await new_page(browser);
   await page.goto(url);
@@ -91,8 +91,8 @@ describe('stills', () => {
   });
 });
 
-// Primaries, secondaries, greys and a skin tone: a mixed-up matrix or range moves at least one of
-// them by far more than the bound.
+// Primaries, secondaries, greys and a skin tone. A wrong matrix or range moves at least one of them by
+// far more than the bound.
 const colours: readonly (readonly [string, number, number, number])[] = [
   ['red', 255, 0, 0],
   ['green', 0, 255, 0],

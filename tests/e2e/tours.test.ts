@@ -4,9 +4,9 @@ import { createServer } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Pose } from '#client/camera/eye';
 import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
@@ -55,7 +55,7 @@ beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '100000');
   write_tour();
   browser = await launch_browser();
-  // However busy this machine is, a second visitor is let in.
+  // A second visitor gets in, however busy this machine is.
   server = await start_server(scene, ['--min-fps', '0']);
 });
 
@@ -123,7 +123,7 @@ describe('a tour', () => {
     const box = (await label.boundingBox())!;
     expect([box.x > 0, box.y > 0, box.x + box.width < 1280, box.y + box.height < 720]).not.toContain(false);
     await keep_screenshot(page, 'hotspot-hover');
-    // It stays for a pointer that goes there to read it, and goes for who wants to see what it hides.
+    // It stays while the pointer is on it, and Escape hides it for visitors who want to see behind it.
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2, { steps: 8 });
     expect(await opacity()).toBe('1');
     await page.keyboard.press('Escape');
@@ -143,7 +143,7 @@ describe('a tour', () => {
     await keep_screenshot(page, 'hotspot-keys');
     await page.keyboard.press('Enter');
     await page.getByText('2 of 2').waitFor();
-    // There the card has the caption.
+    // The card shows the caption there.
     expect(await label.innerText()).not.toContain('Markets');
 
     const phone = await open({ viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true });
@@ -176,7 +176,7 @@ describe('a tour', () => {
     const gallery = await start_server(exported);
     const { page } = await open(desktop, gallery.url);
     const start = await pose_of(page);
-    // Its first camera is where a visit begins; that viewer has x and y the other way round.
+    // A visit begins at its first camera. x and y have the opposite sign in that viewer.
     start.position.forEach((v, i) => expect(v).toBeCloseTo([-2, -1.5, -4][i]!, 4));
     const choice = page.getByLabel('Choose a tour');
     expect(await choice.locator('option').allInnerTexts()).toEqual(['Tour 1', 'cameraAnim']);
@@ -299,7 +299,7 @@ describe('sharing', () => {
     await expect
       .poll(async () => (await heard())[0], patience)
       .toMatchObject({ catgs: 'ready', scene: 'city', stops: ['From afar', 'The square'] });
-    // The code for it says who may use it.
+    // The panel says who may use the code.
     const { page: sharing } = await open(desktop, embeddable.url);
     await sharing.getByRole('button', { name: 'Share' }).click();
     expect(await sharing.locator('#share-frames').isHidden()).toBe(true);

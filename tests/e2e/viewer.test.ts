@@ -1,10 +1,10 @@
-// The client against the real server: what a visitor does, and what happens when things go wrong.
+// The client against the real server: what visitors do, and what happens when things fail.
 import { execFileSync } from 'node:child_process';
 import { cpSync, mkdtempSync, readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { Pose } from '#client/camera/eye';
 import type { StatsSnapshot } from '#client/stats/metrics';
 import {
   choose_full_size,
@@ -341,7 +341,7 @@ describe('trouble', () => {
   });
 
   it('a page that is no secure context gets JPEG pictures and says how to get video', async () => {
-    // By a name of its own the server answers only when it was told that name.
+    // The server answers to another host name only when it was told that name.
     const plain = await start_server(scene, ['--allow-origin', `http://${insecure_host}`]);
     const { page } = await open_viewer(undefined, plain.url.replace('127.0.0.1', insecure_host));
     await page.getByText('browsers offer their video decoder (WebCodecs) on https://').waitFor();

@@ -47,8 +47,15 @@ LAYERS = {name: rank for rank, line in enumerate([
     "render_core/metrics render_core/reference render_core/cpu render_core/cuda", "render_core/make_renderer",
     "render_core/synth", "render_core/tools",
     "render_core/tools/bench render_core/tools/render render_core/tools/trace", "render_core/tools/paper",
+    "web_client/src/base web_client/src/text web_client/src/wire",
+    "web_client/src/camera web_client/src/decode web_client/src/transport",
+    "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour",
+    "web_client/src/worker",
+    "web_client/src/ui",
+    "web_client/src/ui/viewer",
+    "web_client/src/main",
 ]) for name in line.split()}
-LAYERED = re.compile(r"^render_core/")
+LAYERED = re.compile(r"^render_core/|^web_client/src/(?!wire/generated/)")
 
 
 INCLUDE_RULES = [
@@ -74,6 +81,8 @@ INCLUDE_RULES = [
 IMPORT_RULES = [
     IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|/generated/",
                 "src/wire alone speaks protobuf"),
+    IncludeRule(r"^web_client/src/ui/", r"^\.\./(transport/|worker/worker$|session/session$)",
+                "the page speaks to the worker through worker/client"),
 ]
 
 class BannedCall(NamedTuple):
@@ -181,7 +190,9 @@ def layer_of(path: str) -> str:
 
 
 def layer_findings(path: str, number: int, target: str) -> Iterator[str]:
-    """What is wrong with an #include of `target` in line `number` of `path`, by LAYERS."""
+    """What is wrong with an #include or import of `target` in line `number` of `path`, by LAYERS."""
+    if target.startswith("."):
+        target = os.path.normpath(os.path.join(os.path.dirname(path), target))
     own, other = layer_of(path), layer_of(target)
     if LAYERED.search(path) and LAYERED.search(target) and own != other:
         if unknown := [layer for layer in (own, other) if layer not in LAYERS]:

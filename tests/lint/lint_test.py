@@ -52,6 +52,17 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("speaks protobuf", "web_client/src/ui/panel.ts",
                         'import { Pose } from "../wire/generated/catgs_pb";')
 
+    def test_layers_of_the_client(self):
+        self.assertEqual(self.findings("web_client/src/ui/a.ts", "import { b } from './b';",
+                                       "import type { Eye } from '../camera/eye';"), [])
+        self.assertEqual(self.findings("web_client/src/main.ts", "import { a } from './ui/viewer';"), [])
+        for path, module in [("camera/a.ts", "../present/warp"), ("input/a.ts", "../tour/tour"),
+                             ("base/a.ts", "../text"), ("ui/a.ts", "./viewer"), ("ui/a.ts", "../main")]:
+            self.expect_one("does not lie above", f"web_client/src/{path}", f"}} from '{module}';")
+        self.expect_one("is not in LAYERS", "web_client/src/new/a.ts", "import { b } from '../base/b';")
+        self.expect_one("is not in LAYERS", "web_client/src/ui/a.ts", "import { b } from '../new/b';")
+        self.expect_one("through worker/client", "web_client/src/ui/a.ts", "import '../worker/worker';")
+
     def test_length_marker_words_and_guards(self):
         self.expect_one("lines, the limit", "server/a.cpp", *["int x;"] * (lint.MAX_LINES + 1))
         self.expect_one("marker word", "server/a.cpp", "// TO" "DO: later")

@@ -101,7 +101,6 @@ void Connection::say_hello() {
   hello.set_scene_id(settings_.scene_id);
   hello.set_viewport_width_px(static_cast<std::uint32_t>(settings_.size_px.x));
   hello.set_viewport_height_px(static_cast<std::uint32_t>(settings_.size_px.y));
-  hello.set_device_pixel_ratio(1.0f);
   hello.add_decoders(v1::CODEC_H264);
   hello.add_decoders(v1::CODEC_MJPEG);
   hello.set_token(settings_.token);
@@ -304,7 +303,6 @@ void Connection::acknowledge(v1::Ack ack, std::int64_t presented_us) {
     ack.set_decoded_us(presented_us);
     ack.set_presented_us(presented_us);
   }
-  ack.set_decoder_queue(static_cast<std::uint32_t>(decode_stage_.queued()));
   v1::ClientMessage message;
   *message.mutable_ack() = ack;
   say(message);

@@ -40,7 +40,6 @@ class DecodeStage {
   void set_scene(const v1::SceneFacts& scene) { scene_ = scene; }
   /// Decodes until it is cancelled. Throws InputError where a decoder is missing.
   boost::asio::awaitable<void> run();
-  [[nodiscard]] std::size_t queued() const { return queue_.size(); }
 
  private:
   struct Item {

@@ -252,7 +252,6 @@ v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec) {
   hello.set_version(1);
   hello.set_viewport_width_px(static_cast<std::uint32_t>(width_px));
   hello.set_viewport_height_px(static_cast<std::uint32_t>(height_px));
-  hello.set_device_pixel_ratio(1.0f);
   hello.add_decoders(codec);
   return message;
 }

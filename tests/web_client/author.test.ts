@@ -1,6 +1,6 @@
 import { afterEach, describe, expect, it, vi } from 'vitest';
-import type { SceneSetup } from '#client/camera/camera_controller';
-import { identity } from '#client/camera/vector';
+import { identity } from '#client/base/vector';
+import type { SceneSetup } from '#client/camera/scene_setup';
 import { Picks } from '#client/session/picks';
 import { TourDraft } from '#client/tour/draft';
 import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/save';

@@ -1,7 +1,4 @@
 import { describe, expect, it } from 'vitest';
-import { CameraController, type CameraMode, type SceneSetup } from '#client/camera/camera_controller';
-import { no_axes, type Axes } from '#client/camera/movement';
-import { same_view } from '#client/camera/same_view';
 import {
   axis_angle,
   cross,
@@ -14,7 +11,12 @@ import {
   sub,
   type Quat,
   type Vec3,
-} from '#client/camera/vector';
+} from '#client/base/vector';
+import { CameraController } from '#client/camera/camera_controller';
+import type { CameraMode } from '#client/camera/mode';
+import { no_axes, type Axes } from '#client/camera/movement';
+import { same_view } from '#client/camera/same_view';
+import type { SceneSetup } from '#client/camera/scene_setup';
 
 const scene: SceneSetup = {
   up: [0, -1, 0],
@@ -50,9 +52,9 @@ function expect_vec(actual: Vec3, expected: Vec3): void {
 describe('quaternions', () => {
   it('turn right-handed', () => {
     expect_vec(cross(right, down), forward);
-    // About "up" (-y) by a quarter: from forward to the left.
+    // A quarter turn about "up" (-y) takes forward to the left.
     expect_vec(rotate(axis_angle([0, -1, 0], Math.PI / 2), forward), [-1, 0, 0]);
-    // About the camera's x axis: from forward to up.
+    // A quarter turn about the camera's x axis takes forward to up.
     expect_vec(rotate(axis_angle(right, Math.PI / 2), forward), [0, -1, 0]);
   });
 
@@ -66,7 +68,7 @@ describe('quaternions', () => {
 describe('flying', () => {
   it('keeps the scene under the pointer', () => {
     const made = camera('fly');
-    // Half a height to the right: the view turns left by half the field of view.
+    // A drag of half a height to the right turns the view left by half the field of view.
     made.gesture({ kind: 'look', dx: 0.5, dy: 0 });
     made.step(0.016);
     const angle = made.fov_y_rad / 2;
@@ -130,7 +132,7 @@ describe('orbiting', () => {
     const to_focus = sub(scene.focus, made.pose.position);
     expect(length(to_focus)).toBeCloseTo(5, 6);
     expect(dot(to_focus, view_of(made))).toBeCloseTo(5, 6);
-    // Dragged to the right: the camera went to the left. Dragged down: it went up.
+    // A drag to the right takes the camera to the left. A drag down takes it up.
     expect(made.pose.position[0]).toBeLessThan(-4);
     expect(made.pose.position[1]).toBeLessThan(0);
   });

@@ -1,11 +1,11 @@
-// Which samples leave the page, and when.
+// The samples that leave the page.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { identity } from '#client/base/vector';
 import { CameraController } from '#client/camera/camera_controller';
 import { CameraLoop } from '#client/camera/camera_loop';
+import type { CameraSample } from '#client/camera/eye';
+import { Inertia } from '#client/camera/inertia';
 import { no_axes, type Axes } from '#client/camera/movement';
-import { identity } from '#client/camera/vector';
-import { Inertia } from '#client/input/inertia';
-import type { CameraSample } from '#client/present/warp';
 
 describe('the camera loop', () => {
   let refreshes: (() => void)[] = [];

@@ -1,9 +1,10 @@
 import { beforeEach, describe, expect, it } from 'vitest';
+import { axis_angle, identity, type Quat } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
 import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
 import type { Placing, Presenter } from '#client/present/presenter';
-import { axis_angle, identity, type Quat } from '#client/camera/vector';
-import { warped, widened_fov, type Eye } from '#client/present/warp';
+import { warped, widened_fov } from '#client/present/warp';
 
 const at = (yaw: number): Eye => {
   const orientation: Quat = yaw === 0 ? identity : axis_angle([0, -1, 0], yaw);
@@ -102,7 +103,7 @@ describe('the display', () => {
       const picture_eye = at_time(s - lag_s);
       const eye = { ...picture_eye, fov_y_rad: widened_fov(1, display.overscan.y) };
       await display.draw(picture, eye, 640 * display.overscan.x, 360 * display.overscan.y);
-      // Twelve pictures are looked at before anything is asked for.
+      // The policy looks at twelve pictures before it asks for anything.
       if (i > 20) expect(display.read()!.view.uncovered).toBeLessThanOrEqual(0.01);
     }
     expect(display.overscan.x).toBeGreaterThanOrEqual(1.26);

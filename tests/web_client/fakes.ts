@@ -1,6 +1,6 @@
 // A clock that tests move by hand, a socket whose other end is the test, and a storage in memory.
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
-import type { Clock, Timers } from '#client/session/clock';
+import type { Clock, Timers } from '#client/base/clock';
 import type { OpenSocket, SocketEvents } from '#client/transport/socket';
 import {
   ClientMessageSchema,

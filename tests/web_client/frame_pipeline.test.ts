@@ -25,10 +25,6 @@ class FakeDecoder implements Decoder {
     return goes_on;
   }
 
-  queue_length(): number {
-    return this.frames.length;
-  }
-
   close(): void {
     this.closed = true;
     for (const frame of this.frames.splice(0)) {
@@ -202,7 +198,7 @@ describe('another stream', () => {
     const made = await configure();
     push(1n);
     await configure();
-    push(2n); // of neither: the new stream begins with a key frame
+    push(2n); // belongs to neither stream: the new one begins with a key frame
     push(3n, { idr: true });
     expect(decoders).toEqual([made]);
     expect(made.frames.map(({ header }) => header.frameId)).toEqual([1n, 3n]);

@@ -9,7 +9,7 @@ const layout = [
   { offset: 15, stride: 3 },
 ] as const;
 
-/** BT.709, limited range, from the definition. */
+/** BT.709 with limited range, straight from its definition. */
 function expected(y: number, cb: number, cr: number): number[] {
   const l = (y - 16) / 219;
   const b = l + (2 * (1 - 0.0722) * (cb - 128)) / 224;
@@ -46,7 +46,7 @@ describe('software colour conversion', () => {
   });
 
   it('is within one step of the definition for all values', () => {
-    // One expectation at the end: thousands of them take seconds.
+    // There is one expectation at the end, because thousands of them take seconds.
     let worst = { error: 0, at: '' };
     for (let y = 0; y < 256; y += 5) {
       for (let cb = 0; cb < 256; cb += 15) {

@@ -1,14 +1,23 @@
-// Ways of the camera that are known beforehand, walking, and what goes on after a gesture.
+// Walking, flights, and the glide after a gesture.
 import { describe, expect, it } from 'vitest';
-import { CameraController, type SceneSetup } from '#client/camera/camera_controller';
-import { angle_between, glide, glide_time_s } from '#client/camera/flight';
+import {
+  angle_between,
+  axis_angle,
+  identity,
+  look_at,
+  rotate,
+  slerp,
+  type Vec3,
+} from '#client/base/vector';
+import { CameraController } from '#client/camera/camera_controller';
+import type { Eye } from '#client/camera/eye';
+import { glide, glide_time_s } from '#client/camera/flight';
+import { Inertia } from '#client/camera/inertia';
 import { no_axes, sum_of, type Axes } from '#client/camera/movement';
 import { place_of, ray_through } from '#client/camera/ray';
-import { axis_angle, identity, look_at, rotate, slerp, type Vec3 } from '#client/camera/vector';
+import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
-import { Inertia } from '#client/input/inertia';
 import { DoubleTap } from '#client/input/pointers';
-import type { Eye } from '#client/present/warp';
 
 const scene: SceneSetup = {
   up: [0, -1, 0],
@@ -75,9 +84,9 @@ describe('walking', () => {
   it('goes to a place that was pointed at, up to a step before it', () => {
     const made = camera('walk');
     made.focus_on([6, 0, -5]);
-    expect(made.in_flight).toBe(true);
+    expect(made.at_rest).toBe(false);
     hold(made, {}, 10);
-    expect(made.in_flight).toBe(false);
+    expect(made.at_rest).toBe(true);
     const [x, y, z] = made.pose.position;
     expect(y).toBeCloseTo(-1.7, 6);
     expect(z).toBeCloseTo(-5, 6);
@@ -232,7 +241,6 @@ describe('a gamepad', () => {
   const pad = (axes: number[], pressed: Record<number, number> = {}) => ({
     axes,
     connected: true,
-    mapping: 'standard' as const,
     buttons: Array.from({ length: 16 }, (_, i) => ({
       value: pressed[i] ?? 0,
       pressed: (pressed[i] ?? 0) > 0.5,

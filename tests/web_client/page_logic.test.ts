@@ -1,12 +1,12 @@
-// The parts of the page that decide something.
+// The logic of the page.
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
-import { Settling } from '#client/automation';
 import { AutoHeight } from '#client/session/auto_height';
 import { QualityChoice } from '#client/session/quality';
 import { scene_address } from '#client/session/scenes';
-import { take_token } from '#client/session/token';
+import { AccessToken } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
+import { Settling } from '#client/ui/automation';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
 import { Error_Code } from '#client/wire/wire';
 import { with_texts } from '../../web_client/page_texts';
@@ -23,17 +23,22 @@ describe('access token', () => {
       },
     };
     const href = 'http://host/page?scene=city#token=a%2Bb&pose=1';
-    expect(take_token({ href }, history, storage)).toBe('a+b');
+    expect(new AccessToken({ href }, history, storage).value).toBe('a+b');
     expect(shown).toBe('http://host/page?scene=city#pose=1');
-    expect(take_token({ href: 'http://host/page' }, history, storage)).toBe('a+b');
-    expect(take_token({ href: 'http://host/page#token=c' }, history, storage)).toBe('c');
+    const next = new AccessToken({ href: 'http://host/page' }, history, storage);
+    expect(next.value).toBe('a+b');
+    next.value = 'typed';
+    expect(new AccessToken({ href: 'http://host/page' }, history, storage).value).toBe('typed');
+    const other = new AccessToken({ href: 'http://host/page#token=c' }, history, storage);
+    expect(other.value).toBe('c');
     expect(shown).toBe('http://host/page');
   });
 
   it('works without storage', () => {
     const history = { state: null, replaceState: () => undefined };
-    expect(take_token({ href: 'http://host/' }, history, undefined)).toBe('');
-    expect(take_token({ href: 'http://host/#token=x' }, history, undefined)).toBe('x');
+    const token_of = (href: string): string => new AccessToken({ href }, history, undefined).value;
+    expect(token_of('http://host/')).toBe('');
+    expect(token_of('http://host/#token=x')).toBe('x');
   });
 });
 
@@ -217,7 +222,7 @@ describe('the texts of the page', () => {
     const between = [...body.replace(/<kbd[^]*?<\/kbd>/g, '').matchAll(/>([^<]+)</g)];
     const texts = [...attributes, ...between].map(([, found]) => found!.trim());
     expect(texts.length).toBeGreaterThan(60);
-    // A sign is no text: the cross of a button, the comma between two keys.
+    // Signs are no texts, such as the cross of a button or the comma between two keys.
     const loose = texts.filter((found) => /[a-z]{2}/i.test(found.replace(/\{\{[\w.]+\}\}|&#\d+;/g, '')));
     expect(loose).toEqual([]);
   });

@@ -50,7 +50,6 @@ beforeEach(() => {
       sceneId: 'city',
       viewportWidthPx: 640,
       viewportHeightPx: 360,
-      devicePixelRatio: 1,
       decoders: [Codec.H264],
       token: 'secret',
     },

@@ -1,9 +1,10 @@
+import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
-import { angle_between, type Flight } from '#client/camera/flight';
-import { identity, look_at, rotate, type Vec3 } from '#client/camera/vector';
-import type { Eye } from '#client/present/warp';
-import type { PathSample } from '#client/session/messages';
+import { angle_between, identity, look_at, rotate, type Vec3 } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
+import type { Flight, PathSample } from '#client/camera/flight';
 import { film_flight, type Film } from '#client/tour/camera_spline';
+import * as limits from '#client/tour/limits';
 import { read_document } from '#client/tour/load';
 import { TourPlayer, type TourState } from '#client/tour/player';
 import { embed_code, frame_sites, read_shared, share_address } from '#client/tour/share';
@@ -48,6 +49,22 @@ describe('tours of a sidecar', () => {
     expect(stairs).toMatchObject({ caption: 'Built in 1904.', marker: [1, 2, 9] });
     expect(stairs!.eye.fov_y_rad).toBe(1.2);
     expect(stay_of(stairs!)).toBeGreaterThan(3);
+  });
+
+  it('have the same limits here and at the server', () => {
+    const server = ['tours.cpp', 'tours.h']
+      .map((name) => readFileSync(new URL(`../../server/${name}`, import.meta.url), 'utf8'))
+      .join('');
+    const limit = (name: string): number => {
+      const found = new RegExp(`constexpr std::size_t ${name} = (\\d[\\d']*)(?: << (\\d+))?;`).exec(server);
+      if (!found) throw new Error(`server/tours.* have no ${name}`);
+      return Number(found[1]!.replaceAll("'", '')) * 2 ** Number(found[2] ?? 0);
+    };
+    expect(limits.max_tours).toBe(limit('max_tours'));
+    expect(limits.max_stops).toBe(limit('max_stops'));
+    expect(limits.max_sidecar_bytes).toBe(limit('max_sent_sidecar_bytes'));
+    // The server counts bytes; a character of UTF-8 has at most four.
+    expect(limits.max_text_characters * 4).toBe(limit('max_text_bytes'));
   });
 
   it('come back as they were written', () => {
@@ -101,7 +118,7 @@ describe("the SuperSplat viewer's settings.json", () => {
       ['', 2, false],
       ['cameraAnim', 0, true],
     ]);
-    // That viewer has the scene upside down: x and y change their signs.
+    // SuperSplat turns the scene upside down, so x and y change their signs.
     expect_vec(start!.position, [-2, -1.5, -4]);
     const view = rotate(start!.orientation, [0, 0, 1]);
     const to_target = [2, 1.5 - 1, 4].map((v) => v / Math.hypot(2, 0.5, 4));

@@ -8,10 +8,9 @@ class FakeChunk {
   constructor(readonly init: EncodedVideoChunkInit) {}
 }
 
-/** The browser's decoder as far as ours uses it; it refuses chunks once it is closed. */
+/** The part of VideoDecoder that our decoder uses. It refuses chunks once it is closed. */
 class FakeVideoDecoder {
   state = 'unconfigured';
-  readonly decodeQueueSize = 0;
 
   constructor(readonly init: VideoDecoderInit) {
     made.push(this);
@@ -30,7 +29,7 @@ class FakeVideoDecoder {
     this.state = 'closed';
   }
 
-  /** As browsers do it: a decoder that fails is closed when they say so. */
+  /** Fails like browsers do: the decoder is closed before the error event. */
   fail(): void {
     this.close();
     this.init.error(new DOMException('broken', 'EncodingError'));
@@ -84,7 +83,7 @@ function decode(...ids: bigint[]): void {
   for (const id of ids) {
     const header = create(FrameHeaderSchema, { frameId: id, idr: id === 1n });
     const payload = new Uint8Array(1);
-    const frame: EncodedFrame = { header, payload, bytes: 1, received_us: 0, decoded_us: 0 };
+    const frame: EncodedFrame = { header, payload, received_us: 0, decoded_us: 0 };
     decoder.decode(frame);
   }
 }

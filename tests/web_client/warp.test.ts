@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest';
-import { axis_angle, identity, multiply, type Vec3 } from '#client/camera/vector';
-import { angle_between } from '#client/camera/flight';
+import { axis_angle, identity, multiply, angle_between, type Vec3 } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
 import { place_of } from '#client/camera/ray';
-import { reach, uncovered_share, warp_matrix, warped, widened_fov, type Eye } from '#client/present/warp';
 import { TurnForecast } from '#client/present/turn_forecast';
+import { reach, uncovered_share, warp_matrix, warped, widened_fov } from '#client/present/warp';
 import { WarpPolicy } from '#client/present/warp_policy';
 
 const aspect = 16 / 9;
@@ -16,7 +16,7 @@ const eye = (change: Partial<Eye> = {}): Eye => ({
   ...change,
 });
 
-/** Where a point of the scene is in the image of an eye, -1…1. */
+/** Place of a point of the scene in the image of an eye, -1…1. */
 function seen(point: Vec3, by: Eye): readonly [number, number] {
   const [x, y] = place_of(point, by, aspect)!;
   return [2 * x - 1, 2 * y - 1];
@@ -156,7 +156,7 @@ describe('the policy of warping', () => {
     expect(policy.overscan).toEqual({ x: 1.12, y: 1 });
     move(policy, 3, 500, 3, 3);
     expect(policy.overscan).toEqual({ x: 1.6, y: 1.26 });
-    expect(1.6 * 1.26).toBeLessThan(2.1); // pixels that a server has to draw, by those of the view
+    expect(1.6 * 1.26).toBeLessThan(2.1); // pixels to draw over pixels of the view
   });
 
   it('is off where drawing takes too long, unless somebody wants it', () => {

@@ -24,7 +24,6 @@ describe('client messages', () => {
       sceneId: 'city',
       viewportWidthPx: 640,
       viewportHeightPx: 360,
-      devicePixelRatio: 1.5,
       decoders: [Codec.H264, Codec.MJPEG],
       token: 'secret',
       settings: { widthPx: 640, heightPx: 360, maxFps: 30 },
@@ -52,7 +51,6 @@ describe('client messages', () => {
       decodedUs: 2000n,
       presentedUs: 3000n,
       poseAgeUs: 2500,
-      decoderQueue: 1,
     };
     expect(hex_of({ case: 'ack', value: ack })).toBe(golden.client_ack);
   });

@@ -1,26 +1,24 @@
-import { broken_card, unsupported_card } from './ui/wording';
 import { CardView } from './ui/card';
-import { Viewer } from './ui/viewer';
+import type { SessionStatus } from './ui/session_status';
+import { mount_viewer } from './ui/viewer';
+import { broken_card, unsupported_card } from './ui/wording';
 
 function main(): void {
-  const card = new CardView({
-    retry: () => viewer?.retry(),
-    token: (token) => viewer?.use_token(token),
-  });
+  const card = new CardView();
+  let status: SessionStatus | undefined;
   const broken = (message: string): void => {
-    if (viewer) viewer.break_off(message);
+    if (status) status.break_off(message);
     else card.show(broken_card(message));
   };
-  let viewer: Viewer | undefined;
   window.addEventListener('error', (event) => {
-    // Not an error: a size changed again within one frame, and is reported in the next.
+    // This is no error: a size changed twice within one frame, and the next frame reports it.
     if (!event.message.startsWith('ResizeObserver loop')) broken(event.message);
   });
   window.addEventListener('unhandledrejection', (event) => broken(String(event.reason)));
 
   const unsupported = unsupported_card(globalThis);
   if (unsupported) card.show(unsupported);
-  else viewer = new Viewer(card);
+  else status = mount_viewer(card);
 }
 
 main();

@@ -1,6 +1,6 @@
-// All that the page says, in one language; another language is another file of this shape. index.html
-// names its texts as {{page.view}}, which the build fills in (page_texts.ts); which of the cards' texts
-// is shown when, wording.ts decides.
+// All texts of the page in one language. Another language is another file of this shape. index.html names
+// its texts as {{page.view}}, and the build fills them in (page_texts.ts). wording.ts decides which text
+// the cards show when.
 export const text = {
   page: {
     view: '3D view. Drag to look around, scroll to move closer; press H for all controls.',
@@ -27,7 +27,7 @@ export const text = {
     full_screen_key: 'Full screen (F)',
     loading: 'Loading',
     loading_stays:
-      'If this stays, the browser is too old or blocks scripts: Chrome 94, Edge 94, Firefox 113 and Safari 16.4 or newer work.',
+      'If this stays, the browser is too old or blocks scripts. Chrome 94, Edge 94, Firefox 113 and Safari 16.4 or newer work.',
     connect: 'Connect',
     no_script: 'CaT-GS streams a rendered 3D scene and needs JavaScript.',
   },
@@ -85,12 +85,12 @@ export const text = {
     reconnecting: 'Reconnecting',
     loading_scene: {
       title: 'Loading the scene',
-      text: (time: string): string => `It is not in the server's memory yet. That takes about ${time}.`,
+      text: (time: string): string => `The server is loading it into memory. That takes about ${time}.`,
     },
     queue: {
       title: (position: number): string => `Number ${position} in the queue`,
       text: (time: string): string =>
-        `The server is full. Your turn comes in about ${time}; leave this page open.`,
+        `The server is full. Your turn comes in about ${time}. Leave this page open.`,
     },
     waiting: {
       unreachable: 'The server does not answer',
@@ -107,7 +107,7 @@ export const text = {
     },
     version: {
       title: 'Page and server do not fit together',
-      text: 'The server was updated: reload this page.',
+      text: 'The server was updated. Reload this page.',
     },
     no_codec: {
       title: 'No common video format',
@@ -115,13 +115,13 @@ export const text = {
     },
     idle: {
       title: 'Paused',
-      text: 'Your place was given to others; continue where you were.',
+      text: 'Your place went to another visitor. You can continue where you were.',
     },
-    render_failed: { title: 'The server could not render the scene', text: 'Its log says more.' },
+    render_failed: { title: 'The server could not render the scene', text: 'The log of the server says more.' },
     refused: 'The server refused the session',
     broken: {
       title: 'This page ran into an error',
-      text: 'Reload it; if that does not help, please report the message.',
+      text: 'Reload it. If that does not help, please report the message.',
     },
     unsupported: {
       title: 'This browser is too old',
@@ -145,26 +145,26 @@ export const text = {
   },
   jpeg: {
     failed_lately:
-      'Video could not be decoded here lately: pictures come as JPEG, which needs more bandwidth. Video is tried again in a week, or after the site data of this page is cleared.',
+      'Video could not be decoded here lately, so pictures come as JPEG, which needs more bandwidth. Video is tried again in a week, or after you clear the site data of this page.',
     no_decoder:
-      'This browser has no video decoder for pages (WebCodecs): pictures come as JPEG, which needs more bandwidth. A current Chrome, Edge, Firefox or Safari gets video.',
+      'This browser has no video decoder for pages (WebCodecs), so pictures come as JPEG, which needs more bandwidth. A current Chrome, Edge, Firefox or Safari gets video.',
     not_secure:
       'Pictures come as JPEG: browsers offer their video decoder (WebCodecs) on https:// and localhost only. Serve this page with TLS to get video, which needs far less bandwidth.',
     failed_now: (why: string): string =>
       `Video cannot be decoded here (${why}): pictures come as JPEG.`,
   },
   warp: {
-    no_gpu: 'off: needs WebGL2 by a GPU',
+    no_gpu: 'off: needs WebGL2 on a GPU',
     off: 'off',
     too_slow: 'off: drawing is too slow here',
     on: (width: number, height: number): string => `on, ${width} × ${height} % overscan`,
   },
   stages: {
-    wait: { label: 'Wait', title: 'the server has the camera and no turn yet' },
+    wait: { label: 'Wait', title: 'the camera waits at the server for its turn' },
     render: { label: 'Render', title: 'the server draws the picture' },
     encode: { label: 'Encode', title: 'the server compresses it' },
     send: { label: 'Send', title: 'the server waits for the network' },
-    network: { label: 'Network', title: 'the camera to the server, and the picture back' },
+    network: { label: 'Network', title: 'the camera travels to the server, and the picture back' },
     decode: { label: 'Decode', title: 'this browser decompresses it' },
     present: { label: 'Display', title: 'from decoded to drawn on the canvas' },
   },
@@ -174,7 +174,7 @@ export const text = {
     motion: 'Motion to photon',
     motion_title: 'From a camera sample to its picture on the canvas: median / 95th percentile',
     age: 'Pose age',
-    age_title: 'How old the camera behind the picture is while moving: median / 95th percentile',
+    age_title: 'Age of the camera that the picture shows, while moving: median / 95th percentile',
     bitrate: 'Bitrate',
     picture: 'Picture',
     window: 'Window, sub-frames',
@@ -182,8 +182,8 @@ export const text = {
     drops: 'Drops',
     drops_title: 'Frames that arrived and were never shown; packets that the server never sent',
     drops_value: (here: number, server: number): string => `${here} here, ${server} at the server`,
-    at_rest: 'The camera rests: paler values are of its last motion.',
-    not_moved: 'The camera rests: move it to see how long pictures take.',
+    at_rest: 'The camera rests. Paler values are from its last motion.',
+    not_moved: 'The camera rests. Move it to see how long pictures take.',
     renderer: 'Renderer',
     encoder: 'Encoder',
     presenter: 'Presenter',
@@ -227,10 +227,10 @@ export const text = {
     up: (n: number): string => `Move stop ${n} up`,
     down: (n: number): string => `Move stop ${n} down`,
     remove: (n: number): string => `Delete stop ${n}`,
-    no_marker: 'Nothing is in the middle of the view: this stop has no hotspot.',
+    no_marker: 'Nothing is in the middle of the view, so this stop has no hotspot.',
     start_set: 'Visits will begin here, once this is saved.',
     downloaded: (name: string): string =>
-      `Put ${name} beside the scene's file and start the server anew. Saving from here needs a link of role author.`,
+      `Put ${name} beside the scene's file and restart the server. To save from here, open a link of role author.`,
     downloaded_too: (name: string): string => `${name} is saved on this device.`,
     saving: 'Saving…',
     saved: 'Saved. Visitors get it when they open or reload the page.',
@@ -248,10 +248,10 @@ export const text = {
     link_copied: 'The link is in the clipboard.',
     code_copied: 'The code is in the clipboard.',
     copy_yourself: 'Copy it from the field above.',
-    token: 'Your access token is not in it: who opens it needs one, too.',
+    token: 'Your access token is not in it. Visitors need a token of their own.',
     no_frames:
-      'Browsers show it in no other site yet: the server has to name that site with --embed-origin.',
+      'Browsers show it in no other site yet. The server has to name that site with --embed-origin.',
     frames: (sites: string): string =>
-      `Browsers show it in pages of ${sites} only: the server names them with --embed-origin.`,
+      `Browsers show it in pages of ${sites} only. The server names them with --embed-origin.`,
   },
 } as const;

@@ -22,7 +22,7 @@ export async function launch_browser(): Promise<Browser> {
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',
-      // A name that is no secure context, although it is this machine.
+      // A name of this machine that is no secure context.
       `--host-resolver-rules=MAP ${insecure_host} 127.0.0.1`,
     ],
   });
@@ -49,8 +49,8 @@ export async function new_page(
 }
 
 /**
- * Every pixel of the view, always: the automatic size follows how busy this machine is. Leaves the
- * keyboard to the view.
+ * Chooses the full size of the view, because the automatic size depends on how busy this machine is.
+ * Leaves the keyboard to the view.
  */
 export async function choose_full_size(page: Page): Promise<void> {
   await page.getByRole('button', { name: 'Quality and view' }).click();

@@ -1,8 +1,8 @@
 // The camera of the page under test.
 import type { Page } from 'playwright-core';
-import type { Pose } from '#client/camera/camera_controller';
+import type { Pose } from '#client/camera/eye';
 
-/** Also of a document whose script has not run yet: a link has just been followed. */
+/** Works right after a link was followed, too, before the script of the new document has run. */
 export const settle = (page: Page): Promise<void> =>
   page.evaluate(async () => {
     while (!window.catgs) await new Promise((resolve) => setTimeout(resolve, 20));

@@ -1,4 +1,4 @@
-// A way to a server that takes longer: TCP in user space, every byte later by the same time.
+// A TCP proxy in user space that delays every byte by the same time.
 import { connect, createServer, type AddressInfo, type Socket } from 'node:net';
 
 export interface DelayProxy {

@@ -1,5 +1,5 @@
-// A server that says what a test wants it to say: the built client over HTTP with the real
-// server's Content-Security-Policy, and a WebSocket that speaks catgs.v1.
+// A server that follows the script of a test. It serves the built client over HTTP with the real server's
+// Content-Security-Policy, and speaks catgs.v1 on a WebSocket.
 import { createServer, type Server } from 'node:http';
 import { readFile } from 'node:fs/promises';
 import type { AddressInfo } from 'node:net';

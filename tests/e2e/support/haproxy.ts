@@ -1,4 +1,4 @@
-// HAProxy as the compose file sets it up, in front of servers of this machine.
+// Runs HAProxy as the compose file does, in front of servers of this machine.
 import { spawn } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { createServer, type AddressInfo } from 'node:net';
@@ -19,7 +19,7 @@ function free_port(): Promise<number> {
   });
 }
 
-/** docker/haproxy.cfg with addresses of this machine, and nothing else changed. */
+/** docker/haproxy.cfg with addresses of this machine. */
 function configuration(port: number, servers: readonly number[]): string {
   const text = readFileSync(path.join(source_dir, 'docker', 'haproxy.cfg'), 'utf8')
     .replace(/^resolvers [\s\S]*?\n\n/m, '')

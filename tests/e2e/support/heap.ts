@@ -1,4 +1,4 @@
-// What JavaScript holds after a collection, of a page or of its worker, through the DevTools protocol.
+// Measures the memory that scripts of a page or its worker hold, over the DevTools protocol.
 import type { CDPSession } from 'playwright-core';
 
 /** A page or a worker: one heap of V8. */
@@ -29,8 +29,8 @@ interface Message {
 }
 
 /**
- * Of the page's worker. Playwright's sessions speak to pages only, so that what is said to a worker
- * travels inside messages of the page's session.
+ * The heap of the page's worker. Playwright's sessions speak to pages only, so commands for a worker
+ * travel inside messages of the page's session.
  */
 export async function heap_of_worker(page: CDPSession): Promise<HeapOwner> {
   const attached = new Promise<string>((resolve) => {
@@ -72,16 +72,16 @@ export async function heap_of_worker(page: CDPSession): Promise<HeapOwner> {
   };
 }
 
-/** Of everything, compiled code included, which V8 makes and throws away as it sees fit. */
+/** The total. It includes compiled code, which V8 makes and discards as it sees fit. */
 export async function heap_bytes(heap: HeapOwner): Promise<number> {
   await heap.send('HeapProfiler.collectGarbage');
   return ((await heap.send('Runtime.getHeapUsage')) as { usedSize: number }).usedSize;
 }
 
-/** What scripts hold, by class. */
+/** Memory that scripts hold, by class. */
 export type Held = ReadonlyMap<string, { readonly count: number; readonly bytes: number }>;
 
-/** Kinds of nodes that scripts make; others are the engine's: code, shapes, what is behind the DOM. */
+/** Kinds of nodes that scripts make. All others belong to the engine: code, shapes, the inside of the DOM. */
 const made_by_scripts = new Set([
   ...['object', 'array', 'closure', 'number', 'bigint', 'string', 'concatenated string'],
   ...['sliced string', 'regexp', 'symbol'],
@@ -98,7 +98,7 @@ interface Snapshot {
   readonly strings: readonly string[];
 }
 
-/** By a heap snapshot, which collects what nobody holds before. */
+/** Takes a heap snapshot, which first collects what nobody holds. */
 export async function held_by_scripts(heap: HeapOwner): Promise<Held> {
   const chunks: string[] = [];
   heap.take_chunks((chunk) => chunks.push(chunk));
@@ -111,7 +111,7 @@ export async function held_by_scripts(heap: HeapOwner): Promise<Held> {
   for (let i = 0; i < nodes.length; i += fields.length) {
     const type = node_types[0][nodes[i + type_at!]!]!;
     if (!made_by_scripts.has(type)) continue;
-    // The name of an object is its class, that of a string its text.
+    // Objects are named by their class, strings by their text.
     const is_named = type === 'object' || type === 'closure' || type === 'array';
     const name = is_named ? `${type} ${strings[nodes[i + name_at!]!]}` : type;
     const before = held.get(name) ?? { count: 0, bytes: 0 };
@@ -126,7 +126,7 @@ export async function held_by_scripts(heap: HeapOwner): Promise<Held> {
 export const bytes_of = (held: Held): number =>
   [...held.values()].reduce((sum, { bytes }) => sum + bytes, 0);
 
-/** The classes that grew most, for people. */
+/** The classes that grew most, as text for people. */
 export function what_grew(before: Held, after: Held): string {
   return [...after]
     .map(([name, { count, bytes }]) => {

@@ -3,7 +3,7 @@ import type { Browser } from 'playwright-core';
 import { Codec } from '#client/wire/wire';
 import { welcome, type Peer } from './fake_server';
 
-/** A JPEG file: some blobs, so that a screenshot shows whether it is the right way up. */
+/** A JPEG file with some blobs, so that a screenshot shows whether it is the right way up. */
 export async function painted_jpeg(browser: Browser): Promise<Uint8Array> {
   const page = await browser.newPage();
   const url = await page.evaluate(() => {
@@ -26,7 +26,7 @@ export async function painted_jpeg(browser: Browser): Promise<Uint8Array> {
   return Buffer.from(url.split(',')[1]!, 'base64');
 }
 
-/** Welcomes, and answers every pose with the picture. */
+/** Sends a welcome, and answers every pose with the picture. */
 export const stream_of =
   (jpeg: Uint8Array) =>
   (peer: Peer, body: Peer['heard'][number]): void => {

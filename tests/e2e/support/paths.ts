@@ -1,4 +1,4 @@
-// What CTest tells the tests through the environment; the defaults are for running them by hand.
+// Settings from CTest, in the environment. The defaults are for running the tests by hand.
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -11,6 +11,6 @@ export const chromium_path = process.env['CATGS_CHROMIUM'] ?? '/usr/bin/chromium
 
 export const haproxy_path = process.env['CATGS_HAPROXY'] ?? '/usr/sbin/haproxy';
 
-/** Where screenshots go. */
+/** Folder for screenshots. */
 export const artefacts =
   process.env['CATGS_TEST_ARTEFACTS'] ?? path.join(build_dir, 'tests', 'browser');

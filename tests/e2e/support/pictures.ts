@@ -1,4 +1,4 @@
-// Pixels of the shown picture and of PNG files, and how far they are apart.
+// Pixels of the shown picture and of PNG files, and measures of their difference.
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 
@@ -58,7 +58,7 @@ export async function read_png(page: Page, file: string): Promise<Picture> {
   return decoded(encoded);
 }
 
-/** Over the RGB values of all pixels. */
+/** PSNR over the RGB values of all pixels. */
 export function psnr_db(a: Picture, b: Picture): number {
   if (a.width !== b.width || a.height !== b.height) {
     throw new Error(`${a.width}x${a.height} against ${b.width}x${b.height}`);
@@ -71,7 +71,7 @@ export function psnr_db(a: Picture, b: Picture): number {
   return 10 * Math.log10(255 ** 2 / mean);
 }
 
-/** Means of 32x18 boxes: what pictures of two sizes, as a busy server sends them, have in common. */
+/** Means of 32x18 boxes, to compare pictures of different sizes, which a busy server sends. */
 export function thumbnail({ width, height, rgba }: Picture): Picture {
   const columns = 32;
   const rows = 18;

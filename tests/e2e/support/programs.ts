@@ -6,7 +6,7 @@ import { build_dir } from './paths';
 
 const running = new Set<ChildProcess>();
 
-/** For the end of a file: a test that failed half-way leaves no server behind. */
+/** Call this at the end of a file, so that a failed test leaves no server behind. */
 export async function stop_servers(): Promise<void> {
   await Promise.all([...running].map((child) => end(child, 'SIGKILL')));
 }
@@ -22,7 +22,7 @@ export function catgs_render(...args: string[]): void {
   execFileSync(program('catgs-render'), args, { stdio: ['ignore', 'ignore', 'pipe'] });
 }
 
-/** What `catgs-server token` prints. */
+/** Makes an access token with `catgs-server token`. */
 export function access_token(role: string, key_file: string): string {
   const args = ['token', '--role', role, '--token-key-file', key_file];
   return execFileSync(program('catgs-server'), args, { stdio: ['ignore', 'pipe', 'ignore'] })
@@ -33,9 +33,9 @@ export function access_token(role: string, key_file: string): string {
 export interface RunningServer {
   readonly url: string;
   readonly port: number;
-  /** What it has logged so far. */
+  /** Its log so far. */
   log(): string;
-  /** Ends it as a crash does, or as an operator does; resolves when it has gone. */
+  /** Ends it like a crash (SIGKILL) or like an operator (SIGTERM). Resolves when it has ended. */
   stop(signal?: 'SIGKILL' | 'SIGTERM'): Promise<void>;
 }
 
@@ -43,7 +43,7 @@ export interface RunningServer {
 export async function start_server(scene: string, args: string[] = []): Promise<RunningServer> {
   const child = spawn(
     program('catgs-server'),
-    // No proxy is there to see /readyz fail, and no other server to go to.
+    // No proxy watches /readyz here, and there is no other server to go to.
     [
       ...['--scene', scene, '--port', '0', '--admin-bind', 'off'],
       ...['--drain-wait', '0', '--drain-deadline', '1'],

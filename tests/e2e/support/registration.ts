@@ -1,4 +1,4 @@
-// How far two pictures of the same thing are shifted against each other, block by block.
+// Measures the shift between two pictures of the same thing, block by block.
 import type { Picture } from './pictures';
 
 export interface Shift {
@@ -6,7 +6,7 @@ export interface Shift {
   readonly dy: number;
 }
 
-/** Green, which is most of what is seen. */
+/** The green channel, which carries most of the luminance. */
 const value = (picture: Picture, x: number, y: number): number =>
   picture.rgba[(y * picture.width + x) * 4 + 1]!;
 
@@ -23,13 +23,13 @@ function difference(a: Picture, b: Picture, x: number, y: number, side: number, 
   return sum;
 }
 
-/** Place of the least value of a parabola through three, relative to the middle one. */
+/** Minimum of the parabola through three values, relative to the middle one. */
 function vertex(before: number, at: number, after: number): number {
   const curvature = before - 2 * at + after;
   return curvature > 0 ? (before - after) / 2 / curvature : 0;
 }
 
-/** By full search, refined below a pixel; undefined for blocks without structure. */
+/** Shift of a block by full search, refined below a pixel; undefined for blocks without structure. */
 function shift_of(a: Picture, b: Picture, x: number, y: number, side: number): Shift | undefined {
   const at = (dx: number, dy: number): number => difference(a, b, x, y, side, dx, dy);
   let best = { dx: 0, dy: 0, sum: Infinity };
@@ -50,7 +50,7 @@ function shift_of(a: Picture, b: Picture, x: number, y: number, side: number): S
   };
 }
 
-/** Shifts of the blocks that can be told apart. Pictures are of one size. */
+/** Shifts of all blocks with structure. The pictures have the same size. */
 export function block_shifts(a: Picture, b: Picture, side = 32): Shift[] {
   const shifts: Shift[] = [];
   for (let y = search_px + 1; y + side + search_px < a.height; y += side) {

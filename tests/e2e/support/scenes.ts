@@ -2,9 +2,9 @@
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import type { Pose } from '#client/camera/camera_controller';
+import type { Pose } from '#client/camera/eye';
 
-/** A folder of its own, and what removes it. */
+/** Makes a folder, and a function that removes it. */
 export function scratch_folder(): { folder: string; remove: () => void } {
   const folder = mkdtempSync(path.join(tmpdir(), 'catgs-e2e-'));
   return { folder, remove: () => rmSync(folder, { recursive: true, force: true }) };
@@ -27,7 +27,7 @@ export interface Patch {
 }
 
 const sh_c0 = 0.28209479177387814; // value of the constant basis function
-// Three Gaussians of 90 % let 0.1 % through; a fourth would end the pixel by its transmittance.
+// Three Gaussians of 90 % let 0.1 % through. A fourth would end the pixel, because its transmittance is too low.
 const layers = 3;
 const opacity_logit = Math.log(0.9 / 0.1);
 const properties = [

@@ -67,7 +67,6 @@ void require_sound(const Settings& settings) {
 void require_sound(const Hello& hello) {
   require(hello.viewport_px.x > 0, "viewports have sides");
   require_size(hello.viewport_px);
-  require(in(hello.device_pixel_ratio, 0.25f, 8.0f), "pixels have a size");
   require(hello.decoders.size() <= 8, "decoders are few");
   require_text(hello.scene_id, 128);
   require_text(hello.token, 512);
@@ -116,7 +115,6 @@ std::string hello_bytes() {
   hello.set_scene_id("city");
   hello.set_viewport_width_px(640);
   hello.set_viewport_height_px(360);
-  hello.set_device_pixel_ratio(1.0f);
   hello.add_decoders(v1::CODEC_H264);
   hello.set_token("open-sesame");
   hello.set_watch("w");

@@ -74,7 +74,6 @@ v1::ClientMessage good_hello() {
   hello.set_version(1);
   hello.set_viewport_width_px(640);
   hello.set_viewport_height_px(360);
-  hello.set_device_pixel_ratio(1.0f);
   return message;
 }
 
@@ -97,7 +96,6 @@ TEST(Wire, ParsesGoldenClientMessages) {
   EXPECT_EQ(hello.version, 1u);
   EXPECT_EQ(hello.scene_id, "city");
   EXPECT_EQ(hello.viewport_px, glm::ivec2(640, 360));
-  EXPECT_EQ(hello.device_pixel_ratio, 1.5f);
   EXPECT_THAT(hello.decoders, testing::ElementsAre(Codec::h264, Codec::mjpeg));
   EXPECT_EQ(hello.token, "secret");
   EXPECT_EQ(hello.settings.max_fps, 30);
@@ -176,9 +174,6 @@ TEST(Wire, NamesTheFieldThatIsWrong) {
   hello.mutable_hello()->set_viewport_width_px(15);
   EXPECT_THAT(complaint(hello), HasSubstr("hello.viewport_width_px"));
   hello = good_hello();
-  hello.mutable_hello()->set_device_pixel_ratio(nan);
-  EXPECT_THAT(complaint(hello), HasSubstr("hello.device_pixel_ratio"));
-  hello = good_hello();
   hello.mutable_hello()->set_token(std::string(513, 'x'));
   EXPECT_THAT(complaint(hello), HasSubstr("hello.token"));
   hello = good_hello();
@@ -244,9 +239,6 @@ TEST(Wire, TakesWhatIsWithinTheLimitsAndNothingBeyond) {
   const auto height = [](auto& h, std::uint32_t v) { h.set_viewport_height_px(v); };
   hello("hello.viewport_height_px", height, 16, 15);
   hello("hello.viewport_height_px", height, 8192, 8193);
-  const auto ratio = [](auto& h, float v) { h.set_device_pixel_ratio(v); };
-  hello("hello.device_pixel_ratio", ratio, 0.25f, 0.24f);
-  hello("hello.device_pixel_ratio", ratio, 8.0f, 8.1f);
   const auto decoders = [](auto& h, int count) {
     h.clear_decoders();
     for (int i = 0; i < count; ++i) h.add_decoders(v1::CODEC_H264);

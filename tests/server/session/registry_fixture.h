@@ -224,7 +224,6 @@ class RegistryTest : public testing::Test {
     hello.set_version(1);
     hello.set_viewport_width_px(160);
     hello.set_viewport_height_px(96);
-    hello.set_device_pixel_ratio(1.0f);
     hello.add_decoders(v1::CODEC_H264);
     if (!resume_token.empty()) hello.mutable_resume()->set_token(resume_token);
     wish(hello);

@@ -1,15 +1,15 @@
-import type { Clock } from '../session/clock';
-import type { Inertia } from '../input/inertia';
-import type { CameraSample } from '../present/warp';
+import type { Clock } from '../base/clock';
 import type { CameraController } from './camera_controller';
+import type { CameraSample } from './eye';
+import type { Inertia } from './inertia';
 import { is_held, type Axes } from './movement';
 
-const longest_step_s = 0.1; // a page that was held up does not leap
+const longest_step_s = 0.1; // the camera does not leap after the page was held up
 
 /**
- * Steps the camera at display rate while there is movement, and hands out one sample per refresh
- * and change. At rest it does not run at all; it begins with a refresh at which nothing moves, and
- * unless a finger is held down, which may move on, the last sample is handed out again to say so.
+ * Steps the camera at display rate while something moves it, and sends one sample per refresh and
+ * change. It stops at the first refresh at which nothing moves. Then it sends the last sample again,
+ * marked as at rest, unless a finger is still down and may move on.
  */
 export class CameraLoop {
   private running_ = false;
@@ -33,24 +33,24 @@ export class CameraLoop {
     return this.pose_id_;
   }
 
-  /** The newest sample is not yet what the camera will be at the next refresh. */
+  /** The next refresh may move the camera away from the newest sample. */
   get pending(): boolean {
     return this.running_;
   }
 
-  /** Nothing is sent before the scene has told where the camera starts. */
+  /** Starts to send samples, once the scene has said where the camera starts. */
   enable(): void {
     this.enabled_ = true;
     this.changed();
   }
 
-  /** The camera was put somewhere else, or its field of view changed. */
+  /** Something other than a gesture changed the camera or its field of view. */
   changed(): void {
     this.changed_ = true;
     this.wake();
   }
 
-  /** A gesture or a key has come in. */
+  /** Runs from the next refresh on: a gesture or a key came in. */
   wake(): void {
     if (this.running_ || !this.enabled_) return;
     this.running_ = true;
@@ -58,7 +58,7 @@ export class CameraLoop {
     requestAnimationFrame(() => this.tick());
   }
 
-  /** A sample of the camera as it is, at once. Returns its id. */
+  /** Sends a sample of the camera at once. Returns its id. */
   sample(): number {
     this.changed_ = false;
     this.pose_id_ += 1;

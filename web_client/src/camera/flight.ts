@@ -1,15 +1,21 @@
-// Ways of the camera that are known beforehand. Pure.
-import { length, scale, add, slerp, sub, type Quat } from './vector';
-import type { Eye } from '../present/warp';
+// Camera movements that are known in advance. Pure.
+import { add, angle_between, length, scale, slerp, sub } from '../base/vector';
+import type { Eye } from './eye';
 
 export interface Flight {
   readonly duration_s: number;
-  /** `time_s` in 0…duration. */
+  /** The camera at `time_s`, which is in 0…duration. */
   at(time_s: number): Eye;
 }
 
-/** 0…1, at rest at both ends, without a jerk. */
-export function eased(share: number): number {
+/** Where the camera will be on its way. */
+export interface PathSample {
+  readonly time_us: number;
+  readonly eye: Eye;
+}
+
+/** Maps 0…1 to 0…1 with zero velocity and acceleration at both ends (Perlin's smootherstep). */
+function eased(share: number): number {
   const s = Math.min(1, Math.max(0, share));
   return s * s * s * (s * (6 * s - 15) + 10);
 }
@@ -32,14 +38,9 @@ const comfortable_rad_per_s = 0.7;
 const comfortable_reach_per_s = 0.5;
 const time_range_s = [0.6, 6] as const;
 
-/** How long a comfortable glide takes; `reach`: the scale of the scene to a visitor. */
+/** Duration of a comfortable glide. `reach`: the scene's scale to a visitor, world units. */
 export function glide_time_s(from: Eye, to: Eye, reach: number): number {
   const turn_s = angle_between(from.orientation, to.orientation) / comfortable_rad_per_s;
   const way_s = length(sub(to.position, from.position)) / (reach * comfortable_reach_per_s);
   return Math.min(time_range_s[1], Math.max(time_range_s[0], turn_s, way_s));
-}
-
-export function angle_between(a: Quat, b: Quat): number {
-  const cosine = Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
-  return 2 * Math.acos(Math.min(1, cosine));
 }

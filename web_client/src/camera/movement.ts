@@ -1,12 +1,12 @@
 // What pointers, wheels, keys and sticks ask of a camera.
 
-/** One movement of pointer or wheel. Distances are fractions of the view's height, y down. */
+/** One movement of a pointer or wheel. Distances are fractions of the view's height, y down. */
 export type Gesture =
   | { kind: 'look'; dx: number; dy: number } // the scene follows the pointer
   | { kind: 'pan'; dx: number; dy: number } // the scene follows the pointer
   | { kind: 'dolly'; steps: number }; // > 0: towards the scene; 1 = one notch of a wheel
 
-/** Held keys, each -1…1. */
+/** Held keys and deflected sticks, each -1…1. */
 export interface Axes {
   readonly right: number;
   readonly up: number;

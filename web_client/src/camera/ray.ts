@@ -1,16 +1,20 @@
-// Between places in the view and directions in the scene. Pure.
-import type { Eye } from '../present/warp';
-import type { Ray } from '../session/messages';
-import { conjugate, normalize, rotate, sub, forward, type Vec3 } from './vector';
+// Converts between places in the view and rays in the scene. Pure.
+import { conjugate, normalize, rotate, sub, forward, type Vec3 } from '../base/vector';
+import type { Eye } from './eye';
 
-/** `x`, `y`: shares of the view's width and height, y down. */
+export interface Ray {
+  readonly origin: Vec3;
+  readonly direction: Vec3;
+}
+
+/** Ray through a place of the view. `x`, `y`: shares of its width and height, y down. */
 export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray {
   const tan = Math.tan(eye.fov_y_rad / 2);
   const inside = normalize([(2 * x - 1) * tan * aspect, (2 * y - 1) * tan, 1], forward);
   return { origin: eye.position, direction: rotate(eye.orientation, inside) };
 }
 
-/** Where a point of the scene is seen, as ray_through() has it; undefined behind the camera. */
+/** Place of a point of the scene in the view, as in ray_through(); undefined behind the camera. */
 export function place_of(point: Vec3, eye: Eye, aspect: number): readonly [number, number] | undefined {
   const [x, y, z] = rotate(conjugate(eye.orientation), sub(point, eye.position));
   if (z <= 1e-6) return undefined;

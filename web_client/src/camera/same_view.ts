@@ -1,5 +1,5 @@
-import type { Pose } from './camera_controller';
-import { length, sub } from './vector';
+import { length, sub } from '../base/vector';
+import type { Pose } from './eye';
 
 /** A hundredth of a pixel at a focal length of 1000 px. */
 export const same_angle_rad = 1e-5;

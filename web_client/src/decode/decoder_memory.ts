@@ -1,4 +1,4 @@
-// Which decoders have really failed in this browser, so that the next visit does not try them again.
+// Remembers decoders that failed in this browser, so that the next visit does not try them again.
 import { decoder_ladder, type DecoderRung } from './ladder';
 
 const storage_key = 'catgs.decoder';
@@ -10,7 +10,7 @@ interface Remembered {
   readonly until_ms: number;
 }
 
-/** Where to begin on the ladder: at its top, unless a decoder of this very browser failed lately. */
+/** The rung to begin with: the top one, unless decoders of this browser failed lately. */
 export function remembered_rung(
   storage: Storage | undefined,
   agent: string,

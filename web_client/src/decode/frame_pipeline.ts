@@ -67,7 +67,7 @@ export class FramePipeline {
 
   push(header: FrameHeader, payload: Uint8Array): void {
     const received_us = this.env_.now_us();
-    const frame = { header, payload, bytes: payload.length, received_us, decoded_us: 0 };
+    const frame = { header, payload, received_us, decoded_us: 0 };
     if (this.needs_key_ && !header.idr) {
       this.drop(frame);
       return;
@@ -196,7 +196,6 @@ export class FramePipeline {
       presentedUs: BigInt(presented_us),
       dropped: presented_us === 0,
       poseAgeUs: presented_us === 0 ? 0 : Math.min(Math.max(age_us, 0), 0xffffffff),
-      decoderQueue: this.decoder_?.queue_length() ?? 0,
     });
   }
 }

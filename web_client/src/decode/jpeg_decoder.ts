@@ -3,8 +3,8 @@ import { Latest } from './latest';
 import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
 
 /**
- * Motion JPEG by createImageBitmap, which every browser has, also on pages without a secure
- * context. Frames are independent, so while one decodes only the newest waits.
+ * Decodes Motion JPEG with createImageBitmap. Every browser has it, even without a secure context.
+ * Frames are independent, so only the newest one waits while another decodes.
  */
 export class JpegDecoder implements Decoder {
   private readonly next_ = new Latest<EncodedFrame>((frame) => this.events_.skipped(frame));
@@ -22,10 +22,6 @@ export class JpegDecoder implements Decoder {
 
   reconfigure(config: StreamConfig): boolean {
     return config.codec === Codec.MJPEG;
-  }
-
-  queue_length(): number {
-    return this.current_ ? 1 : 0;
   }
 
   close(): void {
@@ -48,13 +44,13 @@ export class JpegDecoder implements Decoder {
     try {
       const picture = await createImageBitmap(blob, { colorSpaceConversion: 'none' });
       if (this.current_ !== frame) {
-        picture.close(); // closed meanwhile
+        picture.close(); // the decoder was closed meanwhile
         return;
       }
       frame.decoded_us = this.now_us_();
       this.events_.decoded(frame, picture);
     } catch (error) {
-      // A broken JPEG spoils itself only: no reset, no new key frame.
+      // A broken JPEG spoils no other frame, so it needs neither a reset nor a key frame.
       console.warn('JPEG frame not decodable', error);
       if (this.current_ === frame) this.events_.skipped(frame);
     }

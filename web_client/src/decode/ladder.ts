@@ -1,4 +1,4 @@
-/** Ways to decode, best first; the last one needs no video decoder. */
+/** Ways to decode, best first. The last one needs no video decoder. */
 export const decoder_ladder = [
   'prefer-hardware',
   'no-preference',

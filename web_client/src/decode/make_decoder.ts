@@ -4,7 +4,7 @@ import { failures_per_rung, rungs_from, type DecoderRung } from './ladder';
 import type { Decoder, DecoderEvents } from './picture';
 import { decoder_config, has_webcodecs, is_supported, WebCodecsDecoder } from './video_decoder';
 
-/** What this browser can decode here from `first_rung` down, best first. */
+/** Codecs that this browser can decode from `first_rung` down, best first. */
 export function available_codecs(first_rung: DecoderRung): Codec[] {
   return has_webcodecs() && first_rung !== 'jpeg' ? [Codec.H264, Codec.MJPEG] : [Codec.MJPEG];
 }
@@ -15,8 +15,8 @@ export interface MadeDecoder {
 }
 
 /**
- * The best decoder from `first_rung` down that is left after `failures` real failures: hardware
- * first, software when hardware has proved unable. Undefined when none is left.
+ * Makes the best decoder that is left below `first_rung` after `failures` failures: hardware first,
+ * software once hardware has failed. Undefined when none is left.
  */
 export async function make_decoder(
   config: StreamConfig,

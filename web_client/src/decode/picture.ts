@@ -1,12 +1,11 @@
 import type { FrameHeader, StreamConfig } from '../wire/wire';
 
-/** Decoded pixels. Whoever holds it must close() it: decoders have only a few to give. */
+/** Decoded pixels. The holder must close() it, because decoders have only a few to give. */
 export type Picture = VideoFrame | ImageBitmap;
 
 /** One frame on its way through the client. Times in microseconds of the page's clock. */
 export interface Frame {
   readonly header: FrameHeader;
-  readonly bytes: number;
   readonly received_us: number;
   decoded_us: number; // 0 until decoded
 }
@@ -28,12 +27,10 @@ export interface DecoderEvents {
 export interface Decoder {
   decode(frame: EncodedFrame): void;
   /**
-   * Goes on with another stream, from its next key frame; frames inside still come out. False when it
-   * cannot: then it is as before.
+   * Goes on with another stream from its next key frame. Frames inside still come out. Returns false,
+   * and stays as it was, when it cannot.
    */
   reconfigure(config: StreamConfig): boolean;
-  /** Frames waiting in the decoder. */
-  queue_length(): number;
-  /** Every frame inside is skipped, at once; no event follows. */
+  /** Skips every frame inside at once. No event follows. */
   close(): void;
 }

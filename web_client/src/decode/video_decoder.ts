@@ -5,7 +5,7 @@ export function has_webcodecs(): boolean {
   return typeof VideoDecoder !== 'undefined' && typeof EncodedVideoChunk !== 'undefined';
 }
 
-/** Annex B needs no `description`: parameter sets travel with every IDR. */
+/** Annex B streams need no `description`, because parameter sets travel with every IDR. */
 export function decoder_config(
   config: StreamConfig,
   acceleration: HardwareAcceleration,
@@ -23,7 +23,7 @@ export async function is_supported(config: VideoDecoderConfig): Promise<boolean>
   return (await VideoDecoder.isConfigSupported(config)).supported === true;
 }
 
-/** H.264 by WebCodecs. One frame in, one picture out; the frame id travels as the timestamp. */
+/** Decodes H.264 with WebCodecs. One frame gives one picture; the frame id travels as the timestamp. */
 export class WebCodecsDecoder implements Decoder {
   private readonly decoder_: VideoDecoder;
   private readonly inside_ = new Map<number, EncodedFrame>();
@@ -53,22 +53,18 @@ export class WebCodecsDecoder implements Decoder {
         }),
       );
     } catch (error) {
-      // Not left for close(), which may have been called already.
+      // close() may have run already, so the frame is not left for it.
       this.inside_.delete(timestamp);
       this.events_.skipped(frame);
       this.events_.failed(error instanceof Error ? error : new Error(String(error)));
     }
   }
 
-  /** What it cannot play after all, it says by failing. */
+  /** A stream that the decoder cannot play after all shows up as a failure. */
   reconfigure(config: StreamConfig): boolean {
     if (config.codec !== Codec.H264 || this.decoder_.state !== 'configured') return false;
     this.decoder_.configure(decoder_config(config, this.acceleration_));
     return true;
-  }
-
-  queue_length(): number {
-    return this.decoder_.decodeQueueSize;
   }
 
   close(): void {
@@ -83,7 +79,7 @@ export class WebCodecsDecoder implements Decoder {
       picture.close();
       return;
     }
-    // Pictures come in decoding order: whatever is older and still inside gave none.
+    // Pictures come in decoding order, so older frames that are still inside gave none.
     for (const [timestamp, older] of this.inside_) {
       if (timestamp > picture.timestamp) break;
       this.inside_.delete(timestamp);

@@ -1,12 +1,12 @@
-// Game controllers with the browsers' "standard" layout: left stick moves, right stick looks.
+// Game controllers with the "standard" layout of browsers: the left stick moves, the right one looks.
 import { no_axes, type Axes } from '../camera/movement';
 
 export type GamepadAction = 'next' | 'previous' | 'play' | 'reset' | 'mode';
 
-type Pad = Pick<Gamepad, 'axes' | 'buttons' | 'connected' | 'mapping'>;
+type Pad = Pick<Gamepad, 'axes' | 'buttons' | 'connected'>;
 
 const dead_zone = 0.15;
-const poll_ms = 50; // while nothing is held: a press is heard soon enough
+const poll_ms = 50; // soon enough for the first press; after it the camera loop reads every frame
 
 const left_shoulder = 4;
 const right_shoulder = 5;
@@ -20,7 +20,7 @@ const actions: readonly (readonly [button: number, action: GamepadAction])[] = [
   [9, 'play'],
 ];
 
-/** A stick at rest is never quite at 0; beyond the dead zone, gently at first. */
+/** A stick at rest is never quite at 0, so there is a dead zone. Beyond it the response is quadratic. */
 function deflection(value: number | undefined): number {
   const size = Math.abs(value ?? 0);
   if (size <= dead_zone) return 0;

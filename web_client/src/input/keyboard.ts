@@ -1,6 +1,6 @@
 import { no_axes, type Axes } from '../camera/movement';
 
-// By position on the keyboard (KeyboardEvent.code), so that WASD is a cross on every layout.
+// Keys by position (KeyboardEvent.code), so that WASD has the same shape on every layout.
 const movement: Readonly<Record<string, Partial<Axes>>> = {
   KeyW: { forward: 1 },
   KeyS: { forward: -1 },
@@ -16,16 +16,16 @@ const movement: Readonly<Record<string, Partial<Axes>>> = {
 
 const clamp = (v: number): number => Math.min(1, Math.max(-1, v));
 
-// A tap moves the camera for this many of its steps, however short it was, and also when it came
-// before the scene did.
+// A tap moves the camera for this many steps, however short it was. This holds too when it comes before
+// the scene is loaded.
 const least_steps = 5;
 
 interface Hold {
-  steps: number; // that it has moved the camera
+  steps: number; // that it has moved the camera so far
   released: boolean;
 }
 
-/** Which movement keys are held, as camera axes. */
+/** Turns held movement keys into camera axes. */
 export class HeldKeys {
   private readonly held_ = new Map<string, Hold>();
   private fast_ = false;
@@ -54,7 +54,7 @@ export class HeldKeys {
     this.fast_ = false;
   }
 
-  /** Once for each step of the camera. */
+  /** Call this once for each step of the camera. */
   axes(): Axes {
     if (this.held_.size === 0) return no_axes;
     const sum = { ...no_axes };

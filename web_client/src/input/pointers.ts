@@ -16,15 +16,15 @@ interface Held {
 }
 
 const primary_button = 1;
-// One wheel notch's worth of dolly for spreading two fingers by this factor.
+// Spreading two fingers by this factor equals one notch of a wheel.
 const pinch_factor_per_step = 1.13;
 const wheel_px_per_step = 100;
 const wheel_px_per_line = 33; // deltaMode 1: lines
 const wheel_px_per_page = 400; // deltaMode 2: pages
 
 /**
- * Turns pointers into camera gestures: a mouse drag looks (primary button) or pans (any other, or
- * with shift); one finger looks; two fingers pan and pinch.
+ * Turns pointers into camera gestures. A mouse drag looks with the primary button, and pans with any
+ * other button or with shift. One finger looks; two fingers pan and pinch.
  */
 export class Pointers {
   private readonly held_ = new Map<number, Held>();
@@ -37,7 +37,7 @@ export class Pointers {
     if (this.held_.size < 2) this.held_.set(p.id, { x: p.x, y: p.y });
   }
 
-  /** Returns whether this was the last one. */
+  /** Returns whether this was the last pointer. */
   up(id: number): boolean {
     return this.held_.delete(id) && this.held_.size === 0;
   }
@@ -96,7 +96,7 @@ export class DoubleTap {
   }
 }
 
-/** `delta_mode` as in WheelEvent. A trackpad's pinch comes as a wheel with ctrl and small deltas. */
+/** `delta_mode` is that of WheelEvent. A pinch on a trackpad comes as a wheel with ctrl and small deltas. */
 export function wheel_gesture(delta_y: number, delta_mode: number, ctrl: boolean): Gesture {
   const px_per_unit = delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
   const steps = (-delta_y * px_per_unit * (ctrl ? 8 : 1)) / wheel_px_per_step;

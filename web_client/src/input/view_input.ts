@@ -1,15 +1,15 @@
-// Binds pointers, wheel and keyboard of the view to gestures and held keys.
+// Turns DOM events of the view into gestures and held keys.
+import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
-import type { Inertia } from './inertia';
 import { HeldKeys } from './keyboard';
 import { DoubleTap, Pointers, wheel_gesture, type PointerSample } from './pointers';
 
-export interface ViewInputListener {
+interface ViewInputListener {
   gesture(gesture: Gesture): void;
   keys_changed(): void;
   /** No pointer is down any more, and nothing glides on. */
   let_go(): void;
-  /** A double click or double tap; a share of the view's width and height, y down. */
+  /** A double click or double tap. `x`, `y`: shares of the view's width and height, y down. */
   pointed_at(x: number, y: number): void;
 }
 
@@ -84,8 +84,8 @@ function bind_keys(keys: HeldKeys, listener: ViewInputListener): void {
 }
 
 /**
- * Marks focus that came by Tab. (`:focus-visible` also frames the picture for whoever clicked on it
- * and then flies by keys.)
+ * Marks focus that came by Tab. (`:focus-visible` would also frame the picture for visitors who clicked
+ * on it and then fly by keys.)
  */
 function bind_focus(view: HTMLElement): void {
   let by_tab = false;
@@ -103,7 +103,7 @@ function bind_focus(view: HTMLElement): void {
   view.addEventListener('focus', mark);
 }
 
-/** Whether a key belongs to a control of the page and not to the camera. */
+/** Whether a key belongs to a form field rather than to the camera. */
 export function is_typing(target: EventTarget | null): boolean {
   return target instanceof HTMLElement && target.matches('input, select, textarea');
 }

@@ -2,7 +2,7 @@ import type { Picture } from '../decode/picture';
 import { i420_to_rgba, type PlaneLayout } from './i420';
 import { size_of, type Pixels, type Presenter } from './presenter';
 
-/** Without a GPU this takes the browser 11 ms of CPU a frame (640x360), WebGL in software 19. */
+/** For machines without a GPU. A 640x360 frame takes 11 ms of CPU, where software WebGL takes 19. */
 export class Canvas2dPresenter implements Presenter {
   readonly description = '2D canvas (no hardware WebGL2)';
   readonly can_warp = false;
@@ -47,7 +47,7 @@ export class Canvas2dPresenter implements Presenter {
   }
 }
 
-/** What our encoders send and software decoders give; anything else is left to the browser. */
+/** The format that our encoders send and software decoders give. The browser converts all others. */
 function is_limited_709(picture: Picture): picture is VideoFrame {
   if (!('colorSpace' in picture) || picture.format !== 'I420') return false;
   const { matrix, fullRange } = picture.colorSpace;

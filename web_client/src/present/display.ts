@@ -1,29 +1,22 @@
-// What the canvas shows: the newest picture, placed as the newest camera of this page sees it, at
-// the rate of the display.
+// Shows the newest picture on the canvas as this page's newest camera sees it, at the rate of the
+// display.
+import type { CameraSample, Eye } from '../camera/eye';
 import type { Picture } from '../decode/picture';
 import type { Pixels, Placing, Presenter } from './presenter';
 import { TurnForecast } from './turn_forecast';
-import {
-  reach,
-  uncovered_share,
-  warp_matrix,
-  type CameraSample,
-  type Eye,
-  type Matrix3,
-  type Sides,
-} from './warp';
+import { reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
 import { WarpPolicy, type WarpMode } from './warp_policy';
 
-export interface DisplayEnvironment {
+interface DisplayEnvironment {
   now_us: () => number;
   on_refresh: (draw: () => void) => void;
-  /** Pictures of another size are wanted. */
+  /** The display wants pictures of another size. */
   overscan_changed: () => void;
 }
 
-/** The camera behind what is on the canvas. */
+/** The camera that the canvas shows. */
 export interface ShownView extends Eye {
-  /** Share of the canvas for which there was no picture. */
+  /** Share of the canvas that the picture does not cover. */
   readonly uncovered: number;
 }
 
@@ -44,7 +37,7 @@ export class Display {
   private view_: Eye | undefined;
   private redraw_due_ = false;
 
-  /** `aspect`: width by height of the view. */
+  /** `aspect`: width over height of the view. */
   constructor(
     private readonly presenter_: Presenter,
     private readonly env_: DisplayEnvironment,
@@ -67,12 +60,12 @@ export class Display {
     return this.policy_.state;
   }
 
-  /** Sides of the picture by those of the view. */
+  /** Sides of the picture over those of the view. */
   get overscan(): Sides {
     return this.policy_.overscan;
   }
 
-  /** Where the camera of this page is. */
+  /** This page's newest camera. */
   set camera(sample: CameraSample) {
     this.camera_ = sample;
     this.turn_.moved(sample);
@@ -117,7 +110,7 @@ export class Display {
     const { picture_: picture, camera_: camera } = this;
     if (!picture || !camera || !this.policy_.active) return undefined;
     const matrix = this.matrix(picture, camera.eye, camera.distance);
-    // A camera that jumped sees next to nothing of the picture: then it is better as it is.
+    // After a jump the view sees almost nothing of the picture, which is then better left as it is.
     const { x, y } = reach(matrix);
     if (Math.max(x, y) > farthest_reach) return undefined;
     const height_px = Math.round(picture.height_px / this.policy_.overscan.y);
@@ -128,7 +121,7 @@ export class Display {
     return warp_matrix(eye, view, width_px / height_px, distance, this.aspect);
   }
 
-  /** Tells the policy how a view was drawn whose camera moves. */
+  /** Tells the policy how the view of a moving camera was drawn. */
   private note({ matrix }: Placing, draw_us: number): void {
     const { picture_: picture, view_: view } = this;
     if (!picture || !view) return;
@@ -139,7 +132,7 @@ export class Display {
     const shown = reach(matrix);
     let needed = { x: shown.x * wide, y: shown.y * tall };
     if (Math.max(Math.abs(needed.x - 1), Math.abs(needed.y - 1)) < no_motion_rad) return;
-    // What this turn will need: whoever waits for what it needed shows a border first.
+    // Also ask for what this turn will need next. The overscan it needed so far comes too late.
     const later = this.turn_.eye_later(now_us);
     if (later) {
       const coming = reach(warp_matrix(view, later, this.aspect, Infinity));

@@ -1,6 +1,6 @@
-// BT.709 limited-range 4:2:0 to RGB, exact to the last bit but one. Browsers do this on a GPU; on a
-// CPU Chromium's conversion misses saturated blue by 12/255 (its coefficient 2.11 does not fit the eight
-// bits it has there), so software presenting brings its own.
+// Converts BT.709 limited-range 4:2:0 to RGB, exact to the last bit but one. Browsers do this on a GPU.
+// Chromium's conversion on a CPU misses saturated blue by 12/255: its coefficient 2.11 does not fit the
+// eight bits it has there. So the 2D canvas gets its own conversion.
 
 // Recommendation ITU-R BT.709: Kr = 0.2126, Kb = 0.0722; limited range: luma 16…235, chroma 16…240.
 const luma_scale = 255 / 219;
@@ -25,13 +25,13 @@ const g_of_cr = table(cr_to_g, 128);
 const g_of_cb = table(cb_to_g, 128);
 const b_of_cb = table(cb_to_b, 128);
 
-// Sums reach from -290 to 550: a table clamps them without a branch.
+// Sums range from -290 to 550. A table clamps them without a branch.
 const clamp_offset = 320;
 const clamped = Uint8Array.from({ length: 1024 }, (_, i) =>
   Math.min(255, Math.max(0, i - clamp_offset)),
 );
 
-/** Where a plane begins in the buffer, and the bytes from row to row. */
+/** Offset of a plane in the buffer and bytes between its rows. */
 export interface PlaneLayout {
   readonly offset: number;
   readonly stride: number;

@@ -5,8 +5,8 @@ import { WebGl2Presenter } from './webgl2_presenter';
 export type PresenterChoice = 'auto' | 'webgl2' | '2d';
 
 /**
- * WebGL2 where a GPU does it, a 2D canvas everywhere else, unless one of them was `wanted`. Throws
- * when the browser has neither.
+ * Makes a WebGL2 presenter where a GPU runs it and a 2D canvas elsewhere, or the `wanted` one. Throws
+ * where the browser has neither.
  */
 export function make_presenter(canvas: OffscreenCanvas, wanted: PresenterChoice): Presenter {
   const attributes: WebGLContextAttributes = { alpha: false, antialias: false, depth: false };
@@ -20,8 +20,8 @@ export function make_presenter(canvas: OffscreenCanvas, wanted: PresenterChoice)
 }
 
 /**
- * Asks a canvas of its own, because a canvas that has given one kind of context gives no other.
- * failIfMajorPerformanceCaveat alone is not enough: Chromium grants it to its software renderer.
+ * Asks a separate canvas, because a canvas gives contexts of one kind only.
+ * failIfMajorPerformanceCaveat alone is not enough, because Chromium grants it to its software renderer.
  */
 function has_hardware_webgl2(): boolean {
   const gl = new OffscreenCanvas(1, 1).getContext('webgl2', { failIfMajorPerformanceCaveat: true });

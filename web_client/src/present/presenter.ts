@@ -8,29 +8,29 @@ export interface Pixels {
   readonly rgba: Uint8ClampedArray<ArrayBuffer>;
 }
 
-/** How a picture is put into the view; without one it fills the view as it is. */
+/** Places a picture in the view. A picture without a placing fills the view as it is. */
 export interface Placing {
   /** From places in the view to places in the picture. */
   readonly matrix: Matrix3;
-  /** Of the canvas. */
+  /** Size of the canvas. */
   readonly width_px: number;
   readonly height_px: number;
 }
 
 /**
- * Draws pictures on the canvas at their native size; CSS scales the canvas to the view, which is
- * free on a GPU and the cheapest there is without one.
+ * Draws pictures on the canvas at their native size. CSS scales the canvas to the view, which is free
+ * on a GPU and the cheapest way without one.
  */
 export interface Presenter {
-  /** For people: how pictures get on the canvas. */
+  /** How pictures get on the canvas, for people to read. */
   readonly description: string;
-  /** Heeds the placing, and redraws. */
+  /** Whether it uses placings and can redraw. */
   readonly can_warp: boolean;
-  /** The picture is free again when the promise resolves; one draw at a time. */
+  /** The promise resolves when the picture may be closed. Only one draw runs at a time. */
   draw(picture: Picture, placing?: Placing): Promise<void>;
-  /** The last picture once more, placed anew. Only where it can warp. */
+  /** Draws the last picture again with another placing. Only for presenters that can warp. */
   redraw(placing: Placing): void;
-  /** What was drawn last. */
+  /** Reads back what was drawn last. */
   read(): Pixels;
 }
 

@@ -1,20 +1,19 @@
-// How far the view will have turned from a picture by the time the next one takes its place. Pure.
-import { angle_between } from '../camera/flight';
-import { slerp, type Quat } from '../camera/vector';
-import { percentile, TimeWindow } from '../stats/window';
-import type { CameraSample, Eye } from './warp';
+// Forecasts how far the view turns away from a picture before the next one replaces it. Pure.
+import { percentile, TimeWindow } from '../base/time_window';
+import { angle_between, slerp, type Quat } from '../base/vector';
+import type { CameraSample, Eye } from '../camera/eye';
 
-const rate_span_us = 80_000; // a turn is measured over this long
+const rate_span_us = 80_000; // the rate of a turn is measured over this time
 const lag_span_us = 10e6;
-const slow_rad_s = 0.2; // says nothing of the lag
-const first_lag_s = 0.1; // before it was measured
+const slow_rad_s = 0.2; // slower turns say nothing about the lag
+const first_lag_s = 0.1; // before a measurement
 const longest_lag_s = 0.4; // beyond that no overscan helps
 const largest_turn_rad = 0.5;
 
 /**
- * The rate at which the camera turns, times how late pictures are. The lag is what is left of motion
- * to photon after the server's own forecast, and is learned from pictures: the angle between one and
- * the view, over the rate.
+ * Multiplies the rate at which the camera turns by the lag of pictures. The lag is the part of motion
+ * to photon that the server's own forecast leaves. It is learned from pictures: the angle between a
+ * picture and the view, divided by the rate.
  */
 export class TurnForecast {
   private samples_: CameraSample[] = [];
@@ -38,7 +37,7 @@ export class TurnForecast {
     this.lags_s_.push(now_us, Math.min(lag_s, longest_lag_s));
   }
 
-  /** Where the camera looks when a picture of how it looks now is about to be replaced. */
+  /** The camera at the time when the picture of its present pose is about to be replaced. */
   eye_later(now_us: number): Eye | undefined {
     const { turn_rad, over_s, oldest, newest } = this.turn();
     if (!oldest || !newest || !(over_s > 0)) return undefined;

@@ -1,31 +1,14 @@
-// Shows a picture as a camera sees it that has moved on since it was rendered. Pure.
-import { conjugate, multiply, rotate, scale, sub, type Quat, type Vec3 } from '../camera/vector';
-
-/** A pinhole camera; axes x right, y down, z forward. */
-export interface Eye {
-  readonly position: Vec3;
-  readonly orientation: Quat;
-  readonly fov_y_rad: number;
-}
-
-/** The newest local camera. */
-export interface CameraSample {
-  readonly pose_id: number;
-  readonly time_us: number;
-  readonly eye: Eye;
-  /** Of what the visitor looks at, along the view axis; Infinity: unknown. World units. */
-  readonly distance: number;
-  /** The newest sample once more: nothing moves the camera. */
-  readonly at_rest?: boolean;
-}
+// Warps a picture to a camera that has moved since the picture was rendered. Pure.
+import { conjugate, multiply, rotate, scale, sub, type Vec3 } from '../base/vector';
+import { limited_fov, type Eye } from '../camera/eye';
 
 /** Column-major, for homogeneous coordinates (x, y, 1); x and y are -1…1 across an image, y down. */
 export type Matrix3 = Float32Array;
 
 /**
- * From places in the view to places in the picture. What lies `distance` ahead of the view (on a
- * plane at a right angle to its axis) comes out exactly; with Infinity, the far field: then only
- * rotation counts. `aspect`: width by height of the picture, and of the view where that differs.
+ * Homography from places in the view to places in the picture. It is exact for the plane at `distance`
+ * ahead of the view, at a right angle to its axis. With Infinity it is exact for the far field, where
+ * only rotation counts. `aspect`: width over height of the picture, and of the view where that differs.
  */
 export function warp_matrix(
   picture: Eye,
@@ -55,7 +38,7 @@ export function warp_matrix(
   ]);
 }
 
-/** Where a place in the view lies in the picture; undefined: behind it. */
+/** Place in the picture of a place in the view; undefined behind the picture's camera. */
 export function warped(m: Matrix3, x: number, y: number): readonly [number, number] | undefined {
   const w = m[2]! * x + m[5]! * y + m[8]!;
   if (w <= 1e-6) return undefined;
@@ -65,13 +48,13 @@ export function warped(m: Matrix3, x: number, y: number): readonly [number, numb
 const probes = [-1, -0.5, 0, 0.5, 1];
 const farthest = 4;
 
-/** Of a picture by those of the view; larger where a turn brings in what is beside the view. */
+/** Sides of a picture over those of the view. They are larger where a turn needs what is beside the view. */
 export interface Sides {
   readonly x: number;
   readonly y: number;
 }
 
-/** How far the view reaches from the middle of the picture: 1 is its border; at most 4. */
+/** How far the view reaches from the middle of the picture: 1 is the border, and 4 the most returned. */
 export function reach(m: Matrix3): Sides {
   let [x_most, y_most] = [0, 0];
   for (const [x, y] of [
@@ -87,7 +70,7 @@ export function reach(m: Matrix3): Sides {
   return { x: Math.min(x_most, farthest), y: Math.min(y_most, farthest) };
 }
 
-/** Share of the view for which the picture has nothing, on a grid. */
+/** Share of the view that the picture does not cover, sampled on a grid. */
 export function uncovered_share(m: Matrix3, columns = 64, rows = 36): number {
   let uncovered = 0;
   for (let row = 0; row < rows; ++row) {
@@ -99,7 +82,7 @@ export function uncovered_share(m: Matrix3, columns = 64, rows = 36): number {
   return uncovered / (columns * rows);
 }
 
-/** Field of view whose image plane is `factor` times as large; within the wire's limits. */
+/** Field of view whose image plane is `factor` times as large, limited to the range of the wire. */
 export function widened_fov(fov_y_rad: number, factor: number): number {
-  return Math.min(2.8, Math.max(0.1, 2 * Math.atan(Math.tan(fov_y_rad / 2) * factor)));
+  return limited_fov(2 * Math.atan(Math.tan(fov_y_rad / 2) * factor));
 }

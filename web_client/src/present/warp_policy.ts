@@ -1,20 +1,21 @@
-// Whether warping helps, and how much more than the view has to be rendered for it. Pure.
-import { percentile, TimeWindow } from '../stats/window';
+// Decides whether warping helps, and how much overscan it needs. Pure.
+import { percentile, TimeWindow } from '../base/time_window';
 import { text } from '../text';
 import type { Sides } from './warp';
 
 export type WarpMode = 'auto' | 'on' | 'off';
 
-// Each change opens the stream anew: so few. Most turns are about the vertical, which needs width, and
-// height for the corners only: twice the view's pixels reach half as far again as by one factor.
+// There are few steps, because each change restarts the stream. Most turns are about the vertical axis.
+// They need width, and height for the corners only. Two factors reach half as far again as a single one
+// would with the same number of pixels, twice those of the view.
 const widths = [1, 1.12, 1.26, 1.42, 1.6] as const;
 const heights = [1, 1.12, 1.26] as const;
 const none: Sides = { x: 1, y: 1 };
 const mode_on_least: Sides = { x: 1.26, y: 1.12 };
 const span_us = 1e6;
 const least_samples = 12;
-const calm_before_less_us = 10e6; // an overscan that was needed lately may be needed again
-const slow_draw_us = 8000; // half a refresh: such drawing makes the picture late
+const calm_before_less_us = 10e6; // a turn may soon need the overscan of the last one again
+const slow_draw_us = 8000; // half a refresh: slower drawing makes the picture late
 
 const percent = (factor: number): number => Math.round((factor - 1) * 100);
 
@@ -43,7 +44,7 @@ export class WarpPolicy {
     return this.active ? this.overscan_ : none;
   }
 
-  /** For people. */
+  /** Text for people. */
   get state(): string {
     if (!this.can_warp_) return text.warp.no_gpu;
     if (this.mode_ === 'off') return text.warp.off;
@@ -53,8 +54,8 @@ export class WarpPolicy {
   }
 
   /**
-   * A moving camera was drawn. `needed`: the overscan that covers it (see reach()). Returns whether
-   * another one is wanted.
+   * The view of a moving camera was drawn. `needed`: the overscan that covers it (see reach()). Returns
+   * whether the policy wants another overscan.
    */
   drawn(needed: Sides, draw_us: number, now_us: number): boolean {
     if (!this.active) return false;
@@ -77,7 +78,7 @@ export class WarpPolicy {
       x: Math.max(fitting(widths, needed.x), least.x),
       y: Math.max(fitting(heights, needed.y), least.y),
     };
-    // What is too much on one side stays while the other one is needed: turns change their axis.
+    // Turns change their axis, so a side that is too large stays while the other one is needed.
     const is_needed = (now.x > 1 && wanted.x >= now.x) || (now.y > 1 && wanted.y >= now.y);
     if (is_needed) this.needed_us_ = now_us;
     if (wanted.x > now.x || wanted.y > now.y) {

@@ -2,8 +2,8 @@ import type { Picture } from '../decode/picture';
 import { size_of, type Pixels, type Placing, type Presenter } from './presenter';
 import type { Matrix3 } from './warp';
 
-// One triangle that covers the view; places are -1…1, y down. The perspective division is done per
-// pixel: interpolated homogeneous places stay exact.
+// One triangle covers the view. Places are -1…1, y down. The perspective division is done per pixel,
+// because interpolated homogeneous places stay exact.
 const vertex_source = `#version 300 es
 uniform mat3 picture_from_view;
 out highp vec3 place;
@@ -36,7 +36,7 @@ export class WebGl2Presenter implements Presenter {
     private readonly gl_: WebGL2RenderingContext,
   ) {
     this.set_up();
-    // The canvas is an EventTarget in the worker too; a lost context comes back empty.
+    // A lost context comes back empty. The canvas is an EventTarget in the worker, too.
     canvas_.addEventListener('webglcontextlost', (event) => event.preventDefault());
     canvas_.addEventListener('webglcontextrestored', () => this.set_up());
   }
@@ -63,7 +63,7 @@ export class WebGl2Presenter implements Presenter {
   read(): Pixels {
     const gl = this.gl_;
     const { width, height } = this.canvas_;
-    // The drawing buffer is gone after it was shown: draw the texture again.
+    // The browser discards the drawing buffer after it is shown, so the texture is drawn again.
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     const bottom_up = new Uint8Array(width * height * 4);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bottom_up);

@@ -1,12 +1,12 @@
 const steps_px = [240, 300, 360, 450, 540, 630, 720, 900, 1080, 1440, 2160] as const;
 const first_px = 720;
-const patience = 3; // looks in a row that must agree before the size changes
+const patience = 3; // looks in a row that must agree
 const growth_margin = 0.6; // grow only when the larger picture is expected to be well in time
 
 /**
- * Picks the height of the picture so that the server renders and encodes it at a pleasant rate:
- * smaller pictures that move beat large ones that do not. Fed once a second with the server's mean
- * time per frame; pure.
+ * Picks the height at which the server renders and encodes moving pictures fast enough. Small pictures
+ * that move beat large ones that do not. It is fed once a second with the server's mean time per
+ * frame. Pure.
  */
 export class AutoHeight {
   private height_px_ = first_px;
@@ -32,7 +32,7 @@ export class AutoHeight {
     return changed;
   }
 
-  /** -1: too slow, 1: there is room to grow, 0: as it should be. */
+  /** -1: too slow. 1: room to grow. 0: as it should be. */
   private vote(frame_ms: number, view_height_px: number): number {
     const now_px = this.height_px(view_height_px);
     if (frame_ms > this.target_frame_ms_ * 1.2) return now_px > steps_px[0] ? -1 : 0;
@@ -41,7 +41,7 @@ export class AutoHeight {
     return can_grow && grown_ms < this.target_frame_ms_ * growth_margin ? 1 : 0;
   }
 
-  /** The largest step whose time, which grows with the pixels, is in budget. */
+  /** The largest step within the time budget. Time grows with the number of pixels. */
   private fitting(height_px: number, frame_ms: number): number {
     const wanted_px = height_px * Math.sqrt(this.target_frame_ms_ / frame_ms);
     return [...steps_px].reverse().find((step) => step <= wanted_px) ?? steps_px[0];

@@ -1,10 +1,10 @@
-import { add, scale, type Vec3 } from '../camera/vector';
-import type { Timers } from './clock';
-import type { Ray } from './messages';
+import type { Timers } from '../base/clock';
+import { add, scale, type Vec3 } from '../base/vector';
+import type { Ray } from '../camera/ray';
 
-const patience_ms = 2000; // the server does not answer more than a few a second
+const patience_ms = 2000; // the server answers only a few a second
 
-/** Asks the server what is seen along rays, and hands the answers to who asked. */
+/** Asks the server how far away the scene is along a ray. */
 export class Picks {
   private asked_ = 0;
   private readonly waiting_ = new Map<number, (distance: number | undefined) => void>();
@@ -14,7 +14,7 @@ export class Picks {
     private readonly timers_: Timers,
   ) {}
 
-  /** The place; undefined where nothing is, and without an answer. */
+  /** The point that the ray meets; undefined where it meets nothing, or where no answer comes. */
   async at(ray: Ray): Promise<Vec3 | undefined> {
     const id = ++this.asked_;
     const distance = await new Promise<number | undefined>((resolve) => {

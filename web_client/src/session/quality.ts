@@ -1,13 +1,23 @@
 import { AutoHeight } from './auto_height';
-import type { Quality } from './messages';
 
-/** Lines of the picture, 0 for those of the view, or how to find them. */
+export interface View {
+  readonly width_px: number; // device pixels
+  readonly height_px: number;
+}
+
+export interface Quality {
+  readonly height_px: number; // while the camera moves; 0: the view's
+  readonly still_height_px: number; // when it rests; 0: the view's
+  readonly max_fps: number; // 0: the server's default
+}
+
+/** Lines of the picture, 0 for the view's, or a way to choose them. */
 export type PictureSize = number | 'auto' | 'sharp' | 'smooth';
 
-// A picture takes as long as the rate allows that the choice is about.
+// Time per frame of the rate that each choice aims at.
 const target_frame_ms = { auto: 1000 / 24, sharp: 1000 / 10, smooth: 1000 / 48 } as const;
 
-/** What is asked of the server: as the visitor chose, or as it keeps up. */
+/** Chooses the size and rate of pictures: by the visitor, or by the speed of the server. */
 export class QualityChoice {
   private size_: PictureSize = 'auto';
   private max_fps_ = 0;
@@ -25,7 +35,7 @@ export class QualityChoice {
     return typeof this.size_ !== 'number';
   }
 
-  /** Once a second, with the server's mean time per frame. Returns whether the height changed. */
+  /** Takes the server's mean time per frame once a second. Returns whether the height changed. */
   look(frame_ms: number, view_height_px: number): boolean {
     return this.is_automatic && this.automatic_.look(frame_ms, view_height_px);
   }
@@ -33,7 +43,7 @@ export class QualityChoice {
   in_view(view_height_px: number): Quality {
     const height_px =
       typeof this.size_ === 'number' ? this.size_ : this.automatic_.height_px(view_height_px);
-    // However small pictures have to be to keep up with a moving camera: one that stays can wait.
+    // Moving pictures may have to be small to keep up. A picture that stays can take its time.
     const still_height_px = typeof this.size_ === 'number' ? this.size_ : 0;
     return { height_px, still_height_px, max_fps: this.max_fps_ };
   }

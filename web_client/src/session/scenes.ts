@@ -1,4 +1,4 @@
-/** Ids of the scenes that the token may see; none when the server does not tell. */
+/** Ids of the scenes that this token may see; empty when the server does not answer. */
 export async function list_scenes(page_url: string, token: string): Promise<readonly string[]> {
   try {
     const headers: HeadersInit = token ? { authorization: `Bearer ${token}` } : {};
@@ -12,7 +12,7 @@ export async function list_scenes(page_url: string, token: string): Promise<read
   }
 }
 
-/** The page's address with another scene; without one, with the server's first. */
+/** The page's address with this scene, or with the server's first one where `scene_id` is empty. */
 export function scene_address(page_url: string, scene_id = ''): string {
   const url = new URL(page_url);
   if (scene_id) url.searchParams.set('scene', scene_id);

@@ -1,5 +1,6 @@
-// The life of a session: hello, welcome, frames, heartbeat, errors, drain, reconnect. It knows
-// neither WebSocket nor wall clock, so that tests drive it with fakes.
+// The life of a session: hello, welcome, frames, heartbeat, errors, drain, reconnect. It uses neither
+// WebSocket nor the wall clock, so that tests can drive it with fakes.
+import type { Clock, Timers } from '../base/clock';
 import type { OpenSocket, Socket } from '../transport/socket';
 import {
   decode_server_message,
@@ -21,27 +22,26 @@ import {
   type Error as ServerError,
 } from '../wire/wire';
 import { backoff_ms } from './backoff';
-import type { Clock, Timers } from './clock';
 import type { SessionState, WaitCause } from './state';
 
-/** What hello says, besides the things that the session itself knows. */
-export type Greeting = Omit<HelloInit, '$typeName' | 'version' | 'resume'>;
+/** The fields of hello that the session does not know itself. */
+type Greeting = Omit<HelloInit, '$typeName' | 'version' | 'resume'>;
 
-export interface SessionListener {
+interface SessionListener {
   state(state: SessionState): void;
   welcome(welcome: Welcome): void;
-  /** Before the first frame it describes. The frame after it is an IDR. */
+  /** Comes before the first frame that it describes. That frame is an IDR. */
   config(config: StreamConfig): void;
   frame(header: FrameHeader, payload: Uint8Array): void;
-  /** The frames so far belong to a connection that goes: acknowledge them now or never. */
+  /** The connection of the frames so far is about to close. Acknowledge them now or never. */
   stream_ended(): void;
   stats(stats: Stats): void;
   picked(picked: Picked): void;
-  /** The server said something for people that does not end the session. */
+  /** The server sent a message for people. The session goes on. */
   notice(message: string): void;
 }
 
-export interface SessionEnvironment {
+interface SessionEnvironment {
   open: OpenSocket;
   clock: Clock;
   timers: Timers;
@@ -50,12 +50,12 @@ export interface SessionEnvironment {
 
 export const silence_ms = 3000; // the server speaks at least once a second
 export const greeting_ms = 10_000; // to open the connection and to be answered the first time
-const stable_ms = 5000; // a connection that lived this long was a good one: backoff starts anew
+const stable_ms = 5000; // after a connection that lived this long, backoff starts anew
 const keep_alive_ms = 10_000;
 const congested_bytes = 32 * 1024;
 const congestion_poll_ms = 20;
 
-/** One connection. During a drain there are two: the old one shows pictures until the new one can. */
+/** One connection. A drain has two: the old one shows pictures until the new one can. */
 interface Link {
   socket: Socket;
   opened: boolean;
@@ -90,19 +90,19 @@ export class Session {
     this.connect();
   }
 
-  /** Connects at once, whatever the session was waiting for. */
+  /** Connects at once and stops waiting. */
   retry(): void {
     this.attempt_ = 0;
     this.connect();
   }
 
-  /** For a new connection with other decoders, another token or another scene. */
+  /** Opens a new connection with other decoders, another token or another scene. */
   greet_anew(change: Partial<Greeting>): void {
     this.greeting_ = { ...this.greeting_, ...change };
     this.retry();
   }
 
-  /** The newest pose wins: on a congested connection older ones are never sent. */
+  /** The newest pose wins. A congested connection skips older ones. */
   send_pose(pose: PoseInit): void {
     this.last_pose_ = pose;
     this.flush_pose();
@@ -117,7 +117,7 @@ export class Session {
     this.send({ case: 'settings', value: settings });
   }
 
-  /** Where the camera will go: forecasts may follow it. */
+  /** Tells where the camera will go, for the forecasts of the server. */
   send_path(samples: PoseInit[]): void {
     this.path_ = samples;
     this.send({ case: 'path', value: { samples } });
@@ -131,12 +131,11 @@ export class Session {
     this.send({ case: 'requestIdr', value: {} });
   }
 
-  set_viewport(width_px: number, height_px: number, device_pixel_ratio: number): void {
+  set_viewport(width_px: number, height_px: number): void {
     this.greeting_ = {
       ...this.greeting_,
       viewportWidthPx: width_px,
       viewportHeightPx: height_px,
-      devicePixelRatio: device_pixel_ratio,
     };
   }
 
@@ -205,7 +204,7 @@ export class Session {
     };
   }
 
-  /** What is left of the path: any server can go on forecasting by it. */
+  /** The rest of the path, so that any server can go on forecasting by it. */
   private path_ahead(): { path?: { samples: PoseInit[] } } {
     const now_us = this.env_.clock.now_us();
     const next = this.path_.findIndex(({ clientTimeUs }) => Number(clientTimeUs ?? 0n) > now_us);
@@ -213,7 +212,7 @@ export class Session {
     return { path: { samples: this.path_.slice(Math.max(0, next - 1)) } };
   }
 
-  /** Ends a link that says nothing for too long. Looks again when the time could be up. */
+  /** Ends a link that stays silent for too long. Looks again when the time could be up. */
   private watch(link: Link): void {
     const limit_ms = link.welcome ? silence_ms : greeting_ms;
     const quiet_ms = (this.env_.clock.now_us() - link.heard_us) / 1000;
@@ -311,7 +310,7 @@ export class Session {
     else if (this.last_pose_) send_on(link, { case: 'pose', value: this.last_pose_ });
   }
 
-  /** The successor has its first picture, or the old connection went before that. */
+  /** Takes over: the successor has its first picture, or the old connection is gone. */
   private succeed(link: Link): void {
     this.listener_.stream_ended();
     if (this.link_) {
@@ -348,7 +347,7 @@ export class Session {
     }
   }
 
-  /** Less and less often: a server that is the only one refuses until it ends. */
+  /** Tries less and less often, because a fleet of one server refuses until it has ended. */
   private open_successor_later(): void {
     this.successor_attempt_ += 1;
     const retry_in_ms = backoff_ms(this.successor_attempt_, this.env_.random);
@@ -368,8 +367,8 @@ export class Session {
   }
 
   /**
-   * Keeps proxies from closing a connection on which nothing moves. The server does not take the
-   * repeated pose for a sign of life: it warns, and then gives the place to others.
+   * Keeps proxies from closing a connection on which nothing moves. The server does not count the
+   * repeated pose as activity: it warns the visitor and then gives the place to others.
    */
   private keep_alive(): void {
     this.cancel_keep_alive_();
@@ -393,7 +392,7 @@ function close_link(link: Link | undefined): void {
   link?.socket.close();
 }
 
-/** Refusals that time may cure; all others need another link, token, scene or program. */
+/** Whether time may cure a refusal. All others need another link, token, scene or program. */
 function is_temporary(code: Error_Code): boolean {
   return (
     code === Error_Code.SERVER_FULL ||

@@ -1,13 +1,13 @@
 import type { Error_Code } from '../wire/wire';
 
-/** Where the session stands, for the page to show. */
+/** State of the session, for the page to show. */
 export type SessionState =
   | { phase: 'connecting'; attempt: number }
   | { phase: 'queued'; position: number; estimate_s: number; for_scene: boolean }
   | { phase: 'live' }
-  /** A new attempt follows by itself. */
+  /** The session tries again by itself. */
   | { phase: 'waiting'; cause: WaitCause; retry_in_ms: number; message: string }
-  /** Nothing follows until retry() or set_token(). */
+  /** The session stays so until retry() or greet_anew(). */
   | { phase: 'failed'; code: Error_Code; message: string };
 
 export type WaitCause =

@@ -1,6 +1,6 @@
 import type { StatsSnapshot } from './metrics';
 
-export interface Sample {
+interface Sample {
   readonly time_s: number; // since the first one
   readonly stats: StatsSnapshot;
 }
@@ -9,8 +9,8 @@ const span_s = 120;
 const capacity = 480; // four a second
 
 /**
- * The statistics of the last two minutes, for plots and for a file. What is older goes by its age, not
- * only by its number: who looks now and then would otherwise keep, and see, samples of an hour.
+ * Keeps the statistics of the last two minutes, for plots and for a file. Samples also expire by age.
+ * Otherwise a panel that is opened now and then would show samples of an hour.
  */
 export class StatsHistory {
   private samples_: Sample[] = [];
@@ -28,12 +28,12 @@ export class StatsHistory {
     return this.samples_;
   }
 
-  /** One value of each sample; null, which JSON and plots know, where nothing was measured. */
+  /** One value per sample; null, which JSON and plots understand, where nothing was measured. */
   column(value: (stats: StatsSnapshot) => number): (number | null)[] {
     return this.samples_.map(({ stats }) => finite_or_null(value(stats)));
   }
 
-  /** A file for others: what was measured, and by whom. */
+  /** The samples as a file for others, with facts about the system that was measured. */
   to_json(facts: object, made: string): string {
     return JSON.stringify({ made, ...facts, samples: this.samples_ }, undefined, 1);
   }

@@ -1,17 +1,17 @@
-// What the stats overlay, the automation surface and the tests read. Pure: fed with events.
+// Figures for the statistics overlay, window.catgs and the tests, computed from events. Pure.
+import { percentile, sum, TimeWindow } from '../base/time_window';
 import type { Frame } from '../decode/picture';
 import type { Stats, StreamConfig } from '../wire/wire';
 import { PoseAge } from './pose_age';
-import { percentile, sum, TimeWindow } from './window';
 
-export interface Percentiles {
+interface Percentiles {
   readonly p50: number;
   readonly p95: number;
 }
 
-/** How pictures of a moving camera came; NaN where nothing was measured. */
+/** Latency of pictures of a moving camera; NaN where nothing was measured. */
 export interface Motion {
-  /** Presented minus pose sample time, of the first picture of each pose. */
+  /** Presentation time minus sample time of the pose, for the first picture of each pose. */
   readonly motion_to_photon_ms: Percentiles;
   readonly pose_age_ms: Percentiles;
   /** Means over frames, from the server's header and the client's clock. */
@@ -20,16 +20,16 @@ export interface Motion {
     readonly render: number;
     readonly encode: number;
     readonly send: number;
-    readonly network: number; // there and back, of the first picture of each pose
+    readonly network: number; // round trip, for the first picture of each pose
     readonly decode: number;
     readonly present: number;
   };
-  /** Sub-frames promised by key frames, in the mean over frames; share of frames that are sub-frames. */
+  /** Mean number of sub-frames that key frames promise, and the share of frames that are sub-frames. */
   readonly window: number;
   readonly sub_share: number;
 }
 
-/** Over the last seconds; NaN where nothing was measured. */
+/** Figures of the last seconds; NaN where nothing was measured. */
 export interface StatsSnapshot extends Motion {
   readonly fps_shown: number;
   readonly bitrate_kbps: number;
@@ -38,11 +38,9 @@ export interface StatsSnapshot extends Motion {
   readonly frames_shown: number; // since the page was opened
   readonly frames_dropped: number; // never shown by this client
   readonly packets_dropped: number; // never sent by the server
-  readonly server_fps: number;
-  readonly sessions: number;
 }
 
-/** What is measured now, and what was when the camera moved last. */
+/** Present figures, and those of the last time the camera moved. */
 export interface StatsReport extends StatsSnapshot {
   readonly last_motion: Motion;
 }
@@ -69,7 +67,7 @@ export class Metrics {
   private frames_shown_ = 0;
   private frames_dropped_ = 0;
   private size_px_: readonly [number, number] = [0, 0];
-  private server_: Stats | undefined;
+  private packets_dropped_ = 0;
 
   configured(config: StreamConfig): void {
     this.pose_age_.set_rate(config.fps);
@@ -89,11 +87,11 @@ export class Metrics {
     this.size_px_ = [header.widthPx, header.heightPx];
     this.shown_.push(now_us, 1);
     const pose_time_us = Number(header.poseClientTimeUs);
-    // Of each pose one picture counts, and none that came before any pose.
+    // One picture of each pose counts. Pictures before the first pose do not.
     const is_first = header.poseId > 0n && header.poseId !== this.last_pose_id_;
     this.last_pose_id_ = header.poseId;
     if (is_first) this.pose_age_.shown(header.poseId, pose_time_us, now_us);
-    // Late on purpose, of another size perhaps, and always a key frame without a window.
+    // A still comes late on purpose, perhaps in another size, and is a key frame without a window.
     if (header.still) return;
     const stages = this.stages_us_;
     if (is_first) {
@@ -115,7 +113,7 @@ export class Metrics {
   }
 
   server_said(stats: Stats): void {
-    this.server_ = stats;
+    this.packets_dropped_ = stats.droppedPackets;
   }
 
   snapshot(now_us: number): StatsReport {
@@ -128,9 +126,7 @@ export class Metrics {
       height_px: this.size_px_[1],
       frames_shown: this.frames_shown_,
       frames_dropped: this.frames_dropped_,
-      packets_dropped: this.server_?.droppedPackets ?? 0,
-      server_fps: this.server_?.fps ?? NaN,
-      sessions: this.server_?.sessions ?? 0,
+      packets_dropped: this.packets_dropped_,
       last_motion: this.motion((window) => window.newest()),
     };
   }
@@ -164,7 +160,7 @@ export class Metrics {
   }
 }
 
-/** There and back: from pose to picture, less what the server had of it. */
+/** Round trip: the time from pose to picture without the time inside the server. */
 function network_us({ header, received_us }: Frame): number {
   const server_us = header.waitUs + header.renderUs + header.encodeUs + header.sendWaitUs;
   return received_us - Number(header.poseClientTimeUs) - server_us;

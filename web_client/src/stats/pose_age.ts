@@ -1,18 +1,17 @@
-import { TimeWindow } from './window';
+import { TimeWindow } from '../base/time_window';
 
 const history_limit = 256;
 const most_ticks = 1000;
 
 /**
- * Pose age: at each tick of the nominal rate, now minus the sample time of the pose behind the
- * shown picture; so a frozen picture counts. While the newest pose is the shown one, there is
- * nothing to be late with: such ticks do not count, and after a rest the age begins when the
- * camera moves again.
+ * Samples the pose age at each tick of the nominal rate: now minus the sample time of the pose that the
+ * shown picture has. So a frozen picture counts. Ticks at which the newest pose is shown do not count,
+ * because nothing is late then. After a rest the age begins when the camera moves again.
  */
 export class PoseAge {
   private readonly ages_us_: TimeWindow;
   private sent_: { id: bigint; time_us: number }[] = [];
-  private shown_: { id: bigint; time_us: number } | undefined;
+  private shown_us_: number | undefined; // sample time of the shown pose
   private next_tick_us_ = 0;
 
   constructor(
@@ -33,7 +32,7 @@ export class PoseAge {
 
   shown(id: bigint, time_us: number, now_us: number): void {
     this.advance(now_us);
-    this.shown_ = { id, time_us };
+    this.shown_us_ = time_us;
     this.sent_ = this.sent_.filter((pose) => pose.id > id);
   }
 
@@ -42,20 +41,20 @@ export class PoseAge {
     return this.ages_us_.values(now_us);
   }
 
-  /** Of the last seconds in which there was something to be late with. */
+  /** Ages of the last seconds in which the camera moved. */
   newest(): readonly number[] {
     return this.ages_us_.newest();
   }
 
-  /** Adds the ticks since the last call; the shown picture was the same at all of them. */
+  /** Adds the ticks since the last call. The same picture was shown at all of them. */
   private advance(now_us: number): void {
     const newer = this.sent_[0];
-    if (!this.shown_ || !newer) {
+    if (this.shown_us_ === undefined || !newer) {
       this.next_tick_us_ = now_us;
       return;
     }
-    // The shown pose was right until just before the first newer sample.
-    const right_until_us = Math.max(this.shown_.time_us, newer.time_us - this.tick_us_);
+    // The shown pose was the newest one until just before the first newer sample.
+    const right_until_us = Math.max(this.shown_us_, newer.time_us - this.tick_us_);
     const first = Math.max(this.next_tick_us_, newer.time_us, now_us - most_ticks * this.tick_us_);
     let tick_us = first;
     for (; tick_us <= now_us; tick_us += this.tick_us_) {

@@ -1,8 +1,8 @@
-// A camera film: values at times, and smooth curves in between. Pure.
+// Camera films: keyframes with smooth curves between them. Pure.
+import { look_at, type Vec3 } from '../base/vector';
 import type { Flight } from '../camera/flight';
-import { look_at, type Vec3 } from '../camera/vector';
 
-/** Where a camera is, what it looks at, and its vertical field of view. */
+/** A keyframe: position, point looked at, and vertical field of view. */
 export interface Shot {
   readonly position: Vec3;
   readonly target: Vec3;
@@ -11,7 +11,7 @@ export interface Shot {
 
 export interface Film {
   readonly times_s: readonly number[]; // increasing
-  readonly shots: readonly Shot[]; // as many
+  readonly shots: readonly Shot[]; // one for each time
   readonly duration_s: number;
   readonly smoothness: number; // of the tangents: 0 stops at every shot, 1 is a Catmull-Rom spline
   readonly steps: boolean; // jumps from shot to shot
@@ -29,7 +29,7 @@ interface Knot {
   readonly rate: Values; // change a second
 }
 
-/** A film that repeats goes on from its last shot to its first, within a second if it must. */
+/** A repeating film returns from its last shot to its first, in an added second where it has no time left. */
 function knots_of(film: Film): { knots: Knot[]; length_s: number } {
   const points = film.shots.map((shot, i) => ({ time_s: film.times_s[i]!, value: values_of(shot) }));
   const last_s = points[points.length - 1]?.time_s ?? 0;
@@ -70,7 +70,7 @@ function between(a: Knot, b: Knot, time_s: number): Values {
   );
 }
 
-/** There and back for a ping-pong, and around for a film that repeats. */
+/** The film as a flight: there and back for a ping-pong, around for a film that repeats. */
 export function film_flight(film: Film, up: Vec3): Flight & { readonly repeats: boolean } {
   const { knots, length_s } = knots_of(film);
   const there_and_back = film.loop === 'pingpong';

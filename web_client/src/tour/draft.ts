@@ -1,53 +1,34 @@
-// A tour while its author works on it, and the sidecar that comes of it. Pure.
-import type { SceneSetup } from '../camera/camera_controller';
-import type { Eye } from '../present/warp';
+// A tour that an author is editing, and the sidecar made from it. Pure.
+import type { Eye } from '../camera/eye';
+import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
 
 export class TourDraft {
   private stops_: readonly Stop[] = [];
-  private title_ = '';
-  private starts_itself_ = false;
-  private others_: readonly Tour[] = []; // of the scene; kept as they are
-  private start_: Eye | undefined;
+  title = '';
+  starts_itself = false;
+  /** Where visits begin; undefined: at the start of the scene. */
+  start: Eye | undefined;
+  private others_: readonly Tour[] = []; // other tours of the scene, kept as they are
 
-  /** The first tour that has stops is the one that is worked on. */
+  /** Edits the first tour that has stops. */
   load(tours: readonly Tour[]): void {
     const edited = tours.find(({ way }) => way === undefined);
-    this.title_ = edited?.title ?? '';
+    this.title = edited?.title ?? '';
     this.stops_ = edited?.stops ?? [];
-    this.starts_itself_ = edited?.starts_itself ?? false;
+    this.starts_itself = edited?.starts_itself ?? false;
     this.others_ = tours.filter((tour) => tour !== edited);
-    this.start_ = undefined;
+    this.start = undefined;
   }
 
   get stops(): readonly Stop[] {
     return this.stops_;
   }
 
-  get title(): string {
-    return this.title_;
-  }
-
-  set title(title: string) {
-    this.title_ = title;
-  }
-
-  get starts_itself(): boolean {
-    return this.starts_itself_;
-  }
-
-  set starts_itself(starts: boolean) {
-    this.starts_itself_ = starts;
-  }
-
-  set start(eye: Eye) {
-    this.start_ = eye;
-  }
-
   get tours(): readonly Tour[] {
-    const { title_: title, stops_: stops, starts_itself_: starts_itself } = this;
+    const { title, stops, starts_itself } = this;
     const edited = { title, stops, way: undefined, starts_itself };
-    return this.stops_.length > 0 ? [edited, ...this.others_] : this.others_;
+    return stops.length > 0 ? [edited, ...this.others_] : this.others_;
   }
 
   add(stop: Stop): void {
@@ -62,7 +43,7 @@ export class TourDraft {
     this.stops_ = this.stops_.map((stop, i) => (i === index ? { ...stop, ...change } : stop));
   }
 
-  /** Changes places with the neighbour; `by` is 1 or -1. */
+  /** Swaps a stop with its neighbour. `by`: 1 or -1. */
   move(index: number, by: number): void {
     const [stop, neighbour] = [this.stops_[index], this.stops_[index + by]];
     if (!stop || !neighbour) return;
@@ -71,9 +52,9 @@ export class TourDraft {
     );
   }
 
-  /** All of `<scene>.json`: what the scene said of itself, and the tours. */
+  /** The whole of `<scene>.json`: the facts of the scene and the tours. */
   sidecar(scene: SceneSetup): object {
-    const start = this.start_ ?? scene.start_pose;
+    const start = this.start ?? scene.start_pose;
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
     return {
       up: scene.up,

@@ -1,6 +1,7 @@
-import type { Vec3 } from '../camera/vector';
+import type { Vec3 } from '../base/vector';
+import { max_text_characters } from './limits';
 
-/** A value in a document that people wrote, with its place for complaints: "tours[0].title: …". */
+/** A value of a document that people wrote. Its errors name its place: "tours[0].title: …". */
 export class JsonPlace {
   constructor(
     private readonly place_: string,
@@ -11,7 +12,7 @@ export class JsonPlace {
     throw new Error(`${this.place_}: ${what}`);
   }
 
-  /** Undefined where it is missing or null. */
+  /** The member; undefined where it is missing or null. */
   find(key: string): JsonPlace | undefined {
     if (typeof this.value_ !== 'object' || this.value_ === null) this.fail('is not an object');
     const value = (this.value_ as Record<string, unknown>)[key];
@@ -29,9 +30,10 @@ export class JsonPlace {
     return this.value_.map((value, i) => new JsonPlace(`${this.place_}[${i}]`, value));
   }
 
-  text(most = 4000): string {
+  /** The text, cut off at the limit. */
+  text(): string {
     if (typeof this.value_ !== 'string') this.fail('is not a text');
-    return this.value_.slice(0, most);
+    return this.value_.slice(0, max_text_characters);
   }
 
   truth(): boolean {

@@ -1,26 +1,26 @@
-import type { Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import type { Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 
-export interface SceneTours {
+interface SceneTours {
   readonly tours: readonly Tour[];
   readonly start: Eye | undefined;
-  /** What could not be read, for the author. */
+  /** Errors for the author: parts that could not be read. */
   readonly problems: readonly string[];
 }
 
-export interface TourDocument {
+interface TourDocument {
   readonly tours?: unknown;
   readonly settings?: unknown;
-  /** Of the sidecar; null: there is none. */
+  /** Tag of the sidecar; null: there is none. */
   readonly etag?: string | null;
 }
 
 /**
- * What /api/scenes/ID/tours says, as far as it makes sense. Pure. Stops come from one place, so that
- * an author's changes to imported ones do not stand beside the old: the sidecar's, where it has any,
- * and then visits begin where the sidecar says too.
+ * Reads the answer of /api/scenes/ID/tours as far as it makes sense. Stops come from one source only, so
+ * that edited stops do not appear beside the imported ones they replace. The sidecar comes first. Where it
+ * has tours, it also says where visits begin. Pure.
  */
 export function read_document(
   document: TourDocument,
@@ -50,7 +50,7 @@ export function read_document(
   };
 }
 
-/** Nothing where the server has none, or does not tell. `may_save`: it takes this token's sidecar. */
+/** Empty where the server has no tours or does not answer. `may_save`: the token may save a sidecar. */
 export async function fetch_tours(
   page_url: string,
   token: string,

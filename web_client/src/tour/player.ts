@@ -1,38 +1,37 @@
-// Leads a visitor through a tour. It knows no page and no clock: tests drive it with fakes.
-import { glide, glide_time_s, type Flight } from '../camera/flight';
-import type { Eye } from '../present/warp';
-import type { Timers } from '../session/clock';
-import type { PathSample } from '../session/messages';
+// Leads a visitor through a tour. It uses neither page nor clock, so that tests can drive it with fakes.
+import type { Timers } from '../base/clock';
+import type { Eye } from '../camera/eye';
+import { glide, glide_time_s, type Flight, type PathSample } from '../camera/flight';
 import { stay_of, type Stop, type Tour } from './tour';
 
-export interface Guided {
+interface Guided {
   readonly eye: Eye;
   readonly reach: number;
   fly(way: Flight, ended: (arrived: boolean) => void): void;
   stop_flight(): void;
 }
 
-export interface TourEnvironment {
+interface TourEnvironment {
   readonly camera: Guided;
   readonly timers: Timers;
   now_us(): number;
-  /** The server may forecast by it. */
+  /** Tells the server the path, for its forecasts. */
   announce(path: readonly PathSample[]): void;
-  /** Jumps instead of gliding, and does not begin by itself. */
+  /** The camera jumps instead of gliding, and no tour starts by itself. */
   readonly reduced_motion: boolean;
 }
 
 export interface TourState {
   readonly tour: Tour | undefined;
   readonly tour_index: number;
-  /** The stop that is shown or gone to; undefined: none yet, or a film. */
+  /** The stop that is shown or approached; undefined: none yet, or a film. */
   readonly stop: Stop | undefined;
   readonly stop_index: number | undefined;
   readonly playing: boolean;
 }
 
 const announced_samples = 64;
-const announced_s = 4; // of a film at a time: the wire takes 256 samples
+const announced_s = 4; // part of a film told at a time: the wire takes 256 samples
 const announce_again_s = 2;
 const held_us = 1_000_000; // at the end of a flight the camera stays
 
@@ -43,7 +42,7 @@ export class TourPlayer {
   private playing_ = false;
   private cancel_ = (): void => undefined;
   private cancel_announcing_ = (): void => undefined;
-  private journey_ = 0; // what ends an older one says nothing of this one
+  private journey_ = 0; // the end of an older journey does not count for this one
 
   constructor(
     private readonly env_: TourEnvironment,
@@ -61,10 +60,6 @@ export class TourPlayer {
       this.play();
     }
     this.tell();
-  }
-
-  get tours(): readonly Tour[] {
-    return this.tours_;
   }
 
   get state(): TourState {
@@ -112,7 +107,7 @@ export class TourPlayer {
     else this.travel(this.stop_index_ === undefined ? 0 : (this.stop_index_ + 1) % tour.stops.length);
   }
 
-  /** Also where the visitor takes over. */
+  /** Stops playing. The page also calls this when the visitor takes over. */
   pause(): void {
     this.cancel_();
     if (!this.playing_) return;
@@ -121,7 +116,7 @@ export class TourPlayer {
     this.tell();
   }
 
-  /** No stop is shown any more. */
+  /** Stops playing and shows no stop any more. */
   leave(): void {
     this.pause();
     this.stop_index_ = undefined;
@@ -203,7 +198,7 @@ export class TourPlayer {
     this.tell();
   }
 
-  /** Tells the part of a way from `from_s` on, which the camera is at now. */
+  /** Tells the server the part of a flight that begins now, at `from_s`. */
   private announce(way: Flight, from_s: number, length_s: number): void {
     if (!(length_s > 0)) return;
     const now_us = this.env_.now_us();

@@ -1,16 +1,16 @@
-// Saves a scene's sidecar to the server, which takes it from authors.
-const most_bytes = 1 << 20; // the server takes no more
+// Saves a scene's sidecar to the server. The server accepts it from authors.
+import { max_sidecar_bytes } from './limits';
 
-/** The tag of a sidecar; null: there is none; undefined: the server does not tell. */
+/** Tag (ETag) of a sidecar; null: there is none; undefined: the server did not say. */
 export type SidecarTag = string | null | undefined;
 
 export type SaveResult =
   | { readonly kind: 'saved'; readonly tag: SidecarTag }
-  /** What is there now is not what this one was made from. */
+  /** Somebody else saved another sidecar meanwhile. */
   | { readonly kind: 'changed'; readonly tag: SidecarTag }
   | { readonly kind: 'refused'; readonly why: string };
 
-/** `made_from`: replaces that one only. */
+/** Replaces the sidecar only where its tag is still `made_from`. */
 export async function save_sidecar(
   page_url: string,
   token: string,
@@ -20,8 +20,8 @@ export async function save_sidecar(
   unreachable: string,
 ): Promise<SaveResult> {
   const body = new Blob([sidecar], { type: 'application/json' });
-  if (body.size > most_bytes)
-    return { kind: 'refused', why: `${body.size} bytes are too many, ${most_bytes} fit` };
+  if (body.size > max_sidecar_bytes)
+    return { kind: 'refused', why: `${body.size} bytes are too many, ${max_sidecar_bytes} fit` };
   const address = new URL(`./api/scenes/${encodeURIComponent(scene_id)}/sidecar`, page_url);
   const headers: Record<string, string> = { authorization: `Bearer ${token}` };
   if (made_from === null) headers['if-none-match'] = '*';
@@ -37,7 +37,7 @@ export async function save_sidecar(
   }
 }
 
-/** The server says "403: why" in its first line; what stands between may answer with a page. */
+/** The first line of the server's answer is "403: reason". A proxy may answer with a page instead. */
 function refusal(status: number, text: string): string {
   const [line = ''] = text.split('\n');
   const prefix = `${status}: `;

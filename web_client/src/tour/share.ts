@@ -1,16 +1,16 @@
-// Links that lead back to a view: the fragment of the address, which no server ever sees. Pure.
-import { camera_modes, type CameraMode } from '../camera/camera_controller';
-import { unit } from '../camera/vector';
-import type { Eye } from '../present/warp';
+// Links that lead back to a view. The view is in the fragment, which no server sees. Pure.
+import { unit } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import { camera_modes, type CameraMode } from '../camera/mode';
 
-export interface SharedView {
+interface SharedView {
   readonly eye: Eye | undefined;
   readonly mode: CameraMode | undefined;
   readonly tour_index: number | undefined;
   readonly stop_index: number | undefined;
 }
 
-/** `page_url` with the scene and the view. It carries no token: links are for others. */
+/** The page's address with scene and view. It contains no token, because links are for others. */
 export function share_address(page_url: string, scene_id: string, view: SharedView): string {
   const url = new URL(page_url);
   const parameters = new URLSearchParams();
@@ -29,7 +29,7 @@ export function share_address(page_url: string, scene_id: string, view: SharedVi
   return url.href;
 }
 
-/** What share_address() put there; undefined where it says nothing, or nonsense. */
+/** Reads an address of share_address(). Members are undefined where it has nothing or nonsense. */
 export function read_shared(page_url: string): SharedView {
   const fragment = new URLSearchParams(new URL(page_url).hash.slice(1));
   const ordinal = (key: string): number | undefined => {
@@ -68,8 +68,7 @@ function read_eye(text: string): Eye | undefined {
 
 /**
  * Sites that may show a page with this Content-Security-Policy header in a frame; undefined: all may. The
- * server names them (--embed-origin). A proxy may have added a policy of its own: then both must name a
- * site.
+ * server names them (--embed-origin). Where a proxy adds a policy of its own, both must name a site.
  */
 export function frame_sites(header: string | null): readonly string[] | undefined {
   return (header ?? '')
@@ -84,7 +83,7 @@ function sites_of_policy(policy: string): readonly string[] | undefined {
   return sites?.includes('*') ? undefined : sites?.filter((site) => site !== "'none'");
 }
 
-/** For pages of others; the server names those that may show it (--embed-origin). */
+/** HTML for pages of others. The server names those that may show it (--embed-origin). */
 export function embed_code(address: string): string {
   const url = new URL(address);
   url.searchParams.set('ui', '0');

@@ -1,11 +1,11 @@
 // Reads the settings.json of the SuperSplat viewer, version 2: cameras, animTracks, annotations.
-import { look_at, type Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import { look_at, type Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import { film_flight, type Shot } from './camera_spline';
 import { JsonPlace } from './json_place';
 import type { Stop, Tour } from './tour';
 
-export interface ImportedTours {
+interface ImportedTours {
   readonly tours: readonly Tour[];
   /** Where a visit begins. */
   readonly start: Eye | undefined;
@@ -14,11 +14,11 @@ export interface ImportedTours {
 const most_entries = 1024;
 const loops = ['none', 'repeat', 'pingpong'] as const;
 
-/** That viewer turns captures, whose y points down, upside down: half a turn about z. */
+/** The y axis of captures points down. SuperSplat turns them by half a turn about z. */
 const to_scene = ([x, y, z]: Vec3): Vec3 => [-x, -y, z];
 const up: Vec3 = [0, -1, 0]; // its +y
 
-/** Its fields of view are degrees of the longer side of the view. */
+/** Fields of view in the file are degrees of the longer side of the view. */
 function vertical_fov(fov: JsonPlace, aspect: number): number {
   const longer = Math.tan((fov.number(1, 170) * Math.PI) / 360);
   return 2 * Math.atan(longer / Math.max(1, aspect));
@@ -84,7 +84,7 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
   return { title: track.find('name')?.text() ?? '', stops: [], way, starts_itself };
 }
 
-/** Throws with the place of what it cannot read. `aspect`: of the view. */
+/** Throws an error that names the place it cannot read. `aspect`: width over height of the view. */
 export function read_supersplat(document: unknown, aspect: number): ImportedTours {
   const settings = new JsonPlace('settings.json', document);
   const version = settings.find('version')?.number();

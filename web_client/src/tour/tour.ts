@@ -1,46 +1,44 @@
-// Tours through a scene: stops to go to, or a way to be led along. Pure.
+// Tours through a scene: stops to visit, or a film of the camera. Pure.
+import { look_at, unit, type Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
-import { look_at, unit, type Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
 import { JsonPlace } from './json_place';
+import { max_stops, max_tours } from './limits';
 
 export interface Stop {
   readonly title: string;
   readonly caption: string;
   readonly eye: Eye;
-  /** Where its hotspot is drawn; undefined: nowhere. */
+  /** Place of its hotspot in the scene; undefined: it has none. */
   readonly marker: Vec3 | undefined;
-  /** How long autoplay stays; undefined: as long as its caption takes to read. */
+  /** Time that autoplay stays; undefined: as long as the caption takes to read. */
   readonly stay_s: number | undefined;
 }
 
 export interface Tour {
   readonly title: string;
   readonly stops: readonly Stop[];
-  /** Instead of stops: a film of the camera. */
+  /** A film of the camera, instead of stops. */
   readonly way: (Flight & { readonly repeats: boolean }) | undefined;
-  /** Begins when the scene is first seen. */
+  /** Plays by itself when the scene opens. */
   readonly starts_itself: boolean;
 }
 
-const most_tours = 32;
-const most_stops = 256;
-
-/** How long somebody needs to look around and to read. */
+/** Time that a visitor needs to look around and to read. */
 export function stay_of(stop: Stop): number {
   return stop.stay_s ?? 3 + 0.06 * (stop.caption.length + stop.title.length);
 }
 
 /**
- * `tours` of a sidecar (README.md), or why it is none. `up`: of the scene; `fov_y_rad`: of stops
- * that say nothing.
+ * Reads `tours` of a sidecar (README.md). Throws an error that names the wrong place. `up`: that of the
+ * scene. `fov_y_rad`: for stops that give none.
  */
 export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
-  return new JsonPlace('tours', document).elements(most_tours).map((tour) => ({
+  return new JsonPlace('tours', document).elements(max_tours).map((tour) => ({
     title: tour.find('title')?.text() ?? '',
     stops: tour
       .at('stops')
-      .elements(most_stops)
+      .elements(max_stops)
       .map((stop) => read_stop(stop, up, fov_y_rad)),
     way: undefined,
     starts_itself: tour.find('autoplay')?.truth() ?? false,
@@ -67,7 +65,7 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   };
 }
 
-/** What read_tours() reads; numbers are shortened to what anybody can see. */
+/** Writes what read_tours() reads. Numbers keep seven digits, more than anybody can see. */
 export function write_tours(tours: readonly Tour[]): unknown[] {
   const short = (v: number): number => Number(v.toPrecision(7));
   return tours

@@ -1,10 +1,10 @@
-// The only user of WebSocket: everything above it runs against these interfaces, also in tests.
+// The only user of WebSocket. Everything above it uses these interfaces, and tests replace them.
 import { subprotocol } from '../wire/wire';
 
 export interface SocketEvents {
   opened(): void;
   message(data: ArrayBuffer): void;
-  /** Once, also when the connection never opened. `code` is the WebSocket close code. */
+  /** Comes once, even when the connection never opened. `code`: the WebSocket close code. */
   closed(code: number, reason: string): void;
 }
 
@@ -18,7 +18,7 @@ export interface Socket {
 
 export type OpenSocket = (events: SocketEvents) => Socket;
 
-/** The WebSocket endpoint that belongs to a page: the folder that the page was loaded from. */
+/** WebSocket endpoint of a page: the folder that the page was loaded from. */
 export function endpoint_of(page_url: string): string {
   const url = new URL('./', page_url);
   url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';

@@ -1,29 +1,29 @@
-import type { SceneSetup } from '../camera/camera_controller';
-import type { Vec3 } from '../camera/vector';
-import type { Eye } from '../present/warp';
+import type { Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import type { SceneSetup } from '../camera/scene_setup';
+import { text } from '../text';
 import { TourDraft } from '../tour/draft';
+import { max_text_characters } from '../tour/limits';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
-import { by_id } from './dom';
-import { save_file } from './share_panel';
-import { text } from '../text';
+import { by_id, on_click, save_file } from './dom';
 
-export interface AuthorTools {
+interface AuthorTools {
   eye(): Eye;
   scene(): SceneSetup | undefined;
   scene_id(): string;
-  /** What is in the middle of the view. */
+  /** The point in the middle of the view; undefined: nothing is there. */
   place_ahead(): Promise<Vec3 | undefined>;
   /** The tours have changed. */
   changed(tours: readonly Tour[]): void;
   go_to(stop_index: number): void;
-  /** Plays what there is so far. */
+  /** Plays the tour as it is so far. */
   preview(): void;
-  /** From now on visits of this page begin there. */
+  /** Sets where visits begin, for this page. */
   start_at(eye: Eye): void;
 }
 
-/** Where a tour is made: `?author` in the address. */
+/** The editor of tours: `?author` in the address. */
 export class AuthorPanel {
   private readonly draft_ = new TourDraft();
   private readonly list_ = by_id('author-stops', HTMLOListElement);
@@ -35,26 +35,24 @@ export class AuthorPanel {
   private readonly done_ = by_id('author-done', HTMLOutputElement);
   private token_: string | undefined;
   private made_from_: SidecarTag;
-  private theirs_: SidecarTag; // somebody else's, saved meanwhile
-  private open_ = 0; // the stop of which all is shown
+  private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
+  private open_ = 0; // index of the stop that is shown with all its fields
   private changes_ = 0;
   private saved_changes_ = 0;
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
-    const click = (id: string, action: () => void): void =>
-      by_id(id, HTMLButtonElement).addEventListener('click', action);
-    click('author-add', () => void this.add());
-    click('author-start', () => {
+    on_click('author-add', () => void this.add());
+    on_click('author-start', () => {
       this.draft_.start = tools_.eye();
       tools_.start_at(tools_.eye());
       this.changes_ += 1;
       this.done_.textContent = text.author.start_set;
     });
-    click('author-preview', () => tools_.preview());
-    click('author-save', () => void this.save(this.made_from_));
-    click('author-replace', () => void this.save(this.theirs_));
-    click('author-download', () => this.download());
+    on_click('author-preview', () => tools_.preview());
+    on_click('author-save', () => void this.save(this.made_from_));
+    on_click('author-replace', () => void this.save(this.theirs_));
+    on_click('author-download', () => this.download());
     this.title_.addEventListener('input', () => {
       this.draft_.title = this.title_.value;
       this.told();
@@ -69,8 +67,8 @@ export class AuthorPanel {
   }
 
   /**
-   * `token`: the server takes the sidecar from who has it; undefined: from nobody here.
-   * `made_from`: the sidecar that has these tours.
+   * `token`: lets its holder save the sidecar; undefined: this visitor may not save.
+   * `made_from`: the tag of the sidecar with these tours.
    */
   load(tours: readonly Tour[], token: string | undefined, made_from: SidecarTag): void {
     this.token_ = token;
@@ -164,7 +162,7 @@ export class AuthorPanel {
         const caption = document.createElement('textarea');
         caption.value = stop.caption;
         caption.rows = 2;
-        caption.maxLength = 4000;
+        caption.maxLength = max_text_characters;
         caption.placeholder = text.author.caption_here;
         caption.setAttribute('aria-label', text.author.caption(i + 1));
         caption.addEventListener('input', () => this.change(i, { caption: caption.value }));
@@ -197,7 +195,7 @@ export class AuthorPanel {
 
   private change(index: number, change: { title?: string; caption?: string }): void {
     this.draft_.change(index, change);
-    this.told(); // the fields stay as they are, with their focus
+    this.told(); // does not rebuild the fields, so that they keep their focus
   }
 
   private async view_here(index: number): Promise<void> {

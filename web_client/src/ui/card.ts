@@ -1,15 +1,13 @@
+import { Signal } from '../base/signal';
 import { scene_address } from '../session/scenes';
 import { by_id } from './dom';
 import { show_scene_links } from './scene_links';
 import type { Card } from './wording';
 
-export interface CardListener {
-  retry(): void;
-  token(token: string): void;
-}
-
-/** The one place where the page says what is going on when the picture does not. */
+/** The card over the picture: what is going on while no picture says it. */
 export class CardView {
+  readonly retried = new Signal();
+  readonly token_given = new Signal<string>();
   private readonly card_ = by_id('card', HTMLElement);
   private readonly title_ = by_id('card-title', HTMLElement);
   private readonly text_ = by_id('card-text', HTMLElement);
@@ -18,18 +16,18 @@ export class CardView {
   private readonly token_ = by_id('token-input', HTMLInputElement);
   private shown_: Card | undefined;
 
-  constructor(listener: CardListener) {
+  constructor() {
     this.action_.addEventListener('click', () => {
       const action = this.shown_?.action;
       if (action?.does === 'reload') location.reload();
       else if (action?.does === 'open') location.href = scene_address(location.href, action.scene_id);
-      else listener.retry();
+      else this.retried.emit();
     });
     this.form_.addEventListener('submit', (event) => {
       event.preventDefault();
       const token = this.token_.value.trim();
       this.token_.value = '';
-      if (token) listener.token(token);
+      if (token) this.token_given.emit(token);
     });
   }
 

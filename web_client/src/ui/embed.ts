@@ -1,11 +1,11 @@
-// Lets the page that shows this one in a frame drive it. Which pages may is the server's decision
-// (--embed-origin): browsers refuse to load this page in anybody else's frame, so the parent window
-// is one of them.
+// Lets the page that shows this one in a frame drive it. The server names the pages that may do so
+// (--embed-origin). Browsers do not load this page in other frames, so the parent window is one of them.
+import { unit } from '../base/vector';
+import type { Eye } from '../camera/eye';
 import { JsonPlace } from '../tour/json_place';
-import type { Eye } from '../present/warp';
-import { unit } from '../camera/vector';
+import { max_stops } from '../tour/limits';
 
-export interface EmbedTarget {
+interface EmbedTarget {
   eye(): Eye;
   set_eye(eye: Eye): void;
   go_to(stop_index: number): void;
@@ -16,14 +16,14 @@ export interface EmbedTarget {
   reset(): void;
 }
 
-/** Said to the parent, once it has said hello. */
-export type EmbedNews =
+/** Messages to the parent, sent once it has said hello. */
+type EmbedNews =
   | { readonly catgs: 'ready'; readonly scene: string; readonly stops: readonly string[] }
   | { readonly catgs: 'stop'; readonly stop: number | null; readonly playing: boolean }
   | { readonly catgs: 'pose'; readonly position: readonly number[]; readonly orientation: readonly number[]; readonly fov_deg: number };
 
 export class EmbedApi {
-  private origin_: string | undefined; // of the parent, once it spoke
+  private origin_: string | undefined; // origin of the parent, once it has spoken
   private ready_: EmbedNews | undefined;
 
   constructor(
@@ -49,14 +49,14 @@ export class EmbedApi {
 
   private heard(message: JsonPlace, origin: string): void {
     const command = message.find('catgs')?.text();
-    if (command === undefined) return; // meant for something else
+    if (command === undefined) return; // the message is for something else
     this.origin_ = origin;
     switch (command) {
       case 'hello':
         if (this.ready_) this.say(this.ready_);
         break;
       case 'stop':
-        this.target_.go_to(message.at('stop').number(0, 255));
+        this.target_.go_to(message.at('stop').number(0, max_stops - 1));
         break;
       case 'pose':
         this.set_pose(message);

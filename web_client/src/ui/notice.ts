@@ -2,7 +2,7 @@ import { by_id } from './dom';
 
 const passing_ms = 20_000;
 
-/** A line at the top. It can be dismissed; what concerns the moment only goes by itself. */
+/** A line at the top of the page. Visitors can dismiss it; a passing one disappears by itself. */
 export class Notice {
   private timer_: ReturnType<typeof setTimeout> | undefined;
   private readonly notice_ = by_id('notice', HTMLElement);

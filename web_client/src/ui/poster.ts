@@ -1,12 +1,12 @@
 import { list_scenes } from '../session/scenes';
 import { by_id } from './dom';
 
-/** The scene as its visits begin, while the first picture is on its way; in a queue that takes long. */
+/** Shows a still of the scene until the first picture arrives, which takes long in a queue. */
 export class Poster {
   private readonly image_ = by_id('poster', HTMLImageElement);
   private over_ = false;
 
-  /** `scene_id` empty: the server's first. */
+  /** `scene_id`: empty for the server's first scene. */
   async show(page_url: string, scene_id: string, token: string): Promise<void> {
     try {
       const id = scene_id || (await list_scenes(page_url, token))[0];
@@ -24,7 +24,7 @@ export class Poster {
     }
   }
 
-  /** A real picture is there. */
+  /** The first picture has arrived. */
   end(): void {
     if (this.over_) return;
     this.over_ = true;

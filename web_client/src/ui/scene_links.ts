@@ -1,7 +1,7 @@
 import { scene_address } from '../session/scenes';
 import { by_id } from './dom';
 
-/** Shows the scenes as links in the list with this id, and the list only when there are any. */
+/** Fills the list with this id with links to the scenes. Hides the list when there are none. */
 export function show_scene_links(list_id: string, ids: readonly string[], current?: string): void {
   const list = by_id(list_id, HTMLUListElement);
   list.hidden = ids.length === 0;

@@ -2,7 +2,7 @@ import type { SceneFacts } from '../wire/wire';
 import { by_id } from './dom';
 import { show_scene_links } from './scene_links';
 
-/** The chip with the scene's name; where there are several scenes, it opens their list. */
+/** Shows the name of the scene, with a list of all scenes where there are several. */
 export class SceneTitle {
   private readonly chooser_ = by_id('scene-chooser', HTMLDetailsElement);
 
@@ -13,13 +13,13 @@ export class SceneTitle {
     this.chooser_.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') close();
     });
-    // Where a click focuses no link (Safari), it focuses the list, whose tabindex is for that.
+    // A click in Safari focuses no link. The list has a tabindex, so that the click focuses the list instead.
     this.chooser_.addEventListener('focusout', ({ relatedTarget }) => {
       if (!(relatedTarget instanceof Node && this.chooser_.contains(relatedTarget))) close();
     });
   }
 
-  /** `scene_ids`: what this visitor may see. */
+  /** `scene_ids`: the scenes that this visitor may see. */
   show(scene: SceneFacts, scene_ids: readonly string[]): void {
     const name = scene.title || scene.sceneId;
     const count = document.createElement('small');

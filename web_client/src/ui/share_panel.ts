@@ -1,18 +1,18 @@
-import type { Snapshot } from '../session/messages';
-import { embed_code, frame_sites } from '../tour/share';
-import { by_id } from './dom';
 import { text as words } from '../text';
+import { embed_code, frame_sites } from '../tour/share';
+import type { Snapshot } from '../worker/messages';
+import { by_id, save_file } from './dom';
 
-export interface ShareSource {
+interface ShareSource {
   address(): string;
   snapshot(): Promise<Snapshot | undefined>;
-  /** For file names. */
+  /** Name for files. */
   name(): string;
-  /** Whether this page has shown a token to the server. */
+  /** Whether this page uses an access token. */
   has_token(): boolean;
 }
 
-/** Link, code for other pages, picture. */
+/** The panel with a link, code for other pages, and a picture to save. */
 export class SharePanel {
   private readonly link_ = by_id('share-link', HTMLInputElement);
   private readonly done_ = by_id('share-done', HTMLOutputElement);
@@ -38,7 +38,7 @@ export class SharePanel {
     this.frames_.hidden = true;
   }
 
-  /** Where the code will not work: the page's own policy says who may show it. */
+  /** Says which sites can show the page. The page's own policy names them. */
   private async tell_of_frames(): Promise<void> {
     try {
       const { headers } = await fetch(location.href, { method: 'HEAD' });
@@ -49,11 +49,11 @@ export class SharePanel {
           sites.length === 0 ? words.share.no_frames : words.share.frames(sites.join(', '));
       }
     } catch (error) {
-      console.warn('the server did not say who may show this page', error); // it is away
+      console.warn('the server did not say who may show this page', error); // the server is away
     }
   }
 
-  /** Pages without a secure context have no clipboard: there the text is shown to be copied. */
+  /** Copies the text. Pages without a secure context have no clipboard, so visitors copy it by hand there. */
   private async hand_over(text: string, done: string): Promise<void> {
     this.link_.value = text;
     const clipboard = navigator.clipboard as Clipboard | undefined;
@@ -77,12 +77,4 @@ export class SharePanel {
     const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
     if (blob) save_file(blob, `${this.source_.name()}.png`);
   }
-}
-
-export function save_file(blob: Blob, name: string): void {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

@@ -1,4 +1,4 @@
-// The plots of the statistics panel. Loaded when the panel is first opened.
+// The plots of the statistics panel. They load when the panel is first opened.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 import type { StatsHistory } from '../stats/history';
@@ -7,7 +7,7 @@ import { text } from '../text';
 
 type Stage = keyof StatsSnapshot['stages_ms'];
 
-/** In the order in which a frame goes through them. Colours for both light and dark pages. */
+/** Stages in the order of a frame, with colours for both light and dark pages. */
 const stages: readonly (readonly [stage: Stage, colour: string])[] = [
   ['wait', '#8d99ae'],
   ['render', '#e07a3f'],
@@ -24,7 +24,7 @@ function style(element: Element, name: string): string {
   return getComputedStyle(element).getPropertyValue(name).trim();
 }
 
-/** Light and dark come from the page's style sheet. */
+/** Colours come from the page's style sheet, light or dark. */
 function axis(host: Element, label: string, more: Partial<uPlot.Axis> = {}): uPlot.Axis {
   const line = style(host, '--line');
   return {
@@ -80,7 +80,7 @@ export class StatsCharts {
     }
   }
 
-  /** Stages on top of each other: the topmost line is about the motion to photon. */
+  /** Stages are stacked, so the topmost line is close to the motion to photon. */
   private latency(): Chart {
     const upwards = stages.map((_, i) => stages.slice(0, i + 1).map(([stage]) => stage));
     const total =

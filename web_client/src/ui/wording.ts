@@ -1,4 +1,4 @@
-// Which of the texts the page shows in each situation: what happened and what to do. Pure.
+// Chooses the text for each situation: what happened, and what to do. Pure.
 import type { DecoderRung } from '../decode/ladder';
 import type { SessionState } from '../session/state';
 import { text } from '../text';
@@ -9,11 +9,11 @@ const { cards, actions } = text;
 export interface Card {
   readonly title: string;
   readonly text: string;
-  readonly busy?: boolean; // something goes on by itself
+  readonly busy?: boolean; // the page goes on by itself
   readonly action?: {
     readonly label: string;
     readonly does: 'retry' | 'reload' | 'open';
-    /** What 'open' opens: this scene; empty: the first one. */
+    /** The scene that 'open' opens; empty: the first one. */
     readonly scene_id?: string;
   };
   readonly asks_token?: boolean;
@@ -21,8 +21,8 @@ export interface Card {
 }
 
 /**
- * Undefined when the picture speaks for itself. `has_picture`: one is on the canvas. `scene_ids`:
- * what this visitor may see, as far as known.
+ * The card for a state; undefined when the picture speaks for itself. `has_picture`: whether the canvas
+ * shows one. `scene_ids`: the scenes that this visitor may see, as far as known.
  */
 export function card_for(
   state: SessionState,
@@ -93,7 +93,7 @@ function unknown_scene_card(message: string, scene_ids: readonly string[]): Card
   };
 }
 
-/** Something in the page itself went wrong. */
+/** The card for an error in the page itself. */
 export function broken_card(message: string): Card {
   return {
     title: cards.broken.title,
@@ -102,7 +102,7 @@ export function broken_card(message: string): Card {
   };
 }
 
-/** What the browser lacks to show anything at all; undefined when it is good enough. */
+/** The card that names what the browser lacks; undefined when it lacks nothing. */
 export function unsupported_card(
   scope: Partial<Pick<typeof globalThis, 'Worker' | 'OffscreenCanvas' | 'WebSocket'>>,
 ): Card | undefined {
@@ -112,7 +112,7 @@ export function unsupported_card(
   return { title, text: text(lacking.join(and)) };
 }
 
-/** Why pictures come as JPEG although the server may have video; undefined when they do not. */
+/** Says why pictures come as JPEG and not as video; undefined when they come as video. */
 export function jpeg_reason(
   has_webcodecs: boolean,
   is_secure: boolean,

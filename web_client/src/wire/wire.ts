@@ -1,4 +1,4 @@
-// The wire contract of subprotocol "catgs.v1" (../../../proto/README.md): bytes in, typed messages out.
+// Converts between bytes and typed messages of subprotocol "catgs.v1" (../../../proto/README.md).
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
 import {
   ClientMessageSchema,
@@ -21,7 +21,7 @@ export const wire_version = 1;
 const kind_message = 1;
 const kind_frame = 2;
 
-/** A message from the server that breaks the contract. The connection is of no further use. */
+/** The server sent a message that breaks the contract. The connection is of no further use. */
 export class WireError extends Error {
   override name = 'WireError';
 }
@@ -29,18 +29,18 @@ export class WireError extends Error {
 export type ServerBody = Exclude<ServerMessage['body'], { case: undefined }>;
 export type ClientBody = NonNullable<MessageInitShape<typeof ClientMessageSchema>['body']>;
 
-// What a message is made from: fields left out are the wire's zeros.
+// Messages before encoding. Fields that are left out become zeros.
 export type HelloInit = MessageInitShape<typeof HelloSchema>;
 export type PickInit = MessageInitShape<typeof PickSchema>;
 export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
 export type AckInit = MessageInitShape<typeof AckSchema>;
 export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 
-export type Incoming =
+type Incoming =
   | { kind: 'message'; body: ServerBody }
   /** `payload` is a view into the received buffer, not a copy. */
   | { kind: 'frame'; header: FrameHeader; payload: Uint8Array }
-  /** Sent by a newer server; ignored. */
+  /** A newer server sent it; it is ignored. */
   | { kind: 'unknown' };
 
 /** Parses one binary WebSocket message of the server. Throws WireError. */
@@ -71,12 +71,12 @@ export function decode_server_message(data: ArrayBuffer): Incoming {
   }
 }
 
-/** One binary WebSocket message to the server. */
+/** Encodes one binary WebSocket message to the server. */
 export function encode_client_message(body: ClientBody): Uint8Array {
   return toBinary(ClientMessageSchema, create(ClientMessageSchema, { body }));
 }
 
-/** Protobuf's base-128 varint, at most 32 bits. Returns value and offset of the byte behind it. */
+/** Reads a base-128 varint of Protobuf, at most 32 bits. Returns its value and the offset behind it. */
 function read_varint(bytes: Uint8Array, offset: number): [value: number, end: number] {
   let value = 0;
   for (let shift = 0; shift < 35; shift += 7) {

@@ -1,4 +1,4 @@
-/** Browsers with blocked site data throw on mere access. */
+/** Undefined where the visitor blocks site data: browsers then throw on mere access. */
 export function session_storage(): Storage | undefined {
   try {
     return sessionStorage;

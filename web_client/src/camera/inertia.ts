@@ -1,4 +1,4 @@
-import type { Gesture } from '../camera/movement';
+import type { Gesture } from './movement';
 
 interface Moved {
   readonly time_ms: number;
@@ -7,17 +7,17 @@ interface Moved {
 }
 
 const looks_back_ms = 80;
-const rested_ms = 40; // a pointer that stood still before it was lifted throws nothing
+const rested_ms = 40; // a pointer that rested this long before its release does not throw the view
 const least_speed = 0.2; // view heights a second
 const fades_in_s = 0.28;
 
-/** What goes on after a pointer that was moving is lifted: the view glides to rest. Pure. */
+/** Lets the view glide to rest after a moving pointer is lifted. Pure. */
 export class Inertia {
   private kind_: 'look' | 'pan' = 'look';
   private trail_: Moved[] = [];
   private velocity_: readonly [x: number, y: number] = [0, 0]; // view heights a second
 
-  /** For people who asked for reduced motion. */
+  /** False for people who asked for reduced motion. */
   enabled = true;
 
   get active(): boolean {
@@ -27,7 +27,7 @@ export class Inertia {
   moved(gesture: Gesture, time_ms: number): void {
     this.stop();
     if (gesture.kind === 'dolly') {
-      this.trail_ = []; // fingers that pinched are lifted one by one
+      this.trail_ = []; // the fingers of a pinch are lifted one by one
       return;
     }
     if (gesture.kind !== this.kind_) this.trail_ = [];
@@ -36,7 +36,7 @@ export class Inertia {
     this.trail_ = this.trail_.filter((step) => step.time_ms >= time_ms - looks_back_ms);
   }
 
-  /** The last pointer was lifted. Returns whether the view goes on. */
+  /** The last pointer was lifted. Returns whether the view glides on. */
   released(time_ms: number): boolean {
     const trail = this.trail_;
     this.trail_ = [];
@@ -44,7 +44,7 @@ export class Inertia {
     if (!this.enabled || !first || !last || trail.length < 3) return false;
     if (time_ms - last.time_ms > rested_ms || last.time_ms <= first.time_ms) return false;
     const seconds = (last.time_ms - first.time_ms) / 1000;
-    const later = trail.slice(1); // the first step happened before the time that is measured
+    const later = trail.slice(1); // the first step came before the measured time
     const velocity = [
       later.reduce((sum, { dx }) => sum + dx, 0) / seconds,
       later.reduce((sum, { dy }) => sum + dy, 0) / seconds,

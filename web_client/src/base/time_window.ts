@@ -1,7 +1,4 @@
-/**
- * Time-stamped values, oldest first: those of the last `span_us` before the newest; at most `capacity`
- * of them.
- */
+/** Keeps values of the last `span_us` before the newest one, oldest first, and at most `capacity`. */
 export class TimeWindow {
   private times_us_: number[] = [];
   private values_: number[] = [];
@@ -20,12 +17,12 @@ export class TimeWindow {
     this.values_.splice(0, first);
   }
 
-  /** Values that are not older than the span at `now_us`. */
+  /** Values of the span that ends at `now_us`. */
   values(now_us: number): readonly number[] {
     return this.values_.slice(this.first_at(now_us));
   }
 
-  /** Values of the span that ended with the newest, however long ago that was. */
+  /** Values of the span that ended with the newest value, however long ago that was. */
   newest(): readonly number[] {
     return this.values_;
   }

@@ -1,42 +1,21 @@
-// What page and worker say to each other. Structured clones: plain data only.
-import type { Pose } from '../camera/camera_controller';
-import type { Vec3 } from '../camera/vector';
+// Messages between page and worker. They are structured clones, so they hold plain data only.
+import type { Pose, CameraSample } from '../camera/eye';
+import type { PathSample } from '../camera/flight';
+import type { Ray } from '../camera/ray';
 import type { DecoderRung } from '../decode/ladder';
-import type { PresenterChoice } from '../present/make_presenter';
 import type { ShownView } from '../present/display';
-import type { CameraSample, Eye, Sides } from '../present/warp';
+import type { PresenterChoice } from '../present/make_presenter';
+import type { Sides } from '../present/warp';
 import type { WarpMode } from '../present/warp_policy';
+import type { Quality, View } from '../session/quality';
+import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
 import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
-import type { SessionState } from './state';
-
-export interface View {
-  readonly width_px: number; // device pixels
-  readonly height_px: number;
-  readonly device_pixel_ratio: number;
-}
-
-export interface Quality {
-  readonly height_px: number; // while the camera moves; 0: the view's
-  readonly still_height_px: number; // when it rests; 0: the view's
-  readonly max_fps: number; // 0: the server's default
-}
-
-/** Where the camera of a tour will be. */
-export interface PathSample {
-  readonly time_us: number;
-  readonly eye: Eye;
-}
-
-export interface Ray {
-  readonly origin: Vec3;
-  readonly direction: Vec3;
-}
 
 export interface Snapshot {
-  /** Of the newest picture. */
+  /** Header of the newest picture. */
   readonly header: FrameHeader;
-  /** What the canvas shows: that picture, warped to where the camera was when it was drawn. */
+  /** Camera of the canvas: the picture is warped to where the camera was when it was drawn. */
   readonly view: ShownView;
   readonly width_px: number;
   readonly height_px: number;
@@ -73,12 +52,12 @@ export type FromWorker =
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
   | { kind: 'presenter'; description: string; warps: boolean; overscan: Sides }
-  /** `rung` has proved to be where decoding works here. */
+  /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
-  /** The answer to a pick; undefined: nothing is there. */
+  /** Answers a pick. `distance`: undefined where nothing is there. */
   | { kind: 'picked'; id: number; distance: number | undefined }
   | { kind: 'notice'; message: string }
-  /** The decoders are at their end: the stream is asked for as JPEG pictures. */
+  /** No video decoder is left. The worker asks for JPEG pictures instead. */
   | { kind: 'fallback'; message: string }
   | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }
   | { kind: 'stats'; request: number; stats: StatsReport }

@@ -20,7 +20,7 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
-/** `fallback` where `a` has no direction. */
+/** Returns `fallback` where `a` has no direction. */
 export function normalize(a: Vec3, fallback: Vec3): Vec3 {
   const n = length(a);
   return n > 1e-12 && Number.isFinite(n) ? scale(a, 1 / n) : fallback;
@@ -36,7 +36,7 @@ export function multiply(a: Quat, b: Quat): Quat {
   ]);
 }
 
-/** The identity where `q` has no direction. */
+/** Normalises. Returns the identity where `q` has no direction. */
 export function unit(q: Quat): Quat {
   const n = Math.hypot(q[0], q[1], q[2], q[3]);
   return n > 1e-12 && Number.isFinite(n) ? [q[0] / n, q[1] / n, q[2] / n, q[3] / n] : identity;
@@ -56,7 +56,13 @@ export function rotate(q: Quat, v: Vec3): Vec3 {
 
 export const conjugate = (q: Quat): Quat => [-q[0], -q[1], -q[2], q[3]];
 
-/** Constant angular rate from `a` (share 0) to `b` (share 1), the short way round. */
+/** Angle of the rotation between two orientations, rad. */
+export function angle_between(a: Quat, b: Quat): number {
+  const cosine = Math.abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
+  return 2 * Math.acos(Math.min(1, cosine));
+}
+
+/** Interpolates from `a` (share 0) to `b` (share 1) at constant angular rate, the short way round. */
 export function slerp(a: Quat, b: Quat, share: number): Quat {
   const cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
   const sign = cosine < 0 ? -1 : 1;
@@ -72,7 +78,7 @@ export function slerp(a: Quat, b: Quat, share: number): Quat {
   ]);
 }
 
-/** The rotation whose camera axes are these unit vectors, at right angles to each other. */
+/** The rotation whose axes are these orthonormal vectors. */
 function from_axes(x: Vec3, y: Vec3, z: Vec3): Quat {
   const trace = x[0] + y[1] + z[2];
   if (trace > 0) {
@@ -87,7 +93,7 @@ function from_axes(x: Vec3, y: Vec3, z: Vec3): Quat {
   return unit([z[0] + x[2], y[2] + z[1], 1 + z[2] - x[0] - y[1], x[1] - y[0]]);
 }
 
-/** Of a camera at `from` that has `to` in the middle of its picture and `up` upright in it. */
+/** Orientation of a camera at `from` that looks at `to`, with `up` upright in its picture. */
 export function look_at(from: Vec3, to: Vec3, up: Vec3): Quat {
   const view = normalize(sub(to, from), forward);
   const aside = Math.abs(view[0]) < 0.7 ? right : forward;

@@ -1,6 +1,6 @@
 /**
- * One monotonic clock for page and worker, in microseconds. Each has its own time origin, so both
- * count from the page's. All times on the wire are of this clock.
+ * One monotonic clock for page and worker, in microseconds. The two have different time origins, so both
+ * count from the page's origin. All client times on the wire are of this clock.
  */
 export interface Clock {
   now_us(): number;

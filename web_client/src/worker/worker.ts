@@ -1,28 +1,20 @@
-// The worker: everything between socket and canvas, so that a busy page delays no picture.
-import type { Vec3 } from '../camera/vector';
+// The worker does everything between socket and canvas, so that a busy page delays no picture.
+import { browser_timers, clock_from } from '../base/clock';
+import type { CameraSample, Eye } from '../camera/eye';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
-import {
-  available_codecs,
-  make_decoder,
-  type MadeDecoder,
-} from '../decode/make_decoder';
+import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make_decoder';
 import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
-import { widened_fov, type CameraSample, type Eye, type Sides } from '../present/warp';
+import { widened_fov, type Sides } from '../present/warp';
+import { eye_of, pose_message, wire_vector } from '../session/camera_messages';
+import type { Quality, View } from '../session/quality';
+import { Session } from '../session/session';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import {
-  Codec,
-  type FrameHeader,
-  type PoseInit,
-  type SettingsInit,
-  type StreamConfig,
-} from '../wire/wire';
-import { browser_timers, clock_from } from './clock';
-import type { FromWorker, Quality, ToWorker, View } from './messages';
-import { Session } from './session';
+import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
+import type { FromWorker, ToWorker } from './messages';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
 
@@ -35,7 +27,7 @@ const scope = self as unknown as {
 
 let client: Client | undefined;
 
-// Uncaught exceptions reach the page as the worker's error event; rejections do not.
+// The page sees uncaught exceptions as the worker's error event, but no rejections.
 scope.onunhandledrejection = ({ reason }) => {
   scope.postMessage({ kind: 'broken', message: String(reason) });
 };
@@ -63,8 +55,8 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
-  private first_rung_: DecoderRung = 'prefer-hardware'; // of the stream that runs
-  private rung_: DecoderRung; // where the next decoder begins on the ladder
+  private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
+  private rung_: DecoderRung; // where the next stream begins on the ladder
 
   constructor(start: Start) {
     this.clock_ = clock_from(start.page_origin_ms);
@@ -172,7 +164,6 @@ class Client {
   }
 
   private make_session(start: Start): Session {
-    const [viewportWidthPx, viewportHeightPx, devicePixelRatio] = viewport(start.view);
     return new Session(
       {
         open: open_web_socket(endpoint_of(start.url)),
@@ -200,9 +191,8 @@ class Client {
       },
       {
         sceneId: start.scene_id,
-        viewportWidthPx,
-        viewportHeightPx,
-        devicePixelRatio,
+        viewportWidthPx: start.view.width_px,
+        viewportHeightPx: start.view.height_px,
         decoders: available_codecs(start.rung),
         token: start.token,
         settings: settings(start.view, start.quality, this.display_.overscan),
@@ -218,9 +208,9 @@ class Client {
     );
   }
 
-  /** Sizes and fields of view go together. */
+  /** Frame sizes and fields of view change together, with the overscan. */
   private send_sizes(): void {
-    this.session_.set_viewport(...viewport(this.view_));
+    this.session_.set_viewport(this.view_.width_px, this.view_.height_px);
     this.session_.send_settings(settings(this.view_, this.quality_, this.display_.overscan));
     this.tell_presenter();
   }
@@ -238,7 +228,7 @@ class Client {
     });
   }
 
-  /** What failed is not tried again: the next stream begins with what worked. */
+  /** Decoders that failed are not tried again. The next stream begins with the one that worked. */
   private async make_decoder(
     config: StreamConfig,
     failures: number,
@@ -275,13 +265,9 @@ class Client {
   }
 }
 
-function viewport(view: View): [width_px: number, height_px: number, ratio: number] {
-  return [view.width_px, view.height_px, view.device_pixel_ratio];
-}
-
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
 
-/** Frame sizes: the chosen heights or the view's, in the view's shape, with overscan. */
+/** Frame sizes: the chosen heights or those of the view, in the view's aspect, with overscan. */
 function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
   const width_px = (height_px: number): number =>
     frame_side(height_px * aspect_of(view) * overscan.x);
@@ -296,31 +282,5 @@ function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
   };
 }
 
-/** Within the limits of the wire, and even: 4:2:0 video has no odd sides. */
+/** Limits a side to the range of the wire and makes it even, because 4:2:0 video has no odd sides. */
 const frame_side = (px: number): number => Math.min(8192, Math.max(16, Math.round(px / 2) * 2));
-
-function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest = false): PoseInit {
-  const [x, y, z, w] = eye.orientation;
-  return {
-    poseId: BigInt(pose_id),
-    clientTimeUs: BigInt(Math.round(time_us)),
-    worldFromCamera: {
-      position: wire_vector(eye.position),
-      orientation: { x, y, z, w },
-    },
-    fovYRad: eye.fov_y_rad,
-    atRest: at_rest,
-  };
-}
-
-const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
-
-function eye_of(pose: FrameHeader['renderPose'], fov_y_rad: number): Eye {
-  const p = pose?.position;
-  const q = pose?.orientation;
-  return {
-    position: [p?.x ?? 0, p?.y ?? 0, p?.z ?? 0],
-    orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
-    fov_y_rad,
-  };
-}

@@ -1,28 +1,38 @@
 // The page's end of the worker.
+import { Signal } from '../base/signal';
 import type { StatsReport } from '../stats/metrics';
 import type { FromWorker, Snapshot, ToWorker } from './messages';
 
 type Answer = StatsReport | Snapshot | undefined;
 type Said = Exclude<FromWorker, { kind: 'stats' } | { kind: 'snapshot' }>;
+type SaidOf<K extends Said['kind']> = Extract<Said, { kind: K }>;
 
 export class WorkerClient {
   private readonly worker_ = new Worker(new URL('./worker.ts', import.meta.url), {
     type: 'module',
     name: 'catgs',
   });
+  private readonly signals_ = new Map<Said['kind'], Signal<Said>>();
   private readonly waiting_ = new Map<number, (answer: Answer) => void>();
   private requests_ = 0;
 
-  constructor(on_message: (message: Said) => void) {
+  constructor() {
     this.worker_.onmessage = ({ data }: MessageEvent<FromWorker>) => {
       if (data.kind === 'stats') this.answer(data.request, data.stats);
       else if (data.kind === 'snapshot') this.answer(data.request, data.snapshot);
-      else on_message(data);
+      else this.signals_.get(data.kind)?.emit(data);
     };
     this.worker_.onerror = (event) => {
-      // A worker that could not be loaded at all says nothing more than that.
-      on_message({ kind: 'broken', message: event.message || 'the worker could not be loaded' });
+      // The event has no message when the worker could not be loaded at all.
+      const message = event.message || 'the worker could not be loaded';
+      this.signals_.get('broken')?.emit({ kind: 'broken', message });
     };
+  }
+
+  on<K extends Said['kind']>(kind: K, listener: (message: SaidOf<K>) => void): void {
+    const signal = this.signals_.get(kind) ?? new Signal<Said>();
+    this.signals_.set(kind, signal);
+    signal.listen((message) => listener(message as SaidOf<K>));
   }
 
   post(message: ToWorker, transfer: Transferable[] = []): void {

@@ -1,0 +1,26 @@
+import type { Quat, Vec3 } from '../base/vector';
+import type { Eye } from './eye';
+
+export const camera_modes = ['orbit', 'fly', 'walk'] as const;
+export type CameraMode = (typeof camera_modes)[number];
+
+/** Moves a camera in one mode. A controller acts on the rig that it was made for, within its limits. */
+export interface ModeController {
+  /** Speed of held keys, in scene scales (CameraRig.reach) a second. */
+  readonly speed: number;
+  /** Turn for a drag across the view's height, rad. Negative: the camera circles. Keys turn the same way. */
+  readonly drag_rad: number;
+  /** From the eye to what the visitor looks at, world units; Infinity: unknown. */
+  readonly sight_distance: number;
+  /** Unit direction of "forward". */
+  readonly heading: Vec3;
+  /** The visitor chose this mode. */
+  begin(): void;
+  turn(by: Quat): void;
+  /** The part of a movement that the mode allows; climbing is added after it. World axes and units. */
+  allowed(movement: Vec3): Vec3;
+  /** `steps`: notches of a wheel, > 0 towards the scene. */
+  dolly(steps: number): void;
+  /** Where the camera goes when the visitor points at a place. */
+  approach(point: Vec3): Eye;
+}

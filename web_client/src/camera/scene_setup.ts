@@ -1,0 +1,13 @@
+import type { Vec3 } from '../base/vector';
+import type { Pose } from './eye';
+
+/** What the camera needs to know of a scene. World units. */
+export interface SceneSetup {
+  readonly up: Vec3;
+  readonly start_pose: Pose;
+  readonly focus: Vec3;
+  readonly limits_min: Vec3;
+  readonly limits_max: Vec3;
+  readonly near_z: number;
+  readonly start_fov_y_rad?: number;
+}

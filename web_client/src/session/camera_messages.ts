@@ -1,0 +1,48 @@
+// Converts cameras and scenes between the client and the wire.
+import type { Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import type { SceneSetup } from '../camera/scene_setup';
+import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
+
+type WireVector = NonNullable<SceneFacts['up']>;
+type WirePose = NonNullable<FrameHeader['renderPose']>;
+
+export function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest = false): PoseInit {
+  const [x, y, z, w] = eye.orientation;
+  return {
+    poseId: BigInt(pose_id),
+    clientTimeUs: BigInt(Math.round(time_us)),
+    worldFromCamera: {
+      position: wire_vector(eye.position),
+      orientation: { x, y, z, w },
+    },
+    fovYRad: eye.fov_y_rad,
+    atRest: at_rest,
+  };
+}
+
+export const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
+
+// Fields that a server leaves out read as zeros. The defaults here make a usable pose and scene of them.
+const vec3 = (v: WireVector | undefined): Vec3 => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
+
+export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {
+  const q = pose?.orientation;
+  return {
+    position: vec3(pose?.position),
+    orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
+    fov_y_rad,
+  };
+}
+
+export function scene_setup(scene: SceneFacts): SceneSetup {
+  const { position, orientation } = eye_of(scene.startPose, 0);
+  return {
+    up: vec3(scene.up),
+    start_pose: { position, orientation },
+    focus: vec3(scene.focus),
+    limits_min: vec3(scene.limitsMin),
+    limits_max: vec3(scene.limitsMax),
+    near_z: scene.nearZ,
+  };
+}

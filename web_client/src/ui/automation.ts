@@ -1,0 +1,121 @@
+// window.catgs: a small interface for tests and for pages that drive the viewer (README.md).
+import { browser_timers, type Clock } from '../base/clock';
+import type { CameraController } from '../camera/camera_controller';
+import type { Pose } from '../camera/eye';
+import { same_angle_rad, same_view } from '../camera/same_view';
+import type { StatsSnapshot } from '../stats/metrics';
+import type { WorkerClient } from '../worker/client';
+import type { FromWorker, Snapshot } from '../worker/messages';
+import type { Navigation } from './navigation';
+
+interface Automation {
+  /** Puts the camera there. Camera axes: x right, y down, z forward; quaternion x, y, z, w. */
+  setPose(pose: Pose, fovYRad?: number): void;
+  pose(): Pose;
+  /** Resolves when the newest pose is shown and its picture has been refined. */
+  settled(): Promise<void>;
+  /** RGBA pixels of the shown picture at its native size, with the header of its frame. */
+  snapshot(): Promise<Snapshot>;
+  stats(): Promise<StatsSnapshot>;
+}
+
+declare global {
+  interface Window {
+    catgs?: Automation;
+  }
+}
+
+type Shown = Extract<FromWorker, { kind: 'presented' }>;
+
+// The server refines a still picture with a few more frames and then falls silent. The time between two
+// of them is at most this, or a few of the intervals seen so far.
+const least_quiet_ms = 400;
+const quiet_intervals = 4;
+
+/** Resolves promises when the picture has come to rest. */
+export class Settling {
+  private last_shown_ms_ = 0;
+  private interval_ms_ = 0;
+  private waiting_: (() => void)[] = [];
+  private cancel_: () => void = () => undefined;
+
+  /** `is_current`: whether the shown picture is that of the present camera. */
+  constructor(
+    private readonly is_current_: () => boolean,
+    private readonly now_ms_: () => number,
+    private readonly after_: (delay_ms: number, action: () => void) => () => void,
+  ) {}
+
+  presented(): void {
+    const now_ms = this.now_ms_();
+    this.interval_ms_ = this.last_shown_ms_ > 0 ? now_ms - this.last_shown_ms_ : 0;
+    this.last_shown_ms_ = now_ms;
+    this.look();
+  }
+
+  wait(): Promise<void> {
+    return new Promise((resolve) => {
+      this.waiting_.push(resolve);
+      this.look();
+    });
+  }
+
+  private look(): void {
+    this.cancel_();
+    if (this.waiting_.length === 0) return;
+    if (!this.is_current_()) return; // the next presented() looks again
+    const quiet_ms = Math.max(least_quiet_ms, Math.min(this.interval_ms_, 1000) * quiet_intervals);
+    const left_ms = this.last_shown_ms_ + quiet_ms - this.now_ms_();
+    if (left_ms <= 0) {
+      for (const resolve of this.waiting_.splice(0)) resolve();
+      return;
+    }
+    this.cancel_ = this.after_(left_ms, () => this.look());
+  }
+}
+
+/** Makes `window.catgs` for a page with these parts. */
+export function make_automation(
+  worker: WorkerClient,
+  { camera, loop, changed }: Navigation,
+  clock: Clock,
+): Automation {
+  let shown: Shown | undefined;
+  const settling = new Settling(
+    () => shown !== undefined && !loop.pending && shows_camera(shown, camera, loop.pose_id),
+    () => clock.now_us() / 1000,
+    (delay_ms, action) => browser_timers.after(delay_ms, action),
+  );
+  worker.on('presented', (message) => {
+    shown = message;
+    settling.presented();
+  });
+  return {
+    setPose: (pose, fov_y_rad) => {
+      camera.jump(pose);
+      if (fov_y_rad !== undefined) camera.fov_y_rad = fov_y_rad;
+      changed.emit();
+      loop.sample();
+    },
+    pose: () => camera.pose,
+    settled: () => settling.wait(),
+    snapshot: async () => {
+      const snapshot = await worker.snapshot();
+      if (!snapshot) throw new Error('no picture has been shown yet');
+      return snapshot;
+    },
+    stats: () => worker.stats(),
+  };
+}
+
+/**
+ * Whether the shown picture is that of the present camera. The server does not render a pose again that
+ * gives the same picture, so the id of the newest pose may never come back.
+ */
+function shows_camera(shown: Shown, camera: CameraController, newest_pose_id: number): boolean {
+  if (shown.pose_id >= newest_pose_id) return true;
+  return (
+    Math.abs(shown.fov_y_rad - camera.fov_y_rad) < same_angle_rad &&
+    same_view(shown.pose, camera.pose, camera.scene?.near_z ?? 0)
+  );
+}

@@ -1,0 +1,106 @@
+import type { Eye } from '../camera/eye';
+import { place_of } from '../camera/ray';
+import { text } from '../text';
+import type { TourState } from '../tour/player';
+import type { Stop, Tour } from '../tour/tour';
+import type { WorkerClient } from '../worker/client';
+import { by_id } from './dom';
+import type { Navigation } from './navigation';
+
+/** Shows the stops of a tour as buttons in the picture. */
+export class Hotspots {
+  private readonly host_ = by_id('hotspots', HTMLElement);
+  private tour_: Tour | undefined;
+  private spots_: { readonly stop: Stop; readonly button: HTMLButtonElement }[] = [];
+  private warps_ = false;
+  private has_picture_ = false;
+
+  constructor(
+    private readonly view_: HTMLElement,
+    worker: WorkerClient,
+    navigation: Navigation,
+    private readonly go_to_: (stop_index: number) => void,
+  ) {
+    window.addEventListener('keydown', ({ code }) => {
+      // A label may hide what is behind it (WCAG 1.4.13).
+      if (code === 'Escape') this.host_.classList.add('labels-dismissed');
+    });
+    // A warped picture shows the newest camera, any other picture its own pose. Hotspots follow that.
+    worker.on('presenter', ({ warps }) => {
+      this.warps_ = warps;
+    });
+    worker.on('presented', ({ pose, fov_y_rad }) => {
+      if (!this.warps_ || !this.has_picture_) this.place({ ...pose, fov_y_rad });
+      this.has_picture_ = true;
+    });
+    navigation.sampled.listen(({ eye }) => {
+      if (this.warps_) this.place(eye);
+    });
+  }
+
+  /** `eye`: the camera of the view. */
+  show({ tour, stop }: TourState, eye: Eye): void {
+    if (tour !== this.tour_) this.show_tour(tour);
+    for (const { stop: other, button } of this.spots_) {
+      if (other === stop) button.setAttribute('aria-current', 'step');
+      else button.removeAttribute('aria-current');
+    }
+    this.place(eye);
+  }
+
+  private place(eye: Eye): void {
+    const { clientWidth: width_px, clientHeight: height_px } = this.view_;
+    for (const { stop, button } of this.spots_) {
+      const place = stop.marker && place_of(stop.marker, eye, width_px / height_px);
+      const inside =
+        place && place[0] > 0 && place[0] < 1 && place[1] > 0 && place[1] < 1 ? place : undefined;
+      button.hidden = !inside;
+      if (!inside) continue;
+      const [x, y] = [inside[0] * width_px, inside[1] * height_px];
+      button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      button.classList.toggle('leftward', inside[0] > 0.5); // where its label has room
+    }
+  }
+
+  private show_tour(tour: Tour | undefined): void {
+    this.tour_ = tour;
+    this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
+      if (!stop.marker) return [];
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.className = 'hotspot';
+      button.hidden = true; // until it is placed
+      const number = document.createElement('span');
+      number.textContent = String(i + 1);
+      number.setAttribute('aria-hidden', 'true');
+      button.append(number, label_of(stop, i, button));
+      button.addEventListener('click', () => this.go_to_(i));
+      for (const arrival of ['pointerenter', 'focus']) {
+        button.addEventListener(arrival, () => this.host_.classList.remove('labels-dismissed'));
+      }
+      return [{ stop, button }];
+    });
+    this.host_.replaceChildren(...this.spots_.map(({ button }) => button));
+  }
+}
+
+/** Title and caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
+function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLElement {
+  const label = document.createElement('span');
+  label.className = 'hotspot-label';
+  const name = document.createElement('span');
+  name.className = 'hotspot-name';
+  name.textContent = stop.title || text.tour.stop_numbered(index + 1);
+  label.append(name);
+  if (stop.caption) {
+    // The title alone is the name of the button; the caption describes it.
+    const caption = document.createElement('span');
+    caption.className = 'hotspot-caption';
+    caption.id = `hotspot-caption-${index}`;
+    caption.textContent = stop.caption;
+    caption.setAttribute('aria-hidden', 'true');
+    button.setAttribute('aria-describedby', caption.id);
+    label.append(caption);
+  }
+  return label;
+}

@@ -1,0 +1,182 @@
+// Moves the visitor through the scene: by pointers, keys, sticks, places pointed at, and flights.
+import { browser_timers, type Clock } from '../base/clock';
+import { Signal } from '../base/signal';
+import type { Vec3 } from '../base/vector';
+import { CameraController } from '../camera/camera_controller';
+import { CameraLoop } from '../camera/camera_loop';
+import type { CameraSample, Eye } from '../camera/eye';
+import type { Flight } from '../camera/flight';
+import { Inertia } from '../camera/inertia';
+import { camera_modes, type CameraMode } from '../camera/mode';
+import { is_held, sum_of, type Axes } from '../camera/movement';
+import { ray_through } from '../camera/ray';
+import { Gamepads, type GamepadAction } from '../input/gamepad';
+import { bind_view_input } from '../input/view_input';
+import { scene_setup } from '../session/camera_messages';
+import { Picks } from '../session/picks';
+import type { SceneFacts, Welcome } from '../wire/wire';
+import type { WorkerClient } from '../worker/client';
+
+export class Navigation {
+  readonly camera = new CameraController();
+  readonly loop: CameraLoop;
+  /** The visitor has entered another scene. */
+  readonly entered = new Signal<{ scene: SceneFacts; scene_ids: readonly string[] }>();
+  /** The visitor has begun to move the camera by a gesture, a key or a stick. */
+  readonly taken_over = new Signal();
+  /** The mode or the field of view may have changed. */
+  readonly changed = new Signal();
+  readonly sampled = new Signal<CameraSample>();
+  readonly pad_pressed = new Signal<GamepadAction>();
+  private readonly inertia_ = new Inertia();
+  private readonly picks_: Picks;
+  private scene_id_: string | undefined;
+  private overscan_ = { x: 1, y: 1 };
+  private pointed_ = 0;
+
+  constructor(
+    private readonly view_: HTMLElement,
+    worker: WorkerClient,
+    clock: Clock,
+    private readonly reduced_motion_: boolean,
+  ) {
+    this.picks_ = new Picks((id, ray) => worker.post({ kind: 'pick', id, ray }), browser_timers);
+    if (reduced_motion_) {
+      this.camera.smoothing_s = 0;
+      this.inertia_.enabled = false;
+    }
+    const { axes, is_touched } = this.bind_input();
+    this.loop = new CameraLoop(this.camera, axes, is_touched, this.inertia_, clock, (sample) => {
+      worker.post({ kind: 'camera', sample });
+      this.sampled.emit(sample);
+    });
+    worker.on('welcome', ({ welcome }) => this.welcomed(welcome));
+    worker.on('picked', ({ id, distance }) => this.picks_.answered(id, distance));
+    worker.on('presenter', ({ overscan }) => {
+      // Pictures need another field of view from now on. A new sample makes the server render one.
+      if (overscan.y !== this.overscan_.y || overscan.x !== this.overscan_.x) this.loop.changed();
+      this.overscan_ = overscan;
+    });
+  }
+
+  /** Id of the scene; '' before the first one. */
+  get scene_id(): string {
+    return this.scene_id_ ?? '';
+  }
+
+  get eye(): Eye {
+    return this.camera.eye;
+  }
+
+  /** The scene's scale to a visitor, world units. */
+  get reach(): number {
+    return this.camera.reach;
+  }
+
+  fly(way: Flight, ended: (arrived: boolean) => void): void {
+    this.camera.fly(way, ended);
+    this.loop.wake();
+  }
+
+  stop_flight(): void {
+    this.camera.stop_flight();
+  }
+
+  put(eye: Eye): void {
+    this.camera.jump(eye);
+    this.camera.fov_y_rad = eye.fov_y_rad;
+    this.moved();
+  }
+
+  reset(): void {
+    this.camera.reset();
+    this.moved();
+  }
+
+  flip_up(): void {
+    this.camera.flip_up();
+    this.moved();
+  }
+
+  set_fov(fov_y_rad: number): void {
+    this.camera.fov_y_rad = fov_y_rad;
+    this.moved();
+  }
+
+  set_mode(mode: CameraMode): void {
+    this.camera.set_mode(mode);
+    this.changed.emit();
+  }
+
+  next_mode(): void {
+    const next = camera_modes.indexOf(this.camera.mode) + 1;
+    this.set_mode(camera_modes[next % camera_modes.length]!);
+  }
+
+  /** The point in the middle of the view; undefined: nothing is there. */
+  place_ahead(): Promise<Vec3 | undefined> {
+    return this.place_at(0.5, 0.5);
+  }
+
+  private bind_input(): { axes: () => Axes; is_touched: () => boolean } {
+    const { keys, pointers } = bind_view_input(this.view_, this.inertia_, {
+      gesture: (gesture) => {
+        this.taken_over.emit();
+        this.camera.gesture(gesture);
+        this.loop.wake();
+      },
+      keys_changed: () => this.take_over(),
+      let_go: () => this.loop.wake(),
+      pointed_at: (x, y) => void this.point_at(x, y),
+    });
+    const pads = new Gamepads({
+      moved: () => {
+        if (is_held(pads.axes())) this.take_over();
+      },
+      action: (action) => {
+        if (action === 'mode') this.next_mode();
+        else if (action === 'reset') this.reset();
+        this.pad_pressed.emit(action);
+      },
+    });
+    return {
+      axes: () => sum_of(keys.axes(), pads.axes()),
+      is_touched: () => pointers.count > 0,
+    };
+  }
+
+  private take_over(): void {
+    this.taken_over.emit();
+    this.loop.wake();
+  }
+
+  /** Something other than a gesture has moved the camera. */
+  private moved(): void {
+    this.changed.emit();
+    this.loop.changed();
+  }
+
+  private welcomed({ scene, sceneIds }: Welcome): void {
+    // After a reconnect the visitor stays where they were.
+    if (!scene || scene.sceneId === this.scene_id_) return;
+    this.scene_id_ = scene.sceneId;
+    this.camera.load(scene_setup(scene));
+    this.loop.enable();
+    this.entered.emit({ scene, scene_ids: sceneIds });
+  }
+
+  /** Turns the camera to what is there, unless the visitor pointed elsewhere meanwhile. */
+  private async point_at(x: number, y: number): Promise<void> {
+    const pointed = ++this.pointed_;
+    const place = await this.place_at(x, y);
+    if (!place || pointed !== this.pointed_) return;
+    this.camera.focus_on(place, this.reduced_motion_);
+    this.loop.wake();
+  }
+
+  /** Point of the scene. `x`, `y`: shares of the view's width and height, y down. */
+  private place_at(x: number, y: number): Promise<Vec3 | undefined> {
+    const aspect = this.view_.clientWidth / Math.max(1, this.view_.clientHeight);
+    return this.picks_.at(ray_through(this.eye, x, y, aspect));
+  }
+}

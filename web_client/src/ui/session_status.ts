@@ -1,0 +1,66 @@
+import { list_scenes } from '../session/scenes';
+import type { SessionState } from '../session/state';
+import type { AccessToken } from '../session/token';
+import { Error_Code } from '../wire/wire';
+import type { WorkerClient } from '../worker/client';
+import type { CardView } from './card';
+import type { Toolbar } from './toolbar';
+import { broken_card, card_for } from './wording';
+
+const first_card_after_ms = 300; // a fast connection shows its picture without a flash of cards
+
+/** Shows the state of the session on the card, and passes on the visitor's answers. */
+export class SessionStatus {
+  private state_: SessionState = { phase: 'connecting', attempt: 0 };
+  private has_picture_ = false;
+  private scene_ids_: readonly string[] = [];
+  private broken_ = false;
+
+  constructor(
+    private readonly card_: CardView,
+    private readonly toolbar_: Toolbar,
+    private readonly worker_: WorkerClient,
+    private readonly token_: AccessToken,
+  ) {
+    worker_.on('state', ({ state }) => this.changed(state));
+    worker_.on('presented', () => {
+      if (this.has_picture_) return;
+      this.has_picture_ = true;
+      this.show();
+    });
+    worker_.on('broken', ({ message }) => this.break_off(message));
+    card_.retried.listen(() => worker_.post({ kind: 'retry' }));
+    card_.token_given.listen((token) => {
+      token_.value = token;
+      worker_.post({ kind: 'token', token });
+    });
+    setTimeout(() => this.show(), first_card_after_ms);
+  }
+
+  /** Ends the session for good. The card with the error stays. */
+  break_off(message: string): void {
+    this.broken_ = true;
+    this.worker_.post({ kind: 'stop' });
+    this.toolbar_.set_active(false);
+    this.card_.show(broken_card(message));
+  }
+
+  private changed(state: SessionState): void {
+    this.state_ = state;
+    if (state.phase !== 'connecting' || state.attempt > 0) this.show();
+    if (state.phase === 'failed' && state.code === Error_Code.UNKNOWN_SCENE) void this.offer_scenes();
+  }
+
+  private show(): void {
+    if (this.broken_) return;
+    this.card_.show(card_for(this.state_, this.has_picture_, this.scene_ids_));
+    this.toolbar_.set_active(this.state_.phase !== 'failed');
+    document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
+  }
+
+  /** Asks for the list of scenes, because no welcome has brought it. */
+  private async offer_scenes(): Promise<void> {
+    this.scene_ids_ = await list_scenes(location.href, this.token_.value);
+    this.show();
+  }
+}
