@@ -395,6 +395,7 @@ void NetServer::start() {
     run_promptly();
     served = &s.site;
     while (!s.stopping.load()) {
+  AcceptGate::require_room();
       if (lws_service(s.context, 0) >= 0) continue;
       s.on_failed();
       break;

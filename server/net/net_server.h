@@ -51,6 +51,8 @@ class NetServer {
   NetServer& operator=(const NetServer&) = delete;
 
   void start();
+  /// Throws InputError where the system allows too few descriptors for connections beside those
+  /// that are open by now.
   /// Closes every connection and joins the thread. Listeners see on_close() before it returns.
   void stop();
 
