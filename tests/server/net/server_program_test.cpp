@@ -221,6 +221,21 @@ TEST(ServerProgram, SessionsResumeAfterItWasKilled) {
   EXPECT_EQ(again.receive_frame().header.pose_id(), 2u);
 }
 
+TEST(ServerProgram, EndsCleanlyAlthoughItWasStoppedWhileItDrains) {
+  Program program({"--drain-deadline", "1"});
+  WireClient client(program.port());
+  client.greet();
+  program.signal(SIGTERM);
+  program.signal(SIGSTOP);
+  std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::seconds(3));  // longer than the whole drain
+    program.signal(SIGCONT);
+  });
+  client.receive_message(v1::ServerMessage::kDrain);
+  EXPECT_EQ(client.receive_until_closed().close_code, 1001);
+  EXPECT_EQ(program.exit_status(), 0);
+}
+
 TEST(ServerProgram, SessionsGoOnAfterItWasStopped) {
   Program program;
   auto client = std::make_unique<WireClient>(program.port());
