@@ -55,6 +55,11 @@ struct ServerConfig {
   std::vector<std::string> trusted_proxies;
   std::string log_format = "human";
   std::string log_level = "info";
+
+  /// Of who wants to see a scene; without tokens everybody may.
+  [[nodiscard]] bool asks_for_tokens() const {
+    return !token_file.empty() || !token_key_file.empty();
+  }
 };
 
 /// One setting: its name is the flag (--max-sessions), the TOML key (max-sessions) and the
