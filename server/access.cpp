@@ -12,6 +12,7 @@
 
 #include "render_core/base/error.h"
 #include "server/required_file.h"
+#include "server/scene_id.h"
 
 namespace catgs {
 namespace {
@@ -47,7 +48,7 @@ std::string make_link_token(const LinkGrant& grant, std::string_view key) {
   if (!is_role(grant.role))
     throw InputError("--role " + grant.role, {}, "is no role",
                      "use viewer, author, spectator or solo");
-  if (grant.scene_id.find('\n') != std::string::npos || grant.scene_id.size() > 128)
+  if (!grant.scene_id.empty() && !is_scene_id(grant.scene_id))
     throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
   const std::string payload =
       fmt::format("{}\n{}\n{}", grant.scene_id, grant.role, grant.expires_unix_s);

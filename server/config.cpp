@@ -266,10 +266,11 @@ std::vector<Setting> access_settings() {
            &C::resume_key_file),
       text("tls-cert", "FILE", "Certificate chain, PEM: serve https and wss", &C::tls_cert),
       text("tls-key", "FILE", "Private key of the certificate, PEM", &C::tls_key),
-      origins("allow-origin",
-              "Other sites whose pages may connect, or whose proxy forwards to a loopback address, "
-              "https://a.example; *: all",
-              &C::allow_origins, false),
+      origins(
+          "allow-origin",
+          "Other sites whose pages may connect, and names that a server on a loopback address or "
+          "without tokens is known by, https://a.example; *: all",
+          &C::allow_origins, false),
       origins("embed-origin", "Sites that may show the client in a frame; *: all",
               &C::embed_origins, true),
       trusted_proxy(),

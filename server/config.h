@@ -25,9 +25,9 @@ struct ServerConfig {
   std::string client_dir;                     // empty: found beside the program
   RendererKind renderer = RendererKind::automatic;
   std::vector<int> devices;  // of the CUDA core; empty: all
-  int threads = 0;          // 0: one per core
-  int lod = -1;             // of streamed SOG scenes; -1: by gaussian_budget
-  int gaussian_budget = 0;  // of streamed SOG scenes; 0: no bound
+  int threads = 0;           // 0: one per core
+  int lod = -1;              // of streamed SOG scenes; -1: by gaussian_budget
+  int gaussian_budget = 0;   // of streamed SOG scenes; 0: no bound
   EncoderKind encoder = EncoderKind::automatic;
   std::string x264_preset = "auto";  // or one of effort_presets
   int nvenc_sessions = 0;            // 0: as many as the driver opens
@@ -54,6 +54,11 @@ struct ServerConfig {
   std::vector<std::string> trusted_proxies;
   std::string log_format = "human";
   std::string log_level = "info";
+
+  /// Of who wants to see a scene; without tokens everybody may.
+  [[nodiscard]] bool asks_for_tokens() const {
+    return !token_file.empty() || !token_key_file.empty();
+  }
 };
 
 /// One setting: its name is the flag (--max-sessions), the TOML key (max-sessions) and the

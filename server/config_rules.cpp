@@ -24,8 +24,7 @@ void validate(const ServerConfig& config) {
   if (config.tls_cert.empty() != config.tls_key.empty())
     throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
                      "--tls-cert and --tls-key belong together");
-  const bool guarded = !config.token_file.empty() || !config.token_key_file.empty();
-  if (!is_loopback(config.bind) && !guarded && !config.open)
+  if (!is_loopback(config.bind) && !config.asks_for_tokens() && !config.open)
     throw InputError("--bind " + config.bind, {}, "other machines could connect without a token",
                      "give --token-file or --token-key-file, or --open if everybody may");
   if (config.admin_bind == "off") return;

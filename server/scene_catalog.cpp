@@ -18,6 +18,7 @@
 #include "render_core/scene/scene.h"
 #include "render_core/synth/synth.h"
 #include "server/poster.h"
+#include "server/scene_id.h"
 #include "server/tours.h"
 
 namespace catgs {
@@ -86,15 +87,6 @@ SceneFacts facts_of(const Scene& scene, std::string id) {
 
 }  // namespace
 
-std::string unique_id(const std::string& name,
-                      const std::function<bool(const std::string&)>& taken) {
-  constexpr std::size_t max_bytes = 100;  // with its number within the wire's 128
-  const std::string base = name.empty() ? "scene" : shortened(name, max_bytes);
-  std::string id = base;
-  for (int n = 2; taken(id); ++n) id = fmt::format("{}-{}", base, n);
-  return id;
-}
-
 std::shared_ptr<const SceneEntry> load_scene(
     const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
     const ServerConfig& config, const RendererOptions& core, int threads,
@@ -134,7 +126,7 @@ std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& c
       return std::ranges::any_of(entries,
                                  [&](const auto& entry) { return entry->facts.scene_id == id; });
     };
-    const auto id_of = [&](const std::string& name) { return unique_id(name, taken); };
+    const auto id_of = [&](const std::string& name) { return scene_id_of(name, taken); };
     auto entry = load_scene(spec, id_of, config, core, core.pool->threads());
     // The banner tells that of the first.
     if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)

@@ -23,10 +23,6 @@ std::shared_ptr<const SceneEntry> load_scene(
 std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& config,
                                                            const RendererOptions& core);
 
-/// Scene ids are names that people can read in a link; a second scene of a name gets a number.
-std::string unique_id(const std::string& name,
-                      const std::function<bool(const std::string&)>& taken);
-
 /// Encoders that the probe found usable and `--encoder` admits, best first. Throws InputError when
 /// there is none. A named encoder still leaves JPEG for clients without a video decoder.
 std::vector<EncoderChoice> usable_encoders(EncoderKind wanted,

@@ -14,6 +14,7 @@
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/formats/json_field.h"
 #include "server/scene_catalog.h"
+#include "server/scene_id.h"
 
 namespace catgs {
 namespace {
@@ -302,7 +303,7 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
 }
 
 std::string SceneLibrary::new_id(const std::string& name) const {
-  return unique_id(name, [this](const std::string& id) { return shelf_.contains(id); });
+  return scene_id_of(name, [this](const std::string& id) { return shelf_.contains(id); });
 }
 
 std::chrono::seconds SceneLibrary::estimate(std::uint64_t bytes) const {

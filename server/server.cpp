@@ -208,6 +208,7 @@ NetOptions Server::State::net_options() {
   options.on_failed = [this] {
     boost::asio::post(io, [this] { give_up("the network thread failed"); });
   };
+  options.asks_for_tokens = config.asks_for_tokens();
   options.allowed_origins = config.allow_origins;
   options.embed_origins = config.embed_origins;
   options.trusted_proxies = config.trusted_proxies;

@@ -4,7 +4,11 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/eventfd.h>
 #include <sys/resource.h>
+#include <unistd.h>
+
+#include "render_core/base/error.h"
 
 namespace catgs {
 namespace {
@@ -29,6 +33,21 @@ int AcceptGate::descriptor_limit() {
   rlimit limit{};
   ::getrlimit(RLIMIT_NOFILE, &limit);
   return usable_descriptors(limit.rlim_cur);
+}
+
+void AcceptGate::require_room() {
+  const int limit = descriptor_limit();
+  const int next = ::eventfd(0, 0);  // the lowest number that is free
+  if (next >= 0) ::close(next);
+  const int taken = next >= 0 ? next : limit;
+  const int needed = taken + least_connections + reserved_descriptors;
+  if (needed <= limit) return;
+  throw InputError(
+      "RLIMIT_NOFILE", {},
+      fmt::format("{} descriptors are allowed, and at least {} are needed: {} are kept "
+                  "for scenes, encoders and the admin port",
+                  limit, needed, reserved_descriptors),
+      "ulimit -n 1024, or LimitNOFILE=1024 in the unit");
 }
 
 std::optional<std::string> AcceptGate::refusal(int descriptor, int limit,

@@ -12,6 +12,7 @@ namespace catgs {
 class AcceptGate {
  public:
   static constexpr int reserved_descriptors = 64;
+  static constexpr int least_connections = 16;  // a visitor's page opens up to seven
 
   /// Of as many as are allowed, those that libwebsockets can keep tables of.
   [[nodiscard]] static int usable_descriptors(std::uint64_t allowed);
@@ -19,6 +20,9 @@ class AcceptGate {
   static void raise_descriptor_limit();
   /// Of this process, now.
   [[nodiscard]] static int descriptor_limit();
+  /// Throws InputError where fewer than least_connections could be accepted now: a server that
+  /// refuses everybody, probes too, is one that should not have started.
+  static void require_room();
 
   /// Why a connection that has this descriptor goes; nothing: it stays, and opened() is next. The
   /// system gives the lowest number that is free: all below it are taken. Of those that may be, one

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <stdexcept>
+#include <variant>
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -38,6 +39,24 @@ bool names_tag(std::string_view header, std::string_view tag) {
   return false;
 }
 
+/// Nothing where it is no address.
+std::variant<std::monostate, in_addr, in6_addr> parse_address(std::string_view address) {
+  const std::string text(address);
+  if (text.find('\0') != std::string::npos) return {};  // where inet_pton() stops to read
+  in_addr v4{};
+  in6_addr v6{};
+  if (::inet_pton(AF_INET, text.c_str(), &v4) == 1) return v4;
+  if (::inet_pton(AF_INET6, text.c_str(), &v6) == 1) return v6;
+  return {};
+}
+
+/// An address, or a name that no outsider can register.
+bool is_local(std::string_view name) {
+  if (name.empty()) return false;
+  return parse_address(name).index() > 0 || name.find('.') == name.npos ||
+         name.ends_with(".local") || name.ends_with(".internal");
+}
+
 /// The host[:port] of "https://a.example:8443"; empty for what is no origin ("null", "*").
 std::string_view authority_of(std::string_view origin) {
   const auto scheme_end = origin.find("://");
@@ -69,12 +88,10 @@ bool origin_allowed(std::string_view origin, std::string_view host,
 
 bool is_loopback(std::string_view address) {
   if (address == "localhost") return true;
-  const std::string text(address);
-  if (text.find('\0') != std::string::npos) return false;  // where inet_pton() stops to read
-  in_addr v4{};
-  in6_addr v6{};
-  if (::inet_pton(AF_INET, text.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
-  return ::inet_pton(AF_INET6, text.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+  const auto parsed = parse_address(address);
+  if (const auto* v4 = std::get_if<in_addr>(&parsed)) return ntohl(v4->s_addr) >> 24 == 127;
+  const auto* v6 = std::get_if<in6_addr>(&parsed);
+  return v6 && IN6_IS_ADDR_LOOPBACK(v6);
 }
 
 void check_origin(std::string_view text, bool any_subdomain) {
@@ -106,9 +123,11 @@ void check_origin(std::string_view text, bool any_subdomain) {
         fmt::format("\"{}\" is not how browsers write an origin (did you mean {}?)", text, meant));
 }
 
-bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed) {
+bool host_allowed(std::string_view host, Names names, const std::vector<std::string>& allowed) {
+  if (names == Names::all || host.empty()) return true;
   const std::string_view name = host_name(host);
-  return host.empty() || is_loopback(name) || std::ranges::any_of(allowed, [&](const auto& a) {
+  return is_loopback(name) || (names == Names::local && is_local(name)) ||
+         std::ranges::any_of(allowed, [&](const auto& a) {
            return a == "*" || (!name.empty() && host_name(authority_of(a)) == name);
          });
 }

@@ -80,11 +80,19 @@ void check_origin(std::string_view text, bool any_subdomain);
 /// 127.0.0.0/8, ::1, localhost.
 bool is_loopback(std::string_view address);
 
-/// Is a request with this Host header meant for a server that listens on a loopback address only? A
-/// foreign page may let its own name resolve to 127.0.0.1 (DNS rebinding); its requests then carry
-/// that name both in Origin and in Host, so comparing the two proves nothing. Yes for loopback
-/// names, for hosts of `allowed` origins (a proxy forwards them), and without a Host (no browser).
-bool loopback_host_allowed(std::string_view host, const std::vector<std::string>& allowed);
+/// The names that a port answers to. A foreign page may let its own name resolve to an address of
+/// this server (DNS rebinding). Its requests then carry that name both in Origin and in Host, so
+/// comparing the two proves nothing.
+enum class Names {
+  loopback,  // the port listens on a loopback address: loopback addresses and localhost
+  local,     // it asks for no token: every address, and names that no outsider can register, which
+             // have no dot or end with .local or .internal
+  all,       // tokens keep foreign pages out
+};
+
+/// Is a request with this Host header for us? Hosts of `allowed` origins always are (a proxy may
+/// forward them), and so is a request without a Host, which no browser sends.
+bool host_allowed(std::string_view host, Names names, const std::vector<std::string>& allowed);
 
 /// The id in "/api/scenes/ID<what>".
 std::optional<std::string_view> scene_of(std::string_view path, std::string_view what);

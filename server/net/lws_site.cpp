@@ -32,6 +32,13 @@ std::string peer_address_of(lws* wsi) {
   return name.data();
 }
 
+/// A proxy says how the client came to it.
+bool came_by_tls(lws* wsi) {
+  if (lws_is_ssl(wsi) != 0) return true;
+  return site_of(wsi).proxies.is_proxy(peer_address_of(wsi)) &&
+         custom_header(wsi, "x-forwarded-proto:") == "https";
+}
+
 }  // namespace
 
 const Site& site_of(lws* wsi) {
@@ -45,14 +52,13 @@ std::string client_address_of(lws* wsi) {
 
 std::string site_address(lws* wsi, const std::string& host) {
   if (host.empty()) return {};
-  bool tls = lws_is_ssl(wsi) != 0;
-  if (site_of(wsi).proxies.is_proxy(peer_address_of(wsi)))
-    tls |= custom_header(wsi, "x-forwarded-proto:") == "https";
-  return (tls ? "https://" : "http://") + host;
+  return (came_by_tls(wsi) ? "https://" : "http://") + host;
 }
 
-bool host_allowed(const Site& site, const std::string& host) {
-  return !site.loopback || loopback_host_allowed(host, site.allowed_origins);
+bool host_allowed(lws* wsi, const std::string& host) {
+  const Site& site = site_of(wsi);
+  if (site.names == Names::local && came_by_tls(wsi)) return true;
+  return host_allowed(host, site.names, site.allowed_origins);
 }
 
 void note_refused(lws* wsi, std::string_view why) {
@@ -99,15 +105,18 @@ HttpResponse refuse_host(lws* wsi, const std::string& host) {
   const std::string name = quoted(host);
   note_refused(
       wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)", name));
+  const bool loopback = site_of(wsi).names == Names::loopback;
   return text_response(
-      403, fmt::format("403: this server listens on a loopback address and is not known as {0}. "
-                       "Open it as localhost, or start it with --allow-origin https://{0}\n",
-                       name));
+      403,
+      fmt::format("403: this server {} and is not known as {}. Open it {}, or start it with "
+                  "--allow-origin {}://{}\n",
+                  loopback ? "listens on a loopback address" : "asks for no token", name,
+                  loopback ? "as localhost" : "by its address", loopback ? "https" : "http", name));
 }
 
 HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request) {
   const Site& site = site_of(wsi);
-  if (!host_allowed(site, host)) return refuse_host(wsi, host);
+  if (!host_allowed(wsi, host)) return refuse_host(wsi, host);
   HttpResponse response = site.http(request);
   if (response.status == 401)
     note_refused(wsi, fmt::format("request refused: {}", reason(response)));
@@ -117,7 +126,7 @@ HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& reque
 std::optional<HttpResponse> refuse_upload(lws* wsi) {
   const Site& site = site_of(wsi);
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-  if (!host_allowed(site, host)) return refuse_host(wsi, host);
+  if (!host_allowed(wsi, host)) return refuse_host(wsi, host);
   const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
   if (!origin_allowed(origin, host, site.allowed_origins)) {
     note_refused_origin(wsi, "upload", origin, host);

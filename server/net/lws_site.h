@@ -21,7 +21,7 @@ struct Site {
   ConnectionAcceptor accept;  // null: no websockets
   std::vector<std::string> allowed_origins;
   std::string policy;
-  bool loopback = false;  // listens on a loopback address
+  Names names = Names::loopback;
   TrustedProxies proxies;
   std::function<void(const std::string&)> on_refused;
 };
@@ -31,11 +31,12 @@ const Site& site_of(lws* wsi);
 /// Who is behind the proxies that are trusted.
 std::string client_address_of(lws* wsi);
 
-/// How the client came here. A proxy says whether it was by TLS.
+/// How the client came here.
 std::string site_address(lws* wsi, const std::string& host);
 
-/// See loopback_host_allowed().
-bool host_allowed(const Site& site, const std::string& host);
+/// Is the request for one of Site::names? By TLS it is, but on a loopback address: a page that let
+/// its own name resolve to this server has no certificate for it.
+bool host_allowed(lws* wsi, const std::string& host);
 
 /// Tells Site::on_refused whose request is refused, and why.
 void note_refused(lws* wsi, std::string_view why);

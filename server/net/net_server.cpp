@@ -199,7 +199,7 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
         return refuse_request(wsi, 400, "open websockets by GET, Sec-WebSocket-Version 13");
       const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
       const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-      if (site.accept && host_allowed(site, host) &&
+      if (site.accept && host_allowed(wsi, host) &&
           origin_allowed(origin, host, site.allowed_origins))
         return 0;
       note_refused_origin(wsi, "websocket", origin, host);
@@ -288,6 +288,11 @@ void log_errors(int level, const char* line) {
 
 constexpr int log_levels = LLL_ERR | LLL_WARN;
 
+Names names_of(const Endpoint& endpoint, bool asks_for_tokens) {
+  if (is_loopback(endpoint.address)) return Names::loopback;
+  return asks_for_tokens ? Names::all : Names::local;
+}
+
 }  // namespace
 
 struct NetServer::State {
@@ -352,7 +357,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
             std::move(options.accept),
             options.allowed_origins,
             content_security_policy(options.embed_origins),
-            is_loopback(options.listen.address),
+            names_of(options.listen, options.asks_for_tokens),
             TrustedProxies(options.trusted_proxies),
             options.on_refused};
   s.admin_site = {std::move(options.admin_http),
@@ -360,7 +365,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
                   nullptr,
                   options.allowed_origins,
                   content_security_policy({}),
-                  is_loopback(options.admin_listen.address),
+                  names_of(options.admin_listen, false),
                   {},
                   options.on_refused};
   s.idle_policy.secs_since_valid_ping = ping_after_s;
@@ -390,6 +395,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
 NetServer::~NetServer() { stop(); }
 
 void NetServer::start() {
+  AcceptGate::require_room();
   State& s = *state_;
   s.thread = std::thread([&s] {
     run_promptly();

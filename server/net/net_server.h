@@ -19,9 +19,10 @@ struct Endpoint {
 
 struct NetOptions {
   Endpoint listen;
-  HttpHandler http;           // pages and /api of the public port
-  HttpUploads uploads;        // to the public port
-  ConnectionAcceptor accept;  // websockets of subprotocol catgs.v1, on any path
+  HttpHandler http;              // pages and /api of the public port
+  HttpUploads uploads;           // to the public port
+  ConnectionAcceptor accept;     // websockets of subprotocol catgs.v1, on any path
+  bool asks_for_tokens = false;  // of who wants to see a scene
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
@@ -50,6 +51,8 @@ class NetServer {
   NetServer(const NetServer&) = delete;
   NetServer& operator=(const NetServer&) = delete;
 
+  /// Throws InputError where the system allows too few descriptors for connections beside those
+  /// that are open by now.
   void start();
   /// Closes every connection and joins the thread. Listeners see on_close() before it returns.
   void stop();

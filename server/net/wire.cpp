@@ -12,6 +12,7 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/catgs.pb.h"
+#include "server/scene_id.h"
 
 namespace catgs::wire {
 namespace {
@@ -127,7 +128,7 @@ Settings parse(const v1::Settings& message) {
 Hello parse(const v1::Hello& message) {
   Hello hello;
   hello.version = message.version();
-  hello.scene_id = checked_length("hello.scene_id", message.scene_id(), 128);
+  hello.scene_id = checked_length("hello.scene_id", message.scene_id(), max_scene_id_bytes);
   hello.viewport_px = {
       static_cast<int>(checked("hello.viewport_width_px", message.viewport_width_px(), 16u, 8192u)),
       static_cast<int>(
@@ -183,8 +184,8 @@ ClientMessage parse(const v1::ClientMessage& message) {
     case v1::ClientMessage::kSettings:
       return parse(message.settings());
     case v1::ClientMessage::kSelectScene:
-      return SelectScene{
-          checked_length("select_scene.scene_id", message.select_scene().scene_id(), 128)};
+      return SelectScene{checked_length("select_scene.scene_id", message.select_scene().scene_id(),
+                                        max_scene_id_bytes)};
     case v1::ClientMessage::kRequestIdr:
       return RequestIdr{};
     case v1::ClientMessage::kPause:

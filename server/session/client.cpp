@@ -154,6 +154,7 @@ void Client::resume(const std::shared_ptr<Peer>& peer, const Hello& hello, Admis
   const LogSession about(session_.id());
   spdlog::info("{} is back", peer_address_);
   session_.on_resumed(hello, std::move(admission), now);
+  if (!may_be_watched()) spectators_.dismiss_all();
 }
 
 SceneAnswer Client::find_scene(const std::string& scene_id) {
@@ -172,13 +173,15 @@ std::vector<std::string> Client::scene_ids() {
 std::uint32_t Client::session_count() { return registry_.admitted_; }
 
 void Client::sign(Welcome& welcome) {
-  const std::string& scene_id = welcome.scene.scene_id;
   const SessionTokens& tokens = registry_.tokens_;
   welcome.resume_token =
-      tokens.resume_token(session_.id(), scene_id, registry_.options_.wall_clock_s());
-  const bool shareable =
-      registry_.options_.max_spectators > 0 && !registry_.authorize_(token_)(scene_id, Use::watch);
-  if (shareable) welcome.watch_token = tokens.watch_token(session_.id());
+      tokens.resume_token(session_.id(), welcome.scene.scene_id, registry_.options_.wall_clock_s());
+  if (may_be_watched()) welcome.watch_token = tokens.watch_token(session_.id());
+}
+
+bool Client::may_be_watched() const {
+  return registry_.options_.max_spectators > 0 &&
+         !registry_.authorize_(token_)(session_.scene()->facts.scene_id, Use::watch);
 }
 
 void Client::send(const ServerMessage& message) {

@@ -62,6 +62,8 @@ class Client final : public SessionHost, public std::enable_shared_from_this<Cli
   [[nodiscard]] Session& session() { return session_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const std::string& peer_address() const { return peer_address_; }
+  /// By its token, which is another one when somebody resumes it with another.
+  [[nodiscard]] bool may_be_watched() const;
   [[nodiscard]] std::size_t queued_frames() const;
   [[nodiscard]] SessionUsage& usage() { return usage_; }
   [[nodiscard]] const SessionUsage& usage() const { return usage_; }

@@ -144,6 +144,9 @@ void SessionRegistry::watch(const std::shared_ptr<Peer>& peer, Client& newcomer,
   const Session& session = host->session();
   if (const auto why = authorize_(hello.token)(session.scene()->facts.scene_id, Use::watch))
     return refuse(ErrorCode::unauthorized, *why);
+  if (!host->may_be_watched())
+    return refuse(ErrorCode::unauthorized,
+                  "the session of this link is not to be watched any more");
   if (session.state() != Session::State::live)
     return refuse(ErrorCode::server_full, "the session of this link is about to start");
   if (std::ranges::count(hello.decoders, session.config().codec) == 0)

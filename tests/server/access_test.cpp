@@ -78,6 +78,7 @@ TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
   EXPECT_TRUE(may("solo", Use::own_session));
   EXPECT_FALSE(may("solo", Use::watch));
   EXPECT_THROW(make_link_token({"city", "emperor", 1000}, key), InputError);
+  EXPECT_THROW(make_link_token({"no\nid", "viewer", 1000}, key), InputError);
 }
 
 TEST_F(AccessTest, OnlyLinksMakeAuthors) {

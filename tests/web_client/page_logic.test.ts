@@ -34,6 +34,18 @@ describe('access token', () => {
     expect(shown).toBe('http://host/page');
   });
 
+  it('is no text that servers close connections for, and the one before stays', () => {
+    const storage = fake_storage();
+    const history = { state: null, replaceState: () => undefined };
+    const token_of = (text: string): string =>
+      take_token({ href: `http://host/#token=${encodeURIComponent(text)}` }, history, storage);
+    expect(token_of('a'.repeat(512))).toHaveLength(512);
+    expect(token_of('good')).toBe('good');
+    for (const text of ['a'.repeat(513), 'é'.repeat(257), 'a'.repeat(70_000), 'a\nb', '\0', 'a\x7f']) {
+      expect(token_of(text)).toBe('good');
+    }
+  });
+
   it('works without storage', () => {
     const history = { state: null, replaceState: () => undefined };
     const token_of = (href: string): string => new AccessToken({ href }, history, undefined).value;

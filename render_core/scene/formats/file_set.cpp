@@ -88,7 +88,8 @@ std::unique_ptr<ByteSource> FolderFiles::open(const std::string& name) const {
   return std::make_unique<FileSource>(path_of(name));
 }
 
-ZipFiles::ZipFiles(const ByteSource& file, std::string_view only) : name_(file.name()) {
+ZipFiles::ZipFiles(const ByteSource& file, std::string_view only)
+    : name_(file.name()), packed_bytes_(file.size()) {
   ArchiveInput input{file};
   const std::unique_ptr<archive, decltype(&archive_read_free)> zip(archive_read_new(),
                                                                    &archive_read_free);

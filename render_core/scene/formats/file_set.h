@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -21,6 +23,11 @@ class FileSet {
 
   /// Throws InputError when there is no such file. The source must not outlive the set.
   [[nodiscard]] virtual std::unique_ptr<ByteSource> open(const std::string& name) const = 0;
+  /// What the files were unpacked from, all together; the largest number: they were not packed.
+  /// A claim of how much a file holds is judged by this: unpacked bytes may be nothing but zeros.
+  [[nodiscard]] virtual std::uint64_t packed_bytes() const {
+    return std::numeric_limits<std::uint64_t>::max();
+  }
 };
 
 /// Files below a folder. Names that lead out of it are refused: they come from untrusted files.
@@ -43,9 +50,11 @@ class ZipFiles final : public FileSet {
   /// `only`: the one entry to unpack; empty: all. Throws InputError.
   explicit ZipFiles(const ByteSource& archive, std::string_view only = {});
   [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override;
+  [[nodiscard]] std::uint64_t packed_bytes() const override { return packed_bytes_; }
 
  private:
   std::string name_;
+  std::uint64_t packed_bytes_;
   std::map<std::string, std::vector<std::byte>> entries_;
 };
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
+#include <map>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
@@ -80,23 +82,26 @@ void parse_version_2(const JsonField& meta, SogMeta& sog) {
   }
 }
 
-/// Every image must have a texel per Gaussian and not many more, before any is decoded.
+/// Every image must have a texel per Gaussian and not many more, before any is decoded. A file that
+/// stands for several of them, and bytes that an archive has made up, do not count.
 void check_image_sizes(const FileSet& files, const SogMeta& sog, const ByteSource& meta_file) {
-  std::uint64_t bytes = 0;
-  const auto open = [&](const std::string& name) { return files.open(sog.folder + name); };
   std::vector<std::string> images = {sog.means_low, sog.means_high, sog.quats, sog.scales,
                                      sog.sh0_image};
   if (!sog.labels.empty()) images.push_back(sog.labels);
+  std::map<std::filesystem::path, std::uint64_t> bytes;
   for (const std::string& name : images) {
-    const auto file = open(name);
+    const auto file = files.open(sog.folder + name);
     const SogImageSize size = sog_image_size(*file);
-    bytes += file->size();
+    bytes[std::filesystem::path(name).lexically_normal()] = file->size();
     if (size.texels() < sog.count || size.texels() > 2 * sog.count + 65536)
       throw InputError(
           file->name(), "size",
           fmt::format("{}x{} texels for {} Gaussians", size.width, size.height, sog.count));
   }
-  require_plausible_count(meta_file, "count", sog.count, sog_texel_bytes * images.size(), bytes);
+  std::uint64_t held = 0;
+  for (const auto& [name, size] : bytes) held += size;
+  require_plausible_count(meta_file, "count", sog.count, sog_texel_bytes * images.size(),
+                          std::min(held, files.packed_bytes()));
 }
 
 /// The palette's image is 64 entries wide; version 1 does not state the degree otherwise.

@@ -106,26 +106,24 @@ class UnsharedFiles final : public FileSet {
   mutable std::uint64_t bytes_ = 0;
 };
 
-/// One of the SOGs that the tree refers to. Its file is closed again: a scene may have thousands.
+/// One of the SOGs that the tree refers to. Nothing of its files stays in memory: a scene may have
+/// thousands.
 struct Part {
-  std::unique_ptr<FileSet> archive;  // unpacked; null for folders
+  std::string archive;  // its name; empty: its files lie in the folder
   SogMeta meta;
   std::vector<SogRange> ranges;
-
-  [[nodiscard]] const FileSet& files(const FileSet& folder) const {
-    return archive ? *archive : folder;
-  }
 };
 
 Part open_part(const FileSet& folder, const std::string& name) {
-  Part part;
-  if (name.ends_with(".sog")) {
-    part.archive = std::make_unique<ZipFiles>(*folder.open(name));
-    part.meta = read_sog_meta(*part.archive, "meta.json");
-  } else {
-    part.meta = read_sog_meta(folder, name);
-  }
-  return part;
+  if (name.ends_with(".sog"))
+    return {name, read_sog_meta(ZipFiles(*folder.open(name)), "meta.json"), {}};
+  return {"", read_sog_meta(folder, name), {}};
+}
+
+void decode_part(const FileSet& folder, const Part& part, GaussianCloud& cloud,
+                 const LoadContext& context) {
+  if (part.archive.empty()) return decode_sog(folder, part.meta, part.ranges, cloud, context);
+  decode_sog(ZipFiles(*folder.open(part.archive)), part.meta, part.ranges, cloud, context);
 }
 
 /// Files of the chosen pieces, with ranges that fill the cloud from 0 on.
@@ -280,8 +278,8 @@ StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
   for (const Part& part : parts) {
     const double from = static_cast<double>(done) / static_cast<double>(total);
     for (const SogRange& range : part.ranges) done += range.count;
-    decode_sog(part.files(folder), part.meta, part.ranges, result.cloud,
-               context.part(from, static_cast<double>(done) / static_cast<double>(total)));
+    decode_part(folder, part, result.cloud,
+                context.part(from, static_cast<double>(done) / static_cast<double>(total)));
   }
   return result;
 }

@@ -213,8 +213,9 @@ void parse_request(Bytes input) {
   if (origin_allowed(origin, host, {"https://friend.example"}) && !origin.empty())
     require(origin == "https://friend.example" || (!host.empty() && origin.ends_with(host)),
             "an origin is listed or this host");
-  require(means_this_machine(host) || !loopback_host_allowed(host, {"https://friend.example"}),
-          "no foreign name is answered on a loopback address");
+  require(
+      means_this_machine(host) || !host_allowed(host, Names::loopback, {"https://friend.example"}),
+      "no foreign name is answered on a loopback address");
 
   require(proxies.client_address("192.0.2.1", forwarded) == "192.0.2.1",
           "strangers are not believed");

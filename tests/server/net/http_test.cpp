@@ -46,21 +46,33 @@ TEST(Precondition, IsAboutWhatIsThere) {
   EXPECT_TRUE((Precondition{"", "\"x\""}.holds(tag)));
 }
 
-TEST(LoopbackHost, ForeignNamesAreRefusedUnlessListed) {
-  for (const char* host : {"localhost", "localhost:", "localhost:8080", "127.0.0.1", "127.9.8.7:1",
-                           "[::1]", "[::1]:8080", ""})
-    EXPECT_TRUE(loopback_host_allowed(host, {})) << host;
-  for (const char* host :
-       {"evil.example", "evil.example:8080", "127.evil.example", "localhost.evil",
-        "192.168.0.1:8080", "[2001:db8::1]:8080", "[::", ":8080", "[::1", "[::1]evil.example",
-        "[::1].evil.example", "[::1] HTTP/1.1", "localhost:80.evil.example", "localhost:80:80"})
-    EXPECT_FALSE(loopback_host_allowed(host, {"https://a.example"})) << host;
-  EXPECT_TRUE(loopback_host_allowed("a.example", {"https://a.example"}));
-  EXPECT_TRUE(loopback_host_allowed("a.example:8443", {"https://a.example"}));
-  EXPECT_TRUE(loopback_host_allowed("b.example", {"https://a.example", "*"}));
+TEST(HostAllowed, ForeignNamesAreRefusedUnlessListed) {
+  const std::vector<std::string> listed = {"https://a.example"};
+  for (const Names names : {Names::loopback, Names::local}) {
+    for (const char* host : {"localhost", "localhost:", "localhost:8080", "127.0.0.1",
+                             "127.9.8.7:1", "[::1]", "[::1]:8080", ""})
+      EXPECT_TRUE(host_allowed(host, names, {})) << host;
+    for (const char* host :
+         {"evil.example", "evil.example:8080", "127.evil.example", "localhost.evil", "[::", ":8080",
+          "[::1", "[::1]evil.example", "[::1].evil.example", "[::1] HTTP/1.1", "127.0.0.1.",
+          "localhost:80.evil.example", "localhost:80:80", "evil.", "xlocal.example", "192.168.0"})
+      EXPECT_FALSE(host_allowed(host, names, listed)) << host;
+    EXPECT_TRUE(host_allowed("a.example", names, listed));
+    EXPECT_TRUE(host_allowed("a.example:8443", names, listed));
+    EXPECT_TRUE(host_allowed("b.example", names, {"https://a.example", "*"}));
+  }
+  EXPECT_TRUE(host_allowed("evil.example", Names::all, {}));
 }
 
-TEST(LoopbackHost, LoopbackIsTheWholeNetwork127) {
+TEST(HostAllowed, OnlyAServerOnALoopbackAddressIsKnownByNoOther) {
+  for (const char* host : {"192.168.0.1:8080", "[2001:db8::1]:8080", "museum-pc", "museum-pc:8080",
+                           "museum-pc.local", "host.docker.internal"}) {
+    EXPECT_FALSE(host_allowed(host, Names::loopback, {})) << host;
+    EXPECT_TRUE(host_allowed(host, Names::local, {})) << host;
+  }
+}
+
+TEST(HostAllowed, LoopbackIsTheWholeNetwork127) {
   for (const char* address : {"localhost", "127.0.0.1", "127.8.9.1", "::1"})
     EXPECT_TRUE(is_loopback(address)) << address;
   for (const char* address : {"::", "0.0.0.0", "127.a.example", "10.0.0.1", "127", ""})

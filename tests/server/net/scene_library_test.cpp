@@ -1,12 +1,15 @@
+#include <cctype>
 #include <filesystem>
 #include <functional>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/save_scene.h"
+#include "server/scene_id.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/support/server_client.h"
 
@@ -150,6 +153,38 @@ TEST_F(SceneLibraryTest, ServesAFolderAlone) {
   EXPECT_TRUE(loaded("attic")) << "a server that is up can show something";
   const auto client = connect();
   EXPECT_EQ(client->greet().scene().scene_id(), "attic");
+}
+
+/// As a part of a path: every byte that is no letter as %41.
+std::string url_part(const std::string& text) {
+  std::string out;
+  for (const char c : text)
+    out += std::isalnum(static_cast<unsigned char>(c))
+               ? std::string(1, c)
+               : fmt::format("%{:02x}", static_cast<unsigned char>(c));
+  return out;
+}
+
+TEST_F(SceneLibraryTest, WhatIsListedCanBeOpenedWhateverItsFileIsCalled) {
+  const std::vector<std::string> names = {
+      "colour\x1b[31m", "two\nlines",          "caf\xe9",
+      "c1\xc2\x9b",     std::string(251, 'x'), "a?b#c%41%2f&+;=,:@!$(*)~^|`{}",
+      "<b>\"'",         "back\\slash",         "a..",
+      "Großmünster"};
+  for (const std::string& name : names) write(name + ".ply", ply_bytes(random_cloud(5, 0)));
+  server_ = std::make_unique<RunningServer>(
+      [&](ServerConfig& config) { config.scene_folders = {folder_.path()}; });
+  const auto scenes = listing();
+  EXPECT_EQ(scenes.size(), names.size() + 3);
+  for (const auto& scene : scenes) {
+    const std::string id = scene.at("id");
+    EXPECT_TRUE(is_scene_id(id)) << id;
+    const auto client = connect();
+    EXPECT_EQ(visit(*client, id).scene().scene_id(), id);
+    const std::string path = "/api/scenes/" + url_part(id);
+    EXPECT_EQ(http_get(server_->port(), path + "/tours").status, 200) << id;
+    EXPECT_EQ(http_get(server_->port(), path + "/poster.jpg").status, 200) << id;
+  }
 }
 
 TEST_F(SceneLibraryTest, AServerStopsWhileItLoads) {

@@ -94,6 +94,37 @@ TEST(ServerAccess, AnswersNoForeignNameOnALoopbackAddress) {
   EXPECT_THROW(WireClient(server.port(), rebound), boost::system::system_error);
 }
 
+TEST(ServerAccess, AnswersNoForeignNameWhereNoTokenIsAskedFor) {
+  // The same page, in the browser of somebody whose network an open server serves.
+  const auto on_all_addresses = [](ServerConfig& config) {
+    config.bind = "0.0.0.0";
+    config.admin_bind = "0.0.0.0:0";
+    config.open = true;
+    config.trusted_proxies = {"127.0.0.0/8"};
+  };
+  const auto status = [](int port, const std::string& host, const std::string& proto = "http") {
+    return http_get(port, "/api/scenes", {{"host", host}, {"x-forwarded-proto", proto}}).status;
+  };
+  RunningServer open(on_all_addresses);
+  for (const int port : {open.port(), open.admin_port()}) {
+    const HttpReply refused = http_get(port, "/api/scenes", {{"host", "evil.example:8080"}});
+    EXPECT_EQ(refused.status, 403);
+    EXPECT_THAT(refused.body, HasSubstr("--allow-origin http://evil.example:8080"));
+  }
+  for (const char* host : {"localhost", "192.0.2.1:8080", "museum-pc", "museum-pc.local:8080"})
+    EXPECT_EQ(status(open.port(), host), 200) << host;
+  EXPECT_EQ(status(open.port(), "tours.example", "https"), 200) << "its certificate was looked at";
+  const WireClient::Options rebound{"http://evil.example:8080", "catgs.v1", "evil.example:8080"};
+  EXPECT_THROW(WireClient(open.port(), rebound), boost::system::system_error);
+
+  const TemporaryFolder folder;
+  RunningServer guarded([&](ServerConfig& config) {
+    on_all_addresses(config);
+    config.token_file = folder.write("tokens", "open-sesame-1\n").string();
+  });
+  EXPECT_EQ(status(guarded.port(), "tours.example"), 401) << "it keeps such pages out by its token";
+}
+
 TEST(ServerAccess, NoPathHidesAForeignName) {
   // libwebsockets decodes them before it looks for the end of the line.
   RunningServer server([](ServerConfig&) {});

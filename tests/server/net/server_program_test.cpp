@@ -12,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -32,7 +33,9 @@ using testing::StartsWith;
 class Program {
  public:
   /// Waits until the log says `until`. A later argument wins.
-  explicit Program(const std::vector<std::string>& more = {}, const std::string& until = "Ctrl-C") {
+  /// `descriptors`: how many it may have; 0: as many as this process.
+  explicit Program(const std::vector<std::string>& more = {}, const std::string& until = "Ctrl-C",
+                   rlim_t descriptors = 0) {
     std::vector<std::string> words = {"catgs-server", "--port",       "0", "--admin-bind",
                                       "off",          "--drain-wait", "1"};
     words.insert(words.end(), more.begin(), more.end());
@@ -47,6 +50,8 @@ class Program {
     if (pid_ < 0) throw std::runtime_error("no process");
     if (pid_ == 0) {
       ::dup2(log_pipe[1], STDERR_FILENO);
+      const rlimit limit{descriptors, descriptors};
+      if (descriptors > 0) ::setrlimit(RLIMIT_NOFILE, &limit);
       ::execv(CATGS_SERVER_PROGRAM, arguments.data());
       ::_exit(127);
     }
@@ -141,6 +146,15 @@ TEST(ServerProgram, SupervisorsTellAFaultFromAMistake) {
   ::unsetenv("CUDA_VISIBLE_DEVICES");
 }
 
+TEST(ServerProgram, DoesNotStartWithDescriptorsForItsOwnWorkAlone) {
+  Program refused({}, "ulimit -n", 64);
+  EXPECT_THAT(refused.log(), AllOf(HasSubstr("64 descriptors are allowed, and at least "),
+                                   testing::Not(HasSubstr("http://"))));
+  EXPECT_EQ(refused.exit_status(), 2);
+  Program serves({}, "Ctrl-C", 128);
+  EXPECT_EQ(http_get(serves.port(), "/healthz").status, 200);
+}
+
 TEST(ServerProgram, WarningsAboutSettingsAreLinesOfTheLog) {
   ::setenv("CATGS_MAX_SESSION", "3", 1);
   Program program({"--print-config", "--log-format", "json"}, "}\n");
@@ -205,6 +219,21 @@ TEST(ServerProgram, SessionsResumeAfterItWasKilled) {
   EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 2)).session_id(),
             welcome.session_id());
   EXPECT_EQ(again.receive_frame().header.pose_id(), 2u);
+}
+
+TEST(ServerProgram, EndsCleanlyAlthoughItWasStoppedWhileItDrains) {
+  Program program({"--drain-deadline", "1"});
+  WireClient client(program.port());
+  client.greet();
+  program.signal(SIGTERM);
+  program.signal(SIGSTOP);
+  std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::seconds(3));  // longer than the whole drain
+    program.signal(SIGCONT);
+  });
+  client.receive_message(v1::ServerMessage::kDrain);
+  EXPECT_EQ(client.receive_until_closed().close_code, 1001);
+  EXPECT_EQ(program.exit_status(), 0);
 }
 
 TEST(ServerProgram, SessionsGoOnAfterItWasStopped) {

@@ -163,5 +163,28 @@ TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
   EXPECT_EQ(alone.greet(64, 64, v1::CODEC_H264, link("solo")).watch_token(), "");
 }
 
+TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
+  const TemporaryFolder folder;
+  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
+  const std::string key = read_key_file("", key_file);
+  const auto link = [&](const std::string& role) {
+    return make_link_token({"city", role, 1'000'000'000'000}, key);
+  };
+  RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
+  WireClient host(server.port());
+  const v1::Welcome welcome = host.greet(64, 64, v1::CODEC_H264, link("viewer"));
+  const v1::ClientMessage watching = watching_hello(welcome.watch_token(), link("spectator"));
+  WireClient spectator(server.port());
+  spectator.greet(watching);
+  WireClient alone(server.port());
+  v1::ClientMessage back = resuming_hello(welcome.resume_token());
+  back.mutable_hello()->set_token(link("solo"));
+  const v1::Welcome now = alone.greet(back);
+  EXPECT_EQ(now.session_id(), welcome.session_id());
+  EXPECT_EQ(now.watch_token(), "");
+  EXPECT_EQ(spectator.receive_until_closed().close_code, 1000);
+  EXPECT_EQ(refusal(server, watching)->code(), v1::Error::UNAUTHORIZED);
+}
+
 }  // namespace
 }  // namespace catgs::test

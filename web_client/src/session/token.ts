@@ -1,4 +1,11 @@
 const storage_key = 'catgs.token';
+const most_bytes = 512; // that the wire takes
+
+/** Servers close the connection of a client that sends any other text as its token. */
+function can_be_token(text: string): boolean {
+  const controls = [...text.slice(0, most_bytes)].some((c) => c < ' ' || c === '\x7f');
+  return !controls && new TextEncoder().encode(text).length <= most_bytes;
+}
 
 /** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
@@ -6,7 +13,8 @@ export class AccessToken {
 
   /**
    * Moves the token out of the URL's fragment, so that the address bar, the history and copied links do
-   * not show it. Fragments never reach a server or its logs.
+   * not show it. Fragments never reach a server or its logs. A text that cannot be a token is dropped:
+   * remembered, it would keep this tab out for good.
    */
   constructor(
     location: Pick<Location, 'href'>,
@@ -21,7 +29,7 @@ export class AccessToken {
     fragment.delete('token');
     url.hash = fragment.toString();
     history.replaceState(history.state, '', url.href.replace(/#$/, ''));
-    this.value = token;
+    if (can_be_token(token)) this.value = token;
   }
 
   get value(): string {

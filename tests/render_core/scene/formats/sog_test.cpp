@@ -148,6 +148,36 @@ TEST(Sog, LyingSizesAreRefusedBeforeMemoryIsTaken) {
               HasSubstr("cannot be in"));
 }
 
+/// A WebP file with a chunk at its end that nobody reads.
+std::string padded(std::string webp, std::uint32_t bytes) {
+  webp += "JUNK";
+  append(webp, bytes);
+  webp.append(bytes, '\0');
+  const auto riff_bytes = static_cast<std::uint32_t>(webp.size() - 8);
+  return webp.replace(4, 4, reinterpret_cast<const char*>(&riff_bytes), 4);
+}
+
+TEST_F(SogFolder, NeitherZerosNorManyNamesOfOneFileMakeAHugeScene) {
+  constexpr std::size_t count = 2'000'000;
+  const std::string one_colour = encode_webp(std::string(4 * 2048 * 1024, '\0'), 2048, 1024);
+  Files files = with_meta(encode_sog(random_cloud(300, 0), 2),
+                          [&](nlohmann::json& meta) { meta["count"] = count; });
+  for (auto& [name, content] : files)
+    if (name != "meta.json") content = padded(one_colour, 32'000);
+  EXPECT_EQ(parse(zip(files)).cloud.size(), count) << "so many bytes could hold them";
+  EXPECT_THAT(input_error([&] { parse(zip(files, true)); }), HasSubstr("cannot be in"));
+
+  files = with_meta(files, [](nlohmann::json& meta) {
+    meta["means"]["files"] = {"image.webp", "./image.webp"};
+    for (const char* attribute : {"quats", "scales", "sh0"})
+      meta[attribute]["files"] = {"image.webp"};
+  });
+  write("meta.json", files.at("meta.json"));
+  write("image.webp", padded(one_colour, 32'000));
+  EXPECT_THAT(input_error([&] { read_sog_meta(FolderFiles(folder_.path()), "meta.json"); }),
+              HasSubstr("cannot be in"));
+}
+
 TEST(Sog, ArchivesThatGrowAreRefused) {
   const Files bomb = {{"meta.json", std::string(4 << 20, ' ')}};
   EXPECT_THAT(input_error([&] { parse(zip(bomb, true)); }),

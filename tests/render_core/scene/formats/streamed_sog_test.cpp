@@ -1,7 +1,11 @@
 #include "render_core/scene/formats/streamed_sog.h"
 
+#include <algorithm>
+#include <fstream>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <unistd.h>
 
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -111,6 +115,35 @@ TEST_F(StreamedSogTest, ManyFilesAreNotOpenAtOnce) {
   two_threads();  // before there is no room for what it opens
   const DescriptorLimit limit(next_descriptor() + 4);
   EXPECT_EQ(load().cloud.size(), 200u);
+}
+
+/// Of this process.
+std::size_t resident_bytes() {
+  std::size_t size = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> size >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+TEST_F(StreamedSogTest, ArchivesAreUnpackedOneAtATime) {
+  constexpr int parts = 128;
+  auto files = encode_sog(random_cloud(10, 0), 2);
+  files["junk"] = std::string(1'000'000, '\0');  // deflated a thousand bytes
+  const std::string archive = zip(files, true);
+  meta_ = {{"version", 1}, {"lodLevels", 1}};
+  for (int i = 0; i < parts; ++i) {
+    const std::string name = std::to_string(i) + ".sog";
+    write(name, archive);
+    meta_["filenames"].push_back(name);
+    meta_["tree"]["children"].push_back({{"lods", {{"0", piece(i, 0, 10)}}}});
+  }
+  const std::size_t before = resident_bytes();
+  std::size_t most = 0;
+  const auto look = [&](double) { most = std::max(most, resident_bytes()); };
+  write("lod-meta.json", meta_.dump());
+  ThreadPool pool(2);
+  read_streamed_sog(FolderFiles(folder_.path()), {}, {}, LoadContext(pool, look));
+  ASSERT_GT(most, 0u);
+  EXPECT_LT(most, before + parts * files["junk"].size() / 4);
 }
 
 TEST_F(StreamedSogTest, ErrorsNameTheField) {
