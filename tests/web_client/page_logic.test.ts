@@ -38,7 +38,7 @@ describe('access token', () => {
     const storage = fake_storage();
     const history = { state: null, replaceState: () => undefined };
     const token_of = (text: string): string =>
-      take_token({ href: `http://host/#token=${encodeURIComponent(text)}` }, history, storage);
+      new AccessToken({ href: `http://host/#token=${encodeURIComponent(text)}` }, history, storage).value;
     expect(token_of('a'.repeat(512))).toHaveLength(512);
     expect(token_of('good')).toBe('good');
     for (const text of ['a'.repeat(513), 'é'.repeat(257), 'a'.repeat(70_000), 'a\nb', '\0', 'a\x7f']) {
