@@ -1,7 +1,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include <glm/vec2.hpp>
 
@@ -42,6 +44,15 @@ struct FrameTicket {
 struct OutgoingFrame {
   FrameTicket ticket;
   std::vector<std::byte> bitstream;
+};
+
+/// What a message is about. Of two about the same thing the newer one is enough, but for events.
+enum class Topic : std::uint8_t { event, session, stream, place, statistics, clock };
+
+/// A serialised message on its way to the socket.
+struct OutgoingMessage {
+  Topic topic = Topic::event;
+  std::vector<std::byte> bytes;
 };
 
 }  // namespace catgs
