@@ -34,9 +34,31 @@ inline Utf8Character first_character(std::string_view text) {
   return {code_point, bytes};
 }
 
-/// Text of others for a terminal or a line of a log: what would move the cursor, change a colour or
-/// begin a line of its own (U+0000 to U+001F, U+007F to U+009F) and what is not UTF-8 come out by
-/// their bytes, as \\x1b. Text that went through it stays as it is.
+/// Does a reader see this character where it stands? Not those of the general categories Cc, Cf, Zl
+/// and Zp (Unicode 16.0, UnicodeData.txt): controls move the cursor and change colours, format
+/// characters turn the direction of text round or are invisible, separators begin lines. Nor the
+/// noncharacters (The Unicode Standard, 23.7).
+constexpr bool is_printable(std::uint32_t code_point) {
+  struct Range {
+    std::uint32_t first, last;
+  };
+  constexpr std::array<Range, 23> unprintable = {{
+      {0x0000, 0x001f},   {0x007f, 0x009f},   {0x00ad, 0x00ad},   {0x0600, 0x0605},
+      {0x061c, 0x061c},   {0x06dd, 0x06dd},   {0x070f, 0x070f},   {0x0890, 0x0891},
+      {0x08e2, 0x08e2},   {0x180e, 0x180e},   {0x200b, 0x200f},   {0x2028, 0x202e},
+      {0x2060, 0x2064},   {0x2066, 0x206f},   {0xfeff, 0xfeff},   {0xfff9, 0xfffb},
+      {0x110bd, 0x110bd}, {0x110cd, 0x110cd}, {0x13430, 0x1343f}, {0x1bca0, 0x1bca3},
+      {0x1d173, 0x1d17a}, {0xe0001, 0xe0001}, {0xe0020, 0xe007f},
+  }};
+  const bool noncharacter =
+      (code_point & 0xfffe) == 0xfffe || (0xfdd0 <= code_point && code_point <= 0xfdef);
+  return !noncharacter && std::ranges::none_of(unprintable, [&](const Range& range) {
+    return range.first <= code_point && code_point <= range.last;
+  });
+}
+
+/// Text of others for a terminal or a line of a log: what is not printable and what is not UTF-8
+/// come out by their bytes, as \\x1b. Text that went through it stays as it is.
 inline std::string printable(std::string_view text) {
   constexpr std::string_view digits = "0123456789abcdef";
   std::string out;
@@ -45,8 +67,7 @@ inline std::string printable(std::string_view text) {
     const auto [code_point, bytes] = first_character(text);
     const std::string_view piece = text.substr(0, std::max<std::size_t>(bytes, 1));
     text.remove_prefix(piece.size());
-    const bool controls = code_point < 0x20 || (0x7f <= code_point && code_point < 0xa0);
-    if (bytes > 0 && !controls) {
+    if (bytes > 0 && is_printable(code_point)) {
       out.append(piece);
       continue;
     }

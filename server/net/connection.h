@@ -40,8 +40,8 @@ class Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  /// Queues a serialised message. A peer that lets its messages pile up is closed.
-  virtual void send(std::vector<std::byte> message) = 0;
+  /// Queues a message. A peer that lets its messages pile up is closed.
+  virtual void send(OutgoingMessage message) = 0;
   /// Queues a frame; returns the ids of the frames dropped for it (PacketRing).
   virtual std::vector<std::uint64_t> send(OutgoingFrame frame) = 0;
   /// Closes once everything queued is out, two seconds from now at the latest.
@@ -59,6 +59,9 @@ class ConnectionListener {
   virtual void on_message(std::span<const std::byte> bytes, const LinkState& link) = 0;
   /// One that is not binary or beyond the limit: the connection closes for it.
   virtual void on_bad_message(std::string_view why) = 0;
+  /// More comes than clients have to say, whatever it is: it has to be closed, and is if it goes
+  /// on.
+  virtual void on_flood() = 0;
   /// The frame was handed to the socket.
   virtual void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                              TimePoint now) = 0;

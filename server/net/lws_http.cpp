@@ -7,10 +7,7 @@
 #include <cstring>
 #include <string_view>
 
-#include <linux/tcp.h>  // glibc's tcp_info lacks the newer fields
-#include <netinet/in.h>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
+#include "server/net/lws_site.h"
 
 namespace catgs {
 namespace {
@@ -63,19 +60,6 @@ std::vector<std::string> query_arguments(lws* wsi) {
   return arguments;
 }
 
-/// That libwebsockets has read of this connection.
-std::uintptr_t bytes_read(lws* wsi) {
-  const int fd = lws_get_socket_fd(wsi);
-  tcp_info info{};
-  socklen_t size = sizeof info;
-  int unread = 0;
-  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
-      ::ioctl(fd, FIONREAD, &unread) != 0)
-    return 0;
-  return static_cast<std::uintptr_t>(info.tcpi_bytes_received) -
-         static_cast<std::uintptr_t>(unread);
-}
-
 }  // namespace
 
 std::string request_header(lws* wsi, lws_token_indexes token) {
@@ -110,26 +94,17 @@ std::optional<std::uint64_t> body_length(lws* wsi) {
   return bytes;
 }
 
-void note_answered(lws* wsi) {
-  lws_set_opaque_user_data(wsi, reinterpret_cast<void*>(bytes_read(wsi) + 1));
-}
-
-bool is_pipelined(lws* wsi) {
-  const void* before = lws_get_opaque_user_data(wsi);
-  return before && reinterpret_cast<std::uintptr_t>(before) == bytes_read(wsi) + 1;
-}
-
-int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site,
-                           const std::string& policy, bool& finished) {
-  head_only_ = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
-  const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
+int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site) {
+  const bool head_only = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+  const std::string path = request_header(wsi, head_only ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  response_ = handler({path, if_none_match, encodings.find("gzip") != std::string::npos,
-                       authorization, site, query_arguments(wsi)});
-  finished = head_only_ || !response_.body || response_.body->empty();
-  return write_headers(wsi, policy);
+  HttpResponse response = handler({path, if_none_match, encodings.find("gzip") != std::string::npos,
+                                   authorization, site, query_arguments(wsi)});
+  const int failed = answer(wsi, std::move(response));
+  if (head_only) unwritten_ = 0;
+  return failed;
 }
 
 int LwsHttpExchange::begin_upload(lws* wsi, std::optional<HttpResponse> refusal) {
@@ -142,17 +117,14 @@ int LwsHttpExchange::begin_upload(lws* wsi, std::optional<HttpResponse> refusal)
   return 0;
 }
 
-int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
-                                 std::vector<std::byte>& scratch) {
+int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, std::vector<std::byte>& scratch) {
   response_ = std::move(response);
   answered_ = true;
   await_body(wsi);
-  bool finished = false;
-  return write_headers(wsi, policy, true) == 0 ? write_body(wsi, scratch, finished) : -1;
+  return write_headers(wsi) == 0 ? write_piece(wsi, scratch) : -1;
 }
 
 void LwsHttpExchange::await_body(lws* wsi) {
-  upload_ = true;
   body_due_ = true;
   lws_set_timer_usecs(wsi, body_time_us);
 }
@@ -167,12 +139,11 @@ int LwsHttpExchange::take_body(std::string_view bytes) {
   return dropped_bytes_ <= max_dropped_bytes ? 0 : -1;
 }
 
-int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy,
-                              bool& finished) {
+int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
   if (!body_due_) return 0;  // more has come after it: libwebsockets tells it again
   if (answered_) return -1;
   body_due_ = false;
-  if (refusal_) return answer(wsi, *std::move(refusal_), policy, finished);
+  if (refusal_) return answer(wsi, *std::move(refusal_));
   HttpRequest request{path_, precondition_.if_none_match, false, authorization_};
   request.if_match = precondition_.if_match;
   answer_ = uploads.take(request, std::move(body_));
@@ -181,7 +152,7 @@ int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads, const std::s
   return 0;
 }
 
-int LwsHttpExchange::on_timer(lws* wsi, const std::string& policy, bool& finished) {
+int LwsHttpExchange::on_timer(lws* wsi) {
   if (body_due_) return -1;
   if (!answer_.valid()) return 0;
   if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
@@ -189,46 +160,44 @@ int LwsHttpExchange::on_timer(lws* wsi, const std::string& policy, bool& finishe
     return 0;
   }
   try {
-    return answer(wsi, answer_.get(), policy, finished);
+    return answer(wsi, answer_.get());
   } catch (const std::future_error&) {
-    return answer(wsi, text_response(503, "503: the server stops\n"), policy, finished);
+    return answer(wsi, text_response(503, "503: the server stops\n"));
   }
 }
 
-int LwsHttpExchange::answer(lws* wsi, HttpResponse response, const std::string& policy,
-                            bool& finished) {
+int LwsHttpExchange::answer(lws* wsi, HttpResponse response) {
   response_ = std::move(response);
-  finished = !response_.body || response_.body->empty();
-  if (write_headers(wsi, policy, true) != 0) return -1;
-  if (!finished) lws_callback_on_writable(wsi);
-  return 0;
+  answering_ = true;
+  lws_callback_on_writable(wsi);
+  return write_headers(wsi);
 }
 
-/// `last`: no other request is answered on this connection.
-int LwsHttpExchange::write_headers(lws* wsi, const std::string& policy, bool last) {
-  HeaderWriter headers(wsi, response_.status, response_.content_type,
-                       response_.body ? response_.body->size() : 0);
+int LwsHttpExchange::write_headers(lws* wsi) {
+  unwritten_ = response_.body ? response_.body->size() : 0;
+  HeaderWriter headers(wsi, response_.status, response_.content_type, unwritten_);
   headers.add("cache-control:", response_.cache_control);
   if (!response_.etag.empty()) headers.add("etag:", response_.etag);
   if (response_.gzip) headers.add("content-encoding:", "gzip");
-  if (last) headers.add("connection:", "close");
-  headers.add("vary:", "accept-encoding");
-  headers.add("content-security-policy:", policy);
-  headers.add("x-content-type-options:", "nosniff");
-  headers.add("referrer-policy:", "no-referrer");
-  headers.add("cross-origin-resource-policy:", "same-origin");
+  headers.add("content-security-policy:", site_of(wsi).policy);
   return headers.finish();
 }
 
-int LwsHttpExchange::write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished) {
+int LwsHttpExchange::on_writable(lws* wsi, std::vector<std::byte>& scratch) {
+  if (!answering_) return 0;
+  if (unwritten_ == 0) return -1;
+  lws_callback_on_writable(wsi);
+  return write_piece(wsi, scratch);
+}
+
+int LwsHttpExchange::write_piece(lws* wsi, std::vector<std::byte>& scratch) {
   const std::string& body = *response_.body;
-  const std::size_t size = std::min(chunk_bytes, body.size() - written_);
+  const std::size_t size = std::min(chunk_bytes, unwritten_);
   scratch.resize(LWS_PRE + size);
-  std::memcpy(scratch.data() + LWS_PRE, body.data() + written_, size);
-  written_ += size;
-  finished = written_ == body.size();
+  std::memcpy(scratch.data() + LWS_PRE, body.data() + body.size() - unwritten_, size);
+  unwritten_ -= size;
   auto* payload = reinterpret_cast<unsigned char*>(scratch.data()) + LWS_PRE;
-  const auto protocol = finished ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP;
+  const auto protocol = unwritten_ == 0 ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP;
   return lws_write(wsi, payload, size, protocol) == static_cast<int>(size) ? 0 : -1;
 }
 

@@ -13,14 +13,12 @@
 
 namespace catgs {
 
-/// One HTTP request of libwebsockets being answered. Network thread only.
+/// Answers the one HTTP request of a connection. Network thread only. The int results are those of
+/// libwebsockets' callbacks: nonzero closes the connection.
 class LwsHttpExchange {
  public:
-  /// Reads the request, asks `handler` and writes the response's headers. `site`:
-  /// HttpRequest::site; `policy`: the Content-Security-Policy. Sets `finished` when there is no
-  /// body to follow. The int results below are libwebsockets': nonzero closes the connection.
-  int begin(lws* wsi, const HttpHandler& handler, const std::string& site,
-            const std::string& policy, bool& finished);
+  /// Reads the request, asks `handler` and begins to answer. `site`: HttpRequest::site.
+  int begin(lws* wsi, const HttpHandler& handler, const std::string& site);
   /// A PUT request: its body follows, of a length that is known to be small. `refusal`: what it
   /// will be answered then, whatever it is.
   int begin_upload(lws* wsi, std::optional<HttpResponse> refusal);
@@ -29,32 +27,28 @@ class LwsHttpExchange {
   /// then the client may not see the answer. It is written at once and not when the socket is
   /// writable, as headers always are: it is a line longer, nothing else is on its way on this
   /// connection, and libwebsockets keeps what the socket does not take.
-  int refuse_body(lws* wsi, HttpResponse response, const std::string& policy,
-                  std::vector<std::byte>& scratch);
+  int refuse_body(lws* wsi, HttpResponse response, std::vector<std::byte>& scratch);
   /// A piece of a body. Only that of an upload which is not refused is kept.
   int take_body(std::string_view bytes);
   /// The body is whole; that of an upload is what `uploads` is asked to take. Calls of on_timer()
   /// follow, by LWS_CALLBACK_TIMER.
-  int end_body(lws* wsi, const HttpUploads& uploads, const std::string& policy, bool& finished);
+  int end_body(lws* wsi, const HttpUploads& uploads);
   /// The answer may have come, or the body's time is over.
-  int on_timer(lws* wsi, const std::string& policy, bool& finished);
-
-  [[nodiscard]] bool is_upload() const { return upload_; }
-
-  /// Writes the next piece of the body.
-  int write_body(lws* wsi, std::vector<std::byte>& scratch, bool& finished);
+  int on_timer(lws* wsi);
+  /// Writes the next piece of the answer. The connection closes once the socket has them all.
+  int on_writable(lws* wsi, std::vector<std::byte>& scratch);
 
  private:
   void await_body(lws* wsi);
-  int write_headers(lws* wsi, const std::string& policy, bool last = false);
-  int answer(lws* wsi, HttpResponse response, const std::string& policy, bool& finished);
+  int answer(lws* wsi, HttpResponse response);
+  int write_headers(lws* wsi);
+  int write_piece(lws* wsi, std::vector<std::byte>& scratch);
 
   HttpResponse response_;
-  bool head_only_ = false;
-  std::size_t written_ = 0;
+  bool answering_ = false;
+  std::size_t unwritten_ = 0;  // bytes of the body
 
   // Of uploads. The request's head is gone when its body has come.
-  bool upload_ = false;
   std::string path_;
   std::string authorization_;
   Precondition precondition_;
@@ -77,12 +71,5 @@ std::string request_header(lws* wsi, lws_token_indexes token);
 
 /// Of the request; 0: it does not say; nothing: what it says is no length.
 std::optional<std::uint64_t> body_length(lws* wsi);
-
-/// The next request of this connection begins after what has been read of it.
-void note_answered(lws* wsi);
-/// Was this request sent before the one before it was answered? libwebsockets has kept it since,
-/// and nothing was read for it. Of such a one lws_http_action() takes the head for the body, and
-/// reads that in a loop that does not end when the body does.
-bool is_pipelined(lws* wsi);
 
 }  // namespace catgs

@@ -1,5 +1,7 @@
 #include "server/net/lws_websocket.h"
 
+#include <algorithm>
+
 #include <linux/tcp.h>  // glibc's tcp_info lacks the newer fields
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -11,6 +13,13 @@ namespace {
 
 constexpr int close_timeout_s = 2;
 
+// libwebsockets answers pings and drops pongs without a word, so that the kernel is asked how much
+// comes: each segment may cost a read and a pong. Clients send a message in one: see peer.cpp.
+constexpr double segments_per_second = 600.0;
+constexpr double segment_burst = 1200.0;
+constexpr double segment_bytes = 1024.0;  // a longer one counts as several
+constexpr lws_usec_t look_every_us = 250'000;
+
 /// Small writes leave at once, and the next packet is taken from the ring only when hardly anything
 /// is unsent: what waits, waits where it is counted and can be dropped.
 void tune_socket(int fd) {
@@ -20,10 +29,15 @@ void tune_socket(int fd) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &lowat_bytes, sizeof lowat_bytes);
 }
 
-LinkState link_state(int fd) {
+tcp_info info_of(lws* wsi) {
   tcp_info info{};
   socklen_t size = sizeof info;  // an older kernel fills less, and the rest stays 0
-  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return {};
+  if (::getsockopt(lws_get_socket_fd(wsi), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return {};
+  return info;
+}
+
+LinkState link_state(lws* wsi) {
+  const tcp_info info = info_of(wsi);
   return {info.tcpi_rtt, 8 * info.tcpi_delivery_rate, info.tcpi_snd_cwnd * info.tcpi_snd_mss,
           info.tcpi_notsent_bytes};
 }
@@ -59,11 +73,14 @@ std::vector<std::shared_ptr<LwsWebsocket>> LwsWaker::take() {
 }
 
 LwsWebsocket::LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address)
-    : waker_(std::move(waker)), peer_address_(std::move(peer_address)), wsi_(wsi) {
+    : waker_(std::move(waker)),
+      peer_address_(std::move(peer_address)),
+      wsi_(wsi),
+      arrivals_(segments_per_second, segment_burst, Clock::now()) {
   tune_socket(lws_get_socket_fd(wsi));
 }
 
-void LwsWebsocket::send(std::vector<std::byte> message) {
+void LwsWebsocket::send(OutgoingMessage message) {
   {
     const std::lock_guard lock(mutex_);
     if (closed_ || closing_) return;
@@ -100,6 +117,21 @@ std::size_t LwsWebsocket::queued_frames() const {
 
 void LwsWebsocket::service_listen(std::shared_ptr<ConnectionListener> listener) {
   listener_ = std::move(listener);
+  const tcp_info info = info_of(wsi_);
+  arrived_ = {info.tcpi_data_segs_in, info.tcpi_bytes_received};
+  lws_set_timer_usecs(wsi_, look_every_us);
+}
+
+int LwsWebsocket::service_timer() {
+  lws_set_timer_usecs(wsi_, look_every_us);
+  const tcp_info info = info_of(wsi_);
+  const double segments = info.tcpi_data_segs_in - arrived_.segments;
+  const auto bytes = static_cast<double>(info.tcpi_bytes_received - arrived_.bytes);
+  arrived_ = {info.tcpi_data_segs_in, info.tcpi_bytes_received};
+  if (arrivals_.take(Clock::now(), std::max(segments, bytes / segment_bytes))) return 0;
+  if (std::exchange(floods_, true)) return -1;  // it has been refused, and does not end
+  listener_->on_flood();
+  return 0;
 }
 
 void LwsWebsocket::service_woken() {
@@ -120,7 +152,7 @@ int LwsWebsocket::service_receive(std::span<const std::byte> fragment) {
     return refuse_message(CloseCode::too_big, "message over 64 KiB");
   received_.insert(received_.end(), fragment.begin(), fragment.end());
   if (lws_is_final_fragment(wsi_) && lws_remaining_packet_payload(wsi_) == 0) {
-    listener_->on_message(received_, link_state(lws_get_socket_fd(wsi_)));
+    listener_->on_message(received_, link_state(wsi_));
     received_.clear();
   }
   return 0;

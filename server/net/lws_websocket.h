@@ -10,6 +10,7 @@
 
 #include "server/net/connection.h"
 #include "server/pipeline/packet_ring.h"
+#include "server/session/rate_limit.h"
 
 namespace catgs {
 
@@ -37,7 +38,7 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
  public:
   LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address);
 
-  void send(std::vector<std::byte> message) override;
+  void send(OutgoingMessage message) override;
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;
   void close(CloseCode code, std::string_view reason) override;
   [[nodiscard]] std::string peer_address() const override { return peer_address_; }
@@ -48,11 +49,18 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
   /// Nonzero: libwebsockets shall close the socket, as its callbacks say it.
   int service_receive(std::span<const std::byte> fragment);
   int service_writeable(std::vector<std::byte>& scratch);
+  /// It is time to look how much has come.
+  int service_timer();
   /// The peer's close frame: two bytes of code, then a reason.
   void service_peer_closes(std::span<const std::byte> payload);
   void service_closed();
 
  private:
+  /// As the kernel counts it, of what libwebsockets keeps for itself too.
+  struct Received {
+    std::uint32_t segments = 0;
+    std::uint64_t bytes = 0;
+  };
   struct Closing {
     CloseCode code;
     std::string reason;
@@ -63,6 +71,9 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
   const std::shared_ptr<LwsWaker> waker_;
   const std::string peer_address_;
   lws* wsi_;
+  Received arrived_;
+  RateLimit arrivals_;
+  bool floods_ = false;
   std::shared_ptr<ConnectionListener> listener_;
   std::vector<std::byte> received_;
   bool peer_leaves_ = false;

@@ -28,8 +28,7 @@
 namespace catgs {
 namespace {
 
-constexpr int request_timeout_s = 10;  // a peer that is slow to send its request
-constexpr int keep_alive_timeout_s = 15;
+constexpr int request_timeout_s = 10;       // a peer that is slow to send its request
 constexpr std::uint16_t ping_after_s = 20;  // of silence; hung up ten seconds later
 constexpr std::uint16_t hang_up_after_s = 30;
 
@@ -66,25 +65,15 @@ const std::string upload_length_rule =
 constexpr int keep_reading = 0;
 constexpr int close_connection = -1;
 
-/// An answered request leaves the connection open for the next one; an upload does not, for
-/// libwebsockets goes on reading into the body that it has had.
-int finish_request(lws* wsi, HttpSlot& slot) {
-  const bool last = slot.exchange && slot.exchange->is_upload();
-  forget(slot);
-  if (last) return close_connection;
-  note_answered(wsi);
-  return lws_http_transaction_completed(wsi) ? close_connection : keep_reading;
-}
-
+/// A connection answers one request, and every answer says so. libwebsockets does not show a head
+/// as it came: a line that a proxy reads as a length is none to it, and what follows may be a body.
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
-  forget(slot);
   if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
   // libwebsockets knows no chunks and would take them for the next request.
   if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
     return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
   if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
-    if (is_pipelined(wsi)) return refuse_request(wsi, 400, "wait for the answer before you upload");
     slot.exchange = new LwsHttpExchange;
     const std::uint64_t bytes = body_length(wsi).value_or(0);
     if (bytes >= 1 && bytes <= max_upload_bytes)
@@ -92,7 +81,7 @@ int on_request(lws* wsi, HttpSlot& slot) {
     const int status = bytes < 1 ? 411 : 413;
     const std::string why = fmt::format("{}: {}", status, upload_length_rule);
     note_refused(wsi, "upload refused: " + why);
-    if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"), site.policy,
+    if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"),
                                    service_of(wsi).scratch) != 0)
       return close_connection;
     const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
@@ -107,23 +96,7 @@ int on_request(lws* wsi, HttpSlot& slot) {
   const HttpHandler handler = [&](const HttpRequest& request) {
     return respond(wsi, host, request);
   };
-  bool finished = false;
-  if (slot.exchange->begin(wsi, handler, site_address(wsi, host), site.policy, finished) != 0)
-    return -1;
-  if (finished) return finish_request(wsi, slot);
-  lws_callback_on_writable(wsi);
-  return 0;
-}
-
-/// The body of an upload is whole, or it is time to look after it.
-int go_on_with_upload(lws* wsi, HttpSlot& slot, bool body_is_whole) {
-  const Site& site = site_of(wsi);
-  bool finished = false;
-  const int failed = body_is_whole
-                         ? slot.exchange->end_body(wsi, site.uploads, site.policy, finished)
-                         : slot.exchange->on_timer(wsi, site.policy, finished);
-  if (failed != 0) return -1;
-  return finished ? finish_request(wsi, slot) : 0;
+  return slot.exchange->begin(wsi, handler, site_address(wsi, host));
 }
 
 /// Before there is a lws of it. Operators and probes come in even where nobody else does; a proxy
@@ -162,17 +135,14 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       if (!slot || !slot->exchange) return 0;
       return slot->exchange->take_body({static_cast<const char*>(in), length});
     case LWS_CALLBACK_HTTP_BODY_COMPLETION:
+      if (!slot || !slot->exchange) return 0;
+      return slot->exchange->end_body(wsi, site_of(wsi).uploads);
     case LWS_CALLBACK_TIMER:
       if (!slot || !slot->exchange) return 0;
-      return go_on_with_upload(wsi, *slot, reason == LWS_CALLBACK_HTTP_BODY_COMPLETION);
-    case LWS_CALLBACK_HTTP_WRITEABLE: {
+      return slot->exchange->on_timer(wsi);
+    case LWS_CALLBACK_HTTP_WRITEABLE:
       if (!slot || !slot->exchange) return 0;
-      bool finished = false;
-      if (slot->exchange->write_body(wsi, service_of(wsi).scratch, finished) != 0) return -1;
-      if (finished) return finish_request(wsi, *slot);
-      lws_callback_on_writable(wsi);
-      return 0;
-    }
+      return slot->exchange->on_writable(wsi, service_of(wsi).scratch);
     case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
     case LWS_CALLBACK_CLOSED_HTTP:
       if (slot) forget(*slot);
@@ -215,6 +185,8 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
     }
     case LWS_CALLBACK_RECEIVE:
       return (*slot->connection)->service_receive(bytes);
+    case LWS_CALLBACK_TIMER:
+      return (*slot->connection)->service_timer();
     case LWS_CALLBACK_SERVER_WRITEABLE:
       return (*slot->connection)->service_writeable(service_of(wsi).scratch);
     case LWS_CALLBACK_WS_PEER_INITIATED_CLOSE:
@@ -262,6 +234,17 @@ const lws_protocols protocols[] = {
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
 
+// Of all answers, those that libwebsockets makes by itself too.
+const lws_protocol_vhost_options resource_policy = {nullptr, nullptr,
+                                                    "cross-origin-resource-policy:", "same-origin"};
+const lws_protocol_vhost_options referrer_policy = {&resource_policy, nullptr,
+                                                    "referrer-policy:", "no-referrer"};
+const lws_protocol_vhost_options content_type_options = {&referrer_policy, nullptr,
+                                                         "x-content-type-options:", "nosniff"};
+const lws_protocol_vhost_options vary = {&content_type_options, nullptr,
+                                         "vary:", "accept-encoding"};
+const lws_protocol_vhost_options common_headers = {&vary, nullptr, "connection:", "close"};
+
 /// Whose network thread this is; null: nobody's.
 thread_local const Site* served = nullptr;
 
@@ -276,9 +259,11 @@ void log_details(int, const char* line) {
 }
 
 /// While its errors are reported by nobody else. They are no errors of the server, which the log
-/// would never leave out: on the network thread most are about what a stranger sent.
+/// would never leave out: on the network thread most are about what a stranger sent. One warning is
+/// about a request that it hangs up on.
 void log_errors(int level, const char* line) {
-  if (level != LLL_ERR) return log_details(level, line);
+  const bool hangs_up = level == LLL_ERR || std::string_view(line).starts_with("More hdr frags");
+  if (!hangs_up) return log_details(level, line);
   if (!served) return spdlog::warn("libwebsockets: {}", without_line_end(line));
   guarded([&] {
     served->on_refused(fmt::format("libwebsockets: {}", without_line_end(line)));
@@ -322,8 +307,8 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   info.iface = all ? nullptr : endpoint.address.c_str();
   info.protocols = protocols;
   info.user = &on;
-  info.keepalive_timeout = keep_alive_timeout_s;
   info.timeout_secs = request_timeout_s;
+  info.headers = &common_headers;
   info.retry_and_idle_policy = &idle_policy;
   info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
   if (endpoint.address.find(':') == std::string::npos)

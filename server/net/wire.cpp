@@ -301,6 +301,19 @@ void fill(const Picked& picked, v1::ServerMessage& out) {
   message.set_distance(picked.distance.value_or(0.0f));
 }
 
+template <typename Body>
+constexpr Topic topic_of = Topic::event;
+template <>
+constexpr Topic topic_of<Welcome> = Topic::session;
+template <>
+constexpr Topic topic_of<StreamConfig> = Topic::stream;
+template <>
+constexpr Topic topic_of<QueuePlace> = Topic::place;
+template <>
+constexpr Topic topic_of<Stats> = Topic::statistics;
+template <>
+constexpr Topic topic_of<Heartbeat> = Topic::clock;
+
 std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
   return static_cast<std::uint32_t>(std::clamp<std::int64_t>(us, 0, UINT32_MAX));
@@ -343,14 +356,19 @@ std::variant<ClientMessage, ParseError> parse_client_message(std::span<const std
   }
 }
 
-std::vector<std::byte> serialize(const ServerMessage& message) {
+OutgoingMessage serialize(const ServerMessage& message) {
   v1::ServerMessage out;
-  std::visit([&](const auto& body) { fill(body, out); }, message);
+  const Topic topic = std::visit(
+      [&]<typename Body>(const Body& body) {
+        fill(body, out);
+        return topic_of<Body>;
+      },
+      message);
   const std::size_t size = out.ByteSizeLong();
   std::vector<std::byte> bytes(1 + size);
   bytes[0] = static_cast<std::byte>(Kind::message);
   out.SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(bytes.data() + 1));
-  return bytes;
+  return {topic, std::move(bytes)};
 }
 
 void append_frame_header(const FrameTicket& ticket, TimePoint now, std::vector<std::byte>& out) {

@@ -29,7 +29,7 @@ struct ParseError {
 std::variant<ClientMessage, ParseError> parse_client_message(std::span<const std::byte> bytes);
 
 /// Kind byte and ServerMessage, ready for the socket.
-std::vector<std::byte> serialize(const ServerMessage& message);
+OutgoingMessage serialize(const ServerMessage& message);
 
 /// Appends what precedes the bitstream in a frame packet: kind byte, varint, FrameHeader. `now` is
 /// when the packet is handed to the socket.

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <glm/vec2.hpp>
 
@@ -49,6 +51,15 @@ struct FrameTicket {
 struct OutgoingFrame {
   FrameTicket ticket;
   std::vector<std::byte> bitstream;
+};
+
+/// What a message is about. Of two about the same thing the newer one is enough, but for events.
+enum class Topic : std::uint8_t { event, session, stream, place, statistics, clock };
+
+/// A serialised message on its way to the socket.
+struct OutgoingMessage {
+  Topic topic = Topic::event;
+  std::vector<std::byte> bytes;
 };
 
 }  // namespace catgs

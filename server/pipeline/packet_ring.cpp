@@ -1,13 +1,43 @@
 #include "server/pipeline/packet_ring.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace catgs {
 
-bool PacketRing::push(std::vector<std::byte> message) {
-  if (packets_.size() - frames_ >= limits_.messages) return false;
-  packets_.push_back({std::nullopt, std::move(message)});
+namespace {
+
+/// A welcome says how the stream is encoded, too.
+bool outdates(Topic newer, Topic older) {
+  if (newer == Topic::event) return false;
+  return older == newer || (newer == Topic::session && older == Topic::stream);
+}
+
+}  // namespace
+
+bool PacketRing::push(OutgoingMessage message) {
+  drop_outdated_messages(message.topic);
+  const std::size_t size = message.bytes.size();
+  const std::size_t messages = packets_.size() - frames_;
+  const bool fits =
+      messages < limits_.messages &&
+      (messages == 0 || message_bytes_ + size <= limits_.message_bytes);  // one always fits
+  if (!fits) return false;
+  message_bytes_ += size;
+  packets_.push_back({std::nullopt, std::move(message.bytes), message.topic});
   return true;
+}
+
+/// Those before a frame are what it is shown by.
+void PacketRing::drop_outdated_messages(Topic newer) {
+  const auto last_frame = std::find_if(packets_.rbegin(), packets_.rend(),
+                                       [](const Packet& packet) { return packet.frame; });
+  const auto outdated =
+      std::stable_partition(last_frame.base(), packets_.end(),
+                            [&](const Packet& packet) { return !outdates(newer, packet.topic); });
+  for (auto packet = outdated; packet != packets_.end(); ++packet)
+    message_bytes_ -= packet->bytes.size();
+  packets_.erase(outdated, packets_.end());
 }
 
 std::vector<std::uint64_t> PacketRing::push(OutgoingFrame frame) {
@@ -26,7 +56,7 @@ std::vector<std::uint64_t> PacketRing::push(OutgoingFrame frame) {
     waiting_for_idr_ = false;
     ++frames_;
     frame_bytes_ += size;
-    packets_.push_back({frame.ticket, std::move(frame.bitstream)});
+    packets_.push_back({frame.ticket, std::move(frame.bitstream), Topic::event});
   }
   dropped_frames_ += dropped.size();
   return dropped;
@@ -39,6 +69,8 @@ std::optional<PacketRing::Packet> PacketRing::pop() {
   if (packet.frame) {
     --frames_;
     frame_bytes_ -= packet.bytes.size();
+  } else {
+    message_bytes_ -= packet.bytes.size();
   }
   return packet;
 }

@@ -78,6 +78,10 @@ void Peer::on_bad_message(std::string_view why) {
   refuse(ErrorCode::bad_message, std::string(why));
 }
 
+void Peer::on_flood() {
+  if (!refused_) refuse(ErrorCode::rate_limited, "too many messages");
+}
+
 void Peer::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) {
   Metrics& metrics = registry_.metrics_;
   metrics.frames_sent.Increment();

@@ -26,6 +26,7 @@ class Peer final : public ConnectionListener, public std::enable_shared_from_thi
   // Network thread.
   void on_message(std::span<const std::byte> bytes, const LinkState& link) override;
   void on_bad_message(std::string_view why) override;
+  void on_flood() override;
   void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes, TimePoint now) override;
   void on_close(bool by_leaving) override;
 

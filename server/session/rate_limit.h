@@ -12,13 +12,13 @@ class RateLimit {
   RateLimit(double per_second, double burst, TimePoint now)
       : per_second_(per_second), burst_(burst), tokens_(burst), last_(now) {}
 
-  /// False: too many.
-  bool take(TimePoint now) {
+  /// False: too many, and nothing is taken.
+  bool take(TimePoint now, double tokens = 1.0) {
     const double seconds = std::chrono::duration<double>(now - last_).count();
     last_ = now;
     tokens_ = std::min(burst_, tokens_ + seconds * per_second_);
-    if (tokens_ < 1.0) return false;
-    tokens_ -= 1.0;
+    if (tokens_ < tokens) return false;
+    tokens_ -= tokens;
     return true;
   }
 

@@ -34,8 +34,8 @@ void SpectatorHub::needs_idr(const Peer& peer) {
 void SpectatorHub::send(const ServerMessage& message, TimePoint now) {
   if (spectators_.empty()) return;
   last_said_ = now;
-  const std::vector<std::byte> bytes = wire::serialize(message);
-  for (Spectator& s : spectators_) s.peer->connection().send(bytes);
+  const OutgoingMessage outgoing = wire::serialize(message);
+  for (Spectator& s : spectators_) s.peer->connection().send(outgoing);
 }
 
 void SpectatorHub::send(const OutgoingFrame& frame, TimePoint now) {

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 REQUESTS, SESSIONS, MESSAGES = ("catgs_requests_refused_total", "catgs_sessions_refused_total",
                                 "catgs_bad_messages_total")
-TEXT, BINARY, CLOSE, PING = 0x81, 0x82, 0x88, 0x89  # first bytes of frames, RFC 6455
-BAD_MESSAGE, UNAUTHORIZED, UNKNOWN_SCENE = 1, 2, 3  # of proto/catgs.proto
+TEXT, FRAGMENT, BINARY, CLOSE, PING, PONG = 0x81, 0x02, 0x82, 0x88, 0x89, 0x8a  # first bytes of frames, RFC 6455
+BAD_MESSAGE, UNAUTHORIZED, UNKNOWN_SCENE, RATE_LIMITED = 1, 2, 3, 7  # of proto/catgs.proto
 NOTHING = rb"\Z"
+FLOOD_FRAMES = 400_000  # of 6 bytes: what a connection may send in 2 s, and half of what cuts it off
 SIDECAR = "/api/scenes/any/sidecar"
+HIDDEN = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"  # where the body of another request is
 
 
 class Misdeed(NamedTuple):
@@ -76,7 +78,15 @@ def closed(name: str, frames: bytes, code: int, why: str, error: int | None = No
                    (SESSIONS, MESSAGES) if bad else (SESSIONS,))
 
 
+def flood(name: str, first: int) -> Misdeed:
+    """Of empty control frames. libwebsockets 4.1.6 writes its answer over bytes that came with the
+    request, so that a fragment comes first, which nothing in it matters of."""
+    return closed(name, frame(FRAGMENT, b"x" * 1000) + frame(first, b"") * FLOOD_FRAMES, 1008, "too many messages",
+                  RATE_LIMITED, bad=False)
+
+
 NO_HTTP = rb"HTTP/1\.0 403 "  # libwebsockets' own answer, which nothing counts
+ONE_ANSWER = rb"HTTP/1\.1 404 (?:(?!HTTP/1\.).)*\Z"  # connection: close, whatever is behind the request
 NO_CLIENT_MESSAGE = "message: not a ClientMessage of catgs.v1"
 NO_AUTHORS = ("upload refused: 403: nobody can save on this server: it was started without --token-key-file, which "
               "links of role author are made with")
@@ -101,6 +111,14 @@ MISDEEDS = [
     refused("chunks", request("GET", headers="Transfer-Encoding: chunked\r\n", body="0\r\n\r\n"), 411,
             "request refused: 411: Content-Length is needed, not Transfer-Encoding"),
     refused("POST", request("POST"), 405, "request refused: 405: only GET and HEAD are served here"),
+    Misdeed("second request", request("GET", "/nowhere", body=HIDDEN), ONE_ANSWER),
+    Misdeed("length before a space", request("GET", "/nowhere", f"Content-Length : {len(HIDDEN)}\r\n", HIDDEN),
+            ONE_ANSWER),
+    Misdeed("folded length", request("GET", "/nowhere", f"X: 1\r\n Content-Length: {len(HIDDEN)}\r\n", HIDDEN),
+            ONE_ANSWER),
+    Misdeed("length behind a bare CR", request("GET", "/nowhere", f"X: 1\rContent-Length: {len(HIDDEN)}\r\n", HIDDEN),
+            ONE_ANSWER),
+    Misdeed("chunks before a space", request("GET", "/nowhere", "Transfer-Encoding : chunked\r\n", HIDDEN), ONE_ANSWER),
     Misdeed("path that climbs", request("GET", "/../../etc/passwd"), rb"HTTP/1\.1 404 "),
     Misdeed("encoded path that climbs", request("GET", "/%2e%2e%2f%2e%2e%2fetc%2fpasswd"), rb"HTTP/1\.1 404 "),
     Misdeed("unknown method", request("NONSENSE"), NO_HTTP),
@@ -109,6 +127,8 @@ MISDEEDS = [
     Misdeed("TLS", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(range(256)), NO_HTTP),
     Misdeed("endless head", request("GET", headers=f"Cookie: {'c' * 5000}\r\n"), NOTHING,
             "libwebsockets: Ran out of header data space", (REQUESTS,)),
+    Misdeed("100 arguments", request("GET", "/?a" + 99 * "&a"), NOTHING,
+            "libwebsockets: More hdr frags than we can deal with", (REQUESTS,)),
     Misdeed("half a head", request("GET")[:30], NOTHING),
     Misdeed("silence", b"", NOTHING),
     closed("junk in a message", frame(BINARY, b"\xff" * 40), 1008, NO_CLIENT_MESSAGE, BAD_MESSAGE),
@@ -129,5 +149,7 @@ MISDEEDS = [
                                                   + frame(BINARY, field(9, b""))),
             rb"HTTP/1\.1 101 .*" + re.escape(frame(CLOSE, struct.pack(">H", 1000) + b"bye", b""))),
     Misdeed("ping of 126 bytes", upgrade(frame(PING, b"p" * 126)), rb"HTTP/1\.1 101 .*\r\n\r\n\Z"),
+    flood("flood of pings", PING),
+    flood("flood of pongs", PONG),
     Misdeed("upgrade and reset", upgrade(), NOTHING, resets=True),
 ]

@@ -20,7 +20,7 @@ from typing import Callable
 from misdeeds import MISDEEDS, Misdeed
 
 PACE_S = 0.4  # the log takes ten lines a second about refusals: refusals_per_second in server/log.cpp
-# The longest of the server's limits is keep_alive_timeout_s, 15 s; compilers may run beside it.
+# The longest of the server's limits is request_timeout_s, 10 s; compilers may run beside it.
 PATIENCE_S = 30.0
 RESET = struct.pack("ii", 1, 0)  # of SO_LINGER
 

@@ -89,6 +89,11 @@ TEST(Log, ClientsWriteNeitherLinesNorColours) {
               EndsWith(R"(not known as \xc2\x9b2Jevil, \x9b2Jevil)"));
   EXPECT_THAT(lines_of("json", "info", c1).at(0),
               EndsWith(R"(not known as \u009b2Jevil, \ufffd2Jevil"})"));
+  const auto invisible = [] { spdlog::warn("not known as {}", "a\u202e\u2066\u200b\u2028b"); };
+  EXPECT_THAT(lines_of("human", "info", invisible).at(0),
+              EndsWith(R"(as a\xe2\x80\xae\xe2\x81\xa6\xe2\x80\x8b\xe2\x80\xa8b)"));
+  EXPECT_THAT(lines_of("json", "info", invisible).at(0),
+              EndsWith(R"(as a\u202e\u2066\u200b\u2028b"})"));
 }
 
 TEST(Log, TellsHowManyLinesItLeftOut) {

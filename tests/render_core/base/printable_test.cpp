@@ -18,10 +18,23 @@ TEST(Printable, ControlCharactersComeOutByTheirBytes) {
 
 TEST(Printable, LettersStay) {
   const std::string first_and_last =
-      " ~ \xc2\xa0 \xdf\xbf \xe0\xa0\x80 \xed\x9f\xbf \xee\x80\x80 \xef\xbf\xbf "
-      "\xf0\x90\x80\x80 \xf4\x8f\xbf\xbf";
+      " ~ \xc2\xa0 \xdf\xbf \xe0\xa0\x80 \xed\x9f\xbf \xee\x80\x80 \xef\xbf\xbd "
+      "\xf0\x90\x80\x80 \xf4\x8f\xbf\xbd";
   EXPECT_EQ(printable(first_and_last), first_and_last);
   EXPECT_EQ(printable("Gärten, 庭園, 🌳"), "Gärten, 庭園, 🌳");
+}
+
+/// They hide in a name, turn round the text behind them or begin a line, without a control
+/// character.
+TEST(Printable, FormatCharactersComeOutByTheirBytes) {
+  EXPECT_EQ(printable("a\u202ecod.exe"), R"(a\xe2\x80\xaecod.exe)");  // right-to-left override
+  EXPECT_EQ(printable("\u2066\u200b\u2028\u2029"),
+            R"(\xe2\x81\xa6\xe2\x80\x8b\xe2\x80\xa8\xe2\x80\xa9)");
+  EXPECT_EQ(printable("\u00ad\ufeff\U000e0041"), R"(\xc2\xad\xef\xbb\xbf\xf3\xa0\x81\x81)");
+  EXPECT_EQ(printable("\ufdd0\uffff\U0010fffe"), R"(\xef\xb7\x90\xef\xbf\xbf\xf4\x8f\xbf\xbe)");
+  for (const char* beside : {"\u00ac", "\u00ae", "\u200a", "\u2010", "\u2027", "\u202f", "\u2065",
+                             "\u2070", "\ufffc", "\U000e0100"})
+    EXPECT_EQ(printable(beside), beside);
 }
 
 TEST(Printable, WhatIsNotUtf8ComesOutByItsBytes) {

@@ -44,6 +44,7 @@ class HttpConformance : public testing::Test {
     limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 8192);
     ::setrlimit(RLIMIT_NOFILE, &limit);
     folder.write("web/index.html", "<!doctype html>the page");
+    folder.write("web/large.bin", std::string(large_bytes, 'l'));
     folder.write("secret.txt", "the secret");
     server.emplace([&](ServerConfig& config) {
       config.client_dir = (folder / "web").string();
@@ -77,6 +78,7 @@ class HttpConformance : public testing::Test {
     return false;
   }
 
+  static constexpr std::size_t large_bytes = 16 << 20;  // more than sockets hold
   const TemporaryFolder folder;
   std::optional<RunningServer> server;
 };
@@ -125,7 +127,15 @@ TEST_F(HttpConformance, EveryAnswerHasTheSecurityHeaders) {
     EXPECT_EQ(reply.headers.at("referrer-policy"), "no-referrer") << target;
     EXPECT_EQ(reply.headers.at("cross-origin-resource-policy"), "same-origin") << target;
     EXPECT_FALSE(reply.headers.contains("access-control-allow-origin")) << target;
+    EXPECT_EQ(reply.headers.at("connection"), "close") << target;
   }
+  // Those that libwebsockets makes.
+  for (const std::string& request :
+       {"GET /%zz HTTP/1.1\r\n" + host() + "\r\n", "POST / HTTP/1.1\r\n" + host() + "\r\n",
+        "NONSENSE / HTTP/1.1\r\n" + host() + "\r\n"})
+    EXPECT_THAT(answer(request), AllOf(HasSubstr("x-content-type-options: nosniff\r\n"),
+                                       HasSubstr("connection: close\r\n")))
+        << request;
 }
 
 TEST_F(HttpConformance, OtherMethodsAreRefused) {
@@ -138,14 +148,65 @@ TEST_F(HttpConformance, OtherMethodsAreRefused) {
   expect_alive();
 }
 
-TEST_F(HttpConformance, AHeadHasNoBodyAndPipelinedRequestsAreAnsweredInOrder) {
+TEST_F(HttpConformance, AHeadHasNoBody) {
   const std::string head = answer("HEAD / HTTP/1.1\r\n" + host() + "\r\n");
   EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
   EXPECT_THAT(head, Not(HasSubstr("the page")));
-  const std::string both =
-      answer("GET / HTTP/1.1\r\n" + host() + "\r\nGET /healthz HTTP/1.1\r\n" + host() + "\r\n");
-  EXPECT_LT(both.find("the page"), both.find("ok\n"));
-  EXPECT_NE(both.find("ok\n"), std::string::npos);
+}
+
+TEST_F(HttpConformance, ALargeAnswerComesWhole) {
+  RawSocket socket(server->port());
+  socket.send("GET /large.bin HTTP/1.1\r\n" + host() + "\r\n");
+  std::this_thread::sleep_for(300ms);  // the buffers of the sockets are full
+  const std::string reply = socket.receive(20s);
+  EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, large_bytes);
+}
+
+/// What comes behind a request may be its body to a proxy, which reads another length than the
+/// server does, or any: then another visitor would get the answer to it.
+TEST_F(HttpConformance, AConnectionAnswersOneRequest) {
+  const std::string hidden = "GET /healthz HTTP/1.1\r\n" + host() + "\r\n";
+  const std::string length = std::to_string(hidden.size());
+  const std::string chunk = "29\r\n" + hidden + "\r\n0\r\n\r\n";
+  const std::string nul(1, '\0');
+  std::vector<std::pair<std::string, std::string>> requests = {
+      {"", hidden},  // a second one
+      {"Transfer-Encoding : chunked\r\n", hidden},
+      {"Transfer-Encoding : chunked\r\n", chunk},
+      {"Transfer-Encoding\v: chunked\r\n", hidden},
+      {"Transfer-Encoding: \vchunked\r\n", hidden},
+      {"Content-Length: 0\r\nContent-Length: " + length + "\r\n", hidden},
+      {"Content-Length: " + length + "\r\nContent-Length: 0\r\n", hidden},
+      {"Content-Length: 0, " + length + "\r\n", hidden}};
+  for (const std::string& before :
+       {std::string("Content-Length : "), std::string("Content-Length\t: "),
+        std::string("Content-Length\v: "), "Content-Length" + nul + ": ",
+        std::string("Content-Length:+"), std::string("Content-Length:\v"),
+        std::string(" Content-Length: "), std::string("X: 1\r\n Content-Length: "),
+        std::string("X: 1\r\n\tContent-Length: "), std::string("X: 1\rContent-Length: "),
+        std::string("X: 1\nContent-Length: "), std::string("X: 1\n Content-Length: "),
+        std::string("Accept: 1\rContent-Length: "), "X: " + nul + "\r\n Content-Length: ",
+        std::string("no colon\r\nContent-Length: "), std::string(": \r\n Content-Length: ")})
+    requests.emplace_back(before + length + "\r\n", hidden);
+  const auto answers = [](const std::string& reply) {
+    int count = 0;
+    for (std::size_t at = 0; (at = reply.find("HTTP/1.", at)) != reply.npos; ++at) ++count;
+    return count;
+  };
+  for (const int port : {server->port(), server->admin_port()})
+    for (const auto& [lines, behind] : requests) {
+      const std::string request = "GET /api/scenes HTTP/1.1\r\n" + host() + lines + "\r\n";
+      RawSocket at_once(port);
+      at_once.send(request + behind);
+      EXPECT_EQ(answers(at_once.receive(1s)), 1) << lines;
+      RawSocket later(port);
+      later.send(request);
+      std::string reply;
+      later.receive_until("\r\n\r\n", reply);
+      later.send(behind);
+      EXPECT_EQ(answers(reply + later.receive(1s)), 1) << lines;
+    }
+  expect_alive();
 }
 
 /// A proxy in front counts bodies: a request hidden in one must not be answered here.

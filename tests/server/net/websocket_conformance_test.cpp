@@ -175,6 +175,37 @@ TEST_F(WebsocketConformance, NothingIsSaidBehindTheCloseFrame) {
   EXPECT_EQ(received.size(), code + static_cast<std::size_t>(received[code - 1]));
 }
 
+/// libwebsockets says nothing of most of these.
+TEST_F(WebsocketConformance, FloodsOfEmptyFramesEndTheConnection) {
+  const std::string head = client_frame(ws_binary, "");
+  for (const auto& [first, frame] :
+       {std::pair{std::string(), client_frame(ws_fin | ws_ping, "")},
+        {std::string(), client_frame(ws_fin | ws_ping, std::string(125, 'p'))},
+        {std::string(), client_frame(ws_fin | ws_pong, "")},
+        {std::string(), client_frame(ws_fin | ws_pong, "pong")},
+        {std::string(), std::string("\x8a\0", 2)},  // without a mask
+        {head, client_frame(ws_continuation, "")}}) {
+    RawSocket socket = open();
+    socket.send(first);
+    std::string flood;
+    while (flood.size() < (64u << 10)) flood += frame;
+    for (int i = 0; i < 64 && socket.send(flood); ++i) {
+    }
+    std::string received;
+    EXPECT_TRUE(socket.receive_until("too many messages", received));
+    EXPECT_TRUE(socket.receive_until("\x88\x13\x03\xf0too many messages", received));
+  }
+}
+
+TEST_F(WebsocketConformance, WhoGoesOnAfterAnAnswerToItsFloodIsCutOff) {
+  RawSocket socket = open();
+  std::string flood;
+  while (flood.size() < (1u << 20)) flood += client_frame(ws_fin | ws_pong, "");
+  int sent = 0;
+  while (sent < 1000 && socket.send(flood)) ++sent;
+  EXPECT_LT(sent, 1000);
+}
+
 TEST_F(WebsocketConformance, HandshakesWithoutTheirPartsAreRefused) {
   const auto refused = [](const std::string& from, const std::string& to) {
     std::string request = handshake(server->port());

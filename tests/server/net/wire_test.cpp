@@ -115,11 +115,13 @@ TEST(Wire, ParsesGoldenClientMessages) {
 }
 
 TEST(Wire, WritesGoldenServerMessages) {
+  EXPECT_EQ(
+      hex(wire::serialize(ErrorMessage{ErrorCode::server_full, "8 of 8 sessions are in use", true})
+              .bytes),
+      golden("server_error"));
   EXPECT_EQ(hex(wire::serialize(
-                ErrorMessage{ErrorCode::server_full, "8 of 8 sessions are in use", true})),
-            golden("server_error"));
-  EXPECT_EQ(hex(wire::serialize(
-                StreamConfig{Codec::h264, "avc1.42C01F", {1280, 720}, 60, 8000, "libx264"})),
+                    StreamConfig{Codec::h264, "avc1.42C01F", {1280, 720}, 60, 8000, "libx264"})
+                    .bytes),
             golden("server_config"));
 }
 
@@ -143,7 +145,7 @@ TEST(Wire, WritesTheGoldenFrame) {
 
 TEST(Wire, EveryServerMessageReadsBack) {
   const auto reread = [](const ServerMessage& message) {
-    const auto bytes = wire::serialize(message);
+    const auto bytes = wire::serialize(message).bytes;
     EXPECT_EQ(bytes.at(0), std::byte{1});
     v1::ServerMessage out;
     EXPECT_TRUE(out.ParseFromArray(bytes.data() + 1, static_cast<int>(bytes.size()) - 1));
@@ -396,13 +398,24 @@ TEST(Wire, ReadsAndChecksPicks) {
   EXPECT_THAT(complaint(message), HasSubstr("pick.origin.y"));
 }
 
+TEST(Wire, SaysWhichMessagesReplaceEachOther) {
+  EXPECT_EQ(wire::serialize(Welcome{}).topic, Topic::session);
+  EXPECT_EQ(wire::serialize(StreamConfig{}).topic, Topic::stream);
+  EXPECT_EQ(wire::serialize(QueuePlace{}).topic, Topic::place);
+  EXPECT_EQ(wire::serialize(Stats{}).topic, Topic::statistics);
+  EXPECT_EQ(wire::serialize(Heartbeat{}).topic, Topic::clock);
+  EXPECT_EQ(wire::serialize(ErrorMessage{}).topic, Topic::event);
+  EXPECT_EQ(wire::serialize(Drain{}).topic, Topic::event);
+  EXPECT_EQ(wire::serialize(Picked{}).topic, Topic::event);
+}
+
 TEST(Wire, AnswersPicks) {
-  EXPECT_EQ(hex(wire::serialize(Picked{7, 2.0f})),
+  EXPECT_EQ(hex(wire::serialize(Picked{7, 2.0f}).bytes),
             "01"
             "42090807"
             "1001"
             "1d00000040");
-  EXPECT_EQ(hex(wire::serialize(Picked{7, std::nullopt})),
+  EXPECT_EQ(hex(wire::serialize(Picked{7, std::nullopt}).bytes),
             "01"
             "42020807");
 }

@@ -31,9 +31,10 @@ class OpenConnection final : public Connection {
  public:
   explicit OpenConnection(std::string peer_address = "127.0.0.1")
       : peer_address_(std::move(peer_address)) {}
-  void send(std::vector<std::byte> message) override {
+  void send(OutgoingMessage message) override {
+    const std::vector<std::byte>& bytes = message.bytes;
     v1::ServerMessage parsed;
-    if (!parsed.ParseFromArray(message.data() + 1, static_cast<int>(message.size()) - 1))
+    if (!parsed.ParseFromArray(bytes.data() + 1, static_cast<int>(bytes.size()) - 1))
       throw std::logic_error("no ServerMessage");
     if (parsed.has_welcome()) welcome = parsed.welcome();
     if (parsed.has_config()) config = parsed.config();

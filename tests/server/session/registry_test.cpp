@@ -252,6 +252,20 @@ TEST_F(RegistryTest, TakesMessagesAtTheirRate) {
   EXPECT_LE(metrics.poses_received.Value(), 1201 + 600 * elapsed.count());
 }
 
+TEST_F(RegistryTest, RefusesAFloodOnce) {
+  start();
+  auto connection = std::make_shared<OpenConnection>();
+  Visitor& flooding = clients.emplace_back(Visitor{connection, registry->accept(connection)});
+  flooding.listener->on_flood();
+  move(flooding);
+  flooding.listener->on_flood();
+  run_until([&] { return connection->closed.has_value(); });
+  EXPECT_EQ(connection->closed, CloseCode::policy_violation);
+  EXPECT_EQ(connection->error->code(), v1::Error::RATE_LIMITED);
+  EXPECT_EQ(metrics.sessions_refused.Value(), 1.0);
+  EXPECT_EQ(metrics.poses_received.Value(), 0.0);
+}
+
 TEST_F(RegistryTest, RefusesConnectionsBeyondAllPlaces) {
   options.max_sessions = 2;
   options.max_spectators = 3;

@@ -16,7 +16,7 @@ struct FakeConnection final : Connection {
   bool full = false;  // of frames that are not read
   std::optional<CloseCode> closed;
 
-  void send(std::vector<std::byte>) override { ++messages; }
+  void send(OutgoingMessage) override { ++messages; }
   std::vector<std::uint64_t> send(OutgoingFrame frame) override {
     if (full) return {frame.ticket.frame_id};
     frames.push_back(frame.ticket.frame_id);
