@@ -181,37 +181,49 @@ TEST_F(BlendStage, IsTheCpuCoresButForTheRestOfARound) {
   }
 }
 
-class CompositeStage : public StageTest {};
+class CompositeStage : public StageTest {
+ protected:
+  static constexpr std::size_t tile_pixels = tile_size_px * tile_size_px;
+  /// What the blend leaves behind: slices of tiles, and how far each part of one looked.
+  struct Slices {
+    std::vector<uint2> of_tile;    // first slice, count
+    std::vector<BlendTask> tasks;  // one a tile, then one a slice
+    std::vector<float4> pixels;    // colour, transmittance; negative: the pixel is finished
+    std::vector<std::uint32_t> looked_at;
+  };
+  static Slices random_slices(std::uint32_t tiles) {
+    std::mt19937_64 random(41);
+    const auto uniform = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    Slices made;
+    made.tasks.resize(tiles);
+    std::uint32_t slices = 0;
+    for (std::uint32_t t = 0; t < tiles; ++t) {
+      const auto count = t % 5 == 1 ? 0u : 2u + static_cast<std::uint32_t>(random() % 6);
+      made.of_tile.push_back(make_uint2(slices, count));
+      for (std::uint32_t s = 0; s < count; ++s)
+        made.tasks.push_back({t, 1000 * t + 100 * s, 1000 * t + 100 * (s + 1),
+                              static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(count)});
+      slices += count;
+    }
+    for (std::uint32_t s = 0; s < slices; ++s) {
+      for (std::size_t k = 0; k < tile_pixels; ++k) {
+        const bool finished = random() % 4 == 0;
+        const float transmittance = finished ? -0.001f : 0.05f + 0.9f * uniform();
+        made.pixels.push_back(make_float4(uniform(), uniform(), uniform(), transmittance));
+      }
+      for (int part = 0; part < parts_per_tile; ++part)
+        made.looked_at.push_back(made.tasks[tiles + s].first +
+                                 static_cast<std::uint32_t>(random() % 100));
+    }
+    return made;
+  }
+};
 
 TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
   FrameShape shape = picture_shape(size_px, image_grid(size_px));
   const std::uint32_t tiles = shape.tiles();
-  std::mt19937_64 random(41);
-  const auto uniform = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
-  std::vector<uint2> of_tile;
-  std::vector<BlendTask> tasks(tiles);
-  std::uint32_t slices = 0;
-  for (std::uint32_t t = 0; t < tiles; ++t) {
-    const auto count = t % 5 == 1 ? 0u : 2u + static_cast<std::uint32_t>(random() % 6);
-    of_tile.push_back(make_uint2(slices, count));
-    for (std::uint32_t s = 0; s < count; ++s)
-      tasks.push_back({t, 1000 * t + 100 * s, 1000 * t + 100 * (s + 1),
-                       static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(count)});
-    slices += count;
-  }
-  shape.slice_bound = slices;
-  constexpr std::size_t tile_pixels = tile_size_px * tile_size_px;
-  std::vector<float4> of_slice;
-  std::vector<std::uint32_t> looked_at;
-  for (std::uint32_t s = 0; s < slices; ++s) {
-    for (std::size_t k = 0; k < tile_pixels; ++k) {
-      const bool finished = random() % 4 == 0;
-      const float transmittance = finished ? -0.001f : 0.05f + 0.9f * uniform();
-      of_slice.push_back(make_float4(uniform(), uniform(), uniform(), transmittance));
-    }
-    for (int part = 0; part < parts_per_tile; ++part)
-      looked_at.push_back(tasks[tiles + s].first + static_cast<std::uint32_t>(random() % 100));
-  }
+  const auto [of_tile, tasks, of_slice, looked_at] = random_slices(tiles);
+  shape.slice_bound = static_cast<std::uint32_t>(tasks.size()) - tiles;
   const auto slice = upload(of_tile);
   const auto task = upload(tasks);
   const auto pixels = upload(of_slice);

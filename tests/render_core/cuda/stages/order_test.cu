@@ -138,7 +138,8 @@ TEST_P(ListOrder, GiantsComeToTheirDepths) {
   }
   const auto [drawn, uncarried] = put_in_order(list);
   const std::size_t front = area * 7 / 8 - std::min(area * 7 / 8, 2 * hidden);
-  expect_same(list, drawn, on_cpu(list), front);
+  if (front > 0)
+    expect_same(list, drawn, on_cpu(list), front);  // a very short list has no such place
   EXPECT_TRUE(std::ranges::is_permutation(drawn, list.slots()));
   EXPECT_EQ(uncarried, 0u);
 }
