@@ -56,8 +56,9 @@ describe('page', () => {
     await page.locator('#stats-panel').getByText('mjpeg').waitFor();
     await keep_screenshot(page, 'fake-streaming');
     const heard = server.peers[0]!.heard;
-    const ack = heard.find((body) => body.case === 'ack');
-    expect(ack?.value).toMatchObject({ dropped: false });
+    // A busy machine may drop the first of the two pictures.
+    const acks = heard.flatMap((body) => (body.case === 'ack' ? [body.value.dropped] : []));
+    expect(acks).toContain(false);
     expect(errors).toEqual([]);
   });
 

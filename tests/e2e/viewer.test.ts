@@ -14,6 +14,7 @@ import {
   new_page,
   type WatchedPage,
 } from './support/browser';
+import { distance, pose_of, settle } from './support/camera';
 import { web_dist } from './support/fake_server';
 import { psnr_db, settled_picture, thumbnail } from './support/pictures';
 import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
@@ -50,8 +51,6 @@ async function open_viewer(options?: BrowserContextOptions, url = server.url): P
   return watched;
 }
 
-const settle = (page: Page): Promise<void> => page.evaluate(() => window.catgs!.settled());
-const pose_of = (page: Page): Promise<Pose> => page.evaluate(() => window.catgs!.pose());
 const stats_of = (page: Page): Promise<StatsSnapshot> => page.evaluate(() => window.catgs!.stats());
 
 const patience = { timeout: 60_000, interval: 100 };
@@ -71,10 +70,6 @@ const rounded = (_key: string, value: unknown): unknown =>
 async function size_of(page: Page): Promise<[number, number]> {
   const { width_px, height_px } = await stats_of(page);
   return [width_px, height_px];
-}
-
-function distance(a: Pose, b: Pose): number {
-  return Math.hypot(...a.position.map((v, i) => v - b.position[i]!));
 }
 
 /** Angle between two orientations, rad. */

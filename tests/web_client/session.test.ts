@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, it } from 'vitest';
 import { backoff_ms } from '#client/session/backoff';
-import { greeting_ms, Session, silence_ms } from '#client/session/session';
+import { greeting_ms, silence_ms } from '#client/session/link';
+import { Session } from '#client/session/session';
 import type { SessionState } from '#client/session/state';
 import { card_for } from '#client/ui/wording';
 import { Codec, Error_Code } from '#client/wire/wire';
@@ -40,7 +41,7 @@ beforeEach(() => {
       frame: (header) => frames.push(header.frameId),
       stream_ended: () => {
         streams_ended += 1;
-        session.send_ack({ frameId: 99n });
+        session.send({ case: 'ack', value: { frameId: 99n } });
       },
       stats: () => undefined,
       picked: () => undefined,
@@ -78,7 +79,7 @@ describe('greeting', () => {
   it('says hello first, and nothing else before the welcome', () => {
     session.start();
     session.send_pose(pose(1n));
-    session.request_idr();
+    session.send({ case: 'requestIdr', value: {} });
     expect(last_state()).toEqual({ phase: 'connecting', attempt: 0 });
     socket(0).events.opened();
     expect(socket(0).heard.map((body) => body.case)).toEqual(['hello']);

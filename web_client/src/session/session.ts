@@ -1,20 +1,17 @@
 // The life of a session: hello, welcome, frames, heartbeat, errors, drain, reconnect. It uses neither
 // WebSocket nor the wall clock, so that tests can drive it with fakes.
 import type { Clock, Timers } from '../base/clock';
-import type { OpenSocket, Socket } from '../transport/socket';
+import type { OpenSocket } from '../transport/socket';
 import {
-  decode_server_message,
-  encode_client_message,
   Error_Code,
   wire_version,
-  type AckInit,
   type ClientBody,
   type FrameHeader,
   type HelloInit,
   type Picked,
-  type PickInit,
   type PoseInit,
   type ServerBody,
+  type Incoming,
   type SettingsInit,
   type Stats,
   type StreamConfig,
@@ -22,6 +19,7 @@ import {
   type Error as ServerError,
 } from '../wire/wire';
 import { backoff_ms } from './backoff';
+import { Link } from './link';
 import type { SessionState, WaitCause } from './state';
 
 /** The fields of hello that the session does not know itself. */
@@ -48,25 +46,13 @@ interface SessionEnvironment {
   random: () => number;
 }
 
-export const silence_ms = 3000; // the server speaks at least once a second
-export const greeting_ms = 10_000; // to open the connection and to be answered the first time
 const stable_ms = 5000; // after a connection that lived this long, backoff starts anew
 const keep_alive_ms = 10_000;
 const congested_bytes = 32 * 1024;
 const congestion_poll_ms = 20;
 
-/** One connection. A drain has two: the old one shows pictures until the new one can. */
-interface Link {
-  socket: Socket;
-  opened: boolean;
-  welcome?: Welcome;
-  config?: StreamConfig;
-  welcomed_us: number;
-  heard_us: number;
-  cancel_watch: () => void;
-}
-
 export class Session {
+  /** A drain has two links: the old one shows pictures until the successor can. */
   private link_: Link | undefined;
   private successor_: Link | undefined;
   private successor_attempt_ = 0;
@@ -102,14 +88,15 @@ export class Session {
     this.retry();
   }
 
+  /** Sends to a server that has welcomed this session. Nothing is kept for later. */
+  send(body: ClientBody): void {
+    if (this.link_?.welcome) this.link_.send(body);
+  }
+
   /** The newest pose wins. A congested connection skips older ones. */
   send_pose(pose: PoseInit): void {
     this.last_pose_ = pose;
     this.flush_pose();
-  }
-
-  send_ack(ack: AckInit): void {
-    this.send({ case: 'ack', value: ack });
   }
 
   send_settings(settings: SettingsInit): void {
@@ -121,14 +108,6 @@ export class Session {
   send_path(samples: PoseInit[]): void {
     this.path_ = samples;
     this.send({ case: 'path', value: { samples } });
-  }
-
-  send_pick(pick: PickInit): void {
-    this.send({ case: 'pick', value: pick });
-  }
-
-  request_idr(): void {
-    this.send({ case: 'requestIdr', value: {} });
   }
 
   set_viewport(width_px: number, height_px: number): void {
@@ -164,29 +143,16 @@ export class Session {
     this.cancel_pose_();
     this.cancel_keep_alive_();
     if (this.link_?.welcome) this.listener_.stream_ended();
-    close_link(this.link_);
-    close_link(this.successor_);
+    this.link_?.close();
+    this.successor_?.close();
     this.link_ = this.successor_ = undefined;
   }
 
   private open_link(): Link {
-    const now_us = this.env_.clock.now_us();
-    const link: Link = {
-      opened: false,
-      welcomed_us: 0,
-      heard_us: now_us,
-      cancel_watch: () => undefined,
-      socket: this.env_.open({
-        opened: () => {
-          link.opened = true;
-          link.socket.send(encode_client_message({ case: 'hello', value: this.hello() }));
-        },
-        message: (data) => this.heard(link, data),
-        closed: (_code, reason) =>
-          this.lost(link, link.opened ? 'lost' : 'unreachable', reason),
-      }),
-    };
-    this.watch(link);
+    const link: Link = new Link(this.env_, () => this.hello(), {
+      heard: (incoming) => this.heard(link, incoming),
+      lost: (cause, message) => this.lost(link, cause, message),
+    });
     return link;
   }
 
@@ -198,33 +164,14 @@ export class Session {
         resume: {
           token: this.resume_token_,
           ...(this.last_pose_ && { pose: this.last_pose_ }),
-          ...this.path_ahead(),
+          ...path_ahead(this.path_, this.env_.clock.now_us()),
         },
       }),
     };
   }
 
-  /** The rest of the path, so that any server can go on forecasting by it. */
-  private path_ahead(): { path?: { samples: PoseInit[] } } {
-    const now_us = this.env_.clock.now_us();
-    const next = this.path_.findIndex(({ clientTimeUs }) => Number(clientTimeUs ?? 0n) > now_us);
-    if (next < 0) return {};
-    return { path: { samples: this.path_.slice(Math.max(0, next - 1)) } };
-  }
-
-  /** Ends a link that stays silent for too long. Looks again when the time could be up. */
-  private watch(link: Link): void {
-    const limit_ms = link.welcome ? silence_ms : greeting_ms;
-    const quiet_ms = (this.env_.clock.now_us() - link.heard_us) / 1000;
-    if (quiet_ms >= limit_ms) {
-      this.lost(link, link.opened ? 'silent' : 'unreachable', '');
-      return;
-    }
-    link.cancel_watch = this.env_.timers.after(limit_ms - quiet_ms, () => this.watch(link));
-  }
-
   private lost(link: Link, cause: WaitCause, message: string): void {
-    close_link(link);
+    link.close();
     if (link === this.successor_) {
       this.successor_ = undefined;
       this.open_successor_later();
@@ -247,15 +194,7 @@ export class Session {
     this.cancel_retry_ = this.env_.timers.after(retry_in_ms, () => this.connect());
   }
 
-  private heard(link: Link, data: ArrayBuffer): void {
-    link.heard_us = this.env_.clock.now_us();
-    let incoming;
-    try {
-      incoming = decode_server_message(data);
-    } catch (error) {
-      this.lost(link, 'lost', String(error));
-      return;
-    }
+  private heard(link: Link, incoming: Incoming): void {
     if (incoming.kind === 'frame') {
       if (link === this.successor_) this.succeed(link);
       this.listener_.frame(incoming.header, incoming.payload);
@@ -307,15 +246,15 @@ export class Session {
     if (welcome.config) link.config = welcome.config;
     if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
     if (link === this.link_) this.go_live(link);
-    else if (this.last_pose_) send_on(link, { case: 'pose', value: this.last_pose_ });
+    else if (this.last_pose_) link.send({ case: 'pose', value: this.last_pose_ });
   }
 
   /** Takes over: the successor has its first picture, or the old connection is gone. */
   private succeed(link: Link): void {
     this.listener_.stream_ended();
     if (this.link_) {
-      send_on(this.link_, { case: 'bye', value: {} });
-      close_link(this.link_);
+      this.link_.send({ case: 'bye', value: {} });
+      this.link_.close();
     }
     this.link_ = link;
     this.successor_ = undefined;
@@ -359,7 +298,7 @@ export class Session {
   private flush_pose(): void {
     this.cancel_pose_();
     if (!this.last_pose_ || !this.link_?.welcome) return;
-    if (this.link_.socket.buffered_bytes() > congested_bytes) {
+    if (this.link_.buffered_bytes() > congested_bytes) {
       this.cancel_pose_ = this.env_.timers.after(congestion_poll_ms, () => this.flush_pose());
       return;
     }
@@ -377,19 +316,12 @@ export class Session {
       this.keep_alive();
     });
   }
-
-  private send(body: ClientBody): void {
-    if (this.link_?.welcome) send_on(this.link_, body);
-  }
 }
 
-function send_on(link: Link, body: ClientBody): void {
-  link.socket.send(encode_client_message(body));
-}
-
-function close_link(link: Link | undefined): void {
-  link?.cancel_watch();
-  link?.socket.close();
+/** The rest of the path, so that any server can go on forecasting by it. */
+function path_ahead(path: readonly PoseInit[], now_us: number): { path?: { samples: PoseInit[] } } {
+  const next = path.findIndex(({ clientTimeUs }) => Number(clientTimeUs ?? 0n) > now_us);
+  return next < 0 ? {} : { path: { samples: path.slice(Math.max(0, next - 1)) } };
 }
 
 /** Whether time may cure a refusal. All others need another link, token, scene or program. */

@@ -7,7 +7,6 @@ import {
   type AckSchema,
   type FrameHeader,
   type HelloSchema,
-  type PickSchema,
   type PoseSampleSchema,
   type ServerMessage,
   type SettingsSchema,
@@ -31,12 +30,11 @@ export type ClientBody = NonNullable<MessageInitShape<typeof ClientMessageSchema
 
 // Messages before encoding. Fields that are left out become zeros.
 export type HelloInit = MessageInitShape<typeof HelloSchema>;
-export type PickInit = MessageInitShape<typeof PickSchema>;
 export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
 export type AckInit = MessageInitShape<typeof AckSchema>;
 export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 
-type Incoming =
+export type Incoming =
   | { kind: 'message'; body: ServerBody }
   /** `payload` is a view into the received buffer, not a copy. */
   | { kind: 'frame'; header: FrameHeader; payload: Uint8Array }

@@ -101,10 +101,13 @@ class Client {
         );
         break;
       case 'pick':
-        this.session_.send_pick({
-          id: message.id,
-          origin: wire_vector(message.ray.origin),
-          direction: wire_vector(message.ray.direction),
+        this.session_.send({
+          case: 'pick',
+          value: {
+            id: message.id,
+            origin: wire_vector(message.ray.origin),
+            direction: wire_vector(message.ray.direction),
+          },
         });
         break;
       case 'hidden':
@@ -145,7 +148,7 @@ class Client {
           this.display_.draw(picture, eye_of(renderPose, fovYRad), widthPx, heightPx),
       },
       {
-        ack: (ack) => this.session_.send_ack(ack),
+        ack: (ack) => this.session_.send({ case: 'ack', value: ack }),
         presented: (frame, presented_us) => {
           this.shown_ = frame.header;
           this.metrics_.presented(frame, presented_us);
@@ -157,7 +160,7 @@ class Client {
           });
         },
         dropped: () => this.metrics_.dropped(),
-        key_frame_wanted: () => this.session_.request_idr(),
+        key_frame_wanted: () => this.session_.send({ case: 'requestIdr', value: {} }),
         undecodable: (message) => this.fall_back(message),
       },
     );
