@@ -2,10 +2,10 @@
 """Checks what operators deploy, each subcommand with the tool that will read it in the end.
 
   operations.py prometheus              rules and configurations (promtool), and when alerts fire
-  operations.py grafana                 the dashboard's fields and panels, and that what it needs is provisioned
+  operations.py grafana                 the dashboard's panels, and that what it needs is provisioned
   operations.py haproxy                 both configurations (haproxy -c)
   operations.py systemd                 the unit and its exposure (systemd-analyze)
-  operations.py kubernetes              renders base and overlays (kubectl kustomize), asserts on them and their fields
+  operations.py kubernetes              renders base and overlays (kubectl kustomize) and asserts on them
   operations.py compose                 the compose file: what every service has to have
   operations.py notices                 the notices name every package that the page contains
   operations.py metrics --server FILE   alerts and dashboard name only metrics that FILE serves
@@ -29,7 +29,6 @@ import time
 import urllib.request
 
 import dashboard_check
-import manifest_fields
 
 SOURCE_DIR = pathlib.Path(__file__).resolve().parents[2]
 DEPLOY = SOURCE_DIR / "deploy"
@@ -110,7 +109,7 @@ def check_grafana(_):
     sources = load_yaml((provisioning / "datasources/prometheus.yaml").read_text())[0]["datasources"]
     provider = load_yaml((provisioning / "dashboards/catgs.yaml").read_text())[0]["providers"][0]
     services = load_yaml((DOCKER / "compose.yaml").read_text())[0]["services"]
-    findings = dashboard_check.findings(field_table(), dashboard(), {source["uid"] for source in sources})
+    findings = dashboard_check.findings(dashboard(), {source["uid"] for source in sources})
     grafana = services["grafana"]
     mounted = {inside: outside for outside, inside, _ in (volume.split(":") for volume in grafana["volumes"] if volume.endswith(":ro"))}
     folder = provider["options"]["path"]
@@ -155,21 +154,11 @@ def check_systemd(_):
     return findings
 
 
-def field_table():
-    return load_yaml((SOURCE_DIR / "tests/deploy/manifest_fields.yaml").read_text())[0]
-
-
-def field_findings(where, manifests):
-    table = field_table()
-    return [f"{where}: {finding}" for manifest in manifests for finding in manifest_fields.findings(table, manifest)]
-
-
 def render(kubectl, folder):
     result = subprocess.run([kubectl, "kustomize", folder], capture_output=True, text=True, check=False, timeout=60)
     if result.returncode != 0:
         return None, [f"kubectl kustomize {folder}: {result.stderr.strip()}"]
-    manifests = load_yaml(result.stdout)
-    return {(d["kind"], d["metadata"]["name"]): d for d in manifests}, field_findings(folder, manifests)
+    return {(d["kind"], d["metadata"]["name"]): d for d in load_yaml(result.stdout)}, []
 
 
 def pod_findings(where, spec, drain_s):
@@ -251,7 +240,6 @@ def agones_findings(kubectl):
     spec = template["template"]["spec"]
     findings = pod_findings("overlays/agones", spec, drain_seconds(objects["ConfigMap", "catgs-config"]["data"]["catgs.toml"]))
     allocation = load_yaml((DEPLOY / "kubernetes/overlays/agones/allocation.example.yaml").read_text())[0]
-    findings += field_findings("allocation.example.yaml", [allocation])
     mounted = {v["configMap"]["name"] for v in spec["volumes"] if "configMap" in v}
     names = {c["name"] for c in spec["containers"]}
     wanted = {
