@@ -13,8 +13,8 @@ namespace {
 
 constexpr int close_timeout_s = 2;
 
-// libwebsockets answers pings and drops pongs without a word, so that the kernel is asked how much
-// comes: each segment may cost a read and a pong. Clients send a message in one: see peer.cpp.
+// libwebsockets answers pings and drops pongs without telling us. The kernel says how much came
+// instead: a segment may cost a read and a pong. The rate is that of messages (peer.cpp).
 constexpr double segments_per_second = 600.0;
 constexpr double segment_burst = 1200.0;
 constexpr double segment_bytes = 1024.0;  // a longer one counts as several
@@ -129,7 +129,7 @@ int LwsWebsocket::service_timer() {
   const auto bytes = static_cast<double>(info.tcpi_bytes_received - arrived_.bytes);
   arrived_ = {info.tcpi_data_segs_in, info.tcpi_bytes_received};
   if (arrivals_.take(Clock::now(), std::max(segments, bytes / segment_bytes))) return 0;
-  if (std::exchange(floods_, true)) return -1;  // it has been refused, and does not end
+  if (std::exchange(floods_, true)) return -1;  // it was refused, and goes on
   listener_->on_flood();
   return 0;
 }

@@ -28,7 +28,7 @@ bool PacketRing::push(OutgoingMessage message) {
   return true;
 }
 
-/// Those before a frame are what it is shown by.
+/// A message before a waiting frame stays: the client needs it to show that frame.
 void PacketRing::drop_outdated_messages(Topic newer) {
   const auto last_frame = std::find_if(packets_.rbegin(), packets_.rend(),
                                        [](const Packet& packet) { return packet.frame; });

@@ -15,7 +15,7 @@ REQUESTS, SESSIONS, MESSAGES = ("catgs_requests_refused_total", "catgs_sessions_
 TEXT, FRAGMENT, BINARY, CLOSE, PING, PONG = 0x81, 0x02, 0x82, 0x88, 0x89, 0x8a  # first bytes of frames, RFC 6455
 BAD_MESSAGE, UNAUTHORIZED, UNKNOWN_SCENE, RATE_LIMITED = 1, 2, 3, 7  # of proto/catgs.proto
 NOTHING = rb"\Z"
-FLOOD_FRAMES = 400_000  # of 6 bytes: what a connection may send in 2 s, and half of what cuts it off
+FLOOD_FRAMES = 400_000  # of 6 bytes: 2.3 MiB, where 1.8 may come within a second
 SIDECAR = "/api/scenes/any/sidecar"
 HIDDEN = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"  # where the body of another request is
 
@@ -79,8 +79,8 @@ def closed(name: str, frames: bytes, code: int, why: str, error: int | None = No
 
 
 def flood(name: str, first: int) -> Misdeed:
-    """Of empty control frames. libwebsockets 4.1.6 writes its answer over bytes that came with the
-    request, so that a fragment comes first, which nothing in it matters of."""
+    """Of empty control frames. The fragment before them takes the place of the bytes that came with the
+    request and that libwebsockets 4.1.6 writes its answer over."""
     return closed(name, frame(FRAGMENT, b"x" * 1000) + frame(first, b"") * FLOOD_FRAMES, 1008, "too many messages",
                   RATE_LIMITED, bad=False)
 
