@@ -3,7 +3,7 @@ const most_bytes = 512; // that the wire takes
 
 /** Servers close the connection of a client that sends any other text as its token. */
 function can_be_token(text: string): boolean {
-  const controls = [...text.slice(0, most_bytes)].some((c) => c < ' ' || c === '\x7f');
+  const controls = Array.from(text.slice(0, most_bytes)).some((c) => c < ' ' || c === '\x7f');
   return !controls && new TextEncoder().encode(text).length <= most_bytes;
 }
 
