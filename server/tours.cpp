@@ -86,7 +86,7 @@ void check_stop(const JsonField& stop) {
   if (const auto target = stop.find("look_at"))
     static_cast<void>(target->place());
   else
-    static_cast<void>(stop.at("orientation").numbers(4));
+    static_cast<void>(stop.at("orientation").orientation());
   if (const auto marker = stop.find("marker")) static_cast<void>(marker->place());
   check_number(stop.find("fov_deg"), 5.0f, 160.0f);
   check_number(stop.find("stay_s"), 0.0f, 3600.0f);

@@ -42,17 +42,12 @@ glm::vec3 parse_up(const JsonField& field) {
 Sidecar::StartPose parse_start_pose(const JsonField& field) {
   Sidecar::StartPose pose;
   pose.position = field.at("position").place();
-  const auto orientation = field.find("orientation");
   if (const auto target = field.find("look_at")) {
-    if (orientation) field.fail("has both 'look_at' and 'orientation'", "keep one");
+    if (field.find("orientation")) field.fail("has both 'look_at' and 'orientation'", "keep one");
     pose.look_at = target->place();
     if (*pose.look_at == pose.position) target->fail("is the position itself");
   } else {
-    const std::vector<float> q = field.at("orientation").numbers(4);
-    pose.orientation = glm::quat(q[3], q[0], q[1], q[2]);
-    if (std::abs(glm::length(pose.orientation) - 1.0f) > 0.01f)
-      orientation->fail("is no unit quaternion x, y, z, w");
-    pose.orientation = glm::normalize(pose.orientation);
+    pose.orientation = field.at("orientation").orientation();
   }
   return pose;
 }

@@ -116,6 +116,13 @@ std::vector<float> JsonField::numbers(std::size_t expected_size) const {
   return all;
 }
 
+glm::quat JsonField::orientation() const {
+  const std::vector<float> q = numbers(4);
+  const glm::quat orientation(q[3], q[0], q[1], q[2]);
+  if (std::abs(glm::length(orientation) - 1.0f) > 0.01f) fail("is no unit quaternion x, y, z, w");
+  return glm::normalize(orientation);
+}
+
 glm::vec3 JsonField::vec3() const {
   const std::vector<float> v = numbers(3);
   return {v[0], v[1], v[2]};

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
 
@@ -42,6 +43,8 @@ class JsonField {
   [[nodiscard]] glm::vec3 place() const;
   /// `at`, which this field holds in another form than place() reads.
   [[nodiscard]] glm::vec3 as_place(const glm::vec3& at) const;
+  /// A unit quaternion x, y, z, w, to one percent; normalised.
+  [[nodiscard]] glm::quat orientation() const;
   [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
 
   [[nodiscard]] const nlohmann::json& value() const { return *value_; }
