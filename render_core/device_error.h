@@ -10,9 +10,9 @@
 
 namespace catgs {
 
-/// A device refused or failed, thrown where things are set up; on the frame path RenderStatus says
-/// the same. After out_of_memory the device serves others; after device_failed it may be lost until
-/// the process ends.
+/// A device refused or failed. Thrown during set-up; on the frame path RenderStatus says the same.
+/// After out_of_memory the device still serves others; after device_failed it may be lost until the
+/// process ends.
 class DeviceError : public std::runtime_error {
  public:
   DeviceError(RenderStatus::Code code, const std::string& message)
@@ -24,7 +24,7 @@ class DeviceError : public std::runtime_error {
   RenderStatus::Code code_;
 };
 
-/// What ended a frame, for who asked for it. A host without memory has no device that failed.
+/// Why a frame failed, as the caller sees it. A host out of memory is not a failed device.
 inline RenderStatus status_of(const std::exception& error) {
   if (const auto* device = dynamic_cast<const DeviceError*>(&error))
     return {device->status_code(), error.what()};
@@ -33,8 +33,9 @@ inline RenderStatus status_of(const std::exception& error) {
   return {RenderStatus::Code::device_failed, error.what()};
 }
 
-/// The wanted CUDA devices cannot be used now: none is found, too old, full, failed, not built for.
-/// Some of that mends without a change of the input.
+/// The wanted CUDA devices cannot be used now: none was found, or one is too old, full, broken, or
+/// of an architecture that this build has no code for. Some of these causes go away without a
+/// change of the input.
 class DevicesUnusable : public InputError {
  public:
   using InputError::InputError;

@@ -18,7 +18,8 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
     std::optional<FrameView> drawn = draw(plan);
     if (!drawn) {
       assert(plan.kind == FrameKind::sub);
-      // Without a window: where one comes after the other, no frame after this is drawn in vain.
+      // The key frame that replaces the sub-frame gets no window. Where this happens to frame after
+      // frame, none is drawn in vain.
       groups_.forget();
       plan = groups_.plan(request.camera, std::nullopt, depths_);
       drawn = draw(plan);
@@ -39,7 +40,7 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
   }
 }
 
-/// What the lists of the frame cover: its own picture alone, unless they are for sub-frames too.
+/// Pipelines other than catgs list for the picture of the frame alone.
 FramePlan FrameDriver::plan(const FrameRequest& request) {
   const Camera& camera = request.camera;
   if (settings_.pipeline == Pipeline::catgs)

@@ -10,13 +10,13 @@
 namespace catgs {
 
 /// The part of View::render() that all cores share. It decides whether a frame is a key frame or a
-/// sub-frame, draws a sub-frame again as a key frame where its lists are not enough, learns from
-/// the statistics, and turns what is thrown into a RenderStatus. One per View.
+/// sub-frame. It draws a sub-frame again as a key frame where its lists are not enough. It learns
+/// from the statistics and turns exceptions into a RenderStatus. One per View.
 class FrameDriver {
  public:
-  /// Draws one frame by its plan and waits for it. The statistics need no kind and no window. An
-  /// empty result means that the lists of a sub-frame are not enough; key frames always succeed or
-  /// throw.
+  /// Draws one frame by its plan and waits for it. Need not fill in kind and window of the
+  /// statistics. An empty result means that the lists of a sub-frame are not enough; key frames
+  /// always succeed or throw.
   using Draw = std::function<std::optional<FrameView>(const FramePlan&)>;
   /// Drops what a core keeps from frame to frame, after a failure.
   using Forget = std::function<void()>;

@@ -1,3 +1,4 @@
+#include <cassert>
 #include <string>
 #include <utility>
 
@@ -33,6 +34,7 @@ void check(const RendererOptions& options) {
 
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
                            const RendererOptions& options) {
+  assert(cloud && cloud->sizes_agree());
   check(options);
   const auto pool = [&options] {
     return options.pool ? options.pool : std::make_shared<ThreadPool>();

@@ -29,13 +29,13 @@ class ThreadPool;
 enum class Pipeline {
   vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
   exact,    // exact ellipse/tile culling; the same image as the reference
-  catgs,    // the paper's: key frames (the image of `exact`) and sub-frames from their caches
+  catgs,    // the paper's: key frames (same image as `exact`), then sub-frames from their caches
 };
 
 enum class PixelFormat {
   rgb_f32,  // one plane, 3 floats a pixel, display-referred, clamped to [0, 1]
-  // Three planes, 8 bit, BT.709 limited range (the encoder's food). 4:2:0 with chroma sited at the
-  // centre of its 2x2 pixels, as in JPEG; H.264 says so by chroma_sample_loc_type 1.
+  // Three planes, 8 bit, BT.709 limited range, as encoders take them. 4:2:0 with chroma sited at
+  // the centre of its 2x2 pixels, as in JPEG; H.264 calls this chroma_sample_loc_type 1.
   i420,
 };
 
@@ -47,10 +47,11 @@ inline constexpr std::size_t stage_count = 5;
 inline constexpr std::array<std::string_view, stage_count> stage_names = {"project", "bin", "sort",
                                                                           "blend", "convert"};
 
-/// By which depths sub-frames blend. Caches fix which Gaussians a tile blends, not their order.
+/// The depths by which sub-frames blend. The caches fix which Gaussians a tile blends, not their
+/// order.
 enum class BlendOrder {
-  fresh,  // their own
-  key,    // those of their key frame, the paper's way: cheaper, but wrong once the view turned
+  fresh,  // those of the frame itself
+  key,    // those of the key frame, as in the paper: cheaper, but wrong once the view has turned
 };
 
 struct FrameStats {
@@ -60,17 +61,17 @@ struct FrameStats {
   std::uint32_t list_max = 0;            // longest tile list
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
-  std::uint64_t tasks = 0;               // parts that the tiles were blended in
+  std::uint64_t tasks = 0;               // parts into which the tiles were cut for the blend
   std::uint32_t giants = 0;  // CUDA core: Gaussians of the group that turns move far in lists
-  std::uint32_t uncarried_lists = 0;  // CUDA core: with more of those than could be moved
+  std::uint32_t uncarried_lists = 0;  // CUDA core: lists with more giants than could be moved
   // Pipeline::catgs
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
-  // Of visible Gaussians deeper than speculation_min_depth(): see SceneDepths.
+  // Over visible Gaussians deeper than speculation_min_depth(): see SceneDepths.
   float nearest_depth = 0;       // world units
   float mean_inverse_depth = 0;  // 1 / world units
-  // Of the drawing that succeeded: what was drawn before for lack of room, or as a sub-frame that a
-  // watched Gaussian came into, is not in them.
+  // Times of the drawing that succeeded. A drawing repeated for lack of room, or because a watched
+  // Gaussian came into view, is not counted.
   std::array<float, stage_count> stage_ms{};
 
   [[nodiscard]] float total_ms() const {
@@ -81,7 +82,7 @@ struct FrameStats {
 struct FrameRequest {
   Camera camera;
   glm::vec3 background{0.0f};
-  std::optional<Forecast> forecast{};  // Pipeline::catgs; without one no sub-frame follows
+  std::optional<Forecast> forecast{};  // Pipeline::catgs; without it no sub-frame follows
 };
 
 struct Plane {
@@ -109,16 +110,17 @@ struct RenderStatus {
 struct ViewSettings {
   Pipeline pipeline = Pipeline::exact;
   PixelFormat format = PixelFormat::rgb_f32;
-  MemorySpace space = MemorySpace::host;  // of rgb_f32; device: stay where the core made it
+  MemorySpace space = MemorySpace::host;  // of rgb_f32; device: it stays on the device
   std::uint64_t max_list_entries = std::uint64_t{64} << 20;  // bounds the memory of tile lists
   bool count_pairs = false;              // fill FrameStats::blended_pairs; slower
   SpeculationSettings speculation{};     // Pipeline::catgs
   BlendOrder order = BlendOrder::fresh;  // Pipeline::catgs
-  bool colour_cache = true;              // Pipeline::catgs: colours are kept while they hold
+  bool colour_cache = true;              // Pipeline::catgs: reuse colours while accurate
   bool split_tasks = true;               // CUDA core: long tiles are blended in several parts
 };
 
-/// What every core refuses before it renders: sizes, focal length, near plane or pose out of range.
+/// The check that every core makes first: sizes, focal length, near plane and pose must be in
+/// range.
 RenderStatus check_request(const FrameRequest& request, PixelFormat format);
 
 class View {
@@ -132,8 +134,8 @@ class View {
   /// may change from frame to frame (i420 needs even sides). On failure `frame` is untouched.
   virtual RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept = 0;
 
-  /// Entries in the list of each tile of the last frame, row by row; nothing where
-  /// the core does not tell. For analysis, not for every frame: it may wait for the device.
+  /// Length of each tile's list in the last frame, row by row; empty where the core does not tell.
+  /// For analysis, not for every frame: it may wait for the device.
   [[nodiscard]] virtual std::vector<std::uint32_t> tile_loads() const { return {}; }
 
   /// Memory of this View (caches, lists, image) where its core renders, without the scene.
@@ -154,9 +156,9 @@ class Renderer {
 
   /// For people: "CPU, AVX3_DL, 2 threads", "CUDA, 2 x NVIDIA H200".
   [[nodiscard]] virtual std::string description() const = 0;
-  /// Bytes of the scene's copy, of which each device holds one.
+  /// Bytes of the scene on one device; each device holds its own copy.
   [[nodiscard]] virtual std::size_t scene_bytes() const = 0;
-  /// Any thread. Throws where the device has no room left for it.
+  /// May be called from any thread. Throws where the device has no room left for the View.
   [[nodiscard]] virtual std::unique_ptr<View> make_view(const ViewSettings& settings) = 0;
 };
 
@@ -169,21 +171,21 @@ struct RendererOptions {
   std::shared_ptr<DeviceSet> devices{};  // CUDA core; null: device 0
 };
 
-/// Refuses options that contradict each other, as make_renderer() does: before a large scene is
+/// Refuses options that contradict each other, as make_renderer() does, but before a large scene is
 /// read. Throws InputError.
 void check(const RendererOptions& options);
 
 struct MadeRenderer {
   std::unique_ptr<Renderer> renderer;
-  std::string reason;  // why this core was chosen, for people
+  std::string reason;  // why this core was chosen, for people to read
 };
 
 /// Instruction sets that the CPU core can use on this machine, best first; the last one, "SCALAR",
 /// uses one lane.
 std::vector<std::string_view> simd_targets();
 
-/// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run, and
-/// where a wanted device does not exist.
+/// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run or a
+/// wanted device does not exist.
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
                            const RendererOptions& options = {});
 

@@ -1,4 +1,4 @@
-# Run at every build: writes OUTPUT only when the commit has changed, so that nothing is compiled
+# Run at every build. Writes OUTPUT only when the commit has changed, so that nothing is compiled
 # without need.
 execute_process(COMMAND git describe --always --dirty --abbrev=12 --exclude=*
                 WORKING_DIRECTORY ${SOURCE_DIR} OUTPUT_VARIABLE commit RESULT_VARIABLE result

@@ -12,7 +12,7 @@
 namespace catgs {
 namespace {
 
-/// Numbers that cannot be negative, of the program and of all its commands.
+/// Options of the program and of all its commands that take no negative numbers refuse them.
 void refuse_negative_numbers(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     if (!option->get_type_name().starts_with("UINT")) continue;
@@ -29,12 +29,12 @@ std::vector<std::string> option_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options())
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  for (const CLI::App* command : app.get_subcommands())  // those that were given
+  for (const CLI::App* command : app.get_subcommands())  // the commands that were given
     for (std::string& name : option_names(*command)) names.push_back(std::move(name));
   return names;
 }
 
-/// Throws where a command is due and a word that is none stands in its place.
+/// Throws where a command is required and an unknown word stands in its place.
 void refuse_unknown_command(const CLI::App& app) {
   const std::vector<std::string> left = app.remaining(true);
   if (left.empty() || left.front().starts_with('-')) return;
@@ -47,7 +47,8 @@ void refuse_unknown_command(const CLI::App& app) {
                    suggest_name(left.front(), names, "--help lists them"));
 }
 
-/// The first word that nothing takes; an option before others, as those are probably its values.
+/// Names the first unknown word, options before others, because the others are probably values of
+/// unknown options.
 [[noreturn]] void refuse_unknown(const CLI::App& app, int argc, const char* const* argv) {
   const std::vector<std::string> left = app.remaining(true);
   std::string first;

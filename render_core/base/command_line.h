@@ -4,10 +4,10 @@
 
 namespace catgs {
 
-/// app.parse() for every program of ours. Where CLI11 takes -5 for a huge unsigned number, names
-/// the words behind an unknown option before it, or says of an unknown command that one is
-/// required, this throws InputError: the word, what is wrong with it, the nearest one that there
-/// is. Everything else is as CLI11 has it.
+/// app.parse() for all our programs, with better errors where CLI11's mislead. CLI11 takes -5 for a
+/// huge unsigned number, names the words behind an unknown option before the option, and answers an
+/// unknown command with "a command is required". Here InputError names the word, what is wrong with
+/// it, and the nearest known one. Everything else is as in CLI11.
 void parse_command_line(CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace catgs

@@ -1,6 +1,7 @@
 #include "render_core/base/device_set.h"
 
 #include <algorithm>
+#include <cassert>
 #include <charconv>
 #include <stdexcept>
 
@@ -44,6 +45,7 @@ DeviceSet::Place::~Place() {
 }
 
 DeviceSet::Place DeviceSet::take(std::span<const int> devices) {
+  assert(!devices.empty());
   const std::lock_guard lock(mutex_);
   const auto load = [this](int index) {
     return std::pair(loads_[index] + mean_load_ * views_since_[index], views_[index]);

@@ -12,18 +12,18 @@
 
 namespace catgs {
 
-/// Which CUDA devices Renderers use, and how many Views live on each. Renderers that share one (a
-/// server's, one per scene) spread their Views together. Knows no CUDA. Thread-safe.
+/// Which CUDA devices Renderers use, and how many Views live on each. Renderers that share a set
+/// (one per scene of a server) spread their Views over it together. Contains no CUDA. Thread-safe.
 class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
  public:
-  /// Indices as CUDA numbers the devices that it sees; empty: all that can be used.
+  /// Takes the indices by which CUDA numbers the devices that it sees; empty: all usable ones.
   explicit DeviceSet(std::vector<int> wanted = {0}) : wanted_(std::move(wanted)) {}
 
   [[nodiscard]] bool all() const { return wanted_.empty(); }
-  /// The wanted ones where devices 0 to count - 1 are. Throws InputError when one is missing.
+  /// The wanted ones of the devices 0 to count - 1. Throws InputError when one is missing.
   [[nodiscard]] std::vector<int> among(int count) const;
 
-  /// A View's place on a device; its end gives it back.
+  /// A View's place on a device; its destructor gives the place back.
   class Place {
    public:
     Place(Place&& other) noexcept = default;
@@ -36,17 +36,17 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
         : set_(std::move(set)), device_(device), measurement_(measurement) {}
     std::shared_ptr<DeviceSet> set_;  // null: moved from
     int device_;
-    std::uint64_t measurement_;  // the last one before it
+    std::uint64_t measurement_;  // the last set_loads() before this Place was taken
   };
-  /// A place on the least loaded of `devices` (not empty). Views whose load nobody has told count
-  /// as much as the others do on average, so that without set_loads() it is the device with the
-  /// fewest; among equally loaded ones it is that too, then the first.
+  /// A place on the least loaded of `devices` (not empty). A View without a measured load counts as
+  /// much as the average View. Without set_loads() the choice is therefore the device with the
+  /// fewest Views. Equal loads are decided by the fewest Views, then by the order of `devices`.
   [[nodiscard]] Place take(std::span<const int> devices);
-  /// How much the Views of each device were measured to keep it busy lately, in devices: 0.5 is
-  /// half of its time. A device that is not named is idle.
+  /// Sets the measured load of each device: the share of its time that its Views kept it busy
+  /// lately, 0.5 for half. Devices that are not named count as idle.
   void set_loads(std::map<int, double> loads);
 
-  /// Has `device` counted by views() from now on, Views or none.
+  /// Makes views() list `device` from now on, even without Views.
   void add(int device);
   /// Live Views by device.
   [[nodiscard]] std::map<int, int> views() const;
@@ -56,14 +56,14 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
   mutable std::mutex mutex_;
   std::map<int, int> views_;
   std::map<int, double> loads_;
-  std::map<int, int> views_since_;  // live ones that are not in them yet
+  std::map<int, int> views_since_;  // live Views taken since then, not yet measured
   double mean_load_ = 1.0;          // of a View
   std::uint64_t measurements_ = 0;
 };
 
-/// The value of a flag --device: "all" -> {}, "0,2" -> {0, 2}. Throws std::invalid_argument.
+/// Parses the value of --device: "all" -> {}, "0,2" -> {0, 2}. Throws std::invalid_argument.
 std::vector<int> parse_devices(std::string_view text);
-/// The same backwards.
+/// The inverse of parse_devices().
 std::string devices_text(std::span<const int> devices);
 
 }  // namespace catgs

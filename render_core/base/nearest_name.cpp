@@ -8,7 +8,7 @@
 namespace catgs {
 namespace {
 
-/// Letters to be put in, taken away, changed or swapped with their neighbour.
+/// Number of letters to insert, delete, change or swap with their neighbour.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1), before, two_before;
   std::iota(row.begin(), row.end(), 0);

@@ -6,10 +6,10 @@
 
 namespace catgs {
 
-/// The one of `names` that was probably meant by `unknown`: at most a third of its letters would
-/// have to be put in, taken away, changed or swapped with their neighbour. One that only goes on
-/// behind a dash is nearer than others: "--token" means --token-file, not --open. Empty where none
-/// is so near.
+/// The one of `names` that `unknown` was probably meant to be. At most a third of its letters may
+/// have to be inserted, deleted, changed or swapped with their neighbour. A name that continues
+/// `unknown` after a dash counts as nearer: "--token" means --token-file, not --open. Empty where
+/// no name is near enough.
 std::string nearest_name(std::string_view unknown, const std::vector<std::string>& names);
 
 /// The remedy for an unknown name: "did you mean NEAREST?", or `otherwise` where none is near.

@@ -14,14 +14,14 @@ namespace fs = std::filesystem;
   throw InputError(path.string(), "", why, "does the folder exist, and is there space?");
 }
 
-/// Neither a file nor a folder: a pipe or a device, which nothing may take the place of.
+/// Neither a file nor a folder: a pipe or a device, which must not be replaced by a file.
 bool is_special(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
-/// Where a symbolic link leads, which stays one.
+/// The target of a symbolic link, so that the link itself survives.
 fs::path without_links(const fs::path& path) {
   std::error_code error;
   fs::path target = fs::canonical(path, error);

@@ -5,9 +5,9 @@
 
 namespace catgs {
 
-/// A file that is written whole or not at all: it is called by its name with `.part` appended until
-/// finish(), so what was there before stays where the writing fails. Pipes and devices are written
-/// as they are. Throws InputError.
+/// A file that is written whole or not at all. It carries the suffix `.part` until finish(), so a
+/// failed write leaves the previous file in place. Pipes and devices are written directly. Throws
+/// InputError.
 class PartFile {
  public:
   explicit PartFile(const std::filesystem::path& path);
@@ -16,7 +16,7 @@ class PartFile {
   PartFile& operator=(const PartFile&) = delete;
 
   [[nodiscard]] std::ostream& stream() { return file_; }
-  /// Gives the file its name.
+  /// Renames the file to its final name.
   void finish();
 
  private:
@@ -24,8 +24,8 @@ class PartFile {
   std::ofstream file_;
 };
 
-/// Throws InputError where no PartFile of this name could be begun: to be asked before work that
-/// only ends in one. Leaves everything as it was.
+/// Throws InputError where a PartFile of this name could not be opened. Call it before long work
+/// whose result goes there. Changes nothing on disk.
 void check_writable(const std::filesystem::path& path);
 
 }  // namespace catgs

@@ -2,10 +2,10 @@
 
 #include <cstdint>
 
-// What gives the same bits on every machine, for poses and scenes made from a seed: integer random
-// numbers, and the part of sine and cosine that does not depend on the precision. (The C library's
-// sin differs by a last bit between versions; the distributions of <random> between standard
-// libraries.)
+// Functions with the same bits on every machine, for poses and scenes made from a seed. They are
+// integer random numbers, and the part of sine and cosine that does not depend on the precision.
+// The C library's sin differs in the last bit between versions; the distributions of <random>
+// differ between standard libraries.
 namespace catgs {
 
 /// SplitMix64's finaliser (Steele, Lea, Flood 2014): a bijection that spreads every input bit.
@@ -34,7 +34,7 @@ struct SinCos {
   T cos;
 };
 
-/// Sine and cosine of an angle from those of the angle less `quarters` right angles.
+/// Sine and cosine of an angle, from those of the same angle minus `quarters` right angles.
 template <class T>
 constexpr SinCos<T> add_quarters(const SinCos<T>& rest, std::int64_t quarters) {
   switch (quarters & 3) {

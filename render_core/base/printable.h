@@ -16,7 +16,7 @@ struct Utf8Character {
   std::size_t bytes = 0;  // 0: there is none
 };
 
-/// What `text` begins with.
+/// The first character of `text`.
 inline Utf8Character first_character(std::string_view text) {
   constexpr std::array<std::uint32_t, 5> least = {0, 0, 0x80, 0x800, 0x10000};  // by bytes
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
@@ -34,10 +34,10 @@ inline Utf8Character first_character(std::string_view text) {
   return {code_point, bytes};
 }
 
-/// Does a reader see this character where it stands? Not those of the general categories Cc, Cf, Zl
-/// and Zp (Unicode 16.0, UnicodeData.txt): controls move the cursor and change colours, format
-/// characters turn the direction of text round or are invisible, separators begin lines. Nor the
-/// noncharacters (The Unicode Standard, 23.7).
+/// True for a code point that a reader sees where it stands. False for the general categories Cc,
+/// Cf, Zl and Zp (Unicode 16.0, UnicodeData.txt). Controls move the cursor and change colours;
+/// format characters reverse the direction of text or are invisible; separators begin lines. False
+/// also for the noncharacters (The Unicode Standard, 23.7).
 constexpr bool is_printable(std::uint32_t code_point) {
   struct Range {
     std::uint32_t first, last;
@@ -57,8 +57,8 @@ constexpr bool is_printable(std::uint32_t code_point) {
   });
 }
 
-/// Text of others for a terminal or a line of a log: what is not printable and what is not UTF-8
-/// come out by their bytes, as \\x1b. Text that went through it stays as it is.
+/// Makes foreign text safe for a terminal or a line of a log. Bytes that are not UTF-8 or not
+/// printable become escapes such as \\x1b. Escaping twice changes nothing more.
 inline std::string printable(std::string_view text) {
   constexpr std::string_view digits = "0123456789abcdef";
   std::string out;
@@ -79,7 +79,7 @@ inline std::string printable(std::string_view text) {
   return out;
 }
 
-/// At most `max_bytes`, of UTF-8 whole characters.
+/// The longest prefix of whole UTF-8 characters with at most `max_bytes` bytes.
 inline std::string shortened(std::string_view text, std::size_t max_bytes) {
   const auto continues_character = [&](std::size_t i) {
     return (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -10,7 +11,7 @@
 
 namespace catgs {
 
-/// What RadixSorter sorts by 64 bits: an unsigned `key` and what it belongs to.
+/// An element for RadixSorter, 64 bits in all: an unsigned `key` and the index that it belongs to.
 struct CodedIndex {
   std::uint64_t key;
   std::uint32_t value;
@@ -26,6 +27,7 @@ class RadixSorter {
   void sort(std::vector<Element>& data, std::vector<Element>& scratch, int key_bits,
             ThreadPool& pool) {
     const std::size_t count = data.size();
+    assert(scratch.size() == count);
     if (count < 2) return;
     const std::size_t parts =
         std::min<std::size_t>(static_cast<std::size_t>(pool.threads()), 1 + count / min_part);
@@ -60,8 +62,8 @@ class RadixSorter {
     return static_cast<std::size_t>(e.key >> shift) & (digits - 1);
   }
 
-  /// Turns counts into the first position of each (digit, part); false when all elements share one
-  /// digit, so that there is nothing to move.
+  /// Turns counts into the first position of each (digit, part). False when all elements share one
+  /// digit, so that nothing has to move.
   bool counts_to_offsets(std::size_t parts, std::size_t count) {
     std::uint32_t offset = 0;
     for (std::size_t d = 0; d < digits; ++d) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <exception>
 #include <utility>
 
@@ -23,7 +24,7 @@ struct ThreadPool::Loop {
   std::atomic<std::size_t> next{0};
   int helpers = 0;  // workers inside run(); guarded by the pool's mutex
   std::condition_variable left;
-  std::exception_ptr failure;  // the first; guarded by the pool's mutex
+  std::exception_ptr failure;  // the first one; guarded by the pool's mutex
 
   void run(std::mutex& mutex) {
     try {
@@ -37,6 +38,7 @@ struct ThreadPool::Loop {
 };
 
 ThreadPool::ThreadPool(int threads) : threads_(threads > 0 ? threads : processors()) {
+  assert(threads >= 0);
   workers_.reserve(static_cast<std::size_t>(threads_));
   for (int i = 0; i < threads_; ++i)
     workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
@@ -49,6 +51,7 @@ ThreadPool::~ThreadPool() {
 }
 
 void ThreadPool::submit(std::function<void()> task) {
+  assert(task);
   {
     const std::lock_guard lock(mutex_);
     tasks_.push_back(std::move(task));
@@ -97,7 +100,7 @@ void ThreadPool::work(const std::stop_token& stop) {
       lock.unlock();
       loop->run(mutex_);
       lock.lock();
-      // Its indices are handed out: nobody else needs to look at it.
+      // All its indices are handed out, so no other worker needs to look at it.
       std::erase(loops_, loop);
       if (--loop->helpers == 0) loop->left.notify_all();
     } else if (stop.stop_requested()) {

@@ -10,17 +10,17 @@
 
 namespace catgs {
 
-/// Those that this process may run on, not all of the machine: std::thread::hardware_concurrency()
-/// counts the latter with glibc 2.35 and later.
+/// The processors that this process may run on, not all of the machine.
+/// std::thread::hardware_concurrency() counts the whole machine with glibc 2.35 and later.
 int processors();
 
-/// Threads shared by rendering and encoding. Work is parallel across tasks first: a frame's inner
-/// loops (`parallel_for`) are helped only by workers that have nothing else to do, so that with as
-/// many sessions as threads each frame stays on its own core.
+/// Threads shared by rendering and encoding. Work is parallel across tasks first: only workers that
+/// have nothing else to do help with a frame's inner loops (`parallel_for`). With as many sessions
+/// as threads, each frame therefore stays on its own core.
 class ThreadPool {
  public:
-  /// Starts `threads` workers for tasks; a loop runs on at most `threads` threads, its caller
-  /// included. 0: one per core.
+  /// Starts `threads` workers for tasks; 0 means one per core. A loop runs on at most `threads`
+  /// threads, its caller included.
   explicit ThreadPool(int threads = 0);
   ~ThreadPool();  // finishes submitted tasks, then joins
   ThreadPool(const ThreadPool&) = delete;
@@ -32,9 +32,9 @@ class ThreadPool {
   void submit(std::function<void()> task);
 
   /// Calls body(i) once for every i in [0, count), on the calling thread and on idle workers, and
-  /// returns when all calls have ended. Indices are handed out one by one: make a call worth a few
-  /// microseconds. May be called from inside a task. When a call throws, indices not yet handed out
-  /// are dropped and the first exception is thrown again here. Allocates nothing.
+  /// returns when all calls have ended. Indices are handed out one by one, so a call should take a
+  /// few microseconds or more. May be called from inside a task. When a call throws, the remaining
+  /// indices are dropped and the first exception is rethrown here. Allocates nothing.
   template <class Body>
   void parallel_for(std::size_t count, const Body& body) {
     run_loop(count,
@@ -42,7 +42,7 @@ class ThreadPool {
   }
 
  private:
-  /// A borrowed callable: std::function would allocate for every frame stage.
+  /// A borrowed callable. std::function would allocate for every frame stage.
   struct BodyRef {
     const void* body;
     void (*call)(const void* body, std::size_t i);

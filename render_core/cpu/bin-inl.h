@@ -18,11 +18,11 @@ HWY_BEFORE_NAMESPACE();
 namespace catgs {
 namespace HWY_NAMESPACE {
 
-/// Tile rows tested at once: few, because most splats touch two or three.
+/// Tile rows tested at once. Few, because most splats touch two or three.
 using RowLanes = Lanes<hn::CappedTag<float, 4>>;
 
 /// Appends to `runs` the tiles that a splat's ellipse or trail meets in RowLanes::count rows of
-/// tiles from `row` on; returns the new end. `centre`: from the grid's first pixel.
+/// tiles from `row` on; returns the new end. `centre`: relative to the grid's first pixel.
 template <class Shape>
 HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, Vec2<float> centre, int row,
                               std::uint32_t slot, TileRun* runs) {
@@ -33,7 +33,8 @@ HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, Vec2<float> ce
   const L height(side - 1.0f + 2.0f * s.growth_px);
   const Interval<L> columns = columns_in_band(convert<L>(shape), low_y, low_y + height);
   const float slack = static_cast<float>(listing_slack_px) + s.growth_px;
-  // Pixel columns with centres inside, then tiles, both inside the splat's box of tiles.
+  // Pixel columns whose centres are inside, then tiles. Both are limited to the splat's box of
+  // tiles.
   const L first =
       max(ceil(columns.low + L(centre.x - 0.5f - slack)), L(static_cast<float>(s.tile_x) * side));
   const L last = min(floor(columns.high + L(centre.x - 0.5f + slack)),
@@ -56,7 +57,7 @@ HWY_INLINE TileRun* list_rows(const Splat& s, const Shape& shape, Vec2<float> ce
   return runs;
 }
 
-/// Of a Splat or a SplatPath.
+/// The ellipse of a Splat or a SplatPath.
 template <class S>
 HWY_INLINE Ellipse<float> ellipse_of(const S& s) {
   return make_ellipse<float>({s.whitening_xx, s.whitening_xy, s.whitening_yy},

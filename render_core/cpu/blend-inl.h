@@ -17,13 +17,13 @@ HWY_BEFORE_NAMESPACE();
 namespace catgs {
 namespace HWY_NAMESPACE {
 
-/// Splats that are blended together: of each block all those that meet it, so that its pixels stay
-/// in registers. A bit each in a word.
+/// Splats that are blended together, a bit of a word each. Each block takes those that meet it,
+/// while its pixels stay in registers.
 inline constexpr std::size_t batch_size = 64;
 
-/// Splats as culling reads them, by field.
+/// Splats as culling reads them: an array for each field.
 struct Batch {
-  // Whitened coordinates of the origin, and what they grow by per pixel; see Whitening. Aligned, as
+  // Whitened coordinates of the origin and their growth per pixel; see Whitening. Aligned, because
   // whole registers are stored.
   alignas(64) float u[batch_size];
   alignas(64) float v[batch_size];
@@ -35,14 +35,14 @@ struct Batch {
   std::size_t count = 0;
 };
 
-/// Fills the batch from the front of `list`. `origin`: of its coordinates, px.
+/// Fills the batch from the front of `list`. `origin`: of the batch's coordinates, px.
 HWY_INLINE void load(const BlendTask& task, std::span<const DepthSlot> list, Vec2<float> origin,
                      Batch& batch) {
   const hn::ScalableTag<float> d;
   alignas(64) float fields[2][4 * batch_size];
   batch.count = std::min(list.size(), batch_size);
   for (std::size_t i = 0; i < batch.count; ++i) {
-    if (i + batch_size < list.size())  // splats lie scattered
+    if (i + batch_size < list.size())  // splats are scattered in memory
       hwy::Prefetch(&task.splats[list[i + batch_size].value]);
     const Splat& s = task.splats[list[i].value];
     batch.splats[i] = &s;
@@ -59,7 +59,7 @@ HWY_INLINE void load(const BlendTask& task, std::span<const DepthSlot> list, Vec
     xx.store(batch.xx + i);
     xy.store(batch.xy + i);
     yy.store(batch.yy + i);
-    (reach_of(log2_opacity) + Floats(1e-4)).store(batch.reach + i);  // rounding errs below it
+    (reach_of(log2_opacity) + Floats(1e-4)).store(batch.reach + i);  // more than the rounding error
   }
 }
 
@@ -68,11 +68,11 @@ struct Hits {
   // Whitened coordinates of the block's first pixel.
   alignas(64) float u[batch_size];
   alignas(64) float v[batch_size];
-  std::uint64_t splats = 0;  // a bit each
+  std::uint64_t splats = 0;  // one bit each
 };
 
 /// Finds splats whose ellipse alpha >= alpha_min may meet the block at `offset` from the batch's
-/// origin, because the bands around both of its whitened axes do. Without `cull`: all.
+/// origin: those whose bands around both whitened axes meet it. Without `cull`: all.
 template <bool cull>
 HWY_INLINE void find_hits(const Batch& batch, Vec2<float> offset, Hits& hits) {
   const Floats zero(0.0), last(static_cast<float>(block_side_px - 1));
@@ -99,8 +99,8 @@ HWY_INLINE void find_hits(const Batch& batch, Vec2<float> offset, Hits& hits) {
   hits.splats = cull ? hits.splats & all : all;
 }
 
-/// Blends the hits over a block. Returns the number of pairs when asked to, and in `finished`
-/// whether all pixels are.
+/// Blends the hits over a block. Returns the number of pairs if `count_pairs`. `finished` tells
+/// whether all pixels are finished.
 template <bool count_pairs>
 HWY_INLINE std::uint64_t blend_hits(const Batch& batch, const Hits& hits, BlockPixels& pixels,
                                     bool& finished) {

@@ -1,6 +1,7 @@
 #include "render_core/cpu/colour_cache.h"
 
 #include <algorithm>
+#include <cassert>
 #include <new>
 
 namespace catgs {
@@ -19,6 +20,7 @@ ColourCache::ColourCache(std::size_t clusters)
 
 ClusterColours ColourCache::of_cluster(std::size_t index, const Cluster& bounds,
                                        const glm::vec3& position) {
+  assert(index < shadings_.size());
   Shading& shading = shadings_[index];
   if (!colours_hold(bounds, shading.position, position)) shading = {position, {}};
   return {colours_.get() + index * floats_per_cluster, &shading.shaded};

@@ -11,15 +11,15 @@
 
 namespace catgs {
 
-/// Colours of a View's Gaussians as they were when they were last shaded. They change with the
-/// direction from the camera only, so those of a cluster are good until the camera has moved by
-/// colour_reuse_rad as seen from its nearest Gaussian; turning the camera changes none.
+/// Colours of a View's Gaussians from when they were last shaded. A colour depends only on the
+/// direction from the camera. A cluster's colours therefore hold until the camera has moved by
+/// colour_reuse_rad, as seen from its nearest Gaussian; turning the camera changes none.
 class ColourCache {
  public:
   explicit ColourCache(std::size_t clusters);
 
-  /// What is known of a cluster's colours, for a camera at `position`: nothing, when it has moved
-  /// too far. Clusters may be asked for in parallel, each by one thread at a time.
+  /// The known colours of a cluster, for a camera at `position`: none when the camera has moved too
+  /// far. Clusters may be asked for in parallel, each by one thread at a time.
   ClusterColours of_cluster(std::size_t index, const Cluster& bounds, const glm::vec3& position);
 
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -27,7 +27,7 @@ class ColourCache {
  private:
   struct Shading {
     glm::vec3 position{0.0f};  // of the camera
-    ClusterMembers shaded{};   // colours that are known from there
+    ClusterMembers shaded{};   // colours that are known from `position`
   };
   std::vector<Shading> shadings_;               // [cluster]
   hwy::AlignedFreeUniquePtr<float[]> colours_;  // [cluster][channel][Gaussian]

@@ -12,7 +12,7 @@
 namespace catgs {
 namespace {
 
-/// Adds the time from one call to the next to stages.
+/// Measures stages: each call adds the time since the call before.
 class StageClock {
  public:
   explicit StageClock(FrameStats& stats) : stats_(stats) {}
@@ -82,7 +82,7 @@ void CpuView::summarise(FrameStats& stats) const {
   }
   if (counted > 0)
     stats.mean_inverse_depth = static_cast<float>(inverse_depths / static_cast<double>(counted));
-  stats.tasks = lists_.tiles();  // each in one part
+  stats.tasks = lists_.tiles();  // each tile is one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();
   stats.overflowed_entries = lists_.overflowed_entries();
@@ -97,12 +97,12 @@ void CpuView::draw_boxes(const Camera& camera, const FramePlan& plan, FrameStats
   clock.end(Stage::sort);
 }
 
-/// Lists for `camera`, and with a window for all cameras on the way to its end.
+/// Makes the lists for `camera`, and with a window for all cameras on the way to its end.
 void CpuView::draw_key_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
   StageClock clock(stats);
   cull_clusters(camera, plan);
   lists_.begin(grid_.tiles, segments(), settings_.max_list_entries);
-  // Listed while they are in cache: reading them again would cost as much as the listing.
+  // Listed while the splats are in cache. Reading them again would cost as much as the listing.
   project(camera, plan, [&](std::size_t segment, std::size_t rank) {
     lists_.add(segment, table(plan).of_cluster(rank), scene_->kernels);
   });
@@ -165,8 +165,9 @@ void CpuView::cull_clusters(const Camera& camera, const FramePlan& plan) {
   }
 }
 
-/// Shares of the visible clusters that threads take: more than threads, because some regions hold
-/// far more that is visible than others, but each share costs a counter per tile.
+/// Number of shares that the visible clusters are cut into for the threads. More than threads,
+/// because some regions hold far more that is visible than others; but each share costs a counter
+/// per tile.
 std::size_t CpuView::segments() const {
   const auto threads = static_cast<std::size_t>(scene_->pool->threads());
   return std::min({threads * 8, std::max<std::size_t>(threads, 64), 1 + clusters_.size() / 8});

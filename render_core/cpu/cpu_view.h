@@ -19,15 +19,16 @@
 
 namespace catgs {
 
-/// What all Views of a renderer share; constant after construction.
+/// The data that all Views of a renderer share; constant after construction.
 struct CpuScene {
   SceneStore store;
   std::shared_ptr<ThreadPool> pool;
   SimdKernels kernels;
 };
 
-/// Buffers of a frame, kept for the next one. A key frame's are the caches of the sub-frames behind
-/// it: which Gaussians (the frustum cache) and which of them each tile blends (the sort cache).
+/// Buffers of a frame, kept for the next one. Those of a key frame are the caches of its
+/// sub-frames: the visible Gaussians (the frustum cache) and the list of each tile (the sort
+/// cache).
 class CpuView final : public View {
  public:
   CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings);
@@ -64,7 +65,7 @@ class CpuView final : public View {
   std::vector<std::uint32_t> counts_;      // [rank]: visible Gaussians
   std::vector<Splat> splats_;              // [slot], see SplatTable
   std::vector<SplatPath> paths_;           // [slot]
-  std::vector<std::uint32_t> depths_;      // [slot]: bits, of a sub-frame
+  std::vector<std::uint32_t> depths_;      // [slot]: bits of a sub-frame's depths
   std::optional<ColourCache> colours_;
   TileLists lists_;
   PixelBlocks blocks_;

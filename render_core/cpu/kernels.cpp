@@ -1,5 +1,6 @@
-// Which instruction sets: one lane for comparison (Highway's emulation of four is not that), and
-// none that adds nothing for us to the ones below. Later versions of Highway know more names.
+// Selects the instruction sets. One lane is kept for comparison (Highway's emulation of four lanes
+// is something else). Sets that bring us nothing over the next lower one are left out. Later
+// versions of Highway know more names.
 #define HWY_COMPILE_ALL_ATTAINABLE
 #define HWY_BROKEN_EMU128 1
 #define HWY_DISABLED_TARGETS                                                                  \

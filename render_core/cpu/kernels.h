@@ -19,14 +19,14 @@
 
 namespace catgs {
 
-/// A visible Gaussian in the image plane: one cache line, written by projection and read by binning
-/// and blending.
+/// A visible Gaussian in the image plane: one cache line. Projection writes it; binning and
+/// blending read it.
 struct alignas(64) Splat {
   float centre_x, centre_y;          // px
   float whitening_xx, whitening_xy;  // math::Whitening
   float whitening_yy, log2_opacity;
   float half_extent_x;  // px, of the ellipse alpha >= alpha_min
-  float growth_px;      // by which its outline is listed wider
+  float growth_px;      // px that its outline is widened by for listing
   float red, green, blue;
   float depth;  // world units along the view axis
   std::uint32_t original_index;
@@ -34,26 +34,26 @@ struct alignas(64) Splat {
   float rightmost_y;  // px below the centre: where the ellipse alpha >= alpha_min is rightmost
 };
 
-/// log2_opacity of a splat that draws nothing now: it is behind the near plane, but not in all
-/// frames of its window.
+/// log2_opacity of a splat that draws nothing now, because it is behind the near plane in this
+/// frame, though not in every frame of its window.
 inline constexpr float hidden_log2_opacity = -128.0f;
 
-/// Where a splat goes until the end of its key frame's window, and the ellipse that stays around it
-/// on the way.
+/// The path of a splat until the end of its key frame's window, and an ellipse that holds it all
+/// along the way.
 struct alignas(32) SplatPath {
   float dx, dy;                                    // px
   float whitening_xx, whitening_xy, whitening_yy;  // of that ellipse
-  float log2_opacity;                              // of the Gaussian, also where it is hidden
+  float log2_opacity;                              // of the Gaussian, even while it is hidden
   float half_extent_x, rightmost_y;                // of that ellipse, as in Splat
 };
 
 /// Members of a cluster, a bit each.
 using ClusterMembers = std::array<std::uint32_t, cluster_size / 32>;
 
-/// The colours of a cluster that need no shading, and room for those that do.
+/// The colours of a cluster that need no shading, and room for the others.
 struct ClusterColours {
   float* rgb;              // [channel][Gaussian of the cluster]; null: none are kept
-  ClusterMembers* shaded;  // which ones hold
+  ClusterMembers* shaded;  // the colours that hold
 };
 
 /// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,
@@ -62,26 +62,26 @@ struct ProjectTask {
   const SceneStore* scene;
   const Camera* camera;
   const FramePlan* plan;  // what the lists have to cover
-  // What visible means, and the tiles of a splat's box: vanilla, the original's; exact, where its
-  // ellipse is; catgs, where its trail is until the window's end.
+  // Defines which Gaussians are visible, and the tiles of a splat's box. vanilla: as in the
+  // original; exact: where the ellipse is; catgs: where the trail is until the window's end.
   Pipeline pipeline;
   std::size_t cluster;
   Splat* splats;
-  float min_depth;  // world units; nearer ones do not count in ClusterSummary
+  float min_depth;  // world units; nearer Gaussians do not count in ClusterSummary
   ClusterColours colours{nullptr, nullptr};
-  // catgs only.
+  // For catgs only.
   SplatPath* paths = nullptr;         // as splats
-  ClusterMembers* members = nullptr;  // which ones are visible
+  ClusterMembers* members = nullptr;  // the visible ones
 };
 
-/// Projects and shades `members` of a cluster as project_cluster() does, but without culling: the
-/// n-th member is always splats[n].
+/// Projects and shades `members` of a cluster like project_cluster(), but without culling: the n-th
+/// member is always splats[n].
 struct RefreshTask {
   const SceneStore* scene;
   const Camera* camera;
   std::size_t cluster;
   const ClusterMembers* members;
-  Splat* splats;          // without what only listing needs
+  Splat* splats;          // without the fields that only listing needs
   std::uint32_t* depths;  // as splats: bits of depth
   float min_depth;
   ClusterColours colours;
@@ -89,7 +89,7 @@ struct RefreshTask {
 
 struct ClusterSummary {
   std::uint32_t visible = 0;  // splats written
-  // Of those deeper than min_depth.
+  // Over splats deeper than min_depth.
   std::uint32_t counted = 0;
   float nearest_depth = std::numeric_limits<float>::infinity();
   float inverse_depth_sum = 0.0f;
@@ -105,13 +105,13 @@ struct TileRun {
 /// Lists splats for the tiles that their ellipses alpha >= alpha_min meet, or their trails.
 struct ListTask {
   std::span<const Splat> splats;
-  const SplatPath* paths;  // as splats; null: they do not move
+  const SplatPath* paths;  // as splats; null: ellipses are listed, not trails
   std::uint32_t first_slot;
   glm::ivec2 first_px;  // of the grid
 };
 
 /// Pixels are blended in blocks of 4x4, which are culled as one: a register where that is wide
-/// enough. Squares are met by fewer splats than rows of as many pixels are.
+/// enough. A square is met by fewer splats than a row of as many pixels.
 inline constexpr int block_side_px = 4;
 inline constexpr int block_px = block_side_px * block_side_px;
 
@@ -120,13 +120,13 @@ struct PixelBlock {
   std::uint16_t x, y;
 };
 
-/// Most blocks that one task blends; a tile has half as many.
+/// The largest number of blocks that one task blends; a tile has half as many.
 inline constexpr int max_task_blocks = 32;
 
 struct BlendResult {
-  std::uint64_t pairs = 0;    // (Gaussian, pixel) pairs blended, if they are counted
-  std::size_t looked_at = 0;  // entries of the list
-  bool finished = false;      // no pixel would look at more of them
+  std::uint64_t pairs = 0;    // (Gaussian, pixel) pairs blended, when counted
+  std::size_t looked_at = 0;  // leading entries of the list that were looked at
+  bool finished = false;      // no pixel would look at more entries
 };
 
 /// Blends a tile's list in some blocks and writes them to the image.
@@ -135,7 +135,7 @@ struct BlendTask {
   std::span<const DepthSlot> list;  // front to back
   std::span<const PixelBlock> blocks;
   glm::vec3 background;
-  bool cull_blocks;  // skip blocks that a splat's ellipse does not meet; same image
+  bool cull_blocks;  // skip blocks that a splat's ellipse misses; same image
   bool count_pairs;
   const HostImage* image;
 };

@@ -94,7 +94,7 @@ CATGS_HD_INLINE std::uint32_t bits(const LaneMask<D>& m) {
   return result & ((1u << Lanes<D>::count) - 1u);
 }
 
-/// The opposite of bits().
+/// The inverse of bits().
 template <class D>
 CATGS_HD_INLINE LaneMask<D> mask_of_bits(std::uint32_t bits) {
   std::uint8_t bytes[8] = {};
@@ -150,7 +150,7 @@ CATGS_HD_INLINE Lanes<D> neg_mul_add(const Lanes<D>& a, const Lanes<D>& b, const
 
 /// 2^x for x in [-8, 0] with a relative error below 2.1e-5 (an alpha is off by less than a
 /// hundredth of an 8-bit step): the minimax polynomial of 2^(x/8), raised to the 8th power. Cheaper
-/// than splitting off the integer part, which the short range does not need.
+/// than splitting off the integer part, which is unnecessary on the short range.
 template <class D>
 CATGS_HD_INLINE Lanes<D> exp2_of_alpha(const Lanes<D>& x) {
   using L = Lanes<D>;

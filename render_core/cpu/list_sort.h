@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cstdint>
 #include <span>
 #include <utility>
 
 namespace catgs {
 
-/// An element of a list: a depth as the unsigned `key` and what it belongs to.
+/// An element of a list: a depth as the unsigned `key`, and the slot of the splat that it belongs
+/// to.
 struct DepthSlot {
   std::uint32_t key;  // bits of a positive float: they order like the float
   std::uint32_t value;
@@ -27,11 +29,12 @@ auto in_order_of(const Before& before) {
 /// elements of equal keys. `scratch` has the size of `data`.
 ///
 /// Two passes over the keys' leading 16 bits within their range bring nearly all elements into
-/// place; what shares those bits is sorted by comparison.
+/// place. Elements that share those bits are then sorted by comparison.
 template <class Before>
 void sort_list(std::span<DepthSlot> data, std::span<DepthSlot> scratch, const Before& before) {
+  assert(scratch.size() == data.size());
   const auto in_order = in_order_of(before);
-  constexpr std::size_t short_list = 24;  // where comparing beats clearing histograms
+  constexpr std::size_t short_list = 24;  // comparing shorter lists beats clearing histograms
   if (data.size() <= short_list) return std::sort(data.begin(), data.end(), in_order);
 
   std::uint32_t low = data.front().key, high = low;
@@ -63,12 +66,12 @@ void sort_list(std::span<DepthSlot> data, std::span<DepthSlot> scratch, const Be
   }
 }
 
-/// sort_list() for lists that are nearly in order: by insertion, as long as that is cheaper.
+/// sort_list() for lists that are nearly in order: by insertion as long as that is cheaper.
 template <class Before>
 void sort_list_again(std::span<DepthSlot> data, std::span<DepthSlot> scratch,
                      const Before& before) {
-  // In moves, measured: an element out of place costs a mispredicted branch, and sorting anew as
-  // much as 8 for each element. The head start keeps the first few from deciding.
+  // In moves, measured. An element out of place costs a mispredicted branch; sorting anew costs as
+  // much as 8 moves per element. The head start keeps the first few elements from deciding.
   constexpr std::size_t misprediction = 24, sorting_anew = 8, head_start = 512;
   const auto in_order = in_order_of(before);
   std::size_t spent = 0;

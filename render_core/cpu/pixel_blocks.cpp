@@ -1,5 +1,6 @@
 #include "render_core/cpu/pixel_blocks.h"
 
+#include <cassert>
 #include <numeric>
 
 #include <glm/common.hpp>
@@ -10,8 +11,8 @@
 namespace catgs {
 
 void widen_for_blocks(FramePlan& plan, GridKind grid) {
-  // From a block's middle to the centres of its pixels, in a picture that turns may stretch by a
-  // fifth; and with a shift from pixel centres to the square of their tile.
+  // Distance from a block's middle to the centres of its pixels, in a picture that turns may
+  // stretch by a fifth. A shift adds the distance from pixel centres to the edges of their tile.
   constexpr double half_block = 0.5 * (block_side_px - 1), stretch = 1.2;
   if (plan.window == 0) return;
   if (grid == GridKind::warp) plan.growth.constant += stretch * half_block;
@@ -19,6 +20,7 @@ void widen_for_blocks(FramePlan& plan, GridKind grid) {
 }
 
 void PixelBlocks::place(glm::ivec2 size_px, const FramePlan& plan) {
+  assert(size_px.x > 0 && size_px.y > 0);
   const TileGrid& grid = plan.grid;
   const auto list_from_frame = math::convert<float>(plan.list_from_frame);
   const glm::vec2 first(grid.first_px), last(grid.tiles - 1);
@@ -39,7 +41,7 @@ void PixelBlocks::place(glm::ivec2 size_px, const FramePlan& plan) {
       ++starts_[tiles_.back()];
     }
   }
-  // A counting sort: ends first, which fall to the beginnings.
+  // A counting sort: positions start at the ends and count down to the beginnings.
   std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
   blocks_.resize(tiles_.size());
   for (std::size_t i = tiles_.size(); i-- > 0;) {

@@ -25,8 +25,9 @@ alignas(64) inline constexpr float columns_in_block[block_px] = {0, 1, 2, 3, 0, 
 alignas(64) inline constexpr float rows_in_block[block_px] = {0, 0, 0, 0, 1, 1, 1, 1,
                                                               2, 2, 2, 2, 3, 3, 3, 3};
 
-/// The pixels of a block while they are blended. Side by side: blocks of planes a power of two
-/// apart would wait for each other's stores, whose addresses processors compare by their low bits.
+/// The pixels of a block while they are blended. All planes are side by side in one struct. If the
+/// planes of a block were a power of two apart, stores would delay each other, because processors
+/// compare addresses by their low bits.
 struct alignas(64) BlockPixels {
   float red[block_px], green[block_px], blue[block_px];
   float transmittance[block_px];  // as in PixelState
@@ -66,7 +67,8 @@ inline void resolve_block(BlockPixels& pixels, const glm::vec3& background) {
   }
 }
 
-/// Copies rows of `row_size` elements (4 pixels' worth at most) of a block's part in the image.
+/// Copies rows of a block's part in the image, of `row_size` elements each (at most 4 pixels'
+/// worth).
 template <std::size_t row_size, class T, class Row>
 HWY_INLINE void copy_rows(const T* rows, glm::ivec2 inside_px, std::size_t per_pixel,
                           const Row& row_of) {

@@ -18,12 +18,12 @@ HWY_BEFORE_NAMESPACE();
 namespace catgs {
 namespace HWY_NAMESPACE {
 
-/// What the lists of a key frame cover.
+/// The region that the lists of a key frame cover.
 struct ListContext {
   CameraModel<Floats> end_camera;
   ListGrowth<Floats> growth;
   Vec2<Floats> trail_shift_px;
-  Vec2<Floats> first_px, last_px;  // of the grid; the last relative to the first
+  Vec2<Floats> first_px, last_px;  // of the grid; last_px relative to first_px
 };
 
 inline ListContext make_list_context(const FramePlan& plan) {
@@ -36,7 +36,8 @@ inline ListContext make_list_context(const FramePlan& plan) {
           pair(plan.trail_shift_px), pair(plan.grid.first_px), pair(plan.grid.size_px - 1)};
 }
 
-/// The box of a splat, and the tiles that it may touch. `nearest_depth`: on its way.
+/// The box of a splat, and the tiles that it may touch. `nearest_depth`: the least depth on its
+/// way.
 template <Pipeline pipeline>
 HWY_INLINE SplatBox box_of(const ProjectionContext& context, const ListContext& lists,
                            const Sweep<Floats>& s, const Floats& reach,
@@ -73,8 +74,8 @@ HWY_INLINE SplatBox box_of(const ProjectionContext& context, const ListContext& 
   return box;
 }
 
-/// Gaussians from `i` on that are behind the near plane at both ends of the window, but may come
-/// into the picture by a turn. `reach`: of their ellipses.
+/// Finds Gaussians from `i` on that are behind the near plane at both ends of the window, but that
+/// a turn may bring into the picture. `reach`: of their ellipses.
 HWY_INLINE FloatMask turning_in(const ProjectionContext& context, const ListContext& lists,
                                 const SceneStore& scene, std::size_t i, const Floats& reach) {
   const Vec3<Floats> mean = load_mean(scene, i);
@@ -135,7 +136,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   camera.near_z = plan.list_near_z;
   const ProjectionContext context = make_context(camera);
   const ListContext lists = make_list_context(plan);
-  const Floats near_z(task.camera->near_z);  // of what is drawn now
+  const Floats near_z(task.camera->near_z);  // of the current picture
   if constexpr (sweeps) task.members->fill(0);
   const std::size_t begin = task.cluster * cluster_size;
   const std::size_t end = std::min(scene.size(), begin + cluster_size);
@@ -153,7 +154,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
       candidates = opaque & (max(depth, depth_at_end) > context.near_z);
       nearest_depth = max(min(depth, depth_at_end), context.near_z);
     }
-    FloatMask turns_in = depth < depth;  // nobody
+    FloatMask turns_in = depth < depth;  // none
     if constexpr (sweeps) {
       turns_in = opaque & turning_in(context, lists, scene, i, reach);
       candidates = candidates | turns_in;

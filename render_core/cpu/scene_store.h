@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -48,6 +49,7 @@ class SceneStore {
   [[nodiscard]] const std::uint32_t* original_index() const { return original_index_.get(); }
   /// SH of packet p: [coefficient][channel][lane], packet_size lanes.
   [[nodiscard]] const float* sh_of_packet(std::size_t p) const {
+    assert(p * packet_size < padded_);
     return sh_.get() + p * sh_floats_per_packet();
   }
   [[nodiscard]] std::size_t sh_floats_per_packet() const {

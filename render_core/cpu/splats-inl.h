@@ -21,9 +21,9 @@ HWY_BEFORE_NAMESPACE();
 namespace catgs {
 namespace HWY_NAMESPACE {
 
-// What projecting and refreshing share: loading Gaussians, shading them, writing splats.
+// Shared by projecting and refreshing: loading Gaussians, shading them, writing splats.
 
-/// What the projection of a task's Gaussians shares.
+/// Constants of a task's projections.
 struct ProjectionContext {
   CameraModel<Doubles> precise;
   CameraModel<Floats> camera;
@@ -106,8 +106,8 @@ inline Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3<Flo
   }
 }
 
-/// Colour of the Gaussians from `i` on, from the `at`-th one of their cluster: as they were kept,
-/// or shaded, and then kept if there is room.
+/// Colour of the Gaussians from `i` on, which begin at place `at` of their cluster. Cached colours
+/// are used; others are shaded, and cached if there is room.
 HWY_INLINE Vec3<Floats> colour_of(const ClusterColours& colours, const SceneStore& scene,
                                   std::size_t i, std::size_t at, const Vec3<Floats>& mean,
                                   const Vec3<Floats>& camera_position) {
@@ -172,7 +172,7 @@ HWY_INLINE void interleave(const Floats (&fields)[16], float* out) {
     for (int q = 0; q < 4; ++q) std::memcpy(out + lane * 16 + q * 4, quads[q] + lane * 4, 16);
 }
 
-/// What a splat blends with.
+/// The fields of a splat that blending needs.
 struct SplatLook {
   Vec2<Floats> centre_px;
   Whitening<Floats> w;
@@ -181,21 +181,22 @@ struct SplatLook {
   Floats depth, original_index;
 };
 
-/// What listing needs besides.
+/// The fields that listing needs in addition.
 struct SplatBox {
   Floats half_extent_x, growth_px;
   TileRange columns, rows;
   Floats rightmost_y;
 };
 
-/// For splats that are listed already.
+/// The box of splats that are listed already.
 HWY_INLINE SplatBox no_box() {
   const Floats zero(0.0);
   const FloatMask nowhere = zero < zero;
   return {zero, zero, {zero, zero, nowhere}, {zero, zero, nowhere}, zero};
 }
 
-/// Makes the splats that are not in front of the near plane draw nothing, at a depth that sorts.
+/// Makes splats that are not in front of the near plane draw nothing, at a depth that can be
+/// sorted.
 HWY_INLINE void hide(SplatLook& look, const FloatMask& in_front, const Floats& near_z) {
   look.log2_opacity = select(in_front, look.log2_opacity, Floats(hidden_log2_opacity));
   look.depth = max(look.depth, near_z);
@@ -219,7 +220,8 @@ struct Extremes {
   Floats nearest_depth, inverse_depths, longest_square;
   std::uint32_t counted = 0;
 
-  // Written out: the compiler's own constructor would not be of this instruction set.
+  // Written out, because the compiler's own constructor would not be compiled for this instruction
+  // set.
   HWY_INLINE Extremes()
       : nearest_depth(std::numeric_limits<float>::infinity()),
         inverse_depths(0.0f),

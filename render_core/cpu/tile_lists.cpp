@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <numeric>
 #include <utility>
 
@@ -20,19 +21,19 @@ void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
   }
 }
 
-/// Room for as many entries, of the calling thread.
+/// The calling thread's buffer, enlarged to `size` entries.
 std::span<DepthSlot> scratch_of(std::size_t size) {
   thread_local std::vector<DepthSlot> scratch;
   if (scratch.size() < size) scratch.resize(size);
   return std::span(scratch).first(size);
 }
 
-/// Moves the entries up to a depth (bits) before the others, both in the order that they have.
-/// Returns them.
+/// Moves the entries up to a depth (bits) before the others; both keep their order. Returns the
+/// moved entries.
 std::span<DepthSlot> bring_to_front(std::span<DepthSlot> list, std::uint32_t reach) {
   const std::span<DepthSlot> behind = scratch_of(list.size());
   std::size_t front = 0, rest = 0;
-  for (const DepthSlot& entry : list) {  // without a branch that could be mispredicted
+  for (const DepthSlot& entry : list) {  // no branch that could be mispredicted
     const bool is_front = entry.key <= reach;
     behind[rest] = entry;
     list[front] = entry;
@@ -54,6 +55,7 @@ struct SceneOrder {
 }  // namespace
 
 void TileLists::begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries) {
+  assert(grid.x > 0 && grid.y > 0);
   grid_ = grid;
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
@@ -73,6 +75,7 @@ void TileLists::clear_segments() {
 }
 
 void TileLists::add(std::size_t segment_index, const ListTask& task, const SimdKernels& kernels) {
+  assert(segment_index < segments_.size());
   Segment& segment = segments_[segment_index];
   const std::size_t known = segment.runs.size();
   kernels.list_tiles(task, segment.runs);
@@ -90,7 +93,7 @@ void TileLists::add(std::size_t segment_index, const ListTask& task, const SimdK
     for (int column = run.begin; column < run.end; ++column) ++row[column];
     segment.entries += run.end - run.begin;
   }
-  // More runs than entries fit: finish() will list again, and these would only take memory.
+  // More runs than entries fit. finish() will list again, so these would only take memory.
   if (runs_.fetch_add(added.size(), std::memory_order_relaxed) + added.size() > max_entries_)
     segment.runs.resize(known);
 }
@@ -113,8 +116,8 @@ void TileLists::finish(const SplatTable& table, const SimdKernels& kernels, Thre
   });
 }
 
-/// Lists everything again without the farthest splats. Listing twice keeps the usual frame, in
-/// which all fits, free of what only this one needs: the number of entries of each splat.
+/// Lists everything again without the farthest splats. The usual frame, in which everything fits,
+/// thus need not count the entries of each splat.
 void TileLists::list_nearest(const SplatTable& table, const SimdKernels& kernels,
                              ThreadPool& pool) {
   const std::size_t ranks = table.counts.size(), shares = segments_.size();
@@ -134,8 +137,8 @@ void TileLists::list_nearest(const SplatTable& table, const SimdKernels& kernels
   });
 }
 
-/// The nearest splat that has to be left out, with all behind it, so that the entries of those
-/// before it (entries_of_slot_) stay within the bound.
+/// The nearest splat to be left out, together with all behind it, so that the entries of the nearer
+/// splats (entries_of_slot_) stay within the bound.
 TileLists::DepthOrder TileLists::find_first_left_out(const SplatTable& table, ThreadPool& pool) {
   const auto& [splats, paths, counts, first_px] = table;
   by_depth_.clear();
@@ -185,6 +188,7 @@ void TileLists::sort_front(std::size_t tile, std::uint32_t reach, std::span<cons
 void TileLists::sort_front_again(std::size_t tile, std::uint32_t reach,
                                  std::span<const Splat> splats,
                                  std::span<const std::uint32_t> depths) {
+  assert(depths.size() == splats.size());
   const std::span<DepthSlot> list = mutable_list(tile);
   for (DepthSlot& entry : list) entry.key = depths[entry.value];
   const std::span<DepthSlot> front = bring_to_front(list, reach);
@@ -200,6 +204,7 @@ void TileLists::sort_rest(std::size_t tile, std::span<const Splat> splats) {
 
 void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
                               ThreadPool& pool) {
+  assert(grid.x > 0 && grid.y > 0);
   const auto& [splats, paths, counts, first_px] = table;
   const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
   max_entries_ = max_entries;
@@ -242,8 +247,8 @@ void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uin
     sorted_[tile] = static_cast<std::uint32_t>(list(tile).size());
 }
 
-/// Counts the keys of each splat that is not left out (entries_of_slot_) and where those of each
-/// cluster begin (key_offsets_); returns their sum.
+/// Counts the keys of each splat that is not left out (entries_of_slot_) and finds the first key of
+/// each cluster (key_offsets_). Returns the sum of the counts.
 std::uint64_t TileLists::count_keys(const SplatTable& table, ThreadPool& pool) {
   const auto& [splats, paths, counts, first_px] = table;
   entries_of_slot_.resize(splats.size());

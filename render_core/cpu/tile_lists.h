@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cassert>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -14,8 +15,8 @@
 
 namespace catgs {
 
-/// The splats of a frame: [cluster rank * cluster_size + i], i < counts[rank]; that index is their
-/// slot.
+/// The splats of a frame: [cluster rank * cluster_size + i], i < counts[rank]. This index is a
+/// splat's slot.
 struct SplatTable {
   std::span<const Splat> splats;
   const SplatPath* paths;  // [slot]; null: ellipses are listed, not trails
@@ -29,52 +30,53 @@ struct SplatTable {
   }
 };
 
-/// Which splats each tile blends. Listing decides membership, sorting the order. Memory is kept
-/// from frame to frame and bounded: where more entries are wanted than `max_entries`, the farthest
-/// splats are left out of all lists, and what they wanted is counted.
+/// The lists of splats that the tiles blend. Listing decides membership, sorting the order. Memory
+/// is kept from frame to frame and bounded: where more than `max_entries` entries are needed, the
+/// farthest splats are left out of all lists, and their entries are counted.
 class TileLists {
  public:
-  /// Starts lists for a grid of tiles. Splats come in `segments` shares, each from one thread at a
-  /// time, in parallel with the others.
+  /// Starts lists for a grid of tiles. Splats are added in `segments` shares, in parallel; each
+  /// share belongs to one thread at a time.
   void begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries);
 
   /// Lists splats for the tiles whose rectangle of pixel centres meets their ellipse alpha >=
   /// alpha_min, or their trail.
   void add(std::size_t segment, const ListTask& task, const SimdKernels& kernels);
 
-  /// Builds the lists of what was added: all of `table`, each once.
+  /// Builds the lists. Every splat of `table` must have been added once.
   void finish(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool);
 
   /// Brings each list into depth order; equal depths keep the order of the scene.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
 
-  /// Brings entries up to the depth `reach` (bits) to the front of a tile's list, in order. Lists
-  /// of several tiles may be ordered in parallel.
+  /// Brings entries up to the depth `reach` (bits) to the front of a tile's list, sorted. Lists of
+  /// several tiles may be sorted in parallel.
   void sort_front(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats);
 
-  /// The same for a list whose front was sorted before its splats moved a little: [slot] `depths`
-  /// are the bits of their depths now.
+  /// The same for a list whose front was sorted before its splats moved a little. `depths` [slot]
+  /// are the bits of the current depths.
   void sort_front_again(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats,
                         std::span<const std::uint32_t> depths);
 
-  /// Sorts what is behind the front of a list, too.
+  /// Sorts the rest of a list, behind its front.
   void sort_rest(std::size_t tile, std::span<const Splat> splats);
 
-  /// Both at once in the original's way: a (tile | depth) key per splat and tile of its box, one
+  /// Lists and sorts in the original's way: a (tile | depth) key per splat and tile of its box, one
   /// sort of all keys.
   void build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
                      ThreadPool& pool);
 
   [[nodiscard]] std::size_t tiles() const { return starts_.size() - 1; }
-  /// The part of a tile's list that is in order.
+  /// The sorted part of a tile's list.
   [[nodiscard]] std::span<const DepthSlot> front(std::size_t tile) const {
     return list(tile).first(sorted_[tile]);
   }
   /// The splats of a tile (row-major index): depth bits and slot.
   [[nodiscard]] std::span<const DepthSlot> list(std::size_t tile) const {
+    assert(tile < tiles());
     return {entries_.data() + starts_[tile], entries_.data() + starts_[tile + 1]};
   }
-  /// All tile indices, those with long lists first: a long one started last would keep one thread
+  /// All tile indices, long lists first, because a long list started last would keep one thread
   /// busy while the others wait. Neighbours stay together among lists of similar length.
   [[nodiscard]] std::span<const std::uint32_t> tiles_by_length();
 
@@ -86,7 +88,7 @@ class TileLists {
  private:
   struct Segment {
     std::vector<TileRun> runs;
-    std::vector<std::uint32_t> positions;  // [tile]: entries, then next position in its list
+    std::vector<std::uint32_t> positions;  // [tile]: length, then next position in its list
     std::uint64_t entries = 0;
   };
   /// Orders splats from near to far: depth bits, then slot.
@@ -101,6 +103,7 @@ class TileLists {
   DepthOrder find_first_left_out(const SplatTable& table, ThreadPool& pool);
   void place_lists();
   std::span<DepthSlot> mutable_list(std::size_t tile) {
+    assert(tile < tiles());
     return {entries_.data() + starts_[tile], entries_.data() + starts_[tile + 1]};
   }
   std::uint64_t count_keys(const SplatTable& table, ThreadPool& pool);
@@ -112,13 +115,13 @@ class TileLists {
   DepthOrder first_left_out_ = nothing_left_out;
   std::vector<std::uint64_t> starts_ = {0};  // tiles + 1
   std::vector<DepthSlot> entries_;
-  std::vector<std::uint32_t> sorted_;  // [tile]: entries at the front of its list, in order
+  std::vector<std::uint32_t> sorted_;  // [tile]: sorted entries at the front of its list
   std::uint64_t overflowed_ = 0;
   std::vector<std::uint32_t> tiles_by_length_;
-  // What is left out when memory is short.
+  // Used when memory is short.
   std::vector<std::uint32_t> entries_of_slot_;
   std::vector<DepthSlot> by_depth_, by_depth_scratch_;
-  // build_by_keys()
+  // For build_by_keys().
   std::vector<std::uint64_t> key_offsets_;  // [cluster rank]
   std::vector<CodedIndex> keys_, key_scratch_;
   RadixSorter sorter_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -13,7 +14,8 @@
 namespace catgs {
 namespace {
 
-// What a camera comes nearer, or things come out behind others, from one frame to the next.
+// Margin for a camera that comes nearer, and for surfaces that appear behind others, from one frame
+// to the next.
 constexpr float reserve = 1.05f;
 
 std::size_t count(glm::ivec2 tiles) {
@@ -45,7 +47,7 @@ void TileReach::begin(const FramePlan& plan) {
   plan_ = plan;
 }
 
-/// The farthest of a tile and its neighbours.
+/// The largest reach among a tile and its neighbours.
 std::uint32_t TileReach::last_around(glm::ivec2 tile) const {
   const glm::ivec2 tiles = plan_.grid.tiles;
   const glm::ivec2 low = glm::max(tile - 1, 0), end = glm::min(tile + 2, tiles);
@@ -58,6 +60,7 @@ std::uint32_t TileReach::last_around(glm::ivec2 tile) const {
 }
 
 void TileReach::set(std::size_t tile, std::uint32_t depth_bits) {
+  assert(tile < reach_.size());
   if (depth_bits == unknown) {
     reach_[tile] = last_[tile] = unknown;
   } else {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -8,23 +9,26 @@
 
 namespace catgs {
 
-/// How deep the pixels of each tile looked into its list in the last frame: lists are mostly hidden
-/// behind opaque surfaces, and what is behind needs no order. A guess: where pixels look farther,
-/// the rest of the list is put in order then.
+/// How deep the pixels of each tile looked into its list in the last frame. Most of a list is
+/// hidden behind opaque surfaces and needs no order. The reach is a guess: where pixels look
+/// farther, the rest of the list is then sorted.
 class TileReach {
  public:
   static constexpr std::uint32_t unknown = ~0u;
 
-  /// Starts a frame. The tiles of a key frame take over from those that showed the same part of the
-  /// picture, or its neighbourhood.
+  /// Starts a frame. The tiles of a key frame take their reach from the tiles that showed the same
+  /// part of the picture, or its neighbourhood.
   void begin(const FramePlan& plan);
   void forget() { last_.clear(); }
 
-  /// Bits of a depth with some reserve, or `unknown`. It stays for a group, so that few entries of
-  /// a list come into the part that is in order.
-  [[nodiscard]] std::uint32_t of_tile(std::size_t tile) const { return reach_[tile]; }
-  /// What the pixels of a tile have looked at: up to an entry with this depth (bits), or `unknown`
-  /// if they would have gone on. Tiles without pixels keep what they have.
+  /// Bits of a depth with some reserve, or `unknown`. It is constant within a group, so that few
+  /// entries of a list enter the sorted part.
+  [[nodiscard]] std::uint32_t of_tile(std::size_t tile) const {
+    assert(tile < reach_.size());
+    return reach_[tile];
+  }
+  /// Notes how far the pixels of a tile looked: up to an entry with this depth (bits), or `unknown`
+  /// if they would have gone on. Tiles without pixels keep their reach.
   void set(std::size_t tile, std::uint32_t depth_bits);
 
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -35,7 +39,7 @@ class TileReach {
   [[nodiscard]] std::uint32_t last_around(glm::ivec2 tile) const;
 
   FramePlan plan_;                           // of the last frame
-  std::vector<std::uint32_t> reach_, last_;  // [tile]: for this group; as the last frame looked
+  std::vector<std::uint32_t> reach_, last_;  // [tile]: for this group; of the last frame
 };
 
 }  // namespace catgs

@@ -9,11 +9,11 @@ namespace {
 constexpr int block_size = 256;
 constexpr int warps = block_size / warp_size;
 
-/// List entries that a block of the emit kernel writes: blocks share the lists evenly, whatever a
+/// List entries that a block of the emit kernel writes. Blocks share the lists evenly, whatever a
 /// splat's size, and write them in order.
 constexpr std::uint32_t window_size = 2048;
 
-// Every splat of a window has an entry in it, but for the one that began before.
+// Every splat of a window has its first entry in it, except one that began before.
 constexpr std::uint32_t most_splats = window_size + 1;
 
 template <class Tile>
@@ -22,8 +22,8 @@ struct Window {
   Tile tile[window_size];
   std::uint32_t slot[window_size];
 
-  /// Writes a row's entries from `at` on, those before `last` and in the window, and returns where
-  /// the next row's begin.
+  /// Writes a row's entries from `at` on, as far as they are before `last` and in the window.
+  /// Returns the first entry of the next row.
   __device__ std::uint32_t put_row(std::uint32_t first_tile, int2 columns, std::uint32_t splat,
                                    std::uint32_t at, std::uint32_t last) {
     const std::uint32_t stop = min(last, end);
@@ -36,7 +36,8 @@ struct Window {
   }
 };
 
-/// The first k in [0, count) whose entries begin after `at`, by one warp: 32 probes at a time.
+/// The first k in [0, count) whose entries begin after `at`. Found by one warp with 32 probes at a
+/// time.
 __device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t count,
                                       std::uint32_t at) {
   const std::uint32_t lane = threadIdx.x % warp_size;
@@ -54,19 +55,20 @@ __device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t 
   return low;
 }
 
-// The tiles of large splats were counted by another kernel, where compilers may round the same
-// formula differently. With half the slack here every tile that is found was counted; what was
-// counted but is not found stays padding.
+// Another kernel counted the tiles of large splats, and compilers may round the same formula
+// differently there. With half the slack here, every tile that is found was counted. Tiles that
+// were counted but are not found stay padding.
 constexpr float emit_slack_px = 0.5f * static_cast<float>(listing_slack_px);
 
-/// Where a splat's entries end.
+/// The end of a splat's entries.
 template <class Tile>
 __device__ std::uint32_t entries_end(const EmitParams<Tile>& p, std::uint32_t slot,
                                      std::uint32_t at) {
   return at + p.tile_count[slot];
 }
 
-/// All lanes write one splat; rows in order, so that the list is the same as a lone lane's.
+/// All lanes write one splat. Rows stay in order, so that the list is the same as if a single lane
+/// wrote it.
 template <class Tile, class Outline>
 __device__ void emit_together(const EmitParams<Tile>& p, Window<Tile>& window,
                               const TileFootprint<Outline>& f, std::uint32_t slot,
@@ -101,7 +103,7 @@ __device__ void emit_large(const EmitParams<Tile>& p, Window<Tile>& window, std:
 template <class Tile>
 __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile> p) {
   __shared__ Window<Tile> window;
-  __shared__ std::uint32_t splats[2];  // in depth order, those with entries in the window
+  __shared__ std::uint32_t splats[2];  // in depth order: range of splats in the window
   __shared__ std::uint32_t large[most_splats];
   __shared__ std::uint32_t large_count;
   const std::uint32_t thread = threadIdx.x;
@@ -110,14 +112,14 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
   const std::uint32_t visible = min(p.counts->visible, p.shape.visible_bound);
   if (begin >= p.counts->list_entries) return;
   if (thread / warp_size < 2) {
-    // The last splat that begins at or before the window, to the last that begins in it.
+    // From the last splat that begins at or before the window, to the last one that begins in it.
     const std::uint32_t beyond =
         first_beyond(p.first, visible, thread < warp_size ? begin : end - 1);
     if (thread % warp_size == 0)
       splats[thread / warp_size] = thread < warp_size ? max(beyond, 1u) - 1 : beyond;
   }
   for (std::uint32_t j = thread; j < window_size; j += block_size) {
-    window.tile[j] = static_cast<Tile>(p.shape.tiles());  // padding, for what nobody writes
+    window.tile[j] = static_cast<Tile>(p.shape.tiles());  // padding, if no splat writes it
     window.slot[j] = 0;
   }
   if (thread == 0) {
@@ -162,7 +164,7 @@ template <class Tile>
 __global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams<Tile> p) {
   const std::uint32_t first = (blockIdx.x * block_size + threadIdx.x) * range_step;
   if (first >= p.entries) return;
-  const std::uint32_t tiles = p.shape.tiles();  // padding, and what is beyond the ends
+  const std::uint32_t tiles = p.shape.tiles();  // padding, and positions beyond the ends
   std::uint32_t before = first > 0 ? p.tile[first - 1] : tiles;
 #pragma unroll
   for (std::uint32_t j = 0; j < range_step; ++j) {

@@ -5,8 +5,8 @@
 
 namespace catgs::cuda {
 
-// Tile: std::uint16_t or std::uint32_t, what holds shape.tiles(). The narrow one saves a quarter of
-// what sorting moves.
+// Tile: std::uint16_t or std::uint32_t, whichever can hold shape.tiles(). The narrow type saves a
+// quarter of the bytes that sorting moves.
 
 /// Writes the tile list entries of all visible splats in depth order.
 template <class Tile>
@@ -15,17 +15,17 @@ struct EmitParams {
   const FrameCounts* counts;
   const SplatRecord* records;
   const std::uint32_t* order;       // [visible_bound], slots front to back
-  const std::uint32_t* first;       // [visible_bound], where the k-th splat's entries begin
+  const std::uint32_t* first;       // [visible_bound], the first entry of the k-th splat
   const std::uint32_t* tile_count;  // [visible_bound], by slot
   const TileSpans* spans;           // [visible_bound], by slot
-  const SplatPath* path;            // [visible_bound], by slot; null: splats stay where they are
-  Tile* tile;                       // [list_bound], tile index; shape.tiles(): of no tile
+  const SplatPath* path;            // [visible_bound], by slot; null: splats do not move
+  Tile* tile;                       // [list_bound], tile index; shape.tiles() means no tile
   std::uint32_t* slot;              // [list_bound]
 };
 template <class Tile>
 void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream);
 
-/// range[t] = {first, one past last} list entry of tile t; {0, 0} where it has none.
+/// range[t] = {first, one past last} list entry of tile t; {0, 0} for a tile without entries.
 template <class Tile>
 struct RangesParams {
   FrameShape shape;

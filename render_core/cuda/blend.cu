@@ -11,24 +11,24 @@ namespace {
 
 constexpr int warps_per_block = 2;
 constexpr int block_size = warps_per_block * warp_size;
-// As many as leave a thread the 128 registers that a round takes. Their shared memory, 26 KB each,
-// fits on Hopper; other generations hold fewer at a time.
+// The largest number that leaves a thread the 128 registers of a round. Their shared memory, 26 KB
+// each, fits on Hopper; other generations run fewer at a time.
 constexpr int blocks_per_processor = 8;
 
-/// Splats of a group: so many a lane, since the work on one hides the latencies of the other.
+/// Splats of a lane in a group. Work on one hides the latency of the other.
 constexpr unsigned lane_splats = 2;
 constexpr unsigned group_splats = lane_splats * warp_size;
 
-/// What a warp shares.
+/// Shared by the lanes of a warp.
 struct __align__(16) WarpScratch {
   StagedHalf staged[halves];  // splats that wait for the halves of its part
-  Box box[halves];            // of parts that are no squares
-  // A lane's own.
+  Box box[halves];            // of parts that are not squares
+  // A column for each lane.
   PixelPlaces places[halves][warp_size];
-  float4 fetched[2][lane_splats][2][warp_size];  // records of this group, and of the next
+  float4 fetched[2][lane_splats][2][warp_size];  // records of this group and the next
 };
 
-/// Splats of a list in groups. Two loads are in flight while a group is blended: the next group's
+/// Splats of a list, in groups. Two loads are in flight while a group is blended: the next group's
 /// records, and the slots of the one after it.
 class Groups {
  public:
@@ -43,17 +43,17 @@ class Groups {
   }
 
   __device__ bool more() const { return next_ < last_; }
-  /// One past the entries that were taken.
+  /// One past the last entry taken.
   __device__ std::uint32_t taken() const { return min(next_, last_); }
 
-  /// Brings the next group here.
+  /// Makes the next group available.
   __device__ void take() {
     next_ += group_splats;
     buffer_ ^= 1u;
     fetch();
     asm volatile("cp.async.wait_group 1;" ::: "memory");
   }
-  /// The lane's i-th splat of the group; those of the first come before those of the second.
+  /// The lane's i-th splat of the group. All splats with i = 0 come before those with i = 1.
   __device__ SplatRecord splat(unsigned i) const {
     const float4* words = &mine_[(buffer_ ^ 1u) * buffer_words + i * splat_words];
     const float4 a = words[0], b = words[warp_size];
@@ -71,7 +71,7 @@ class Groups {
     }
   }
 
-  /// Begins to load the records of the group at next_, and loads the slots of the one after it.
+  /// Starts loading the records of the group at next_, and loads the slots of the group after it.
   __device__ void fetch() {
 #pragma unroll
     for (unsigned i = 0; i < lane_splats; ++i) {
@@ -92,20 +92,20 @@ class Groups {
     load_slots(next_ + group_splats);
   }
 
-  // Of fetched, in its elements.
+  // In elements of `fetched`.
   static constexpr unsigned splat_words = 2 * warp_size, buffer_words = lane_splats * splat_words;
 
   const SplatRecord* records_;
   const std::uint32_t* slots_;
   std::uint32_t next_, last_;        // list entries
-  std::uint32_t slot_[lane_splats];  // of the group that is fetched next
-  unsigned buffer_ = 0;              // that it goes to
+  std::uint32_t slot_[lane_splats];  // of the group to fetch next
+  unsigned buffer_ = 0;              // the buffer that it goes to
   float4* mine_;                     // the lane's column of fetched
 };
 
-/// Whether a splat centred at `centre` reaches the box with alpha_min: the minimum of a
-/// convex quadratic over a box lies on the line through the box point nearest in x, on that nearest
-/// in y, or at the centre.
+/// Whether a splat centred at `centre` reaches the box with alpha_min. The minimum of a convex
+/// quadratic over a box is at the centre, or on a line through the nearest point of the box in x or
+/// in y.
 struct BoxTest {
   math::Whitening<float> w;
   float2 centre;
@@ -130,13 +130,13 @@ __device__ BoxTest make_box_test(const SplatRecord& splat, float2 centre) {
           __fdividef(-w.xx * w.xy, w.xy * w.xy + w.yy * w.yy), __fdividef(-w.xy, w.xx)};
 }
 
-/// Splats that wait in a half part's ring.
+/// Splats that wait in the ring of a half part.
 struct Waiting {
-  unsigned first = 0;  // of the ring, where a round begins
+  unsigned first = 0;  // place in the ring where a round begins
   unsigned count = 0;
 };
 
-/// Stages a group for the halves that its splats reach and that are not finished.
+/// Stages the splats of a group for each unfinished half that they reach.
 template <class Pixels>
 __device__ void stage(WarpScratch& scratch, const Pixels& pixels, const Groups& groups,
                       const bool (&live)[halves], Waiting (&waiting)[halves]) {
@@ -157,7 +157,7 @@ __device__ void stage(WarpScratch& scratch, const Pixels& pixels, const Groups& 
       hits[i][half] =
           __ballot_sync(~0u, test.reaches(Pixels::box(scratch.box, half)) && live[half]);
   }
-  __syncwarp();  // the last round has been read
+  __syncwarp();  // all lanes have read the last round
 #pragma unroll
   for (int half = 0; half < halves; ++half) {
 #pragma unroll
@@ -173,7 +173,7 @@ __device__ void stage(WarpScratch& scratch, const Pixels& pixels, const Groups& 
   __syncwarp();
 }
 
-/// Fills the halves' rounds up with nothing.
+/// Pads the halves' rounds with splats that contribute nothing.
 __device__ void fill_up(WarpScratch& scratch, const Waiting (&waiting)[halves]) {
   const unsigned place = threadIdx.x % warp_size;
 #pragma unroll
@@ -186,7 +186,7 @@ __device__ void fill_up(WarpScratch& scratch, const Waiting (&waiting)[halves]) 
 }
 
 /// The largest transmittance that earlier slices of the task's tile leave in this part, as far as
-/// they are known to have finished.
+/// they are known to be finished.
 __device__ float transmittance_before(const BlendParams& p, std::uint32_t slice, int place,
                                       int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
@@ -226,12 +226,12 @@ __device__ void store(const BlendParams& p, const BlendTask& task, std::uint32_t
   }
 }
 
-/// As math::PixelState has it.
+/// Marks finished pixels by the sign, as in math::PixelState.
 __device__ float finished_by_sign(float transmittance) {
   return is_live(transmittance) ? transmittance : -transmittance;
 }
 
-/// Brings the pixels of the halves to their lanes.
+/// Moves the pixels of the halves to the lanes that store them.
 __device__ void gather_states(WarpScratch& scratch, const HalfPixels (&half_pixels_of)[halves],
                               States& states) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
@@ -269,16 +269,17 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
                            int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const BlendTask task = load_task(p, task_index);
-  const std::uint32_t slice = task_index - p.shape.tiles();  // where its pixels are, if it is one
+  const std::uint32_t slice = task_index - p.shape.tiles();  // its index if it is a slice
   const Pixels pixels(p, scratch.box, task.tile, part);
   if (pixels.empty()) return;
   unsigned long long pairs = 0;
   const auto behind_finished = [&] {
-    // Half of it, so that rounding cannot make the composite want what was not blended.
+    // The limit is halved, so that rounding cannot make the composite use a slice that was not
+    // blended.
     return task.slice > 0 && transmittance_before(p, slice, task.slice, part) <
                                  0.5f * static_cast<float>(transmittance_min);
   };
-  if (behind_finished()) return;  // nobody will ask for this part of the slice
+  if (behind_finished()) return;  // the composite will not use this part of the slice
   Groups groups(p, task, scratch);
   PixelPlaces(&places)[halves][warp_size] = scratch.places;
   HalfPixels half[halves] = {take_half(pixels, p.shape, 0, places[0][lane]),
@@ -313,7 +314,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
   store(p, task, slice, pixels, states);
 
   const std::uint32_t consumed = groups.taken();
-  float largest = 0.0f;  // of pixels that are not finished: nothing behind shows in those that are
+  float largest = 0.0f;  // of unfinished pixels: nothing behind shows in the finished ones
 #pragma unroll
   for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, states[i].transmittance);
   largest = __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(largest)));
@@ -328,7 +329,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
   }
 }
 
-/// Warps take parts from a queue: no warp waits for the longest part of its tile or block.
+/// Warps take parts from a queue, so that none waits for the longest part of its tile or block.
 template <bool count_pairs, class Pixels>
 __global__ void __launch_bounds__(block_size, blocks_per_processor)
     blend_kernel(const BlendParams p) {
@@ -336,7 +337,7 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
   __shared__ WarpScratch scratch[warps_per_block];
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const int warp = static_cast<int>(threadIdx.x) / warp_size;
-  // Rounds are filled up by one pair of coefficients, so that the rest must be numbers.
+  // Padding sets one pair of coefficients only, so the others must be finite.
   std::uint32_t* words = reinterpret_cast<std::uint32_t*>(scratch);
   for (unsigned i = threadIdx.x; i < sizeof(scratch) / sizeof(*words); i += block_size)
     words[i] = 0;

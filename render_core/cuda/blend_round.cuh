@@ -10,47 +10,48 @@
 
 /// Blending on tensor cores: a half part (32 pixels) and 32 of its splats at a time.
 ///
-/// A splat's exponent is a polynomial of degree two in the pixel's place, so that the exponents of
-/// 16 pixels and 8 splats are one product of matrices: (1, x, y, x^2, xy, y^2) times coefficients
-/// (as in TC-GS and GEMM-GS). Places count from the middle of the part: up to 22.5 px, which parts
-/// stay far below, fp16 holds their products exactly; of coefficients, what its 11 bits leave is
-/// multiplied too.
+/// A splat's exponent is a polynomial of degree two in the pixel's place. The exponents of 16
+/// pixels and 8 splats are thus one product of matrices: (1, x, y, x^2, xy, y^2) times coefficients
+/// (as in TC-GS and GEMM-GS). Places count from the middle of the part. Up to 22.5 px fp16 holds
+/// their products exactly, and parts stay far below that. Coefficients are split into two halves:
+/// the upper 11 bits, and the remainder, which is multiplied too.
 ///
-/// The product leaves a pixel's exponents on four lanes. Each has a quarter of the splats, in
-/// their order, and blends it by itself from transmittance 1; the product of the transmittances
-/// of the quarters before it is the factor of its weights. Colours are then summed by a second
-/// product, weights times colours, whose first matrix the lanes already hold in the right places.
+/// The product leaves a pixel's exponents on four lanes. Each lane has a quarter of the splats, in
+/// their order, and blends it by itself from transmittance 1. The product of the transmittances of
+/// the quarters before it then scales its weights. A second product, weights times colours, sums
+/// the colours; the lanes already hold its first matrix in the right places.
 ///
-/// Unlike with math::blend, a pixel that falls below transmittance_min takes in the rest of its
-/// round: it sees at most transmittance_min / (1 - alpha_max) more of what lies behind.
+/// Unlike in math::blend, a pixel that falls below transmittance_min takes in the rest of its
+/// round. It sees at most transmittance_min / (1 - alpha_max) more of what lies behind.
 namespace catgs::cuda {
 
 constexpr int round_splats = 32;
-constexpr int round_lanes = 4;                       // that share a pixel
+constexpr int round_lanes = 4;                       // lanes that share a pixel
 constexpr int quarter = round_splats / round_lanes;  // splats of a lane
-constexpr int block_pixels = 16;                     // of one product
+constexpr int block_pixels = 16;                     // pixels of one product
 constexpr int half_blocks = half_pixels / block_pixels;
-constexpr int column_splats = 8;                       // of the first product
-constexpr int columns = round_splats / column_splats;  // products
-constexpr int chunks = round_splats / 16;              // of the second product
+constexpr int column_splats = 8;                       // splats of the first product
+constexpr int columns = round_splats / column_splats;  // number of first products
+constexpr int chunks = round_splats / 16;              // number of second products
 
-/// An exponent that contributes nothing, and fits in a half.
+/// An exponent that contributes nothing and fits in a half.
 constexpr float least_exponent = -6e4f;
 
-// exp2 flushes what is below 2^-126 to zero: exponents are shifted so that this is where alpha
-// falls below alpha_min, and alphas are scaled back with the transmittance.
+// exp2 flushes results below 2^-126 to zero. Exponents are shifted so that this happens where alpha
+// falls below alpha_min; alphas are scaled back with the transmittance.
 constexpr float exponent_shift = static_cast<float>(-126.0 - log2_alpha_min);
 constexpr float alpha_scale = static_cast<float>(0x1p126 * alpha_min);
 constexpr float most_scaled_alpha = static_cast<float>(alpha_max / (0x1p126 * alpha_min));
 
-/// A splat as both products want it, in halves: of the pairs of coefficients (1, x), (y, x^2) and
-/// (xy, y^2) the upper 11 bits, then the rest; and its colour, which the first product multiplies
-/// by zero. Red, green and blue are columns 4 to 6 of the last eight halves.
+/// A splat in halves, as both products need it. First the upper 11 bits of the pairs of
+/// coefficients (1, x), (y, x^2) and (xy, y^2), each followed by the remainders; then the colour,
+/// which the first product multiplies by zero. Red, green and blue are columns 4 to 6 of the last
+/// eight halves.
 struct StagedSplat {
   uint2 pair[round_lanes];
 };
 
-/// Two floats as halves, and what these leave.
+/// Two floats as halves, and the remainders as halves.
 __device__ inline uint2 split_pair(float a, float b) {
   const __half2 high = __floats2half2_rn(a, b);
   const float2 rounded = __half22float2(high);
@@ -59,7 +60,7 @@ __device__ inline uint2 split_pair(float a, float b) {
                     reinterpret_cast<const std::uint32_t&>(low));
 }
 
-/// `f` is about the part's origin; `colour` are the words of a PackedColour.
+/// `f` has its origin at that of the part; `colour` holds the words of a PackedColour.
 __device__ inline StagedSplat staged_splat(const math::ExponentField<float>& f, uint2 colour) {
   const float at_origin = f.log2_opacity + exponent_shift - f.u * f.u - f.v * f.v;
   return {{split_pair(at_origin, -2.0f * f.u * f.xx),
@@ -67,24 +68,24 @@ __device__ inline StagedSplat staged_splat(const math::ExponentField<float>& f, 
            split_pair(-2.0f * f.xx * f.xy, -(f.xy * f.xy + f.yy * f.yy)), colour}};
 }
 
-/// Splats of a half part in their order, a ring of three rounds. Lanes read splats a quarter apart:
-/// gaps, and half a row of banks between the halves of a splat, spread them over all banks.
+/// Splats of a half part in order, in a ring of three rounds. Lanes read splats a quarter apart.
+/// Gaps, and half a row of banks between the halves of a splat, spread the reads over all banks.
 class StagedHalf {
  public:
   static constexpr unsigned room = 3 * round_splats;
   static constexpr unsigned gap = 2;  // after each quarter
 
-  /// For place < 2 room.
+  /// Requires place < 2 room.
   __device__ static unsigned wrapped(unsigned place) { return place < room ? place : place - room; }
 
-  /// Where pairs 2 k and 2 k + 1 of a splat are.
+  /// Address of pairs 2 k and 2 k + 1 of a splat.
   __device__ uint4* at(unsigned place, unsigned k) {
     return &words_[k][place + place / quarter * gap];
   }
   __device__ const uint4* at(unsigned place, unsigned k) const {
     return &words_[k][place + place / quarter * gap];
   }
-  /// A branch instead of the predicate would cost more.
+  /// A predicate is cheaper than a branch.
   __device__ void put_if(bool wanted, unsigned place, const StagedSplat& splat) {
     const uint2(&p)[round_lanes] = splat.pair;
     asm volatile(
@@ -102,8 +103,8 @@ class StagedHalf {
   uint4 words_[2][room / quarter * (quarter + gap) + 4];
 };
 
-/// d = a b + d for 16x8 halves a, 8x8 halves b and 16x8 floats d, spread over the warp as PTX has
-/// it for mma.m16n8k8.
+/// d = a b + d for 16x8 halves a, 8x8 halves b and 16x8 floats d, distributed over the warp as PTX
+/// defines for mma.m16n8k8.
 __device__ inline void multiply_add(float (&d)[4], const std::uint32_t (&a)[2], std::uint32_t b) {
   asm("mma.sync.aligned.m16n8k8.row.col.f32.f16.f16.f32 "
       "{%0, %1, %2, %3}, {%4, %5}, {%6}, {%0, %1, %2, %3};"
@@ -119,8 +120,8 @@ __device__ inline void multiply_add(float (&d)[4], const std::uint32_t (&a)[4], 
       : "r"(a[0]), "r"(a[1]), "r"(a[2]), "r"(a[3]), "r"(b.x), "r"(b.y));
 }
 
-/// Four 8x8 matrices of halves, of which lane l gives row l % 8 of matrix l / 8, as the second
-/// factors of two products.
+/// Loads four 8x8 matrices of halves as the second factors of two products. Lane l passes the
+/// address of row l % 8 of matrix l / 8.
 __device__ inline void load_columns(uint2 (&b)[chunks], const void* row) {
   const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(row));
   asm volatile("ldmatrix.sync.aligned.m8n8.x4.trans.shared.b16 {%0, %1, %2, %3}, [%4];"
@@ -143,15 +144,15 @@ __device__ inline bool is_live(float transmittance) {
   return transmittance >= static_cast<float>(transmittance_min);
 }
 
-/// What the lanes of a warp keep of a block of pixels. Lane l has pixel l / 4 and that eight on:
-/// the transmittance, and if it is the third of four red and green, the last blue.
+/// A block of pixels, distributed over the lanes of a warp. Lane l has pixels l / 4 and l / 4 + 8:
+/// their transmittances; red and green if it is the third lane of the four, blue if it is the last.
 struct BlockPixels {
   float colour[4];
-  float transmittance[2];  // of pixels that are finished, whatever lies below transmittance_min
+  float transmittance[2];  // any value below transmittance_min means finished
 };
 
-/// The first factors of the first product: a lane's pair of (1, x), (y, x^2), (xy, y^2), 0 for its
-/// two pixels of each block.
+/// The first factors of the first product: the lane's pair out of (1, x), (y, x^2), (xy, y^2), 0,
+/// for its two pixels of each block.
 struct PixelPlaces {
   std::uint32_t of[half_blocks][2];
 };
@@ -159,7 +160,7 @@ struct PixelPlaces {
 struct HalfPixels {
   BlockPixels block[half_blocks];
 
-  /// Whether any pixel of the half part is not finished; the whole warp asks.
+  /// Whether any pixel of the half part is not finished. Called by the whole warp.
   __device__ bool live() const {
     float most = 0.0f;
 #pragma unroll
@@ -169,7 +170,7 @@ struct HalfPixels {
   }
 };
 
-/// Takes over half part `half` of the warp's pixels, and sets where the lane's are.
+/// Initialises half part `half` from the warp's pixels, and sets the places of the lane's pixels.
 template <class Pixels>
 __device__ HalfPixels take_half(const Pixels& pixels, const FrameShape& shape, int half,
                                 PixelPlaces& places) {
@@ -194,13 +195,14 @@ __device__ HalfPixels take_half(const Pixels& pixels, const FrameShape& shape, i
   return taken;
 }
 
-/// Of a block of pixels, what a lane's quarter of a round does.
+/// The blend of a lane's quarter of a round with a block of pixels.
 struct QuarterBlend {
-  float scaled[2];             // the transmittance that it leaves, times alpha_scale
-  __half2 weight[columns][2];  // of its splats, as if it came first
+  float scaled[2];             // the transmittance left, times alpha_scale
+  __half2 weight[columns][2];  // of its splats, as if the quarter came first
 };
 
-/// `in_column`: the lane's pair of the splat of its column in the first of the products.
+/// `in_column`: the lane's pair of coefficients, of the splat in the lane's column of the first
+/// product.
 template <bool count_pairs>
 __device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint32_t (&places)[2],
                                       const uint2* in_column, unsigned& pairs) {
@@ -227,8 +229,8 @@ __device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint
   return blend;
 }
 
-/// Blends the staged splats at first, first + 1, … first + 31 into a half part. Returns, when
-/// counting, how many pairs the lane blended.
+/// Blends the staged splats at first, first + 1, … first + 31 into a half part. Returns the number
+/// of pairs that the lane blended if `count_pairs`.
 template <bool count_pairs>
 __device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
                                 const StagedHalf& staged, unsigned first) {
@@ -243,7 +245,7 @@ __device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
 #pragma unroll
   for (int b = 0; b < half_blocks; ++b)
     mine[b] = blend_quarter<count_pairs>(pixels.block[b], places.of[b], in_column, pairs);
-  // Row r of a matrix of colours is the splat that column r of the first product had.
+  // Row r of a matrix of colours belongs to the splat in column r of the first product.
   const unsigned row_of_matrix = lane % column_splats, matrix = lane / column_splats;
   uint2 colours[chunks];
   load_columns(colours,

@@ -9,7 +9,7 @@ namespace {
 constexpr int block_size = 128;
 constexpr std::uint32_t words_per_cluster = cluster_size / warp_size;
 
-/// A thread a cluster.
+/// One thread per cluster.
 __global__ void __launch_bounds__(block_size) want_colours_kernel(const WantColoursParams p) {
   let_next_kernel_begin();
   const std::uint32_t rank = blockIdx.x * block_size + threadIdx.x;

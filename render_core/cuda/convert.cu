@@ -1,3 +1,5 @@
+#include <cassert>
+
 #include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/cuda_check.h"
 #include "render_core/math/colour-inl.h"
@@ -31,6 +33,7 @@ __global__ void convert_kernel(const ConvertParams p) {
 }  // namespace
 
 void launch_convert(const ConvertParams& params, cudaStream_t stream) {
+  assert(params.width_px % 2 == 0 && params.height_px % 2 == 0);
   const dim3 block(32, 8);
   const dim3 grid((params.width_px / 2 + block.x - 1) / block.x,
                   (params.height_px / 2 + block.y - 1) / block.y);

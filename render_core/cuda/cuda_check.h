@@ -8,8 +8,8 @@
 
 namespace catgs::cuda {
 
-/// A failed CUDA call, thrown inside the core: set-up lets it out, the frame path turns it into a
-/// RenderStatus at its edge.
+/// A failed CUDA call, thrown inside the core. It leaves the core during set-up; the frame path
+/// turns it into a RenderStatus.
 class CudaError : public DeviceError {
  public:
   CudaError(const char* stage, cudaError_t code)
@@ -18,7 +18,7 @@ class CudaError : public DeviceError {
                     std::string(stage) + ": " + cudaGetErrorString(code)) {}
 };
 
-/// `stage` names what was being done, for people.
+/// `stage` names the failed activity, for people.
 inline void check(cudaError_t code, const char* stage) {
   if (code != cudaSuccess) {
     (void)cudaGetLastError();  // a launch error is sticky until read

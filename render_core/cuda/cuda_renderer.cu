@@ -19,7 +19,7 @@ namespace {
 
 constexpr int oldest_major = 8;  // compute capability
 
-/// A kernel to look for: code that the build lacks for a device is missing for this one too.
+/// An empty kernel. If it has no code for a device, the build lacks code for that device.
 __global__ void probe() {}
 
 /// A device with its copy of the scene.
@@ -35,7 +35,7 @@ class PlacedView final : public View {
   PlacedView(const Device& device, DeviceSet::Place place, const ViewSettings& settings)
       : place_(std::move(place)), view_(std::in_place, device.scene, device.index, settings) {}
   ~PlacedView() override {
-    // Freeing makes a context on the current device, which may be one that nobody asked for.
+    // Freeing creates a context on the current device, which must not be one that nobody selected.
     (void)cudaSetDevice(place_.device());
     view_.reset();
   }
@@ -103,8 +103,8 @@ class CudaRenderer final : public Renderer {
   std::shared_ptr<DeviceSet> set_;
 };
 
-/// Makes the device the calling thread's current one, if the core can use it. Else throws
-/// DevicesUnusable with what to do about it.
+/// Makes the device the current one of the calling thread, if the core can use it. Otherwise throws
+/// DevicesUnusable with a remedy.
 void use_device(const std::string& flag, int index, const cudaDeviceProp& properties) {
   const auto version = [&](const char* separator) {
     return std::to_string(properties.major) + separator + std::to_string(properties.minor);
@@ -134,7 +134,7 @@ std::string free_memory() {
   return text;
 }
 
-/// Copies the scene to a device and leaves that the calling thread's current one. Throws
+/// Copies the scene to a device, which becomes the current one of the calling thread. Throws
 /// DevicesUnusable.
 Device open_device(const SceneSource& source, int index) {
   const std::string flag = "--device " + std::to_string(index);

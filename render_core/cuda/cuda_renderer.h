@@ -10,10 +10,10 @@
 
 namespace catgs {
 
-/// The CUDA core, with a copy of the scene on each of `devices`. The reason says which of all
-/// devices were left out. Throws InputError when a wanted device is not among those that are there,
-/// or in a build without the core; DevicesUnusable when one cannot be used, and where all are
-/// wanted, when none can. `pool` packs the scene.
+/// The CUDA core, with a copy of the scene on each of `devices`. If all devices are wanted, the
+/// reason names those that were left out. Throws InputError when a wanted device does not exist, or
+/// in a build without the core. Throws DevicesUnusable when a wanted device cannot be used, or, if
+/// all are wanted, when none can. `pool` packs the scene.
 MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
                                 ThreadPool& pool);
 

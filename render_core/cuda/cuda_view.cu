@@ -22,7 +22,7 @@ int processors_of(int device) {
   return processors;
 }
 
-/// What of a shape concerns the picture alone: its Gaussians are in view, or not.
+/// The part of a shape that concerns the picture alone; it decides which Gaussians are in view.
 FrameShape picture_of(FrameShape shape) {
   shape.first_x_px = shape.first_y_px = 0;
   shape.list_width_px = shape.width_px;
@@ -43,9 +43,9 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       builder_(scene_->arrays(), memory_, processors_),
       blend_warps_(blend_warps(processors_)),
       reach_(memory_.reach, memory_.other_reach) {
-  // What does not depend on the image is the most of a small scene's View: a device that cannot
-  // hold it should say so while there is a choice of devices. What is in view of a large scene only
-  // the first frame tells.
+  // The memory that does not depend on the image is the largest part of a small scene's View. A
+  // device without room for it should say so while another can be chosen. For a large scene, only
+  // the first frame tells how much is in view.
   if (settings.pipeline == Pipeline::vanilla) return;
   const glm::ivec2 one_tile(tile_size_px);
   set_shape(one_tile, image_grid(one_tile));
@@ -71,7 +71,8 @@ std::optional<FrameView> CudaView::draw(const FrameRequest& request, const Frame
   return finished(plan.kind, request.camera.near_z);
 }
 
-/// After a failure: buffers that could not grow are gone, and with them what frames shared.
+/// Called after a failure. Buffers that could not grow are gone, and the data that frames shared
+/// with them.
 void CudaView::forget_frames() {
   shape_ = {};
   reach_.forget();
@@ -90,7 +91,7 @@ void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
   shape_.tile_parts = turns_tiles(settings_) ? most_run_parts : parts_per_tile;
   const glm::ivec2 image_tiles = image_grid(size_px).tiles;
   const auto in_image = static_cast<std::uint32_t>(image_tiles.x * image_tiles.y);
-  // Grids of sub-frames differ in size: room for all, so that buffers settle.
+  // Grids of sub-frames differ in size. There is room for all, so that buffers settle.
   shape_.tile_bound = std::max(shape_.tiles(), in_image + in_image / 2 + 64);
   const FrameSizes room = room_.sizes();
   shape_.visible_bound = room.visible;
@@ -98,8 +99,8 @@ void CudaView::set_shape(glm::ivec2 size_px, const TileGrid& grid) {
   shape_.slice_bound = std::min(room.slices, most_slices(shape_));
 }
 
-/// For the frame's shape, and with `headroom`, where lists need memory, for somewhat longer ones,
-/// so that they do not need it again and again. Throws CudaError.
+/// Reserves memory for the frame's shape. Where lists need more memory, `headroom` adds some, so
+/// that they do not need more again and again. Throws CudaError.
 void CudaView::reserve(Headroom headroom) {
   FrameShape roomy = shape_;
   if (headroom == Headroom::some && !memory_.holds_lists(shape_)) {
@@ -113,8 +114,8 @@ void CudaView::reserve(Headroom headroom) {
   }
 }
 
-/// Sets the frame's shape and makes room for it; where the device has too little memory, without
-/// headroom, then without slices, and for the nearest part of the lists.
+/// Sets the frame's shape and makes room for it. Where the device has too little memory, it first
+/// gives up the headroom, then slices, then the farther part of the lists.
 void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   const FrameRoom wanted = room_;
   Headroom headroom = Headroom::some;
@@ -136,7 +137,7 @@ void CudaView::make_room(glm::ivec2 size_px, const TileGrid& grid) {
   }
 }
 
-/// After a key frame: whether it lacked room, and has more now.
+/// Called after a key frame: whether it lacked room, and has more now.
 bool CudaView::needs_more_room() {
   const FrameCounts& counts = *memory_.host_counts.get();
   return room_.outgrown_by(
@@ -156,7 +157,7 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
     blend(request);
     deliver();
     if (!needs_more_room()) break;
-    colours_known_ = false;  // not of Gaussians that found no room
+    colours_known_ = false;  // Gaussians without room were marked too
   }
   reach_.keep(shape_, {});
 }
@@ -175,7 +176,7 @@ void CudaView::list_tiles(const ListRequest& request) {
   builder_.sort_by_tile(shape_, stream);
 }
 
-/// False: a watched Gaussian came into view, and nothing was drawn.
+/// Returns false when a watched Gaussian came into view; then nothing was drawn.
 bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   const cudaStream_t stream = stream_.get();
   const ViewMemory& m = memory_;
@@ -217,7 +218,7 @@ bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   return true;
 }
 
-/// Decides whether a sub-frame tells giants from others.
+/// Decides whether a sub-frame looks for giants.
 GiantSet CudaView::want_giants(const FramePlan& plan) {
   if (!plan.warped || settings_.order != BlendOrder::fresh) return {};
   const double spread = depth_spread<double>(
@@ -256,7 +257,7 @@ void CudaView::reorder(const GiantSet& giants) {
                  stream);
 }
 
-/// Says which pixels of a sub-frame belong to each tile of its key frame.
+/// Assigns the pixels of a sub-frame to the tiles of its key frame.
 void CudaView::place_tiles(const FramePlan& plan) {
   turned_ = plan.warped;
   shape_.shown_x_px = shape_.first_x_px - plan.shift_px.x;
@@ -312,10 +313,10 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   deliver();
 }
 
-/// Cuts the tiles into tasks, and into runs where the reorder stage follows.
+/// Cuts the tiles into tasks, and into runs if the reorder stage follows.
 void CudaView::split(ReorderRun* runs, const LastReach& last) {
   const ViewMemory& m = memory_;
-  // What the last frame expected, in the mean; 0: not known.
+  // The mean that the last frame expected; 0: unknown.
   std::uint32_t mean = 0;
   if (const auto expected = m.host_counts.get()->expected_entries; last.reach && expected > 0)
     mean = std::max(1u, static_cast<std::uint32_t>(expected / shape_.tiles()));
@@ -375,7 +376,7 @@ void CudaView::blend(const FrameRequest& request) {
   times_.end(Stage::blend, stream_.get());
 }
 
-/// Brings the picture where the View's settings want it, and waits for the frame.
+/// Moves the picture where the View's settings want it, and waits for the frame.
 void CudaView::deliver() {
   const ViewMemory& m = memory_;
   const cudaStream_t stream = stream_.get();
@@ -400,8 +401,8 @@ void CudaView::deliver() {
                         cudaMemcpyDeviceToHost, stream),
         "counts");
   times_.end(Stage::convert, stream_.get());
-  // Pictures for an encoder come from servers, whose processors have work while a GPU draws; others
-  // are waited for in a loop, which answers sooner.
+  // Pictures for an encoder belong to servers, whose processors have other work while a GPU draws.
+  // For other pictures the host polls, which answers sooner.
   if (settings_.format == PixelFormat::i420) {
     check(cudaEventRecord(delivered_.get(), stream), "frame");
     check(cudaEventSynchronize(delivered_.get()), "frame");

@@ -21,7 +21,7 @@ namespace catgs::cuda {
 
 class CudaView final : public View {
  public:
-  /// On the current device, which is `device`. Throws CudaError where that has no memory for a
+  /// Uses the current device, which is `device`. Throws CudaError where it has no memory for a
   /// View.
   CudaView(std::shared_ptr<const DeviceScene> scene, int device, const ViewSettings& settings);
 
@@ -55,7 +55,7 @@ class CudaView final : public View {
   int processors_;
   ViewSettings settings_;
   Stream stream_;
-  Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame, to an encoder
+  Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame has arrived
   StageTimes times_;
   FrameDriver driver_;
   FrameShape shape_;
@@ -65,11 +65,11 @@ class CudaView final : public View {
   VanillaPipeline vanilla_;
   int blend_warps_;
 
-  // What sub-frames take over, beside memory_.
+  // State of sub-frames beside memory_.
   ReachHistory reach_;
   bool turned_ = false;         // the frame's tiles are runs of pixels
-  bool seeks_giants_ = false;   // since some turn of this group
-  bool colours_known_ = false;  // those that memory_ says are
+  bool seeks_giants_ = false;   // since a turn in this group
+  bool colours_known_ = false;  // memory_ says which ones
 };
 
 }  // namespace catgs::cuda

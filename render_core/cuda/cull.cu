@@ -11,13 +11,13 @@
 namespace catgs::cuda {
 namespace {
 
-/// A block takes one cluster after another: as many are in sight as the device finds, which the
-/// host does not wait for.
+/// A block takes one cluster after another. The number of clusters in sight is known on the device
+/// only, and the host does not wait for it.
 constexpr int block_size = cluster_size;
 constexpr int warps = block_size / warp_size;
 constexpr int blocks_per_processor = 8;
 
-// Apart from their selection, whose few blocks would test one cluster after another.
+// Separate from the selection kernel, whose few blocks would test one cluster after another.
 __global__ void __launch_bounds__(block_size) sight_kernel(const CullParams p) {
   const std::uint32_t c = blockIdx.x * block_size + threadIdx.x;
   if (c < p.scene.cluster_count) p.seen[c] = p.culler.outside(p.scene.clusters[c]) ? 0 : 1;
@@ -41,7 +41,7 @@ __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
   }
 }
 
-/// seen[rank], and nothing beyond the clusters in sight.
+/// seen[rank], and 0 beyond the clusters in sight.
 struct Seen {
   const std::uint32_t* seen;
   const FrameCounts* counts;

@@ -7,21 +7,23 @@
 
 namespace catgs::cuda {
 
-/// Finds the Gaussians in view (now, or with `sweeps` at some time of the window, and those that
-/// are watched), in the order of the scene's clusters: the frustum cache of a key frame. Clusters
-/// are tested first, so that the cost of the rest follows what is in sight, not the size of the
-/// scene.
+/// Finds the Gaussians in view, in the order of the scene's clusters: the frustum cache of a key
+/// frame. In view means now, or with `sweeps` at some time of the window; watched Gaussians count
+/// too. Clusters are tested first, so that the cost of the rest depends on what is in sight, not on
+/// the size of the scene.
 struct CullParams {
   SceneArrays scene;
   ListCuller culler;
   FrameCameras camera;
   bool sweeps;
   FrameShape shape;
-  std::uint32_t* clusters;  // [scene.cluster_count], those in sight; their place here is their rank
-  std::uint32_t* mask;      // [cull_words(scene.cluster_count)], by rank, a bit a Gaussian
-  // [scene.cluster_count], first by cluster: whether it is in sight; then by rank: its set bits.
+  std::uint32_t* clusters;  // [scene.cluster_count], those in sight; a cluster's position here is
+                            // its rank
+  std::uint32_t* mask;      // [cull_words(scene.cluster_count)], by rank, a bit per Gaussian
+  // [scene.cluster_count]. First, by cluster: whether it is in sight. Then, by rank: its number of
+  // set bits.
   std::uint32_t* seen;
-  std::uint32_t* before;    // [scene.cluster_count], of clusters of lower rank
+  std::uint32_t* before;    // [scene.cluster_count], Gaussians in clusters of lower rank
   std::uint32_t* visible;   // [visible_bound], scene indices
   FrameCounts* counts;      // `clusters` is set, and `visible`, which may exceed visible_bound
   HostCounts* host_counts;  // `visible` is set

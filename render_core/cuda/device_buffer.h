@@ -10,7 +10,7 @@
 namespace catgs::cuda {
 
 /// Owns bytes of device memory, or of page-locked host memory when `pinned`. Grows by `reserve`,
-/// never keeps its contents when growing.
+/// and loses its contents when it grows.
 class RawBuffer {
  public:
   explicit RawBuffer(bool pinned) : pinned_(pinned) {}
@@ -27,7 +27,7 @@ class RawBuffer {
   [[nodiscard]] bool pinned() const { return pinned_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
-  /// Makes room for so many bytes; throws CudaError and is then empty.
+  /// Makes room for this many bytes. After a CudaError it is empty.
   void reserve_bytes(std::size_t bytes) {
     if (bytes <= bytes_) return;
     release();
@@ -69,12 +69,12 @@ class Buffer : public RawBuffer {
  public:
   Buffer() : RawBuffer(is_pinned) {}
 
-  /// Makes room for `count` elements; throws CudaError and is then empty.
+  /// Makes room for `count` elements. After a CudaError it is empty.
   void reserve(std::size_t count) { reserve_bytes(count * sizeof(T)); }
 
   [[nodiscard]] T* get() const { return static_cast<T*>(data()); }
   [[nodiscard]] std::size_t size() const { return bytes() / sizeof(T); }
-  /// Each takes over the memory of the other.
+  /// Exchanges the memory of two buffers.
   void swap(Buffer& other) noexcept { RawBuffer::swap(other); }
 };
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cassert>
 #include <span>
 #include <vector>
 
@@ -7,7 +8,7 @@
 namespace catgs::cuda {
 namespace {
 
-// Host to device in pieces of some megabytes, so that set-up needs little memory beside the cloud.
+// Uploads in pieces of some megabytes, so that set-up needs little memory beside the cloud.
 constexpr std::size_t clusters_per_upload = 1024;
 
 template <class T>
@@ -21,6 +22,7 @@ void upload(T* target, const std::vector<T>& source, std::size_t count) {
 DeviceScene::DeviceScene(const SceneSource& source) {
   const GaussianCloud& cloud = source.cloud;
   const std::span<const std::uint32_t> order = source.order;
+  assert(order.size() == cloud.size());
   const std::size_t clusters = clusters_of(order.size());
   const std::size_t block_bytes = packed_block_bytes(cloud.sh_degree);
   blocks_.reserve(clusters * block_bytes);
@@ -32,7 +34,7 @@ DeviceScene::DeviceScene(const SceneSource& source) {
   std::vector<std::byte> blocks(std::min(clusters, clusters_per_upload) * block_bytes);
   for (std::size_t first = 0; first < clusters; first += clusters_per_upload) {
     const std::size_t count = std::min(clusters - first, clusters_per_upload);
-    std::ranges::fill(blocks, std::byte{});  // places that the last cluster leaves empty
+    std::ranges::fill(blocks, std::byte{});  // the last cluster may not fill its block
     source.pool.parallel_for(count, [&](std::size_t c) {
       const std::size_t begin = (first + c) * cluster_size;
       const PackedCluster packed =
@@ -45,8 +47,8 @@ DeviceScene::DeviceScene(const SceneSource& source) {
   }
   upload(units_.get(), units, clusters);
   upload(clusters_.get(), bounds, clusters);
-  // Copies from pageable memory may return before they end, and Views' streams do not wait for
-  // them.
+  // Copies from pageable memory may return before they have ended, and Views' streams do not wait
+  // for them.
   check(cudaStreamSynchronize(cudaStreamLegacy), "scene upload");
   arrays_ = {.count = static_cast<std::uint32_t>(order.size()),
              .cluster_count = static_cast<std::uint32_t>(clusters),

@@ -10,7 +10,7 @@
 
 namespace catgs::cuda {
 
-/// What kernels see of a scene. Pointers are device memory. Gaussians are in the order of their
+/// A scene as kernels see it. Pointers are device memory. Gaussians are in the order of their
 /// clusters: Gaussian i is number i % cluster_size of cluster i / cluster_size.
 struct SceneArrays {
   std::uint32_t count = 0;
@@ -21,7 +21,7 @@ struct SceneArrays {
   const Cluster* clusters = nullptr;   // [cluster_count]
 };
 
-/// What the copies on all devices are made from.
+/// The source of the copies on all devices.
 struct SceneSource {
   const GaussianCloud& cloud;
   std::vector<std::uint32_t> order;  // morton_order()
@@ -31,7 +31,7 @@ struct SceneSource {
 /// One scene on one device, shared by all Views.
 class DeviceScene {
  public:
-  /// On the current device. Throws CudaError.
+  /// Allocates on the current device. Throws CudaError.
   explicit DeviceScene(const SceneSource& source);
 
   [[nodiscard]] const SceneArrays& arrays() const { return arrays_; }

@@ -8,22 +8,22 @@
 
 namespace catgs::cuda {
 
-// A frame is a row of mostly short kernels. One that is launched early has its blocks on the
-// processors before the kernel before it ends, and begins some microseconds sooner: see
-// programmatic dependent launch in the CUDA programming guide. (One H200, hon_sui_sen: 1 % more
-// frames of head2 a second, 0.3 % of drone.)
+// A frame is a sequence of mostly short kernels. A kernel that is launched early has its blocks on
+// the processors before the previous kernel ends, and so begins some microseconds sooner. See
+// programmatic dependent launch in the CUDA programming guide. Measured on one H200 with
+// hon_sui_sen: 1 % more frames per second for head2, 0.3 % for drone.
 
-/// Whether this code of the kernel waits: what a newer device compiled from code for an older one
-/// does not. Throws CudaError.
+/// Whether this kernel's code waits. Code for an older architecture, compiled by the driver for a
+/// newer device, does not. Throws CudaError.
 inline bool launches_early(const void* kernel, const char* stage) {
   cudaFuncAttributes attributes{};
   check(cudaFuncGetAttributes(&attributes, kernel), stage);
   return attributes.ptxVersion >= 90;
 }
 
-/// Launches a kernel of which every thread calls wait_for_earlier_work() before it does anything
-/// that others see, or returns. Early is it only behind a kernel that calls
-/// let_next_kernel_begin(). `stage`: as for check(). Throws CudaError.
+/// Launches a kernel whose threads all call wait_for_earlier_work() before they return or have any
+/// visible effect. It starts early only after a kernel that calls let_next_kernel_begin(). `stage`:
+/// as for check(). Throws CudaError.
 template <class Params>
 void launch_early(const char* stage, void (*kernel)(Params), std::uint32_t blocks,
                   std::uint32_t block_size, cudaStream_t stream, const Params& params) {
@@ -39,15 +39,16 @@ void launch_early(const char* stage, void (*kernel)(Params), std::uint32_t block
   check(cudaLaunchKernelEx(&config, kernel, params), stage);
 }
 
-/// Waits until the kernel before is done and can be seen. All before that is too, for it waited
-/// itself or was begun when they were done.
+/// Waits until the previous kernel has finished and its results are visible. This covers all
+/// earlier kernels, because each of them waited likewise or began after they had finished.
 __device__ inline void wait_for_earlier_work() {
 #if __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" ::: "memory");
 #endif
 }
 
-/// Lets the next kernel of the stream begin, up to its own wait, once all blocks of this one have.
+/// Lets the next kernel of the stream begin, up to its own wait, once all blocks of this kernel
+/// have begun.
 __device__ inline void let_next_kernel_begin() {
 #if __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.launch_dependents;");

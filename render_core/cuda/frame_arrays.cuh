@@ -9,14 +9,14 @@
 
 namespace catgs::cuda {
 
-/// A splat's colour: its rounding alone leaves 77 dB.
+/// A splat's colour. Its rounding alone leaves 77 dB.
 struct __align__(8) PackedColour {
   __half2 red_green;
   __half blue;
   __half unused;
 };
 
-/// What blending needs of one projected Gaussian: one 32-byte sector.
+/// The fields of one projected Gaussian that blending needs: one 32-byte sector.
 struct __align__(32) SplatRecord {
   float2 centre_px;
   math::Whitening<float> whitening;
@@ -25,44 +25,44 @@ struct __align__(32) SplatRecord {
 };
 static_assert(sizeof(SplatRecord) == 32);
 
-/// The blend draws its tasks in so many classes: by their place in the tile's list, the last taking
-/// all that are farther back.
+/// The blend takes its tasks from this many classes, by their place in the tile's list. The last
+/// class has all that are farther back.
 constexpr int queue_classes = 8;
 
 /// Counts of a frame. Written by the device, copied to page-locked host memory at the frame's end.
 struct FrameCounts {
-  // Of the key frame; sub-frames keep them.
+  // Counts of the key frame, kept by its sub-frames.
   std::uint32_t clusters = 0;      // in sight
   std::uint32_t visible = 0;       // Gaussians in view
   std::uint32_t list_entries = 0;  // sum of all tile lists, before any bound was applied
   std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float
-  std::uint32_t giants = 0;        // in the GiantSet, which its sub-frames add to
-  // Of the frame.
+  std::uint32_t giants = 0;        // in the GiantSet; sub-frames add to it
+  // Counts of each frame.
   std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
-  std::uint32_t sampled = 0;   // counted Gaussians of which inverse_depths is the sum
+  std::uint32_t sampled = 0;   // counted Gaussians; inverse_depths is their sum
   unsigned long long inverse_depths = 0;     // in units of 1 / (near_z * inverse_depth_scale)
   std::uint32_t unlisted = 0;                // 1: a watched Gaussian came into view
   std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
   std::uint32_t runs = 0;                    // of the reorder stage
-  std::uint32_t uncarried_lists = 0;         // with more giants than launch_giants() can carry
+  std::uint32_t uncarried_lists = 0;         // lists with too many giants for launch_giants()
   std::uint32_t wanted_slices = 0;           // of long tiles; allocated_slices found room
   std::uint32_t allocated_slices = 0;
-  std::uint32_t next_part = 0;              // of a task, that no warp of the blend has taken yet
+  std::uint32_t next_part = 0;              // of a task; next one for a warp of the blend
   unsigned long long expected_entries = 0;  // list entries that tiles are expected to look at
-  unsigned long long blended_pairs = 0;     // only when counted, with a pixel's whole last round
+  unsigned long long blended_pairs = 0;     // only when counted; with a pixel's whole last round
 };
 
-/// Counts of a key frame that the device writes straight to page-locked host memory, as soon as it
-/// knows them: sorting room that is not used would cost as much as sorting splats.
+/// Counts of a key frame that the device writes directly to page-locked host memory as soon as it
+/// knows them. Sorting unused room would cost as much as sorting splats.
 struct HostCounts {
   std::uint32_t visible = 0;
   std::uint32_t list_entries = 0;
 };
 
-// In an array of visible Gaussians: this one is in no list. A turn may bring it into view (giants
-// far to the side, which come before the near plane with footprints all over the picture), but
-// seldom does; a sub-frame that finds one in view is drawn again as a key frame.
+// In an array of visible Gaussians: this one is in no list. A turn may bring it into view, but
+// seldom does. Giants far to the side may come before the near plane with footprints all over the
+// picture. A sub-frame that finds one in view is drawn again as a key frame.
 constexpr std::uint32_t watched_bit = std::uint32_t{1} << 31;
 static_assert(max_gaussians <= watched_bit);
 
@@ -71,9 +71,9 @@ struct FrameShape {
   int width_px = 0, height_px = 0;
   int tiles_x = 0, tiles_y = 0;
   int first_x_px = 0, first_y_px = 0;         // where tile (0, 0) begins in the lists' image plane
-  int list_width_px = 0, list_height_px = 0;  // where lists end, from there
+  int list_width_px = 0, list_height_px = 0;  // extent of the lists, from there
   int shown_x_px = 0, shown_y_px = 0;         // where tile (0, 0) begins in the picture
-  int tile_parts = 0;                         // parts of a tile that slices have room for
+  int tile_parts = 0;                         // parts per tile for which slices have room
   std::uint32_t tile_bound = 0;               // room for tiles
   std::uint32_t visible_bound = 0;            // room for visible Gaussians
   std::uint32_t list_bound = 0;               // room for list entries
@@ -86,14 +86,14 @@ struct FrameShape {
 
 constexpr int warp_size = 32;
 
-/// near_z / depth as an integer; a warp's sum fits in 32 bits.
+/// near_z / depth as an integer. A warp's sum fits in 32 bits.
 constexpr float inverse_depth_scale = 1 << 20;
 
 constexpr std::uint32_t blocks_for(std::uint32_t threads, std::uint32_t block_size) {
   return (threads + block_size - 1) / block_size;
 }
 
-/// Sums of list entries saturate here, so that 32 bits hold them whatever a scene asks for.
+/// Sums of list entries saturate here, so that they fit in 32 bits for any scene.
 constexpr std::uint32_t list_entries_limit = std::uint32_t{1} << 31;
 
 }  // namespace catgs::cuda

@@ -8,8 +8,8 @@
 
 namespace catgs::cuda {
 
-/// What the counts of a finished frame say: all statistics but kind, window and times. `near_z`:
-/// that of the frame's camera.
+/// Statistics of a finished frame from its counts: all but kind, window and times. `near_z`: of the
+/// frame's camera.
 FrameStats frame_stats(const FrameCounts& counts, const FrameShape& shape, FrameKind kind,
                        float near_z);
 

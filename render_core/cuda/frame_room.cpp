@@ -1,6 +1,7 @@
 #include "render_core/cuda/frame_room.h"
 
 #include <algorithm>
+#include <cassert>
 #include <limits>
 #include <utility>
 
@@ -9,12 +10,12 @@ namespace {
 
 constexpr int patience = 600;  // key frames
 
-// Room for lists has threads, but room for slices costs nothing while it is not used.
+// Unused room for lists costs threads; unused room for slices costs nothing.
 constexpr int lists_span = 240;
 constexpr int slices_span = 600;
 
-// What a large scene starts with: drawing its first frame says how much of it is in view, and
-// drawing that again how long its lists are.
+// The first room of a large scene. Its first drawing tells how much of the scene is in view; the
+// second tells how long its lists are.
 constexpr std::uint64_t first_visible = 1u << 18, first_entries = 1u << 20;
 
 }  // namespace
@@ -24,7 +25,9 @@ Room::Room(std::uint64_t first_guess, std::uint64_t limit, int span)
           std::min<std::uint64_t>(limit, std::numeric_limits<std::uint32_t>::max()))),
       limit_(ceiling_),
       size_(static_cast<std::uint32_t>(std::min<std::uint64_t>(first_guess, limit_))),
-      span_(span) {}
+      span_(span) {
+  assert(span > 0);
+}
 
 std::uint32_t Room::with_margin(std::uint32_t needed) const {
   return static_cast<std::uint32_t>(
@@ -33,7 +36,7 @@ std::uint32_t Room::with_margin(std::uint32_t needed) const {
 
 bool Room::outgrown_by(std::uint32_t needed) {
   const bool lacked = needed > size_ && size_ < limit_;
-  // Before the margin is used up: a frame that lacks room is drawn twice.
+  // Grows before the margin is used up, because a frame that lacks room is drawn twice.
   if (needed > size_ - size_ / 16) size_ = std::max(size_, with_margin(needed));
   most_ = std::max(most_, needed);
   if (++frames_ == span_) {
@@ -46,6 +49,7 @@ bool Room::outgrown_by(std::uint32_t needed) {
 }
 
 void Room::shrink_to(double part) {
+  assert(part >= 0.0 && part <= 1.0);
   size_ = limit_ = static_cast<std::uint32_t>(part * size_);
   limited_for_ = patience;
 }
@@ -65,7 +69,8 @@ bool FrameRoom::outgrown_by(const FrameSizes& needed) {
   slices_.outgrown_by(needed.slices);  // without them the frame was slower, not wrong
   const std::uint32_t had = visible_.size();
   const bool more_visible = visible_.outgrown_by(needed.visible);
-  // Of splats that found no room no entries were counted: as many as of the others.
+  // Splats that found no room had no entries counted. They are assumed to have as many as the
+  // others.
   const double counted = std::min(1.0, static_cast<double>(had) / std::max(needed.visible, 1u));
   const bool longer_lists = lists_.outgrown_by(static_cast<std::uint32_t>(
       std::min<double>(needed.list_entries / counted, std::numeric_limits<std::uint32_t>::max())));

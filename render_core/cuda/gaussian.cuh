@@ -7,7 +7,7 @@
 
 namespace catgs::cuda {
 
-// How kernels read a scene: nobody else knows its layout.
+// How kernels read a scene. No other code knows its layout.
 
 __device__ inline const std::byte* block_of(const SceneArrays& scene, std::uint32_t i) {
   return scene.blocks + i / cluster_size * packed_block_bytes(scene.sh_degree);
@@ -26,7 +26,7 @@ __device__ inline float high_half(std::uint32_t word) {
   return from_half(static_cast<std::uint16_t>(word >> 16));
 }
 
-/// What already rules out most Gaussians that nobody sees.
+/// The data that rules out most invisible Gaussians.
 struct Centre {
   math::Vec3<float> mean;  // world
   float log2_opacity;

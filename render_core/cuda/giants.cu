@@ -8,42 +8,43 @@ namespace {
 
 constexpr int block_size = 128;
 
-// A set that holds more is too full to tell giants from others; no scene was seen to have them.
+// A fuller set is too full to tell giants from others. No scene was seen to reach this.
 constexpr std::uint32_t most_giants = giant_bits / 4;
 
-// Of one tile's list: giants that are carried, and entries that change places for them, one more at
-// each boundary that a giant passes. A tile with more moves keeps its list as it is.
+// Limits for the list of one tile: giants that are carried, and all entries that move, which
+// include one neighbour for each boundary that a giant passes. A tile with more moves keeps its
+// list as it is.
 constexpr std::uint32_t found_per_thread = 4, most_found = found_per_thread * block_size;
 constexpr std::uint32_t most_moves = 1536;
 
-// The parts of a list: runs of the reorder stage, 31 at most, then whatever is behind those. This
-// is hardly looked at and in no order: giants that are carried there are out of the way, and
-// neighbours that took their places there may stand too far back.
+// The parts of a list: at most 31 runs of the reorder stage, then the rest of the list. The rest is
+// hardly looked at and unordered. Giants that are carried there are out of the way, and neighbours
+// that took their places may stand too far back.
 constexpr std::uint32_t most_parts = warp_size;
 
-/// A block's notes about the list of one tile.
+/// A block's working data for the list of one tile.
 struct Notes {
   std::uint32_t bits[giant_words];  // GiantSet::bits
-  std::uint32_t found;              // giants to be carried, maybe more than `at` holds
+  std::uint32_t found;              // giants to be carried; may exceed the size of `at`
   std::uint32_t at[most_found];
-  // Of each part of the list.
+  // For each part of the list.
   std::uint32_t begin[most_parts + 1];
   std::uint32_t depth[most_parts];    // key of one of its first entries
   std::uint32_t leaving[most_parts];  // giants that belong to another part
-  int gain[most_parts];               // giants that come, less those that leave
-  int gives[most_parts];  // neighbours that go to the next part; negative: that come from there
-  // Whatever changes parts leaves a place and takes another. Both are noted part by part, where
-  // each has as many of one as of the other.
+  int gain[most_parts];               // giants that come, minus giants that leave
+  int gives[most_parts];              // neighbours that move to the next part; negative: from it
+  // Each moving entry leaves a place and takes another. Both are noted by part, and each part has
+  // as many of one as of the other.
   std::uint32_t moves;
   std::uint32_t left[most_moves];   // places in the list
   std::uint32_t taken[most_moves];  // slots
   std::uint32_t next_left[most_parts], next_taken[most_parts];
-  bool lacking;  // a part has too few neighbours to give: nothing moves
+  bool lacking;  // a part has too few neighbours to give, so nothing moves
 };
 
 struct List {
   std::uint32_t* slot;
-  std::uint32_t length, ordered;  // entries, and how many of them are in runs
+  std::uint32_t length, ordered;  // entries; entries that are in runs
 
   __device__ std::uint32_t runs() const {
     return min((ordered + reorder_run - 1) / reorder_run, most_parts - 1);
@@ -59,8 +60,8 @@ __device__ bool may_be_giant(const Notes& notes, std::uint32_t slot) {
   return (notes.bits[giant_word(slot)] & giant_bit(slot)) != 0;
 }
 
-/// By one warp, a part a lane: notes where parts begin, at which depths, and that nothing moves
-/// yet.
+/// Run by one warp, a lane for each part. Notes where parts begin and at which depths, and clears
+/// the moves.
 __device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes) {
   const std::uint32_t r = threadIdx.x;
   const std::uint32_t begin = r < list.runs() ? r * reorder_run : list.behind();
@@ -73,9 +74,9 @@ __device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes
     notes.lacking = false;
   }
   __syncwarp();
-  // Not of its very first entries, some of which may belong farther in front; nor of what is
-  // hidden, nor of giants, for they may stand in the wrong part. One that has no others is skipped:
-  // it takes the depth of the next.
+  // The depth of a part is not taken from its very first entries, some of which may belong farther
+  // in front. Hidden entries do not count, nor giants, which may stand in the wrong part. A part
+  // with no other entries is skipped: it takes the depth of the next part.
   constexpr std::uint32_t unknown = ~0u;
   std::uint32_t depth = unknown;
   const std::uint32_t length = notes.begin[r + 1] - notes.begin[r];
@@ -91,18 +92,18 @@ __device__ void begin_parts(const GiantParams& p, const List& list, Notes& notes
   notes.depth[r] = depth;
 }
 
-/// The part that a giant in part `source` belongs to.
+/// The part that a giant, now in part `source`, belongs to.
 __device__ std::uint32_t target_of(const Notes& notes, const List& list, std::uint32_t source,
                                    std::uint32_t key) {
   const std::uint32_t last = list.parts() - 1;
   std::uint32_t target = 0;
   for (std::uint32_t r = 1; r <= last; ++r) target += notes.depth[r] <= key ? 1 : 0;
-  // A short part has no neighbours to give for those that come.
+  // A short part has too few neighbours to exchange for giants that come.
   const bool is_short = list.length - notes.begin[last] < reorder_run / 2;
   return target == last && source != last && is_short ? last - 1 : target;
 }
 
-/// Notes the giants that lie in another part than they belong to.
+/// Notes the giants that are in the wrong part.
 __device__ void find(const GiantParams& p, const List& list, Notes& notes) {
   constexpr std::uint32_t loads = 8;
   for (std::uint32_t first = 0; first < list.length; first += loads * block_size) {
@@ -123,8 +124,8 @@ __device__ void find(const GiantParams& p, const List& list, Notes& notes) {
   }
 }
 
-/// By one warp, a part a lane: how many neighbours each boundary lets pass so that all parts keep
-/// their lengths, and where a part's moves are noted.
+/// Run by one warp, a lane for each part. Finds how many neighbours must pass each boundary so that
+/// all parts keep their lengths, and where each part's moves are noted.
 __device__ void plan(Notes& notes) {
   const std::uint32_t r = threadIdx.x;
   const int taken = warp_sums(notes.gain[r]).before;  // from the part before
@@ -136,8 +137,8 @@ __device__ void plan(Notes& notes) {
   if (r == 0) notes.moves = leaving.all;
 }
 
-/// By one warp: notes the neighbours that pass the boundary behind part r. A part gives from its
-/// nearer half.
+/// Run by one warp. Notes the neighbours that pass the boundary behind part r. A part gives from
+/// the half next to the boundary.
 __device__ void give(const List& list, std::uint32_t r, Notes& notes) {
   const std::uint32_t lane = threadIdx.x % warp_size;
   const bool back = notes.gives[r] > 0;
@@ -171,7 +172,8 @@ __device__ void give(const List& list, std::uint32_t r, Notes& notes) {
   }
 }
 
-/// Carries the giants that were found to the parts that their depths lie in; false: not all.
+/// Carries the giants that were found to the parts that their depths belong to. Returns false if
+/// any was left.
 __device__ bool carry(const GiantParams& p, const List& list, Notes& notes) {
   const std::uint32_t found = min(notes.found, most_found);
   std::uint32_t giant[found_per_thread], source[found_per_thread], target[found_per_thread];
@@ -234,7 +236,7 @@ __global__ void __launch_bounds__(block_size) giants_kernel(const GiantParams p)
 }  // namespace
 
 void launch_giants(const GiantParams& params, cudaStream_t stream) {
-  constexpr int blocks_per_processor = 14;  // more than it holds at a time
+  constexpr int blocks_per_processor = 14;  // more than run at a time
   launch_early("giants", giants_kernel, params.processors * blocks_per_processor, block_size,
                stream, params);
 }

@@ -11,7 +11,7 @@
 namespace catgs::cuda {
 namespace {
 
-/// Whether tile indices and shape.tiles(), which is none's, fit in 16 bits.
+/// Whether tile indices and shape.tiles(), which stands for no tile, fit in 16 bits.
 bool is_narrow(const FrameShape& shape) {
   return shape.tiles() <= std::numeric_limits<std::uint16_t>::max();
 }

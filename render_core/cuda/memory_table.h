@@ -7,16 +7,16 @@
 
 namespace catgs::cuda {
 
-/// How long the contents of a buffer are of use.
+/// How long the contents of a buffer are needed.
 enum class Life {
-  view,   // as long as its View: over key frames
+  view,   // as long as its View, across key frames
   group,  // from a key frame to its last sub-frame
   frame,  // within one frame
 };
 
-/// The memory of a View as a table. A class derived from this one declares each buffer once, as a
-/// member: what it holds, how long that is of use, and how many elements it has for given Sizes.
-/// Allocation, release and byte counts follow.
+/// The memory of a View as a table. A derived class declares each buffer once, as a member: its
+/// contents, how long they are needed, and its number of elements for given Sizes. Allocation,
+/// release and byte counts follow from that.
 template <class Sizes>
 class MemoryTable {
  public:
@@ -38,7 +38,7 @@ class MemoryTable {
   void release() noexcept {
     for (const Entry& row : rows_) row.buffer->release();
   }
-  /// Of device memory.
+  /// Bytes of device memory.
   [[nodiscard]] std::size_t bytes() const {
     std::size_t sum = 0;
     for (const Entry& row : rows_) sum += row.buffer->pinned() ? 0 : row.buffer->bytes();

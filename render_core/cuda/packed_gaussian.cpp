@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -11,7 +12,7 @@ namespace {
 
 constexpr float sh_levels = 127.0f;  // on either side of zero
 constexpr float sh_unit_scale = 0x1p15f;
-constexpr int factor_bits = 14;  // of an entry, beside the sign
+constexpr int factor_bits = 14;  // of an entry, without the sign
 constexpr int most_octaves = 63;
 
 using Factor = math::CovarianceFactor<double>;
@@ -101,6 +102,8 @@ void add_to(ClusterBounds& bounds, const PackedGeometry& g, float unit) {
 
 PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
                            std::span<std::byte> block) {
+  assert(!members.empty() && members.size() <= cluster_size);
+  assert(block.size() == packed_block_bytes(cloud.sh_degree));
   std::array<Factor, cluster_size> factors;
   for (std::size_t j = 0; j < members.size(); ++j) factors[j] = factor_of(cloud, members[j]);
   const PackedUnits units = units_for(cloud, members, std::span(factors).first(members.size()));

@@ -21,14 +21,14 @@ namespace catgs::cuda {
 // How the CUDA core stores Gaussians: 77 bytes each with harmonics of degree 3, where plain floats
 // take 236.
 //
-// A Gaussian is a record: what geometry and base colour need, then a byte for every higher
-// harmonic. A block holds the records of a cluster plane by plane: the first 16 bytes of all, the
-// next 16 of all, and so on, and what is left of a record in planes of 8, 4, 2 and 1 bytes. So
-// every load is a whole word, neighbours' loads are one access, and no byte is padding.
+// A Gaussian is a record: geometry and base colour, then a byte for every higher harmonic. A block
+// holds the records of a cluster plane by plane: the first 16 bytes of all records, the next 16 of
+// all, and so on. The end of a record is in planes of 8, 4, 2 and 1 bytes. Thus every load is a
+// whole word, neighbours' loads are one access, and no byte is padding.
 
 /// The first part of a record. Halves are IEEE binary16, as bits.
 struct PackedGeometry {
-  float mean[3];               // world; as it is: view depth decides the order of blending
+  float mean[3];               // world; not rounded: view depth decides the blending order
   std::uint16_t log2_opacity;  // see unpack_log2_opacity()
   std::uint16_t base_red;      // halves: the first harmonic
   std::uint32_t factor[3];     // see unpack_factor()
@@ -36,7 +36,7 @@ struct PackedGeometry {
 };
 static_assert(sizeof(PackedGeometry) == 32);
 
-/// What the numbers of a cluster's records count in.
+/// The units of the numbers in a cluster's records.
 struct alignas(16) PackedUnits {
   float factor;  // of the cluster's largest Gaussian, a power of two
   float sh[3];   // of the harmonics of degree 1, 2 and 3; the largest in the cluster is 127 / 2^15
@@ -57,8 +57,7 @@ constexpr int packed_plane_width(int sh_degree, int at) {
   return width;
 }
 
-/// Where in its block a Gaussian keeps the part of its record in the plane that begins at byte
-/// `at`.
+/// Offset in a block of a Gaussian's data in the plane that begins at byte `at`.
 CATGS_HD constexpr std::uint32_t packed_offset(int at, int width, std::uint32_t in_cluster) {
   return static_cast<std::uint32_t>(at) * static_cast<std::uint32_t>(cluster_size) +
          static_cast<std::uint32_t>(width) * in_cluster;
@@ -82,16 +81,17 @@ CATGS_HD inline float from_half(std::uint16_t bits) {
 #endif
 }
 
-/// 65536 levels from 0 to -8, where nothing is visible any more (log2_alpha_min).
+/// 65536 levels from 0 to -8, which is below visibility (log2_alpha_min).
 constexpr float log2_opacity_min = -8.0f;
 CATGS_HD inline float unpack_log2_opacity(std::uint32_t level) {
   return static_cast<float>(level) * (log2_opacity_min / 65535.0f);
 }
 
-/// A covariance factor has one exponent for all entries, as many octaves below the cluster's unit,
-/// for it is their error beside the largest one that moves the ends of a needle: 2^-15 of it, where
-/// halves would leave 2^-12. Each word holds an entry beside the diagonal (bits 0 to 14, signed),
-/// one on it (bits 15 to 29, in half the unit) and two bits of the exponent: yx xx, zx yy, zy zz.
+/// A covariance factor has one exponent for all entries: the number of octaves below the cluster's
+/// unit. One exponent is enough, because the ends of a needle move by the entries' error relative
+/// to the largest one. That is 2^-15, where halves would leave 2^-12. The words hold yx xx, zx yy
+/// and zy zz: an off-diagonal entry (bits 0 to 14, signed) and a diagonal one (bits 15 to 29, in
+/// half the unit). Two bits of the exponent follow in each.
 CATGS_HD inline math::CovarianceFactor<float> unpack_factor(const std::uint32_t (&words)[3],
                                                             float unit) {
   const std::uint32_t octaves = words[0] >> 30 | words[1] >> 30 << 2 | words[2] >> 30 << 4;
@@ -117,11 +117,11 @@ CATGS_HD inline float packed_sh(std::uint32_t word, int j) {
 
 struct PackedCluster {
   PackedUnits units;
-  Cluster bounds;  // of the Gaussians as they are packed
+  Cluster bounds;  // of the Gaussians after packing
 };
 
-/// Packs the `members` of the cloud (1 to cluster_size indices) into `block`, packed_block_bytes()
-/// of zeros. Everything is rounded to the nearest.
+/// Packs the `members` of the cloud (1 to cluster_size indices) into `block`, which is
+/// packed_block_bytes() of zeros. All values are rounded to nearest.
 PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
                            std::span<std::byte> block);
 

@@ -5,9 +5,9 @@
 
 namespace catgs::cuda {
 
-// A warp blends a part (8x8 px) of a tile in two halves (8x4 px), each with its own list of splats:
-// most splats that reach a part miss half of it. In loading and storing pixels a half-warp has a
-// half, and a lane two of its pixels.
+// A warp blends a part (8x8 px) of a tile in two halves (8x4 px). Each half has its own list of
+// splats, because most splats that reach a part miss half of it. To load and store pixels, each
+// half-warp has a half, and each lane two of its pixels.
 constexpr int halves = 2;
 constexpr int half_lanes = warp_size / halves;
 constexpr int half_height_px = part_size_px / halves;
@@ -16,7 +16,7 @@ constexpr int half_pixels = half_lanes * pixels_per_lane;
 constexpr int rows_per_pass = half_height_px / pixels_per_lane;
 constexpr int parts_across = tile_size_px / part_size_px;
 
-/// Pixel centres, px from the origin of a part: a pixel corner in its middle.
+/// Bounds of pixel centres, px from the origin of a part, which is a pixel corner in its middle.
 struct Box {
   float low_x, low_y, high_x, high_y;
 };
@@ -24,7 +24,7 @@ struct Box {
 /// A pixel as blending sees it.
 struct PartPixel {
   float x, y;   // its centre, px from the origin of the part
-  bool inside;  // of the picture, and of the part
+  bool inside;  // of the picture and of the part
 };
 
 /// The pixels of a lane in a square part of a tile: one column, rows_per_pass apart.
@@ -46,11 +46,11 @@ class SquarePixels {
   }
 
   __device__ static bool empty() { return false; }
-  /// Of the part, px in the picture.
+  /// Origin of the part, px in the picture.
   __device__ float origin_x() const { return static_cast<float>(x_px_ - column_ + middle); }
   __device__ float origin_y() const { return static_cast<float>(y_px_ - row_ + middle); }
-  /// Of the half_lanes pixels that the half's lanes have as their i-th, number k. The whole warp
-  /// asks.
+  /// Number k of the half_lanes pixels that are the i-th of their lanes in half `half`. Called by
+  /// the whole warp.
   __device__ PartPixel part_pixel(const FrameShape& shape, int half, int i, int k) const {
     const int x = k % part_size_px - middle;
     const int y = half * half_height_px + i * rows_per_pass + k / part_size_px - middle;
@@ -75,13 +75,13 @@ class SquarePixels {
   int x_px_, y_px_;
 };
 
-/// The pixels of a lane in a part of a tile's run: half of the part a half-warp, and of that every
-/// half_lanes-th a lane.
+/// The pixels of a lane in a part of a tile's run. A half-warp has half of the part, a lane every
+/// half_lanes-th pixel of that.
 class RunPixels {
  public:
   static constexpr int most_parts = most_run_parts;
 
-  /// `box` is the warp's, and is set.
+  /// Sets `box`, which belongs to the warp.
   __device__ RunPixels(const BlendParams& p, Box (&box)[halves], std::uint32_t tile, int part) {
     const int lane = static_cast<int>(threadIdx.x) % warp_size;
     const int count = static_cast<int>(p.pixel_count[tile]);

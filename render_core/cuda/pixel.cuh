@@ -5,13 +5,13 @@
 
 namespace catgs::cuda {
 
-/// Tiles may lie partly or wholly outside.
+/// Whether a pixel is in the picture. Tiles may lie partly or wholly outside.
 __device__ inline bool in_picture(const FrameShape& shape, int x_px, int y_px) {
   return x_px >= 0 && y_px >= 0 && x_px < shape.width_px && y_px < shape.height_px;
 }
 
-/// Shows a blended pixel over its background. `rgb`: [height][width][3], display-referred, in
-/// [0, 1]. Pixels outside the picture go nowhere.
+/// Writes a blended pixel over its background. `rgb`: [height][width][3], display-referred, in [0,
+/// 1]. Pixels outside the picture are dropped.
 __device__ inline void show_pixel(float* rgb, const FrameShape& shape, int x_px, int y_px,
                                   const math::PixelState<float>& pixel, float3 background) {
   if (!in_picture(shape, x_px, y_px)) return;

@@ -9,14 +9,14 @@ namespace {
 constexpr int tile_pixels = tile_size_px * tile_size_px;
 constexpr int block_size = tile_pixels;
 
-/// Place of a cell of the tile along the Hilbert curve through it.
+/// Position of a cell of the tile along the Hilbert curve through it.
 __device__ unsigned along_hilbert(unsigned x, unsigned y) {
   unsigned place = 0;
 #pragma unroll
   for (unsigned side = tile_size_px / 2; side > 0; side /= 2) {
     const bool right = (x & side) != 0, low = (y & side) != 0;
     place = place * 4 + (right ? (low ? 2u : 3u) : (low ? 1u : 0u));
-    // The curve through a quarter starts and ends at the corners that its neighbours begin at.
+    // The curve through a quarter starts and ends at the corners where its neighbours begin.
     x &= side - 1;
     y &= side - 1;
     if (low) continue;
@@ -35,7 +35,8 @@ __device__ unsigned along_hilbert(unsigned x, unsigned y) {
 struct Candidates {
   int first_x, first_y, width, count;
 
-  /// Number k, row by row. Exact: k and width are small, and no quotient is near the next integer.
+  /// Pixel number k, row by row. Exact: k and width are small, and no quotient is near the next
+  /// integer.
   __device__ int2 pixel(int k) const {
     const int row =
         static_cast<int>(__fdividef(static_cast<float>(k) + 0.5f, static_cast<float>(width)));
@@ -56,7 +57,7 @@ __device__ Candidates candidates_of(const PixelRunParams& p, int tile_x, int til
     high_x = fmaxf(high_x, at.x);
     high_y = fmaxf(high_y, at.y);
   }
-  // Their centres lie inside, or outside by rounding.
+  // Pixels whose centres lie inside; rounding may add some outside.
   const int first_x = max(0, static_cast<int>(floorf(low_x - 0.5f)));
   const int first_y = max(0, static_cast<int>(floorf(low_y - 0.5f)));
   const int width = min(p.shape.width_px, static_cast<int>(ceilf(high_x + 0.5f))) - first_x;
@@ -67,7 +68,7 @@ __device__ Candidates candidates_of(const PixelRunParams& p, int tile_x, int til
 __global__ void __launch_bounds__(block_size) pixel_runs_kernel(const PixelRunParams p) {
   using Scan = cub::BlockScan<unsigned, block_size>;
   __shared__ Scan::TempStorage scratch;
-  __shared__ unsigned in_cell[tile_pixels];  // pixels of each cell, then where they begin
+  __shared__ unsigned in_cell[tile_pixels];  // pixels of each cell, then its first position
   const int tile = static_cast<int>(blockIdx.x), thread = static_cast<int>(threadIdx.x);
   const int tile_x = tile % p.shape.tiles_x, tile_y = tile / p.shape.tiles_x;
   const int left = p.shape.first_x_px + tile_x * tile_size_px;

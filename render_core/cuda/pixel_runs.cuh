@@ -6,8 +6,8 @@
 namespace catgs::cuda {
 
 /// Finds the pixels of each tile of a grid that is turned with the camera (GridKind::warp): pixel p
-/// of the picture belongs to the tile that holds list_from_frame(p). Every pixel is in one run,
-/// which is ordered along a Hilbert curve in the grid, so that any part of it is compact.
+/// of the picture belongs to the tile that holds list_from_frame(p). Every pixel is in one run. A
+/// run follows a Hilbert curve in the grid, so that any part of it is compact.
 struct PixelRunParams {
   FrameShape shape;
   Homography<float> list_from_frame;  // picture px -> px of the lists' image plane

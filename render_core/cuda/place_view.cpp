@@ -1,5 +1,6 @@
 #include "render_core/cuda/place_view.h"
 
+#include <cassert>
 #include <optional>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace catgs {
 std::unique_ptr<View> place_view(
     DeviceSet& set, std::vector<int> devices,
     const std::function<std::unique_ptr<View>(DeviceSet::Place place)>& make) {
+  assert(!devices.empty());
   std::optional<DeviceError> full;
   for (;;) {
     DeviceSet::Place place = set.take(devices);

@@ -9,9 +9,10 @@
 
 namespace catgs {
 
-/// A View on the least loaded of `devices` (not empty) on which `make` throws no DeviceError: a
-/// device that has failed loses its Views and would look like the best place for the next. Where it
-/// fails on all, throws out_of_memory if one said so, which serves others, else what the last said.
+/// Makes a View on the least loaded of `devices` (not empty) on which `make` throws no DeviceError.
+/// A failed device loses its Views and so would look like the best place for the next. Where `make`
+/// fails on all devices, throws out_of_memory if any of them did, because such a device still
+/// serves others; otherwise throws the last error.
 std::unique_ptr<View> place_view(
     DeviceSet& set, std::vector<int> devices,
     const std::function<std::unique_ptr<View>(DeviceSet::Place place)>& make);

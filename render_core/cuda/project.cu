@@ -8,7 +8,7 @@ namespace {
 
 constexpr int block_size = 128;
 
-/// Raises *target to `value`, which only grows: most threads see that it is no record.
+/// Raises *target to `value`. The value only grows, so most threads see that theirs is no maximum.
 __device__ void raise(std::uint32_t* target, std::uint32_t value) {
   const std::uint32_t largest = __reduce_max_sync(__activemask(), value);
   if (value == largest && largest > *const_cast<const volatile std::uint32_t*>(target))
@@ -20,7 +20,7 @@ __device__ bool wants_shading(const ColourArrays& colours, std::uint32_t i) {
   return colours.wanted == nullptr || (colours.wanted[i / warp_size] >> i % warp_size & 1u) != 0;
 }
 
-// The mean depth is that of a part of the blocks: it needs no more, and their sums meet in one
+// The mean depth is taken from a sample of the blocks. That is enough, and their sums meet in one
 // place.
 constexpr unsigned sampled_blocks = 16;
 
@@ -35,7 +35,7 @@ __device__ void add_inverse_depth(const ProjectParams& p, bool counted, float de
   atomicAdd(&p.counts->sampled, count);
 }
 
-/// Puts a Gaussian that is a giant into the group's set.
+/// Adds a Gaussian to the group's set if it is a giant.
 __device__ void note_giant(const ProjectParams& p, std::uint32_t v, const Splat& splat) {
   const bool is_giant = p.giants.bits != nullptr && splat.in_view &&
                         p.giants.is_giant(splat.centre_px, splat.half_px);

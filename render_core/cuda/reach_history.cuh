@@ -5,22 +5,22 @@
 
 namespace catgs::cuda {
 
-/// How much of each tile's list a View's last frame looked at, and where those tiles lay: what the
-/// next frame expects.
+/// How much of each tile's list a View's last frame looked at, and where those tiles were. The next
+/// frame expects the same.
 class ReachHistory {
  public:
-  /// Two buffers, [tiles] each, which take turns and outlive the history.
+  /// Takes two buffers, [tiles] each, which alternate and outlive the history.
   ReachHistory(const DeviceBuffer<std::uint32_t>& a, const DeviceBuffer<std::uint32_t>& b)
       : reach_{&a, &b} {}
 
   void forget() { known_ = false; }
 
-  /// Of the last frame, for one of this shape; nothing where the picture had another size.
-  /// `same_grid`: both have the lists of one key frame.
+  /// The reach of the last frame, for a frame of this shape; empty where the picture had another
+  /// size. `same_grid`: both frames have the lists of one key frame.
   [[nodiscard]] LastReach last(const FrameShape& shape, bool same_grid) const;
-  /// Where the frame that is being drawn writes its own, [tiles].
+  /// [tiles], output of the current frame.
   [[nodiscard]] std::uint32_t* current() const { return reach_[1 - last_]->get(); }
-  /// The frame is drawn: its pixels found their tiles by `list_from_frame`.
+  /// Call when the frame is drawn. Its pixels found their tiles by `list_from_frame`.
   void keep(const FrameShape& shape, const Homography<double>& list_from_frame);
 
  private:

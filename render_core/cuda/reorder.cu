@@ -10,8 +10,8 @@ namespace {
 constexpr int warps = 4;
 constexpr int block_size = warps * warp_size;
 
-// A key holds a depth and, below it, the entry's place in what the warp sorts. Key j of lane l is
-// number per_lane l + j.
+// A key holds a depth and, in its low bits, the entry's place among those that the warp sorts. Key
+// j of lane l is number per_lane l + j.
 template <int per_lane>
 using Keys = std::uint32_t[per_lane];
 template <int per_lane>
@@ -20,12 +20,12 @@ template <int per_lane>
 constexpr int place_bits = std::bit_width(static_cast<unsigned>(entries_of<per_lane>)) - 1;
 constexpr std::uint32_t behind_all = ~0u;
 
-// Keys a lane of a whole run.
+// Keys per lane for a whole run.
 constexpr int run_keys = reorder_run / warp_size;
 
 __device__ int lane_index() { return static_cast<int>(threadIdx.x) % warp_size; }
 
-/// The slots that a warp sorts, by place; padded, for lanes that read places a power of two apart.
+/// The slots that a warp sorts, by place. Padded, because lanes read places a power of two apart.
 class Held {
  public:
   __device__ std::uint32_t& operator[](int place) { return slot_[place + place / warp_size]; }
@@ -34,12 +34,12 @@ class Held {
   std::uint32_t slot_[reorder_run + reorder_run / warp_size];
 };
 
-/// Orders a lane's key with another lane's; `low`: this one takes the smaller.
+/// Orders a lane's key with another lane's. `low`: this lane takes the smaller one.
 __device__ std::uint32_t ordered(std::uint32_t key, std::uint32_t other, bool low) {
   return low ? min(key, other) : max(key, other);
 }
 
-/// Within each lane, the stages of a bitonic merge that order numbers `stride` and less apart.
+/// The stages of a bitonic merge within each lane: those that order keys up to `stride` apart.
 template <int per_lane, int stride>
 __device__ void merge_in_lane(Keys<per_lane>& key) {
 #pragma unroll
@@ -67,9 +67,9 @@ __device__ void sort_in_lane(Keys<per_lane>& key) {
   if constexpr (size < per_lane) sort_in_lane<per_lane, 2 * size>(key);
 }
 
-/// Merges the sorted halves of each group of `lanes` lanes: a bitonic merge, of which the first
-/// stage takes the second half backwards. Loops, for the network as a whole would not fit the
-/// instruction cache.
+/// Merges the sorted halves of each group of `lanes` lanes: a bitonic merge whose first stage reads
+/// the second half backwards. It loops, because the whole network would not fit in the instruction
+/// cache.
 template <int per_lane>
 __device__ void merge(Keys<per_lane>& key, int lanes) {
   const int lane = lane_index();
@@ -99,9 +99,9 @@ __device__ void sort(Keys<per_lane>& key) {
   for (int lanes = 2; lanes <= warp_size; lanes *= 2) merge<per_lane>(key, lanes);
 }
 
-/// Sorted by depth, neighbours of the same depth are brought into the order of their slots, that of
-/// key frames: how they stood before says nothing. Two rounds of odd-even transposition do that
-/// for two of the same depth, and nearly for three; more are rare.
+/// Orders neighbours of equal depth by their slots, as in key frames; their previous order says
+/// nothing. Two rounds of odd-even transposition do that for two of the same depth, and nearly for
+/// three. More are rare.
 template <int per_lane>
 __device__ void order_ties(const Keys<per_lane>& key, Keys<per_lane>& slot) {
   const int lane = lane_index();
@@ -127,8 +127,8 @@ __device__ void order_ties(const Keys<per_lane>& key, Keys<per_lane>& slot) {
   if (lane > 0) order(depth_before, depth(key[0]), before, slot[0]);
 }
 
-/// Makes keys of depths; a key of behind_all remains. Depths count from the nearest, and should
-/// they have too many bits, lose the lowest. place(j): that of key j.
+/// Turns depths into keys; a key of behind_all stays. Depths count from the nearest one, and lose
+/// their lowest bits if they have too many. place(j): place of key j.
 template <int per_lane, class Place>
 __device__ void pack(Keys<per_lane>& key, const Place& place) {
   std::uint32_t nearest = behind_all, farthest = 0;
@@ -149,13 +149,13 @@ __device__ void pack(Keys<per_lane>& key, const Place& place) {
   }
 }
 
-/// Writes the slots that stand in `held` back to `list` in the order of their keys.
+/// Writes the slots in `held` back to `list` in the order of their keys.
 template <int per_lane>
 __device__ void write(const Keys<per_lane>& key, Held& held, std::uint32_t* list, int count) {
   const int lane = lane_index();
   Keys<per_lane> slot;
 #pragma unroll
-  for (int j = 0; j < per_lane; ++j)  // whatever is no entry ties with none
+  for (int j = 0; j < per_lane; ++j)  // padding ties with no entry
     slot[j] = per_lane * lane + j < count
                   ? held[static_cast<int>(key[j] & (entries_of<per_lane> - 1))]
                   : behind_all;
@@ -191,13 +191,14 @@ __device__ void sort_run(const ReorderParams& p, std::uint32_t* list, int count,
   write<per_lane>(key, held, list, count);
 }
 
-/// Merges the sorted half of a run before `middle` with as many entries behind it, or `behind`.
+/// Merges the sorted half run before `middle` with as many entries behind it, or with `behind`
+/// entries if they are fewer.
 __device__ void stitch(const ReorderParams& p, std::uint32_t* middle, int behind, Held& held) {
   constexpr int per_lane = run_keys, half = reorder_run / 2;
   const int lane = lane_index();
   const int count = half + min(behind, half);
   std::uint32_t* list = middle - half;
-  // Past the first-level cache: another warp may have written them.
+  // Bypasses the first-level cache, because another warp may have written them.
   for (int place = lane; place < count; place += warp_size) held[place] = __ldcg(&list[place]);
   __syncwarp();
   const auto place = [lane](int j) { return per_lane * lane + j; };
@@ -210,11 +211,11 @@ __device__ void stitch(const ReorderParams& p, std::uint32_t* middle, int behind
   write<per_lane>(key, held, list, count);
 }
 
-/// To be called when one of the two runs that meet at `run` is in order; the later of the two calls
-/// puts their neighbouring ends in order.
+/// Call when one of the two runs that meet at `run` is sorted. The later of the two calls merges
+/// their neighbouring ends.
 __device__ void meet(const ReorderParams& p, ReorderRun& run, Held& held) {
   std::uint32_t met = 0;
-  __threadfence();  // what this warp wrote, before the other one may see that it did
+  __threadfence();  // publishes what this warp wrote before the other warp can see the count
   __syncwarp();
   if (lane_index() == 0) met = atomicAdd(&run.met, 1u);
   if (__shfl_sync(~0u, met, 0) == 0) return;
@@ -225,7 +226,7 @@ __device__ void meet(const ReorderParams& p, ReorderRun& run, Held& held) {
   stitch(p, p.slot + run.first, static_cast<int>(run.last - run.first), held);
 }
 
-// More warps at a time are faster than no spilled registers, up to here.
+// Up to this number, more warps at a time are faster than avoiding spilled registers.
 constexpr int blocks_at_a_time = 8;
 
 __global__ void __launch_bounds__(block_size, blocks_at_a_time)
@@ -252,7 +253,8 @@ __global__ void __launch_bounds__(block_size, blocks_at_a_time)
 }  // namespace
 
 void launch_reorder(const ReorderParams& params, cudaStream_t stream) {
-  // As runs differ in work, more than fit at a time: most blocks take one run a warp.
+  // Runs differ in work, so there are more blocks than fit at a time; in most, each warp takes one
+  // run.
   constexpr int blocks_per_processor = 6 * blocks_at_a_time;
   launch_early("reorder", reorder_kernel, params.processors * blocks_per_processor, block_size,
                stream, params);

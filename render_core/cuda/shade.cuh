@@ -63,7 +63,8 @@ __device__ inline ShCoefficients load_sh(const SceneArrays& scene, std::uint32_t
 
 __device__ inline math::Vec3<float> shade(const ShCoefficients& sh, int degree,
                                           const math::Vec3<float>& direction) {
-  float basis[16] = {};  // all set: zeros meet the coefficients that the degree leaves out
+  float basis[16] = {};  // all set, because zeros are multiplied by coefficients that the degree
+                         // leaves out
   math::sh_basis(direction, degree, basis);
   float sum[3] = {basis[0] * sh.base[0], basis[0] * sh.base[1], basis[0] * sh.base[2]};
 #pragma unroll
@@ -79,7 +80,7 @@ __device__ inline math::Vec3<float> shade(const ShCoefficients& sh, int degree,
           math::colour_from_sh_sum(sum[2])};
 }
 
-/// Colours brighter than a half holds stay finite: infinity times no weight would be no number.
+/// Colours too bright for a half are clamped, because infinity times a weight of zero is NaN.
 __device__ inline PackedColour pack(const math::Vec3<float>& colour) {
   constexpr float most = 65504.0f;
   return {__floats2half2_rn(fminf(colour.x, most), fminf(colour.y, most)),

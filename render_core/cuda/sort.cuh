@@ -4,18 +4,18 @@
 
 namespace catgs::cuda {
 
-/// Radix sorts by CUB, of as many as there are: see HostCounts.
+/// Radix sorts by CUB, of exactly as many elements as there are: see HostCounts.
 
 // Positive floats sort like their bits. Counted from the near plane, 24 bits are enough: 32 octaves
-// of depth in steps of 2e-6. A quarter of the sort is saved.
+// of depth in steps of 2e-6. This saves a quarter of the sort.
 constexpr int depth_bits_below = 4;
 constexpr int depth_bits = 24;
 
-/// The last key.
+/// The largest key.
 constexpr std::uint32_t most_depth_key = (1u << (depth_bits + depth_bits_below)) - 1u;
 
-/// Key of a view depth; the lowest, where it is not beyond the near plane. What is of the same
-/// depth for one near plane is so for every other: they begin at a step.
+/// Key of a view depth; 0 for one not beyond the near plane. Depths with equal keys for one near
+/// plane have equal keys for every other, because near planes are rounded down to a step.
 __device__ inline std::uint32_t depth_key(float depth, float near_z) {
   if (!(depth > near_z)) return 0;
   constexpr std::uint32_t below = (1u << depth_bits_below) - 1u;
@@ -34,12 +34,12 @@ struct SortScratch {
   std::size_t bytes = 0;
 };
 
-/// Scratch that sort_by_depth(), scan_tile_counts() and sort_by_tile() need at most for these
-/// bounds.
+/// Upper bound of the scratch that sort_by_depth(), scan_tile_counts() and sort_by_tile() need for
+/// these bounds.
 std::size_t sort_scratch_bytes(const FrameShape& shape);
 
-/// Sorts `visible` splats front to back, stable: on return order.current[k] is the slot of the k-th
-/// nearest. `order` holds their numbers.
+/// Sorts `visible` splats front to back, stable. On return order.current[k] is the slot of the k-th
+/// nearest. `order` must hold 0, 1, 2, ….
 void sort_by_depth(std::uint32_t visible, PingPong<std::uint32_t>& depth,
                    PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream);
 
@@ -55,8 +55,8 @@ template <class Tile>
 void sort_by_tile(const FrameShape& shape, std::uint32_t entries, PingPong<Tile>& tile,
                   PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
 
-/// For the original's way: sums[i] = tile_count[0] + … + tile_count[i], and list entries by 64-bit
-/// (tile | depth) keys.
+/// For the vanilla pipeline: sums[i] = tile_count[0] + … + tile_count[i], and a sort of list
+/// entries by 64-bit (tile | depth) keys.
 std::size_t sum_scratch_bytes(std::uint32_t count);
 std::size_t key_sort_scratch_bytes(std::uint32_t entries, const FrameShape& shape);
 void sum_tile_counts(std::uint32_t count, const std::uint32_t* tile_count, std::uint32_t* sums,

@@ -7,7 +7,7 @@
 
 namespace catgs::cuda {
 
-/// A camera as kernels use it: view depth is evaluated in double by every core.
+/// A camera as kernels use it. Every core evaluates view depth in double.
 struct CameraPair {
   math::CameraModel<float> single;
   math::CameraModel<double> precise;
@@ -18,33 +18,33 @@ inline CameraPair make_camera_pair(const Camera& camera) {
   return {math::convert<float>(precise), precise};
 }
 
-/// The camera of a frame and, for listing, where its window ends (the same, when it has none) and
-/// what else lists have to cover.
+/// The camera of a frame. For listing also the camera at the end of its window (the same if it has
+/// none) and the other bounds of the lists.
 struct FrameCameras {
-  CameraPair now;  // its near_z is where lists begin
+  CameraPair now;  // its near_z is the near plane of the lists
   math::CameraModel<float> end;
-  float near_z;  // of what is drawn now
+  float near_z;  // near plane of the picture
   ListGrowth<float> growth{};
-  float2 trail_shift_px{};  // trails are that much longer
+  float2 trail_shift_px{};  // added to trails
 };
 
-/// Logarithm of an opacity that reaches nothing.
+/// Base-2 logarithm of an opacity that reaches nothing.
 constexpr float never = -1e30f;
 
 /// A Gaussian in the image plane, before its colour.
 struct Splat {
   float2 centre_px = {0.0f, 0.0f};
-  float2 half_px = {0.0f, 0.0f};  // of the box around it where it is seen at all
+  float2 half_px = {0.0f, 0.0f};  // of the box around it, if it is visible at all
   math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
   float log2_opacity = never;
   float depth = 0.0f;
   SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, 0.0f, {}};
-  bool in_view = false;  // its box, or that of its path, meets what lists cover
-  bool watched = false;  // it may come into view by a turn
+  bool in_view = false;  // its box, or that of its path, meets the region of the lists
+  bool watched = false;  // a turn may bring it into view
 };
 
-/// Whether a Gaussian that is behind the near plane at both ends of the window may come into the
-/// picture by a turn. `reach`: of its ellipse.
+/// Whether a turn may bring a Gaussian into the picture that is behind the near plane at both ends
+/// of the window. `reach`: of its ellipse.
 __device__ inline bool turns_in(const SceneArrays& scene, const FrameCameras& camera,
                                 std::uint32_t i, const math::Vec3<float>& mean, float reach) {
   const math::CameraModel<float>& now = camera.now.single;
@@ -54,7 +54,8 @@ __device__ inline bool turns_in(const SceneArrays& scene, const FrameCameras& ca
                            now.near_z);
 }
 
-/// With `sweeps`, splats that are in view at some time of the window; else those that are now.
+/// With `sweeps`, finds splats that are in view at some time of the window; otherwise those in view
+/// now.
 template <bool sweeps>
 __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera,
                             const FrameShape& shape, std::uint32_t i, const Centre& centre) {

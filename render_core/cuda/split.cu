@@ -16,13 +16,13 @@ constexpr std::uint32_t most_slices_per_tile = 1024;
 struct Cut {
   uint2 range;
   bool seen;               // it has pixels in the picture
-  std::uint32_t reach;     // what it looked at last
-  std::uint32_t expected;  // list entries that it will look at
-  std::uint32_t slices;    // of these
-  std::uint32_t reserve;   // slices of what lies behind them
+  std::uint32_t reach;     // last frame's reach
+  std::uint32_t expected;  // list entries that it is expected to look at
+  std::uint32_t slices;    // of the expected entries
+  std::uint32_t reserve;   // of the entries behind them
 
   __device__ std::uint32_t listed() const { return range.y - range.x; }
-  /// Slices that need room: a whole tile needs none.
+  /// Number of slices that need room: a whole tile needs none.
   __device__ std::uint32_t stored() const { return slices + reserve > 1 ? slices + reserve : 0; }
   __device__ Cut without_reserve() const { return {range, seen, reach, expected, slices, 0}; }
   __device__ Cut whole() const {
@@ -30,8 +30,8 @@ struct Cut {
   }
 };
 
-/// What the tile, or the one that showed its middle, looked at in the last frame; all ones: not
-/// known.
+/// The reach in the last frame of this tile, or of the one that showed its middle; all ones:
+/// unknown.
 __device__ std::uint32_t last_reach(const SplitParams& p, std::uint32_t t) {
   const LastReach& last = p.last;
   if (last.reach == nullptr) return ~0u;
@@ -44,7 +44,7 @@ __device__ std::uint32_t last_reach(const SplitParams& p, std::uint32_t t) {
   constexpr float tile = tile_size_px;
   const int last_x = static_cast<int>((at.x - static_cast<float>(last.first_x_px)) / tile);
   const int last_y = static_cast<int>((at.y - static_cast<float>(last.first_y_px)) / tile);
-  // A turn shows what the last frame did not list.
+  // A turn shows places that the last frame did not list.
   const bool listed = at.x >= static_cast<float>(last.first_x_px) && last_x < last.tiles_x &&
                       at.y >= static_cast<float>(last.first_y_px) && last_y < last.tiles_y;
   return listed ? last.reach[last_y * last.tiles_x + last_x] : ~0u;
@@ -74,7 +74,7 @@ __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
   return cut;
 }
 
-/// What the block's earlier threads, or all of them, take up.
+/// Places taken by the block's earlier threads, or by all of them.
 struct Places {
   std::uint32_t slices, slices_without_reserve, runs;
 };
@@ -86,7 +86,7 @@ struct AddPlaces {
   }
 };
 
-/// Room for `count` slices, or false.
+/// Finds room for `count` slices; false if there is none.
 __device__ bool allocate(const SplitParams& p, std::uint32_t count, std::uint32_t& first) {
   std::uint32_t* allocated = &p.counts->allocated_slices;
   std::uint32_t seen = *const_cast<const volatile std::uint32_t*>(allocated);
@@ -98,15 +98,15 @@ __device__ bool allocate(const SplitParams& p, std::uint32_t count, std::uint32_
   return false;
 }
 
-/// Slices of a tile that stand in one class of the queue.
+/// Number of a tile's slices in one class of the queue.
 __device__ std::uint32_t queued_in(int queue_class, const Cut& cut) {
   const std::uint32_t c = static_cast<std::uint32_t>(queue_class);
   if (queue_class + 1 < queue_classes) return c < cut.slices ? 1 : 0;
   return cut.reserve + (cut.slices > c ? cut.slices - c : 0);
 }
 
-/// Entries that the reorder stage brings into order: somewhat more than will be looked at, for what
-/// comes from behind may belong in front.
+/// Entries that the reorder stage sorts: somewhat more than will be looked at, because entries from
+/// behind may belong in front.
 __device__ std::uint32_t ordered_of(const SplitParams& p, const Cut& cut) {
   if (p.runs == nullptr || cut.expected == 0) return 0;
   constexpr std::uint32_t step = 128;
@@ -126,7 +126,7 @@ __device__ void write_runs(const SplitParams& p, const Cut& cut, std::uint32_t a
   }
 }
 
-/// `first`: the tile's first slice, if it has any; `place`: its first in each class of the queue.
+/// `first`: the tile's first slice, if any; `place`: its first place in each class of the queue.
 __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cut,
                             std::uint32_t first, const std::uint32_t (&place)[queue_classes]) {
   const std::uint32_t slices = cut.slices + cut.reserve;
@@ -152,8 +152,8 @@ __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cu
   }
 }
 
-/// Finds room for the slices of the block's tiles: of all, of those that will be looked at, or of
-/// none; `cut` is what remains of this thread's tile. Returns its first slice.
+/// Finds room for slices of the block's tiles: for all, for those that will be looked at, or for
+/// none. `cut` becomes what is left for this thread's tile. Returns its first slice.
 __device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places& before,
                                    const Places& all) {
   enum class Room { all, without_reserve, none };
@@ -176,7 +176,7 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
   if (p.counts->unlisted != 0) return;  // no tasks, no runs: the frame will be drawn again
   using Scan = cub::BlockScan<Places, split_block>;
   __shared__ Scan::TempStorage scratch;
-  __shared__ std::uint32_t queued[queue_classes];  // by the block, then before the block
+  __shared__ std::uint32_t queued[queue_classes];  // by the block; then before the block
   __shared__ std::uint32_t first_run;
   const std::uint32_t tiles = p.shape.tiles();
   const std::uint32_t t = blockIdx.x * split_block + threadIdx.x;
@@ -219,7 +219,7 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
 
 constexpr int composite_block = tile_size_px * tile_size_px;
 
-/// A pixel of a tile: where it is in the picture, and the part that it was blended in.
+/// A pixel of a tile: its place in the picture, and the part that it was blended in.
 struct TilePixel {
   int x_px, y_px, part;
 };
@@ -237,7 +237,7 @@ __device__ TilePixel run_pixel(const CompositeParams& p, int tile, int in_tile) 
   return {place.x, place.y, in_tile / part_pixels};
 }
 
-/// Folds one pixel's slices and shows it. Returns one past the last entry that it looked at.
+/// Blends one pixel's slices and writes it. Returns one past the last entry that it looked at.
 __device__ std::uint32_t fold(const CompositeParams& p, uint2 slices, int in_tile,
                               const TilePixel& at) {
   math::PixelState<float> pixel = math::empty_pixel<float>();

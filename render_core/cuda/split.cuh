@@ -6,49 +6,49 @@
 
 namespace catgs::cuda {
 
-/// What tiles looked at in the View's last frame, and the grid that they were of.
+/// The reach of tiles in the View's last frame, and the grid that they belonged to.
 struct LastReach {
   const std::uint32_t* reach = nullptr;  // [tiles]; null: not known
   bool same_grid = false;
-  // Else: from this picture's pixels to the plane of the last lists.
+  // For another grid: from this picture's pixels to the plane of the last lists.
   Homography<float> list_from_frame{};
   int first_x_px = 0, first_y_px = 0;
   int tiles_x = 0, tiles_y = 0;
 };
 
-/// Cuts long tile lists into slices of about twice the mean length (paper 3.4, Algorithm 1): with l
+/// Cuts long tile lists into slices of about twice the mean length (paper 3.4, Algorithm 1). With l
 /// the length of a slice, a tile longer than 2 l becomes ceil(length / l) tasks of equal length.
 ///
-/// Length is not that of the list but of the part of it that will be looked at: what the tile's
-/// pixels needed in the View's last frame, and a margin. Most entries lie behind opaque surfaces,
-/// and slices of those would be work that an unsplit tile never does. A long rest is cut too, in
-/// slices that are drawn last: most find then that nothing shines through what lies before them.
-/// For the same reason all first slices are queued before all second ones, and so on.
-/// The mean is the last frame's too, so that nothing waits for this one's. Where slices find no
-/// room, blocks of tiles go without, first without those of the rest. Tiles without a pixel in the
-/// picture have no task.
+/// Only the part of a list that will be looked at counts as its length: the reach of the tile's
+/// pixels in the View's last frame, plus a margin. Most entries lie behind opaque surfaces, and
+/// slices of those would be work that an unsplit tile never does. A long rest is cut too, in slices
+/// that are drawn last. Most of them then find that nothing shines through what lies before them.
+/// For the same reason all first slices are queued before all second ones, and so on. The mean is
+/// also the last frame's, so that nothing waits for that of this frame. Blocks of tiles whose
+/// slices find no room go without: first without slices of the rest, then without any. Tiles
+/// without a pixel in the picture have no task.
 struct SplitParams {
   FrameShape shape;
   const uint2* range;  // [tiles]
   LastReach last;
-  std::uint32_t* reach;              // [tiles], zeroed here; of tiles that are not seen, kept
+  std::uint32_t* reach;              // [tiles], zeroed here; kept for tiles that are not seen
   const std::uint32_t* pixel_count;  // [tiles]; null: tiles are squares in the picture
   BlendTask* tasks;                  // [task_bound(shape)]
-  uint2* tile_slices;                // [tiles], first slice and how many; none: one task
+  uint2* tile_slices;                // [tiles], first slice and number of slices; 0: one task
   std::uint32_t* queue;              // [queue_bound(shape)], see FrameCounts
   // For the reorder stage; null: it does not follow.
   ReorderRun* runs;            // [run_bound]
-  std::uint32_t* ordered;      // [tiles], entries that are in runs
+  std::uint32_t* ordered;      // [tiles], number of entries in runs
   float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
-  FrameCounts* counts;         // what split makes is set, and list_max
-  std::uint32_t mean_list;     // of a tile, for slice_length(); 0: not known, this frame's then
-  bool split;                  // else every tile is one task
+  FrameCounts* counts;         // sets the counts of tasks and runs, and list_max
+  std::uint32_t mean_list;     // of a tile, for slice_length(); 0: unknown, take this frame's
+  bool split;                  // false: every tile is one task
 };
 void launch_split(const SplitParams& params, cudaStream_t stream);
 
-/// The length of a slice where a tile lists `mean` entries in the mean: two mean lists. The paper
-/// has one; beginning and ending a part costs as much as a hundred entries, so that longer slices
-/// are faster (one H200, fungi_room: 6 % of the blend), and one that is shorter than four warps'
+/// The length of a slice where tiles list `mean` entries on average: two mean lists. The paper uses
+/// one. Beginning and ending a part costs as much as a hundred entries, so longer slices are faster
+/// (6 % of the blend, measured on one H200 with fungi_room). A slice shorter than four warps'
 /// entries is not worth its own pixels.
 __host__ __device__ inline std::uint32_t slice_length(std::uint32_t mean) {
   constexpr std::uint32_t shortest = 4 * warp_size;
@@ -59,12 +59,12 @@ inline std::uint32_t task_bound(const FrameShape& shape) {
   return shape.tile_bound + shape.slice_bound;
 }
 
-/// Room for the queue: a place a tile in all classes but the last.
+/// Room for the queue: one place per tile in all classes but the last.
 inline std::uint32_t queue_bound(const FrameShape& shape) {
   return (queue_classes - 1) * shape.tile_bound + shape.slice_bound;
 }
 
-/// Slices that are worth their pixels: what the paper's rule can ask for, and as much again.
+/// Number of slices that are worth their pixels: twice what the paper's rule can ask for.
 inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tile_bound; }
 
 /// Room for the runs of the reorder stage.
@@ -72,8 +72,8 @@ inline std::uint32_t run_bound(const FrameShape& shape) {
   return shape.tile_bound + shape.list_bound / reorder_run;
 }
 
-/// Folds the slices of split tiles front to back:
-/// C = sum_i C_i prod_{m < i} T_m. Slices behind a finished pixel are not looked at.
+/// Blends the slices of split tiles front to back: C = sum_i C_i prod_{m < i} T_m. Slices behind a
+/// finished pixel are not looked at.
 struct CompositeParams {
   FrameShape shape;
   const BlendTask* tasks;
@@ -85,7 +85,7 @@ struct CompositeParams {
   const FrameCounts* counts;
   float3 background;
   float* rgb;
-  std::uint32_t* reach;  // of split tiles is set
+  std::uint32_t* reach;  // set for split tiles
 };
 void launch_composite(const CompositeParams& params, cudaStream_t stream);
 

@@ -8,15 +8,15 @@
 
 namespace catgs::cuda {
 
-/// Times of a frame's stages on the device, by events between them.
+/// Times of a frame's stages on the device, from events between them.
 class StageTimes {
  public:
   void begin(cudaStream_t stream) { record(start_, stream); }
   void end(Stage stage, cudaStream_t stream) { record(after_[index(stage)], stream); }
-  /// Key frames bin in depth order: so far Stage::bin was a part of Stage::sort.
+  /// Key frames bin in depth order, so the time before this belongs to Stage::sort.
   void end_depth_sort(cudaStream_t stream) { record(depth_sorted_, stream); }
 
-  /// Of a frame that is finished, [stage] in ms; all stages have ended. Throws CudaError.
+  /// Times of a finished frame, [stage] in ms; all stages must have ended. Throws CudaError.
   void read(bool sorted_by_depth, std::array<float, stage_count>& stage_ms) const {
     const Event* before = &start_;
     for (std::size_t i = 0; i < stage_count; ++i) {

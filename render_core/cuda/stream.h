@@ -6,7 +6,7 @@
 
 namespace catgs::cuda {
 
-/// A stream that does not wait for the default one.
+/// A stream that does not wait for the default stream.
 class Stream {
  public:
   Stream() { check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream"); }
@@ -21,7 +21,7 @@ class Stream {
 
 class Event {
  public:
-  /// With cudaEventBlockingSync, who waits for it sleeps.
+  /// With cudaEventBlockingSync, a thread that waits for it sleeps.
   explicit Event(unsigned flags = cudaEventDefault) {
     check(cudaEventCreateWithFlags(&event_, flags), "event");
   }

@@ -7,12 +7,12 @@
 
 namespace catgs::cuda {
 
-/// The way of a splat through a key frame's window, by which it is listed: a math::Sweep.
+/// The path of a splat through a key frame's window, which decides its lists: a math::Sweep.
 struct __align__(16) SplatPath {
   float dx, dy;                      // px, from the record's centre
   math::Whitening<float> whitening;  // of the outline
   float log2_opacity;                // the record has none while the splat is behind the near plane
-  float grow_px;                     // by which the outline is widened
+  float grow_px;                     // px that the outline is widened by
   float unused;
 };
 static_assert(sizeof(SplatPath) == 32);
@@ -23,13 +23,13 @@ template <class Outline>
 struct TileFootprint {
   Outline outline;
   float2 centre_px;  // from the grid's corner
-  float grow_px;     // by which the outline is widened
-  float slack_px;    // by which columns and rows are, against rounding
+  float grow_px;     // px that the outline is widened by
+  float slack_px;    // px that rows and columns are widened by, against rounding
   int first_row, last_row;
   FrameShape shape;
 
   /// First and last column of one tile row; empty when first > last. A tile counts when the
-  /// rectangle of its pixel centres, as far as lists reach, meets the outline.
+  /// rectangle of its pixel centres, within the lists, meets the outline.
   __device__ int2 columns(int row) const {
     constexpr float tile = tile_size_px;
     const float top = static_cast<float>(row) * tile + 0.5f;
@@ -48,7 +48,7 @@ struct TileFootprint {
                      static_cast<int>(fminf(last, static_cast<float>(shape.tiles_x - 1))));
   }
 
-  /// Sets the rows, for an outline that covers `top`…`bottom` (px, from its centre).
+  /// Sets the rows for an outline that covers `top`…`bottom` (px, from its centre).
   __device__ void set_rows(float top, float bottom) {
     constexpr float tile = tile_size_px;
     const float slack = grow_px + slack_px;
@@ -60,13 +60,13 @@ struct TileFootprint {
   }
 };
 
-/// From the grid's corner.
+/// Position relative to the grid's corner.
 __device__ inline float2 in_grid(float2 centre_px, const FrameShape& shape) {
   return make_float2(centre_px.x - static_cast<float>(shape.first_x_px),
                      centre_px.y - static_cast<float>(shape.first_y_px));
 }
 
-/// Footprint of a splat as it is now. It reaches nothing when `log2_opacity` is too low.
+/// Footprint of a splat in its present place. It reaches nothing when `log2_opacity` is too low.
 __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
     float2 centre_px, const math::Whitening<float>& w, float log2_opacity, const FrameShape& shape,
     float slack_px = listing_slack_px) {
@@ -83,7 +83,7 @@ __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
   return f;
 }
 
-/// Footprint of a splat on its way through a window.
+/// Footprint of a splat's path through a window.
 __device__ inline TileFootprint<math::Trail<float>> make_footprint(
     float2 centre_px, const SplatPath& path, const FrameShape& shape,
     float slack_px = listing_slack_px) {
@@ -101,13 +101,13 @@ __device__ inline TileFootprint<math::Trail<float>> make_footprint(
   return f;
 }
 
-/// The tiles of a small splat, row by row: most splats are small, and their tiles are worth
-/// remembering between counting and listing.
+/// The tiles of a small splat, row by row. Most splats are small, so their tiles are kept between
+/// counting and listing.
 struct TileSpans {
   static constexpr int most_rows = 4;
-  static constexpr unsigned not_small = 255;  // instead of rows: the tiles are found anew
-  // x: first row, leftmost column << 16; y: rows; z: first column of each row, from the leftmost,
-  // a byte a row; w: how many, likewise.
+  static constexpr unsigned not_small = 255;  // in place of rows: the tiles have to be found again
+  // x: first row, leftmost column << 16; y: number of rows. z: first column of each row, from the
+  // leftmost, a byte per row; w: number of columns of each row, likewise.
   uint4 packed;
 
   __device__ std::uint32_t row() const { return packed.x & 0xffffu; }
@@ -117,7 +117,7 @@ struct TileSpans {
   __device__ int count(int j) const { return static_cast<int>(packed.w >> (8 * j) & 0xffu); }
 };
 
-/// Tiles of a footprint. Their number is the return value.
+/// Finds the tiles of a footprint, and returns their number.
 template <class Outline>
 __device__ std::uint32_t find_tiles(const TileFootprint<Outline>& f, TileSpans& spans) {
   const int rows = max(0, f.last_row - f.first_row + 1);

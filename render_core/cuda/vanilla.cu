@@ -47,7 +47,7 @@ struct BlendParams {
 
 constexpr int block_size = 256;
 
-/// The tiles that a box of whole pixels around the centre overlaps, as the original rounds them.
+/// The tiles that a box of whole pixels around the centre overlaps, rounded as in the original.
 __device__ ushort4 box_of(float2 centre_px, float radius, const FrameShape& shape) {
   constexpr float side = tile_size_px;
   const float x = centre_px.x - 0.5f, y = centre_px.y - 0.5f;
@@ -162,7 +162,7 @@ void VanillaPipeline::project(const Frame& f, cudaStream_t stream) {
   check_launch("vanilla project");
 }
 
-/// List entries of the projected Gaussians, as many as there is room for.
+/// Number of list entries of the projected Gaussians, limited to the room that there is.
 std::uint32_t VanillaPipeline::count_entries(const Frame& f, cudaStream_t stream) {
   const VanillaMemory& m = memory_;
   const std::uint32_t count = f.scene->count;
@@ -187,7 +187,7 @@ void VanillaPipeline::draw(const Frame& f, const std::function<void(Stage)>& mar
   mark(Stage::project);
 
   const std::uint32_t entries = count_entries(f, stream);
-  // The device has finished: rows that grow are in no use.
+  // The device has finished, so rows that grow are not in use.
   (void)memory_.reserve({.gaussians = count, .entries = entries, .shape = f.shape});
   emit_kernel<<<std::max(blocks_for(count, block_size), 1u), block_size, 0, stream>>>(
       {.count = count,

@@ -10,7 +10,7 @@
 
 namespace catgs::cuda {
 
-/// What the rows of VanillaMemory are sized by.
+/// The sizes that the rows of VanillaMemory depend on.
 struct VanillaSizes {
   std::uint32_t gaussians;  // of the scene
   std::uint32_t entries;    // of all tile lists
@@ -28,7 +28,7 @@ struct VanillaMemory : MemoryTable<VanillaSizes> {
   DeviceRow<std::uint32_t> tile_count{this, Life::frame, [](S s) { return s.gaussians; }};
   DeviceRow<std::uint32_t> last{this, Life::frame, [](S s) { return s.gaussians; }};  // their sums
   PinnedRow<std::uint32_t> entries{this, Life::frame, [](S) { return 1; }};  // the last of `last`
-  // By list entry. The sort changes between a row and the `other` one.
+  // By list entry. The sort may leave its result in the row or in its `other` one.
   DeviceRow<std::uint64_t> key{this, Life::frame, [](S s) { return s.entries; }};
   DeviceRow<std::uint64_t> other_key{this, Life::frame, [](S s) { return s.entries; }};
   DeviceRow<std::uint32_t> slot{this, Life::frame, [](S s) { return s.entries; }};
@@ -40,23 +40,23 @@ struct VanillaMemory : MemoryTable<VanillaSizes> {
                                }};
 };
 
-/// The original 3DGS on the same records, as the baseline that speed-ups are measured against:
-/// every Gaussian is tested every frame, a box of three standard deviations decides its tiles, all
-/// (tile | depth) keys of 64 bits are sorted, and a block blends a tile, all splats by all pixels.
+/// The original 3DGS on the same records, as the baseline of speed-ups. Every Gaussian is tested
+/// every frame. A box of three standard deviations decides its tiles. All (tile | depth) keys of 64
+/// bits are sorted, and a block blends a tile, all splats by all pixels.
 class VanillaPipeline {
  public:
   struct Frame {
     const SceneArrays* scene;
     CameraPair camera;
-    FrameShape shape;  // list_bound: entries beyond it are not drawn
+    FrameShape shape;  // entries beyond list_bound are not drawn
     float3 background;
     float* rgb;           // [height][width][3]
     FrameCounts* counts;  // visible, list_entries and list_max are set; blended_pairs when counted
     bool count_pairs;
   };
 
-  /// Enqueues a frame; `mark` is called after each stage. Waits for the number of list entries, as
-  /// the original does, to sort as many. Throws CudaError.
+  /// Enqueues a frame; `mark` is called after each stage. Like the original, it waits for the
+  /// number of list entries and sorts exactly as many. Throws CudaError.
   void draw(const Frame& frame, const std::function<void(Stage)>& mark, cudaStream_t stream);
   /// [tiles], device memory: {first, one past last} list entry of each tile of the last frame.
   [[nodiscard]] const uint2* ranges() const { return memory_.range.get(); }

@@ -14,7 +14,7 @@ bool turns_tiles(const ViewSettings& settings) {
 }
 
 std::size_t ViewSizes::scratch_bytes() const {
-  if (shape.tiles() == 0) return 0;  // of a View without such lists
+  if (shape.tiles() == 0) return 0;  // the View has no such lists
   return std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene.cluster_count));
 }
 

@@ -14,11 +14,11 @@
 
 namespace catgs::cuda {
 
-/// Whether a View has sub-frames, and whether these find their tiles by launch_pixel_runs().
+/// Whether a View has sub-frames; whether these find their tiles by launch_pixel_runs().
 bool speculates(const ViewSettings& settings);
 bool turns_tiles(const ViewSettings& settings);
 
-/// What the rows of ViewMemory are sized by.
+/// The sizes that the rows of ViewMemory depend on.
 struct ViewSizes {
   FrameShape shape;
   SceneArrays scene;
@@ -27,7 +27,7 @@ struct ViewSizes {
   [[nodiscard]] std::size_t pixels() const {
     return static_cast<std::size_t>(shape.width_px) * static_cast<std::size_t>(shape.height_px);
   }
-  /// Parts of slices, and their pixels.
+  /// Number of parts of slices.
   [[nodiscard]] std::size_t slice_parts() const {
     return std::size_t{shape.slice_bound} * static_cast<unsigned>(shape.tile_parts);
   }
@@ -42,16 +42,16 @@ struct ViewSizes {
   }
   [[nodiscard]] bool makes_video() const { return settings.format == PixelFormat::i420; }
   [[nodiscard]] std::size_t scratch_bytes() const;
-  /// Of the picture in host memory.
+  /// Size of the picture in host memory.
   [[nodiscard]] std::size_t host_image_bytes() const;
 };
 
-/// Device memory of a View, and the page-locked host memory that it copies to.
+/// Device memory of a View, and the page-locked host memory for its copies.
 struct ViewMemory : MemoryTable<ViewSizes> {
   using S = const ViewSizes&;
   using U32 = std::uint32_t;
 
-  // The frustum cache and the sort cache: which Gaussians are in view, and the list of every tile.
+  // The frustum cache and the sort cache: the Gaussians in view, and the list of every tile.
   DeviceRow<U32> clusters{this, Life::group, [](S s) { return s.scene.cluster_count; }};
   DeviceRow<U32> cull_mask{this, Life::group,
                            [](S s) { return cull_words(s.scene.cluster_count); }};
@@ -61,11 +61,11 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<FrameCounts> counts{this, Life::group, [](S) { return 1; }};
   DeviceRow<U32> giants{this, Life::group, [](S s) { return s.reorders() ? giant_words : 0; }};
 
-  // Of the Gaussians in view.
+  // For the Gaussians in view.
   DeviceRow<SplatRecord> records{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> depth{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
 
-  // What makes the lists. Sorts change between a row and the `other` one.
+  // Used to make the lists. A sort may leave its result in a row or in its `other` one.
   DeviceRow<U32> cull_seen{this, Life::frame, [](S s) { return s.scene.cluster_count; }};
   DeviceRow<U32> cull_before{this, Life::frame, [](S s) { return s.scene.cluster_count; }};
   DeviceRow<TileSpans> spans{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
@@ -115,7 +115,7 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<float> slice_transmittance{this, Life::frame, [](S s) { return s.slice_parts(); }};
   DeviceRow<float4> slice_pixels{this, Life::frame, [](S s) { return s.slice_pixels(); }};
 
-  // The picture, and what the host learns of the frame.
+  // The picture, and the frame's counts for the host.
   DeviceRow<float> rgb{this, Life::frame, [](S s) { return 3 * s.pixels(); }};
   DeviceRow<std::uint8_t> i420{this, Life::frame,
                                [](S s) { return s.makes_video() ? s.host_image_bytes() : 0; }};
@@ -128,7 +128,7 @@ struct ViewMemory : MemoryTable<ViewSizes> {
             .wanted = colours_wanted.get(),
             .colour = colours.get()};
   }
-  /// Whether lists of this shape fit in what there is.
+  /// Whether lists of this shape fit in the present memory.
   [[nodiscard]] bool holds_lists(const FrameShape& shape) const {
     return shape.visible_bound <= visible.size() && shape.tile_bound <= range.size() &&
            shape.list_bound <= slot.size();

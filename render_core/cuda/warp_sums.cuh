@@ -10,10 +10,10 @@ struct WarpSums {
   T all;
 };
 
-/// Adds up one value a lane; all lanes of the warp take part.
+/// Adds up one value per lane; all lanes of the warp take part.
 template <class T>
 __device__ WarpSums<T> warp_sums(T value) {
-  typename cub::WarpScan<T>::TempStorage none;  // a whole warp's scan needs shuffles alone
+  typename cub::WarpScan<T>::TempStorage none;  // the scan of a whole warp needs shuffles alone
   static_assert(sizeof(none) <= 1);
   WarpSums<T> sums;
   cub::WarpScan<T>(none).ExclusiveSum(value, sums.before, sums.all);

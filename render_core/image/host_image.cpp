@@ -1,8 +1,12 @@
 #include "render_core/image/host_image.h"
 
+#include <cassert>
+
 namespace catgs {
 
 void HostImage::resize(PixelFormat format, glm::ivec2 size_px) {
+  assert(size_px.x > 0 && size_px.y > 0);
+  assert(format == PixelFormat::rgb_f32 || (size_px.x % 2 == 0 && size_px.y % 2 == 0));
   const auto width = static_cast<std::size_t>(size_px.x);
   const auto height = static_cast<std::size_t>(size_px.y);
   const std::size_t luma = width * height;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <vector>
 
 #include "render_core/renderer.h"
@@ -21,10 +22,13 @@ class HostImage {
 
   /// rgb_f32: row `y`, 3 floats a pixel.
   [[nodiscard]] float* rgb_row(int y) const {
+    assert(format_ == PixelFormat::rgb_f32 && y >= 0 && y < size_px_.y);
     return reinterpret_cast<float*>(planes_[0].data + planes_[0].stride_bytes * y);
   }
   /// i420: row `y` of a plane; planes 1 and 2 have half the rows and columns.
   [[nodiscard]] std::uint8_t* byte_row(int plane, int y) const {
+    assert(format_ == PixelFormat::i420 && plane >= 0 && plane < 3);
+    assert(y >= 0 && y < (plane == 0 ? size_px_.y : size_px_.y / 2));
     return reinterpret_cast<std::uint8_t*>(planes_[plane].data + planes_[plane].stride_bytes * y);
   }
 

@@ -12,7 +12,7 @@ CATGS_BEFORE_MATH();
 namespace catgs {
 namespace CATGS_MATH_NAMESPACE {
 
-/// A pixel while Gaussians are blended front to back.
+/// The state of a pixel while Gaussians are blended into it, front to back.
 template <class T>
 struct PixelState {
   Vec3<T> colour;
@@ -36,15 +36,15 @@ CATGS_HD_INLINE T alpha_of(T exponent) {
   return select(contributes(exponent), min(T(alpha_max), exp2_of_alpha(exponent)), T(0.0));
 }
 
-/// Blends one Gaussian with alpha_of(exponent) over what lies behind, where the pixel is not
-/// finished. A pixel that it would take below transmittance_min is finished without it. Returns
+/// Blends one Gaussian with alpha_of(exponent) over what lies behind, unless the pixel is finished.
+/// A pixel that the Gaussian would take below transmittance_min is finished without it. Returns
 /// which pixels are not finished.
 template <class T>
 CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colour) {
   const T alpha = alpha_of(exponent);
   const T weight = alpha * pixel.transmittance;
   const T behind = pixel.transmittance - weight;
-  // Negative, hence false, for pixels finished before; true for live ones that it does not reach.
+  // Negative, hence false, for pixels finished before; true for live pixels that stay live.
   const auto live = behind >= T(transmittance_min);
   const T used = select(live, weight, T(0.0));
   pixel.colour.x = mul_add(used, colour.x, pixel.colour.x);
@@ -55,7 +55,7 @@ CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colo
 }
 
 /// A pixel for a run of Gaussians in registers. Its transmittance goes on falling behind the
-/// Gaussian that finishes it: one multiply-add is all that the next Gaussian has to wait for.
+/// Gaussian that finishes it, so the next Gaussian waits for one multiply-add only.
 template <class T>
 struct RunningPixel {
   Vec3<T> colour;

@@ -13,7 +13,7 @@ CATGS_BEFORE_MATH();
 namespace catgs {
 namespace CATGS_MATH_NAMESPACE {
 
-/// A Camera unfolded for projection. Rows of camera_from_world are camera axes in the world.
+/// A Camera prepared for projection. Rows of camera_from_world are camera axes in the world.
 template <class T>
 struct CameraModel {
   Vec3<T> position;  // world
@@ -60,8 +60,8 @@ CATGS_HD_INLINE CameraModel<T> convert(const CameraModel<S>& c) {
           convert<T>(c.slope_max)};
 }
 
-/// Distance along the view axis, world units. Evaluated in double by every core and then rounded
-/// to float: blending order is decided by this number, and so it is the same everywhere.
+/// Distance along the view axis, world units. Every core evaluates it in double and rounds it to
+/// float: this number decides the blending order, which must be the same everywhere.
 template <class T>
 CATGS_HD_INLINE T view_depth(const CameraModel<T>& camera, const Vec3<T>& mean) {
   return dot(camera.forward, mean - camera.position);

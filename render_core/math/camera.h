@@ -10,7 +10,8 @@
 
 namespace catgs {
 
-/// Beyond it, on each axis, is no place in a scene: squares would overflow a float's precision.
+/// Largest coordinate of a place in a scene, on each axis. Squares of larger ones would exceed a
+/// float's precision.
 inline constexpr float max_coordinate = 1.0e9f;
 
 /// Camera-to-world rigid transform. Camera axes: x right, y down, z forward. World units are the

@@ -27,12 +27,12 @@ inline constexpr double fov_clamp = 1.3;
 /// sqrt(log2(e) / 2): exp(-q^2 / 2) = exp2(-(exponent_scale q)^2).
 inline constexpr double exponent_scale = 0.8493218002880191;
 
-/// What the edges of boxes and tile intervals are moved outwards by, so that rounding in float can
+/// Edges of boxes and tile intervals are moved outwards by this, so that rounding in float can
 /// never leave out a tile. 1/100 px adds fewer than 0.2 % to the lists.
 inline constexpr double listing_slack_px = 0.01;
 
-/// A cached colour is good while the direction from the camera has turned by less: a step of 1 cm
-/// at 2.5 m. Reusing colours then costs less than harmonics of 8 bits do.
+/// A cached colour is reused until the direction from the camera has turned by this much: a step of
+/// 1 cm at 2.5 m. The reuse then costs less quality than 8-bit harmonics do.
 inline constexpr double colour_reuse_rad = 0.004;
 
 /// Side of the square tiles that pixels are binned into.

@@ -39,8 +39,8 @@ CATGS_HD_INLINE T whitened_square(const Whitening<T>& w, const Vec2<T>& d) {
   return mul_add(u, u, v * v);
 }
 
-/// A Gaussian's base-2 exponent over the image plane, its linear parts gathered at an origin near
-/// the pixels, where they are small numbers: log2_opacity - (u + xx x + xy y)^2 - (v + yy y)^2.
+/// A Gaussian's base-2 exponent over the image plane: log2_opacity - (u + xx x + xy y)^2 - (v + yy
+/// y)^2. The origin is near the pixels, so that the linear parts are small numbers.
 template <class T>
 struct ExponentField {
   T u, xx, xy;
@@ -104,8 +104,8 @@ struct Ellipse {
   T rightmost_y;
 };
 
-/// `reach` is widened by what rounding can add to it in `w` (it is 8 at most), so that a listed set
-/// misses no pixel.
+/// `reach` (at most 8) is widened by the rounding error that it can have in `w`, so that a listed
+/// set misses no pixel.
 template <class T>
 CATGS_HD_INLINE Ellipse<T> make_ellipse(const Whitening<T>& w, T reach, T half_extent_x,
                                         T rightmost) {

@@ -22,9 +22,9 @@ CATGS_HD_INLINE ListGrowth<T> convert(const ListGrowth<S>& g) {
 /// Growth in px of an outline of `radius_px` around a centre at `slope` = (x/z, y/z), whose depth
 /// does not fall below `nearest_depth` on its way (world units).
 ///
-/// A camera that is tau off its path sees a point at f tau sqrt(1 + |slope|^2) / z at most from
-/// where it should be. A turn maps the image by a homography H; to first order the projection of a
-/// Gaussian follows it (chain rule), and the second order is at most 1/2 |D^2 H| radius^2.
+/// A camera that is tau off its path sees a point displaced by at most f tau sqrt(1 + |slope|^2) /
+/// z. A turn maps the image by a homography H. To first order the projection of a Gaussian follows
+/// H (chain rule); the second order is at most 1/2 |D^2 H| radius^2.
 template <class T>
 CATGS_HD_INLINE T growth_px(const ListGrowth<T>& g, const Vec2<T>& slope, T nearest_depth,
                             T radius_px) {
@@ -35,11 +35,11 @@ CATGS_HD_INLINE T growth_px(const ListGrowth<T>& g, const Vec2<T>& slope, T near
   return mul_add(by_radius, radius_px, g.parallax * oblique / nearest_depth) + g.constant;
 }
 
-/// Whether a turn may bring a Gaussian into the picture that is at `at` in camera space, behind the
-/// near plane on the camera's path: it comes before that plane, far to the side, and the footprint
-/// that is linearised at the clamped slope (fov_clamp) is as wide. `extent`: how far from its
-/// centre it reaches alpha_min at most, world units. True of giants and of those around the camera
-/// alone.
+/// Whether a turn may bring a Gaussian into the picture that lies behind the near plane on the
+/// camera's path, at `at` in camera space. Such a Gaussian comes before that plane far to the side,
+/// where its footprint, linearised at the clamped slope (fov_clamp), is huge. `extent`: the largest
+/// distance from its centre at which it reaches alpha_min, world units. True only for giants and
+/// for Gaussians around the camera.
 template <class T>
 CATGS_HD_INLINE auto may_turn_in(const ListGrowth<T>& g, const Vec3<T>& at, T extent, T near_z) {
   const T lateral2 = mul_add(at.x, at.x, at.y * at.y);

@@ -17,7 +17,7 @@ CATGS_HD_INLINE Homography<T> convert(const Homography<S>& h) {
   return {T(h.xx), T(h.xy), T(h.x), T(h.yx), T(h.yy), T(h.y), T(h.wx), T(h.wy), T(h.w)};
 }
 
-/// The map back, for those that have one; weights keep their sign.
+/// The inverse map, for maps that have one; weights keep their sign.
 template <class T>
 CATGS_HD_INLINE Homography<T> inverse(const Homography<T>& h) {
   const Vec3<T> x{h.xx, h.xy, h.x}, y{h.yx, h.yy, h.y}, w{h.wx, h.wy, h.w};

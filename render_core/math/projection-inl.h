@@ -53,8 +53,8 @@ CATGS_HD_INLINE Vec3<T> operator*(const Vec3<T>& row, const CovarianceFactor<T>&
           mul_add(row.y, l.yy, row.z * l.zy), row.z * l.zz};
 }
 
-/// How far from its centre a Gaussian reaches at most, world units, by the trace of its covariance;
-/// `reach` as reach_of() has it.
+/// Largest distance from a Gaussian's centre at which it reaches alpha_min, world units, by the
+/// trace of its covariance; `reach` as in reach_of().
 template <class T>
 CATGS_HD_INLINE T extent_bound(const CovarianceFactor<T>& l, T reach) {
   const T variance =

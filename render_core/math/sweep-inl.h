@@ -15,14 +15,14 @@ namespace CATGS_MATH_NAMESPACE {
 /// A Gaussian on its way through a window.
 template <class T>
 struct Sweep {
-  // Now; of those behind the near plane now, at the window's end.
+  // At the start; at the window's end for a Gaussian behind the near plane at the start.
   ProjectedGaussian<T> shape;
-  Vec2<T> displacement;  // from there on, px
-  Whitening<T> outline;  // stays around it on the way
+  Vec2<T> displacement;  // from `shape` to the other end, px
+  Whitening<T> outline;  // holds the Gaussian all along the way
 };
 
-/// The sweep of a Gaussian that is drawn at one end of the window only: from there to the near
-/// plane, growing as it comes nearer. `shape`: at that end.
+/// The sweep of a Gaussian that is drawn at one end of the window only. It goes from that end to
+/// the near plane, and grows on the way. `shape`: at that end.
 template <class T>
 CATGS_HD_INLINE Sweep<T> sweep_to_near_plane(const CameraModel<T>& camera,
                                              const ProjectedGaussian<T>& shape,
@@ -49,7 +49,8 @@ CATGS_HD_INLINE Sweep<T> choose(const Mask& mask, const Sweep<T>& a, const Sweep
            select(mask, a.outline.yy, b.outline.yy)}};
 }
 
-/// Of a Gaussian in front of the near plane now (its view_depth() is `depth`) or at the end.
+/// The sweep of a Gaussian in front of the near plane at the start (its view_depth() is `depth`) or
+/// at the end.
 template <class T>
 CATGS_HD_INLINE Sweep<T> sweep(const CameraModel<T>& now, const CameraModel<T>& end,
                                const Vec3<T>& mean, const CovarianceFactor<T>& factor,

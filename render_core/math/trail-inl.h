@@ -12,8 +12,8 @@ CATGS_BEFORE_MATH();
 namespace catgs {
 namespace CATGS_MATH_NAMESPACE {
 
-/// Where a point that moves straight from `inside` (in front of the near plane) to `to`, both in
-/// camera space, leaves the view: `to` itself, or where it reaches the near plane before.
+/// The point where a path leaves the view. It runs straight from `inside` (in front of the near
+/// plane) to `to`, both in camera space, and ends at `to` or where it reaches the near plane first.
 template <class T>
 CATGS_HD_INLINE Vec3<T> cut_at_near(const Vec3<T>& inside, const Vec3<T>& to, T near_z) {
   const auto leaves = to.z < near_z;
@@ -22,10 +22,11 @@ CATGS_HD_INLINE Vec3<T> cut_at_near(const Vec3<T>& inside, const Vec3<T>& to, T 
           select(leaves, mul_add(share, to.y - inside.y, inside.y), to.y), max(to.z, near_z)};
 }
 
-/// Whitening of the smallest ellipse that holds those of `a` and `b`, all around one centre: what a
-/// Gaussian needs that is seen from two places. In the plane whitened by `a` the covariance of `a`
-/// is I and that of `b` some S; the smallest one above both is I + (S - I)+, the positive part by
-/// eigenvalues. Sums of positive terms throughout: of two crossed needles S has a condition of 1e8.
+/// Whitening of the smallest ellipse that holds those of `a` and `b`, all around one centre: the
+/// outline of a Gaussian that is seen from two places. In the plane whitened by `a`, the covariance
+/// of `a` is I and that of `b` some S; the smallest one above both is I + (S - I)+, the positive
+/// part by eigenvalues. All sums have positive terms, because for two crossed needles S has a
+/// condition of 1e8.
 template <class T>
 CATGS_HD_INLINE Whitening<T> whitening_of_both(const Whitening<T>& a, const Whitening<T>& b) {
   const T zero = T(0.0), half = T(0.5), one = T(1.0), tiny = T(1e-30);
@@ -84,8 +85,9 @@ CATGS_HD_INLINE Trail<T> make_trail(const Ellipse<T>& ellipse, const Vec2<T>& di
       max(ellipse.reach, zero) + T(3e-6) * mul_add(w.xx, abs(dx), (abs(w.xy) + w.yy) * abs(dy));
   t.inverse_dy = T(1.0) / dy;
 
-  // In the whitened plane the ellipse is a circle, and the tangent is parallel to the path (u, v)
-  // at the circle's point (-v, u) r / |(u, v)| or at the opposite: the one with x on the right.
+  // In the whitened plane the ellipse is a circle. The tangent is parallel to the path (u, v) at
+  // the circle's point (-v, u) r / |(u, v)| and at the opposite one; this takes the one with x on
+  // the right.
   const T u = mul_add(w.xx, dx, w.xy * dy);
   const T v = w.yy * dy;
   const T half_height = sqrt(t.ellipse.reach) / w.yy;
@@ -95,7 +97,7 @@ CATGS_HD_INLINE Trail<T> make_trail(const Ellipse<T>& ellipse, const Vec2<T>& di
   const T up = min(dy, zero), down = max(dy, zero);
   t.top_y = up - half_height;
   t.bottom_y = down + half_height;
-  // Edges are farthest out where the ellipse's are, at that end of the path which is farther out.
+  // The trail reaches farthest where the ellipse does, at the end of the path that is farther out.
   t.rightmost_y = ellipse.rightmost_y + select(dx > zero, dy, zero);
   t.leftmost_y = select(dx > zero, zero, dy) - ellipse.rightmost_y;
   return t;

@@ -10,7 +10,7 @@ namespace catgs {
 /// PSNR in dB of a mean squared error of values in [0, 1]; infinite for 0.
 double psnr_db(double mean_squared_error);
 
-/// How close two pictures are; one of them is the truth, but the numbers are symmetric.
+/// The difference of two pictures. One of them is the truth, but the numbers are symmetric.
 struct ImageQuality {
   double mean_squared_error = 0.0;  // over pixels and channels
   double max_error = 0.0;           // largest absolute difference of a channel
@@ -21,7 +21,7 @@ struct ImageQuality {
 
   [[nodiscard]] double psnr() const { return psnr_db(mean_squared_error); }
   [[nodiscard]] double worst_block_psnr() const { return psnr_db(block_errors.back()); }
-  /// PSNR of the block that 0.1 % of the blocks are worse than.
+  /// PSNR of the block at the 0.1 % quantile: 0.1 % of the blocks are worse.
   [[nodiscard]] double block_0_1_percent_psnr() const;
 };
 
@@ -30,14 +30,14 @@ struct ImageQuality {
 /// averaged over the channels and the positions where the whole window fits.
 ImageQuality compare_images(const Image& a, const Image& b);
 
-/// Two pictures in time order.
+/// Two consecutive pictures.
 struct Step {
   const Image& before;
   const Image& after;
 };
 
-/// How much more a shown step changes than the true one: the value that 99.9 % of all channels of
-/// |shown change| - |true change| do not exceed. All pictures have one size
+/// How much more the shown pictures change in a step than the true ones: 99.9 % of all channels
+/// have a |shown change| - |true change| of at most this. All pictures must have one size
 /// (std::invalid_argument).
 double pop_excess(const Step& shown, const Step& truth);
 

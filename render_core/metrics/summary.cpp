@@ -1,12 +1,14 @@
 #include "render_core/metrics/summary.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numeric>
 
 namespace catgs {
 
 double percentile(std::span<const double> sorted, double share) {
+  assert(share > 0.0 && share <= 1.0 && std::ranges::is_sorted(sorted));
   if (sorted.empty()) return 0.0;
   const double rank = std::ceil(share * static_cast<double>(sorted.size()));
   return sorted[static_cast<std::size_t>(

@@ -22,9 +22,9 @@ double percentile(std::span<const double> sorted, double share);
 
 Summary summarize(std::vector<double> values);
 
-/// How even the frame times of a moving camera are: the p99 over frames of
-/// t_i / median(t_{i-60} … t_{i+60}), the window cut at the ends. A trace changes what a frame
-/// costs, so p99 / mean would measure the trace. 0 for an empty set.
+/// How even the frame times of a moving camera are: the p99 over frames of t_i / median(t_{i-60} …
+/// t_{i+60}), the window cut at the ends. The cost of a frame changes along a trace, so p99 / mean
+/// would measure the trace. 0 for an empty set.
 double flatness(std::span<const double> frame_ms);
 
 }  // namespace catgs

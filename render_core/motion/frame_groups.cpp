@@ -1,6 +1,7 @@
 #include "render_core/motion/frame_groups.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -15,7 +16,7 @@ namespace {
 
 constexpr int grid_steps = 4;  // per axis of the image, its edges included
 
-/// Same image and same near plane, so that the cached lists mean the same.
+/// Image and near plane are the same, so the cached lists still apply.
 bool same_lens(const Camera& a, const Camera& b) {
   return a.size_px == b.size_px && a.focal_px == b.focal_px &&
          a.principal_point_px == b.principal_point_px && a.near_z == b.near_z;
@@ -29,7 +30,7 @@ Camera at_pose(const Camera& camera, const Pose& world_from_camera) {
 
 glm::dquat unit(const glm::quat& q) { return glm::normalize(glm::dquat(q)); }
 
-/// What a camera's image looks like from another pose.
+/// The image of one camera as it appears from another pose.
 class RelativeView {
  public:
   RelativeView(const Camera& from, const Pose& to)
@@ -40,8 +41,9 @@ class RelativeView {
         centre_(from.principal_point_px),
         near_z_(from.near_z) {}
 
-  /// Where the point seen at `pixel` with view depth `depth` (world units; may be infinite) lies in
-  /// the image from the other pose; infinitely far away if it is not in front of the camera there.
+  /// Place of a point in the image from the other pose. The point is seen at `pixel` with view
+  /// depth `depth` (world units; may be infinite). Infinitely far away if it is not in front of the
+  /// camera there.
   [[nodiscard]] glm::dvec2 image_of(const glm::dvec2& pixel, double depth) const {
     const glm::dvec3 ray = to_from_ * glm::dvec3((pixel - centre_) / focal_, 1.0);
     const bool far = std::isinf(depth);
@@ -94,6 +96,7 @@ float speculation_min_depth(const SpeculationSettings& settings, float near_z) {
 }
 
 Pose uniform_motion(const Pose& from, const Pose& to, float share) {
+  assert(share >= 0.0f && share <= 1.0f);
   return {glm::mix(from.position, to.position, share),
           glm::quat(glm::normalize(glm::slerp(unit(from.orientation), unit(to.orientation),
                                               static_cast<double>(share))))};
@@ -101,6 +104,7 @@ Pose uniform_motion(const Pose& from, const Pose& to, float share) {
 
 float max_displacement_px(const Camera& now, const Pose& end, float nearest_depth,
                           glm::ivec2 end_shift_px) {
+  assert(nearest_depth > 0.0f);
   const RelativeView view(now, end);
   const glm::dvec2 shift(end_shift_px);
   double largest = 0.0;
@@ -112,6 +116,7 @@ float max_displacement_px(const Camera& now, const Pose& end, float nearest_dept
 
 float max_deviation_px(const Camera& key, const Pose& end, const Pose& now, float nearest_depth,
                        glm::ivec2 end_shift_px, glm::ivec2 now_shift_px) {
+  assert(nearest_depth > 0.0f);
   const RelativeView end_view(key, end), now_view(key, now);
   const glm::dvec2 end_shift(end_shift_px), now_shift(now_shift_px);
   double largest = 0.0;
@@ -131,6 +136,7 @@ float max_deviation_px(const Camera& key, const Pose& end, const Pose& now, floa
 }
 
 int speculation_window(int initial_window, float max_trail_px, float displacement_px) {
+  assert(initial_window >= 0 && max_trail_px > 0.0f && displacement_px >= 0.0f);
   if (displacement_px <= max_trail_px) return initial_window;
   return static_cast<int>(static_cast<double>(initial_window) * max_trail_px / displacement_px);
 }
@@ -168,14 +174,14 @@ void FrameGroups::begin_group(const Camera& now, const Forecast& forecast,
   };
   const bool warps = settings_.grid == GridKind::warp;
   const bool shifts = settings_.grid == GridKind::shift;
-  // Where lists have to reach for a camera that is at `pose` then.
+  // The pose that lists have to reach to for a camera that is at `pose` by then.
   const auto end_of = [&](const Pose& pose) {
     return warps ? Pose{pose.position, now.world_from_camera.orientation} : pose;
   };
   const auto shift_of = [&](const Pose& pose) {
     return shifts ? image_shift_px(now, pose) : glm::ivec2(0);
   };
-  // The forecast says nothing about what comes behind its last frame.
+  // The forecast says nothing about the time after its last frame.
   const int longest = std::min(settings_.initial_window, forecast.frames);
   const Pose last = after(longest);
   int window =
@@ -222,8 +228,8 @@ FramePlan FrameGroups::sub_frame(const Camera& now) const {
   return plan;
 }
 
-/// Whether the group's lists hold what the next frame shows. A deviation at infinity is one by
-/// rotation alone, so the bound in pixels bounds the angle too.
+/// Whether the group's lists hold everything that the next frame shows. A deviation at infinity
+/// comes from rotation alone, so the bound in pixels bounds the angle too.
 bool FrameGroups::continues(const Camera& now, const SceneDepths& depths) const {
   if (drawn_ >= group_.window || !same_lens(now, key_)) return false;
   const Pose& pose = now.world_from_camera;

@@ -12,7 +12,7 @@
 namespace catgs {
 namespace {
 
-/// The camera, with the plan's grid and what that grows by on all sides as its image.
+/// The camera, with an image that is the plan's grid and its margin on all sides.
 Camera camera_of_grid(Camera camera, const FramePlan& plan) {
   const int margin = static_cast<int>(std::ceil(plan.growth.constant));
   const glm::ivec2 shift = glm::abs(plan.trail_shift_px);
@@ -22,7 +22,7 @@ Camera camera_of_grid(Camera camera, const FramePlan& plan) {
   return camera;
 }
 
-/// Of a camera's image from its axis.
+/// The largest slope in a camera's image, from its axis.
 float steepest_slope(const Camera& camera) {
   const glm::vec2 size(camera.size_px);
   return glm::length(glm::max(camera.principal_point_px, size - camera.principal_point_px) /

@@ -6,8 +6,8 @@
 
 namespace catgs {
 
-/// Which clusters the lists of a key frame need: those that may reach its grid, for any camera of
-/// its guard set.
+/// Finds the clusters that a key frame's lists need: those that may reach its grid, for any camera
+/// of its guard set.
 class ListCuller {
  public:
   ListCuller(const Camera& camera, const FramePlan& plan);
@@ -34,8 +34,8 @@ class ListCuller {
     return {along(end.right), along(end.down), along(end.forward)};
   }
 
-  /// math::may_turn_in() of any Gaussian in the cluster that is behind the near plane: of those
-  /// before it the half-spaces tell.
+  /// math::may_turn_in() of any Gaussian in the cluster that is behind the near plane. The
+  /// half-spaces decide about Gaussians in front of it.
   [[nodiscard]] CATGS_HD bool turns_in(const Cluster& cluster, const End& end) const {
     const float nearest = nearest_depth(end, cluster);
     const glm::vec3& at = end.position;
@@ -54,8 +54,8 @@ class ListCuller {
            fabsf(end.forward.y) * half.y - fabsf(end.forward.z) * half.z;
   }
 
-  /// math::growth_px() as a longer reach: by the camera's way off, and by shares of the splats'
-  /// radii.
+  /// math::growth_px() as a longer reach: larger by the camera's distance off its path, and by
+  /// shares of the splats' radii.
   [[nodiscard]] CATGS_HD Cluster grown(const Cluster& cluster) const {
     const float nearest =
         fminf(nearest_depth(start_, cluster), nearest_depth(window_end_, cluster));
@@ -70,8 +70,9 @@ class ListCuller {
   End start_, window_end_;
   ListGrowth<float> growth_;
   float near_z_;
-  float focal_px_;  // and so much more that it bounds a splat's radius at the sides
-  float off_path_;  // world units that a camera of the guard set may be off, likewise
+  float focal_px_;  // enlarged so that it bounds a splat's radius at the sides too
+  float off_path_;  // world units that a camera of the guard set may be off its path, enlarged
+                    // likewise
 };
 
 }  // namespace catgs

@@ -14,12 +14,12 @@
 namespace catgs {
 namespace {
 
-/// How far one may go from the start, backwards (<= 0) and forwards (>= 0).
+/// The free distance from the start, backwards (<= 0) and forwards (>= 0).
 struct Range {
   double low, high;
 };
 
-/// Where the line from `start` along the unit vector `axis` stays in the box.
+/// The part of the line from `start` along the unit vector `axis` that is in the box.
 Range range_in(const Bounds& bounds, const glm::dvec3& start, const glm::dvec3& axis) {
   constexpr double margin = 0.98;
   Range range{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};

@@ -8,8 +8,8 @@
 
 namespace catgs {
 
-/// One kind of camera motion alone, at one speed: the paper's panning, zooming and rotation (3.1.1)
-/// and an orbit. From a scene's start pose, its image made upright:
+/// A single kind of camera motion at one speed: the paper's panning, zooming and rotation (3.1.1)
+/// and an orbit. All begin at a scene's start pose, its image made upright:
 ///
 ///   pan     sideways, to and fro, view direction held; world units / s
 ///   zoom    along the view, to and fro; world units / s
@@ -23,12 +23,12 @@ struct PlainMotion {
   double speed = 1.0;  // see MotionKind
   double duration_s = 10.0;
   double rate_hz = 120.0;
-  std::optional<double> reach{};  // pan, zoom: this far to both sides; default: as far as `bounds`
+  std::optional<double> reach{};  // pan, zoom: to both sides; default: as far as `bounds`
 };
 
 /// Poses at `rate_hz` from time 0. Without a reach, pan and zoom turn back 2 % of the way before
-/// they would leave `bounds`. Throws InputError for a speed, duration or rate out of range, and for
-/// a start outside of `bounds`, where no default reach exists.
+/// they would leave `bounds`. Throws InputError for a speed, duration or rate out of range. Throws
+/// also for a start outside of `bounds`, where no default reach exists.
 Trajectory make_plain_motion(const PlainMotion& motion, const SceneHints& hints,
                              const Bounds& bounds);
 

@@ -7,9 +7,9 @@
 namespace catgs {
 
 // Building blocks of pose scripts that give the same bits on every machine: integer random numbers,
-// and double arithmetic of + - * / and sqrt only, which IEEE 754 rounds exactly.
+// and arithmetic in double with + - * / and sqrt only, which IEEE 754 rounds exactly.
 
-/// Draws of doubles, good enough to place waypoints.
+/// Random doubles, good enough to place waypoints.
 class PortableRng : public SplitMix64 {
  public:
   using SplitMix64::SplitMix64;
@@ -34,8 +34,8 @@ SinCos<double> portable_sincos(double angle_rad);
 /// differentiable). The channel picks one of independent noises.
 double value_noise(std::uint64_t seed, std::uint32_t channel, double x);
 
-/// Goes from 0 to 1 over [0, 1] with the least jerk, as a reaching or turning person does (Flash
-/// and Hogan 1985); clamped outside. Its largest slope is 1.875.
+/// Goes from 0 to 1 over [0, 1] with the least jerk, as people reach or turn (Flash and Hogan
+/// 1985); clamped outside. Its largest slope is 1.875.
 constexpr double minimum_jerk(double x) {
   if (x <= 0.0) return 0.0;
   if (x >= 1.0) return 1.0;

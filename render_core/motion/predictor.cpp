@@ -1,6 +1,7 @@
 #include "render_core/motion/predictor.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -11,26 +12,26 @@ namespace catgs {
 namespace {
 
 constexpr std::int64_t memory_us = 1'000'000;
-// Closer stamps are jitter: dividing a step by them would make a jump of it.
+// Stamps closer than this are jitter; dividing a step by them would make a jump of it.
 constexpr std::int64_t min_step_us = 4'000;
-// How late a sample may come without cutting a forecast of the whole horizon.
+// A sample may be this late and still leaves room for a forecast of the whole horizon.
 constexpr std::int64_t max_age_us = 50'000;
 
-// Confidence. Of recorded head motion, foreseen from samples that come up to 20 ms late, these
-// make the smallest errors at 8…100 ms; twice or half of each costs less than 2 % of them.
+// Confidence. On recorded head motion, with samples up to 20 ms late, these values make the
+// smallest errors at 8…100 ms. Twice or half of any costs less than 2 % of them.
 constexpr std::int64_t check_us = 33'000;
 constexpr double fading_s = 0.3;
 constexpr double damping_s = 0.12;
-constexpr double first_doubt = 0.4;         // the usual one of these recordings
-constexpr double first_doubt_moved = 1e-4;  // weighs as much as so much motion, rad
+constexpr double first_doubt = 0.4;         // the usual one in these recordings
+constexpr double first_doubt_moved = 1e-4;  // rad; it weighs as much as this much motion
 
-// Horizons that shrink to nothing leave recorded heads with 2 to 5 % less frames per key frame, and
-// the trails in its lists hardly shorter: far motion ends a window anyway.
+// If the horizon shrank to nothing, recorded heads would have 2 to 5 % fewer frames per key frame.
+// The trails in its lists would hardly be shorter, because far motion ends a window anyway.
 constexpr double least_trust = 0.5;
 
 constexpr std::int64_t still_us = 100'000;
 constexpr double still_rad = 0.5e-3;  // half a pixel at a focal length of 1000 px
-constexpr double jump_rad = 5e-3;     // what is less than a few pixels needs no new motion
+constexpr double jump_rad = 5e-3;     // smaller steps, of a few pixels, begin no new motion
 
 bool usable(const Pose& pose) {
   const glm::vec3& p = pose.position;
@@ -39,12 +40,12 @@ bool usable(const Pose& pose) {
          norm > 1e-6f;
 }
 
-/// World axes, units.
+/// In world axes, world units.
 glm::dvec3 shift_between(const Pose& from, const Pose& to) {
   return glm::dvec3(to.position) - glm::dvec3(from.position);
 }
 
-/// Rotation vector in the axes of `from`, rad.
+/// As a rotation vector in the axes of `from`, rad.
 glm::dvec3 turn_between(const Pose& from, const Pose& to) {
   return rotation_between(from.orientation, to.orientation);
 }
@@ -53,7 +54,7 @@ double seconds_between(std::int64_t from_us, std::int64_t to_us) {
   return 1e-6 * static_cast<double>(to_us - from_us);
 }
 
-/// How far a unit velocity goes that decays at `rate_hz`.
+/// The way covered in `seconds` at a velocity that starts at 1 and decays at `rate_hz`.
 double decaying_reach_s(double seconds, double rate_hz) {
   return rate_hz > 0.0 ? -std::expm1(-rate_hz * seconds) / rate_hz : seconds;
 }
@@ -111,8 +112,8 @@ void MotionPredictor::start_at(const Sample& sample) {
   error_ = moved_ = 0.0;
 }
 
-/// Sets the motion of a sample, from that of the sample before and the step in between: exponential
-/// smoothing, for irregular intervals.
+/// Sets the motion of a sample from the motion of the sample before it and the step in between.
+/// Exponential smoothing for irregular intervals.
 void MotionPredictor::follow(std::size_t index) {
   if (index == 0) return;
   Sample& sample = samples_[index];
@@ -130,7 +131,8 @@ void MotionPredictor::follow(std::size_t index) {
                    glm::mix(before.motion.angular_rate, turn / seconds, share)};
 }
 
-/// The first step of a motion has none to be compared with, but the second tells.
+/// The first step of a motion has no step to be compared with; the second step tells whether it was
+/// a jump.
 void MotionPredictor::drop_a_jump_at_the_start() {
   if (samples_.size() != 3) return;
   const Sample &first = samples_[1], &second = samples_[2];
@@ -154,8 +156,8 @@ bool MotionPredictor::newest_is_a_jump() const {
          extent_between(samples_[samples_.size() - 2], newest) >= jump_rad;
 }
 
-/// Compares the newest sample with what the one check_us ago let expect, undamped: whether the
-/// camera keeps its velocity is the question.
+/// Compares the newest sample with the forecast that the sample check_us ago implied. The forecast
+/// is not damped, because the question is whether the camera keeps its velocity.
 void MotionPredictor::check_forecast() {
   const Sample& newest = samples_.back();
   const double fading =
@@ -174,7 +176,7 @@ void MotionPredictor::check_forecast() {
   moved_ += extent(shift, turn);
 }
 
-/// By what angle a step moves a picture.
+/// The angle by which a step moves a picture.
 double MotionPredictor::extent(const glm::dvec3& shift, const glm::dvec3& turn) const {
   return glm::length(turn) + glm::length(shift) / settings_.lever;
 }
@@ -193,7 +195,7 @@ bool MotionPredictor::still() const {
   const Sample& newest = samples_.back();
   const auto later =
       std::ranges::upper_bound(samples_, newest.time_us - still_us, {}, &Sample::time_us);
-  if (later == samples_.begin()) return false;  // not known for so long
+  if (later == samples_.begin()) return false;  // the history is too short
   return std::all_of(std::prev(later), samples_.end(), [&](const Sample& sample) {
     return extent_between(sample, newest) <= still_rad;
   });
@@ -213,6 +215,7 @@ std::optional<Pose> MotionPredictor::at(std::int64_t time_us) const {
 
 std::optional<Forecast> MotionPredictor::forecast(std::int64_t now_us, double rate_hz,
                                                   int frames) const {
+  assert(rate_hz > 0.0 && frames >= 0);
   if (samples_.size() < 3) return std::nullopt;
   const std::int64_t age_us = now_us - samples_.back().time_us;
   if (age_us > settings_.gap_us) return std::nullopt;

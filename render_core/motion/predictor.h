@@ -15,11 +15,11 @@ struct PredictorSettings {
   std::int64_t smoothing_us = 6'000;  // time constant of the velocities
   std::int64_t horizon_us = 100'000;  // no forecast reaches further
   std::int64_t gap_us = 250'000;      // a longer silence ends a motion
-  // Forecasts are trusted this much, whatever came of earlier ones (0…1). With 1 the camera goes on
-  // at constant velocity, over the whole horizon.
+  // Forecasts are trusted at least this much (0…1), however wrong earlier ones were. With 1 the
+  // camera continues at constant velocity over the whole horizon.
   double min_confidence = 0.0;
   // World units; the distance at which shifts count like turns. Forecasts of recorded head motion
-  // hardly depend on it, from 0.5 to 10 m; what is tremor and what a motion does.
+  // hardly depend on it, from 0.5 to 10 m. The limit between tremor and motion does.
   double lever = 3.0;
 };
 
@@ -29,46 +29,47 @@ constexpr double forecast_lever(float near_z) {
   return near_z > 0.0f ? 15.0 * static_cast<double>(near_z) : PredictorSettings{}.lever;
 }
 
-/// Where a camera is going, judged by where it has been: its smoothed velocity and angular rate,
-/// damped by how wrong its own forecasts were. One per camera; not for several threads at once.
+/// Forecasts a camera from its past: its smoothed velocity and angular rate, damped by the errors
+/// of its own forecasts. One per camera; not thread-safe.
 ///
-/// Confidence is the share of the motion that forecasts made 33 ms ahead got right lately: 1 - the
-/// sum of their errors over the sum of the motions, a sample weighing exp(-age / 0.3 s). A turn
-/// counts by its angle, a shift by the angle under which it appears a lever away. In doubt, which
-/// is 1 - confidence, velocity decays as exp(-t doubt / 120 ms); under a confidence of one half the
-/// horizon shrinks too, to its half at one quarter.
-/// `catgs-render trace forecast` compares this with other ways to predict.
+/// Confidence is the share of recent motion that forecasts made 33 ms ahead got right. It is 1 -
+/// the sum of their errors over the sum of the motions, each sample weighed by exp(-age / 0.3 s). A
+/// turn counts by its angle, a shift by the angle under which it appears a lever away. Doubt is 1 -
+/// confidence, and velocity decays as exp(-t doubt / 120 ms). Under a confidence of one half the
+/// horizon shrinks too, to half its length at one quarter. `catgs-render trace forecast` compares
+/// this with other ways to predict.
 ///
 /// Stamps lie within +-2^62 us. Samples may come irregularly and late:
-///  - one with a known stamp replaces that sample;
-///  - one out of order is put where it belongs, or ignored if it is older than all that is kept or
-///    tells nothing new;
-///  - one later than the newest by more than gap_us, or earlier by as much (the clock was set),
-///    begins a new motion;
-///  - so does a teleport: a step that is jump_ratio times faster than any of the last second, in
-///    position or in orientation. Nothing before it says where the camera goes after it, and the
-///    same holds for a sudden start from rest. Two steps that agree make a motion; before them
-///    nothing is forecast;
-///  - one that is not finite, or whose orientation is not a rotation, is ignored.
+/// - A sample with a known stamp replaces the earlier one.
+/// - A sample out of order is inserted where it belongs. It is ignored if it is older than all that
+///   are kept or tells nothing new.
+/// - A sample later than the newest by more than gap_us, or earlier by as much (the clock was set),
+///   begins a new motion.
+/// - A teleport begins a new motion too: a step jump_ratio times faster than any of the last
+///   second, in position or in orientation. The samples before it say nothing about the motion
+///   after it. The same holds for a sudden start from rest. Nothing is forecast until two steps
+///   agree.
+/// - A sample that is not finite, or whose orientation is not a rotation, is ignored.
 class MotionPredictor {
  public:
   explicit MotionPredictor(const PredictorSettings& settings = {}) : settings_(settings) {}
 
   void add(const TimedPose& sample);
 
-  /// The expected pose at a time after the newest sample; nothing before the first sample. A camera
+  /// The expected pose at a time after the newest sample; empty before the first sample. A camera
   /// that is still, or whose motion is unknown, stays where it is.
   [[nodiscard]] std::optional<Pose> at(std::int64_t time_us) const;
 
-  /// For a frame shown at `now_us`, the camera as many frames later as the horizon holds, `frames`
-  /// at most; nothing while the motion is unknown. A still camera stays over the whole horizon.
+  /// The expected camera for frames from `now_us` on: `frames` frames later, or fewer if the
+  /// horizon ends before. Empty while the motion is unknown. A still camera stays over the whole
+  /// horizon.
   [[nodiscard]] std::optional<Forecast> forecast(std::int64_t now_us, double rate_hz,
                                                  int frames) const;
 
   /// 0…1; a first guess until forecasts have been checked.
   [[nodiscard]] double confidence() const;
 
-  /// Whether the camera has not moved for 100 ms, but for the tremor of tracking.
+  /// Whether the camera has not moved for 100 ms, apart from the tremor of tracking.
   [[nodiscard]] bool still() const;
 
   static constexpr double jump_ratio = 10.0;
@@ -83,7 +84,7 @@ class MotionPredictor {
     std::int64_t time_us = 0;
     Pose pose;
     Motion motion;
-    double speed = 0.0, angular_speed = 0.0;  // of the step that led here; units / s, rad / s
+    double speed = 0.0, angular_speed = 0.0;  // of the step to here; units / s, rad / s
   };
   using Samples = std::vector<Sample>;
 
@@ -99,7 +100,7 @@ class MotionPredictor {
 
   PredictorSettings settings_;
   Samples samples_;  // of one motion; increasing times, min_step_us apart but for the newest
-  double error_ = 0.0, moved_ = 0.0;  // of forecasts, faded sums; rad
+  double error_ = 0.0, moved_ = 0.0;  // of forecasts, decaying sums; rad
 };
 
 }  // namespace catgs

@@ -18,7 +18,7 @@ namespace {
 constexpr double max_duration_s = 24 * 3600.0;
 constexpr double max_rate_hz = 1000.0;
 
-/// Too close to vertical to tell where ahead is. `up` is a unit vector.
+/// Too close to vertical to have a heading. `up` is a unit vector.
 bool is_steep(const glm::dvec3& direction, const glm::dvec3& up) {
   return std::abs(glm::dot(direction, up)) >= 0.999 * glm::length(direction);
 }
@@ -34,7 +34,7 @@ double soft_limit(double value, double low, double high) {
   const double middle = 0.5 * (low + high);
   const double half = 0.5 * (high - low);
   if (half <= 0.0) return middle;
-  const double free = 0.8 * half;  // the rest is where motion slows down
+  const double free = 0.8 * half;  // motion slows down in the rest
   const double excess = std::abs(value - middle) - free;
   if (excess <= 0.0) return value;
   const double room = half - free;

@@ -9,8 +9,8 @@
 
 namespace catgs {
 
-/// What a scripted pose stream is built from. Deterministic for (script, seed, scene
-/// hints) on every machine.
+/// The parameters of a scripted pose stream. It is deterministic for (script, seed, scene hints) on
+/// every machine.
 struct ScriptOptions {
   std::string script;  // orbit | walk | head | drone | still | tour:FILE
   std::uint64_t seed = 1;

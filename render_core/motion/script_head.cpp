@@ -1,6 +1,6 @@
-// The `head` script: constants are fitted to recorded head motion of twelve people in 3DGS scenes
-// (EyeNavGS), whose angular speed has 8 deg/s at p10, 27 at the median, 66 at p90 and 138 at p99,
-// yaw twice as fast as pitch and roll, and whose head moves at 0.2 m/s at the median, 0.5 at p90.
+// The `head` script. Its constants are fitted to recorded head motion of twelve people in 3DGS
+// scenes (EyeNavGS). Their angular speed has 8 deg/s at p10, 27 at the median, 66 at p90 and 138 at
+// p99, yaw twice as fast as pitch and roll. Their heads move at 0.2 m/s at the median, 0.5 at p90.
 #include <algorithm>
 #include <numbers>
 
@@ -45,7 +45,7 @@ class Moves {
 
 /// Turns of the head to new points of interest, as (yaw, pitch, roll) offsets in radians.
 Moves make_turns(PortableRng& rng, double duration_s) {
-  constexpr double widest_yaw = 120.0 * degree;  // beyond it a person turns back
+  constexpr double widest_yaw = 120.0 * degree;  // people turn back before they turn farther
   Moves turns(glm::dvec3(0.0));
   while (turns.end_s() < duration_s) {
     const double u = rng.uniform(0.0, 1.0);
@@ -66,7 +66,7 @@ Moves make_steps(PortableRng& rng, double duration_s) {
   Moves steps(glm::dvec3(0.0));
   while (steps.end_s() < duration_s) {
     const glm::dvec3 to{reach_m * rng.uniform(-1.0, 1.0),
-                        0.12 * std::min(0.0, rng.normal()),  // people crouch, they do not fly
+                        0.12 * std::min(0.0, rng.normal()),  // people crouch but do not fly
                         reach_m * rng.uniform(-1.0, 1.0)};
     const double rest_s = rng.uniform(0.0, 2.5);
     const double speed_m_s = rng.uniform(0.25, 0.45);
@@ -83,7 +83,8 @@ PoseAt head_script(const SceneFrame& frame, std::uint64_t seed, double duration_
   const Moves steps = make_steps(rng, duration_s);
   const std::uint64_t noise_seed = rng.next();
   return [=](double time_s) {
-    // Two noises half a cell apart: one alone stands still at every lattice point.
+    // The sum of two noises half a cell apart, because a single one stands still at every lattice
+    // point.
     const auto noise = [&](std::uint32_t channel, double rate_hz) {
       const double x = time_s * rate_hz;
       return value_noise(noise_seed, 2 * channel, x) +

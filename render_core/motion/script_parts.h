@@ -13,11 +13,11 @@ namespace catgs {
 /// A script: the camera at a time in seconds, defined over the whole duration.
 using PoseAt = std::function<Pose(double time_s)>;
 
-/// Where a script plays: the scene's ground axes, scale and limits, in double precision.
+/// The place where a script plays: the scene's ground axes, scale and limits, in double precision.
 ///
 /// Ground axes are those of a level camera at the start pose: x right, y down (against the scene's
-/// up), z forward. `metre` is what a human-sized motion is multiplied by: a scene whose horizontal
-/// limits are narrower than four metres is taken for a miniature.
+/// up), z forward. Human-sized motion is multiplied by `metre`. A scene whose horizontal limits are
+/// narrower than four metres counts as a miniature.
 class SceneFrame {
  public:
   explicit SceneFrame(const SceneHints& hints);
@@ -34,12 +34,12 @@ class SceneFrame {
   [[nodiscard]] glm::dquat world_from_ground() const { return level_; }
   /// Start pose as it is, rotation included.
   [[nodiscard]] glm::dquat start_orientation() const { return start_orientation_; }
-  /// The start pose's view, its image made upright, then turned in radians: yaw about the scene's
-  /// up (to the right), then pitch (upwards), then roll (clockwise) in camera axes.
+  /// The start pose's view, with its image made upright and then turned, in radians: yaw about the
+  /// scene's up (to the right), then pitch (upwards), then roll (clockwise) in camera axes.
   [[nodiscard]] glm::dquat turned(const glm::dvec3& yaw_pitch_roll_rad) const;
 
-  /// Bends a position into the limits: untouched in the middle, ever slower towards a limit, which
-  /// is never reached. Continuous with its first derivative, so that motion stays smooth.
+  /// Bends a position into the limits: unchanged in the middle, ever slower towards a limit, which
+  /// is never reached. Its derivative is continuous, so that motion stays smooth.
   [[nodiscard]] glm::dvec3 inside(const glm::dvec3& position) const;
 
   /// Camera at `position` (bent into the limits) that looks along `view` with its image upright
@@ -59,8 +59,8 @@ class SceneFrame {
 /// Poses at `rate_hz` from time 0 over the duration. Throws InputError naming --duration or --fps.
 Trajectory sample(const PoseAt& pose_at, double duration_s, double rate_hz);
 
-/// A circle around the focus that begins at the start pose and always looks at the focus, turned by
-/// the angle of a time in radians (to the left as seen from above).
+/// A circle around the focus that begins at the start pose and always looks at the focus. At a time
+/// it has turned by `angle_rad` (to the left as seen from above).
 PoseAt circle(const SceneFrame& frame, const std::function<double(double time_s)>& angle_rad);
 
 /// A person looking around: turns of the head with fixations between, leaning, stepping.

@@ -123,12 +123,12 @@ PoseAt drone_script(const SceneFrame& frame, std::uint64_t seed, double duration
       wander(frame, {.speed_m_s = 3.0, .step_s = 0.8, .climb = 0.3}, rng, duration_s);
   return [=](double time_s) {
     constexpr double gravity_m_s2 = 9.81;
-    const SinCos<double> dive =
-        portable_sincos(-10.0 * degree);  // looks a little down on what it passes
+    const SinCos<double> dive = portable_sincos(-10.0 * degree);  // looks slightly down
     const SmoothPath::Sample sample = path.at(time_s);
     const double speed = glm::length(sample.velocity);
     const glm::dvec3 view = dive.cos * sample.velocity + dive.sin * speed * frame.up();
-    // Banked as an aircraft in a coordinated turn: its up is against what its passengers feel.
+    // Banked like an aircraft in a coordinated turn: its up is opposite to the force on its
+    // passengers.
     const glm::dvec3 up = gravity_m_s2 * frame.metre() * frame.up() + sample.acceleration;
     return frame.look_along(sample.position, view, up);
   };

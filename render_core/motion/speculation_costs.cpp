@@ -6,9 +6,9 @@ namespace catgs {
 namespace {
 
 constexpr int mean_over = 8;     // samples
-constexpr int few = 4;           // samples that say nothing yet
-constexpr double margin = 1.02;  // of costs that vary as much without a reason
-// Costs follow the scene in view: what an exact frame costs is asked again after so many frames.
+constexpr int few = 4;           // fewer samples say nothing yet
+constexpr double margin = 1.02;  // costs vary as much without a reason
+// Costs follow the scene in view, so an exact frame is measured again after this many frames.
 constexpr int exact_every = 128;
 
 }  // namespace
@@ -43,7 +43,7 @@ void SpeculationCosts::close_group() {
   if (grouped_.samples >= few && exact_.samples > 0 && grouped_.value > margin * exact_.value) {
     resting_ = rest_;
     rest_ = std::min(2 * rest_, most_rest);
-    grouped_ = {};  // of another view, when it is tried again
+    grouped_ = {};  // the next try is in another view
   } else if (since_exact_ >= exact_every || exact_.samples == 0) {
     resting_ = 1;
   } else if (grouped_.samples >= 2 * few) {

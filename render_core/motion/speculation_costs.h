@@ -4,17 +4,17 @@
 
 namespace catgs {
 
-/// Whether speculation pays, by what frames were measured to cost. A key frame with a window costs
-/// more than one without, and where a camera breaks its windows early (large motion, a low frame
-/// rate) the few sub-frames behind it do not bring that back. Then frames get no window for a
-/// while, longer each time that this holds. Needs no clock; not thread-safe.
+/// Decides from the measured cost of frames whether speculation pays. A key frame with a window
+/// costs more than one without. Where a camera breaks its windows early (large motion, a low frame
+/// rate), the few sub-frames after it do not make up for that. Frames then get no window for a
+/// while, and for longer each time that it happens. Needs no clock; not thread-safe.
 class SpeculationCosts {
  public:
-  /// After each frame of a View: what it was, and what it cost, in any unit.
+  /// Call after each frame of a View, with its kind and its cost in any unit.
   void note(FrameKind kind, int window, double cost);
-  /// Whether the next frame may begin a group, or go on with one.
+  /// Whether the next frame may begin a group, or continue one.
   [[nodiscard]] bool pays() const { return resting_ == 0; }
-  /// The next frame may be no sub-frame of the group so far.
+  /// Ends the group: the next frame will be a key frame.
   void forget() { group_ = {}; }
 
  private:
@@ -33,11 +33,11 @@ class SpeculationCosts {
 
   void close_group();
 
-  Mean exact_;    // of a frame without a window
-  Mean grouped_;  // of a frame of a group, key frame and sub-frames alike
+  Mean exact_;    // of frames without a window
+  Mean grouped_;  // of frames in groups, key frames and sub-frames alike
   Group group_;
   int resting_ = 0;        // frames
-  int rest_ = least_rest;  // of the next time that it does not pay
+  int rest_ = least_rest;  // length of the next rest
   int since_exact_ = 0;    // frames
 
   static constexpr int least_rest = 32, most_rest = 256;  // frames

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -14,18 +15,19 @@
 namespace catgs {
 namespace {
 
-// How far a camera may turn away from its key frame's axis. Gaussians follow a turn to first order
-// only, so that lists grow with its square; and tiles take up to 1 / least_weight^3 as many pixels.
+// How far a camera may turn away from its key frame's axis. Gaussians follow a turn only to first
+// order, so lists grow with its square; and tiles take up to 1 / least_weight^3 as many pixels.
 constexpr double most_turn_rad = 5.0 * glm::pi<double>() / 180.0;
 constexpr double least_weight = 0.91;
 
-// What lists allow a turn to differ from its forecast: at least this much, and more the faster the
-// camera turns.
+// A turn may differ from its forecast by this much and stay in the lists: at least the margin, and
+// more the faster the camera turns.
 constexpr double turn_margin_rad = 0.35 * glm::pi<double>() / 180.0;
 constexpr double turn_margin_share = 0.25;
 
-// A long lens sees the same margin as more pixels: lists go no farther beyond the picture than half
-// of it for the margin, and end where their grid would be larger than so many pictures.
+// A long lens sees the same margin as more pixels. For the margin, lists therefore extend beyond
+// the picture by at most half of it, and end where their grid would be larger than this many
+// pictures.
 constexpr double most_overscan = 0.5;
 constexpr double most_pictures = 3.0;
 
@@ -73,8 +75,7 @@ double distance_to_path(const glm::dvec3& from, const glm::dvec3& to, const glm:
   return glm::distance(point, from + share * path);
 }
 
-/// Calls visit(point of the key frame's plane) for what the corners of the picture from `pose`
-/// show.
+/// Calls visit(point of the key frame's plane) for the corners of the picture from `pose`.
 template <class Visit>
 void for_each_corner(const Camera& key, const Pose& pose, const Visit& visit) {
   const Homography<double> turn = image_turn(key, pose);
@@ -87,10 +88,12 @@ void for_each_corner(const Camera& key, const Pose& pose, const Visit& visit) {
 }  // namespace
 
 TileGrid image_grid(glm::ivec2 size_px) {
+  assert(size_px.x > 0 && size_px.y > 0);
   return {glm::ivec2(0), (size_px + (tile_size_px - 1)) / tile_size_px, size_px};
 }
 
 TileGrid covering_grid(const glm::dvec2& low, const glm::dvec2& high) {
+  assert(low.x <= high.x && low.y <= high.y);
   const auto side = static_cast<double>(tile_size_px);
   const glm::ivec2 first(glm::floor(low / side)), end(glm::ceil(high / side));
   return {first * tile_size_px, end - first, (end - first) * tile_size_px};
@@ -128,6 +131,7 @@ glm::ivec2 image_shift_px(const Camera& key, const Pose& pose) {
 double most_tau(const Camera& key) { return 0.1 * key.near_z; }
 
 GuardSet make_guard_set(const Camera& key, const Pose& end, double tau) {
+  assert(tau >= 0.0 && tau <= most_tau(key));
   const Pose& start = key.world_from_camera;
   const double rotation = rotation_rad(start, end);
   const double margin = turn_margin_rad + turn_margin_share * rotation;
@@ -147,10 +151,10 @@ GuardSet make_guard_set(const Camera& key, const Pose& end, double tau) {
     });
   }
   const glm::dvec2 size(key.size_px);
-  // Of a picture of few pixels, a tile more is not much.
+  // In a picture of few pixels, another tile costs little.
   constexpr double some_tiles = 4.0 * tile_size_px;
   if (glm::any(glm::greaterThan(high - low, most_pictures * size + some_tiles))) return guard;
-  // A turn by a moves what is seen at the slope s by f (1 + s^2) a.
+  // A turn by a moves a point at the slope s by f (1 + s^2) a.
   const auto reach = [&](const glm::dvec2& edge) {
     const glm::dvec2 slope = slope_of(key, edge);
     return glm::min(margin * glm::dvec2(key.focal_px) * (1.0 + slope * slope),
@@ -180,19 +184,19 @@ ListGrowth<double> list_growth(const Camera& key, const GuardSet& guard) {
   const double weight = weight_after(guard.max_turn_rad, slope);
   // H(p + d) = H(p) + DH d / (1 + e) with e = grad w . d / w and |grad w| <= sin(turn) / f.
   const double curvature = sine / (std::min(key.focal_px.x, key.focal_px.y) * weight * weight);
-  // Depths are those from the path: a camera that is tau nearer sees them at tau less.
+  // Depths are those from the path. A camera that is tau nearer sees them reduced by tau.
   const double parallax = std::max(key.focal_px.x, key.focal_px.y) * guard.tau /
                           (1.0 - guard.tau / guarded_near_z(key, guard));
-  // A splat that is all low-pass filter does not follow the image's scale, which a turn changes by
-  // 1 / weight^2 at most.
+  // A splat that consists of low-pass filter alone does not follow the image's scale, which a turn
+  // changes by at most 1 / weight^2.
   const double low_pass_radius =
-      std::sqrt(low_pass_px2 * -2.0 * std::log(alpha_min));  // of an opaque one
+      std::sqrt(low_pass_px2 * -2.0 * std::log(alpha_min));  // of an opaque splat
   const double low_pass = low_pass_radius * (1.0 / (weight * weight) - 1.0);
-  // Tiles are closed squares: a turn brings pixel centres anywhere in them.
+  // Tiles are closed squares, and a turn brings pixel centres anywhere in them.
   const double constant = 0.5 + low_pass;
-  // Slopes that stay inside the linearisation's limits (fov_clamp) after any turn. Of all others
-  // the projection may be linearised at another slope than a turn of the picture takes it to, and a
-  // Gaussian's outline changes by the difference times its depth, which is a radius at most.
+  // Slopes that stay inside the linearisation's limits (fov_clamp) after any turn. At all others
+  // the projection may be linearised at another slope than the turn of the picture leads to. A
+  // Gaussian's outline then changes by the difference times its depth, which is at most a radius.
   const glm::dvec2 size(key.size_px);
   const glm::dvec2 margin = 0.5 * (fov_clamp - 1.0) * size / glm::dvec2(key.focal_px);
   const glm::dvec2 low = slope_of(key, glm::dvec2(0.0)) - margin;

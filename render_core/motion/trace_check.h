@@ -13,8 +13,8 @@
 
 namespace catgs {
 
-/// Whether a trace is fit to measure with: a camera that looks away from the scene, or has left it,
-/// renders fast and well.
+/// Whether a trace is fit for measurements. A camera that looks away from the scene, or has left
+/// it, renders fast and well.
 struct TraceCheck {
   static constexpr double wanted_frames = 0.95;  // share of the frames that see enough
   static constexpr double enough_in_view = 0.1;  // of the trace's largest in-view count
@@ -27,11 +27,11 @@ struct TraceCheck {
   std::optional<std::size_t> first_outside;
 
   [[nodiscard]] bool valid() const { return seeing_frames >= wanted_frames && outside_frames == 0; }
-  /// What is wrong, with both values; empty for a valid trace.
+  /// Names the fault, with both values; empty for a valid trace.
   [[nodiscard]] std::string complaint() const;
 };
 
-/// `means` are the centres of the scene's Gaussians; in view are those deeper than the near plane
+/// `means` are the centres of the scene's Gaussians. In view are those deeper than the near plane
 /// that project into the image of `lens` (its pose is not used). Judged by an even sample of at
 /// most 2^17 of them. `bounds`: robust_bounds() of the scene.
 TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,

@@ -8,7 +8,7 @@
 
 namespace catgs {
 
-/// A pose with the time at which the camera was there.
+/// A pose and the time at which the camera was there.
 struct TimedPose {
   std::int64_t time_us = 0;
   Pose world_from_camera;
@@ -17,13 +17,13 @@ struct TimedPose {
 /// Poses in strictly increasing time order.
 using Trajectory = std::vector<TimedPose>;
 
-/// Reads a TUM file: `timestamp_s tx ty tz qx qy qz qw` a line, '#' starts a comment. Quaternions
-/// are normalised; throws InputError with the line of a mistake.
+/// Reads a TUM file: `timestamp_s tx ty tz qx qy qz qw` on each line, '#' starts a comment.
+/// Quaternions are normalised. Throws InputError with the line of a mistake.
 Trajectory read_tum(const std::filesystem::path& path);
 void write_tum(const std::filesystem::path& path, const Trajectory& trajectory);
 
-/// Pose at `time_us`: linear in position, slerp in orientation, clamped to the ends. This looks at
-/// the sample after `time_us`, so it serves display and resampling, never a forecast.
+/// Pose at `time_us`: linear in position, slerp in orientation, clamped to the ends. It uses the
+/// sample after `time_us`, so it serves display and resampling, never a forecast.
 Pose interpolate(const Trajectory& trajectory, std::int64_t time_us);
 
 /// The trajectory sampled at `rate_hz` from its first to its last pose, by interpolate().

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <chrono>
 #include <cmath>
 #include <random>
@@ -205,10 +206,12 @@ std::vector<glm::dvec3> render_reference_pixels(const GaussianCloud& cloud,
                                                 const FrameRequest& request,
                                                 std::span<const glm::ivec2> pixels,
                                                 ThreadPool& pool) {
+  assert(check_request(request, PixelFormat::rgb_f32).ok());
   return render_pixels(cloud, request, pixels, pool).colours;
 }
 
 std::vector<glm::ivec2> random_pixels(glm::ivec2 size_px, std::size_t count, std::uint64_t seed) {
+  assert(size_px.x > 0 && size_px.y > 0);
   // Selection sampling (Knuth, TAOCP 3.4.2, algorithm S).
   std::mt19937_64 random(seed);
   std::vector<glm::ivec2> pixels;

@@ -23,7 +23,7 @@ std::vector<glm::dvec3> render_reference_pixels(const GaussianCloud& cloud,
 /// image has no more.
 std::vector<glm::ivec2> random_pixels(glm::ivec2 size_px, std::size_t count, std::uint64_t seed);
 
-/// The oracle as a Renderer. It has one pipeline, whatever a View asks for.
+/// The oracle as a Renderer. It has one pipeline and ignores the one that a View asks for.
 std::unique_ptr<Renderer> make_reference_renderer(std::shared_ptr<const GaussianCloud> cloud,
                                                   std::shared_ptr<ThreadPool> pool);
 

@@ -39,12 +39,12 @@ inline unsigned char to_byte(float value) {
   return static_cast<unsigned char>(std::lround(std::clamp(value, 0.0f, 255.0f)));
 }
 
-/// SH coefficient of a colour component in [0, 1], as far as the constant term goes.
+/// SH coefficient of a colour component in [0, 1], constant term only.
 inline float sh_from_colour(float colour) { return (colour - 0.5f) / sh_c0; }
 inline float colour_from_sh(float sh) { return 0.5f + sh_c0 * sh; }
 
-/// Unit quaternion. Those that are one up to rounding stay bit for bit; zero and non-finite ones
-/// are returned as they are, for `sanitize` to judge.
+/// Unit quaternion. A quaternion that is unit up to rounding stays bit for bit; zero and non-finite
+/// ones are returned unchanged, for `sanitize` to judge.
 inline glm::quat unit(const glm::quat& q) {
   const float squared = glm::dot(q, q);
   if (std::abs(squared - 1.0f) < 1e-6f || !(squared > 0.0f) || !std::isfinite(squared)) return q;

@@ -1,6 +1,7 @@
 #include "render_core/scene/clusters.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include <glm/common.hpp>
@@ -60,6 +61,7 @@ void ClusterBounds::add(const glm::vec3& mean, double sigma, float log2_opacity)
 }
 
 Cluster ClusterBounds::cluster() const {
+  assert(low_.x <= high_.x);
   const glm::vec3 centre = 0.5f * (low_ + high_);
   // Rounded outwards.
   const glm::vec3 half = glm::max(high_ - centre, centre - low_) * (1.0f + 1e-6f);

@@ -24,8 +24,8 @@ constexpr std::size_t clusters_of(std::size_t gaussians) {
   return (gaussians + cluster_size - 1) / cluster_size;
 }
 
-/// Indices of places along a Morton curve; equal codes keep their order. Of a cloud's means,
-/// cluster c is a run of them, from c * cluster_size on.
+/// Indices of places along a Morton curve; equal codes keep their order. Applied to a cloud's
+/// means, cluster c is the run of indices that starts at c * cluster_size.
 std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> places, ThreadPool& pool);
 
 /// Bounds of a cluster for culling.
@@ -36,8 +36,8 @@ struct Cluster {
   float reach;
 };
 
-/// Collects the bounds of a cluster. They hold for the values that are added: those that a core
-/// draws, as it has rounded them.
+/// Collects the bounds of a cluster. They hold for the values that are added, so a core adds the
+/// values that it draws, after rounding.
 class ClusterBounds {
  public:
   /// `sigma`: no less than the Gaussian's largest standard deviation, world units.
@@ -50,13 +50,14 @@ class ClusterBounds {
   double reach_ = 0.0;
 };
 
-/// Half-spaces in the world: a cluster lies outside when none of its Gaussians can reach a pixel.
+/// Half-spaces of the world. A cluster is outside when none of its Gaussians can reach a pixel.
 class ClusterCuller {
  public:
   explicit ClusterCuller(const Camera& camera);
   [[nodiscard]] CATGS_HD bool outside(const Cluster& cluster) const { return beyond(cluster) != 0; }
 
-  /// Half-spaces (a bit each, in the same order for all cameras) that the cluster lies outside of.
+  /// The half-spaces that the cluster lies outside of, a bit each, in the same order for all
+  /// cameras.
   [[nodiscard]] CATGS_HD unsigned beyond(const Cluster& cluster) const {
     unsigned beyond = 0;
     for (int i = 0; i < count; ++i) {
@@ -77,21 +78,21 @@ class ClusterCuller {
   struct HalfSpace {
     glm::vec3 normal;  // towards the image
     float offset;
-    float reach_factor;  // how far a Gaussian's reach, in world units, carries it inwards
+    float reach_factor;  // inward shift of the half-space per world unit of a Gaussian's reach
   };
   HalfSpace half_spaces_[count];
 };
 
-/// Whether a cluster is outside all the way from one camera to another: what is outside of the same
-/// half-space at both ends of a straight path through camera space is so on it.
+/// Whether a cluster is outside all the way from one camera to another. A straight path through
+/// camera space that has both ends outside of one half-space lies outside of it.
 CATGS_HD inline bool outside_on_the_way(const ClusterCuller& now, const ClusterCuller& end,
                                         const Cluster& cluster) {
   const unsigned beyond = now.beyond(cluster);
   return beyond != 0 && (beyond & end.beyond(cluster)) != 0;
 }
 
-/// Whether colours that were shaded for a camera at `shaded_from` are good for one at `position`:
-/// the direction to no Gaussian of the cluster has turned by more than colour_reuse_rad.
+/// Whether colours shaded for a camera at `shaded_from` are accurate for one at `position`: no
+/// direction to a Gaussian of the cluster has turned by more than colour_reuse_rad.
 CATGS_HD inline bool colours_hold(const Cluster& cluster, const glm::vec3& shaded_from,
                                   const glm::vec3& position) {
   const auto squared = [](float x, float y, float z) { return x * x + y * y + z * z; };

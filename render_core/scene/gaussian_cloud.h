@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <vector>
 
@@ -32,6 +33,10 @@ struct GaussianCloud {
 
   [[nodiscard]] std::size_t size() const { return mean.size(); }
   [[nodiscard]] bool empty() const { return mean.empty(); }
+  [[nodiscard]] bool sizes_agree() const {
+    return rotation.size() == size() && scale.size() == size() && opacity.size() == size() &&
+           sh.size() == size() * sh_count();
+  }
   [[nodiscard]] int sh_count() const { return sh_coefficient_count(sh_degree); }
   [[nodiscard]] const glm::vec3* sh_of(std::size_t i) const { return sh.data() + i * sh_count(); }
 
@@ -44,6 +49,7 @@ struct GaussianCloud {
 
   /// Sets the size of every array; new entries are value-initialised.
   void resize(std::size_t count, int degree) {
+    assert(degree >= 0 && degree <= max_sh_degree);
     sh_degree = degree;
     mean.resize(count);
     rotation.resize(count);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cstddef>
 
 #include "render_core/scene/gaussian_cloud.h"
@@ -11,6 +12,7 @@ namespace catgs {
 /// the vectors' allocations.
 template <class Keep>
 void keep_if(GaussianCloud& cloud, const Keep& keep) {
+  assert(cloud.sizes_agree());
   const std::size_t sh_count = cloud.sh_count();
   std::size_t kept = 0;
   for (std::size_t i = 0; i < cloud.size(); ++i) {

@@ -1,6 +1,7 @@
 #include "render_core/scene/prune.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -11,6 +12,7 @@
 namespace catgs {
 
 void keep_most_important(GaussianCloud& cloud, double fraction) {
+  assert(fraction > 0.0 && fraction <= 1.0);
   const auto kept = static_cast<std::size_t>(
       std::ceil(std::clamp(fraction, 0.0, 1.0) * static_cast<double>(cloud.size())));
   if (kept >= cloud.size()) return;

@@ -11,7 +11,7 @@
 
 namespace catgs {
 
-/// What was wrong with the Gaussians of a file and what was done about it (see sanitize.h).
+/// The faults found among the Gaussians of a file, and how they were treated (see sanitize.h).
 struct SanitizeReport {
   std::size_t read = 0;      // Gaussians in the file
   std::size_t dropped = 0;   // removed; the sum of the next three
@@ -31,14 +31,14 @@ struct Bounds {
   glm::vec3 max{0.0f};
 };
 
-/// How to look at a scene the first time: from a sidecar, from the training's
-/// cameras.json, or estimated from the Gaussians.
+/// Hints for the first view of a scene: from a sidecar, from the training's cameras.json, or
+/// estimated from the Gaussians.
 struct SceneHints {
   glm::vec3 up{0.0f, -1.0f, 0.0f};  // unit, world axes; y points down in 3DGS captures
   Pose start_pose;                  // world_from_camera
   float near_z = 0.2f;              // world units
   Bounds limits;                    // where the camera may go, world axes
-  glm::vec3 focus{0.0f};            // what orbiting turns around
+  glm::vec3 focus{0.0f};            // the point that orbiting turns around
   std::string source;               // "sidecar scene.json", "cameras.json", "estimated"
 };
 
@@ -49,7 +49,7 @@ struct Scene {
   GaussianCloud cloud;
   SceneHints hints;
   SanitizeReport report;
-  std::vector<std::string> notes;  // for people: what was found beside the scene but not used
+  std::vector<std::string> notes;  // for people: files found beside the scene but not used
 };
 
 }  // namespace catgs

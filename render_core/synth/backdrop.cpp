@@ -9,12 +9,13 @@
 namespace catgs::synth {
 namespace {
 
-/// Share of haze in front of something this far from the centre of a place of that radius.
+/// Share of haze in front of a place, by its distance from the centre and the radius of the scene.
 float haze_at(float distance, float radius) {
   return 0.93f * (1.0f - exp_exact(-distance / (1.6f * radius)));
 }
 
-/// Discs that cover the sky down to a little below the horizon, denser there, where one looks.
+/// Discs that cover the sky down to a little below the horizon, where they are densest because
+/// people look there.
 void paint_shell(Painter& painter, const glm::vec2& centre, float radius, double weight,
                  float overlap, std::uint64_t key) {
   const std::size_t count = painter.take(weight);
@@ -23,7 +24,7 @@ void paint_shell(Painter& painter, const glm::vec2& centre, float radius, double
   constexpr float lowest = -0.06f;
   constexpr float area = 6.2832f * (1.0f - lowest);  // steradians
   for (std::size_t i = 0; i < count; ++i) {
-    // Heights follow t^1.5: against an even spread that is 1 / (1.5 sqrt(t)) as dense.
+    // Heights follow t^1.5. Compared with an even spread, that is 1 / (1.5 sqrt(t)) as dense.
     const float t = (static_cast<float>(i) + 0.5f) / n;
     const float root = std::sqrt(t);
     const float height = lowest + (1.0f - lowest) * t * root;
@@ -47,7 +48,7 @@ void paint_sky(Painter& painter, const glm::vec2& centre, float radius, double w
                std::uint64_t key) {
   painter.divide(painter.take(weight), [&](Painter& p) {
     paint_shell(p, centre, radius, 0.94, 0.66f, child(key, 1));
-    // Few and wide behind them, so that nothing black shows between.
+    // A few wide discs behind them, so that no gap is black.
     paint_shell(p, centre, 1.06f * radius, 0.06, 0.9f, child(key, 2));
   });
 }
@@ -59,7 +60,7 @@ void paint_horizon(Painter& painter, const glm::vec2& centre, float inner, float
     Random random(key);
     const std::size_t land = p.take(0.7);
     // Radii grow exponentially with t^2: fine where the land meets the place itself, so that no
-    // disc reaches over what stands there, and wider with the distance.
+    // disc covers what stands there, and wider with the distance.
     const float growth = outer > 4.0f * inner ? 3.7f : 2.3f;
     for (std::size_t i = 0; i < land; ++i) {
       const float t = (static_cast<float>(i) + 0.5f) / static_cast<float>(land);

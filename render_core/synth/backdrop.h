@@ -18,7 +18,8 @@ void paint_horizon(Painter& painter, const glm::vec2& centre, float inner, float
 void paint_skyline(Painter& painter, const glm::vec2& centre, float inner, float outer,
                    double weight, std::uint64_t key);
 
-/// What a training leaves in empty air: faint, soft Gaussians. Here they pass for motes and haze.
+/// Faint, soft Gaussians like those that training leaves in empty air. Here they look like dust and
+/// haze.
 void paint_floaters(Painter& painter, const glm::vec3& min, const glm::vec3& max, double weight,
                     std::uint64_t key);
 

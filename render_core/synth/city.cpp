@@ -16,8 +16,9 @@
 namespace catgs::synth {
 namespace {
 
-// Weights are Gaussians at full density, which a city has from this size on: a larger one spreads
-// further and keeps the same Gaussians in its middle; a smaller one is both smaller and coarser.
+// Weights are numbers of Gaussians at full density. A city of at least this size has full density:
+// a larger one extends farther and keeps the same Gaussians in its middle. A smaller one is both
+// smaller and coarser.
 constexpr std::size_t full_density_count = 1'000'000;
 
 /// Gaussians of the sky, the hills and the skyline: a few thousand show them, more sharpen them.
@@ -29,7 +30,7 @@ std::size_t backdrop_count(std::size_t count) {
 struct Cell {
   int column;
   int row;
-  float distance;  // of its middle from the city's centre
+  float distance;  // from its middle to the city's centre
   double weight;
 };
 
@@ -64,8 +65,8 @@ double measure_cell(std::uint64_t seed, const Light& light, int column, int row)
   return painter.measured();
 }
 
-/// Cells from the centre outwards until their weights reach `target`; at least those around the
-/// first crossings, whatever their density.
+/// Cells from the centre outwards until their weights reach `target`. Always includes those around
+/// the first crossings.
 std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double target,
                                ThreadPool& pool) {
   std::vector<Cell> chosen;
@@ -106,7 +107,7 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   const std::size_t reference = std::min(count, full_density_count);
   const std::size_t backdrop = backdrop_count(count);
   const std::size_t in_cells = count - backdrop;
-  // Below full density the area shrinks with the count to the power 3/4, the density by the rest.
+  // Below full density, the area shrinks with the count to the power 3/4, the density by the rest.
   const double fill = std::sqrt(std::sqrt(static_cast<double>(reference) / full_density_count));
   const double target = static_cast<double>(in_cells) / fill;
   const std::vector<Cell> cells = choose_cells(seed, light, target, pool);
@@ -131,7 +132,7 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
         const glm::vec2 centre = city_centre;
         const float sky = std::max(900.0f, 4.0f * radius);
         paint_sky(p, centre, sky, 0.55, child(seed, 2));
-        // From within the outermost cells: their ring has gaps.
+        // Begins within the outermost cells, whose ring has gaps.
         paint_horizon(p, centre, std::max(0.55f * radius, radius - 1.2f * block_pitch_m), sky,
                       {0.22f, 0.21f, 0.17f}, 0.18, child(seed, 3));
         paint_skyline(p, centre, radius + 40.0f, 2.2f * radius + 150.0f, 0.27, child(seed, 4));

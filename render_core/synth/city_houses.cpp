@@ -78,9 +78,9 @@ void paint_frame(Painter& p, const Wall& wall, float x0, float x1, float y0, flo
              child(key, 6));
 }
 
-/// Wall around one window, its glass, and as much joinery as the budget of `budget` Gaussians
-/// allows. The pieces tile the bay: one lying on another would be hidden by it from the side, where
-/// whichever centre is nearer comes first.
+/// Wall around one window, its glass, and as much joinery as a budget of `budget` Gaussians allows.
+/// The pieces tile the bay without overlap. Where two overlapped, the one with the nearer centre
+/// would hide the other in a view from the side.
 void paint_bay(Painter& p, const Wall& wall, const Bay& bay, float budget, std::uint64_t key) {
   Random random(key);
   const bool framed = budget >= 12.0f;
@@ -112,7 +112,7 @@ void paint_bay(Painter& p, const Wall& wall, const Bay& bay, float budget, std::
   if (framed) paint_frame(p, wall, x0, x1, y0, y1, budget >= 17.0f, child(key, 8));
 }
 
-/// A storey as a band of glass and a band of wall: from far away that is what remains of it.
+/// A storey as a band of glass and a band of wall, as it looks from far away.
 void paint_coarse_storey(Painter& p, const Wall& wall, float floor, float height,
                          std::uint64_t key) {
   Finish plaster = wall.finish(wall.palette.wall, floor);
@@ -169,7 +169,7 @@ void paint_shops(Painter& p, const Wall& wall) {
     const float a = static_cast<float>(i) * width;
     const float front = height - 1.2f;
     paint_patch(p, wall.patch(a, 0, 0.5f, height - 0.55f, 0.05f), stone, 2.2, child(key, 1));
-    // What is on display below, the lit room above it.
+    // Goods on display below, the lit room above.
     const float glow = random.chance(0.75f) ? random.uniform(0.25f, 0.7f) : 0.05f;
     Finish glass = pane_finish(wall, random, 0.0f, 0.0f);
     glass.mottle = 0.5f;
@@ -290,7 +290,7 @@ void paint_building(Painter& painter, const Building& b, float detail, float haz
          at(b.base.max.x + 1, 0, b.base.max.y + 1)});
   }
   const float x0 = b.base.min.x, x1 = b.base.max.x, z0 = b.base.min.y, z1 = b.base.max.y;
-  // Along runs so that cross(along, up) faces out.
+  // Wall directions, such that cross(along, up) points outwards.
   const std::array<std::array<glm::vec3, 4>, 4> walls = {
       {{at(x0, 0, z1), {0, 0, -1}, {-1, 0, 0}, {}},
        {at(x1, 0, z0), {0, 0, 1}, {1, 0, 0}, {}},

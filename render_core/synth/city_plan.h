@@ -10,7 +10,7 @@
 
 namespace catgs::synth {
 
-// The city is an endless plan: a grid of blocks between streets, each block a pure function of
+// The city is an endless plan: a grid of blocks between streets. Each block is a pure function of
 // (seed, column, row). City coordinates are metres: x and z on the ground, heights upward.
 
 struct Rect {
@@ -36,7 +36,7 @@ struct Building {
   Roof roof;
   Style style;
   std::array<SideUse, 4> sides;
-  std::array<float, 4> neighbour_eaves;  // what hides the lower part of a party wall
+  std::array<float, 4> neighbour_eaves;  // height that hides the lower part of a party wall
   [[nodiscard]] float eaves() const {
     return ground_height + static_cast<float>(floors) * floor_height;
   }
@@ -84,22 +84,22 @@ inline constexpr float pond_share = 0.42f;     // of half a park's width
 inline constexpr glm::vec2 city_centre(-6.0f, 44.0f);
 inline constexpr glm::vec2 start_place(2.0f, -16.0f);  // of the first view
 
-/// Density of Gaussians here against that of the stretch of the avenue where a visit starts. It
-/// falls like the pixels that a square metre covers from there, down to a floor that still shows
+/// Density of Gaussians here relative to the part of the avenue where a visit starts. It follows
+/// the number of pixels that a square metre covers from there, down to a minimum that still shows
 /// windows.
 float detail_at(const glm::vec2& place);
 
-/// From building line to building line of the street at x = 84 column (or z = 84 row).
+/// Distance between the building lines of the street at x = 84 column (or z = 84 row).
 float street_width_x(int column);
 float street_width_z(int row);
-/// Of the pavement on either side of it.
+/// Width of the pavement on either side of it.
 float pavement_width(float street_width);
 
 /// The block between streets (column, row) and (column + 1, row + 1), with the trees, cars and
 /// lamps of the streets to its west and south.
 Block plan_block(std::uint64_t seed, int column, int row);
 
-/// What of a block throws shadows.
+/// Adds the objects of a block that cast shadows.
 void add_shadows(const Block& block, Shadows& shadows);
 
 }  // namespace catgs::synth

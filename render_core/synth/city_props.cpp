@@ -44,8 +44,8 @@ void paint_car(Painter& painter, const Car& car, float detail, float haze) {
                        .sky_visibility = 0.7f,
                        .haze = haze};
     const Finish tyre{.albedo = glm::vec3(0.02f), .sky_visibility = 0.3f, .haze = haze};
-    const float length = random.uniform(1.95f, 2.25f);  // half of it
-    // The shadow under it, which no box can throw.
+    const float length = random.uniform(1.95f, 2.25f);  // half of the length
+    // The shadow under the car, which no box can cast.
     Finish dark{
         .albedo = glm::vec3(0.03f), .sky_visibility = 0.25f, .haze = haze, .opacity = 0.85f};
     const glm::vec3 corner = point(-length, 0.03f, -0.85f);

@@ -38,15 +38,15 @@ struct Wall {
   }
 };
 
-/// What one sees in a window at this height: its glass, and a room that may be lit.
+/// The view into a window at this height: its glass, and a room that may be lit.
 Finish pane_finish(const Wall& wall, Random& random, float height, float lit_chance);
 
-/// Slopes on the open sides, gables on party walls, a flat top where the slopes leave one, and what
-/// stands on it.
+/// Slopes on the open sides, gables on party walls, a flat top where the slopes leave one, and the
+/// objects on it.
 void paint_roof(Painter& painter, const Building& building, const Palette& palette, float detail,
                 float haze);
 
-/// Windows that stand out of the steep part of a mansard roof, above one wall.
+/// Windows that project from the steep part of a mansard roof, above one wall.
 void paint_dormers(Painter& painter, const Wall& wall, float detail);
 
 }  // namespace catgs::synth

@@ -1,14 +1,15 @@
 #pragma once
 
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 
 #include "render_core/base/portable.h"
 
-// Functions whose every bit is the same on every machine: they use only the operations that IEEE
-// 754 rounds exactly (+ - * / sqrt floor). The C library's sin, exp and pow differ in the last bit
-// between versions and processors, and a scene is pinned by its hash. The library is compiled with
+// Functions with the same bits on every machine. They use only the operations that IEEE 754 rounds
+// exactly (+ - * / sqrt floor). The C library's sin, exp and pow differ in the last bit between
+// versions and processors, and a scene is identified by its hash. The library is compiled with
 // -ffp-contract=off for the same reason.
 namespace catgs::synth {
 
@@ -25,8 +26,9 @@ inline SinCos sin_cos_turns(float turns) {
   return add_quarters<float>({s, c}, static_cast<std::int64_t>(quarters));
 }
 
-/// e^x for |x| < 80, relative error below 1e-6.
+/// e^x for |x| <= 80, relative error below 8e-6.
 inline float exp_exact(float x) {
+  assert(x >= -80.0f && x <= 80.0f);
   const float y = x * 1.44269504f;
   const float whole = std::floor(y + 0.5f);
   const float f = (y - whole) * 0.69314718f;  // |f| <= ln(2) / 2: six Taylor terms suffice
@@ -40,7 +42,7 @@ inline float exp_exact(float x) {
 
 inline float clamp01(float x) { return x < 0.0f ? 0.0f : (x > 1.0f ? 1.0f : x); }
 
-/// 0 below `low`, 1 above `high`, a cubic between; `low` > `high` turns it round.
+/// 0 below `low`, 1 above `high`, a cubic between; `low` > `high` reverses it.
 inline float smooth_step(float low, float high, float x) {
   const float t = clamp01((x - low) / (high - low));
   return t * t * (3.0f - 2.0f * t);

@@ -48,7 +48,7 @@ Splat leaf_like(const Light& light, const Sun& sun, const glm::vec3& middle, con
           .lobe_gain = 0.35f + 0.65f * sun.visibility};
 }
 
-/// Petals around a heart; `axis` is where the blossom looks.
+/// Petals around a heart; the blossom faces `axis`.
 void paint_blossom(Painter& p, const Kind& kind, const Sun& sun, const glm::vec3& centre,
                    const glm::vec3& axis, std::size_t count, Random& random) {
   const Light& light = p.light();

@@ -22,7 +22,7 @@ constexpr double backdrop_share = 0.16;
 /// Middle of the path at this z.
 float path_x(float z) { return 0.55f * sin_cos_turns(z * 0.11f).sin; }
 
-/// Density against that at the table.
+/// Density relative to that at the table.
 float garden_detail(const glm::vec2& place) {
   return glm::max(0.12f, 1.0f / (1.0f + glm::dot(place, place) / 6.0f));
 }
@@ -32,7 +32,7 @@ bool in_bed(float x, float z) {
   return from_path > path_half_width + 0.08f && from_path < 1.75f && glm::abs(z) > 0.9f;
 }
 
-/// A square of ground: slabs, soil or grass, each with what grows on it.
+/// A square of ground: slabs, soil or grass, each with its plants.
 void paint_plot(Painter& p, const glm::vec2& corner, float size, std::uint64_t key) {
   const glm::vec2 middle = corner + 0.5f * size;
   const double area = static_cast<double>(size) * size * garden_detail(middle);
@@ -143,7 +143,8 @@ Scene make_garden(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   const auto corner_of = [&](std::size_t plot) {
     return glm::vec2(-half_m) + size * glm::vec2(plot % plots, plot / plots);
   };
-  // Everything is measured and shared out at once, then the plots are painted side by side.
+  // All plots are measured first, so that Gaussians can be shared out; then they are painted in
+  // parallel.
   constexpr std::size_t ground_parts = plots * plots;
   std::vector<double> sums = {0.0};
   for (std::size_t i = 0; i < ground_parts; ++i) {

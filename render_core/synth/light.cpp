@@ -53,7 +53,7 @@ void solve(std::array<std::array<double, 16>, 16>& a, std::array<std::array<doub
 }
 
 /// Least-squares fit of `response(view)` over the directions from which the surface is seen. The
-/// other half weighs a little, towards zero, which keeps the fit tame beyond the horizon.
+/// other half sphere has a small weight, towards zero, which keeps the fit tame beyond the horizon.
 template <typename Response>
 Lobe fit_lobe(const glm::vec3& normal, bool two_sided, const Response& response) {
   constexpr int samples = 600;
@@ -152,7 +152,7 @@ glm::vec3 Light::sky(const glm::vec3& d) const {
   return blend(colour, blend(shade_colour, lit_colour, lit), 0.9f * cover);
 }
 
-/// What a mirror in a street shows: sky above, walls at eye level, paving below.
+/// The reflection in a mirror in a street: sky above, walls at eye level, paving below.
 glm::vec3 Light::mirrored(const glm::vec3& d) const {
   const glm::vec3 walls = blend(glm::vec3(0.34f, 0.29f, 0.27f), glm::vec3(0.62f, 0.46f, 0.33f),
                                 clamp01(0.5f - 0.5f * (d.x * to_sun_.x + d.z * to_sun_.z)));

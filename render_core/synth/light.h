@@ -11,7 +11,7 @@
 
 namespace catgs::synth {
 
-/// What a surface does to light besides scattering it evenly.
+/// How a surface reflects light besides scattering it evenly.
 enum class Gloss {
   matte,    // a trace of sheen at grazing angles: plaster, stone
   glass,    // mirrors the sky, more at grazing angles
@@ -23,19 +23,19 @@ enum class Gloss {
 inline constexpr int gloss_count = 6;
 
 /// The view-dependent part of a colour: spherical-harmonics coefficients of degree 0…3, in the
-/// order and with the signs of the original 3DGS, to be added to a Gaussian's own.
+/// order and with the signs of the original 3DGS. They are added to those of the Gaussian.
 using Lobe = std::array<glm::vec3, 16>;
 
-/// A low sun, a sky around it, and how they make a colour. Radiances are linear; what `shade` and
-/// `sky` return is display-referred, in [0, 1]. World axes, y down.
+/// A low sun, a sky around it, and the colours that they make. Radiances are linear; `shade` and
+/// `sky` return display-referred values in [0, 1]. World axes, y down.
 class Light {
  public:
   Light(const glm::vec3& to_sun, std::uint64_t key);
 
   [[nodiscard]] const glm::vec3& to_sun() const { return to_sun_; }
 
-  /// Display colour of a matte surface with this linear albedo. Visibilities in [0, 1] say how much
-  /// of the sun and of the sky it sees; `glow` is linear light of its own.
+  /// Display colour of a matte surface with this linear albedo. The visibilities in [0, 1] say how
+  /// much of the sun and of the sky it sees; `glow` is linear light that it emits.
   [[nodiscard]] glm::vec3 shade(const glm::vec3& albedo, const glm::vec3& normal,
                                 float sun_visibility, float sky_visibility,
                                 const glm::vec3& glow = glm::vec3(0.0f)) const;
@@ -60,7 +60,7 @@ class Light {
   std::array<std::array<Lobe, 6>, gloss_count> lobes_;
 };
 
-/// Linear radiance to what a display shows: a filmic curve, then gamma 2.
+/// Maps linear radiance to display values: a filmic curve, then gamma 2.
 glm::vec3 to_display(const glm::vec3& linear);
 
 }  // namespace catgs::synth

@@ -1,5 +1,7 @@
 #include "render_core/synth/painter.h"
 
+#include <cassert>
+
 #include <glm/geometric.hpp>
 
 namespace catgs::synth {
@@ -37,10 +39,11 @@ glm::quat random_rotation(Random& random) {  // Shoemake 1992, "Uniform random r
 }
 
 std::size_t Painter::take(double weight) {
+  assert(weight >= 0.0);
   share_.sum += weight;
   if (measuring()) return 0;
-  // Measuring and painting add the same numbers in the same order, so the last piece sees
-  // sum == total to the bit and gets all that is left.
+  // Measuring and painting add the same numbers in the same order. For the last piece sum equals
+  // total to the bit, so it gets all that is left.
   const std::size_t target = share_.sum >= share_.total
                                  ? share_.count
                                  : static_cast<std::size_t>(static_cast<double>(share_.count) *
@@ -53,6 +56,7 @@ std::size_t Painter::take(double weight) {
 void Painter::put(const Splat& splat) {
   GaussianCloud& cloud = *cloud_;
   const std::size_t i = next_++;
+  assert(i < cloud.size());
   cloud.mean[i] = splat.mean;
   cloud.rotation[i] = splat.rotation;
   cloud.scale[i] = splat.scale;

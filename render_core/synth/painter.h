@@ -32,18 +32,18 @@ struct Splat {
   glm::vec3 scale;
   float opacity;
   glm::vec3 colour;
-  const Lobe* lobe = nullptr;  // null: the same from everywhere
+  const Lobe* lobe = nullptr;  // null: same colour from all sides
   float lobe_gain = 1.0f;
 };
 
-/// Writes a part of a scene into its range of the cloud, sharing the range out by weight.
+/// Writes a part of a scene into its range of the cloud, shared out by weight.
 ///
 /// A part is described by code that calls `take(weight)` for every piece, in a fixed order, and
-/// `put`s as many Gaussians as it got. The code runs twice: once to measure the sum of weights,
-/// when take() returns 0, and once to paint, when piece k gets floor(n (w_0 + … + w_k) / W) minus
-/// what the pieces before it got. So exactly n come out, whatever n is, a piece of weight w gets w
-/// n / W within one, and no list of pieces is ever stored. Nothing but the painted colours and
-/// positions may depend on `measuring()`.
+/// `put`s as many Gaussians as take() returned. The code runs twice. The first run measures the sum
+/// of weights; take() returns 0. The second run paints; piece k gets floor(n (w_0 + … + w_k) / W)
+/// minus the Gaussians of earlier pieces. Exactly n Gaussians result for any n, a piece of weight w
+/// gets w n / W within one, and no list of pieces is stored. Only the painted colours and positions
+/// may depend on `measuring()`.
 class Painter {
  public:
   /// For measuring.
@@ -63,12 +63,12 @@ class Painter {
   [[nodiscard]] const Light& light() const { return light_; }
   [[nodiscard]] Shadows& shadows() { return shadows_; }
 
-  /// Gaussians that a piece of this weight (>= 0) is to put.
+  /// The number of Gaussians that a piece of this weight (>= 0) has to put.
   std::size_t take(double weight);
 
   void put(const Splat& splat);
 
-  /// Shares `count` Gaussians (what a take() returned) out among the pieces of `paint(*this)`, by
+  /// Shares `count` Gaussians (the result of a take()) out among the pieces of `paint(*this)`, by
   /// their own weights.
   template <typename Paint>
   void divide(std::size_t count, const Paint& paint) {

@@ -68,7 +68,7 @@ void paint_tree(Painter& painter, const glm::vec3& foot, float height, float cro
                  child(key, 1 + i));
     }
   });
-  // Dark middles close the crown behind its leaves.
+  // Dark clumps in the middle close the crown behind its leaves.
   for (std::size_t i = 0; i < core; ++i) {
     const Clump& clump = clumps[i % clump_count];
     const glm::vec3 point = clump.centre + unit_vector(random) * (0.25f * clump.radius);
@@ -84,7 +84,7 @@ void paint_tree(Painter& painter, const glm::vec3& foot, float height, float cro
   float area = 0.0f;
   for (const Clump& clump : clumps) area += clump.radius * clump.radius;
   const float share = std::sqrt(12.566f * area / static_cast<float>(leaves + 1));
-  // Other trees and houses may shade this one; its own shade is in the clump's normals.
+  // Only other trees and houses count: the clump's normals hold the shading by this tree.
   const float sun = painter.shadows().sun_visibility(centre + light.to_sun() * (2.3f * crown));
   float reached = 0.0f;
   std::size_t which = 0;

@@ -10,7 +10,7 @@ namespace catgs::synth {
 void paint_tree(Painter& painter, const glm::vec3& foot, float height, float crown,
                 const glm::vec3& leaf_albedo, float haze, double weight, std::uint64_t key);
 
-/// Albedo of a tree's leaves: greens, and now and then the first autumn colours.
+/// Albedo of a tree's leaves: greens, and sometimes the first autumn colours.
 glm::vec3 leaf_albedo(Random& random);
 
 /// Upright blades or stems over a patch of ground.

@@ -6,15 +6,15 @@
 
 namespace catgs::synth {
 
-/// Key of a part inside its whole: children of one key are independent of each other.
+/// Key of a part of a whole. Children of one key are independent of each other.
 constexpr std::uint64_t child(std::uint64_t key, std::uint64_t index) {
   return mix_bits(key ^ mix_bits(index + golden_gamma));
 }
 
-/// Counter-based random numbers: draw n of a key is a pure function of (key, n), so that every part
-/// of a scene can be made alone, in any order, on any thread. C++ leaves open in which order a
-/// call's arguments and an operator's operands are evaluated: draw twice in one expression only
-/// inside braces.
+/// Counter-based random numbers. Draw n of a key is a pure function of (key, n), so every part of a
+/// scene can be made alone, in any order, on any thread. C++ does not define the order in which a
+/// call's arguments or an operator's operands are evaluated, so two draws in one expression are
+/// allowed only inside braces.
 class Random {
  public:
   explicit Random(std::uint64_t key) : bits_(key) {}

@@ -14,8 +14,8 @@ void Shadows::add_ball(const glm::vec3& centre, float radius, float density) {
 }
 
 bool Shadows::may_shade(const glm::vec3& min, const glm::vec3& max, const Bounds& region) const {
-  // An occluder shades no further than where the ray from its top reaches the region's bottom
-  // (y points down: the top is min.y).
+  // An occluder shades no farther than the point where the ray from its top reaches the region's
+  // bottom (y points down: the top is min.y).
   const float drop = region.max.y - min.y;
   if (drop <= 0.0f) return false;
   const float reach = drop / -to_sun_.y;

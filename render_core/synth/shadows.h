@@ -8,19 +8,20 @@
 
 namespace catgs::synth {
 
-/// Things that stand between the sun and what they shade: solid boxes and leafy balls. World axes.
+/// Objects that cast shadows: solid boxes and leafy balls. World axes.
 class Shadows {
  public:
   explicit Shadows(const glm::vec3& to_sun) : to_sun_(to_sun) {}
 
   void add_box(const glm::vec3& min, const glm::vec3& max);
-  /// A ball that swallows `density` of the light through its middle and less towards its rim.
+  /// A ball that absorbs `density` of the light through its middle, and less towards its rim.
   void add_ball(const glm::vec3& centre, float radius, float density);
 
-  /// Forgets for good what shades nothing of `region`.
+  /// Removes all objects that cast no shadow on `region`.
   void keep(const Bounds& region);
 
-  /// Keeps only what may shade `region` in mind, until the next call. Queries outside are wrong.
+  /// Restricts queries to `region`, until the next call: only objects that may shade it count.
+  /// Queries outside are wrong.
   void focus(const Bounds& region);
 
   /// Share of sunlight that reaches a point, in [0, 1].

@@ -13,7 +13,7 @@ glm::vec3 lit_colour(const Painter& painter, const Shadows& shadows, const Finis
                      const glm::vec3& point, const glm::vec3& normal, float grain, float t) {
   const Light& light = painter.light();
   const float facing = glm::dot(normal, light.to_sun());
-  // Asked a little off the surface, so that it does not shade itself.
+  // Queried slightly off the surface, so that it does not shade itself.
   const float sun = facing > 0.0f ? shadows.sun_visibility(point + normal * 0.15f) : 0.0f;
   const float sky = finish.sky_visibility_end < 0.0f
                         ? finish.sky_visibility
@@ -32,7 +32,7 @@ float solid_opacity(Random& random, float opacity) {
   return opacity * (1.0f - 0.05f * u * u);
 }
 
-/// Centres of `count` Gaussians over an edge of length 1: the outermost stay `inset` standard
+/// Centres of `count` Gaussians over an edge of length 1. The outermost stay `inset` standard
 /// deviations inside, so that edges are neither frayed nor open.
 struct Spacing {
   float first;
@@ -112,7 +112,7 @@ void paint_line(Painter& painter, const glm::vec3& a, const glm::vec3& b, float 
   const glm::vec3 helper = glm::abs(u.y) < 0.9f ? glm::vec3(0, -1, 0) : glm::vec3(-1, 0, 0);
   const glm::vec3 side = glm::normalize(glm::cross(u, helper));
   const glm::quat rotation = rotation_of(u, side);
-  // A line has no one normal: take what its upper or sunny side would show.
+  // A line has no single normal; this takes that of its upper or sunny side.
   const glm::vec3 normal =
       glm::normalize(painter.light().to_sun() - u * glm::dot(u, painter.light().to_sun()) +
                      glm::vec3(1e-3f, 0, 0));
@@ -138,7 +138,8 @@ void paint_box(Painter& painter, const glm::vec3& min, const glm::vec3& max, con
   painter.divide(painter.take(weight), [&](Painter& p) {
     const glm::vec3 size = max - min;
     const glm::vec3 x(size.x, 0, 0), y(0, size.y, 0), z(0, 0, size.z);
-    // y points down: the top is at min.y. Each pair of edges turns so that cross(u, v) faces out.
+    // y points down: the top is at min.y. In each pair the edges are ordered so that cross(u, v)
+    // points outwards.
     const std::array<Patch, 5> faces = {Patch{min, x, z},       // up (-y)
                                         Patch{min, y, x},       // -z
                                         Patch{min + z, x, y},   // +z
@@ -167,10 +168,10 @@ void paint_blob(Painter& painter, const glm::vec3& centre, const glm::vec3& radi
     const glm::vec3 helper = glm::abs(normal.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
     const glm::vec3 side = glm::normalize(glm::cross(normal, helper));
     const glm::vec3 point = centre + d * radii;
-    // The sphere's area over n, as the edge of a square.
+    // The area of the sphere divided by n, as the edge of a square.
     const float mean_radius = (radii.x + radii.y + radii.z) / 3.0f;
     const float size = mean_radius * std::sqrt(12.566f / n) * 0.6f * random.spread(0.12f);
-    const float cap = mean_radius * 0.7f;  // few Gaussians on a small ball: do not outgrow it
+    const float cap = mean_radius * 0.7f;  // do not outgrow a small ball of few Gaussians
     const float flat = glm::min(size, cap);
     painter.put({.mean = point - normal * (0.3f * flat),
                  .rotation = rotation_of(side, glm::cross(normal, side)),

@@ -20,7 +20,7 @@ struct Finish {
 };
 
 /// A parallelogram that faces cross(u, v); u and v are its whole edges, in metres. The edge
-/// opposite to u may be cut short by shares of it at its start and its end: a trapezium, a
+/// opposite to u may be shortened by shares of it at its start and its end: to a trapezium or a
 /// triangle.
 struct Patch {
   glm::vec3 corner;
@@ -31,12 +31,12 @@ struct Patch {
 };
 
 /// Flat Gaussians in rows over the patch, overlapping so that it looks closed at any count.
-/// `overlap` is a Gaussian's standard deviation over its share of an edge; the outermost stay
-/// `inset` standard deviations inside: about 1 where another patch goes on, more at a silhouette.
+/// `overlap` is a Gaussian's standard deviation over its share of an edge. The outermost stay
+/// `inset` standard deviations inside: about 1 where another patch continues, more at a silhouette.
 void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, std::size_t count,
                  std::uint64_t key, float overlap = 0.60f, float inset = 0.9f);
 
-/// The same for a piece of this weight.
+/// The same, with the number of Gaussians for a piece of this weight.
 void paint_patch(Painter& painter, const Patch& patch, const Finish& finish, double weight,
                  std::uint64_t key, float overlap = 0.60f, float inset = 0.9f);
 

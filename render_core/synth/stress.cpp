@@ -28,7 +28,7 @@ void paint_each(Painter& painter, double weight, std::uint64_t key, const Make& 
   for (std::size_t i = 0; i < count; ++i) painter.put(make(random, i));
 }
 
-/// Ordinary content, so that a picture is worth comparing: floor, pillars, coloured balls.
+/// Ordinary content for meaningful pictures: floor, pillars, coloured balls.
 void paint_room(Painter& painter, double weight, std::uint64_t key) {
   painter.divide(painter.take(weight), [&](Painter& p) {
     p.shadows().focus({at(-room_m, 5, -room_m), at(room_m, 0, room_m)});
@@ -118,8 +118,8 @@ void paint_hard_to_project(Painter& painter, std::uint64_t seed) {
   });
 }
 
-/// Of what covers the whole picture a few are enough, however large the scene is: more would leave
-/// nothing else to see.
+/// A few Gaussians that cover the whole picture are enough, however large the scene is. More would
+/// hide everything else.
 void paint_covers(Painter& painter, double weight, std::uint64_t seed) {
   // Huge and faint: they touch every tile of every picture, from inside too.
   paint_each(painter, weight, child(seed, 4), [](Random& r, std::size_t) {

@@ -7,14 +7,14 @@
 namespace catgs {
 
 // Subcommands of catgs-render. Each lives in its own file, adds itself to the program and runs from
-// its CLI11 callback; main.cpp turns what it throws into a message and an exit code:
+// its CLI11 callback. main.cpp turns exceptions into a message and an exit code:
 //
 //   0  done
 //   1  a check that was asked for failed     CheckFailed
 //   2  bad usage or bad input                CLI::ParseError, InputError
 //   3  anything else, a bug or a full disk   any other exception
 
-/// A check that the user asked for did not hold. The message says which, with both values.
+/// A check that the user asked for has failed. The message names it, with both values.
 struct CheckFailed : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -38,7 +38,7 @@ void add_info_command(CLI::App& app);
 void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
-// Of `trace`, which adds them.
+// Subcommands of `trace`, which adds them.
 void add_trace_forecast_command(CLI::App& trace);
 void add_trace_windows_command(CLI::App& trace);
 

@@ -1,5 +1,7 @@
 #include "render_core/tools/frame_feed.h"
 
+#include <cassert>
+
 namespace catgs {
 
 FrameFeed::FrameFeed(const RenderSetup& setup, const ViewSettings& settings)
@@ -9,6 +11,7 @@ FrameFeed::FrameFeed(const RenderSetup& setup, const ViewSettings& settings)
       predictor_(setup.predictor) {}
 
 FrameRequest FrameFeed::next() {
+  assert(next_frame_ < setup_.poses.size());
   FrameRequest request = setup_.request(next_frame_);
   if (forecast_frames_ > 0) {
     const std::int64_t now_us = setup_.poses[next_frame_].time_us;

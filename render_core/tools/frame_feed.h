@@ -7,15 +7,16 @@
 
 namespace catgs {
 
-/// The requests of a path in order, each with the forecast that a server could have made at its
-/// time: the predictor has seen the recorded samples up to the frame's time, and none after it. A
-/// resampled path is interpolated towards the next sample, so its poses are never samples.
+/// The requests of a path in order. Each has the forecast that a server could have made at its
+/// time: the predictor has seen the recorded samples up to the frame's time, and no later ones. A
+/// resampled path is interpolated towards the next sample, so its poses are never given to the
+/// predictor.
 class FrameFeed {
  public:
   /// Both belong to the caller. Only the catgs pipeline gets forecasts, over its initial window.
   FrameFeed(const RenderSetup& setup, const ViewSettings& settings);
 
-  /// Of frame 0, 1, … of the path.
+  /// The request of frame 0, 1, … of the path.
   FrameRequest next();
 
  private:

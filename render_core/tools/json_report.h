@@ -6,11 +6,11 @@
 
 namespace catgs {
 
-/// Indented text. JSON has to be UTF-8 and file names need not be: other bytes read U+FFFD.
+/// Indented text. JSON must be UTF-8, but file names need not be: other bytes become U+FFFD.
 std::string json_text(const nlohmann::ordered_json& json);
 
-/// Throws InputError where write_json() could not begin, so that nobody measures in vain. An empty
-/// path is none.
+/// Throws InputError where write_json() could not begin, so that no measurement is made in vain. An
+/// empty path is ignored.
 void check_json(const std::string& path);
 
 /// Writes a report to a file, whole or not at all; "-" prints it. Throws InputError when it cannot

@@ -19,12 +19,13 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", build_version);
   app.require_subcommand(1);
   app.fallthrough();
-  bool quiet = false;  // read back by is_quiet()
-  app.add_flag("-q,--quiet", quiet, "No progress on the terminal");
+  bool quiet = false;  // read by is_quiet()
+  app.add_flag("-q,--quiet", quiet, "Show no progress on the terminal");
   app.failure_message([](const CLI::App*, const CLI::Error& error) {
     return fmt::format("catgs-render: {} (see --help)\n", error.what());
   });
-  app.footer("Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal.");
+  app.footer(
+      "Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal error.");
 
   add_bench_command(app);
   add_compare_command(app);

@@ -11,7 +11,8 @@
 
 namespace catgs {
 
-/// The value of a name; `flag` names its source in the InputError that lists all names.
+/// The value that a name stands for; `flag` names the source in the InputError, which lists all
+/// names.
 template <typename Value>
 Value parse_name(std::string_view flag, std::string_view name,
                  std::initializer_list<std::pair<std::string_view, Value>> known) {

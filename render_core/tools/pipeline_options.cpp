@@ -25,11 +25,11 @@ GridKind parse_grid(std::string_view name) {
       {{"fixed", GridKind::fixed}, {"shift", GridKind::shift}, {"warp", GridKind::warp}});
 }
 
-/// An option that changes nothing would spoil a comparison unnoticed.
+/// Options without effect are refused, because they would spoil a comparison silently.
 void refuse_without_caches(const PipelineOptions& options) {
   const auto refuse = [&](bool given, std::string_view flag) {
     if (!given) return;
-    throw InputError(flag, "", fmt::format("means nothing to the {} pipeline", options.pipeline),
+    throw InputError(flag, "", fmt::format("has no effect on the {} pipeline", options.pipeline),
                      "use --pipeline catgs");
   };
   refuse(options.window.has_value(), "--window");
@@ -57,14 +57,15 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
       .add_flag("--no-cache", options.no_cache, "catgs: every frame is a key frame (--window 0)")
       ->excludes(command.get_option("--window"));
   command.add_flag("--no-colour-cache", options.no_colour_cache,
-                   "catgs: every Gaussian in view is shaded in every frame");
-  command.add_flag("--cost-aware", options.cost_aware,
-                   "catgs: no windows for a while where they cost more than they save, as in the "
-                   "server; which frames are key frames then depends on the machine");
+                   "catgs: shade every Gaussian in view in every frame");
+  command.add_flag(
+      "--cost-aware", options.cost_aware,
+      "catgs: pause windows that cost more than they save, as the server does. The choice of "
+      "key frames then depends on the machine");
   command.add_flag("--constant-velocity", options.constant_velocity,
-                   "catgs: forecasts go on undamped, however wrong earlier ones were");
+                   "catgs: do not damp forecasts, however wrong earlier ones were");
   command.add_flag("--no-split", options.no_split,
-                   "CUDA: a tile's list is never cut, however long");
+                   "CUDA core: do not split long tile lists into slices");
 }
 
 void add_speculation_options(CLI::App& command, PipelineOptions& options) {
@@ -72,27 +73,30 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
   command.add_option(
       "--window", options.window,
       fmt::format(
-          "catgs: sub-frames behind a key frame while motion is small, within 100 ms; 0: none ({})",
+          "catgs: sub-frames after a key frame while motion is small, within 100 ms; 0: none ({})",
           defaults.initial_window));
+  command.add_option("--max-trail-px", options.max_trail_px,
+                     fmt::format("catgs: largest motion of a Gaussian in a window, px ({})",
+                                 defaults.max_trail_px));
   command.add_option(
-      "--max-trail-px", options.max_trail_px,
-      fmt::format("catgs: longest motion of a Gaussian in a window ({})", defaults.max_trail_px));
-  command.add_option("--min-depth", options.min_depth,
-                     "catgs: nearer Gaussians do not shorten the window (2 x near plane)");
-  command.add_option("--max-deviation-px", options.max_deviation_px,
-                     fmt::format("catgs: farther from the forecast a key frame is due, with the "
-                                 "fixed and the shift grid ({})",
-                                 defaults.max_deviation_px));
+      "--min-depth", options.min_depth,
+      "catgs: depth below which Gaussians do not shorten the window (2 x near plane)");
+  command.add_option(
+      "--max-deviation-px", options.max_deviation_px,
+      fmt::format("catgs: largest distance from the forecast, px, with the fixed or shift "
+                  "grid; beyond it a key frame follows ({})",
+                  defaults.max_deviation_px));
   command.add_option("--grid", options.grid,
                      "catgs: how tiles follow a turn of the camera: fixed, shift (by whole pixels) "
                      "or warp (warp)");
-  command.add_option("--guard-px", options.guard_px,
-                     fmt::format("catgs: px by which lists are widened for a camera that leaves "
-                                 "its path, with the warp grid ({})",
-                                 defaults.guard_px));
   command.add_option(
-      "--order", options.order,
-      "catgs: sub-frames blend by fresh depths or by those of the key frame (fresh)");
+      "--guard-px", options.guard_px,
+      fmt::format("catgs: widen lists by this many px for a camera that leaves its path, "
+                  "with the warp grid ({})",
+                  defaults.guard_px));
+  command.add_option("--order", options.order,
+                     "catgs: order in which sub-frames blend: by fresh depths or by those of the "
+                     "key frame (fresh)");
 }
 
 ViewSettings view_settings(const PipelineOptions& options) {
@@ -110,7 +114,7 @@ ViewSettings view_settings(const PipelineOptions& options) {
   const bool warps = speculation.grid == GridKind::warp;
   const auto refuse = [&](std::string_view flag, std::string_view remedy) {
     throw InputError(
-        flag, "", fmt::format("means nothing to the {} grid", grid_name(speculation.grid)), remedy);
+        flag, "", fmt::format("has no effect on the {} grid", grid_name(speculation.grid)), remedy);
   };
   if (options.guard_px && !warps) refuse("--guard-px", "use --grid warp");
   if (options.max_deviation_px && warps) refuse("--max-deviation-px", "use --grid fixed or shift");
@@ -133,9 +137,10 @@ PipelineOptions with_flags(PipelineOptions options, const std::string& flags) {
     throw InputError("--variant", flags, error.what(), "catgs-render bench --help lists the flags");
   }
   if (options.pipeline != catgs) {
-    throw InputError("--variant", flags, "is not of the catgs pipeline", "leave --pipeline out");
+    throw InputError("--variant", flags, "selects another pipeline than catgs",
+                     "leave --pipeline out");
   }
-  // What all rows are given is for those that have it; what the flags give is for this one.
+  // Default flags of all rows apply only where they have an effect. The flags of this row decide.
   const bool warps = options.grid.value_or("warp") == "warp";
   if (!warps && parser.count("--guard-px") == 0) options.guard_px.reset();
   (void)view_settings(options);

@@ -10,10 +10,10 @@
 
 namespace catgs {
 
-/// Which pipeline renders, and with which of its parts.
+/// The choice of pipeline and of its parts.
 struct PipelineOptions {
   std::string pipeline = "exact";
-  // Of the catgs pipeline; unset ones keep the default of ViewSettings.
+  // For the catgs pipeline. Unset fields keep the default of ViewSettings.
   std::optional<int> window{};
   std::optional<float> max_trail_px{};
   std::optional<float> min_depth{};
@@ -30,18 +30,20 @@ struct PipelineOptions {
 
 /// The options belong to the caller and must outlive the command's callback.
 void add_pipeline_options(CLI::App& command, PipelineOptions& options);
-/// Those of them that adjust the catgs pipeline without taking a part away.
+/// The options that adjust the catgs pipeline without leaving out a part.
 void add_speculation_options(CLI::App& command, PipelineOptions& options);
 
-/// Pipeline, speculation, order and task splitting of the options; the rest as by default. Throws
-/// InputError for an unknown name, a value out of range, an option that the pipeline has not.
+/// Sets pipeline, speculation, order and task splitting from the options, the rest by default.
+/// Throws InputError for an unknown name, a value out of range, or an option that the pipeline does
+/// not have.
 ViewSettings view_settings(const PipelineOptions& options);
 
-/// The options of the catgs pipeline with these flags too, written as on a command line. InputError
-/// for what that refuses; it names --variant, where users give such flags.
+/// The options of the catgs pipeline with additional flags, written as on a command line. Throws
+/// InputError for what the command line would refuse; the error names --variant, where users give
+/// such flags.
 PipelineOptions with_flags(PipelineOptions options, const std::string& flags);
 
-/// How the catgs pipeline's forecasts are made.
+/// The predictor's settings for forecasts of the catgs pipeline.
 PredictorSettings predictor_settings(const PipelineOptions& options);
 
 std::string_view pipeline_name(Pipeline pipeline);

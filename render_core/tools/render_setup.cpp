@@ -1,6 +1,7 @@
 #include "render_core/tools/render_setup.h"
 
 #include <algorithm>
+#include <cassert>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -55,27 +56,29 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
 
 void add_frame_options(CLI::App& command, RenderOptions& options) {
   const ScriptOptions defaults;
-  command.add_option("--seed", options.seed, fmt::format("Of the script ({})", defaults.seed));
+  command.add_option("--seed", options.seed, fmt::format("Seed of the script ({})", defaults.seed));
   command.add_option("--duration", options.duration_s,
-                     fmt::format("Of the script, seconds ({})", defaults.duration_s));
+                     fmt::format("Length of the script, seconds ({})", defaults.duration_s));
   command.add_option(
       "--fps", options.fps,
-      "Frames per second (default: a trace's own samples, 120 of a script). A trace is "
-      "resampled, but forecasts know its own samples alone, and none of the future");
-  command.add_option("--frames", options.frames, "A:B renders frames A to B - 1 of the path");
+      "Frames per second (default: the rate of the trace, or 120 for a script). The trace is "
+      "resampled, but forecasts use its recorded samples only, and none of the future");
+  command.add_option("--frames", options.frames,
+                     "Render frames A to B - 1 of the path, given as A:B");
   add_lens_options(command, options.lens);
-  command.add_option("--renderer", options.renderer, "auto, cpu, cuda or reference")
+  command.add_option("--renderer", options.renderer, "Core: auto, cpu, cuda or reference")
       ->capture_default_str();
   command.add_option("--device", options.device,
-                     "CUDA core: all, or devices as CUDA numbers them, like 0 or 0,1 [0]");
+                     "CUDA core: all, or numbers of CUDA devices, like 0 or 0,1 [0]");
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
-  command.add_option("--threads", options.threads, "0: one per core")
+  command.add_option("--threads", options.threads, "Number of threads; 0: one per core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
 }
 
 FrameRequest RenderSetup::request(std::size_t i) const {
+  assert(i < poses.size());
   FrameRequest request;
   request.camera = camera;
   request.camera.world_from_camera = poses[i].world_from_camera;
@@ -93,7 +96,7 @@ ScriptOptions script_options(const RenderOptions& options) {
 void refuse_script_options(const RenderOptions& options) {
   const auto refuse = [](bool given, std::string_view flag) {
     if (!given) return;
-    throw InputError(flag, "", "means nothing to a recorded trace", "it is of a script");
+    throw InputError(flag, "", "has no effect on a recorded trace", "it belongs to --script");
   };
   refuse(options.seed.has_value(), "--seed");
   refuse(options.duration_s.has_value(), "--duration");
@@ -107,7 +110,7 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
 }
 
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
-  (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
+  (void)make_lens(options.lens, 1.0f);  // a mistake appears before a large scene is read
   RendererOptions core = renderer_options(options);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);

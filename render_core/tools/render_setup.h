@@ -18,20 +18,20 @@
 
 namespace catgs {
 
-/// What `frames`, `bench` and `paper` have in common: a scene, a camera path and a renderer.
+/// The common options of `frames`, `bench` and `paper`: a scene, a camera path and a renderer.
 struct RenderOptions {
   SceneOptions scene;
   std::string trace;
   bool anchor = false;
   std::string script;
-  // Of the script; unset ones keep the default of ScriptOptions.
+  // For the script. Unset fields keep the default of ScriptOptions.
   std::optional<std::uint64_t> seed;
   std::optional<double> duration_s;
   LensOptions lens;
   std::optional<double> fps;
   std::string frames;
   std::string renderer = "auto";
-  std::string device;  // empty: the first, if CUDA renders
+  std::string device;  // empty: the first device, if CUDA renders
   PipelineOptions pipeline;
   std::string simd = "auto";
   int threads = 0;
@@ -39,7 +39,7 @@ struct RenderOptions {
 
 /// The options belong to the caller and must outlive the command's callback.
 void add_render_options(CLI::App& command, RenderOptions& options);
-/// Those of them that name neither scene nor path nor pipeline.
+/// The options that name neither scene nor path nor pipeline.
 void add_frame_options(CLI::App& command, RenderOptions& options);
 
 /// The options, loaded and checked.
@@ -48,35 +48,35 @@ struct RenderSetup {
   std::shared_ptr<const GaussianCloud> cloud;
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
-  ViewSettings view;  // pipeline and its parts; format and memory space are the user's choice
+  ViewSettings view;            // pipeline and its parts; callers set format and memory space
   PredictorSettings predictor;  // of the catgs pipeline's forecasts
   Trajectory samples;           // the camera as recorded
   Trajectory poses;             // one per frame
-  std::size_t first = 0;        // number of the first of them in the whole path
+  std::size_t first = 0;        // number of poses[0] in the whole path
   double fps = 0.0;             // of the path
   Camera camera;                // without the pose
 
-  /// Of a frame by itself, without a forecast; see FrameFeed.
+  /// The request for frame i alone, without a forecast; see FrameFeed.
   [[nodiscard]] FrameRequest request(std::size_t i) const;
 };
 
 /// Loads scene and path, makes the renderer. Throws InputError.
 RenderSetup prepare(const RenderOptions& options, bool quiet);
-/// The same in two steps, for several paths through one scene.
+/// Loads the scene, then set_path() a path; for several paths through one scene.
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet);
 void set_path(RenderSetup& setup, const RenderOptions& options);
 
-/// The script of the options, as set_path() makes it.
+/// The script that the options describe, as set_path() makes it.
 ScriptOptions script_options(const RenderOptions& options);
-/// Throws InputError where an option of scripts is given. One that changes nothing, as where only
-/// recorded traces are followed, would spoil a comparison unnoticed.
+/// Throws InputError where an option of scripts is given. Without a script it would have no effect
+/// and spoil a comparison silently.
 void refuse_script_options(const RenderOptions& options);
 
-/// The choice of core, checked; without a thread pool. Throws InputError.
+/// The choice of core, checked; it has no thread pool. Throws InputError.
 RendererOptions renderer_options(const RenderOptions& options);
 
-/// "A:B" -> frames A to B - 1 of `count`; either may be left out; "" is all. Throws InputError when
-/// nothing is left.
+/// "A:B" -> frames A to B - 1 of `count`; either bound may be missing; "" is all. Throws InputError
+/// when no frame is left.
 struct FrameRange {
   std::size_t begin, end;
 };

@@ -6,8 +6,8 @@
 namespace catgs {
 namespace {
 
-/// Four independent lanes of multiply-rotate over 32-byte blocks: memory speed, not the
-/// multiplier's latency, is the limit.
+/// Four independent lanes of multiply-rotate over 32-byte blocks. The speed of memory is the limit,
+/// not the multiplier's latency.
 class Hasher {
  public:
   template <typename T>

@@ -6,7 +6,7 @@
 
 namespace catgs {
 
-/// Identifies what was measured, whatever file it came from: equal clouds have equal hashes. Not
+/// Identifies a measured scene by its content, not its file: equal clouds have equal hashes. Not
 /// for security.
 std::uint64_t scene_hash(const GaussianCloud& cloud);
 

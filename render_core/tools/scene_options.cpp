@@ -27,10 +27,10 @@ bool parse_side(std::string_view text, int& side) {
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name) {
   command.add_option(name, options.path, "Scene file or folder")->required();
   auto* lod = command.add_option("--lod", options.lod,
-                                 "Streamed SOG: this level of detail; 0 is the finest");
+                                 "Streamed SOG: level of detail to load; 0 is the finest");
   command
       .add_option("--budget", options.budget,
-                  "Streamed SOG: the finest levels with at most so many Gaussians")
+                  "Streamed SOG: load the finest levels with at most this many Gaussians")
       ->excludes(lod);
 }
 
@@ -49,7 +49,7 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
   auto* focal = command.add_option("--focal-px", options.focal_px, "Focal length, pixels");
   command
       .add_option("--fov-deg", options.fov_y_deg,
-                  fmt::format("Vertical field of view (default: {})", default_fov_y_deg))
+                  fmt::format("Vertical field of view, degrees (default: {})", default_fov_y_deg))
       ->excludes(focal);
   command.add_option("--near", options.near_z,
                      "Near plane, world units (default: the scene's hint)");

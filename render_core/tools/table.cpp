@@ -1,6 +1,7 @@
 #include "render_core/tools/table.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 
@@ -72,8 +73,10 @@ Json to_json(const PaperTable& table) {
 }
 
 PaperTable joined(std::span<const PaperTable> tables) {
+  assert(!tables.empty());
   PaperTable all = tables.front();
   for (const PaperTable& table : tables.subspan(1)) {
+    assert(table.rows.size() == all.rows.size());
     all.columns.insert(all.columns.end(), table.columns.begin(), table.columns.end());
     for (std::size_t r = 0; r < all.rows.size(); ++r) {
       const auto& numbers = table.rows[r].numbers;
@@ -85,6 +88,7 @@ PaperTable joined(std::span<const PaperTable> tables) {
 }
 
 PaperTable averaged(std::span<const PaperTable> tables) {
+  assert(!tables.empty());
   PaperTable mean = tables.front();
   for (std::size_t r = 0; r < mean.rows.size(); ++r) {
     for (std::size_t c = 0; c < mean.columns.size(); ++c) {
@@ -105,6 +109,7 @@ PaperTable averaged(std::span<const PaperTable> tables) {
 }
 
 void add_rows(PaperTable& table, std::size_t behind, const Json& rows, std::string_view source) {
+  assert(behind < table.rows.size());
   constexpr std::string_view remedy = "like {\"FlashGS\": {\"city\": 120.5}}";
   if (!rows.is_object()) throw InputError(source, "", "is not an object of rows", remedy);
   std::vector<PaperTable::Row> added;

@@ -23,8 +23,8 @@ glm::vec3 perpendicular(const glm::vec3& v) {
   return glm::normalize(glm::cross(v, axis));
 }
 
-// Where a first camera may stand, around the middle of the content: distances in content radii,
-// elevations above it. Inside rooms the near ones win, around objects the far ones.
+// Candidate places for the first camera, around the middle of the content: distances in content
+// radii, elevations above it. In rooms the near ones win, around objects the far ones.
 constexpr std::array distances = {0.35f, 0.6f, 0.85f, 1.1f, 1.4f, 1.7f, 2.1f, 2.6f};
 constexpr std::array elevations_rad = {0.0f, 0.2f, 0.4f};
 constexpr int azimuths = 16;
@@ -39,7 +39,7 @@ constexpr float half_width = half_height * columns / rows;
 // light.
 constexpr float free_optical_depth = 0.1f;
 
-// Many objects look as good from all sides: then the usual front decides.
+// Many objects look equally good from all sides; the usual front then decides.
 constexpr float front_preference = 0.1f;
 
 struct WeightedPoint {
@@ -47,12 +47,12 @@ struct WeightedPoint {
   float weight;
 };
 
-/// What a first view is about.
+/// The part of the scene that a first view should show.
 struct Content {
   Bounds bounds;
   glm::vec3 middle;
   float radius;
-  std::vector<WeightedPoint> points;  // an even sample in and a bit around the bounds
+  std::vector<WeightedPoint> points;  // an even sample, in and slightly around the bounds
 };
 
 Content find_content(const GaussianCloud& cloud) {
@@ -68,8 +68,8 @@ Content find_content(const GaussianCloud& cloud) {
   return content;
 }
 
-/// The light that the content stops on its way along a ray: all of it, and with each part weighted
-/// by its distance up to `radius`.
+/// The light that the content stops along a ray: in all, and with each part weighted by its
+/// distance up to `radius`.
 struct Stopped {
   float all = 0.0f, weighted = 0.0f;
 };
@@ -87,9 +87,9 @@ Stopped march(const VoxelGrid& grid, const glm::vec3& from, const glm::vec3& ray
   return stopped;
 }
 
-/// How much there is to see from `pose`, in 0…1: the mean over the image of the light stopped, far
-/// content counting more. So it prefers views that are filled, but not by something right in front
-/// of the camera.
+/// How much there is to see from `pose`, in 0…1: the mean over the image of the light stopped, with
+/// more weight for far content. It thus prefers views that are filled, but not by something right
+/// in front of the camera.
 float fullness(const VoxelGrid& grid, const Pose& pose, float radius) {
   float sum = 0.0f;
   for (int row = 0; row < rows; ++row)
@@ -131,8 +131,8 @@ float share_in_image(const Content& content, const Pose& pose) {
   return inside / all;
 }
 
-/// Before an object, content that is cut off by the image's border spoils the view; inside of a
-/// room it is bound to be.
+/// Content that is cut off by the image's border spoils the view of an object, but is inevitable in
+/// a room.
 float view_score(const VoxelGrid& grid, const Content& content, const Pose& pose) {
   const float enclosed = enclosure(grid, pose.position, content.radius);
   const float share = share_in_image(content, pose);
@@ -140,14 +140,14 @@ float view_score(const VoxelGrid& grid, const Content& content, const Pose& pose
   return framing * fullness(grid, pose, content.radius);
 }
 
-/// Where a camera usually stands first: captures begin near the identity pose, which looks along
+/// The usual direction of the first look: captures begin near the identity pose, which looks along
 /// +z; scenes with z up are by habit seen along +y. A unit vector at a right angle to `up`.
 glm::vec3 usual_front(const glm::vec3& up) {
   const glm::vec3 front = std::abs(up.z) < 0.7f ? glm::vec3(0, 0, -1) : glm::vec3(0, -1, 0);
   return glm::normalize(front - glm::dot(front, up) * up);
 }
 
-/// The best of the free places around the content; where none is free, one outside of it.
+/// The best of the free places around the content; where none is free, a place outside of it.
 Pose choose_start_pose(const GaussianCloud& cloud, const Content& content, const glm::vec3& up) {
   const VoxelGrid grid(cloud, content.middle, 2.7f * content.radius);
   const glm::vec3 front = usual_front(up), side = glm::cross(up, front);

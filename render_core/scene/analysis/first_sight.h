@@ -10,9 +10,9 @@ namespace catgs {
 /// the image. Any orientation around the view axis is taken where the two are parallel.
 Pose look_at(const glm::vec3& eye, const glm::vec3& target, const glm::vec3& up);
 
-/// How to look at a scene that says nothing about it: up is -y as in every
-/// COLMAP capture unless given; the pose looks at the content of the robust bounds (5–95 %,
-/// opacity-weighted) from a place in free space, judged on a coarse voxel grid. Deterministic.
+/// Hints for a scene that comes with none. Up is -y, as in every COLMAP capture, unless given. The
+/// pose looks at the content of the robust bounds (5–95 %, opacity-weighted) from a place in free
+/// space, judged on a coarse voxel grid. Deterministic.
 SceneHints estimate_hints(const GaussianCloud& cloud,
                           const glm::vec3& up = glm::vec3(0.0f, -1.0f, 0.0f));
 

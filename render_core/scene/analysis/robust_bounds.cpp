@@ -1,6 +1,7 @@
 #include "render_core/scene/analysis/robust_bounds.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -26,6 +27,7 @@ float weighted_quantile(const std::vector<WeightedValue>& values, double total, 
 }  // namespace
 
 std::optional<Bounds> robust_bounds(const GaussianCloud& cloud, float tail) {
+  assert(tail >= 0.0f && tail < 0.5f);
   const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_sample - 1) / max_sample);
   std::vector<std::size_t> sample;
   double total = 0.0;

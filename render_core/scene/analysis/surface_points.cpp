@@ -1,6 +1,7 @@
 #include "render_core/scene/analysis/surface_points.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -14,17 +15,18 @@
 namespace catgs {
 namespace {
 
-/// Of a disc with the area that the Gaussian covers when it is seen from its broad side.
+/// Radius of a disc with the area that the Gaussian covers when seen from its broad side.
 float disc_radius(const glm::vec3& scale) {
   const float smallest = std::min({scale.x, scale.y, scale.z});
   const float product = scale.x * scale.y * scale.z;
   return std::sqrt(product / std::max(smallest, 1e-12f));
 }
 
-/// Beyond so many standard deviations there is nothing to see.
+/// A Gaussian is invisible beyond this many standard deviations.
 constexpr float reach = 3.0f;
 
-/// Where a ray comes nearest to a point: how far along it, and the squared distance there.
+/// The place on a ray that is nearest to a point: its distance along the ray, and its squared
+/// distance to the point.
 struct Approach {
   float along, beside2;
 };
@@ -32,7 +34,7 @@ struct Approach {
 Approach approach(const glm::vec3& origin, const glm::vec3& direction, const glm::vec3& point) {
   const glm::vec3 offset = point - origin;
   const float along = glm::dot(offset, direction);
-  // Not as a difference of squares, which has lost its digits where the point is far.
+  // A difference of squares would have lost its digits where the point is far.
   const glm::vec3 beside = offset - along * direction;
   return {along, glm::dot(beside, beside)};
 }
@@ -42,8 +44,8 @@ Approach approach(const glm::vec3& origin, const glm::vec3& direction, const glm
 SurfacePoints::SurfacePoints(const GaussianCloud& cloud, ThreadPool& pool, std::size_t max_points) {
   const std::size_t step = std::max<std::size_t>(
       1, (cloud.size() + max_points - 1) / std::max<std::size_t>(1, max_points));
-  const float growth = std::sqrt(static_cast<float>(step));  // of the discs that stand for `step`
-  // One out of each `step`, not always the same: many files are ordered row by row.
+  const float growth = std::sqrt(static_cast<float>(step));  // of discs that stand for `step`
+  // Picks one of each `step`, at a varying position, because many files are ordered row by row.
   std::vector<std::size_t> chosen;
   std::vector<glm::vec3> centres;
   std::uint32_t lot = 1;
@@ -81,6 +83,7 @@ SurfacePoints::Ball SurfacePoints::around(std::span<const Point> points) {
 
 std::optional<float> SurfacePoints::distance_along(const glm::vec3& origin,
                                                    const glm::vec3& direction) const {
+  assert(std::abs(glm::length(direction) - 1.0f) < 1e-3f);
   std::vector<std::pair<float, float>> stops;  // distance, alpha
   for (std::size_t c = 0; c < clusters_.size(); ++c) {
     const Ball& ball = clusters_[c];
@@ -89,7 +92,7 @@ std::optional<float> SurfacePoints::distance_along(const glm::vec3& origin,
     for (const Point& point : points_of(c)) {
       const auto [along, beside2] = approach(origin, direction, point.centre);
       const float sigma2 = point.sigma * point.sigma;
-      // Nobody points at what the camera stands in.
+      // The balls around the camera are no target.
       if (along <= point.sigma || beside2 > reach * reach * sigma2) continue;
       stops.emplace_back(along, point.opacity * std::exp(-0.5f * beside2 / sigma2));
     }

@@ -12,8 +12,9 @@
 
 namespace catgs {
 
-/// What a ray meets first, whatever core renders the scene: its Gaussians as balls, of large scenes
-/// an even sample with balls that are larger for it. For pointing at things, not for pictures.
+/// The surface that a ray meets first. For pointing at things, not for pictures, so it does not
+/// depend on the core. Gaussians count as balls; a large scene is an even sample of them with balls
+/// enlarged to match.
 class SurfacePoints {
  public:
   /// Keeps at most `max_points` (20 bytes each).
@@ -21,8 +22,8 @@ class SurfacePoints {
                 std::size_t max_points = std::size_t{1} << 20);
 
   /// Distance from `origin` along the unit vector `direction` at which half of the light is
-  /// stopped; nothing where less is. Looks at one ball for each cluster_size points, and at the
-  /// points of those that the ray meets.
+  /// stopped; empty where less is stopped. Looks at one ball for each cluster_size points, and at
+  /// the points of the clusters that the ray meets.
   [[nodiscard]] std::optional<float> distance_along(const glm::vec3& origin,
                                                     const glm::vec3& direction) const;
 
@@ -40,7 +41,7 @@ class SurfacePoints {
   static Ball around(std::span<const Point> points);
 
   std::vector<Point> points_;   // along a Morton curve
-  std::vector<Ball> clusters_;  // around all that is to be seen of cluster_size points each
+  std::vector<Ball> clusters_;  // each holds cluster_size points and all that is visible of them
 };
 
 }  // namespace catgs

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 
 #include <glm/common.hpp>
@@ -20,13 +21,14 @@ VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const glm::vec3& centre, float 
     : corner_(centre - half_size),
       cell_size_(2.0f * half_size / static_cast<float>(cells_per_side)),
       depth_(static_cast<std::size_t>(cells_per_side) * cells_per_side * cells_per_side) {
+  assert(half_size > 0.0f);
   const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_sample - 1) / max_sample);
   for (std::size_t i = 0; i < cloud.size(); i += step)
     add_gaussian(cloud, i, static_cast<float>(step));
 }
 
 /// A Gaussian stops opacity * 2 pi s t of the light (its integral over the plane of its two larger
-/// standard deviations). Those larger than a cell are spread over points of that plane.
+/// standard deviations). One larger than a cell is spread over points of that plane.
 void VoxelGrid::add_gaussian(const GaussianCloud& cloud, std::size_t i, float weight) {
   const glm::vec3& scale = cloud.scale[i];
   std::array<int, 3> axes = {0, 1, 2};

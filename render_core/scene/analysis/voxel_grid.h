@@ -8,9 +8,8 @@
 
 namespace catgs {
 
-/// How much of the light the scene stops, on a coarse grid of cubes around a point: per cell the
-/// optical depth that a ray meets on its way through. For decisions about where a camera may
-/// stand, not for pictures.
+/// The light that the scene stops, on a coarse grid of cubes around a point: each cell has the
+/// optical depth for a ray through it. For choosing places for a camera, not for pictures.
 class VoxelGrid {
  public:
   /// Covers centre ± half_size along each axis. Large scenes are judged by an even sample.

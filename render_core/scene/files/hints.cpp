@@ -34,7 +34,7 @@ glm::vec3 parse_up(const JsonField& field) {
     up[static_cast<int>(k)] = name[0] == '-' ? -1.0f : 1.0f;
     return up;
   }
-  const glm::dvec3 up = field.vec3();  // squares of large floats are no floats
+  const glm::dvec3 up = field.vec3();  // squares of large floats overflow a float
   if (glm::length(up) < 1e-6) field.fail("has no direction");
   return glm::normalize(up);
 }
@@ -67,7 +67,7 @@ glm::mat3 parse_rotation(const JsonField& rows, std::size_t size) {
     const auto row = rows[static_cast<std::size_t>(r)].numbers(size);
     for (int c = 0; c < 3; ++c) rotation[c][r] = row[static_cast<std::size_t>(c)];
   }
-  // A determinant of 1 alone may be a shear's, with numbers of any size.
+  // A determinant of 1 alone is not enough: a shear can have it, with numbers of any size.
   bool is_rotation = std::abs(glm::determinant(rotation) - 1.0f) < 0.05f;
   for (int c = 0; c < 3; ++c)
     is_rotation = is_rotation && std::abs(glm::length(rotation[c]) - 1.0f) < 0.05f;
@@ -96,7 +96,8 @@ CameraFile find_cameras(const HintFiles& files, std::vector<std::string>& notes)
   return cameras;
 }
 
-/// Mean of the cameras' up; empty where they cancel out, as for a drone that looks straight down.
+/// Mean of the cameras' up vectors; empty where they cancel out, as for a drone that looks straight
+/// down.
 std::optional<glm::vec3> mean_up(const std::vector<Pose>& poses) {
   glm::vec3 sum(0.0f);
   for (const Pose& pose : poses) sum += pose.orientation * glm::vec3(0.0f, -1.0f, 0.0f);

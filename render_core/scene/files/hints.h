@@ -12,7 +12,7 @@
 
 namespace catgs {
 
-/// What somebody wrote down about a scene in `<scene>.json`. All fields are optional:
+/// Hints that the author of a scene wrote down in `<scene>.json`. All fields are optional:
 ///
 ///   "up":         "-y", "+z", … or [x, y, z]
 ///   "start_pose": {"position": [x, y, z], "look_at": [x, y, z]}
@@ -34,16 +34,16 @@ struct Sidecar {
   std::optional<glm::vec3> focus;
 };
 
-/// Throws InputError naming the field, also for fields that are not known.
+/// Throws InputError naming the field. Unknown fields are errors too.
 Sidecar read_sidecar(const ByteSource& file);
 
-/// Puts the sidecar's fields in the place of those hints. `name`: of its file.
+/// Overwrites hints with the sidecar's fields. `name`: name of the sidecar's file.
 void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints);
 
-/// Where the sidecar of a scene file is: "city.ply" -> "city.json".
+/// The path of a scene file's sidecar: "city.ply" -> "city.json".
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
 
-/// Writes all of the hints as a sidecar. Throws InputError when that fails.
+/// Writes all hints as a sidecar. Throws InputError when that fails.
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path);
 
 /// Poses of a training's cameras.json (array of position, 3x3 rotation from camera axes).
@@ -52,16 +52,17 @@ std::vector<Pose> read_cameras_json(const ByteSource& file);
 /// Poses of a transforms.json (frames with a 4x4 world-from-camera matrix, OpenGL axes).
 std::vector<Pose> read_transforms_json(const ByteSource& file);
 
-/// Where hints may be found; empty paths are not looked at.
+/// Files that may hold hints; empty paths are skipped.
 struct HintFiles {
   std::filesystem::path sidecar;
   std::filesystem::path cameras;
   std::filesystem::path transforms;
 };
 
-/// The sidecar's fields first, then what follows from the training cameras (first camera, their
-/// mean up, the box around them grown by half its diagonal), then estimate_hints. A sidecar with a
-/// mistake throws InputError; unusable camera files, which nobody wrote for us, only add a note.
+/// Takes each hint from the first source that has it: the sidecar; the training cameras (first
+/// camera, their mean up, the box around them grown by half its diagonal); estimate_hints. A faulty
+/// sidecar throws InputError. Unusable camera files, which were not written for us, only add a
+/// note.
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
                       std::vector<std::string>& notes);
 

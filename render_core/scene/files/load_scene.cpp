@@ -38,7 +38,7 @@ Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
   return {"3DGS ply", read_ply(file, header, context)};
 }
 
-/// Files are told apart by their first bytes; .splat has none of its own and goes by its name.
+/// The first bytes of a file tell its format. Only .splat has no such mark and is told by its name.
 Decoded read_file(const std::filesystem::path& path, const LoadContext& context) {
   const FileSource file(path);
   std::array<char, 4> magic{};

@@ -14,7 +14,7 @@ inline constexpr std::string_view supported_scenes =
     "(streamed "
     "SOG) or meta.json (SOG), a training output folder";
 
-/// What a path given by a user means.
+/// The scene that a path given by a user names.
 struct SceneLocation {
   enum class Kind { file, sog_folder, streamed_sog_folder };
   Kind kind = Kind::file;

@@ -20,7 +20,7 @@ namespace catgs {
 namespace {
 
 constexpr float least_opacity = static_cast<float>(alpha_min);
-// A file that keeps the logit gives back a little less than was written.
+// A file that stores the logit returns slightly less than was written.
 constexpr float invisible_opacity = least_opacity * (1.0f - 1e-5f);
 constexpr float absurd_value = 1e9f;
 constexpr float absurd_diagonals = 1e4f;
@@ -32,7 +32,7 @@ bool finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// What lies outside of this is absurd. Unlimited while `radius` is 0, as for a single Gaussian.
+/// A Gaussian outside of this is absurd. Unlimited while `radius` is 0, as for a single Gaussian.
 struct Reach {
   glm::vec3 centre{0.0f};
   float radius = 0.0f;

@@ -1,5 +1,6 @@
 #include "render_core/scene/files/save_scene.h"
 
+#include <cassert>
 #include <ostream>
 #include <string>
 
@@ -12,6 +13,7 @@
 namespace catgs {
 
 void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path) {
+  assert(cloud.sizes_agree());
   const std::string extension = path.extension().string();
   void (*write)(const GaussianCloud&, std::ostream&) = nullptr;
   if (extension == ".ply") write = write_ply;

@@ -7,18 +7,18 @@
 
 namespace catgs {
 
-/// How large a scene is, as its headers announce it.
+/// The size of a scene, as announced by its headers.
 struct SceneSize {
   std::uint64_t gaussians = 0;
-  /// Of the scene as loaded, 0…3; where only images tell, the highest possible.
+  /// SH degree of the scene as loaded, 0…3; where only images tell it, the highest possible one.
   int sh_degree = 0;
 
-  /// Of the decoded scene; no core's copy of it is larger.
+  /// Size of the decoded scene; no core's copy is larger.
   [[nodiscard]] std::uint64_t bytes() const;
 };
 
-/// Reads headers alone, so that a folder of large scenes costs next to nothing, and a scene that is
-/// too large can be refused before it is read. A count that the file cannot hold is an error here
+/// Reads headers alone. A folder of large scenes therefore costs next to nothing, and a scene that
+/// is too large can be refused before it is read. A count that the file cannot hold is an error
 /// already. Throws InputError, as load_scene() would.
 SceneSize read_scene_size(const std::filesystem::path& path, const LoadOptions& options = {});
 

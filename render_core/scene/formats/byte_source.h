@@ -13,12 +13,12 @@
 
 namespace catgs {
 
-/// Random-access bytes that readers parse: a file, or a buffer in memory (archive entries, tests,
+/// Random-access bytes for the readers: a file, or a buffer in memory (archive entries, tests,
 /// fuzzers). `read` may be called from several threads.
 ///
-/// Files are read with pread and not mapped: a training run may truncate the file while a server
-/// reads it, which must be an error message and not a SIGBUS; and mapped pages would count as a
-/// second copy of the scene in memory.
+/// Files are read with pread, not mapped. A training run may truncate the file while a server reads
+/// it, which must be an error message and not a SIGBUS. Mapped pages would also count as a second
+/// copy of the scene in memory.
 class ByteSource {
  public:
   ByteSource(std::string name, std::uint64_t size) : name_(std::move(name)), size_(size) {}

@@ -97,7 +97,7 @@ class BinaryReader {
     }
     return name;
   }
-  /// Over `count` records; what lies beyond the end is found out by the next read.
+  /// Skips `count` records. The next read notices if that leads beyond the end.
   void skip(std::uint64_t count, std::uint64_t record_bytes) {
     if (count > (file_.size() - offset_) / record_bytes) {
       throw InputError(file_.name(), where(), fmt::format("{} points do not fit the file", count));

@@ -122,7 +122,8 @@ glm::quat unpack_rotation(std::uint32_t packed) {
   return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
 }
 
-/// The bytes stand for the middles of 256 steps of [-4, 4], the first and last for its ends.
+/// The bytes stand for the middles of 256 steps of [-4, 4], the first and the last byte for its
+/// ends.
 float unpack_sh(std::byte packed) {
   const auto byte = std::to_integer<unsigned>(packed);
   if (byte == 0) return -4.0f;

@@ -56,7 +56,7 @@ std::string_view why(archive* zip) {
   return message ? message : "cannot be unpacked";
 }
 
-/// `piece`: room for bytes on their way.
+/// `piece`: buffer that the bytes pass through.
 std::vector<std::byte> unpack_entry(archive* zip, std::uint64_t limit, const ByteSource& file,
                                     const std::string& name, std::span<std::byte> piece) {
   std::vector<std::byte> bytes;
@@ -79,7 +79,7 @@ std::filesystem::path FolderFiles::path_of(const std::string& name) const {
     throw InputError(folder_.string(), "file name '" + printable(name) + "'", what);
   };
   if (name.empty() || relative.is_absolute() || leaves) refuse("leads out of the folder");
-  // The system would take what is before it for the name.
+  // The system would read the name up to the zero byte only.
   if (name.find('\0') != std::string::npos) refuse("has a zero byte");
   return folder_ / relative;
 }

@@ -13,7 +13,7 @@
 
 namespace catgs {
 
-/// The files that a scene made of several consists of, by their names in its meta data.
+/// The files of a scene that consists of several, by their names in its meta data.
 class FileSet {
  public:
   FileSet() = default;
@@ -23,8 +23,9 @@ class FileSet {
 
   /// Throws InputError when there is no such file. The source must not outlive the set.
   [[nodiscard]] virtual std::unique_ptr<ByteSource> open(const std::string& name) const = 0;
-  /// What the files were unpacked from, all together; the largest number: they were not packed.
-  /// A claim of how much a file holds is judged by this: unpacked bytes may be nothing but zeros.
+  /// Size of the archive that the files were unpacked from; the largest number when there is none.
+  /// Claims about a file's content are checked against this, because unpacked bytes may be nothing
+  /// but zeros.
   [[nodiscard]] virtual std::uint64_t packed_bytes() const {
     return std::numeric_limits<std::uint64_t>::max();
   }

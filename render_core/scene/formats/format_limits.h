@@ -8,21 +8,21 @@
 
 namespace catgs {
 
-/// Gaussians are indexed with 32 bits everywhere, two of them left for tags; 2^28 Gaussians are
-/// already 15 GB without SH.
+/// Gaussians are indexed with 32 bits everywhere, two of them left for tags. 2^28 Gaussians already
+/// take 15 GB without SH.
 inline constexpr std::uint64_t max_gaussians = std::uint64_t{1} << 28;
 
 /// Throws InputError when a file announces no Gaussians or more than max_gaussians.
 void require_count(const ByteSource& file, std::string_view where, std::uint64_t count);
 
-/// The same for compressed files, where the count cannot be checked against the size: refuses what
-/// would have to be compressed more than max_compression : 1. 2^16 Gaussians are always allowed, so
-/// that a lying header can make us take no more than 15 MB or about 3,000 times the file's size.
-/// `plain_bytes`: what the file stores of a Gaussian, decompressed.
+/// The same for compressed files, where the count cannot be checked against the size. Refuses
+/// counts that need a compression of more than max_compression : 1. 2^16 Gaussians are always
+/// allowed, so a lying header can make us allocate at most 15 MB or about 3,000 times the file's
+/// size. `plain_bytes`: decompressed bytes of the file per Gaussian.
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
                              std::size_t plain_bytes, std::uint64_t compressed_bytes);
 
-/// Far from what captures reach, and from what deflate can (1032).
+/// Far above what captures reach, far below what deflate can (1032).
 inline constexpr std::uint64_t max_compression = 256;
 
 /// SH degree with `coefficients` per channel beyond the constant one: 0, 3, 8, 15 or 24 (degree 4);

@@ -1,5 +1,6 @@
 #include "render_core/scene/formats/json_field.h"
 
+#include <cassert>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -11,48 +12,30 @@ namespace catgs {
 
 namespace {
 
-/// Documents are copied and printed by recursion: one of a million brackets would end the stack.
+/// Documents are copied and printed recursively: a million brackets would overflow the stack.
 constexpr int max_depth = 256;
-/// Two bytes, `0,`, take sixteen in memory, empty brackets a hundred: those count twice.
+/// A number takes sixteen bytes in memory. An empty array or object takes a hundred and counts
+/// twice.
 constexpr std::size_t max_values = std::size_t{1} << 20;
-
-/// Before any memory is taken for the document.
-void require_modest(const ByteSource& file, std::string_view text) {
-  int depth = 0;
-  std::size_t values = 1;  // each but the first follows a comma or is the first in its brackets
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      in_string = c != '"';
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '[' || c == '{') {
-      ++depth;
-      ++values;
-    } else if (c == ',') {
-      ++values;
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-    if (depth > max_depth)
-      throw InputError(file.name(), fmt::format("byte {}", i),
-                       fmt::format("is nested deeper than {}", max_depth));
-    if (values > max_values)
-      throw InputError(file.name(), fmt::format("byte {}", i),
-                       fmt::format("more than {} values", max_values));
-  }
-}
 
 }  // namespace
 
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit) {
   const std::vector<std::byte> bytes = file.read_all(limit);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  require_modest(file, text);
+  std::size_t values = 0;
+  const auto within_limits = [&](int depth, nlohmann::json::parse_event_t event, auto&) {
+    using Event = nlohmann::json::parse_event_t;
+    const bool opens = event == Event::object_start || event == Event::array_start;
+    if (opens && depth >= max_depth)
+      throw InputError(file.name(), "", fmt::format("is nested deeper than {}", max_depth));
+    if (opens || event == Event::value) values += opens ? 2 : 1;
+    if (values > max_values)
+      throw InputError(file.name(), "", fmt::format("has more than {} values", max_values));
+    return true;
+  };
   try {
-    return nlohmann::json::parse(text);
+    return nlohmann::json::parse(text, within_limits);
   } catch (const nlohmann::json::parse_error& error) {
     throw InputError(file.name(), fmt::format("byte {}", error.byte), "is not valid JSON");
   } catch (const nlohmann::json::out_of_range& error) {
@@ -88,6 +71,7 @@ std::size_t JsonField::size() const {
 }
 
 JsonField JsonField::operator[](std::size_t index) const {
+  assert(index < size());
   return JsonField(file_, fmt::format("{}[{}]", path_, index), value_->at(index));
 }
 

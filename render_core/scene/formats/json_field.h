@@ -18,11 +18,12 @@ namespace catgs {
 /// `limit` bytes, of more than 2^20 values or nested deeper than 256 are refused.
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit);
 
-/// `bytes` with U+FFFD for what is not UTF-8. File names may hold any bytes, JSON and the wire not.
+/// `bytes` with U+FFFD in place of invalid UTF-8. File names may hold any bytes, JSON and the wire
+/// may not.
 std::string to_utf8(const std::string& bytes);
 
-/// A value in a JSON document together with its place there, so that every complaint names file and
-/// field: "scene.json: limits.min[2]: is not a number". Borrows the document.
+/// A value in a JSON document together with its path, so that every error names file and field:
+/// "scene.json: limits.min[2]: is not a number". Borrows the document.
 class JsonField {
  public:
   JsonField(std::string file, const nlohmann::json& value)
@@ -41,7 +42,7 @@ class JsonField {
   [[nodiscard]] glm::vec3 vec3() const;
   /// Three coordinates, at most max_coordinate from the origin on each axis.
   [[nodiscard]] glm::vec3 place() const;
-  /// `at`, which this field holds in another form than place() reads.
+  /// The place `at`, which this field stores in another form than place() reads.
   [[nodiscard]] glm::vec3 as_place(const glm::vec3& at) const;
   /// A unit quaternion x, y, z, w, to one percent; normalised.
   [[nodiscard]] glm::quat orientation() const;

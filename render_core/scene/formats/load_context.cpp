@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <exception>
 #include <limits>
 #include <mutex>
@@ -11,6 +12,7 @@ namespace catgs {
 
 void LoadContext::for_blocks(std::size_t count, std::size_t block,
                              const std::function<void(std::size_t, std::size_t)>& body) const {
+  assert(block > 0);
   const std::size_t blocks = (count + block - 1) / block;
   const auto loading_thread = std::this_thread::get_id();
   std::atomic<std::size_t> ended{0};
@@ -39,6 +41,7 @@ void LoadContext::for_blocks(std::size_t count, std::size_t block,
 }
 
 LoadContext LoadContext::part(double from, double to) const {
+  assert(from >= 0.0 && from <= to && to <= 1.0);
   if (!progress_) return LoadContext(pool_);
   return LoadContext(pool_, [outer = progress_, from, to](double fraction) {
     outer(from + (to - from) * fraction);

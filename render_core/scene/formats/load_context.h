@@ -8,16 +8,16 @@
 
 namespace catgs {
 
-/// What every reader is given besides its bytes: threads, and somebody to tell about progress.
+/// Arguments of every reader besides its bytes: threads, and a receiver of progress.
 class LoadContext {
  public:
   explicit LoadContext(ThreadPool& pool, std::function<void(double)> progress = {})
       : pool_(pool), progress_(std::move(progress)) {}
 
-  /// Calls body(begin, end) for consecutive ranges of at most `block` of the indices [0, count),
-  /// on several threads, and reports progress as they end. Unlike ThreadPool::parallel_for, `body`
-  /// may throw: what the first failing range threw is rethrown here, the other ranges having ended
-  /// or been skipped.
+  /// Calls body(begin, end) for consecutive ranges of at most `block` of the indices [0, count), on
+  /// several threads, and reports progress as they end. Unlike with ThreadPool::parallel_for,
+  /// `body` may throw. The exception of the first failing range is rethrown here after the others
+  /// have ended or been skipped.
   void for_blocks(std::size_t count, std::size_t block,
                   const std::function<void(std::size_t begin, std::size_t end)>& body) const;
 

@@ -32,7 +32,7 @@ struct Row {
 static_assert(sizeof(Row) == sizeof(float) * (14 + max_rest));
 constexpr std::size_t row_fields = sizeof(Row) / sizeof(float);
 
-/// Where a field of Row comes from.
+/// The source of a field of Row.
 struct Field {
   std::size_t destination;  // float of Row
   std::size_t property;     // of the element

@@ -137,14 +137,14 @@ class HeaderParser {
     element.properties.push_back(std::move(property));
   }
 
-  /// Elements behind one with a list cannot be located; none of the formats has such.
+  /// Elements behind one with a list cannot be located; none of the formats has any.
   void locate_elements() {
     std::uint64_t offset = header_.bytes;
     for (PlyElement& element : header_.elements) {
       element.data_offset = offset;
       if (header_.encoding == PlyEncoding::ascii || element.has_list) return;
       if (element.row_bytes > 0 && element.count > (file_.size() - offset) / element.row_bytes)
-        return;  // cut off here: whoever needs this element or a later one reports it
+        return;  // cut off here: the reader of this element or a later one reports it
       offset += element.count * element.row_bytes;
     }
   }

@@ -1,6 +1,7 @@
 #include "render_core/scene/formats/sog.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -31,7 +32,8 @@ SogMeta::Channel between(float min, float max) {
   return values;
 }
 
-/// An early writer left the first of its ascending values out; it continues the others' slope.
+/// An early writer left out the first of the ascending values. The mean slope of
+/// the others gives it.
 SogMeta::Channel codebook(const JsonField& field) {
   SogMeta::Channel values{};
   if (field.size() != values.size()) field.fail("is not an array of 256 numbers");
@@ -82,8 +84,8 @@ void parse_version_2(const JsonField& meta, SogMeta& sog) {
   }
 }
 
-/// Every image must have a texel per Gaussian and not many more, before any is decoded. A file that
-/// stands for several of them, and bytes that an archive has made up, do not count.
+/// Checks, before any image is decoded, that each has a texel per Gaussian and not many more. A
+/// file named twice counts once, and bytes count only as far as the archive held them.
 void check_image_sizes(const FileSet& files, const SogMeta& sog, const ByteSource& meta_file) {
   std::vector<std::string> images = {sog.means_low, sog.means_high, sog.quats, sog.scales,
                                      sog.sh0_image};
@@ -104,7 +106,8 @@ void check_image_sizes(const FileSet& files, const SogMeta& sog, const ByteSourc
                           std::min(held, files.packed_bytes()));
 }
 
-/// The palette's image is 64 entries wide; version 1 does not state the degree otherwise.
+/// The palette's image is 64 entries wide; its width is the only statement of version 1 about the
+/// degree.
 void check_palette(const FileSet& files, SogMeta& sog) {
   const auto file = files.open(sog.folder + sog.centroids);
   const SogImageSize size = sog_image_size(*file);
@@ -128,8 +131,8 @@ struct Decoder {
   std::span<const SogRange> ranges;
   GaussianCloud& cloud;
 
-  /// With `texels` and more. Sizes were checked when the meta data was read, but files of a folder
-  /// may have been replaced since.
+  /// The image, with `texels` or more. Sizes were checked when the meta data was read, but files of
+  /// a folder may have been replaced since.
   [[nodiscard]] SogImage image(const std::string& name, std::size_t texels) const {
     const auto file = files.open(meta.folder + name);
     SogImage image = read_sog_image(*file);
@@ -272,8 +275,12 @@ SogMeta read_sog_meta(const FileSet& files, const std::string& name) {
 
 void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRange> ranges,
                 GaussianCloud& cloud, const LoadContext& context) {
+  for ([[maybe_unused]] const SogRange& range : ranges) {
+    assert(range.begin + range.count <= meta.count);
+    assert(range.destination + range.count <= cloud.size());
+  }
   const Decoder decoder{files, meta, ranges, cloud};
-  // The longest first, so that threads end together.
+  // The longest step first, so that threads end together.
   std::vector<std::function<void()>> steps;
   if (meta.sh_degree > 0) steps.emplace_back([&] { decoder.rest(); });
   steps.emplace_back([&] { decoder.means(); });

@@ -18,16 +18,16 @@ namespace catgs {
 // per Gaussian, and meta.json. As a zip archive (.sog) or as a folder. Version 1 quantises between
 // limits, version 2 by codebooks; SH is a palette and a label per Gaussian.
 
-/// What every SOG stores of a Gaussian, decompressed: a texel in each of five images.
+/// The size of a Gaussian in every SOG, decompressed: a texel in each of five images.
 inline constexpr std::size_t sog_texel_bytes = 4, sog_least_bytes = 5 * sog_texel_bytes;
 
 /// The checked content of meta.json.
 struct SogMeta {
-  /// 256 values per channel: what a byte of a texel stands for.
+  /// For each channel, the 256 values that a texel's byte can stand for.
   using Channel = std::array<float, 256>;
 
   int version = 2;
-  std::string folder;  // where the images are, "" or ending in "/"
+  std::string folder;  // folder of the images, "" or ending in "/"
   std::uint64_t count = 0;
   int sh_degree = 0;
   glm::vec3 min_log_mean{0.0f}, max_log_mean{0.0f};  // of sign(x) ln(|x| + 1)
@@ -45,7 +45,7 @@ SogMeta parse_sog_meta(const FileSet& files, const std::string& name);
 /// The same, and the sizes of the images; only they tell the SH degree of version 1.
 SogMeta read_sog_meta(const FileSet& files, const std::string& name);
 
-/// Gaussians [begin, begin + count) of a SOG that go to `destination` in the cloud.
+/// Gaussians [begin, begin + count) of a SOG, to be stored from `destination` on in the cloud.
 struct SogRange {
   std::size_t begin = 0;
   std::size_t count = 0;

@@ -33,7 +33,8 @@ struct Header {
   bool has_extensions = false;
 };
 
-/// One attribute of all Gaussians: bytes per Gaussian in the file, and how to take them over.
+/// One attribute of all Gaussians: bytes per Gaussian in the file, and the function that stores
+/// them.
 struct Attribute {
   const char* name;
   std::size_t bytes;
@@ -70,8 +71,8 @@ glm::quat first_three(const std::byte* from) {
   return {std::sqrt(std::max(0.0f, 1.0f - glm::dot(v, v))), v.x, v.y, v.z};
 }
 
-/// From version 3 on: two bits name the largest of x, y, z, w, which is not negative and not
-/// stored; the others, last one in the lowest bits, are a sign and 9 bits up to sqrt(1/2).
+/// From version 3 on. Two bits name the largest of x, y, z, w, which is not negative and not
+/// stored. The others, last one in the lowest bits, are a sign and 9 bits up to sqrt(1/2).
 glm::quat smallest_three(const std::byte* from) {
   auto bits = load_as<std::uint32_t>(from);
   const int largest = static_cast<int>(bits >> 30);
@@ -165,7 +166,7 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
   return header;
 }
 
-/// The axes that the extension records (u32 type, u32 length, payload) name, or the usual ones.
+/// The axes named by the extension records (u32 type, u32 length, payload), or the usual ones.
 AxisFlip axes_of(const ByteSource& file, std::span<const std::byte> extensions) {
   while (extensions.size() >= 8) {
     const auto type = load_as<std::uint32_t>(extensions.data());
@@ -202,7 +203,7 @@ GaussianCloud make_cloud(const Header& header) {
   return cloud;
 }
 
-/// Versions 1 to 3: one gzip stream, and only its end tells the axes.
+/// Versions 1 to 3: one gzip stream, which tells the axes only at its end.
 SpzFile read_gzip(const ByteSource& file, const LoadContext& context) {
   const auto stream = open_gzip(file);
   std::array<std::byte, gzip_header_bytes> start;

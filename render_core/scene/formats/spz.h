@@ -12,9 +12,9 @@ namespace catgs {
 
 // Niantic's .spz: attributes one after the other, quantised to bytes. Versions 1 (half-float
 // positions) to 3 are one gzip stream; version 4 has a plain header and one zstd stream per
-// attribute. By its specification the axes are right, up, back unless an extension says otherwise;
-// files written by tools that did not convert come out upside down, and a sidecar's "up" puts that
-// right.
+// attribute. By its specification the axes are right, up, back unless an extension says otherwise.
+// Tools that did not convert the axes wrote files that appear upside down; a sidecar's "up"
+// corrects that.
 
 struct SpzFile {
   int version = 0;
@@ -24,7 +24,7 @@ struct SpzFile {
 /// Whether the file begins like an .spz: gzip or the plain header of version 4.
 bool is_spz(const ByteSource& file);
 
-/// What the header says; the SH degree is that of the file. Throws InputError.
+/// Content of the header; the SH degree is that of the file. Throws InputError.
 struct SpzSize {
   std::uint64_t count = 0;
   int sh_degree = 0;

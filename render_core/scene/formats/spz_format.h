@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,11 +16,11 @@ inline constexpr std::size_t plain_header_bytes = 32;  // version 4
 inline constexpr std::uint8_t extensions_flag = 0x2;
 inline constexpr std::uint32_t coordinate_system_extension = 0xadbe0003;
 
-/// The constant SH coefficient is stored with less contrast than a colour, so that values a bit
+/// The constant SH coefficient is stored with less contrast than a colour, so that values slightly
 /// outside of [0, 1] fit.
 inline constexpr float colour_scale = 0.15f;
 
-/// Quaternion components are a sign and this magnitude, in units that end at sqrt(1/2).
+/// Quaternion components are a sign and a magnitude up to this, which stands for sqrt(1/2).
 inline constexpr std::uint32_t max_magnitude = 511;
 inline constexpr float magnitude_unit = 0.70710678f / static_cast<float>(max_magnitude);
 
@@ -29,6 +30,7 @@ inline constexpr glm::vec3 right_up_back(1.0f, -1.0f, -1.0f);  // signs to right
 /// Signs for the systems 1…8 of the coordinate system extension, which are numbered in binary:
 /// bit 0 right (not left), bit 1 up (not down), bit 2 front (not back).
 inline glm::vec3 signs_to_right_down_front(std::uint32_t system) {
+  assert(system >= 1 && system <= 8);
   const std::uint32_t bits = system - 1;
   return {bits & 1 ? 1.0f : -1.0f, bits & 2 ? -1.0f : 1.0f, bits & 4 ? 1.0f : -1.0f};
 }

@@ -25,7 +25,7 @@ using namespace spz;
 constexpr int version = 3;
 constexpr int max_fractional_bits = 16;
 constexpr int position_bits = 23;  // and a sign
-// The precision that Niantic's writer keeps: bits that noise fills would double the file.
+// The precision of Niantic's writer. Bits of mere noise would double the file.
 constexpr int sh1_bits = 5;
 constexpr int sh_rest_bits = 4;
 

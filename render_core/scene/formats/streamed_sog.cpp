@@ -48,7 +48,7 @@ std::vector<std::optional<LodPiece>> parse_node(const JsonField& lods, const Lod
   return pieces;
 }
 
-/// By recursion, which max_tree_depth bounds.
+/// Recursive; max_tree_depth bounds it.
 void parse_tree(const JsonField& node, int depth, LodTree& tree) {
   if (depth > max_tree_depth) node.fail(fmt::format("lies deeper than {}", max_tree_depth));
   if (const auto lods = node.find("lods")) {
@@ -59,7 +59,7 @@ void parse_tree(const JsonField& node, int depth, LodTree& tree) {
     for (std::size_t i = 0; i < children->size(); ++i) parse_tree((*children)[i], depth + 1, tree);
 }
 
-/// Level of the node's piece that stands for `wanted`; -1 when the node is empty.
+/// The level that the node offers for `wanted`; -1 when the node is empty.
 int level_for(const std::vector<std::optional<LodPiece>>& node, int wanted) {
   const int levels = static_cast<int>(node.size());
   for (int level = wanted; level < levels; ++level)
@@ -83,8 +83,8 @@ LodChoice choose(const LodTree& tree, const std::vector<int>& wanted) {
   return choice;
 }
 
-/// The files of a scene while its parts are opened, each once: a few bytes that many parts share
-/// would be a scene of any size.
+/// The files of a scene while its parts are opened. Each file may be opened once: many parts that
+/// share a few bytes could claim a scene of any size.
 class UnsharedFiles final : public FileSet {
  public:
   UnsharedFiles(const FileSet& folder, std::string scene)
@@ -106,8 +106,8 @@ class UnsharedFiles final : public FileSet {
   mutable std::uint64_t bytes_ = 0;
 };
 
-/// One of the SOGs that the tree refers to. Nothing of its files stays in memory: a scene may have
-/// thousands.
+/// One of the SOGs that the tree refers to. Nothing of its files stays in memory, because a scene
+/// may have thousands.
 struct Part {
   std::string archive;  // its name; empty: its files lie in the folder
   SogMeta meta;

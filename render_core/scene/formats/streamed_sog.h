@@ -14,7 +14,7 @@ namespace catgs {
 // PlayCanvas' streamed SOG: a folder of SOGs and lod-meta.json, a tree whose nodes hold the same
 // part of the scene at several levels of detail. We load one level per node, once.
 
-/// Where a level of a node is: Gaussians [offset, offset + count) of a file.
+/// The position of a node's level: Gaussians [offset, offset + count) of a file.
 struct LodPiece {
   std::size_t file = 0;
   std::size_t offset = 0;
@@ -26,40 +26,41 @@ struct LodTree {
   int levels = 0;
   std::vector<std::string> files;  // names of meta.json or .sog files
   std::string environment;         // drawn with every level; may be empty
-  /// Per node its pieces by level, 0 the finest; a node may lack levels.
+  /// For each node its pieces by level, 0 the finest; a node may lack levels.
   std::vector<std::vector<std::optional<LodPiece>>> nodes;
 };
 
 /// Reads lod-meta.json. Throws InputError naming the field.
 LodTree read_lod_tree(const ByteSource& file);
 
-/// What to load: for every node one piece, where it has any.
+/// The pieces to load, one for every node that has any.
 struct LodChoice {
   std::vector<LodPiece> pieces;
   int finest = 0, coarsest = 0;  // levels among the pieces
   std::size_t count = 0;         // Gaussians, the environment not among them
 };
 
-/// Level `level` everywhere. Nodes that lack it give their next coarser one, else the next finer.
+/// Level `level` everywhere. Nodes that lack it use their next coarser level, else the next finer
+/// one.
 LodChoice choose_level(const LodTree& tree, int level);
 
-/// The finest level whose Gaussians fit into `budget`, and after that one level more for as many
-/// nodes as still fit, cheapest first. Empty when not even the coarsest level fits.
+/// The finest level whose Gaussians fit into `budget`. As many nodes as still fit then get the next
+/// finer level, cheapest first. Empty when not even the coarsest level fits.
 std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t budget);
 
-/// Gaussians that `level` or `budget` (see read_streamed_sog) choose, the environment among them.
-/// Reads lod-meta.json and the environment's meta data only. Throws InputError.
+/// Number of Gaussians that `level` or `budget` select (see read_streamed_sog), the environment
+/// included. Reads lod-meta.json and the environment's meta data only. Throws InputError.
 std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget);
 
 struct StreamedSog {
-  std::string detail;   // what was loaded, for people: "level 2 of 0…6"
+  std::string detail;   // the chosen levels, for people: "level 2 of 0…6"
   GaussianCloud cloud;  // not sanitized
 };
 
 /// Loads the streamed SOG in `folder`; without `level` and `budget` the finest level. The
-/// environment counts towards the budget. Throws InputError, also when both are given, when there
-/// is no such level, when the coarsest level exceeds the budget, and when SOGs share a file.
+/// environment counts towards the budget. Throws InputError. Errors include: both are given, there
+/// is no such level, the coarsest level exceeds the budget, SOGs share a file.
 StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context);
 

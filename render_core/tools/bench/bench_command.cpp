@@ -1,4 +1,4 @@
-// catgs-render bench: how fast a camera path renders, and how well.
+// catgs-render bench: the speed and the quality of a renderer along a camera path.
 #include <memory>
 #include <optional>
 
@@ -25,7 +25,7 @@ struct BenchOptions {
 
 void bench(const BenchOptions& options, bool quiet) {
   if (!options.worst.empty() && options.render.pipeline.pipeline == "exact") {
-    throw InputError("--worst", "", "has no whole pictures of the exact pipeline to compare with",
+    throw InputError("--worst", "", "needs pictures of the exact pipeline to compare with",
                      "use --pipeline catgs or vanilla");
   }
   check_json(options.json);
@@ -56,27 +56,30 @@ void bench(const BenchOptions& options, bool quiet) {
 
 void add_bench_command(CLI::App& app) {
   auto options = std::make_shared<BenchOptions>();
-  CLI::App* command = app.add_subcommand("bench", "Measures how fast a camera path renders");
+  CLI::App* command =
+      app.add_subcommand("bench", "Measures how fast, and how well, a camera path renders");
   add_render_options(*command, options->render);
   command->add_option("--warmup", options->warmup,
                       fmt::format("Frames rendered before measuring ({})", default_warmup));
   command
       ->add_option("--views", options->views,
-                   "Views that render the path at the same time; the rate is that of all")
+                   "Views that render the path at the same time; the frame rate is their sum")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  auto* quality = command->add_flag("--quality", options->quality,
-                                    "Compare with the exact pipeline, or that with the reference");
+  auto* quality =
+      command->add_flag("--quality", options->quality,
+                        "Compare with the exact pipeline; compare exact with the reference");
   command
       ->add_option("--quality-every", options->quality_every,
-                   "Judge one frame in N and one key switch in N")
+                   "Judge one frame in N and one switch to a key frame in N")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
       ->add_option("--worst", options->worst,
-                   "Write the worst key and sub-frames here as PNG, beside what exact draws")
+                   "Write the worst key and sub-frames to this folder as PNG, with those of exact")
       ->needs(quality);
-  command->add_option("--json", options->json, "Write the report here; - prints it instead");
+  command->add_option("--json", options->json,
+                      "Write the report to this file; - prints it instead");
   command->callback([options, command] { bench(*options, is_quiet(*command)); });
 }
 

@@ -37,8 +37,8 @@ std::vector<Measurement::Frame> time_path(const RenderSetup& setup, const ViewSe
   return frames;
 }
 
-/// Calls body(i) for every i in [0, count): the first on this thread, each other on its own. Throws
-/// what one of them threw, when all have ended.
+/// Calls body(i) for every i in [0, count): the first on this thread, each other on a thread of its
+/// own. When all have ended, rethrows an exception of one of them.
 template <class Body>
 void side_by_side(std::size_t count, const Body& body) {
   std::vector<std::future<void>> others;
@@ -134,7 +134,7 @@ std::size_t warmup_frames(std::optional<std::size_t> asked, const RenderSetup& s
   const std::size_t most = setup.poses.size();
   if (asked && *asked > most) {
     throw InputError("--warmup", "", fmt::format("{} frames of a path of {}", *asked, most),
-                     "the path's first frames warm up: at most all of them");
+                     "the warm-up uses the path's first frames, so it has no more than the path");
   }
   return std::min(asked.value_or(default_warmup), most);
 }

@@ -1,6 +1,7 @@
 #include "render_core/tools/bench/bench_quality.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <string_view>
 #include <utility>
@@ -38,8 +39,8 @@ QualityReport judge_by_reference(const RenderSetup& setup, const ViewSettings& s
   return quality;
 }
 
-/// The judged pipeline beside the exact one. Comparing costs more than rendering, so pictures are
-/// gathered and compared in parallel.
+/// Compares the judged pipeline with the exact one. Comparing costs more than rendering, so
+/// pictures are gathered and compared in parallel.
 class Judge {
  public:
   Judge(const RenderSetup& setup, QualityReport& quality)
@@ -100,8 +101,8 @@ class Judge {
     return copy_image(frame);
   }
 
-  /// A pixel is C + T b over a background b, so two backgrounds tell its transmittance T. Where a
-  /// channel is clamped at 1 it shows less; hence the largest of the three.
+  /// A pixel over a background b is C + T b, so two backgrounds tell its transmittance T. A channel
+  /// clamped at 1 shows less of it; hence the largest of the three.
   static double see_through(const Image& over_black, const Image& over_backdrop) {
     std::size_t count = 0;
     for (std::size_t p = 0; p < over_black.rgb.size(); p += 3) {
@@ -132,7 +133,7 @@ QualityReport judge_by_exact(const RenderSetup& setup, const ViewSettings& setti
   FrameKind kind_before = FrameKind::key;
   std::size_t switches = 0;
   for (std::size_t i = 0; i < setup.poses.size(); ++i) {
-    FrameView frame;  // every frame is rendered: caches depend on the frames before
+    FrameView frame;  // every frame is rendered, because caches depend on earlier frames
     render_or_throw(*view, feed.next(), frame);
     const FrameKind kind = frame.stats.kind;
     Image image = copy_image(frame);
@@ -233,6 +234,7 @@ void Extent::add(const Extent& other) {
 
 QualityReport judge(const RenderSetup& setup, const ViewSettings& settings, std::size_t every,
                     const ProgressReport& report) {
+  assert(every > 0);
   return settings.pipeline == Pipeline::exact ? judge_by_reference(setup, settings, report)
                                               : judge_by_exact(setup, settings, every, report);
 }

@@ -10,12 +10,12 @@
 
 namespace catgs {
 
-/// Quality of a set of frames: PSNR of the mean squared error over them, and the worst of them.
+/// Quality of a set of frames: the PSNR of their mean squared error, and the worst frame.
 class QualityTally {
  public:
   /// `frame` is its number in the path.
   void add(const ImageQuality& quality, std::size_t frame);
-  /// All frames of another set; the worst frame keeps the number that it has there.
+  /// Adds all frames of another set. The worst frame keeps its number in that set.
   void add(const QualityTally& other);
 
   [[nodiscard]] std::size_t frames() const { return frames_; }
@@ -40,7 +40,7 @@ class QualityTally {
   double block_0_1_percent_psnr_ = psnr_db(0.0);
 };
 
-/// A number per frame: its mean and its largest value.
+/// Mean and largest value of a number per frame.
 struct Extent {
   std::size_t count = 0;
   double sum = 0.0, max = 0.0;
@@ -50,7 +50,7 @@ struct Extent {
   [[nodiscard]] double mean() const { return count == 0 ? 0.0 : sum / static_cast<double>(count); }
 };
 
-/// A frame and what it should have been, for people to look at.
+/// A frame and its ideal, for people to look at.
 struct JudgedFrame {
   std::size_t number = 0;
   Image judged, truth;
@@ -63,10 +63,10 @@ struct WorstFrames {
 
 struct QualityReport {
   std::string against;       // "exact pipeline, every 10th frame"
-  bool whole_images = true;  // else random pixels: no SSIM, no blocks and nothing of what follows
+  bool whole_images = true;  // else random pixels: no SSIM, no blocks, none of the following fields
   QualityTally key, sub;
   WorstFrames worst_key, worst_sub;
-  // Share of pixels that more than half of the background shows through: a view of nothing much
+  // Share of pixels that more than half of the background shows through. A view of almost nothing
   // flatters every PSNR.
   Extent see_through;
   // pop_excess() at the switches from a sub-frame to the next key frame.
@@ -75,10 +75,10 @@ struct QualityReport {
   std::size_t worst_pop_frame = 0;
 };
 
-/// What a switch may add to the change that the exact pipeline shows there.
+/// The largest change that a switch may add to the one that the exact pipeline shows there.
 inline constexpr double max_pop = 1.0 / 255.0;
 
-/// Makes the folder of write_worst_frames(), and tries whether files can be made in it. Throws
+/// Makes the folder for write_worst_frames(), and tries whether files can be created in it. Throws
 /// InputError.
 void make_worst_frames_folder(const std::filesystem::path& folder);
 
@@ -87,9 +87,9 @@ void make_worst_frames_folder(const std::filesystem::path& folder);
 /// InputError.
 void write_worst_frames(const std::filesystem::path& folder, const QualityReport& report);
 
-/// Judges a pipeline at its own poses: `exact` by the reference at random pixels of a few frames,
-/// anything else by the exact pipeline on whole pictures: every `every`-th frame, every `every`-th
-/// switch.
+/// Judges a pipeline at its own poses. The reference judges `exact`, at random pixels of a few
+/// frames. The exact pipeline judges all others, on whole pictures: every `every`-th frame and
+/// every `every`-th switch.
 QualityReport judge(const RenderSetup& setup, const ViewSettings& settings, std::size_t every,
                     const ProgressReport& report);
 

@@ -70,7 +70,7 @@ Json lists_json(const Measurement& measurement, Measurement::Kind kind) {
   return {{"mean", lists.mean}, {"max", lists.max}, {"tile_max", lists.tile_max}};
 }
 
-/// Adds frame_ms, stage_ms and list_length of frames of a kind.
+/// Adds frame_ms, stage_ms and list_length of the frames of one kind.
 void add_times(Json& json, const Measurement& measurement, Measurement::Kind kind,
                const std::string& suffix) {
   const std::vector<double> times = measurement.frame_ms(kind);
@@ -255,7 +255,7 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
                lists.overflowed);
   }
   if (lists.uncarried > 0) {
-    fmt::print("{:<14}{} lists had more giants (up to {} in view) than can be carried\n", "ORDER",
+    fmt::print("{:<14}{} lists had more giants than can be sorted (up to {} in view)\n", "ORDER",
                lists.uncarried, lists.giants_max);
   }
   if (result.quality) print_quality(*result.quality);

@@ -9,7 +9,7 @@
 
 namespace catgs {
 
-/// What `bench` found out, and about what.
+/// The results of `bench`, and what they are about.
 struct BenchResult {
   ViewSettings settings;
   std::size_t warmup = 0;
@@ -18,13 +18,13 @@ struct BenchResult {
   PairCost pair_cost;
   std::optional<QualityReport> quality;
 
-  /// Everything before the blend, over the Gaussians of the scene.
+  /// Time of everything before the blend, per Gaussian of the scene.
   [[nodiscard]] double ns_per_gaussian(const RenderSetup& setup) const;
 };
 
-/// The report of `catgs-render bench`. Fields that end in _key and _sub repeat one for key and
-/// sub-frames and are null where there are none. JSON has no infinity: null stands for the PSNR of
-/// identical pictures.
+/// The report of `catgs-render bench`. Fields that end in _key and _sub repeat a field for key and
+/// sub-frames; they are null where there are none. JSON has no infinity, so null stands for the
+/// PSNR of identical pictures.
 nlohmann::ordered_json report_json(const RenderOptions& options, const RenderSetup& setup,
                                    const BenchResult& result);
 

@@ -6,13 +6,13 @@
 namespace catgs {
 namespace {
 
-// Bytes of one.
+// Bytes of one element.
 constexpr double shape = 32.0;      // a resident Gaussian without harmonics above degree 0
 constexpr double record = 32.0;     // a projected Gaussian, as the blend reads it
 constexpr double depth_key = 4.0;   // 24 bits of it are sorted
-constexpr double slot = 4.0;        // index of a record
+constexpr double slot = 4.0;        // of which 24 bits are sorted
 constexpr double tile = 2.0;        // index of a tile, as a sort key
-constexpr double tile_count = 4.0;  // of a Gaussian
+constexpr double tile_count = 4.0;  // of one Gaussian
 constexpr double colour = 6.0;      // cached, half precision
 constexpr double rgb_pixel = 12.0;
 constexpr double cluster_bounds = 24.0;
@@ -21,7 +21,7 @@ constexpr double gaussians_per_cluster = 256.0;
 constexpr double bits_per_pass = 8.0;
 constexpr double depth_passes = 24.0 / bits_per_pass;
 
-/// Of a resident Gaussian with its harmonics.
+/// Bytes of a resident Gaussian with its harmonics.
 double whole(const FrameWork& f) { return f.scene_bytes / std::max(f.gaussians, 1.0); }
 
 double tile_passes(const FrameWork& f) {

@@ -28,7 +28,7 @@ RenderOptions with_trace(RenderOptions options, const std::string& trace) {
 
 std::string stem(const std::string& file) {
   std::filesystem::path path(file);
-  // A scene of many files is called by its folder.
+  // A scene of many files is named by its folder.
   if (path.filename() == "lod-meta.json" || path.filename() == "meta.json") {
     path = path.parent_path();
   }
@@ -67,7 +67,7 @@ PaperCase::PaperCase(const PaperOptions& options, std::size_t index, std::string
       quiet_(quiet),
       setup_(load_case(options, index, quiet)) {
   const std::vector<std::string>& files = options.cases[index];
-  for (std::size_t i = 1; i < files.size(); ++i) {  // mistakes show before anything is measured
+  for (std::size_t i = 1; i < files.size(); ++i) {  // mistakes appear before anything is measured
     set_path(setup_, with_trace(options.render, files[i]));
     (void)warmup_frames(options.warmup, setup_);
   }
@@ -84,7 +84,7 @@ PaperCase PaperCase::pruned(double keep_fraction) const {
   GaussianCloud cloud = *setup_.cloud;
   keep_most_important(cloud, keep_fraction);
   RenderSetup setup;
-  setup.scene = setup_.scene;  // the hints are those of the whole scene, so the paths stay
+  setup.scene = setup_.scene;  // with the whole scene's hints, so that paths stay the same
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(cloud));
   setup.pool = setup_.pool;
   setup.view = setup_.view;
@@ -203,7 +203,7 @@ void check(const PaperOptions& options) {
     throw InputError(
         "--images", "",
         fmt::format("{} folders for {} scenes", options.images.size(), options.cases.size()),
-        "name one for each --case, in their order");
+        "name one for each --case, in the same order");
   }
   for (const std::string& folder : options.images) {
     require(folder, "--images takes the folder of a COLMAP reconstruction");

@@ -15,19 +15,18 @@
 namespace catgs {
 
 struct PaperOptions {
-  RenderOptions render;                         // its scene and path are those of the cases
+  RenderOptions render;                         // each case sets its scene and path
   std::vector<std::vector<std::string>> cases;  // scene, traces…
   std::vector<std::string> images;              // COLMAP folders, one per case, or none at all
   double image_rate_hz = 30.0;                  // photographs per second
   std::optional<std::size_t> warmup;            // as warmup_frames() takes it
-  std::size_t every = 10;                       // quality and tiles look at one frame in so many
+  std::size_t every = 10;                       // quality and tiles look at one frame in this many
   std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
-  std::vector<std::string> variants;  // flags of more rows of ablation
+  std::vector<std::string> variants;  // flags of additional rows of ablation
   DeviceRates rates;                  // of floor
 };
 
-/// A renderer that the tables compare: a pipeline, and the flags by which `bench` would be told to
-/// do without a part of it.
+/// A renderer in the tables: a pipeline, and the flags that tell `bench` to leave out a part of it.
 struct Variant {
   std::string name;
   Pipeline pipeline = Pipeline::catgs;
@@ -41,12 +40,12 @@ inline const Variant ours{"Ours"};
 inline const Variant without_cache{"Ours-w/o cache", Pipeline::catgs, "--no-cache"};
 }  // namespace variants
 
-/// Ours with one part at a time taken away, and with the flags of `--variant`. A new part is a line
-/// here.
+/// Our pipeline with one part at a time left out, and with the flags of `--variant`. A new part is
+/// a line here.
 std::vector<Variant> ablations(const PaperOptions& options);
 
-/// A scene and its traces, loaded, and what was measured on it so far: several tables use the same
-/// runs.
+/// A scene and its traces, loaded, and the results measured on it so far: several tables use the
+/// same runs.
 class PaperCase {
  public:
   /// Case `index` of the options, which must outlive it. Throws InputError.
@@ -57,27 +56,27 @@ class PaperCase {
 
   [[nodiscard]] const std::string& label() const { return label_; }
   [[nodiscard]] const PaperOptions& options() const { return *options_; }
-  /// The scene; its path is one of the traces inside for_each_trace(), else undefined.
+  /// The scene. Inside for_each_trace() its path is that of one trace, elsewhere undefined.
   [[nodiscard]] const RenderSetup& setup() const { return setup_; }
   /// COLMAP folder; "" without one.
   [[nodiscard]] std::string images() const;
 
   [[nodiscard]] ViewSettings settings(const Variant& variant) const;
 
-  /// One measurement per trace; of a variant, measured when first asked for. An InputError says
-  /// which one the core does not render.
+  /// One measurement per trace, made for a variant at its first call. The InputError of a variant
+  /// that the core does not render names it.
   const std::vector<Measurement>& runs(const Variant& variant);
   std::vector<Measurement> runs(const ViewSettings& settings, std::string_view name);
 
-  /// What a trace is called in tables.
+  /// The name of a trace in tables.
   [[nodiscard]] std::string trace_name(std::size_t trace) const;
 
-  /// Calls visit(index of the trace, progress) with setup() on each trace in turn; `doing` is what
-  /// the terminal shows.
+  /// Calls visit(index of the trace, progress) with setup() on each trace in turn. The terminal
+  /// shows `doing`.
   using Visit = std::function<void(std::size_t trace, const ProgressReport& report)>;
   void for_each_trace(std::string_view doing, const Visit& visit);
 
-  /// How forecasts are made in what is measured from now on.
+  /// Sets how forecasts are made in all later measurements.
   void predict_by(const PredictorSettings& settings) { setup_.predictor = settings; }
 
   /// Puts setup() on a path of the caller's.
@@ -100,14 +99,13 @@ class PaperCase {
 /// All traces as one: the same queries, over all frames.
 Measurement pooled(const std::vector<Measurement>& runs);
 
-/// A column's name per case: the scene's, with its traces where that alone would not tell them
-/// apart.
+/// A column's name per case: that of the scene, with its traces where the scene alone is ambiguous.
 std::vector<std::string> case_labels(const std::vector<std::vector<std::string>>& cases);
 
 /// Whether a trace of any case is a script.
 bool has_script(const PaperOptions& options);
 
-/// Finds mistakes in the options before a large scene is read: counts, files that are not there.
+/// Finds mistakes in the options before a large scene is read, such as counts and missing files.
 /// Throws InputError.
 void check(const PaperOptions& options);
 

@@ -38,7 +38,8 @@ std::vector<PaperTable> mean_first(std::vector<PaperTable> of_scenes) {
   return of_scenes;
 }
 
-/// The first column of all scenes side by side, which the first note explains; then all of each.
+/// The first column of all scenes side by side, explained by the first note; then all columns of
+/// each scene.
 std::vector<PaperTable> first_column_first(std::vector<PaperTable> of_scenes) {
   std::vector<PaperTable> first = of_scenes;
   for (PaperTable& table : first) {
@@ -51,7 +52,7 @@ std::vector<PaperTable> first_column_first(std::vector<PaperTable> of_scenes) {
   return of_scenes;
 }
 
-/// Side by side, and behind them what grows over the first scene.
+/// All scenes side by side, then their growth relative to the first scene.
 std::vector<PaperTable> growing(std::vector<PaperTable> of_scenes) {
   PaperTable all = joined(of_scenes);
   const std::vector<PaperTable::Row> rows = all.rows;
@@ -76,7 +77,7 @@ std::vector<const PaperTableKind*> chosen_kinds(const std::vector<std::string>& 
   return kinds;
 }
 
-/// Rows of fps_table(), whose columns are `labels`.
+/// Rows of fps_table() for the columns `labels`.
 Json read_baseline(const std::string& path, const std::vector<std::string>& labels) {
   std::ifstream file(path);
   if (!file) throw InputError(path, "", "cannot be read");
@@ -86,14 +87,14 @@ Json read_baseline(const std::string& path, const std::vector<std::string>& labe
   } catch (const Json::parse_error& error) {
     throw InputError(path, fmt::format("byte {}", error.byte), "is not JSON");
   }
-  PaperTable unmeasured;  // a mistake shows before anything is measured
+  PaperTable unmeasured;  // a mistake appears before anything is measured
   unmeasured.columns = labels;
   unmeasured.rows = {{"", std::vector<Number>(labels.size())}};
   add_rows(unmeasured, 0, baseline, path);
   return baseline;
 }
 
-/// Ours over the fastest of the rows that `baseline` names, where they have a number.
+/// Adds the ratio of our pipeline to the fastest row of `baseline`, where that has a number.
 void add_lead(PaperTable& fps, const Json& baseline) {
   PaperTable::Row lead{"Ours over the best of these", {}};
   for (std::size_t c = 0; c < fps.columns.size(); ++c) {
@@ -107,7 +108,7 @@ void add_lead(PaperTable& fps, const Json& baseline) {
   fps.rows.push_back(std::move(lead));
 }
 
-/// Options of some tables alone. Without these they would change nothing, unnoticed.
+/// Options that concern some tables only. Without these tables they would be ignored silently.
 void refuse_unused(const CLI::App& app, const std::vector<const PaperTableKind*>& kinds) {
   struct Use {
     const char* option;
@@ -127,19 +128,19 @@ void refuse_unused(const CLI::App& app, const std::vector<const PaperTableKind*>
       return std::ranges::find(use.tables, kind->name) != use.tables.end();
     });
     if (used || app.count(use.option) == 0) continue;
-    throw InputError(use.option, "", "means nothing to the tables that were asked for",
-                     fmt::format("it is of --table {}", fmt::join(use.tables, ", ")));
+    throw InputError(use.option, "", "has no effect on the requested tables",
+                     fmt::format("it belongs to --table {}", fmt::join(use.tables, ", ")));
   }
 }
 
-/// Every table follows traces but that of photographs.
+/// Every table follows traces, except that of photographs.
 void require_traces(const PaperOptions& options, const std::vector<std::string>& labels,
                     const std::vector<const PaperTableKind*>& kinds) {
   for (const PaperTableKind* kind : kinds) {
     if (kind->name == "quality" && !options.images.empty()) continue;
     for (std::size_t i = 0; i < options.cases.size(); ++i) {
       if (options.cases[i].size() > 1) continue;
-      throw InputError("--case", labels[i], "has no trace", "name one or more behind the scene");
+      throw InputError("--case", labels[i], "has no trace", "name one or more after the scene");
     }
   }
 }
@@ -180,7 +181,7 @@ Json settings_json(const PaperCase& scene) {
           {"every", scene.options().every}};
 }
 
-/// What a table that is copied elsewhere should not be without.
+/// The data that should accompany a table wherever it is copied.
 std::string provenance(const Json& report) {
   const Json& settings = report["settings"];
   return fmt::format("{}x{}, focal length {} px, {}; version {}, commit {}.\n",
@@ -235,11 +236,12 @@ void add_device_rates(CLI::App& command, DeviceRates& rates) {
   const auto add = [&](const char* name, double& rate, const char* what) {
     command.add_option(name, rate, what)->check(CLI::PositiveNumber)->capture_default_str();
   };
-  add("--dram-bytes-per-s", rates.dram_bytes_per_s, "floor: what the device's memory moves (H200)");
+  add("--dram-bytes-per-s", rates.dram_bytes_per_s,
+      "floor: rate of the device's memory (default: H200)");
   add("--warp-instructions-per-s", rates.warp_instructions_per_s,
-      "floor: what its processors issue (H200)");
+      "floor: rate of its processors (default: H200)");
   add("--instructions-per-evaluation", rates.instructions_per_evaluation,
-      "floor: for a list entry on a warp's pixels");
+      "floor: instructions for a list entry on a warp's pixels");
 }
 
 }  // namespace
@@ -254,10 +256,10 @@ std::span<const PaperTableKind> paper_table_kinds() {
        {"window", "Impact of the window", window_table, one_each, true},
        {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side, true},
        {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side, true},
-       {"traces", "Each trace by itself", traces_table, one_each, false},
+       {"traces", "Each trace alone", traces_table, one_each, false},
        {"scaling", "One view of scenes of several sizes", scaling_table, growing, false},
-       {"floor", "Stages beside what their bytes and evaluations allow", floor_table, one_each,
-        false}}};
+       {"floor", "Stages and the least times for their bytes and evaluations", floor_table,
+        one_each, false}}};
   return kinds;
 }
 
@@ -271,30 +273,31 @@ void add_paper_command(CLI::App& app) {
   names.emplace_back("all");
   paper_app
       ->add_option("--table", command->tables,
-                   "One or more, separated by commas; all: those of the paper")
+                   "One or more tables, separated by commas; all: those of the paper")
       ->required()
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::IsMember(names));
   paper_app
-      ->add_option("--case", options.cases,
-                   "A scene and behind it its traces: TUM files or scripts (orbit, walk, head, "
-                   "drone, still, tour:FILE). Repeated, it adds a column for each scene")
+      ->add_option(
+          "--case", options.cases,
+          "A scene, then its traces: TUM files or scripts (orbit, walk, head, drone, still, "
+          "tour:FILE). Repeat it to add a column for another scene")
       ->required()
       ->type_name("SCENE TRACE...");
   auto* images = paper_app->add_option(
       "--images", options.images,
-      "quality: a COLMAP folder per case; compares with its photographs (PNG)");
+      "quality: compare with the photographs (PNG) of a COLMAP folder, one per case");
   paper_app
       ->add_option("--image-rate", options.image_rate_hz,
-                   "Photographs per second of the video that they are from")
+                   "quality: photographs per second of the video that they come from")
       ->needs(images)
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   paper_app->add_option(
       "--baseline", command->baseline,
-      "fps: rows measured elsewhere, JSON {\"FlashGS\": {\"city\": 120.5}}, and ours "
-      "over the best of them");
+      "fps: add rows measured elsewhere, JSON {\"FlashGS\": {\"city\": 120.5}}, and the ratio "
+      "of ours to the best of them");
   paper_app
       ->add_option("--keep-fraction", options.keep_fractions,
                    "pruned: shares of the Gaussians (1,0.5,0.25)")
@@ -302,7 +305,7 @@ void add_paper_command(CLI::App& app) {
       ->allow_extra_args(false);
   paper_app
       ->add_option("--variant", options.variants,
-                   "ablation: a row more, of ours with these flags of bench, like \"--window 8\"")
+                   "ablation: add a row for ours with these flags of bench, like \"--window 8\"")
       ->allow_extra_args(false);
   add_device_rates(*paper_app, options.rates);
   paper_app->add_flag("--anchor", options.render.anchor,
@@ -313,11 +316,11 @@ void add_paper_command(CLI::App& app) {
                         fmt::format("Frames rendered before measuring ({})", default_warmup));
   paper_app
       ->add_option("--every", options.every,
-                   "quality, tiles, traces: look at one frame in N of a trace")
+                   "quality, tiles, traces: judge one frame in N of a trace")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   paper_app->add_option("--json", command->json,
-                        "Write the tables here too; - prints JSON instead");
+                        "Also write the tables to this file; - prints JSON instead");
   paper_app->callback([command, paper_app] { paper(*command, *paper_app); });
 }
 

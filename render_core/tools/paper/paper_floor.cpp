@@ -1,4 +1,4 @@
-// How far each stage is from what its bytes and evaluations allow.
+// The table floor: the distance of each stage from the least time for its bytes and evaluations.
 #include <string>
 #include <utility>
 
@@ -56,7 +56,7 @@ FrameWork frame_work(const PaperCase& scene, const MeanWork& work) {
   return frame;
 }
 
-/// Rows of the frames of a kind: a stage each, and the frame.
+/// Adds rows for the frames of a kind: one for each stage, and one for the frame.
 void add_rows(PaperTable& table, const std::string& name, const Measurement& run, FrameKind kind,
               FrameWork frame, const DeviceRates& rates) {
   if (run.frame_ms(kind).empty()) return;
@@ -84,7 +84,7 @@ void add_rows(PaperTable& table, const std::string& name, const Measurement& run
     sum.bytes += work.bytes;
     sum.evaluations += work.evaluations;
     sum_ms += floor_ms(work, rates);
-    if (stage == Stage::convert) continue;  // the picture stays as it is
+    if (stage == Stage::convert) continue;  // the picture stays where it is
     add(fmt::format(" {}", stage_names[i]), measured_ms, work, floor_ms(work, rates));
   }
   add("", measured_sum_ms, sum, sum_ms);

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double thousand = 1e-3;
 
-/// What the tiles of some frames hold. A frame's tiles are compared with each other before frames
-/// are: a busy frame is not a busy tile.
+/// The loads of tiles in some frames. Tiles are compared within their frame before frames are
+/// compared: a busy frame is not a busy tile.
 class TileLoads {
  public:
   void add(std::vector<std::uint32_t> loads) {
@@ -66,7 +66,7 @@ void add_tiles(PaperTable& table, PaperCase& scene, const Variant& variant) {
       std::vector<std::uint32_t> lists = view->tile_loads();
       if (lists.empty()) {
         throw InputError("--table", "tiles",
-                         fmt::format("{} does not tell how long its lists are",
+                         fmt::format("{} does not report the length of its lists",
                                      setup.made.renderer->description()),
                          "use --renderer cpu");
       }

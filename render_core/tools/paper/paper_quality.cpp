@@ -1,5 +1,5 @@
 // The paper's table about quality: key frames and sub-frames against the exact pipeline, or against
-// the photographs that the scene was made from.
+// the photographs that the scene was trained on.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -34,11 +34,12 @@ std::filesystem::path find_photo(const std::filesystem::path& folder, const std:
   if (file.extension() == ".png" && std::filesystem::exists(file, error)) return file;
   const std::filesystem::path png = std::filesystem::path(file).replace_extension(".png");
   if (std::filesystem::exists(png, error)) return png;
-  throw InputError(png.string(), "", "does not exist",
-                   "photographs are read as PNG; convert others, with their names but for the end");
+  throw InputError(
+      png.string(), "", "does not exist",
+      "photographs must be PNG; convert others and keep their names except the extension");
 }
 
-/// The camera for a picture that was scaled since COLMAP saw it.
+/// The camera for a picture that was scaled after COLMAP had seen it.
 Camera scaled_to(const Camera& camera, glm::ivec2 size_px) {
   Camera scaled = camera;
   const glm::vec2 factor = glm::vec2(size_px) / glm::vec2(camera.size_px);
@@ -48,7 +49,7 @@ Camera scaled_to(const Camera& camera, glm::ivec2 size_px) {
   return scaled;
 }
 
-/// Renders the camera path through the poses of the photographs and judges what it shows there.
+/// Renders a camera path through the poses of the photographs, and compares it with them.
 class PhotoJudge {
  public:
   explicit PhotoJudge(PaperCase& scene)
@@ -61,8 +62,8 @@ class PhotoJudge {
     }
   }
 
-  /// Frames from one photograph to the next; the poses in between are interpolated, but forecasts
-  /// know the poses of the photographs passed so far only.
+  /// Renders the frames from one photograph to the next. The poses between are interpolated, but
+  /// forecasts know only the poses of the photographs passed so far.
   int follow_path() {
     const PaperOptions& options = scene_.options();
     const double rate_hz = options.render.fps.value_or(120.0);
@@ -120,7 +121,7 @@ class PhotoJudge {
     Variant variant;
     QualityTally tally{};
     std::unique_ptr<View> view{};
-    Image picture{};  // to be judged, if any
+    Image picture{};  // the sub-frame to be judged, if any
   };
 
   [[nodiscard]] Camera with_pose(Camera camera, const Pose& world_from_camera) const {
@@ -129,11 +130,11 @@ class PhotoJudge {
     return camera;
   }
 
-  /// The sub-frame, if there was one, and a frame of each other kind at the same pose.
+  /// Judges the sub-frame, if there was one, and a frame of each other kind at the same pose.
   void judge(std::size_t photo_index, const Image& photo, const Camera& camera) {
     for (Row& row : rows_) {
       if (&row == &sub_) continue;
-      FrameRequest request;  // without a forecast a frame of ours is a key frame
+      FrameRequest request;  // without a forecast our frame is a key frame
       request.camera = with_pose(camera, camera.world_from_camera);
       FrameView frame;
       render_or_throw(*row.view, request, frame);

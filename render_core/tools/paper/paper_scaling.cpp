@@ -1,4 +1,5 @@
-// How times and memory grow with a scene: the same view of scenes of several sizes.
+// The table scaling: growth of times and memory with the scene, in the same view of scenes of
+// several sizes.
 #include "render_core/metrics/summary.h"
 #include "render_core/tools/paper/paper_tables.h"
 

@@ -26,8 +26,8 @@ constexpr std::string_view fps_note =
     "Frames per second of wall clock, back to back, over all traces of a scene; the picture stays "
     "on the device.";
 
-/// The stages as the paper counts them. It times finding the lists' ranges apart; our cores do that
-/// while they sort, and so in the baseline too.
+/// The stages as the paper counts them. It times separately how the lists' ranges are found; our
+/// cores and our baseline do that while they sort.
 struct PaperStage {
   std::string_view name;
   std::array<bool, stage_count> parts;  // project, bin, sort, blend, convert

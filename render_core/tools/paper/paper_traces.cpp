@@ -1,5 +1,5 @@
-// Each trace by itself: how fast ours is beside precise culling alone, how even, how often it needs
-// key frames, and how good its sub-frames are.
+// The table traces, each trace alone: speed of ours and of exact culling, evenness, share of key
+// frames, and quality of sub-frames.
 #include <algorithm>
 #include <string>
 #include <utility>

@@ -1,5 +1,5 @@
-// The paper's table about the length of the window, with the curve behind it: how lists grow with
-// the trails that they cover.
+// The paper's table about the length of the window, and its curve: growth of lists with the trails
+// that they cover.
 #include <algorithm>
 #include <cmath>
 
@@ -13,18 +13,18 @@
 namespace catgs {
 namespace {
 
-/// Windows are held whatever the motion: beyond any trail, but finite, so that one without a bound
-/// (through the near plane) still gets no window.
+/// Makes windows independent of motion: longer than any trail, but finite, so that an unbounded
+/// trail (through the near plane) still gets no window.
 constexpr float any_trail_px = 1e9f;
-/// Nor does a forecast end them, which would be 100 ms away at most.
+/// Longer than the predictor's usual 100 ms, so that no forecast ends a window either.
 constexpr std::int64_t any_horizon_us = 1'000'000;
 
 constexpr std::size_t max_trail_frames = 32;
 constexpr std::size_t max_trail_gaussians = 50'000;
 
-/// Sum and number of the ways that Gaussian centres go in the image while the camera moves from
-/// `now` to `end`: of some Gaussians, where both images lie in front of the camera and the first
-/// in the picture.
+/// Adds the displacements of Gaussian centres in the image while the camera moves from `now` to
+/// `end`: their sum and number. Takes a sample of the Gaussians that are in front of the camera at
+/// both ends, and in the first picture.
 void add_trails(const GaussianCloud& cloud, const Camera& now, const Camera& end, Extent& trails) {
   const auto from = math::make_camera_model(now), to = math::make_camera_model(end);
   const std::size_t stride = 1 + cloud.size() / max_trail_gaussians;
@@ -40,7 +40,7 @@ void add_trails(const GaussianCloud& cloud, const Camera& now, const Camera& end
   }
 }
 
-/// The trails under some of the key frames with a full window of one run; `setup` has its trace.
+/// Adds the trails of some key frames with a full window of one run; `setup` has its trace.
 void add_trails(const RenderSetup& setup, const ViewSettings& settings, const Measurement& run,
                 Extent& trails) {
   const int window = settings.speculation.initial_window;
@@ -60,7 +60,7 @@ void add_trails(const RenderSetup& setup, const ViewSettings& settings, const Me
   }
 }
 
-/// The column of a window.
+/// The column for one window.
 struct WindowColumn {
   Number list, growth, mean_trail, held, p99_ms, max_ms;
 };

@@ -26,7 +26,7 @@ struct Splat {
 
 math::Vec3<double> to_vec3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
-/// Of Gaussian i, if any tile may see it.
+/// Projects Gaussian i, if any tile may see it.
 bool project(const GaussianCloud& cloud, std::size_t i, const math::CameraModel<double>& camera,
              int tile_rows, Splat& splat) {
   const math::Vec3<double> mean = to_vec3(cloud.mean[i]);
@@ -53,7 +53,7 @@ bool project(const GaussianCloud& cloud, std::size_t i, const math::CameraModel<
   return true;
 }
 
-/// Front to back.
+/// Sorted front to back.
 std::vector<Splat> project_all(const GaussianCloud& cloud, const Camera& camera, int tile_rows,
                                ThreadPool& pool) {
   constexpr std::size_t chunk = 16384;
@@ -102,7 +102,7 @@ class Box {
            covered.low <= left + static_cast<float>(box_px.x) - 0.5f;
   }
 
-  /// How many pixels the splat was blended into.
+  /// Returns the number of pixels that the splat was blended into.
   int blend(const Splat& splat) {
     int blended = 0, kept = 0;
     for (int i = 0; i < live_; ++i) {

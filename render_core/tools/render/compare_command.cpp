@@ -1,4 +1,4 @@
-// catgs-render compare: how close two pictures are.
+// catgs-render compare: the difference of two pictures.
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -70,7 +70,7 @@ void add_compare_command(CLI::App& app) {
   command->add_option("b", options->b, "Second picture")->required();
   command->add_flag("--json", options->json, "Print JSON");
   command->add_option("--require-psnr", options->required_psnr_db,
-                      "Exit with 1 below this many dB");
+                      "Exit with 1 if the PSNR is below this many dB");
   command->callback([options] { compare(*options); });
 }
 

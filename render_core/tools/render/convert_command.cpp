@@ -1,4 +1,4 @@
-// catgs-render convert: a scene in, another format out.
+// catgs-render convert: reads a scene and writes it in another format.
 #include <filesystem>
 #include <memory>
 
@@ -23,7 +23,7 @@ struct ConvertOptions {
   int threads = 0;
 };
 
-/// Estimated hints can be estimated again; others would be lost with the files they came from.
+/// Estimated hints can be estimated again. Others would be lost with the files that they came from.
 void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
   if (hints.source == "estimated") return;
   const auto sidecar = sidecar_of(out);
@@ -32,7 +32,7 @@ void write_hints_beside(const SceneHints& hints, const std::filesystem::path& ou
     return;
   }
   write_sidecar(hints, sidecar);
-  fmt::print("{}: first sight, from {}\n", sidecar.string(), hints.source);
+  fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
 }
 
 void convert(const ConvertOptions& options, bool quiet) {
@@ -50,7 +50,7 @@ void convert(const ConvertOptions& options, bool quiet) {
     fmt::print("{} could not be drawn and were dropped (catgs-render info says why)\n",
                scene.report.dropped);
   if (scene.cloud.size() < loaded)
-    fmt::print("{} of least importance were pruned\n", loaded - scene.cloud.size());
+    fmt::print("{} least important Gaussians were pruned\n", loaded - scene.cloud.size());
   for (const std::string& note : scene.notes) fmt::print(stderr, "note: {}\n", printable(note));
   write_hints_beside(scene.hints, options.out);
 }
@@ -63,10 +63,12 @@ void add_convert_command(CLI::App& app) {
   add_scene_options(*command, options->in, "in");
   command->add_option("out", options->out, "File to write: .ply, .splat or .spz")->required();
   command
-      ->add_option("--keep-fraction", options->keep_fraction,
-                   "Keep this share of the Gaussians, by opacity times mean projected area")
+      ->add_option(
+          "--keep-fraction", options->keep_fraction,
+          "Keep the most important share of the Gaussians, by opacity times mean projected area")
       ->capture_default_str();
-  command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
+  command->add_option("--threads", options->threads, "Number of threads; 0: one per core")
+      ->capture_default_str();
   command->callback([options, command] { convert(*options, is_quiet(*command)); });
 }
 

@@ -43,8 +43,8 @@ class PngFolderSink final : public FrameSink {
   std::size_t number_;
 };
 
-/// Uncompressed video. Its header has no field for the colour matrix; by custom readers take the
-/// size for it. Range and chroma position are written.
+/// Uncompressed video. Its header has no field for the colour matrix; readers usually infer it from
+/// the size. Range and chroma position are written.
 class Y4mSink final : public FrameSink {
  public:
   explicit Y4mSink(const FrameSinkSettings& settings)

@@ -7,7 +7,7 @@
 
 namespace catgs {
 
-/// Where rendered frames go. Writing throws InputError (a full disk, no right to write).
+/// A destination for rendered frames. Writing throws InputError (a full disk, no right to write).
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
@@ -15,10 +15,10 @@ class FrameSink {
   FrameSink(const FrameSink&) = delete;
   FrameSink& operator=(const FrameSink&) = delete;
 
-  /// What write() takes, always in host memory.
+  /// Format of the frames that write() takes, always in host memory.
   [[nodiscard]] virtual PixelFormat format() const = 0;
   virtual void write(const FrameView& frame) = 0;
-  /// Completes the file. To be called after the last frame; without it the file is unusable.
+  /// Completes the file. Call it after the last frame; without it the file is unusable.
   virtual void finish() = 0;
 };
 
@@ -29,8 +29,8 @@ struct FrameSinkSettings {
   std::size_t first_frame = 0;  // number of the first picture in a folder
 };
 
-/// By the extension of the path: one .png, a .y4m or .mp4 video (both BT.709 limited range 4:2:0),
-/// else a folder of frame_000000.png …, made if it is not there. Throws InputError.
+/// Chooses by the extension of the path: one .png, a .y4m or .mp4 video (both BT.709 limited range
+/// 4:2:0), else a folder of frame_000000.png …, created if missing. Throws InputError.
 std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings);
 
 /// H.264 in MP4 through libavformat and libx264; InputError where the build has no libav.

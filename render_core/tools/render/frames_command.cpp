@@ -36,7 +36,8 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
                      "choose one with --frames A:A+1, or give a folder");
   }
   if (options.checked_pixels > 0 && sink->format() != PixelFormat::rgb_f32) {
-    throw InputError("--pixels", "", "compares RGB, which a video has not", "write PNG pictures");
+    throw InputError("--pixels", "", "compares RGB, which a video does not have",
+                     "write PNG pictures");
   }
   return sink;
 }

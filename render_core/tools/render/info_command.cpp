@@ -1,4 +1,4 @@
-// catgs-render info: what a scene holds and how it will be seen.
+// catgs-render info: the content of a scene, and the first view of it.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -121,7 +121,7 @@ void print_text(const Json& info) {
   line("repaired", fmt::format("{}: {} zero rotations, {} clamped, {} with bad SH",
                                count(report["repaired"]), count(report["zero_rotations"]),
                                count(report["clamped"]), count(report["zeroed_sh"])));
-  line("first sight", hints["source"].get<std::string>());
+  line("first view", hints["source"].get<std::string>());
   line("  up", point(hints["up"]));
   line("  start",
        fmt::format("{}  looking at  {}", point(hints["start_position"]), point(hints["focus"])));
@@ -149,11 +149,10 @@ void info(const InfoOptions& options, bool quiet) {
 
 void add_info_command(CLI::App& app) {
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command =
-      app.add_subcommand("info", "Describes a scene: content, defects, first sight");
+  CLI::App* command = app.add_subcommand("info", "Describes a scene: content, defects, first view");
   add_scene_options(*command, options->scene);
   command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
-  command->add_flag("--json", options->json, "As JSON, lengths in world units");
+  command->add_flag("--json", options->json, "Print JSON, with lengths in world units");
   command->callback([options, command] { info(*options, is_quiet(*command)); });
 }
 

@@ -63,7 +63,7 @@ class Mp4Sink final : public FrameSink {
     frame_->height = frame.size_px.y;
     frame_->pts = next_pts_++;
     for (int plane = 0; plane < 3; ++plane) {
-      // Not reference-counted: the encoder copies what it wants to keep.
+      // Not reference-counted: the encoder copies the data that it keeps.
       frame_->data[plane] = reinterpret_cast<std::uint8_t*>(frame.planes[plane].data);
       frame_->linesize[plane] = static_cast<int>(frame.planes[plane].stride_bytes);
     }

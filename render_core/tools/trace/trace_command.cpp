@@ -1,4 +1,4 @@
-// catgs-render trace: makes pose streams, and checks that they are fit to measure with.
+// catgs-render trace: makes pose streams, and checks that they are fit for measurements.
 #include <functional>
 #include <memory>
 #include <numbers>
@@ -17,7 +17,7 @@
 namespace catgs {
 namespace {
 
-/// What the subcommands have in common.
+/// Options that the subcommands share.
 struct TraceOptions {
   SceneOptions scene;
   LensOptions lens{.size = "1920x1080", .focal_px = {}, .fov_y_deg = {}, .near_z = {}};
@@ -29,7 +29,7 @@ void add_trace_options(CLI::App& command, TraceOptions& options) {
   add_scene_options(command, options.scene);
   add_lens_options(command, options.lens);
   command.add_flag("--force", options.force,
-                   "Write the trace although it is unfit to measure with");
+                   "Write the trace even if it is unfit for measurements");
   command.add_option("--out", options.out, "TUM file to write")->required();
 }
 
@@ -39,7 +39,7 @@ struct LoadedScene {
 };
 
 LoadedScene load_for_trace(const TraceOptions& options, bool quiet) {
-  (void)make_lens(options.lens, 1.0f);  // a mistake shows before a large scene is read
+  (void)make_lens(options.lens, 1.0f);  // a mistake appears before a large scene is read
   LoadedScene loaded{load_scene(options.scene, 0, quiet), {}};
   loaded.bounds = robust_bounds(loaded.scene.cloud).value_or(Bounds{});
   return loaded;
@@ -81,7 +81,7 @@ void add_script(CLI::App& trace) {
       ->add_option("--script", options->script.script,
                    "orbit, walk, head, drone, still or tour:FILE (a TUM file of keyframes)")
       ->required();
-  command->add_option("--seed", options->script.seed, "Same seed, same trace")
+  command->add_option("--seed", options->script.seed, "The same seed gives the same trace")
       ->capture_default_str();
   command->add_option("--duration", options->script.duration_s, "Seconds")->capture_default_str();
   command->add_option("--fps", options->script.rate_hz, "Poses per second")->capture_default_str();
@@ -102,7 +102,9 @@ void add_anchor(CLI::App& trace) {
       "anchor", "Moves a recorded trace to a scene's start pose, upright and with its heading");
   add_trace_options(*command, *options);
   command->add_option("--trace", options->trace, "TUM file to read, up is -y")->required();
-  command->add_option("--fps", options->rate_hz, "Resample (default: the samples as recorded)")
+  command
+      ->add_option("--fps", options->rate_hz,
+                   "Resample to this rate (default: keep the recorded samples)")
       ->check(CLI::Range(1.0, 1000.0));
   command->callback([options, command] {
     const bool quiet = is_quiet(*command);
@@ -118,7 +120,7 @@ struct MotionCommand {
   const char* name;
   const char* description;
   MotionKind kind;
-  double default_speed;  // as given on the command line
+  double default_speed;  // as on the command line
 };
 
 void add_motion(CLI::App& trace, const MotionCommand& how) {
@@ -136,8 +138,9 @@ void add_motion(CLI::App& trace, const MotionCommand& how) {
                    straight ? "World units per second" : "Degrees per second")
       ->capture_default_str();
   if (straight) {
-    command->add_option("--reach", options->motion.reach,
-                        "Farthest from the start, world units (default: the scene's bounds)");
+    command->add_option(
+        "--reach", options->motion.reach,
+        "Largest distance from the start, world units (default: the scene's bounds)");
   }
   command->add_option("--duration", options->motion.duration_s, "Seconds")->capture_default_str();
   command->add_option("--fps", options->motion.rate_hz, "Poses per second")->capture_default_str();
@@ -156,7 +159,8 @@ void add_check(CLI::App& trace) {
     std::string trace;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = trace.add_subcommand("check", "Says whether a trace is fit to measure with");
+  CLI::App* command =
+      trace.add_subcommand("check", "Checks whether a trace is fit for measurements");
   add_scene_options(*command, options->scene);
   add_lens_options(*command, options->lens);
   command->add_option("--trace", options->trace, "TUM file to read")->required();

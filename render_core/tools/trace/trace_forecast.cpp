@@ -1,4 +1,4 @@
-// catgs-render trace forecast: how well ways to predict a camera foresee recorded motion.
+// catgs-render trace forecast: compares ways to predict recorded camera motion.
 #include <algorithm>
 #include <charconv>
 #include <memory>
@@ -31,7 +31,7 @@ struct ForecastOptions {
   std::string json;
 };
 
-/// "native" is 0.
+/// Parses a rate; "native" is 0.
 double parse_input_hz(const std::string& text) {
   if (text == "native") return 0.0;
   double rate_hz = 0.0;
@@ -135,24 +135,25 @@ void forecast(const ForecastOptions& options, bool quiet) {
 void add_trace_forecast_command(CLI::App& trace) {
   auto options = std::make_shared<ForecastOptions>();
   CLI::App* command = trace.add_subcommand(
-      "forecast", "Compares ways to predict a camera, as Markdown, on any traces");
+      "forecast", "Compares ways to predict a camera on recorded traces, as Markdown");
   command->add_option("--trace", options->traces, "TUM files of recorded motion")->required();
   command
       ->add_option("--input", options->inputs,
-                   "native, or how often a client sends the newest sample, Hz")
+                   "Rate at which a client sends its newest sample, Hz, or native")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--jitter-ms", options->jitter_ms, "Samples arrive up to so much later")
+  command->add_option("--jitter-ms", options->jitter_ms, "Samples arrive up to this much later")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Of the jitter")->capture_default_str();
-  command->add_option("--size", options->size, "Of the picture that errors are seen in, pixels")
+  command->add_option("--size", options->size, "Size of the picture in which errors count, pixels")
       ->capture_default_str();
   command->add_option("--focal-px", options->focal_px, "Its focal length, pixels")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--json", options->json, "Write the tables here too; - prints JSON instead");
+  command->add_option("--json", options->json,
+                      "Also write the tables to this file; - prints JSON instead");
   command->callback([options, command] { forecast(*options, is_quiet(*command)); });
 }
 

@@ -1,5 +1,5 @@
-// catgs-render trace windows: how long the windows of key frames are on recorded motion, by the
-// rules of motion/frame_groups.h alone, without a scene and without drawing anything.
+// catgs-render trace windows: the length of key frames' windows on recorded motion, by the rules of
+// motion/frame_groups.h alone. Needs no scene and draws nothing.
 #include <cmath>
 #include <memory>
 #include <string>
@@ -29,7 +29,7 @@ struct WindowsOptions {
   std::string json;
 };
 
-/// A way to choose key frames, as `bench` is told it.
+/// A way to choose key frames, as flags of `bench`.
 struct Rule {
   std::string name, flags;
 };
@@ -46,13 +46,13 @@ std::vector<Rule> rules(const WindowsOptions& options) {
   return all;
 }
 
-/// Frames of a kind, of all traces.
+/// Numbers of frames of each kind, over all traces.
 struct Groups {
   std::size_t frames = 0, keys = 0, keys_without_window = 0;
 };
 
-/// A trace at a frame rate, without a scene. `setup` is what FrameFeed wants: forecasts know the
-/// recorded samples up to each frame.
+/// A trace at a frame rate, without a scene. `setup` serves FrameFeed: forecasts know the recorded
+/// samples up to each frame.
 struct Journey {
   RenderSetup setup;
   SceneDepths depths;  // of every frame
@@ -74,7 +74,7 @@ Journey make_journey(const Trajectory& trace, double rate_hz, const WindowsOptio
   return journey;
 }
 
-/// Groups as a View makes them: a key frame is cut and shown where a group has ended.
+/// Counts groups as a View makes them: a key frame is made and shown where a group has ended.
 void add_groups(const Journey& journey, Groups& sum) {
   FrameFeed feed(journey.setup, journey.setup.view);
   FrameGroups groups(journey.setup.view.speculation);
@@ -123,7 +123,7 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
 void windows(const WindowsOptions& options, bool quiet) {
   (void)make_lens(options.lens, 0.0f);
   if (!(options.depths[0] < options.depths[1])) {
-    throw InputError("--depths", "", "the nearest comes first", "like --depths 1 20");
+    throw InputError("--depths", "", "the nearest depth must come first", "like --depths 1 20");
   }
   const std::vector<Rule> all_rules = rules(options);
   for (const Rule& rule : all_rules) (void)with_flags(options.pipeline, rule.flags);
@@ -153,7 +153,7 @@ void windows(const WindowsOptions& options, bool quiet) {
 void add_trace_windows_command(CLI::App& trace) {
   auto options = std::make_shared<WindowsOptions>();
   CLI::App* command = trace.add_subcommand(
-      "windows", "Frames per key frame and lost windows by each rule, as Markdown, on any traces");
+      "windows", "Prints frames per key frame and lost windows for each rule, as Markdown");
   command->add_option("--trace", options->traces, "TUM files of recorded motion")->required();
   command->add_option("--fps", options->rates_hz, "Frames per second; one or more")
       ->delimiter(',')
@@ -162,11 +162,11 @@ void add_trace_windows_command(CLI::App& trace) {
       ->capture_default_str();
   command
       ->add_option("--depths", options->depths,
-                   "Of the nearest and the farthest Gaussian in every frame, world units")
+                   "Depths of the nearest and the farthest Gaussian in every frame, world units")
       ->expected(2)
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--size", options->lens.size, "Of the picture, pixels")
+  command->add_option("--size", options->lens.size, "Size of the picture, pixels")
       ->capture_default_str();
   command->add_option("--focal-px", options->lens.focal_px, "Focal length, pixels")
       ->check(CLI::PositiveNumber)
@@ -177,9 +177,10 @@ void add_trace_windows_command(CLI::App& trace) {
   add_speculation_options(*command, options->pipeline);
   command
       ->add_option("--variant", options->variants,
-                   "A row more, by these flags of bench, like \"--window 16 --constant-velocity\"")
+                   "Add a row for these flags of bench, like \"--window 16 --constant-velocity\"")
       ->allow_extra_args(false);
-  command->add_option("--json", options->json, "Write the table here too; - prints JSON instead");
+  command->add_option("--json", options->json,
+                      "Also write the table to this file; - prints JSON instead");
   command->callback([options, command] { windows(*options, is_quiet(*command)); });
 }
 
