@@ -15,8 +15,8 @@
 #include "render_core/base/device_set.h"
 #include "render_core/base/error.h"
 #include "render_core/base/nearest_name.h"
+#include "server/base/required_file.h"
 #include "server/net/http.h"
-#include "server/required_file.h"
 
 namespace catgs {
 namespace {
@@ -128,7 +128,7 @@ Choices<std::string> words(std::initializer_list<const char*> list_of_words) {
 
 Setting device() {
   return {"device", Setting::Kind::text, "all|N[,N...]",
-          "CUDA devices that render, as CUDA numbers them; each holds the scenes",
+          "CUDA devices that render, by CUDA's numbers; each holds the scenes",
           // A TOML array comes as several values.
           [](ServerConfig& c, const Values& v) {
             c.devices = parse_devices(fmt::format("{}", fmt::join(v, ",")));
@@ -138,7 +138,7 @@ Setting device() {
 
 Setting admin_bind() {
   Setting setting =
-      text("admin-bind", "ADDRESS:PORT", "Address of /metrics and /api/sessions, or off",
+      text("admin-bind", "ADDRESS:PORT", "Address of /metrics and /api/sessions; off: none",
            &ServerConfig::admin_bind);
   setting.set = [](ServerConfig& c, const Values& v) {
     if (single(v) != "off") parse_endpoint(v.front());
@@ -148,9 +148,10 @@ Setting admin_bind() {
 }
 
 Setting trusted_proxy() {
-  Setting setting = list("trusted-proxy", "CIDR",
-                         "Networks of proxies whose X-Forwarded-For is believed, 10.0.0.0/8",
-                         &ServerConfig::trusted_proxies);
+  Setting setting =
+      list("trusted-proxy", "CIDR",
+           "Networks of proxies whose X-Forwarded-For is believed, such as 10.0.0.0/8",
+           &ServerConfig::trusted_proxies);
   setting.set = [](ServerConfig& c, const Values& v) {
     [[maybe_unused]] const TrustedProxies valid{v};  // throws else
     c.trusted_proxies = v;
@@ -173,22 +174,20 @@ Setting origins(std::string name, std::string help, std::vector<std::string> Ser
 std::vector<Setting> scene_settings() {
   using C = ServerConfig;
   return {
-      list("scene", "PATH", "Scene files or folders, or synth:KIND:COUNT[:SEED] (city, garden)",
+      list("scene", "PATH",
+           "Scene files or folders, or synth:KIND:COUNT[:SEED] (city, garden); loaded at the start",
            &C::scenes),
       list("scene-folder", "DIR",
-           "Folders of scenes that are loaded when somebody asks for them; new ones are found",
+           "Folders of scenes that are loaded when somebody asks; the server finds new ones",
            &C::scene_folders),
-      integer(
-          "scene-memory", "MB",
-          "Of --scene-folder, the least recently used go when all scenes take more than this on "
-          "a device; 0: they stay",
-          &C::scene_memory_mb, 0, 10'000'000),
-      integer("scene-residency", "SECONDS", "They stay at least so long", &C::scene_residency_s, 1,
-              86'400),
+      integer("scene-memory", "MB",
+              "Memory for all scenes on each device; for more, the least recently used scene of "
+              "--scene-folder is released; 0: no bound",
+              &C::scene_memory_mb, 0, 10'000'000),
       text("bind", "ADDRESS", "Address to listen on; 0.0.0.0 or :: is every interface", &C::bind),
       integer("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
       admin_bind(),
-      text("client-dir", "DIR", "Built browser client; by default found beside the program",
+      text("client-dir", "DIR", "Folder of the built browser client; by default beside the program",
            &C::client_dir),
   };
 }
@@ -196,30 +195,27 @@ std::vector<Setting> scene_settings() {
 std::vector<Setting> picture_settings() {
   using C = ServerConfig;
   return {
-      choice<RendererKind>("renderer", "Core that renders", &C::renderer,
-                           {{"auto", RendererKind::automatic},
-                            {"cpu", RendererKind::cpu},
-                            {"cuda", RendererKind::cuda}}),
+      choice<RendererKind>(
+          "renderer", "Core that renders; auto: CUDA if a device works, else the CPU", &C::renderer,
+          {{"auto", RendererKind::automatic},
+           {"cpu", RendererKind::cpu},
+           {"cuda", RendererKind::cuda}}),
       device(),
       integer("threads", "N", "Threads that render and encode; 0: one per core", &C::threads, 0,
               1024),
-      integer("lod", "N", "Streamed SOG: this level of detail, 0 is the finest; -1: by --budget",
+      integer("lod", "N", "Streamed SOG: level of detail, 0 is the finest; -1: by --budget",
               &C::lod, -1, 1000),
       integer("budget", "N",
-              "Streamed SOG: the finest levels with at most so many Gaussians; 0: no bound",
+              "Streamed SOG: the finest levels with at most this many Gaussians; 0: no bound",
               &C::gaussian_budget, 0, 1'000'000'000),
       choice<EncoderKind>("encoder", "Video encoder", &C::encoder,
                           {{"auto", EncoderKind::automatic},
                            {"nvenc", EncoderKind::nvenc},
                            {"x264", EncoderKind::x264},
                            {"jpeg", EncoderKind::jpeg}}),
-      choice<std::string>("x264-preset", "Preset of libx264; auto: by the processors' headroom",
+      choice<std::string>("x264-preset", "Preset of libx264; auto: by how busy the processors are",
                           &C::x264_preset,
                           words({"auto", "ultrafast", "ultrafast-subpel", "superfast"})),
-      integer("nvenc-sessions", "N", "NVENC sessions that the driver allows; 0: until it refuses",
-              &C::nvenc_sessions, 0, 1000),
-      choice<std::string>("nvenc-full", "When all are taken: encode with x264, or let wait",
-                          &C::nvenc_full, words({"x264", "queue"})),
       integer("fps", "N", "Nominal frame rate of a session", &C::fps, 1, 240),
       integer("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
               200'000),
@@ -230,22 +226,23 @@ std::vector<Setting> session_settings() {
   using C = ServerConfig;
   return {
       integer("max-sessions", "N", "Sessions at the same time", &C::max_sessions, 1, 10'000),
-      integer(
-          "min-fps", "N",
-          "Admit sessions while measured costs leave everybody this rate; 0: --max-sessions only",
-          &C::min_fps, 0, 240),
+      integer("min-fps", "N",
+              "Admit sessions while measured costs let all keep this frame rate; 0: no such limit",
+              &C::min_fps, 0, 240),
       integer("max-sessions-per-address", "N", "Sessions at the same time from one address",
               &C::max_sessions_per_address, 1, 10'000),
       integer("max-queue", "N", "Clients that may wait for a place; others are refused",
               &C::max_queue, 0, 10'000),
-      integer("idle-timeout", "SECONDS", "Close a session in which nothing moved; 0: never",
-              &C::idle_timeout_s, 0, 86'400),
-      integer("max-spectators", "N", "Clients that may watch one session; 0: nobody",
+      integer("idle-timeout", "SECONDS",
+              "End a session when nothing has moved for this long; 0: never", &C::idle_timeout_s, 0,
+              86'400),
+      integer("max-spectators", "N", "Clients that may watch one session; 0: none",
               &C::max_spectators, 0, 1000),
       integer("drain-wait", "SECONDS",
               "After SIGTERM, time for proxies to see /readyz fail before clients are told",
               &C::drain_wait_s, 0, 600),
-      integer("drain-deadline", "SECONDS", "Time for clients to go to another server after that",
+      integer("drain-deadline", "SECONDS",
+              "After --drain-wait, time for clients to move to another server",
               &C::drain_deadline_s, 0, 3600),
   };
 }
@@ -254,29 +251,28 @@ std::vector<Setting> access_settings() {
   using C = ServerConfig;
   return {
       flag("open", "Serve other machines without a token", &C::open),
-      flag("admin-open", "--admin-bind may be another than a loopback address: a private network",
+      flag("admin-open", "Allow an --admin-bind beyond loopback, for a private network",
            &C::admin_open),
       text("token-file", "FILE", "Access tokens, one per line; read again when it changes",
            &C::token_file),
-      text("token-key-file", "FILE", "Key of the expiring links made by 'catgs-server token'",
+      text("token-key-file", "FILE", "Key of the expiring links that 'catgs-server token' makes",
            &C::token_key_file),
       text("resume-key-file", "FILE",
            "Key that the servers of a fleet share, so that sessions move between them "
-           "[that of tokens, else random]",
+           "[the key of tokens, or a random one]",
            &C::resume_key_file),
       text("tls-cert", "FILE", "Certificate chain, PEM: serve https and wss", &C::tls_cert),
       text("tls-key", "FILE", "Private key of the certificate, PEM", &C::tls_key),
-      origins(
-          "allow-origin",
-          "Other sites whose pages may connect, and names that a server on a loopback address or "
-          "without tokens is known by, https://a.example; *: all",
-          &C::allow_origins, false),
+      origins("allow-origin",
+              "Sites whose pages may connect, such as https://a.example; *: all. A server on "
+              "loopback or without tokens answers to their names, too",
+              &C::allow_origins, false),
       origins("embed-origin", "Sites that may show the client in a frame; *: all",
               &C::embed_origins, true),
       trusted_proxy(),
-      choice<std::string>("log-format", "Form of the log on standard error", &C::log_format,
+      choice<std::string>("log-format", "Format of the log on standard error", &C::log_format,
                           words({"human", "json"})),
-      choice<std::string>("log-level", "Least level that is logged", &C::log_level,
+      choice<std::string>("log-level", "Lowest level that is logged", &C::log_level,
                           words({"debug", "info", "warn", "error"})),
   };
 }

@@ -18,7 +18,7 @@ struct ServerConfig {
   std::vector<std::string> scenes;  // paths, or synth:KIND:COUNT[:SEED]
   std::vector<std::string> scene_folders;
   int scene_memory_mb = 0;     // 0: no bound
-  int scene_residency_s = 60;  // at least
+  int scene_residency_s = 10;  // at least; no setting: tests shorten it
   std::string bind = "127.0.0.1";
   int port = 8080;
   std::string admin_bind = "127.0.0.1:9090";  // address:port or "off"
@@ -30,8 +30,6 @@ struct ServerConfig {
   int gaussian_budget = 0;   // of streamed SOG scenes; 0: no bound
   EncoderKind encoder = EncoderKind::automatic;
   std::string x264_preset = "auto";  // or one of effort_presets
-  int nvenc_sessions = 0;            // 0: as many as the driver opens
-  std::string nvenc_full = "x264";   // or "queue"
   int fps = 60;
   int bitrate_kbps = 8000;
   int max_sessions = 16;
@@ -55,7 +53,7 @@ struct ServerConfig {
   std::string log_format = "human";
   std::string log_level = "info";
 
-  /// Of who wants to see a scene; without tokens everybody may.
+  /// True if viewers need a token. Without tokens, everybody may see all scenes.
   [[nodiscard]] bool asks_for_tokens() const {
     return !token_file.empty() || !token_key_file.empty();
   }
@@ -86,14 +84,14 @@ void apply_toml(const std::string& path, ServerConfig& config, ConfigSources& so
 /// `lookup` is getenv, or a fake.
 void apply_environment(const std::function<const char*(const char*)>& lookup, ServerConfig& config,
                        ConfigSources& sources);
-/// Those of the environment's `names` that begin as the variables of settings do and are none, with
-/// what was probably meant; empty: there are none. They may be somebody else's (scripts', links of
-/// containers), so that this is for a warning.
+/// Returns the environment's `names` that start like settings' variables but are none, with the
+/// names probably meant; empty: none. They may belong to other programs (scripts, container links),
+/// so the caller only warns.
 std::string unknown_variables(const std::vector<std::string>& names);
 void apply_flag(const Setting& setting, const std::vector<std::string>& values,
                 ServerConfig& config, ConfigSources& sources);
 
-/// What no single value shows: missing scenes, half a TLS pair, an open door to the network.
+/// Checks combinations of values: missing scenes, half a TLS pair, public access without tokens.
 /// Throws InputError with the remedy.
 void validate(const ServerConfig& config);
 

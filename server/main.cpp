@@ -20,9 +20,9 @@
 #include "render_core/base/printable.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/device_error.h"
+#include "server/base/log.h"
 #include "server/commands.h"
 #include "server/config.h"
-#include "server/log.h"
 #include "server/server.h"
 
 namespace catgs {
@@ -32,13 +32,12 @@ constexpr int exit_ok = 0;
 constexpr int exit_failure = 1;
 constexpr int exit_usage = 2;
 
-/// Large blocks (scenes, pictures, encoders' buffers: not what is made for each frame) are mappings
-/// of their own, which go back to the system when they are freed. Left to itself, glibc raises the
-/// bound to the largest block that was ever freed, up to 32 MiB, and what visitors needed then
-/// stays with the process, between small blocks. Where one bound is set it no longer adapts the
-/// other, by which the ends of heaps go back: that stays wide enough for what frames allocate and
-/// free. No more heaps than threads that run at a time: glibc's eight for each processor fill for
-/// long with what these could hold.
+/// Returns freed memory to the system. Large blocks (scenes, pictures, encoders' buffers, but
+/// nothing that is made for each frame) become mappings, which go back when freed. By default glibc
+/// raises the mapping threshold to the largest block ever freed, up to 32 MiB. A fixed threshold
+/// also stops glibc from adapting the trim threshold. That is therefore set too, wide enough for
+/// the blocks of frames. The number of heaps is that of threads that run at a time, because glibc's
+/// eight for each processor take long to fill.
 void bound_heaps() {
   ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 8 << 20);
@@ -54,13 +53,13 @@ struct CommandLine {
 };
 
 void add_options(CLI::App& app, CommandLine& line) {
-  app.add_option("--config", line.config_file, "TOML file: KEY = VALUE, keys as the flags")
+  app.add_option("--config", line.config_file,
+                 "TOML file: KEY = VALUE, with the names of the flags as keys")
       ->envname("CATGS_CONFIG")
       ->option_text("FILE");
   app.add_flag("--print-config", line.print_config,
-               "Print the settings in force and where each comes from, check them, then exit; the "
-               "files that "
-               "they name are not opened");
+               "Print the settings in force with their sources, check them and exit; opens none of "
+               "the files that they name");
   const ServerConfig defaults;
   for (const auto& setting : settings()) {
     const std::string name = "--" + setting.name;
@@ -110,7 +109,7 @@ int serve(const CommandLine& line) {
   validate(config);
   set_up_log(config.log_format, config.log_level);
   if (const std::string unknown = unknown_variables(variable_names()); !unknown.empty())
-    spdlog::warn("the environment has what is no setting: {}", unknown);
+    spdlog::warn("the environment has variables that are no settings: {}", unknown);
   if (line.print_config) return exit_ok;
   Server server(config);
   server.run();
@@ -127,10 +126,9 @@ int run(int argc, char** argv) {
     return fmt::format("catgs-server: {} (see catgs-server {}--help)\n", error.what(), command);
   });
   app.footer(
-      "Settings come from defaults, then --config FILE (TOML), then CATGS_<NAME> variables, then\n"
-      "flags. Exit codes: 0 ended as asked, 1 failed (no GPU can be used, where one has to), 2 "
-      "bad\n"
-      "usage, scene or configuration.\n"
+      "Flags override CATGS_<NAME> variables, and these override --config FILE (TOML).\n"
+      "Exit codes: 0 ended as asked, 1 failed (also when a required GPU cannot be used),\n"
+      "2 bad usage, scene or configuration.\n"
       "Example: catgs-server --scene synth:city:300000");
   CommandLine line;
   add_options(app, line);
@@ -143,8 +141,8 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_ok : exit_usage;
   } catch (const DevicesUnusable& error) {
-    // A fault, even where no GPU is found: one that is lost looks like one that never was, one that
-    // is full empties, and a supervisor that tries again loses nothing.
+    // This is a fault, not a usage error, even if no GPU is found. A lost GPU looks like one that
+    // never existed, and a full one may become free. A supervisor loses nothing by trying again.
     std::cerr << "catgs-server: " << printable(error.what()) << '\n';
     return exit_failure;
   } catch (const InputError& error) {

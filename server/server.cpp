@@ -1,7 +1,6 @@
 #include "server/server.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -14,30 +13,30 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "render_core/base/device_set.h"
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
-#include "server/access.h"
-#include "server/link_preview.h"
-#include "server/liveness.h"
-#include "server/log.h"
-#include "server/metrics.h"
+#include "server/access/access.h"
+#include "server/access/signed_token.h"
+#include "server/base/liveness.h"
+#include "server/base/log.h"
+#include "server/base/metrics.h"
+#include "server/base/prompt_thread.h"
+#include "server/base/scene_id.h"
+#include "server/base/stop_while_loading.h"
+#include "server/base/watchdog.h"
+#include "server/frame_path.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
-#include "server/prompt_thread.h"
-#include "server/scene_catalog.h"
-#include "server/scene_library.h"
+#include "server/scenes/scene_api.h"
+#include "server/scenes/scene_library.h"
+#include "server/scenes/sidecar_saver.h"
 #include "server/schedule/pool_executor.h"
 #include "server/schedule/watched_executor.h"
-#include "server/session/session_registry.h"
-#include "server/sidecar_saver.h"
-#include "server/signed_token.h"
-#include "server/stop_while_loading.h"
-#include "server/watchdog.h"
+#include "server/visit/places.h"
 
 namespace catgs {
 namespace {
@@ -47,7 +46,7 @@ using namespace std::chrono_literals;
 constexpr auto quick_stop_deadline = 1000ms;
 constexpr auto farewell_time = 500ms;  // for close frames, after the deadline
 constexpr auto drain_poll = 20ms;
-// Two or three frames at a time keep a GPU busy; more only take turns on it.
+// Two or three frames at a time keep a GPU busy. More would only take turns.
 constexpr int render_threads_per_gpu = 3;
 
 constexpr std::string_view no_client_page =
@@ -65,8 +64,8 @@ StaticFiles find_client(const std::string& client_dir) {
   return {};
 }
 
-RegistryOptions registry_options(const ServerConfig& config) {
-  RegistryOptions options;
+VisitOptions visit_options(const ServerConfig& config) {
+  VisitOptions options;
   options.policy.idle_timeout = std::chrono::seconds(config.idle_timeout_s);
   options.policy.default_fps = config.fps;
   options.policy.default_bitrate_kbps = config.bitrate_kbps;
@@ -75,7 +74,6 @@ RegistryOptions registry_options(const ServerConfig& config) {
   options.max_queue = config.max_queue;
   options.max_spectators = config.max_spectators;
   options.min_fps = config.min_fps;
-  options.encoders = {config.nvenc_sessions, config.nvenc_full == "queue"};
   for (int i = 0; i < static_cast<int>(std::size(effort_presets)); ++i)
     if (effort_presets[static_cast<std::size_t>(i)].name == config.x264_preset)
       options.presets = {i, i};
@@ -90,41 +88,6 @@ SessionTokens session_tokens(const ServerConfig& config) {
   return SessionTokens(random_key());
 }
 
-constexpr std::string_view sidecar_part = "/sidecar";
-
-/// What there is to read of a scene, and where: "/api/scenes/ID<name>".
-enum class ScenePart { tours, poster };
-constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
-
-/// The token of "Authorization: Bearer TOKEN"; empty: none.
-std::string_view bearer_token(std::string_view authorization) {
-  constexpr std::string_view scheme = "Bearer ";
-  return authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "";
-}
-
-HttpResponse json_response(std::shared_ptr<const std::string> body) {
-  HttpResponse response;
-  response.content_type = "application/json";
-  response.body = std::move(body);
-  return response;
-}
-
-/// Of "GET /api/scenes".
-std::shared_ptr<const std::string> scene_list(
-    const std::vector<const SceneLibrary::Listing*>& scenes) {
-  auto list = nlohmann::json::array();
-  for (const auto* scene : scenes)
-    list.push_back({{"id", scene->id},
-                    {"title", scene->title},
-                    {"gaussians", scene->gaussians},
-                    {"loaded", scene->loaded}});
-  return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
-}
-
-HttpResponse unauthorized(std::string_view why) {
-  return text_response(401, fmt::format("401: {}\nSend it as Authorization: Bearer TOKEN\n", why));
-}
-
 }  // namespace
 
 struct Server::State {
@@ -136,37 +99,26 @@ struct Server::State {
         net(net_options()),
         pool(std::make_shared<ThreadPool>(config.threads)),
         devices(std::make_shared<DeviceSet>(config.devices)),
-        stop_signals(io),
-        drain_timer(io) {}
+        stop{.signals = boost::asio::signal_set(io), .timer = boost::asio::steady_timer(io)} {}
 
   NetOptions net_options();
   /// /healthz and /readyz, on both ports: probes of the admin port need neither TLS nor a host
   /// name.
   [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
-  std::string preview(const HttpRequest& request);
-  /// What the request's token admits to.
-  Permit permit_of(const HttpRequest& request) {
-    return access.permit(bearer_token(request.authorization), unix_now_s());
-  }
-  HttpResponse list_scenes(const Permit& permit);
-  HttpResponse part_of_scene(std::string_view scene_id, ScenePart part, const Permit& permit);
-  /// Of "PUT /api/scenes/ID/sidecar".
-  std::optional<HttpResponse> refuse_upload(const HttpRequest& request);
   HttpResponse respond_admin(const HttpRequest& request);
   void print_banner() const;
   void wait_for_signal();
-  /// Readiness ends; after `wait` clients are told, and after `deadline` more they are closed.
+  /// Ends readiness. Clients are told after `wait` and closed after a further `deadline`.
   void begin_stop(std::chrono::milliseconds wait, std::chrono::milliseconds deadline);
-  /// Nobody can be served here any more: clients are told, and run() throws.
+  /// This server cannot serve any more: clients are told, and run() throws.
   void give_up(const std::string& why);
   void drain(std::chrono::milliseconds deadline);
-  /// Goes on with `then` when nobody is connected any more, and at the latest at `deadline`.
+  /// Calls `then` when no client is connected or saving, at the latest at `deadline`.
   void when_empty(TimePoint deadline, std::function<void()> then);
   void finish_stop();
 
   const ServerConfig config;
-  std::optional<StopWhileLoading> stop_while_loading{std::in_place};
   Liveness liveness;
   AccessControl access;
   Metrics metrics;
@@ -177,29 +129,36 @@ struct Server::State {
   std::shared_ptr<ThreadPool> pool;
   std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
   std::unique_ptr<SceneLibrary> scenes;
+  std::unique_ptr<SceneApi> api;
   std::unique_ptr<SidecarSaver> saver;
-  // The answer to who may see every scene of a listing. Network thread.
-  std::weak_ptr<const std::vector<SceneLibrary::Listing>> listed;
-  std::shared_ptr<const std::string> whole_list;
   std::vector<EncoderChoice> encoders;
-  boost::asio::signal_set stop_signals;
-  boost::asio::steady_timer drain_timer;
-  std::unique_ptr<SessionRegistry> registry;
-  bool stopping = false;
-  std::string failure;  // for which run() ends; empty: as it was asked to
+  std::unique_ptr<FramePath> frames;
+  std::unique_ptr<Places> places;
+  struct {
+    std::optional<StopWhileLoading> while_loading{std::in_place};
+    boost::asio::signal_set signals;
+    boost::asio::steady_timer timer;
+    bool begun = false;
+    std::string failure{};  // why run() ends; empty: it was asked to
+  } stop;
 };
 
 NetOptions Server::State::net_options() {
   NetOptions options;
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return respond(request); };
-  options.uploads.refusal = [this](const HttpRequest& request) { return refuse_upload(request); };
-  options.uploads.take = [this](const HttpRequest& request, std::string body) {
-    return saver->save(std::string(scene_of(request.path, sidecar_part).value()), std::move(body),
-                       {std::string(request.if_match), std::string(request.if_none_match)});
+  options.uploads.refusal = [this](const HttpRequest& request) {
+    return api->refuse_upload(request);
   };
+  options.uploads.take = [this](const HttpRequest& request, std::string body,
+                                std::shared_ptr<const UploadPlace> place) {
+    return saver->save(api->saved_scene(request), std::move(body),
+                       {std::string(request.if_match), std::string(request.if_none_match)},
+                       std::move(place));
+  };
+  options.uploads.on_full = [this] { metrics.uploads_refused.Increment(); };
   options.accept = [this](std::shared_ptr<Connection> connection) {
-    return registry->accept(std::move(connection));
+    return places->accept(std::move(connection));
   };
   options.on_refused = [this](const std::string& line) {
     metrics.requests_refused.Increment();
@@ -232,84 +191,11 @@ std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& r
 
 HttpResponse Server::State::respond(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
-  if (request.path == "/api/scenes") return list_scenes(permit_of(request));
-  for (const ScenePart part : {ScenePart::tours, ScenePart::poster})
-    if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
-      return part_of_scene(*id, part, permit_of(request));
+  if (auto answer = api->respond(request)) return *std::move(answer);
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   if (!client.empty() && (request.path == "/" || request.path == "/index.html"))
-    return client.respond_with_head(request, preview(request));
+    return client.respond_with_head(request, api->preview(request));
   return client.respond(request);
-}
-
-/// For who sees the scene without a token: programs that make previews have none, and a preview
-/// must not tell more than the page.
-std::string Server::State::preview(const HttpRequest& request) {
-  constexpr std::string_view name = "scene=";
-  const auto argument = std::ranges::find_if(
-      request.arguments, [&](const std::string& text) { return text.starts_with(name); });
-  const auto listing = scenes->listing();
-  const auto scene =
-      argument == request.arguments.end()
-          ? listing->begin()
-          : std::ranges::find(*listing, std::string_view(*argument).substr(name.size()),
-                              &SceneLibrary::Listing::id);
-  if (scene == listing->end() || access.permit("", unix_now_s())(scene->id, Use::own_session))
-    return {};
-  return preview_elements(
-      {request.site, scene->id, scene->title, scene->gaussians, scene->poster != nullptr});
-}
-
-/// What the permit shows. Like hello, this never tells a stranger what is here.
-HttpResponse Server::State::list_scenes(const Permit& permit) {
-  const auto listing = scenes->listing();
-  std::vector<const SceneLibrary::Listing*> shown;
-  Refusal refusal = listing->empty() ? permit({}, Use::list) : std::nullopt;
-  for (const auto& scene : *listing) {
-    if (auto refused = permit(scene.id, Use::list))
-      refusal = std::move(refused);
-    else
-      shown.push_back(&scene);
-  }
-  if (shown.empty() && refusal) return unauthorized(*refusal);
-  if (shown.size() < listing->size()) return json_response(scene_list(shown));
-  if (listed.lock() != listing) {
-    listed = listing;
-    whole_list = scene_list(shown);
-  }
-  return json_response(whole_list);
-}
-
-HttpResponse Server::State::part_of_scene(std::string_view scene_id, ScenePart part,
-                                          const Permit& permit) {
-  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
-  const auto listing = scenes->listing();
-  const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
-  if (found == listing->end()) return text_response(404, "404: there is no such scene here\n");
-  if (part == ScenePart::tours) {
-    static const ToursAnswers none;
-    const ToursAnswers& tours = found->tours ? *found->tours : none;
-    return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
-  }
-  if (!found->poster)
-    return text_response(404, "404: the scene has no poster, or waits for its first visit\n");
-  HttpResponse response;
-  response.content_type = "image/jpeg";
-  response.cache_control = "private, max-age=60";
-  response.body = found->poster;
-  return response;
-}
-
-std::optional<HttpResponse> Server::State::refuse_upload(const HttpRequest& request) {
-  const auto scene_id = scene_of(request.path, sidecar_part);
-  if (!scene_id) return text_response(405, "405: only the sidecars of scenes are saved here\n");
-  const Permit permit = permit_of(request);
-  if (const auto refused = permit(*scene_id, Use::list)) return unauthorized(*refused);
-  if (const auto refused = permit(*scene_id, Use::save))
-    return text_response(403, "403: " + *refused + "\n");
-  if (std::ranges::count(*scenes->listing(), *scene_id, &SceneLibrary::Listing::id) == 0)
-    return text_response(404, "404: there is no such scene here\n");
-  return std::nullopt;
 }
 
 HttpResponse Server::State::respond_admin(const HttpRequest& request) {
@@ -320,7 +206,7 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
   if (request.path == "/metrics")
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
   if (request.path == "/api/sessions")
-    return text_response(200, registry->published_json(), "application/json");
+    return text_response(200, places->published_json(), "application/json");
   return text_response(404, "404: /metrics and /api/sessions are here\n");
 }
 
@@ -332,38 +218,41 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       s.io, s.metrics);
   s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
-  auto authorize = [&s](const std::string& token) { return s.access.permit(token, unix_now_s()); };
-  RegistryOptions options = registry_options(s.config);
+  auto authorize = [&s](const std::string& token) {
+    const auto resolve = [&s](auto wish) { return s.scenes->resolve(wish); };
+    return s.access.permit(token, unix_now_s(), resolve);
+  };
+  s.api = std::make_unique<SceneApi>(*s.scenes, authorize);
+  VisitOptions options = visit_options(s.config);
   PoolExecutor::Pools pools{s.pool};
   for (const auto& [device, views] : s.devices->views())
     pools.render.emplace(device, std::make_shared<ThreadPool>(render_threads_per_gpu));
-  if (!pools.render.empty()) options.devices = s.devices;
   options.cpus = s.pool->threads();
-  options.on_devices_lost = [&s](const std::string& why) {
-    s.give_up("no device renders any more: " + why);
-  };
   options.on_tick = [&s] { s.liveness.session_moved(); };
   std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(std::move(pools));
   if (parts.wrap) executor = parts.wrap(std::move(executor));
   executor = std::make_shared<WatchedExecutor>(std::move(executor), s.liveness);
-  s.registry = std::make_unique<SessionRegistry>(s.io, std::move(options), std::move(executor),
-                                                 *s.scenes, s.encoders, std::move(authorize),
-                                                 session_tokens(s.config), s.metrics);
+  s.frames = std::make_unique<FramePath>(
+      s.io, executor, static_cast<int>(s.devices->views().size()),
+      [&s](const auto& why) { s.give_up("no device renders any more: " + why); }, s.metrics);
+  s.places = std::make_unique<Places>(VisitContext{s.io, options, executor, *s.devices, *s.frames,
+                                                   *s.scenes, s.encoders, authorize,
+                                                   session_tokens(s.config), s.metrics});
 }
 
 Server::~Server() {
-  // The network thread hands connections to the registry, which ends before the network does.
+  // The network thread hands connections to the places, which are destroyed before the network.
   if (state_) state_->net.stop();
 }
 
 void Server::run() {
   State& s = *state_;
-  s.stop_signals.add(SIGINT);
-  s.stop_signals.add(SIGTERM);
-  s.stop_while_loading.reset();
+  s.stop.signals.add(SIGINT);
+  s.stop.signals.add(SIGTERM);
+  s.stop.while_loading.reset();
   s.wait_for_signal();
   s.net.start();
-  run_promptly();  // others have been started
+  run_promptly();  // after the other threads were started
   s.ready = true;
   s.print_banner();
   const Watchdog watchdog(s.liveness, [](const std::string& why) {
@@ -372,7 +261,7 @@ void Server::run() {
   });
   s.io.run();
   spdlog::info("stopped");
-  if (!s.failure.empty()) throw std::runtime_error(s.failure);
+  if (!s.stop.failure.empty()) throw std::runtime_error(s.stop.failure);
 }
 
 void Server::stop() {
@@ -396,9 +285,9 @@ void Server::State::print_banner() const {
 }
 
 void Server::State::wait_for_signal() {
-  stop_signals.async_wait([this](const boost::system::error_code& error, int signal) {
+  stop.signals.async_wait([this](const boost::system::error_code& error, int signal) {
     if (error) return;
-    if (stopping) ::_exit(1);
+    if (stop.begun) ::_exit(1);
     wait_for_signal();
     if (signal == SIGTERM)
       begin_stop(std::chrono::seconds(config.drain_wait_s),
@@ -409,42 +298,45 @@ void Server::State::wait_for_signal() {
 }
 
 void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::milliseconds deadline) {
-  if (std::exchange(stopping, true)) return;
+  if (std::exchange(stop.begun, true)) return;
   ready = false;
   if (wait == 0ms) return drain(deadline);
   spdlog::info("stopping: not ready any more, clients are told in {} s",
                std::chrono::duration_cast<std::chrono::seconds>(wait).count());
-  drain_timer.expires_after(wait);
-  drain_timer.async_wait([this, deadline](const boost::system::error_code&) { drain(deadline); });
+  stop.timer.expires_after(wait);
+  stop.timer.async_wait([this, deadline](const boost::system::error_code&) { drain(deadline); });
 }
 
 void Server::State::give_up(const std::string& why) {
-  if (stopping) return;
-  failure = why;
-  spdlog::critical("{}; the process ends, for its supervisor to start it anew", failure);
+  if (stop.begun) return;
+  stop.failure = why;
+  spdlog::critical("{}; the process ends, for its supervisor to start it anew", stop.failure);
   begin_stop(0ms, quick_stop_deadline);
 }
 
 void Server::State::drain(std::chrono::milliseconds deadline) {
-  spdlog::info("stopping: {} connections are told", registry->connections());
-  registry->drain(deadline);
+  spdlog::info("stopping: {} connections are told", places->connections());
+  places->drain(deadline);
+  saver->stop();
   when_empty(Clock::now() + deadline, [this] {
-    registry->close_all();
+    places->close_all();
     when_empty(Clock::now() + farewell_time, [this] { finish_stop(); });
   });
 }
 
 void Server::State::when_empty(TimePoint deadline, std::function<void()> then) {
-  if (registry->connections() == 0 || Clock::now() >= deadline) return then();
-  drain_timer.expires_after(drain_poll);
-  drain_timer.async_wait([this, deadline, then = std::move(then)](
-                             const boost::system::error_code&) { when_empty(deadline, then); });
+  const bool empty = places->connections() == 0 && net.uploads() == 0;
+  if (empty || Clock::now() >= deadline) return then();
+  stop.timer.expires_after(drain_poll);
+  stop.timer.async_wait([this, deadline, then = std::move(then)](const boost::system::error_code&) {
+    when_empty(deadline, then);
+  });
 }
 
 void Server::State::finish_stop() {
   net.stop();
-  registry->stop_timers();
-  stop_signals.cancel();  // nothing is left to wait for but frames under way: io.run() returns
+  places->stop_timer();
+  stop.signals.cancel();  // nothing is left to wait for but frames under way: io.run() returns
 }
 
 }  // namespace catgs

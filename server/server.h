@@ -3,17 +3,16 @@
 #include <functional>
 #include <memory>
 
+#include "server/base/clock.h"
 #include "server/config.h"
-#include "server/pipeline/frame_ticket.h"
 
 namespace catgs {
 
 class FrameExecutor;
 
-/// What a test may put into a server.
+/// Parts of a server that a test may replace.
 struct ServerParts {
-  /// Puts something between the sessions and what renders for them: who watches it, or lets it
-  /// fail.
+  /// Wraps the executor, to observe it or to make it fail.
   std::function<std::shared_ptr<FrameExecutor>(std::shared_ptr<FrameExecutor> executor)> wrap{};
   std::function<TimePoint()> liveness_clock = Clock::now;  // by which /healthz judges
 };
@@ -28,12 +27,13 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Serves until SIGINT, SIGTERM or stop(): then readiness ends, clients are told, and run()
-  /// returns when they have left, within two seconds; on SIGTERM --drain-wait and --drain-deadline
-  /// give proxies and clients more time. A second signal ends the process at once. Where no device
-  /// renders any more or the network thread fails, clients are told in the same way, and then it
-  /// throws std::runtime_error. Where a thread that serves visitors stalls for minutes, it ends the
-  /// process with status 1.
+  /// Serves until SIGINT, SIGTERM or stop(). Then readiness ends, clients are told, and run()
+  /// returns when they have left, within two seconds. On SIGTERM, --drain-wait and --drain-deadline
+  /// give proxies and clients more time. A second signal ends the process at once.
+  ///
+  /// If no device renders any more or the network thread fails, clients are told in the same way.
+  /// run() then throws std::runtime_error. If a thread that serves visitors stalls for minutes, the
+  /// process ends with status 1.
   void run();
   /// Any thread.
   void stop();

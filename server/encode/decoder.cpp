@@ -44,8 +44,8 @@ Decoder::Decoder(Codec codec) : state_(std::make_unique<State>()) {
   if (decoder == nullptr) throw InputError(state_->name, "", "libavcodec has no such decoder");
   state_->context = libav::make_context(*decoder);
   state_->context->thread_count = 1;  // frame threads would hold pictures back
-  // Concealment stays on: without it libavcodec 59 finds fault with every picture of several
-  // slices. What it conceals it says, and such a picture is refused.
+  // Concealment stays on, because without it libavcodec 59 rejects every picture of several slices.
+  // It reports what it conceals, and such a picture is refused.
   state_->context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_EXPLODE;
   libav::Options options;
   libav::open(*state_->context, *decoder, options);

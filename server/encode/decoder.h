@@ -21,11 +21,11 @@ struct DecodedPicture {
   bool idr = false;
 };
 
-/// The receiving end, for self-tests, tests and load generators: libavcodec, one frame in, one
-/// picture out. Damage is an error, never concealed.
+/// A libavcodec decoder for self-tests, tests and load generators. It takes one frame and returns
+/// one picture. Damage is an error and never concealed.
 class Decoder {
  public:
-  /// Throws InputError where libavcodec lacks the decoder.
+  /// Throws InputError if libavcodec lacks the decoder.
   explicit Decoder(Codec codec);
   ~Decoder();
 

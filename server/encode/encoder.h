@@ -16,7 +16,7 @@ enum class Codec { h264, mjpeg };
 
 enum class EncoderKind { automatic, nvenc, x264, jpeg };
 
-/// libavcodec's name of an encoder: "h264_nvenc", "libx264", "mjpeg"; "automatic".
+/// The libavcodec name of an encoder: "h264_nvenc", "libx264", "mjpeg"; or "automatic".
 std::string_view encoder_name(EncoderKind kind);
 
 inline constexpr int min_encoded_side_px = 16;
@@ -42,7 +42,7 @@ struct EncoderSettings {
 struct EncodedFrame {
   std::vector<std::byte> bytes;
   bool idr = false;
-  bool sharp = false;  // coded so finely that to encode the same picture again would show nothing
+  bool sharp = false;  // another pass over the same picture would show no difference
 };
 
 struct EncodeStatus {
@@ -64,20 +64,20 @@ class Encoder {
   virtual EncodeStatus encode(const FrameView& frame, bool force_idr,
                               EncodedFrame& out) noexcept = 0;
 
-  /// From the next frame on, without an IDR: frames of at most bitrate / fps. `fps` is the rate
-  /// that the session really reaches, 1…settings.fps; the slower it runs, the more bits a frame
-  /// gets. The bitrate is clamped to 100 kbit/s and to what the level of the running stream allows
-  /// (h264: at least the bitrate it was opened with).
+  /// Limits frames to bitrate / fps from the next one on, without an IDR. `fps` is the rate that
+  /// the session really reaches, 1…settings.fps. A slower session gets more bits a frame. The
+  /// bitrate is clamped between 100 kbit/s and the maximum of the stream's level (h264: at least
+  /// the bitrate it was opened with).
   virtual void set_rate(int bitrate_kbps, int fps) noexcept = 0;
 
   [[nodiscard]] virtual Codec codec() const = 0;
   [[nodiscard]] virtual std::string_view name() const = 0;  // "libx264", "mjpeg", "h264_nvenc"
-  /// For WebCodecs: "avc1.PPCCLL" of the bitstream really produced, known from the start; empty for
-  /// MJPEG.
+  /// The codec string for WebCodecs: "avc1.PPCCLL" of the real bitstream, known from the start;
+  /// empty for MJPEG.
   [[nodiscard]] virtual std::string codec_string() const = 0;
 };
 
-/// What a start-up probe found out by really encoding a few frames.
+/// The result of a start-up probe, which encodes a few frames.
 struct EncoderProbe {
   EncoderKind kind = EncoderKind::x264;
   std::string name;

@@ -34,8 +34,8 @@ struct NalUnit {
   [[nodiscard]] unsigned header() const { return std::to_integer<unsigned>(bytes[0]); }
 };
 
-/// NAL units of an Annex B byte stream, in order. Bytes before the first start code and empty units
-/// are left out; so are zero bytes that trail a unit.
+/// Returns the NAL units of an Annex B byte stream in order. Leaves out bytes before the first
+/// start code, empty units and trailing zero bytes.
 std::vector<NalUnit> split_annex_b(std::span<const std::byte> stream);
 
 /// Colour of the samples; defaults are what E.2.1 infers when the field is absent. Code points of
@@ -65,7 +65,7 @@ struct Vui {
   std::optional<BitstreamRestriction> restriction;
 };
 
-/// What an SPS says, as far as a sender or a decoder's set-up needs it.
+/// The fields of an SPS that a sender or a decoder's set-up needs.
 struct Sps {
   int profile_idc = 0;
   int constraint_flags = 0;  // the byte after profile_idc
@@ -80,10 +80,10 @@ struct Sps {
 /// Reads an SPS NAL unit (7.3.2.1.1, E.1.1).
 std::optional<Sps> parse_sps(NalUnit sps);
 
-/// The SPS with bitstream_restriction saying max_num_reorder_frames = 0, so that a decoder shows
-/// each frame at once instead of waiting for the deepest reordering that the level allows. A VUI
-/// without other facts is added where there is none; everything before the restriction keeps its
-/// bits. Only for streams without B-frames, where it is the truth.
+/// Returns the SPS with max_num_reorder_frames = 0 in its bitstream_restriction. A decoder then
+/// shows each frame at once instead of waiting for the deepest reordering that the level allows. A
+/// VUI without other facts is added if needed; all bits before the restriction stay. Only valid for
+/// streams without B-frames.
 std::optional<std::vector<std::byte>> with_zero_reorder_frames(NalUnit sps);
 
 /// "avc1.PPCCLL" (RFC 6381): profile, constraint flags and level in hexadecimal.

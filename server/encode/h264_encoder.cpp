@@ -19,14 +19,14 @@ namespace catgs {
 
 namespace {
 
-// Of 0 to 51. What an encoder tells is what it planned: where frames are small, blocks were coded
-// more coarsely than that. A rendered city has 41 (at 1 Mbit/s) to 46 dB there.
+// The quantiser of a sharp picture, of 0 to 51. An encoder reports its planned value; small frames
+// were coded more coarsely. A rendered city then has 41 dB (at 1 Mbit/s) to 46 dB.
 constexpr double sharp_quantiser = 16.0;
 constexpr double coarsest_quantiser = 51.0;
 
-/// A VBV of one frame interval: no frame may take longer on a link of this bitrate. The encoder
-/// counts time by the nominal rate it was opened with; a session that runs slower than that gets a
-/// higher bitrate per nominal second instead, for the same bits per real one.
+/// A VBV of one frame interval, so that no frame takes longer on a link of this bitrate. The
+/// encoder counts time at its nominal rate. A slower session gets a higher bitrate per nominal
+/// second, for the same bits per real second.
 void apply_rate(AVCodecContext& context, int bitrate_kbps, int fps) {
   // libavcodec hands whole kbit to x264: round up, a VBV of 0 would mean none.
   const std::int64_t frame_kbit = (bitrate_kbps + fps - 1) / fps;
@@ -38,7 +38,7 @@ void apply_rate(AVCodecContext& context, int bitrate_kbps, int fps) {
   context.rc_buffer_size = static_cast<int>(frame_kbit * 1000);
 }
 
-/// What every H.264 encoder is told, whoever makes it.
+/// The settings common to all H.264 encoders.
 void apply_common(AVCodecContext& context, const EncoderSettings& settings, int level_idc) {
   context.width = settings.size_px.x;
   context.height = settings.size_px.y;
@@ -74,8 +74,8 @@ void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) {
   to.insert(to.end(), bytes.begin(), bytes.end());
 }
 
-/// SPS and PPS of an open encoder as an Annex B stream, each SPS saying that frames come in order.
-/// `codec_string` is that of the SPS.
+/// Returns the SPS and PPS of an open encoder as an Annex B stream. Each SPS says that frames come
+/// in order. `codec_string` gets the SPS's codec string.
 std::vector<std::byte> read_parameter_sets(const AVCodecContext& context, const char* name,
                                            std::string& codec_string) {
   constexpr std::byte start_code[] = {std::byte{0}, std::byte{0}, std::byte{0}, std::byte{1}};
@@ -134,7 +134,7 @@ class LibavH264Encoder final : public Encoder {
   [[nodiscard]] std::string codec_string() const override { return codec_string_; }
 
  private:
-  /// Lends the frame's planes to libav without a copy. Encoders without delay are done with them
+  /// Lends the frame's planes to libav without a copy. Encoders without delay have released them
   /// when encode() returns.
   void borrow(const FrameView& frame) {
     av_frame_unref(input_.get());
@@ -189,8 +189,8 @@ struct X264Preset {
 /// Slower presets than medium are no use live.
 constexpr X264Preset x264_presets[] = {
     {"ultrafast", "ultrafast", ""},
-    // A moving camera moves pictures by parts of a pixel, of which ultrafast's motion vectors know
-    // nothing: 3 to 4 dB for 1.4 times its work.
+    // A moving camera shifts pictures by fractions of a pixel, and ultrafast has no sub-pixel
+    // motion vectors. They gain 3 to 4 dB for 1.4 times its work.
     {"ultrafast-subpel", "ultrafast", "subme=1:deblock=0,0"},
     {"superfast", "superfast", ""},
     {"veryfast", "veryfast", ""},

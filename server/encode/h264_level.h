@@ -6,13 +6,13 @@
 
 namespace catgs::h264 {
 
-/// Lowest level (as level_idc: 31 = level 3.1) whose limits in ITU-T H.264 table A-1 admit frames
-/// of this size (luma samples) at this rate (frames/s) and bitrate (1000 bit/s), with one reference
-/// frame. nullopt: no level does.
+/// Returns the lowest level (as level_idc: 31 = level 3.1) for this frame size (luma samples), rate
+/// (frames/s) and bitrate (1000 bit/s) with one reference frame. Limits are those of ITU-T H.264
+/// table A-1. nullopt: no level fits.
 std::optional<int> level(glm::ivec2 size_px, int fps, int bitrate_kbps);
 
-/// MaxBR of a level, in 1000 bit/s, as it stands for the Baseline and Main profiles (High allows a
-/// quarter more); nullopt for a level_idc that is not in table A-1.
+/// Returns the MaxBR of a level in 1000 bit/s for the Baseline and Main profiles. High allows a
+/// quarter more. nullopt: the level_idc is not in table A-1.
 std::optional<int> level_max_bitrate_kbps(int level_idc);
 
 }  // namespace catgs::h264

@@ -13,8 +13,8 @@ struct Yuv420Planes {
   std::ptrdiff_t stride_bytes[3] = {};
 };
 
-/// Video samples (BT.709, limited range) to what JFIF prescribes (BT.601, full range). Even sides;
-/// chroma keeps its place in the middle of 2x2 pixels. The planes must not overlap.
+/// Converts video samples (BT.709, limited range) to those of JFIF (BT.601, full range). Sides are
+/// even. Chroma stays centred in each 2x2 pixels. The planes must not overlap.
 void video_to_jfif(const Yuv420Planes& video, const Yuv420Planes& jfif, glm::ivec2 size_px);
 
 }  // namespace catgs

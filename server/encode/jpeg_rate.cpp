@@ -8,7 +8,7 @@ namespace catgs {
 namespace {
 
 constexpr double exponent = 0.7;
-// Before the first frame: what a rendered scene takes at qscale 1.
+// The start value: the bytes of a rendered scene at qscale 1.
 constexpr double typical_bytes_per_pixel = 0.25;
 
 }  // namespace

@@ -4,22 +4,22 @@
 
 namespace catgs {
 
-/// Chooses the quantiser of each JPEG so that frames stay near bitrate / fps. Every JPEG stands
-/// alone, so the last one is the best forecast of the next: its bytes times qscale^0.7 hardly move
-/// between neighbouring frames (the exponent was fitted on rendered scenes).
+/// Chooses the quantiser of each JPEG so that frames stay near bitrate / fps. The last JPEG
+/// predicts the next: bytes times qscale^0.7 is nearly constant between neighbouring frames. The
+/// exponent was fitted on rendered scenes.
 class JpegRateControl {
  public:
   static constexpr int finest_qscale = 2;
   static constexpr int sharp_qscale = 4;  // finer ones can hardly be told apart
   static constexpr int coarsest_qscale = 31;
 
-  /// `pixels` of a frame; set the budget before the first qscale().
+  /// `pixels` is the size of a frame. Call set_budget() before the first qscale().
   explicit JpegRateControl(std::size_t pixels);
 
   void set_budget(int bitrate_kbps, int fps);
   /// libavcodec's quantiser scale for the next frame.
   [[nodiscard]] int qscale() const;
-  /// Told after every frame: how large it became.
+  /// Records the size of each frame.
   void update(int qscale, std::size_t bytes);
 
  private:

@@ -11,7 +11,7 @@ extern "C" {
 
 namespace catgs::libav {
 
-// Owners of libav's objects, and its words: what it logs and what its error codes mean.
+// Owning pointers for libav's objects, and its log and error texts.
 
 struct Deleter {
   void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
@@ -22,7 +22,7 @@ using CodecContext = std::unique_ptr<AVCodecContext, Deleter>;
 using Frame = std::unique_ptr<AVFrame, Deleter>;
 using Packet = std::unique_ptr<AVPacket, Deleter>;
 
-/// Empty objects; they throw std::bad_alloc where libav returns null.
+/// Make empty objects. They throw std::bad_alloc if libav returns null.
 CodecContext make_context(const AVCodec& codec);
 Frame make_frame();
 Packet make_packet();
@@ -37,21 +37,21 @@ class Options {
 
   void set(const char* key, const char* value);
   [[nodiscard]] AVDictionary** raw() { return &dictionary_; }
-  /// First option that nobody took: after avcodec_open2, one that the codec does not know.
+  /// The first unused option. After avcodec_open2, it is one that the codec does not know.
   [[nodiscard]] std::string first_unused() const;
 
  private:
   AVDictionary* dictionary_ = nullptr;
 };
 
-/// Throws InputError where this libavcodec lacks the encoder.
+/// Throws InputError if this libavcodec lacks the encoder.
 const AVCodec& find_encoder(const char* name);
 
-/// avcodec_open2 that throws InputError with libav's reason, also for an option nobody knows.
+/// Calls avcodec_open2. Throws InputError with libav's reason, or for an unknown option.
 void open(AVCodecContext& context, const AVCodec& codec, Options& options);
 
-/// Collects the errors that libav logs on this thread while it lives, so that they reach our
-/// message instead of stderr. The first one silences libav's own printing for the whole process.
+/// Collects the errors that libav logs on this thread, so that they appear in our message instead
+/// of on stderr. The first LogCapture silences libav's own output for the whole process.
 class LogCapture {
  public:
   LogCapture();
@@ -59,7 +59,7 @@ class LogCapture {
   LogCapture(const LogCapture&) = delete;
   LogCapture& operator=(const LogCapture&) = delete;
 
-  /// What went wrong: the logged errors, else the meaning of `error_code`.
+  /// The logged errors, or else the meaning of `error_code`.
   [[nodiscard]] std::string explain(int error_code) const;
 
  private:

@@ -19,7 +19,8 @@ bool loads(const char* library) {
   return true;
 }
 
-/// libavcodec says only that NVENC could not be opened; people need to know which part is missing.
+/// Finds the missing part for the message, because libavcodec only says that NVENC could not be
+/// opened.
 std::string nvenc_failure(const std::string& libav_reason) {
   if (!loads("libcuda.so.1")) return "no NVIDIA driver: libcuda.so.1 not found";
   if (!loads("libnvidia-encode.so.1")) {
@@ -29,7 +30,7 @@ std::string nvenc_failure(const std::string& libav_reason) {
   return "driver present, but no GPU here has a usable NVENC engine: " + libav_reason;
 }
 
-/// A grey frame, a few times over: enough to pass through every part of an encoder.
+/// Encodes a grey frame a few times, which exercises every part of an encoder.
 void encode_some(Encoder& encoder, glm::ivec2 size_px) {
   const auto width = static_cast<std::size_t>(size_px.x);
   std::vector<std::byte> grey(width * static_cast<std::size_t>(size_px.y), std::byte{128});

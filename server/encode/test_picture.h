@@ -10,9 +10,9 @@
 
 namespace catgs {
 
-// Pictures to try encoders on: for the self-test and for tests.
+// Pictures that test encoders, for the self-test and for tests.
 
-/// An i420 picture in memory of its own, planes without padding; black at first. Even sides.
+/// An i420 picture that owns its memory, without padding. It starts black and has even sides.
 struct I420Picture {
   explicit I420Picture(glm::ivec2 size);
   [[nodiscard]] FrameView view();  // borrowed from this picture
@@ -21,8 +21,8 @@ struct I420Picture {
   std::array<std::vector<std::uint8_t>, 3> planes;  // Y, Cb, Cr
 };
 
-/// Smooth structure and fine texture that pan by (3, 1) px per unit of `time`: like a rendered view
-/// that turns.
+/// Smooth structure and fine texture that pan by (3, 1) px per unit of `time`, like a turning
+/// camera's view.
 I420Picture moving_picture(glm::ivec2 size_px, int time);
 
 /// Peak signal-to-noise ratio in dB of 8-bit samples, vectors of equal length; infinite for equal

@@ -13,7 +13,8 @@
 namespace catgs {
 namespace {
 
-// Container engines may allow a billion, and libwebsockets has tables of as many as are allowed.
+// Container engines may allow a billion descriptors, and libwebsockets allocates tables for all of
+// them.
 constexpr std::uint64_t most_descriptors = 65'536;
 
 }  // namespace

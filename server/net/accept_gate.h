@@ -7,30 +7,32 @@
 
 namespace catgs {
 
-/// Which connections are accepted, as descriptors are finite: beyond the last one accept() fails
-/// without end, and scenes, encoders and probes find none either. Not thread-safe.
+/// Decides which connections are accepted, because descriptors are limited. Without a free
+/// descriptor accept() fails forever, and scenes, encoders and probes fail too. Not thread-safe.
 class AcceptGate {
  public:
   static constexpr int reserved_descriptors = 64;
   static constexpr int least_connections = 16;  // a visitor's page opens up to seven
 
-  /// Of as many as are allowed, those that libwebsockets can keep tables of.
+  /// The usable part of the allowed descriptors: libwebsockets must be able to allocate tables for
+  /// them.
   [[nodiscard]] static int usable_descriptors(std::uint64_t allowed);
-  /// Raises the limit of this process to what is usable of what the system allows.
+  /// Raises this process's limit to all usable descriptors that the system allows.
   static void raise_descriptor_limit();
-  /// Of this process, now.
+  /// The current limit of this process.
   [[nodiscard]] static int descriptor_limit();
-  /// Throws InputError where fewer than least_connections could be accepted now: a server that
-  /// refuses everybody, probes too, is one that should not have started.
+  /// Throws InputError if fewer than least_connections could be accepted now. A server that refuses
+  /// everybody, even probes, should not start.
   static void require_room();
 
-  /// Why a connection that has this descriptor goes; nothing: it stays, and opened() is next. The
-  /// system gives the lowest number that is free: all below it are taken. Of those that may be, one
-  /// address has half at most; without an address (a proxy has one for all) there is no bound.
+  /// The reason to refuse a connection with this descriptor. Nothing: it is accepted, and opened()
+  /// follows. The system assigns the lowest free number, so all lower ones are taken. One address
+  /// may hold half of the connections; without an address (a proxy shares one) there is no such
+  /// bound.
   std::optional<std::string> refusal(int descriptor, int limit, const std::string& address);
-  /// The one that was let in last counts for its address from here on, under any name.
+  /// The connection let in last counts for its address under the key `connection`.
   void opened(const void* connection);
-  /// Does nothing about others.
+  /// Ends a connection's count. Unknown connections are ignored.
   void closed(const void* connection);
 
  private:

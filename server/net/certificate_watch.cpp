@@ -13,7 +13,7 @@ namespace {
 
 constexpr lws_usec_t look_every_us = 1'000'000;
 
-/// libwebsockets would mix the new certificate with the old key, so the pair is tried out before.
+/// libwebsockets would combine the new certificate with the old key, so the pair is tested first.
 bool usable(const std::string& certificate, const std::string& key) {
   const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> trial(SSL_CTX_new(TLS_server_method()),
                                                                 SSL_CTX_free);

@@ -7,12 +7,12 @@
 
 namespace catgs {
 
-/// Serves a renewed certificate without a restart: new connections get it, open ones go on. Looks
-/// once a second, on the network thread, whether the files have changed. A pair that cannot be used
-/// (one file of two was replaced so far) leaves the one before in force.
+/// Loads a renewed certificate without a restart. New connections get it; open ones continue. The
+/// files are checked once a second on the network thread. A pair that cannot be used (one of two
+/// files replaced so far) leaves the old pair in force.
 class CertificateWatch {
  public:
-  /// The files as they were when the vhost was made with them.
+  /// Takes the files as the vhost has loaded them.
   CertificateWatch(lws_context* context, std::string certificate, std::string key);
   CertificateWatch(const CertificateWatch&) = delete;
   CertificateWatch& operator=(const CertificateWatch&) = delete;
@@ -23,7 +23,7 @@ class CertificateWatch {
   [[nodiscard]] Times times() const;
   void look();
 
-  /// libwebsockets' timer, with the way back to its owner; the timer comes first.
+  /// A libwebsockets timer with a pointer to its owner. The timer must be the first member.
   struct Timer {
     lws_sorted_usec_list_t list{};
     CertificateWatch* owner = nullptr;

@@ -23,15 +23,15 @@ enum class CloseCode : std::uint16_t {
   try_again_later = 1013,
 };
 
-/// What the kernel knows of a connection's way to its peer, which may be a proxy.
+/// The kernel's view of the path to the peer, which may be a proxy.
 struct LinkState {
   std::uint32_t rtt_us = 0;               // smoothed
-  std::uint64_t delivery_bits_per_s = 0;  // lately; at least that much is possible
+  std::uint64_t delivery_bits_per_s = 0;  // measured lately; a lower bound of what is possible
   std::uint32_t window_bytes = 0;         // congestion window
-  std::uint32_t unsent_bytes = 0;         // not yet on the way, for want of a window
+  std::uint32_t unsent_bytes = 0;         // held back by the window
 };
 
-/// One open websocket. Every function may be called from any thread and none waits; after the peer
+/// One open websocket. Every function may be called from any thread and none blocks. After the peer
 /// has gone they do nothing.
 class Connection {
  public:
@@ -40,32 +40,32 @@ class Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  /// Queues a message. A peer that lets its messages pile up is closed.
+  /// Queues a message. A peer that does not read its messages is disconnected.
   virtual void send(OutgoingMessage message) = 0;
-  /// Queues a frame; returns the ids of the frames dropped for it (PacketRing).
+  /// Queues a frame. Returns the ids of the frames that were dropped to make room (PacketRing).
   virtual std::vector<std::uint64_t> send(OutgoingFrame frame) = 0;
-  /// Closes once everything queued is out, two seconds from now at the latest.
+  /// Closes when all queued packets are sent, after two seconds at the latest.
   virtual void close(CloseCode code, std::string_view reason) = 0;
 
   [[nodiscard]] virtual std::string peer_address() const = 0;
   [[nodiscard]] virtual std::size_t queued_frames() const = 0;
 };
 
-/// Who listens to a Connection. Called on the network thread: answer at once and never wait.
+/// Receives a Connection's events. Called on the network thread; must not block.
 class ConnectionListener {
  public:
   virtual ~ConnectionListener() = default;
-  /// One whole binary message within the size limit, and the link as it is now.
+  /// One complete binary message within the size limit, and the current state of the link.
   virtual void on_message(std::span<const std::byte> bytes, const LinkState& link) = 0;
-  /// One that is not binary or beyond the limit: the connection closes for it.
+  /// A message that is not binary or too large. The connection closes.
   virtual void on_bad_message(std::string_view why) = 0;
-  /// More comes than clients have to say, whatever it is: it has to be closed, and is if it goes
-  /// on.
+  /// The peer sends more than any client needs to. The listener must close the connection; if the
+  /// flood continues, the connection closes by itself.
   virtual void on_flood() = 0;
   /// The frame was handed to the socket.
   virtual void on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                              TimePoint now) = 0;
-  /// The last call. `by_leaving`: the peer has said that it goes for good (its page was closed).
+  /// The last call. `by_leaving`: the peer said that it leaves for good (its page was closed).
   virtual void on_close(bool by_leaving) = 0;
 };
 

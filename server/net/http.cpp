@@ -12,7 +12,8 @@
 namespace catgs {
 namespace {
 
-/// "a.example:8080" or "[::1]:8080" without port and brackets; of anything else nothing.
+/// The host of "a.example:8080" or "[::1]:8080", without port and brackets. Other text gives
+/// nothing.
 std::string_view host_name(std::string_view authority) {
   const bool brackets = authority.starts_with('[');
   const auto end = brackets ? authority.find(']') : std::min(authority.find(':'), authority.size());
@@ -24,7 +25,8 @@ std::string_view host_name(std::string_view authority) {
   return brackets ? authority.substr(1, end - 1) : authority.substr(0, end);
 }
 
-/// Does a header with a list of tags, or "*", name this one? No, where there is none.
+/// True if a header with a list of tags, or "*", names this one. False if there is no such
+/// resource.
 bool names_tag(std::string_view header, std::string_view tag) {
   if (tag.empty()) return false;
   if (header == "*") return true;
@@ -39,10 +41,10 @@ bool names_tag(std::string_view header, std::string_view tag) {
   return false;
 }
 
-/// Nothing where it is no address.
+/// Returns nothing if the text is no address.
 std::variant<std::monostate, in_addr, in6_addr> parse_address(std::string_view address) {
   const std::string text(address);
-  if (text.find('\0') != std::string::npos) return {};  // where inet_pton() stops to read
+  if (text.find('\0') != std::string::npos) return {};  // inet_pton() would stop there
   in_addr v4{};
   in6_addr v6{};
   if (::inet_pton(AF_INET, text.c_str(), &v4) == 1) return v4;
@@ -50,14 +52,14 @@ std::variant<std::monostate, in_addr, in6_addr> parse_address(std::string_view a
   return {};
 }
 
-/// An address, or a name that no outsider can register.
+/// True for an address, or a name that no outsider can register.
 bool is_local(std::string_view name) {
   if (name.empty()) return false;
   return parse_address(name).index() > 0 || name.find('.') == name.npos ||
          name.ends_with(".local") || name.ends_with(".internal");
 }
 
-/// The host[:port] of "https://a.example:8443"; empty for what is no origin ("null", "*").
+/// The host[:port] of "https://a.example:8443"; empty for text that is no origin ("null", "*").
 std::string_view authority_of(std::string_view origin) {
   const auto scheme_end = origin.find("://");
   return scheme_end == std::string_view::npos ? "" : origin.substr(scheme_end + 3);
@@ -65,7 +67,7 @@ std::string_view authority_of(std::string_view origin) {
 
 }  // namespace
 
-/// FNV-1a, 64 bit: nobody gains by two contents of one tag.
+/// FNV-1a, 64 bit. A deliberate collision would gain nothing.
 std::string etag_of(std::string_view content) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const char c : content) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;

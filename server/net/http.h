@@ -11,7 +11,9 @@
 
 namespace catgs {
 
-/// A GET or HEAD request, or the head of a PUT request; other methods are answered before a handler
+class UploadPlace;
+
+/// A GET or HEAD request, or the head of a PUT request. Other methods are answered before a handler
 /// sees them.
 struct HttpRequest {
   std::string_view path;  // decoded, starts with '/', no query
@@ -27,8 +29,9 @@ struct HttpResponse {
   int status = 200;
   std::string content_type = "text/plain; charset=utf-8";
   std::string cache_control = "no-store";
-  std::string etag;   // empty: none
-  bool gzip = false;  // `body` is compressed
+  std::string etag;       // empty: none
+  bool gzip = false;      // `body` is compressed
+  int retry_after_s = 0;  // 0: no header Retry-After
   std::shared_ptr<const std::string> body;
 };
 
@@ -41,66 +44,79 @@ inline HttpResponse text_response(int status, std::string body,
   return response;
 }
 
-/// The entity tag (RFC 9110) of a content: another content has another one.
+/// Status 503: another attempt may succeed.
+inline HttpResponse busy_response(std::string body) {
+  HttpResponse response = text_response(503, std::move(body));
+  response.retry_after_s = 1;
+  return response;
+}
+
+/// The entity tag (RFC 9110) of a content. Different contents get different tags.
 std::string etag_of(std::string_view content);
 
-/// What a request that replaces something asks of what is there: headers If-Match and
-/// If-None-Match. An empty one asks nothing.
+/// The If-Match and If-None-Match headers of a request that replaces a resource. An empty one
+/// demands nothing.
 struct Precondition {
   std::string if_match;
   std::string if_none_match;
 
-  /// `current`: the tag of what is there; empty: nothing is.
+  /// `current` is the tag of the present resource; empty: there is none.
   [[nodiscard]] bool holds(std::string_view current) const;
 };
 
-/// Called on the network thread: answers at once and never waits.
+/// Called on the network thread; must not block.
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
 
-/// Takes PUT requests; none are taken where its members are null. Both are called on the network
-/// thread.
+/// Handles PUT requests. None are accepted if `take` is null. All functions are called on the
+/// network thread.
 struct HttpUploads {
-  /// By the request's head: the refusal, or nothing. It has come from an allowed origin.
+  /// Refuses a request by its head, or returns nothing. Its origin was already allowed.
   std::function<std::optional<HttpResponse>(const HttpRequest&)> refusal;
-  /// With the whole body. The answer may come from any thread; an abandoned one becomes status 503.
-  std::function<std::future<HttpResponse>(const HttpRequest&, std::string body)> take;
+  /// Takes a complete body. Any thread may fulfil the promise; a broken promise becomes status 503.
+  /// The body's owner also holds `place` and may drop both when the place is abandoned.
+  std::function<std::future<HttpResponse>(const HttpRequest&, std::string body,
+                                          std::shared_ptr<const UploadPlace> place)>
+      take;
+  /// Called when an upload finds no free place.
+  std::function<void()> on_full = [] {};
 };
 inline constexpr std::size_t max_upload_bytes = 1 << 20;
 
-/// May a page of `origin` ("https://a.example:8443", empty when the client is no browser) open a
-/// websocket here? Yes when it was served by this host (`host` is the Host header) or is listed;
-/// "*" lists every origin.
+/// True if a page of `origin` may open a websocket here. `origin` looks like
+/// "https://a.example:8443" and is empty if the client is no browser. The host that served the page
+/// is allowed (`host` is the Host header), and so are listed origins; "*" allows all.
 bool origin_allowed(std::string_view origin, std::string_view host,
                     const std::vector<std::string>& allowed);
 
-/// Throws std::invalid_argument where no browser writes this origin, so that it would match none,
-/// with the form that was probably meant. `any_subdomain`: "https://*.a.example" is good too.
+/// Throws std::invalid_argument for an origin that no browser sends and that would never match. The
+/// message suggests the form that was probably meant. `any_subdomain` also accepts
+/// "https://*.a.example".
 void check_origin(std::string_view text, bool any_subdomain);
 
 /// 127.0.0.0/8, ::1, localhost.
 bool is_loopback(std::string_view address);
 
-/// The names that a port answers to. A foreign page may let its own name resolve to an address of
-/// this server (DNS rebinding). Its requests then carry that name both in Origin and in Host, so
-/// comparing the two proves nothing.
+/// The host names that a port accepts. In DNS rebinding, a foreign page resolves its own name to an
+/// address of this server. Its requests carry that name in both Origin and Host, so comparing the
+/// two proves nothing.
 enum class Names {
   loopback,  // the port listens on a loopback address: loopback addresses and localhost
-  local,     // it asks for no token: every address, and names that no outsider can register, which
+  local,     // without tokens: every address, and names that no outsider can register, which
              // have no dot or end with .local or .internal
   all,       // tokens keep foreign pages out
 };
 
-/// Is a request with this Host header for us? Hosts of `allowed` origins always are (a proxy may
-/// forward them), and so is a request without a Host, which no browser sends.
+/// True if a request with this Host header is accepted. Hosts of `allowed` origins always are, as a
+/// proxy may forward them. A request without a Host is too, because no browser sends one.
 bool host_allowed(std::string_view host, Names names, const std::vector<std::string>& allowed);
 
-/// The id in "/api/scenes/ID<what>".
+/// Returns the id in "/api/scenes/ID<what>".
 std::optional<std::string_view> scene_of(std::string_view path, std::string_view what);
 
-/// As text, or as an attribute in quotes, of an HTML page.
+/// Escapes text for HTML content or a quoted attribute.
 std::string escape_html(std::string_view text);
 
-/// Security headers of every page. `embed_origins`: who may show it in a frame.
+/// The Content-Security-Policy of every page. `embed_origins` may show it in a frame.
 std::string content_security_policy(const std::vector<std::string>& embed_origins);
 
 }  // namespace catgs

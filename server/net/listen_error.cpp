@@ -15,7 +15,7 @@
 namespace catgs {
 namespace {
 
-/// The system's reason why nothing can listen there; 0: something can.
+/// The system's error for listening at an address; 0: none.
 int bind_error(const Endpoint& endpoint) {
   addrinfo hints{};
   hints.ai_flags = AI_NUMERICHOST | AI_PASSIVE;

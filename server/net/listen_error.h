@@ -4,9 +4,9 @@
 
 namespace catgs {
 
-/// For an address at which libwebsockets could not listen; it says no more than that. Throws
-/// InputError with `flag`, the system's reason and the remedy. `tls`: where it is not null, its
-/// certificate and key are to blame where the address is not.
+/// Explains why libwebsockets could not listen at an address, which it does not tell itself. Throws
+/// InputError with `flag`, the system's reason and the remedy. If the address is usable and `tls`
+/// is not null, its certificate or key is to blame.
 [[noreturn]] void throw_listen_error(const Endpoint& endpoint, const char* flag,
                                      const NetOptions* tls);
 

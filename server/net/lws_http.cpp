@@ -7,17 +7,23 @@
 #include <cstring>
 #include <string_view>
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+
 #include "server/net/lws_site.h"
 
 namespace catgs {
 namespace {
 
 constexpr std::size_t chunk_bytes = 64 * 1024;
-constexpr int answer_timeout_s = 30;  // of who takes an upload
-// A whole body; libwebsockets' own timeout begins anew with each piece of it.
+constexpr int answer_timeout_s = 30;  // until an upload is answered
+constexpr int piece_timeout_s = 30;   // until the client has taken a piece of an answer
+// The limit for a whole body. libwebsockets' own timeout restarts with each piece.
 constexpr lws_usec_t body_time_us = 30 * LWS_US_PER_SEC;
 constexpr std::size_t max_dropped_bytes = 16 << 20;
-constexpr lws_usec_t answer_poll_us = 10'000;  // authors save now and then
+constexpr lws_usec_t answer_poll_us = 10'000;  // saves are rare
 
 /// Appends response headers to a fixed buffer; remembers whether everything found room.
 class HeaderWriter {
@@ -60,6 +66,14 @@ std::vector<std::string> query_arguments(lws* wsi) {
   return arguments;
 }
 
+/// libwebsockets does not report a client that closes while its answer is prepared. TCP does not
+/// tell a close from a half-close, so a client that ends its sending after an upload counts as gone
+/// too.
+bool has_gone(lws* wsi) {
+  pollfd socket{lws_get_socket_fd(wsi), POLLRDHUP, 0};
+  return ::poll(&socket, 1, 0) > 0;
+}
+
 }  // namespace
 
 std::string request_header(lws* wsi, lws_token_indexes token) {
@@ -85,7 +99,8 @@ std::string custom_header(lws* wsi, std::string_view name_with_colon) {
 std::optional<std::uint64_t> body_length(lws* wsi) {
   const std::string text = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
   if (text.empty()) return 0;
-  // Longer ones libwebsockets does not read, zeros in front or not, and takes 100 MiB or none.
+  // libwebsockets does not parse longer values, with or without leading zeros, and assumes 100 MiB
+  // or none.
   constexpr std::size_t max_digits = 20;
   if (text.size() > max_digits) return std::nullopt;
   std::uint64_t bytes = 0;
@@ -107,11 +122,21 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
   return failed;
 }
 
-int LwsHttpExchange::begin_upload(lws* wsi, std::optional<HttpResponse> refusal) {
+LwsHttpExchange::~LwsHttpExchange() {
+  if (place_) place_->abandon();
+}
+
+int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place) {
   path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
   authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   precondition_ = {request_header(wsi, WSI_TOKEN_HTTP_IF_MATCH),
                    request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH)};
+  place_ = std::move(place);
+  await_body(wsi);
+  return 0;
+}
+
+int LwsHttpExchange::begin_refused_upload(lws* wsi, HttpResponse refusal) {
   refusal_ = std::move(refusal);
   await_body(wsi);
   return 0;
@@ -129,9 +154,10 @@ void LwsHttpExchange::await_body(lws* wsi) {
   lws_set_timer_usecs(wsi, body_time_us);
 }
 
-int LwsHttpExchange::take_body(std::string_view bytes) {
-  if (body_due_ && !answered_ && !refusal_) {
-    if (body_.size() + bytes.size() > max_upload_bytes) return -1;  // more than was announced
+int LwsHttpExchange::take_body(lws* wsi, std::string_view bytes) {
+  if (has_gone(wsi)) return -1;
+  if (body_due_ && place_) {
+    if (body_.size() + bytes.size() > max_upload_bytes) return -1;  // more than announced
     body_.append(bytes);
     return 0;
   }
@@ -140,13 +166,13 @@ int LwsHttpExchange::take_body(std::string_view bytes) {
 }
 
 int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
-  if (!body_due_) return 0;  // more has come after it: libwebsockets tells it again
-  if (answered_) return -1;
+  if (!body_due_ || answered_) return -1;
   body_due_ = false;
   if (refusal_) return answer(wsi, *std::move(refusal_));
   HttpRequest request{path_, precondition_.if_none_match, false, authorization_};
   request.if_match = precondition_.if_match;
-  answer_ = uploads.take(request, std::move(body_));
+  lws_rx_flow_control(wsi, 0);  // see AnsweredConnections
+  answer_ = uploads.take(request, std::move(body_), place_);
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);
   lws_set_timer_usecs(wsi, answer_poll_us);
   return 0;
@@ -156,19 +182,26 @@ int LwsHttpExchange::on_timer(lws* wsi) {
   if (body_due_) return -1;
   if (!answer_.valid()) return 0;
   if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    if (has_gone(wsi)) return -1;
     lws_set_timer_usecs(wsi, answer_poll_us);
     return 0;
   }
   try {
     return answer(wsi, answer_.get());
   } catch (const std::future_error&) {
-    return answer(wsi, text_response(503, "503: the server stops\n"));
+    return answer(wsi, busy_response("503: the server stops\n"));
   }
 }
 
 int LwsHttpExchange::answer(lws* wsi, HttpResponse response) {
   response_ = std::move(response);
   answering_ = true;
+  served_.add(wsi);
+  // Counts a socket as writable only when little is unsent. Progress of a slow client is then
+  // visible.
+  const int unsent_bytes = 16 * 1024;
+  ::setsockopt(lws_get_socket_fd(wsi), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes,
+               sizeof unsent_bytes);
   lws_callback_on_writable(wsi);
   return write_headers(wsi);
 }
@@ -178,6 +211,8 @@ int LwsHttpExchange::write_headers(lws* wsi) {
   HeaderWriter headers(wsi, response_.status, response_.content_type, unwritten_);
   headers.add("cache-control:", response_.cache_control);
   if (!response_.etag.empty()) headers.add("etag:", response_.etag);
+  if (response_.retry_after_s > 0)
+    headers.add("retry-after:", std::to_string(response_.retry_after_s));
   if (response_.gzip) headers.add("content-encoding:", "gzip");
   headers.add("content-security-policy:", site_of(wsi).policy);
   return headers.finish();
@@ -186,6 +221,7 @@ int LwsHttpExchange::write_headers(lws* wsi) {
 int LwsHttpExchange::on_writable(lws* wsi, std::vector<std::byte>& scratch) {
   if (!answering_) return 0;
   if (unwritten_ == 0) return -1;
+  lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, piece_timeout_s);
   lws_callback_on_writable(wsi);
   return write_piece(wsi, scratch);
 }

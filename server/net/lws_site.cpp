@@ -12,7 +12,7 @@
 namespace catgs {
 namespace {
 
-/// As much of what a stranger sent as a line of the log, or of an answer, has room for.
+/// Shortens a stranger's text to fit a line of the log or an answer.
 constexpr std::size_t max_quoted_bytes = 100;
 
 std::string quoted(const std::string& text) {
@@ -32,7 +32,7 @@ std::string peer_address_of(lws* wsi) {
   return name.data();
 }
 
-/// A proxy says how the client came to it.
+/// A proxy reports how the client reached it.
 bool came_by_tls(lws* wsi) {
   if (lws_is_ssl(wsi) != 0) return true;
   return site_of(wsi).proxies.is_proxy(peer_address_of(wsi)) &&
@@ -87,8 +87,8 @@ const char* fault_of_head(lws* wsi) {
 }
 
 int confirm_upgrade(lws* wsi) {
-  // Not the callback's own text: what libwebsockets does not know it has answered already, and
-  // then the text may be gone.
+  // Do not use the callback's text: libwebsockets has already answered requests that it does not
+  // know, and the text may be gone.
   const std::string protocol = request_header(wsi, WSI_TOKEN_UPGRADE);
   if (::strcasecmp(protocol.c_str(), "websocket") == 0) {
     const std::string connection = request_header(wsi, WSI_TOKEN_CONNECTION);

@@ -14,7 +14,7 @@
 
 namespace catgs {
 
-/// What one listening port serves; the vhost's user pointer.
+/// Holds the settings of one listening port. The vhost's user pointer points to it.
 struct Site {
   HttpHandler http;
   HttpUploads uploads;
@@ -28,41 +28,42 @@ struct Site {
 
 const Site& site_of(lws* wsi);
 
-/// Who is behind the proxies that are trusted.
+/// The client's address, as seen through trusted proxies.
 std::string client_address_of(lws* wsi);
 
-/// How the client came here.
+/// The address by which the client reached this server.
 std::string site_address(lws* wsi, const std::string& host);
 
-/// Is the request for one of Site::names? By TLS it is, but on a loopback address: a page that let
-/// its own name resolve to this server has no certificate for it.
+/// True if the request is for one of Site::names. TLS requests are, except on loopback: a page that
+/// resolves its own name to this server has no certificate for it.
 bool host_allowed(lws* wsi, const std::string& host);
 
-/// Tells Site::on_refused whose request is refused, and why.
+/// Reports to Site::on_refused whose request is refused, and why.
 void note_refused(lws* wsi, std::string_view why);
 
-/// The same, of an upload or a websocket from another site's page.
+/// Reports a refused upload or websocket from another site's page.
 void note_refused_origin(lws* wsi, std::string_view what, const std::string& origin,
                          const std::string& host);
 
-/// Answers a request that no handler is asked about. Nonzero: the connection closes.
+/// Answers a request without asking a handler. Nonzero: the connection closes.
 int refuse_request(lws* wsi, unsigned status, const char* why);
 
-/// What is wrong with a head; null: nothing. libwebsockets decodes a path before it looks for the
-/// end of its line: by a %0a in it a page writes a header of its own in place of the version, or
-/// hides its Host.
+/// Describes a fault of the request's head; null: none. libwebsockets decodes a path before it
+/// looks for the end of its line. By a %0a in the path, a page could therefore replace the version
+/// by a header of its own or hide its Host.
 const char* fault_of_head(lws* wsi);
 
-/// Of a request with an Upgrade header, the callback's result. h2c is another parser, without our
-/// time limits; a websocket's Connection header libwebsockets would refuse without an answer.
+/// The callback's result for a request with an Upgrade header. h2c is refused: its parser lacks our
+/// time limits. libwebsockets would refuse a wrong Connection header of a websocket without an
+/// answer.
 int confirm_upgrade(lws* wsi);
 
 HttpResponse refuse_host(lws* wsi, const std::string& host);
 
-/// Site::http's answer, if the host is allowed.
+/// Returns the answer of Site::http if the host is allowed.
 HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request);
 
-/// Why nothing is taken from this upload; nothing: its body may come.
+/// Returns the refusal of an upload; nothing: its body may come.
 std::optional<HttpResponse> refuse_upload(lws* wsi);
 
 }  // namespace catgs

@@ -13,15 +13,15 @@ namespace {
 
 constexpr int close_timeout_s = 2;
 
-// libwebsockets answers pings and drops pongs without telling us. The kernel says how much came
-// instead: a segment may cost a read and a pong. The rate is that of messages (peer.cpp).
+// libwebsockets answers pings and drops pongs without telling us, so the kernel's byte count is
+// used. A segment may cost a read and a pong. The rate is that of messages (client_connection.cpp).
 constexpr double segments_per_second = 600.0;
 constexpr double segment_burst = 1200.0;
 constexpr double segment_bytes = 1024.0;  // a longer one counts as several
 constexpr lws_usec_t look_every_us = 250'000;
 
-/// Small writes leave at once, and the next packet is taken from the ring only when hardly anything
-/// is unsent: what waits, waits where it is counted and can be dropped.
+/// Small writes leave at once. The next packet leaves the ring only when hardly anything is unsent,
+/// so that waiting packets are counted and can be dropped.
 void tune_socket(int fd) {
   const int on = 1;
   const int lowat_bytes = 16 * 1024;
@@ -59,7 +59,8 @@ void LwsWaker::wake(std::shared_ptr<LwsWebsocket> connection) {
   const std::lock_guard lock(mutex_);
   if (!context_) return;
   pending_.push_back(std::move(connection));
-  if (pending_.size() == 1) lws_cancel_service(context_);  // else it is on its way
+  if (pending_.size() == 1)
+    lws_cancel_service(context_);  // otherwise a wake-up is already under way
 }
 
 void LwsWaker::wake() {
@@ -129,7 +130,7 @@ int LwsWebsocket::service_timer() {
   const auto bytes = static_cast<double>(info.tcpi_bytes_received - arrived_.bytes);
   arrived_ = {info.tcpi_data_segs_in, info.tcpi_bytes_received};
   if (arrivals_.take(Clock::now(), std::max(segments, bytes / segment_bytes))) return 0;
-  if (std::exchange(floods_, true)) return -1;  // it was refused, and goes on
+  if (std::exchange(floods_, true)) return -1;  // already refused, and still flooding
   listener_->on_flood();
   return 0;
 }
@@ -159,7 +160,8 @@ int LwsWebsocket::service_receive(std::span<const std::byte> fragment) {
 }
 
 int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
-  // libwebsockets closes by itself what is no websocket any more; nothing goes out behind that.
+  // libwebsockets itself closes a connection that breaks the protocol. Nothing may be sent after
+  // that.
   if (lws_get_close_length(wsi_) > 0) return 0;
   std::optional<PacketRing::Packet> packet;
   std::optional<Closing> closing;
@@ -173,7 +175,7 @@ int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
   if (closing) return close_now(closing->code, closing->reason);
   if (!packet) return 0;
 
-  // libwebsockets writes its own framing into the bytes before the payload.
+  // libwebsockets writes its framing into the bytes before the payload.
   scratch.assign(LWS_PRE, std::byte{0});
   const TimePoint now = Clock::now();
   if (packet->frame) wire::append_frame_header(*packet->frame, now, scratch);
@@ -187,7 +189,8 @@ int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
 }
 
 void LwsWebsocket::service_peer_closes(std::span<const std::byte> payload) {
-  // Browsers send this code when a page is closed or left; whoever reconnects closes otherwise.
+  // Browsers send this code when a page is closed or left. A client that reconnects sends another
+  // code.
   constexpr auto leaves = static_cast<unsigned>(CloseCode::going_away);
   peer_leaves_ = payload.size() >= 2 && (std::to_integer<unsigned>(payload[0]) << 8 |
                                          std::to_integer<unsigned>(payload[1])) == leaves;

@@ -8,20 +8,20 @@
 
 #include <libwebsockets.h>
 
+#include "server/base/rate_limit.h"
 #include "server/net/connection.h"
 #include "server/pipeline/packet_ring.h"
-#include "server/session/rate_limit.h"
 
 namespace catgs {
 
 class LwsWebsocket;
 
-/// How other threads reach the network thread: they list the connection that has something to do
-/// and wake the poll loop, the only call into libwebsockets that is allowed from outside.
+/// Lets other threads reach the network thread. They list the connection that has work and wake the
+/// poll loop. Waking is the only libwebsockets call allowed from outside.
 class LwsWaker {
  public:
   void attach(lws_context* context);
-  void detach();  // wake() does nothing from here on
+  void detach();  // later calls of wake() do nothing
   void wake(std::shared_ptr<LwsWebsocket> connection);
   void wake();
   std::vector<std::shared_ptr<LwsWebsocket>> take();
@@ -32,8 +32,8 @@ class LwsWaker {
   std::vector<std::shared_ptr<LwsWebsocket>> pending_;
 };
 
-/// A websocket of libwebsockets. Functions beginning with `service_` run on the network thread and
-/// are the only ones to touch `wsi_`.
+/// One libwebsockets websocket. Functions that begin with `service_` run on the network thread.
+/// Only they touch `wsi_`.
 class LwsWebsocket final : public Connection, public std::enable_shared_from_this<LwsWebsocket> {
  public:
   LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address);
@@ -46,17 +46,17 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
 
   void service_listen(std::shared_ptr<ConnectionListener> listener);
   void service_woken();
-  /// Nonzero: libwebsockets shall close the socket, as its callbacks say it.
+  /// As in all callbacks, nonzero tells libwebsockets to close the socket.
   int service_receive(std::span<const std::byte> fragment);
   int service_writeable(std::vector<std::byte>& scratch);
-  /// It is time to look how much has come.
+  /// Checks how much was received.
   int service_timer();
-  /// The peer's close frame: two bytes of code, then a reason.
+  /// Handles the peer's close frame: two bytes of code, then a reason.
   void service_peer_closes(std::span<const std::byte> payload);
   void service_closed();
 
  private:
-  /// As the kernel counts it, of what libwebsockets keeps for itself too.
+  /// Received data as the kernel counts it, including what libwebsockets handles itself.
   struct Received {
     std::uint32_t segments = 0;
     std::uint64_t bytes = 0;

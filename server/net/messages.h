@@ -11,13 +11,14 @@
 #include <glm/vec3.hpp>
 
 #include "render_core/math/camera.h"
+#include "server/base/clock.h"
 #include "server/encode/encoder.h"
 
 namespace catgs {
 
-// The wire contract (proto/catgs.proto) as plain structs: what the rest of the server knows of it.
-// Client messages come out of parse_client_message() validated: every number finite and within the
-// limits written beside the fields of the contract, every quaternion of unit length.
+// The wire contract (proto/catgs.proto) as plain structs for the rest of the server.
+// parse_client_message() validates client messages: numbers are finite and within the contract's
+// limits, and quaternions have unit length.
 
 struct PoseSample {
   std::uint64_t pose_id = 0;
@@ -49,7 +50,7 @@ struct Hello {
   std::string token;
   std::string resume_token;
   std::optional<PoseSample> resume_pose;
-  PosePath resume_path;  // empty: there was none
+  PosePath resume_path;  // empty: no path
   std::string watch_token;
   Settings settings;
 };
@@ -76,7 +77,7 @@ struct Pick {
   glm::vec3 origin{0.0f};
   glm::vec3 direction{0.0f, 0.0f, 1.0f};  // unit
 };
-/// A message of a newer wire version, ignored by rule.
+/// A message of a newer wire version. It is ignored, as the contract demands.
 struct UnknownMessage {};
 
 using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
@@ -135,6 +136,11 @@ struct Heartbeat {
   std::int64_t server_time_us = 0;
 };
 
+inline Heartbeat heartbeat_at(TimePoint now) {
+  const auto since_epoch = now.time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::microseconds>(since_epoch).count()};
+}
+
 enum class ErrorCode {
   bad_message = 1,
   unauthorized,
@@ -159,17 +165,17 @@ struct Drain {
   std::uint32_t deadline_ms = 0;
 };
 
-/// Where a client stands that waits for a place, or for its scene.
+/// The position of a client that waits for a place or for its scene.
 struct QueuePlace {
   int position = 1;                 // 1: next
   std::chrono::seconds estimate{};  // of the whole wait
-  bool for_scene = false;           // there is a place; the scene is being loaded
+  bool for_scene = false;           // a place is free, but the scene is still loading
 };
 
-/// Answers a Pick.
+/// The answer to a Pick.
 struct Picked {
   std::uint32_t id = 0;
-  std::optional<float> distance;  // nothing is there otherwise
+  std::optional<float> distance;  // none: nothing was hit
 };
 
 using ServerMessage =

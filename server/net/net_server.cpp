@@ -1,10 +1,8 @@
 #include "server/net/net_server.h"
 
-#include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdint>
-#include <exception>
 #include <optional>
 #include <string>
 #include <thread>
@@ -15,226 +13,24 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
+#include "server/base/prompt_thread.h"
+#include "server/base/required_file.h"
 #include "server/net/accept_gate.h"
 #include "server/net/certificate_watch.h"
 #include "server/net/listen_error.h"
-#include "server/net/lws_http.h"
+#include "server/net/lws_callbacks.h"
 #include "server/net/lws_site.h"
-#include "server/net/lws_websocket.h"
-#include "server/net/wire.h"
-#include "server/prompt_thread.h"
-#include "server/required_file.h"
 
 namespace catgs {
 namespace {
 
-constexpr int request_timeout_s = 10;       // a peer that is slow to send its request
+constexpr int request_timeout_s = 10;       // for a peer to send its request
 constexpr std::uint16_t ping_after_s = 20;  // of silence; hung up ten seconds later
 constexpr std::uint16_t hang_up_after_s = 30;
 
-/// Per-connection memory that libwebsockets owns, zeroed at its birth.
-struct HttpSlot {
-  LwsHttpExchange* exchange;
-};
-struct WebsocketSlot {
-  std::shared_ptr<LwsWebsocket>* connection;
-};
+constexpr unsigned buffer_bytes = 64 * 1024;  // read or written per connection and round
 
-/// The context's user pointer: what callbacks need besides their site.
-struct Service {
-  std::shared_ptr<LwsWaker> waker = std::make_shared<LwsWaker>();
-  std::vector<std::byte> scratch;  // outgoing bytes of the packet being written
-  AcceptGate gate;
-};
-
-Service& service_of(lws* wsi) {
-  return *static_cast<Service*>(lws_context_user(lws_get_context(wsi)));
-}
-
-void forget(HttpSlot& slot) { delete std::exchange(slot.exchange, nullptr); }
-
-bool is_get_or_head(lws* wsi) {
-  return lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 ||
-         lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
-}
-
-const std::string upload_length_rule =
-    fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
-
-// Results of callbacks.
-constexpr int keep_reading = 0;
-constexpr int close_connection = -1;
-
-/// A connection answers one request, and every answer says so. libwebsockets does not show a head
-/// as it came: a line that a proxy reads as a length is none to it, and what follows may be a body.
-int on_request(lws* wsi, HttpSlot& slot) {
-  const Site& site = site_of(wsi);
-  if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
-  // libwebsockets knows no chunks and would take them for the next request.
-  if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
-    return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
-  if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
-    slot.exchange = new LwsHttpExchange;
-    const std::uint64_t bytes = body_length(wsi).value_or(0);
-    if (bytes >= 1 && bytes <= max_upload_bytes)
-      return slot.exchange->begin_upload(wsi, refuse_upload(wsi));
-    const int status = bytes < 1 ? 411 : 413;
-    const std::string why = fmt::format("{}: {}", status, upload_length_rule);
-    note_refused(wsi, "upload refused: " + why);
-    if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"),
-                                   service_of(wsi).scratch) != 0)
-      return close_connection;
-    const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
-    return body_follows ? keep_reading : close_connection;
-  }
-  if (!is_get_or_head(wsi)) return refuse_request(wsi, 405, "only GET and HEAD are served here");
-  // It means nothing, and libwebsockets would report it while the answer is on its way.
-  if (const auto bytes = body_length(wsi); bytes != 0)
-    return refuse_request(wsi, bytes ? 413 : 400, "a GET needs no body");
-  slot.exchange = new LwsHttpExchange;
-  const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-  const HttpHandler handler = [&](const HttpRequest& request) {
-    return respond(wsi, host, request);
-  };
-  return slot.exchange->begin(wsi, handler, site_address(wsi, host));
-}
-
-/// Before there is a lws of it. Operators and probes come in even where nobody else does; a proxy
-/// has one address for all its clients.
-int on_accept(lws* listener, int descriptor) {
-  const Site& site = site_of(listener);
-  if (!site.accept) return keep_reading;
-  std::array<char, 64> peer{};
-  lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
-  const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : limited_as(peer.data());
-  const auto why =
-      service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
-  if (!why) return keep_reading;
-  site.on_refused(fmt::format("{}: {}", peer.data(), *why));
-  return close_connection;
-}
-
-int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
-  switch (reason) {
-    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION:
-      return on_accept(wsi, static_cast<int>(reinterpret_cast<std::intptr_t>(in)));
-    case LWS_CALLBACK_WSI_CREATE:
-      service_of(wsi).gate.opened(wsi);
-      return 0;
-    case LWS_CALLBACK_WSI_DESTROY:
-      service_of(wsi).gate.closed(wsi);
-      return 0;
-    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
-      return confirm_upgrade(wsi);
-    case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
-      note_refused(wsi, "request refused: this is no proxy");
-      return close_connection;
-    case LWS_CALLBACK_HTTP:
-      return on_request(wsi, *slot);
-    case LWS_CALLBACK_HTTP_BODY:
-      if (!slot || !slot->exchange) return 0;
-      return slot->exchange->take_body({static_cast<const char*>(in), length});
-    case LWS_CALLBACK_HTTP_BODY_COMPLETION:
-      if (!slot || !slot->exchange) return 0;
-      return slot->exchange->end_body(wsi, site_of(wsi).uploads);
-    case LWS_CALLBACK_TIMER:
-      if (!slot || !slot->exchange) return 0;
-      return slot->exchange->on_timer(wsi);
-    case LWS_CALLBACK_HTTP_WRITEABLE:
-      if (!slot || !slot->exchange) return 0;
-      return slot->exchange->on_writable(wsi, service_of(wsi).scratch);
-    case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
-    case LWS_CALLBACK_CLOSED_HTTP:
-      if (slot) forget(*slot);
-      return 0;
-    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:  // a websocket that did not ask for catgs.v1
-      return refuse_request(wsi, 400, "ask for subprotocol catgs.v1");
-    case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
-      for (const auto& connection : service_of(wsi).waker->take()) connection->service_woken();
-      return 0;
-    default:
-      return lws_callback_http_dummy(wsi, reason, slot, in, length);
-  }
-}
-
-int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
-                 std::span<const std::byte> bytes) {
-  switch (reason) {
-    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
-      const Site& site = site_of(wsi);
-      if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
-      // libwebsockets takes any version of the protocol, and any method.
-      if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
-          request_header(wsi, WSI_TOKEN_VERSION) != "13")
-        return refuse_request(wsi, 400, "open websockets by GET, Sec-WebSocket-Version 13");
-      const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
-      const std::string host = request_header(wsi, WSI_TOKEN_HOST);
-      if (site.accept && host_allowed(wsi, host) &&
-          origin_allowed(origin, host, site.allowed_origins))
-        return 0;
-      note_refused_origin(wsi, "websocket", origin, host);
-      lws_return_http_status(wsi, 403, "this origin is not allowed");
-      return -1;
-    }
-    case LWS_CALLBACK_ESTABLISHED: {
-      auto connection =
-          std::make_shared<LwsWebsocket>(wsi, service_of(wsi).waker, client_address_of(wsi));
-      slot->connection = new std::shared_ptr<LwsWebsocket>(connection);
-      connection->service_listen(site_of(wsi).accept(connection));
-      return 0;
-    }
-    case LWS_CALLBACK_RECEIVE:
-      return (*slot->connection)->service_receive(bytes);
-    case LWS_CALLBACK_TIMER:
-      return (*slot->connection)->service_timer();
-    case LWS_CALLBACK_SERVER_WRITEABLE:
-      return (*slot->connection)->service_writeable(service_of(wsi).scratch);
-    case LWS_CALLBACK_WS_PEER_INITIATED_CLOSE:
-      (*slot->connection)->service_peer_closes(bytes);
-      return 0;
-    case LWS_CALLBACK_CLOSED:
-      if (slot && slot->connection) {
-        (*slot->connection)->service_closed();
-        delete std::exchange(slot->connection, nullptr);
-      }
-      return 0;
-    default:
-      return 0;
-  }
-}
-
-/// No exception may pass through C: it costs its own connection only.
-template <typename Function>
-int guarded(Function&& function) {
-  try {
-    return function();
-  } catch (const std::exception& error) {
-    spdlog::error("network: {}", error.what());
-    return -1;
-  }
-}
-
-int http_callback(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
-  return guarded([&] { return on_http(wsi, reason, static_cast<HttpSlot*>(user), in, length); });
-}
-
-int websocket_callback(lws* wsi, lws_callback_reasons reason, void* user, void* in,
-                       std::size_t length) {
-  return guarded([&] {
-    return on_websocket(wsi, reason, static_cast<WebsocketSlot*>(user),
-                        {static_cast<const std::byte*>(in), length});
-  });
-}
-
-// A socket buffer of one whole message at most: larger ones arrive in pieces and are refused.
-const lws_protocols protocols[] = {
-    {"http", http_callback, sizeof(HttpSlot), 0, 0, nullptr, 0},
-    {"catgs.v1", websocket_callback, sizeof(WebsocketSlot), wire::max_client_message_bytes, 0,
-     nullptr, 0},
-    {nullptr, nullptr, 0, 0, 0, nullptr, 0},
-};
-
-// Of all answers, those that libwebsockets makes by itself too.
+// Headers of all answers, including those that libwebsockets makes itself.
 const lws_protocol_vhost_options resource_policy = {nullptr, nullptr,
                                                     "cross-origin-resource-policy:", "same-origin"};
 const lws_protocol_vhost_options referrer_policy = {&resource_policy, nullptr,
@@ -245,7 +41,7 @@ const lws_protocol_vhost_options vary = {&content_type_options, nullptr,
                                          "vary:", "accept-encoding"};
 const lws_protocol_vhost_options common_headers = {&vary, nullptr, "connection:", "close"};
 
-/// Whose network thread this is; null: nobody's.
+/// The server whose network thread this is; null: none.
 thread_local const Site* served = nullptr;
 
 std::string_view without_line_end(std::string_view line) {
@@ -253,14 +49,14 @@ std::string_view without_line_end(std::string_view line) {
   return line;
 }
 
-/// While they become an InputError.
+/// While it lives, libwebsockets' errors become an InputError.
 void log_details(int, const char* line) {
   spdlog::debug("libwebsockets: {}", without_line_end(line));
 }
 
-/// While its errors are reported by nobody else. They are no errors of the server, which the log
-/// would never leave out: on the network thread most are about what a stranger sent. One warning is
-/// about a request that it hangs up on.
+/// While it lives, libwebsockets' errors are reported here only. They are not errors of the server,
+/// which the log would never omit: on the network thread most concern input from strangers. One
+/// warning is about a request that it hangs up on.
 void log_errors(int level, const char* line) {
   const bool hangs_up = level == LLL_ERR || std::string_view(line).starts_with("More hdr frags");
   if (!hangs_up) return log_details(level, line);
@@ -305,7 +101,7 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   info.vhost_name = name;
   info.port = endpoint.port;
   info.iface = all ? nullptr : endpoint.address.c_str();
-  info.protocols = protocols;
+  info.protocols = service_protocols;
   info.user = &on;
   info.timeout_secs = request_timeout_s;
   info.headers = &common_headers;
@@ -327,7 +123,7 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
 }
 
 NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
-  // A peer that goes away while it is written to is an error code, not a signal.
+  // A write to a closed peer is an error code, not a signal.
   std::signal(SIGPIPE, SIG_IGN);
   lws_set_log_level(log_levels, log_errors);
   const bool tls = !options.tls_certificate.empty();
@@ -361,6 +157,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
   info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS;
   if (tls) info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
   info.user = &s.service;
+  info.pt_serv_buf_size = buffer_bytes;
   info.gid = static_cast<gid_t>(-1);
   info.uid = static_cast<uid_t>(-1);
   s.context = lws_create_context(&info);
@@ -386,9 +183,12 @@ void NetServer::start() {
     run_promptly();
     served = &s.site;
     while (!s.stopping.load()) {
-      if (lws_service(s.context, 0) >= 0) continue;
-      s.on_failed();
-      break;
+      if (lws_service(s.context, 0) < 0) {
+        s.on_failed();
+        break;
+      }
+      s.service.answered.serve(s.context);
+      pause_where_nothing_happens(s.service);
     }
     s.service.waker->detach();
     s.certificates.reset();
@@ -413,5 +213,7 @@ void NetServer::stop() {
 int NetServer::port() const { return state_->port; }
 
 int NetServer::admin_port() const { return state_->admin_port; }
+
+std::size_t NetServer::uploads() const { return state_->service.uploads.taken(); }
 
 }  // namespace catgs

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
@@ -22,15 +23,14 @@ struct NetOptions {
   HttpHandler http;              // pages and /api of the public port
   HttpUploads uploads;           // to the public port
   ConnectionAcceptor accept;     // websockets of subprotocol catgs.v1, on any path
-  bool asks_for_tokens = false;  // of who wants to see a scene
+  bool asks_for_tokens = false;  // scenes are shown only with a token
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
-  /// Of each request that is refused before anybody is asked for a session: whose, and why. Of what
-  /// libwebsockets refuses itself, the errors that it reports, which name nobody. Called on the
-  /// network thread.
+  /// Reports each request refused before admission: whose it was, and why. Errors that
+  /// libwebsockets itself reports name no client. Called on the network thread.
   std::function<void(const std::string& line)> on_refused = [](const auto&) {};
-  /// The network thread ends although nobody asked it to. Called on it.
+  /// The network thread ended unasked. Called on that thread.
   std::function<void()> on_failed = [] {};
   std::string tls_certificate;  // PEM files; both or neither
   std::string tls_key;
@@ -40,9 +40,9 @@ struct NetOptions {
   HttpHandler admin_http;
 };
 
-/// HTTP and websockets in one thread of their own around libwebsockets' stock poll loop. Ports are
-/// bound by the constructor, so that a busy one is known before scenes are loaded; requests wait in
-/// the backlog until start().
+/// Serves HTTP and websockets on one thread with libwebsockets' poll loop. The constructor binds
+/// the ports, so that a busy one is known before scenes are loaded. Requests wait in the backlog
+/// until start().
 class NetServer {
  public:
   /// Throws InputError when an address cannot be bound or a certificate cannot be used.
@@ -51,14 +51,15 @@ class NetServer {
   NetServer(const NetServer&) = delete;
   NetServer& operator=(const NetServer&) = delete;
 
-  /// Throws InputError where the system allows too few descriptors for connections beside those
-  /// that are open by now.
+  /// Throws InputError if the system allows too few further descriptors for connections.
   void start();
-  /// Closes every connection and joins the thread. Listeners see on_close() before it returns.
+  /// Closes all connections and joins the thread. Each listener gets on_close() before it returns.
   void stop();
 
   [[nodiscard]] int port() const;        // really bound
   [[nodiscard]] int admin_port() const;  // 0 without an admin endpoint
+  /// Uploads that have a place. Any thread.
+  [[nodiscard]] std::size_t uploads() const;
 
  private:
   struct State;

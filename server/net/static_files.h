@@ -11,8 +11,8 @@
 
 namespace catgs {
 
-/// The browser client, read into memory once: requests look names up in a map and never touch the
-/// file system, so no path from the wire can leave the folder.
+/// Serves the browser client from memory. Requests are looked up in a map and never touch the file
+/// system, so no path from the wire can leave the folder.
 class StaticFiles {
  public:
   StaticFiles() = default;
@@ -20,11 +20,11 @@ class StaticFiles {
   /// index.html or exceeds 4,096 files or 256 MiB.
   explicit StaticFiles(const std::filesystem::path& folder);
 
-  /// 200, 304 or 404. "/" is index.html. Names with a content hash (assets/) are cached for a year,
-  /// the others are revalidated by their ETag.
+  /// Answers with 200, 304 or 404. "/" is index.html. Names with a content hash (assets/) are
+  /// cached for a year; the others are revalidated by ETag.
   [[nodiscard]] HttpResponse respond(const HttpRequest& request) const;
 
-  /// "/" and "/index.html", with `head` added to the end of the page's <head>.
+  /// Serves "/" and "/index.html" with `head` added to the end of the page's <head>.
   [[nodiscard]] HttpResponse respond_with_head(const HttpRequest& request,
                                                std::string_view head) const;
 
@@ -36,7 +36,7 @@ class StaticFiles {
     std::string cache_control;
     std::string etag;
     std::shared_ptr<const std::string> body;
-    std::shared_ptr<const std::string> gzip_body;  // null: not worth it
+    std::shared_ptr<const std::string> gzip_body;  // null: compression saves nothing
   };
   static HttpResponse respond_with(const File& file, const HttpRequest& request);
 

@@ -9,7 +9,7 @@ namespace {
 
 namespace ip = boost::asio::ip;
 
-/// An IPv4 peer of a dual-stack socket is that IPv4 address.
+/// Maps an IPv4 peer of a dual-stack socket to its IPv4 address.
 ip::address unmapped(const ip::address& address) {
   return address.is_v6() && address.to_v6().is_v4_mapped()
              ? ip::address(ip::make_address_v4(ip::v4_mapped, address.to_v6()))

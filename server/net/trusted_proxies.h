@@ -11,23 +11,23 @@
 
 namespace catgs {
 
-/// Whom limits count an address for: an IPv4 address is somebody's, of IPv6 a network of 64 bits
-/// is, "2001:db8:1:2::/64". What is no address stays as it is.
+/// The key by which limits count an address: an IPv4 address itself, or the /64 network of an IPv6
+/// address ("2001:db8:1:2::/64"). Text that is no address stays unchanged.
 std::string limited_as(const std::string& address);
 
-/// Whose X-Forwarded-For is believed. Immutable.
+/// The proxies whose X-Forwarded-For is believed. Immutable.
 class TrustedProxies {
  public:
   TrustedProxies() = default;
   /// "10.0.0.0/8", "2001:db8::/32", or single addresses. Throws std::invalid_argument.
   explicit TrustedProxies(const std::vector<std::string>& networks);
 
-  /// Whether what connections from `peer` say of their clients is believed.
+  /// True if `peer` is a trusted proxy.
   [[nodiscard]] bool is_proxy(const std::string& peer) const;
 
-  /// Whom a connection from `peer` belongs to. Each proxy has appended the address that it was
-  /// called from: from the right, the first one that is no trusted proxy's is the client's. What
-  /// stands left of it the client may have made up. An entry that is no address ends the search.
+  /// The client of a connection from `peer`. Each proxy appends the address that called it. From
+  /// the right, the first address that is no trusted proxy is the client; the client may have
+  /// forged the rest. The search ends at an entry that is no address.
   [[nodiscard]] std::string client_address(const std::string& peer,
                                            std::string_view forwarded_for) const;
 

@@ -12,13 +12,13 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/catgs.pb.h"
-#include "server/scene_id.h"
+#include "server/base/scene_id.h"
 
 namespace catgs::wire {
 namespace {
 
-/// Protobuf has a line to say for each text that is not UTF-8, as often as a stranger likes; left
-/// to itself it prints them beside our log, without its bounds.
+/// Protobuf logs a line for each text that is not UTF-8, as often as a stranger likes. By default
+/// it would print them outside our log and its bounds.
 void log_of_protobuf(google::protobuf::LogLevel level, const char* file, int line,
                      const std::string& message) {
   const bool ends_the_process = level == google::protobuf::LOGLEVEL_FATAL;
@@ -27,14 +27,14 @@ void log_of_protobuf(google::protobuf::LogLevel level, const char* file, int lin
 }
 [[maybe_unused]] auto* const former_log_handler = google::protobuf::SetLogHandler(log_of_protobuf);
 
-/// Beyond it differences of times might overflow, and a browser's numbers are no longer exact.
+/// Beyond this bound, time differences might overflow, and a browser's numbers are no longer exact.
 constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
-// What is told of how old a picture is: a clock that jumped would spoil every mean.
+// Bounds the reported age of a picture, because one jump of a clock would spoil every mean.
 constexpr std::uint32_t max_pose_age_us = 10'000'000;
 constexpr int max_path_samples = 256;
 constexpr int max_decoders = 8;
 
-/// Thrown and caught inside this file only: the path out of nested message parts.
+/// Thrown and caught only in this file, to leave nested message parts.
 struct Invalid : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -56,7 +56,7 @@ const std::string& checked_length(std::string_view field, const std::string& tex
                                   std::size_t max_bytes) {
   if (text.size() > max_bytes)
     throw Invalid(fmt::format("{}: {} bytes, at most {}", field, text.size(), max_bytes));
-  // They would let a client write lines and colours into the log.
+  // Control characters would let a client write lines and colours into the log.
   if (std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     throw Invalid(fmt::format("{}: control characters", field));
   return text;

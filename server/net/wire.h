@@ -12,7 +12,7 @@
 
 namespace catgs::wire {
 
-// Bytes of subprotocol "catgs.v1" (proto/README.md) to plain structs and back.
+// Converts between bytes of subprotocol "catgs.v1" (proto/README.md) and plain structs.
 
 inline constexpr std::uint32_t version = 1;
 inline constexpr std::size_t max_client_message_bytes = 64 * 1024;
@@ -20,7 +20,7 @@ inline constexpr std::size_t max_client_message_bytes = 64 * 1024;
 /// Byte 0 of every message from the server.
 enum class Kind : std::uint8_t { message = 1, frame = 2 };
 
-/// What is wrong with a message, for people: "pose.fov_y_rad: 3.5 is not in 0.1…2.8".
+/// Describes a bad message, for people: "pose.fov_y_rad: 3.5 is not in 0.1…2.8".
 struct ParseError {
   std::string what;
 };
@@ -28,11 +28,11 @@ struct ParseError {
 /// Parses and validates one message of at most max_client_message_bytes. Never throws on content.
 std::variant<ClientMessage, ParseError> parse_client_message(std::span<const std::byte> bytes);
 
-/// Kind byte and ServerMessage, ready for the socket.
+/// Serializes a message, kind byte included, for the socket.
 OutgoingMessage serialize(const ServerMessage& message);
 
-/// Appends what precedes the bitstream in a frame packet: kind byte, varint, FrameHeader. `now` is
-/// when the packet is handed to the socket.
+/// Appends the bytes before a frame's bitstream: kind byte, varint, FrameHeader. `now` is the time
+/// at which the packet is handed to the socket.
 void append_frame_header(const FrameTicket& ticket, TimePoint now, std::vector<std::byte>& out);
 
 }  // namespace catgs::wire

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,14 +8,12 @@
 #include <glm/vec2.hpp>
 
 #include "render_core/math/camera.h"
+#include "server/base/clock.h"
 #include "server/encode/encoder.h"
 
 namespace catgs {
 
-using Clock = std::chrono::steady_clock;
-using TimePoint = Clock::time_point;
-
-/// When a stage worked on a frame.
+/// The start and end of one stage's work on a frame.
 struct StageTime {
   TimePoint start;
   TimePoint end;
@@ -32,7 +29,7 @@ struct FrameTicket {
 
   Codec codec = Codec::h264;
   bool idr = false;
-  bool still = false;    // the camera rests: late on purpose, perhaps of another size
+  bool still = false;    // drawn at rest: late on purpose, perhaps larger
   bool refined = false;  // a still that is encoded once more: nothing is rendered
   glm::ivec2 size_px{0};
   bool speculated = false;   // a sub-frame
@@ -41,8 +38,7 @@ struct FrameTicket {
   TimePoint pose_received{};
   TimePoint ready{};    // the session could have started it, had its turn come
   TimePoint started{};  // handed to the executor
-  // Missing where the frame failed before the stage had ended. Of a refined frame, no time passed
-  // in rendering.
+  // Missing if the frame failed before the stage ended. A refined frame has no render time.
   std::optional<StageTime> render{};
   std::optional<StageTime> encode{};
 };
@@ -53,7 +49,7 @@ struct OutgoingFrame {
   std::vector<std::byte> bitstream;
 };
 
-/// What a message is about. Of two about the same thing the newer one is enough, but for events.
+/// A message's topic. A newer message replaces one on the same topic, except for events.
 enum class Topic : std::uint8_t { event, session, stream, place, statistics, clock };
 
 /// A serialised message on its way to the socket.

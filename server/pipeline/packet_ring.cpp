@@ -7,7 +7,7 @@ namespace catgs {
 
 namespace {
 
-/// A welcome says how the stream is encoded, too.
+/// A welcome also describes the stream's encoding.
 bool outdates(Topic newer, Topic older) {
   if (newer == Topic::event) return false;
   return older == newer || (newer == Topic::session && older == Topic::stream);

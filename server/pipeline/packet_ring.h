@@ -10,12 +10,12 @@
 
 namespace catgs {
 
-/// What waits for one socket, in order: messages and frames. Bounded in number and bytes:
-/// - frames: overflow drops every waiting frame and refuses new ones up to the next IDR, because a
-///   decoder can make nothing of a P-frame whose predecessor is missing; each is counted;
-/// - messages: a newer one replaces those about the same thing that no frame stands behind. No
-///   other is dropped; their overflow means that the peer does not read, and the owner closes the
-///   connection.
+/// The bounded queue of messages and frames for one socket, in order. It is bounded in number and
+/// bytes:
+/// - frames: overflow drops every waiting frame and refuses new ones up to the next IDR. A decoder
+///   cannot use a P-frame without its predecessor. Each dropped frame is counted.
+/// - messages: a newer one replaces those on the same topic that no frame follows. No other message
+///   is dropped. Overflow means that the peer does not read, and the owner closes the connection.
 /// Not thread-safe.
 class PacketRing {
  public:
@@ -36,9 +36,9 @@ class PacketRing {
 
   /// False: the ring is full of messages.
   [[nodiscard]] bool push(OutgoingMessage message);
-  /// Ids of the frames that this push dropped, possibly the pushed one; empty when all is well.
+  /// Returns the ids of the dropped frames, possibly the pushed one; empty: none.
   [[nodiscard]] std::vector<std::uint64_t> push(OutgoingFrame frame);
-  /// Oldest packet, or nothing.
+  /// Returns the oldest packet, or nothing.
   std::optional<Packet> pop();
 
   [[nodiscard]] bool empty() const { return packets_.empty(); }

@@ -12,35 +12,34 @@
 
 namespace catgs {
 
-/// What one client's stream is made of.
+/// The settings of one client's stream.
 struct StreamSettings {
-  std::shared_ptr<Renderer> renderer;  // of the scene that is shown
+  std::shared_ptr<Renderer> renderer;  // the shown scene's
   EncoderKind encoder = EncoderKind::x264;
-  EncoderSettings encoding;            // of the first frames
-  std::shared_ptr<const void> seat{};  // let go of once the encoders have ended
+  EncoderSettings encoding;  // for the first frames
 };
 
 /// One client's share of a device: its View (caches, image) and its encoders. Owned by the session,
 /// used by one job at a time.
 struct Stream {
-  StreamSettings settings;  // the seat in it outlives the encoders
+  StreamSettings settings;
   std::unique_ptr<View> view;
   StreamEncoders encoders;
   FrameView picture;  // borrowed from `view`: the last one rendered
 };
 
-/// Why no stream was opened or no frame made, as far as somebody can act on it.
+/// Why a stream could not be opened or a frame not made, by what the caller can do about it.
 enum class Fault {
   none,
-  encoder_unavailable,  // it cannot be opened: another one may serve
-  encoder_failed,       // it was ended: the next frame opens it anew
-  device_failed,        // the View was ended: the stream has to be opened again
-  other,                // for want of memory, for one: the next frame may succeed
+  encoder_unavailable,  // cannot be opened: another encoder may work
+  encoder_failed,       // was closed: the next frame reopens it
+  device_failed,        // the View was destroyed: the stream must be reopened
+  other,                // for example lack of memory: the next frame may succeed
 };
 
 struct StreamOpened {
   bool ok = false;
-  std::string message;  // why not, for people
+  std::string message;  // the reason of a failure, for people
   Codec codec = Codec::h264;
   std::string codec_string;
   std::string encoder_name;
@@ -48,14 +47,18 @@ struct StreamOpened {
   Fault fault = Fault::none;
 };
 
-struct FrameJob {
-  std::shared_ptr<Stream> stream;
+/// A frame that a visit orders.
+struct FrameOrder {
   FrameTicket ticket;  // refined: nothing is rendered
   FrameRequest request;
-  EncoderSettings encoding;             // other ones than before: with `force_idr`
+  EncoderSettings encoding;             // changes require `force_idr`
   int bitrate_kbps = min_bitrate_kbps;  // for now
-  int real_fps = 1;                     // what the session reaches: shares the bitrate out
+  int real_fps = 1;                     // the rate that the session reaches; divides the bitrate
   bool force_idr = false;
+};
+
+struct FrameJob : FrameOrder {
+  std::shared_ptr<Stream> stream;
 };
 
 struct FrameResult {
@@ -68,9 +71,9 @@ struct FrameResult {
   Fault fault = Fault::none;
 };
 
-/// What renders and encodes: the CPU's thread pool, or GPUs with a few render threads and a pool of
-/// encoders. `done` is called once per call, on a thread of the executor. Until then the stream
-/// belongs to the executor, which keeps no reference to it afterwards.
+/// Renders and encodes frames: on the CPU's thread pool, or on GPUs with a few render threads and a
+/// pool of encoders. `done` is called once per call, on a thread of the executor. Until then the
+/// stream belongs to the executor, which drops its reference afterwards.
 class FrameExecutor {
  public:
   virtual ~FrameExecutor() = default;
@@ -78,14 +81,14 @@ class FrameExecutor {
   FrameExecutor(const FrameExecutor&) = delete;
   FrameExecutor& operator=(const FrameExecutor&) = delete;
 
-  /// Frames that are worth having under way at the same time.
+  /// The number of frames that should be under way at the same time.
   [[nodiscard]] virtual int slots() const = 0;
-  /// Makes the stream's view and encoder for `settings`, keeping what still fits.
+  /// Makes the stream's view and encoder for `settings`. Parts that still fit are kept.
   virtual void open(std::shared_ptr<Stream> stream, StreamSettings settings,
                     std::function<void(StreamOpened)> done) = 0;
   virtual void submit(FrameJob job, std::function<void(FrameResult)> done) = 0;
-  /// Ends the stream on a thread of the executor: freeing device memory waits for the device, and
-  /// the caller has other sessions to serve. Not while a job holds it.
+  /// Ends the stream on a thread of the executor, because freeing device memory waits for the
+  /// device and would block other sessions. No job may hold the stream.
   virtual void close(std::shared_ptr<Stream> stream) = 0;
 };
 

@@ -6,11 +6,11 @@
 
 namespace catgs {
 
-/// What the frames of one session cost, smoothed, and which kind the next one will be. Pure; not
-/// thread-safe.
+/// Predicts the cost of a session's next frame and whether it is a key frame. Costs are smoothed.
+/// Pure; not thread-safe.
 class NextFrameCost {
  public:
-  /// Of a frame that was made.
+  /// Adds the cost of a finished frame.
   void add(const FrameTicket& ticket) {
     const Clock::duration encode = ticket.encode->end - ticket.render->end;
     if (ticket.still) {
@@ -22,12 +22,12 @@ class NextFrameCost {
     sub_frames_left_ = ticket.speculated ? sub_frames_left_ - 1 : static_cast<int>(ticket.window);
   }
 
-  /// The window of the last key frame is used up. A core may still decide otherwise: a key frame
-  /// sooner where the camera left its guard set, a sub-frame where it stays within for longer.
+  /// True: the last key frame's window is used up. A core may decide otherwise: an earlier key
+  /// frame if the camera left its guard set, or more sub-frames if it stays inside.
   [[nodiscard]] bool key_is_next() const { return sub_frames_left_ <= 0; }
-  /// Of the next frame: rendering and encoding, 0 before the first.
+  /// The predicted cost of rendering and encoding the next frame; 0 before the first.
   [[nodiscard]] Clock::duration next() const { return (key_is_next() ? key_ : sub_) + encode_; }
-  /// Of a picture that stays, perhaps of another size; as those in motion before the first.
+  /// The predicted cost of a still. Before the first still, it is that of a frame in motion.
   [[nodiscard]] Clock::duration still() const {
     return still_ == Clock::duration{} ? key_ + encode_ : still_;
   }

@@ -8,7 +8,7 @@
 namespace catgs {
 namespace {
 
-/// Pictures for an encoder, made from lists that frames share where that pays.
+/// Requests pictures in the encoder's format, with lists shared across frames where that pays.
 ViewSettings view_settings() {
   ViewSettings settings{Pipeline::catgs, PixelFormat::i420};
   settings.speculation.cost_aware = true;
@@ -50,7 +50,7 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
   return opened;
 }
 
-/// False: it failed, and `result` says why.
+/// False: rendering failed, and `result` says why.
 bool render_now(FrameJob& job, FrameResult& result) {
   FrameTicket& ticket = result.frame.ticket;
   ticket = job.ticket;
@@ -61,7 +61,7 @@ bool render_now(FrameJob& job, FrameResult& result) {
     if (!rendered.ok()) {
       result.message = rendered.message;
       result.fault = Fault::other;
-      if (lost(rendered.code)) {  // its buffers are worth nothing any more
+      if (lost(rendered.code)) {  // its buffers are lost
         result.fault = Fault::device_failed;
         stream.picture = {};
         stream.view.reset();
@@ -76,7 +76,7 @@ bool render_now(FrameJob& job, FrameResult& result) {
   return true;
 }
 
-/// Null: it cannot be opened, and `result` says why.
+/// Null: the encoder cannot be opened, and `result` says why.
 Encoder* encoder_for(const FrameJob& job, const EncoderFactory& encoders, FrameResult& result) {
   try {
     return &job.stream->encoders.use(job.stream->settings.encoder, job.encoding, encoders);
@@ -112,9 +112,9 @@ void encode_now(FrameJob& job, const EncoderFactory& encoders, FrameResult& resu
 
 }  // namespace
 
-// A worker lets go of the stream before it reports: the stream may hold the last reference to this
-// very pool, which none of its own threads can join. For the same reason the executor, which holds
-// the pools, outlasts the streams that are closing.
+// A worker releases the stream before it reports. The stream may hold the last reference to this
+// very pool, which its own threads cannot join. For the same reason the executor, which owns the
+// pools, outlives the streams that are closing.
 
 PoolExecutor::PoolExecutor(Pools pools, EncoderFactory encoders)
     : pools_(std::move(pools)), encoders_(std::move(encoders)) {}
@@ -130,7 +130,7 @@ int PoolExecutor::slots() const {
   return threads;
 }
 
-/// Where frames of this View are rendered; null: where they are encoded.
+/// The pool that renders frames of this View; null: the encoding pool.
 ThreadPool* PoolExecutor::render_pool(const View& view) const {
   const std::optional<int> device = view.device();
   const auto found = device ? pools_.render.find(*device) : pools_.render.end();

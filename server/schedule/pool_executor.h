@@ -11,17 +11,18 @@
 
 namespace catgs {
 
-/// Threads that render and encode. As many frames are under way as there are threads.
-/// - The CPU core renders and encodes in one pool: work is parallel across sessions first; with
-///   fewer sessions the pool's idle workers help inside a frame.
-/// - Where GPUs render, threads that render wait for them most of the time. Each GPU has a few, a
-///   pool of their own, so that no GPU waits for frames of another, and none of those that encode,
-///   one for each processor, ever waits. A frame goes from one to the other.
+/// Renders and encodes on thread pools. As many frames are under way as there are threads.
+/// - CPU core: one pool renders and encodes. Work is parallel across sessions first; with fewer
+///   sessions, idle workers help inside a frame.
+/// - GPUs: render threads mostly wait for their GPU. Each GPU has a small pool of its own, so that
+///   none waits for another's frames. A separate pool encodes, with one thread for each processor,
+///   and never waits for a GPU. Each frame moves from the first pool to the second.
 class PoolExecutor final : public FrameExecutor {
  public:
   struct Pools {
     std::shared_ptr<ThreadPool> encode;
-    // By the device of a View; none: what encodes renders. They end first, since they hand on.
+    // Render pools by a View's device; empty: the encoding pool renders. They are destroyed first,
+    // because they hand frames on.
     std::map<int, std::shared_ptr<ThreadPool>> render{};
   };
   explicit PoolExecutor(const std::shared_ptr<ThreadPool>& pool) : PoolExecutor(Pools{pool}) {}

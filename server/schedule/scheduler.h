@@ -1,59 +1,163 @@
 #pragma once
 
-#include <cstddef>
+#include <algorithm>
 #include <map>
 #include <optional>
-#include <span>
+#include <unordered_map>
+#include <utility>
 
-#include "server/pipeline/frame_ticket.h"
+#include "server/base/clock.h"
 
 namespace catgs {
 
-/// A session that could start a frame.
+/// A frame that a session could start.
 struct FrameCandidate {
   TimePoint ready;              // not before (its nominal rate)
   TimePoint deadline;           // when its nominal rate says that the frame is due
-  Clock::duration cost{};       // measured: what it will probably take
+  Clock::duration cost{};       // predicted from measurements
   bool key = false;             // probably a key frame
-  std::optional<int> device{};  // that renders it, where devices have numbers
+  std::optional<int> device{};  // the device that renders it, if devices have numbers
+
+  [[nodiscard]] TimePoint latest_start() const { return deadline - cost; }
+  bool operator==(const FrameCandidate&) const = default;
 };
 
-/// Who renders next: earliest deadline first, the deadline being the last moment at which a frame
-/// can start to be ready in time by what its session's frames have cost. Each frame moves its
-/// session's deadline on from the moment it started, so that under overload the sessions take
-/// turns: everyone's rate falls and nobody starves. Key frames cost several times a sub-frame, and
-/// sessions that began together need theirs together: while a device renders one, sub-frames go
-/// first there, as long as the next key frame can wait without missing its deadline. No slot stays
-/// empty for it. One device takes no more than its share of the slots, or where it cannot keep up
-/// its frames, late as they are, would leave none to the others. Pure; not thread-safe.
+/// Chooses the next frame by earliest deadline first. The deadline is the latest start that still
+/// finishes in time, from the measured costs of the session's frames. Each frame advances its
+/// session's deadline from the moment it started. Under overload the sessions therefore take turns:
+/// all rates fall and no session starves.
+///
+/// Key frames cost several times a sub-frame, and sessions that began together need theirs
+/// together. While a device renders a key frame, its sub-frames go first as long as the next key
+/// frame can still meet its deadline. No slot stays empty for that. A device takes no more than its
+/// share of the slots, so that late frames of an overloaded device leave slots to others.
+///
+/// A source is asked for its next frame only when its own state changed. A change costs O(log n)
+/// for n sources. Not thread-safe.
+///
+/// `Source` has `std::optional<FrameCandidate> next_frame()`, which depends on its state alone.
+template <typename Source>
 class FrameScheduler {
  public:
-  /// `devices`: that candidates name; none, or one: all slots are its own.
-  explicit FrameScheduler(int slots, int devices = 1)
-      : slots_(slots), slots_of_device_(devices > 1 ? (slots + devices - 1) / devices : slots) {}
-
-  [[nodiscard]] bool has_free_slot() const { return running_ < slots_; }
-  void frame_started(const FrameCandidate& frame);
-  /// `frame` is what frame_started() was told.
-  void frame_ended(const FrameCandidate& frame);
-  [[nodiscard]] int running() const { return running_; }
-
-  /// Index of the candidate to start now; none: nobody is ready.
-  [[nodiscard]] std::optional<std::size_t> choose(std::span<const FrameCandidate> candidates,
-                                                  TimePoint now) const;
-
- private:
-  struct OnDevice {
-    int frames = 0;
-    int key_frames = 0;
+  struct Turn {
+    Source& source;
+    FrameCandidate frame;
+    TimePoint ready;  // the time from which the frame could have started
   };
 
-  [[nodiscard]] OnDevice running_on(std::optional<int> device) const;
+  /// `devices` is the number of devices that candidates name. With none or one, it has all slots.
+  explicit FrameScheduler(int slots, int devices = 1)
+      : slots_(slots), slots_of_device_(devices > 1 ? (slots + devices - 1) / devices : slots) {}
+  FrameScheduler(const FrameScheduler&) = delete;
+  FrameScheduler& operator=(const FrameScheduler&) = delete;
 
-  int slots_;
-  int slots_of_device_;
+  [[nodiscard]] bool has_free_slot() const { return running_ < slots_; }
+  [[nodiscard]] int running() const { return running_; }
+
+  /// The source's next frame may have changed.
+  void changed(Source& source, TimePoint now) {
+    const auto frame = source.next_frame();
+    const auto known = offers_.find(&source);
+    if (known == offers_.end()) {
+      if (frame) put_in_line(source, *frame, std::max(now, frame->ready), now);
+    } else if (frame != known->second.frame) {
+      const TimePoint ready = known->second.ready;
+      withdraw(source);
+      if (frame) put_in_line(source, *frame, std::min(ready, std::max(now, frame->ready)), now);
+    }
+  }
+  /// The source has no frame to start any more.
+  void withdraw(Source& source) {
+    const auto known = offers_.find(&source);
+    if (known == offers_.end()) return;
+    known->second.line->erase(known->second.place);
+    offers_.erase(known);
+  }
+
+  /// Takes the frame to start now and counts it as running. None: no frame is ready, or no slot is
+  /// free.
+  std::optional<Turn> take(TimePoint now) {
+    while (!later_.empty() && later_.begin()->first <= now) line_up(*later_.begin()->second, now);
+    while (Source* const source = has_free_slot() ? first_in_line(now) : nullptr) {
+      const Offer offer = offers_.at(source);
+      if (source->next_frame() != offer.frame) {  // a change that was not reported
+        changed(*source, now);
+        continue;
+      }
+      withdraw(*source);
+      Device& device = devices_[offer.frame.device];
+      ++running_;
+      ++device.frames;
+      if (offer.frame.key) ++device.key_frames;
+      return Turn{*source, offer.frame, std::min(offer.ready, now)};
+    }
+    return std::nullopt;
+  }
+  /// `frame` is the one of its Turn.
+  void frame_ended(const FrameCandidate& frame) {
+    Device& device = devices_[frame.device];
+    --running_;
+    --device.frames;
+    if (frame.key) --device.key_frames;
+  }
+
+  /// The time at which the next waiting source becomes ready.
+  [[nodiscard]] std::optional<TimePoint> next_ready() const {
+    return later_.empty() ? std::nullopt : std::optional(later_.begin()->first);
+  }
+
+ private:
+  using Line = std::multimap<TimePoint, Source*>;
+  struct Offer {
+    FrameCandidate frame;
+    TimePoint ready;
+    Line* line;
+    typename Line::iterator place;
+  };
+  struct Device {
+    int frames = 0;
+    int key_frames = 0;
+    Line waiting_subs, waiting_keys;  // ready, by their latest start
+  };
+
+  void put_in_line(Source& source, const FrameCandidate& frame, TimePoint ready, TimePoint now) {
+    Device& device = devices_[frame.device];
+    const bool later = frame.ready > now;
+    Line& line = later ? later_ : frame.key ? device.waiting_keys : device.waiting_subs;
+    const auto place = line.emplace(later ? frame.ready : frame.latest_start(), &source);
+    offers_.emplace(&source, Offer{frame, ready, &line, place});
+  }
+  void line_up(Source& source, TimePoint now) {
+    const Offer offer = offers_.at(&source);
+    withdraw(source);
+    put_in_line(source, offer.frame, offer.ready, now);
+  }
+  Source* first_in_line(TimePoint now) {
+    using Rank = std::pair<bool, TimePoint>;
+    Source* first = nullptr;
+    Rank first_rank;
+    for (auto& [number, device] : devices_) {
+      if (device.frames >= slots_of_device_) continue;
+      for (const Line* line : {&device.waiting_subs, &device.waiting_keys}) {
+        if (line->empty()) continue;
+        const auto& [latest_start, source] = *line->begin();
+        const bool can_wait =
+            line == &device.waiting_keys && device.key_frames > 0 && latest_start > now;
+        const Rank rank{can_wait, latest_start};
+        if (first && first_rank <= rank) continue;
+        first = source;
+        first_rank = rank;
+      }
+    }
+    return first;
+  }
+
+  const int slots_;
+  const int slots_of_device_;
   int running_ = 0;
-  std::map<std::optional<int>, OnDevice> running_on_;
+  std::unordered_map<const Source*, Offer> offers_;
+  Line later_;  // not ready yet, by when they are
+  std::map<std::optional<int>, Device> devices_;
 };
 
 }  // namespace catgs

@@ -13,7 +13,8 @@ Encoder& StreamEncoders::use(EncoderKind kind, const EncoderSettings& settings,
     std::rotate(kept_.begin(), it, it + 1);
     return *kept_.front().encoder;
   }
-  // Those of another kind serve no more. Room first: a driver may open no second one.
+  // Encoders of another kind are of no more use. Free the old one first, as a driver may not open a
+  // second.
   std::erase_if(kept_, [&](const Kept& kept) { return kept.kind != kind; });
   const std::size_t others = kind == EncoderKind::nvenc ? 0 : 1;
   if (kept_.size() > others) kept_.resize(others);

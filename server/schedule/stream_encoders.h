@@ -8,18 +8,18 @@
 
 namespace catgs {
 
-/// Makes encoders: make_encoder(), or what stands in for hardware that is not there.
+/// Makes encoders: make_encoder(), or a substitute for hardware in tests.
 using EncoderFactory = std::function<std::unique_ptr<Encoder>(EncoderKind, const EncoderSettings&)>;
 
-/// The encoders of one stream. A camera that stops and goes takes turns between two picture sizes,
-/// and so does a visitor who tries one quality after the other: the two used last are kept, so that
-/// neither opens one each time. Of NVENC only one: a driver opens few. Not thread-safe.
+/// The encoders of one stream. The two used last are kept, because a camera that stops and goes
+/// alternates between two picture sizes. A visitor who compares two qualities does the same. Only
+/// one NVENC encoder is kept, because its driver opens few. Not thread-safe.
 class StreamEncoders {
  public:
-  /// The encoder with these settings, opened where it is not there; the one that was not used for
-  /// longest goes for it. Throws what `make` throws, and keeps the others then.
+  /// Returns the encoder with these settings and opens it if needed, replacing the least recently
+  /// used one. Throws what `make` throws, and then keeps the others.
   Encoder& use(EncoderKind kind, const EncoderSettings& settings, const EncoderFactory& make);
-  /// Ends the one used last: it failed, and what it would make next nobody knows.
+  /// Closes the encoder used last, because its state after a failure is unknown.
   void drop_last() { kept_.erase(kept_.begin()); }
 
   [[nodiscard]] std::size_t size() const { return kept_.size(); }
@@ -30,7 +30,7 @@ class StreamEncoders {
     EncoderSettings settings;
     std::unique_ptr<Encoder> encoder;
   };
-  std::vector<Kept> kept_;  // the one used last in front
+  std::vector<Kept> kept_;  // most recently used first
 };
 
 }  // namespace catgs

@@ -2,12 +2,12 @@
 
 #include <utility>
 
-#include "server/liveness.h"
+#include "server/base/liveness.h"
 #include "server/schedule/frame_executor.h"
 
 namespace catgs {
 
-/// Tells how long the frames and streams that another executor makes have been under way.
+/// Wraps another executor and reports how long its frames and streams have been under way.
 class WatchedExecutor final : public FrameExecutor {
  public:
   WatchedExecutor(std::shared_ptr<FrameExecutor> executor, Liveness& liveness)

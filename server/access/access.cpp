@@ -1,0 +1,192 @@
+#include "server/access/access.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/base/error.h"
+#include "server/base/required_file.h"
+#include "server/base/scene_id.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::string_view link_purpose = "catgs-link-v1";
+constexpr std::size_t min_key_bytes = 16;
+constexpr std::size_t min_token_bytes = 8;
+constexpr std::size_t max_token_bytes = 512;
+constexpr std::chrono::days longest_link{3650};
+
+bool is_role(std::string_view role) {
+  return role == "viewer" || role == "author" || role == "spectator" || role == "solo";
+}
+
+/// Returns why the role forbids a use; nothing: it allows it.
+Refusal forbidden(std::string_view role, Use use) {
+  if (use == Use::own_session && role == "spectator")
+    return "this link lets you watch others, not move by yourself";
+  if (use == Use::watch && role == "solo") return "this link does not let you watch others";
+  if (use == Use::save && role != "author")
+    return "this link does not let you save: ask for one of role author";
+  return std::nullopt;
+}
+
+std::string other_scene(const LinkGrant& grant, std::string_view scene_id) {
+  const std::string_view name = name_in(grant.scene_id);
+  if (name != name_in(scene_id)) return "this link is for another scene";
+  return fmt::format("this link was made for another scene called \"{}\": ask for a new one", name);
+}
+
+std::string read_text(const std::filesystem::path& path, std::string_view flag) {
+  std::ifstream in = open_required_file(flag, path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+std::string make_link_token(const LinkGrant& grant, std::string_view key) {
+  if (!is_role(grant.role))
+    throw InputError("--role " + grant.role, {}, "is no role",
+                     "use viewer, author, spectator or solo");
+  if (!grant.scene_id.empty() && !is_scene_id(grant.scene_id))
+    throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
+  const std::string payload =
+      fmt::format("{}\n{}\n{}", grant.scene_id, grant.role, grant.expires_unix_s);
+  return sign_token(link_purpose, payload, key);
+}
+
+std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key) {
+  const auto payload = read_signed_token(link_purpose, token, key);
+  if (!payload) return std::nullopt;
+  LinkGrant grant;
+  std::istringstream lines(*payload);
+  std::string expires;
+  std::getline(lines, grant.scene_id);
+  std::getline(lines, grant.role);
+  std::getline(lines, expires);
+  const char* end = expires.data() + expires.size();
+  if (!is_role(grant.role)) return std::nullopt;
+  if (std::from_chars(expires.data(), end, grant.expires_unix_s).ptr != end) return std::nullopt;
+  return grant;
+}
+
+std::string read_key_file(std::string_view flag, const std::filesystem::path& path) {
+  std::string key = read_text(path, flag);
+  while (!key.empty() && (key.back() == '\n' || key.back() == '\r')) key.pop_back();
+  if (key.size() < min_key_bytes)
+    throw InputError(
+        fmt::format("{} {}", flag, path.string()), {},
+        fmt::format("the key has {} bytes, at least {} are needed", key.size(), min_key_bytes),
+        "make one: openssl rand -hex 32");
+  return key;
+}
+
+std::chrono::seconds parse_duration(std::string_view text) {
+  std::int64_t count = 0;
+  const char* end = text.data() + text.size();
+  const auto [at, error] = std::from_chars(text.data(), end, count);
+  const std::string_view units = "smhd";
+  constexpr std::array<std::int64_t, 4> unit_s = {1, 60, 3600, 86'400};
+  const auto unit = at + 1 == end ? units.find(*at) : std::string_view::npos;
+  if (error != std::errc() || unit == std::string_view::npos || count < 1 || count > 1'000'000)
+    throw InputError("--expires " + std::string(text), {}, "is no duration",
+                     "give 90s, 30m, 12h or 7d");
+  const std::chrono::seconds duration(count * unit_s[unit]);
+  if (duration > longest_link)
+    throw InputError("--expires " + std::string(text), {}, "is too long",
+                     fmt::format("links live {} days at most", longest_link.count()));
+  return duration;
+}
+
+AccessControl::AccessControl(std::filesystem::path token_file,
+                             const std::filesystem::path& key_file)
+    : token_file_(std::move(token_file)) {
+  if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
+  if (!token_file_.empty()) {
+    std::error_code missing;  // read_token_file() reports it
+    token_file_time_ = std::filesystem::last_write_time(token_file_, missing);
+    read_token_file();
+  }
+}
+
+Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
+                             const ResolveScene& resolve) {
+  auto granted = read(token, now_unix_s);
+  if (auto* grant = std::get_if<LinkGrant>(&granted); grant && !grant->scene_id.empty())
+    grant->scene_id = resolve(grant->scene_id);
+  return [granted = std::move(granted), has_authors = !key_.empty()](std::string_view scene_id,
+                                                                     Use use) -> Refusal {
+    if (use == Use::save && !has_authors)
+      return "nobody can save on this server: it was started without --token-key-file, which "
+             "links of role author are made with";
+    if (const auto* refused = std::get_if<std::string>(&granted)) return *refused;
+    const auto& grant = std::get<LinkGrant>(granted);
+    if (!grant.scene_id.empty() && grant.scene_id != scene_id) return other_scene(grant, scene_id);
+    return forbidden(grant.role, use);
+  };
+}
+
+std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
+                                                         std::int64_t now_unix_s) {
+  const LinkGrant everything;  // the default grant: all that viewers may do
+  if (token_file_.empty() && key_.empty()) return everything;
+  if (token.empty()) return "this server needs an access token: open the link you were given";
+  if (is_static_token(token)) return everything;
+  if (const auto grant = key_.empty() ? std::nullopt : read_link_token(token, key_)) {
+    if (now_unix_s < grant->expires_unix_s) return *grant;
+    return "this link has expired: ask for a new one";
+  }
+  return "the access token is not valid here";
+}
+
+bool AccessControl::is_static_token(std::string_view token) {
+  if (token_file_.empty()) return false;
+  const std::lock_guard lock(mutex_);
+  reload_when_changed();
+  const TokenDigest digest = digest_of(token);
+  bool found = false;
+  for (const TokenDigest& known : tokens_) found |= equal_in_constant_time(known, digest);
+  return found;
+}
+
+void AccessControl::reload_when_changed() {
+  std::error_code error;
+  const auto time = std::filesystem::last_write_time(token_file_, error);
+  if (error || time == token_file_time_) return;
+  token_file_time_ = time;
+  try {
+    read_token_file();
+    spdlog::info("--token-file was read again: {} tokens", tokens_.size());
+  } catch (const InputError& bad) {
+    spdlog::error("{}; the tokens read before stay in force", bad.what());
+  }
+}
+
+void AccessControl::read_token_file() {
+  const std::string source = "--token-file " + token_file_.string();
+  std::istringstream lines(read_text(token_file_, "--token-file"));
+  std::vector<TokenDigest> tokens;
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    if (line.empty() || line.front() == '#') continue;
+    if (line.size() < min_token_bytes || line.size() > max_token_bytes)
+      throw InputError(
+          fmt::format("{}:{}", source, number), {},
+          fmt::format("a token has {} to {} characters", min_token_bytes, max_token_bytes),
+          "make one: openssl rand -hex 16");
+    tokens.push_back(digest_of(line));
+  }
+  if (tokens.empty())
+    throw InputError(source, {}, "no token in it", "make one: openssl rand -hex 16");
+  tokens_ = std::move(tokens);
+}
+
+}  // namespace catgs

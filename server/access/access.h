@@ -1,0 +1,64 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "server/access/authorize.h"
+#include "server/access/signed_token.h"
+
+namespace catgs {
+
+/// The rights of an expiring link.
+struct LinkGrant {
+  std::string scene_id;  // or a name, which means the scene that has it alone; empty: every scene
+  /// "viewer": may look at everything; "author": may also save tours; "spectator": only watch
+  /// others' sessions; "solo": neither watch nor be watched.
+  std::string role = "viewer";
+  std::int64_t expires_unix_s = 0;
+};
+
+/// Makes a token `payload.mac`, both base64url: the grant in clear and its HMAC-SHA256 under `key`.
+/// Every server with the key can check it. Throws InputError on a bad role or scene.
+std::string make_link_token(const LinkGrant& grant, std::string_view key);
+/// Returns the grant if the token was made with `key`. Its expiry is not checked.
+std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key);
+
+/// Reads a key of at least 16 bytes, without trailing line ends. Throws InputError that names the
+/// flag of the path.
+std::string read_key_file(std::string_view flag, const std::filesystem::path& path);
+
+/// "90s", "30m", "12h", "7d". Throws InputError.
+std::chrono::seconds parse_duration(std::string_view text);
+
+/// Decides who may see which scene. Without a token file and a key file, everybody may see all
+/// scenes. Only links of role "author" may change files in scenes' folders. Thread-safe.
+class AccessControl {
+ public:
+  /// An empty path disables that kind of token. Throws InputError if a file cannot be read.
+  AccessControl(std::filesystem::path token_file, const std::filesystem::path& key_file);
+
+  /// Returns what `token` permits. `resolve` gives the id of the scene that it names. The token
+  /// file is reread after a change; if that fails, its last valid content stays in force.
+  Permit permit(std::string_view token, std::int64_t now_unix_s, const ResolveScene& resolve);
+
+ private:
+  /// Returns the grant of a valid token, or why it is invalid.
+  std::variant<LinkGrant, std::string> read(std::string_view token, std::int64_t now_unix_s);
+  void reload_when_changed();
+  void read_token_file();
+  bool is_static_token(std::string_view token);
+
+  std::mutex mutex_;
+  const std::filesystem::path token_file_;
+  std::filesystem::file_time_type token_file_time_{};
+  std::vector<TokenDigest> tokens_;
+  std::string key_;  // not changed once constructed
+};
+
+}  // namespace catgs

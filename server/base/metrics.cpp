@@ -1,0 +1,81 @@
+#include "server/base/metrics.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include <prometheus/text_serializer.h>
+
+#include "server/base/log.h"
+#include "server/base/process_metrics.h"
+
+namespace catgs {
+namespace {
+
+using prometheus::Histogram;
+
+// From a tenth of a frame at 120 Hz to a frozen picture.
+const Histogram::BucketBoundaries latency_buckets_s = {
+    0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.1, 0.15, 0.25, 0.5, 1.0, 2.0};
+
+}  // namespace
+
+prometheus::Gauge& Metrics::gauge(const char* name, const char* help,
+                                  const prometheus::Labels& labels) {
+  return prometheus::BuildGauge().Name(name).Help(help).Register(registry_).Add(labels);
+}
+
+prometheus::Gauge& Metrics::budget(const char* resource) {
+  return gauge(
+      "catgs_budget_used_ratio",
+      "Share of processors and GPUs that the sessions take at --min-fps, as measured; at 1 "
+      "admission ends",
+      {{"resource", resource}});
+}
+
+prometheus::Counter& Metrics::counter(const char* name, const char* help,
+                                      const prometheus::Labels& labels) {
+  return prometheus::BuildCounter().Name(name).Help(help).Register(registry_).Add(labels);
+}
+
+prometheus::Histogram& Metrics::stage(const char* name) {
+  return prometheus::BuildHistogram()
+      .Name("catgs_frame_stage_seconds")
+      .Help(
+          "Duration of a frame's stages: queue_wait (it could start, others' turns came first), "
+          "hand_off (to the thread that renders), render_key, render_sub, encode_wait (to the "
+          "thread that encodes), encode, send (encoded to handed to the socket)")
+      .Register(registry_)
+      .Add({{"stage", name}}, latency_buckets_s);
+}
+
+prometheus::Histogram& Metrics::latency(const char* name, const char* help) {
+  return prometheus::BuildHistogram().Name(name).Help(help).Register(registry_).Add(
+      {}, latency_buckets_s);
+}
+
+std::string Metrics::scrape() const {
+  auto families = registry_.Collect();
+  std::ranges::move(process_metrics(), std::back_inserter(families));
+  prometheus::ClientMetric lost;
+  lost.counter.value = static_cast<double>(log_lines_lost());
+  families.push_back({"catgs_log_lines_lost_total",
+                      "Lines that are not in the log: there were too many, or standard error did "
+                      "not take them (a full disk, a pipe that nobody reads)",
+                      prometheus::MetricType::Counter,
+                      {lost}});
+  return prometheus::TextSerializer().Serialize(families);
+}
+
+void Metrics::set_views(int device, int views) {
+  views_.Add({{"device", std::to_string(device)}}).Set(views);  // returns the existing gauge
+}
+
+void Metrics::set_loop_stalled(const std::string& loop, Clock::duration stalled) {
+  loop_stalled_.Add({{"loop", loop}}).Set(std::chrono::duration<double>(stalled).count());
+}
+
+void Metrics::set_encoder_sessions(const std::string& encoder, int count) {
+  encoder_sessions_.Add({{"encoder", encoder}}).Set(count);
+}
+
+}  // namespace catgs

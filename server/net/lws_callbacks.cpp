@@ -1,0 +1,230 @@
+#include "server/net/lws_callbacks.h"
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/net/lws_http.h"
+#include "server/net/lws_site.h"
+#include "server/net/wire.h"
+
+namespace catgs {
+namespace {
+
+/// Per-connection memory, owned and zeroed by libwebsockets.
+struct HttpSlot {
+  LwsHttpExchange* exchange;
+};
+struct WebsocketSlot {
+  std::shared_ptr<LwsWebsocket>* connection;
+};
+
+Service& service_of(lws* wsi) {
+  return *static_cast<Service*>(lws_context_user(lws_get_context(wsi)));
+}
+
+void forget(lws* wsi, HttpSlot& slot) {
+  service_of(wsi).answered.remove(wsi);
+  delete std::exchange(slot.exchange, nullptr);
+}
+
+bool is_get_or_head(lws* wsi) {
+  return lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) > 0 ||
+         lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+}
+
+const std::string upload_length_rule =
+    fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
+
+// Results of callbacks.
+constexpr int keep_reading = 0;
+constexpr int close_connection = -1;
+
+/// Keeps an upload's body if a place is free.
+int on_upload(lws* wsi, LwsHttpExchange& exchange) {
+  if (auto refusal = refuse_upload(wsi)) return exchange.begin_refused_upload(wsi, *refusal);
+  const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  if (auto place = service_of(wsi).uploads.take(link)) return exchange.begin_upload(wsi, place);
+  site_of(wsi).uploads.on_full();
+  return exchange.refuse_body(
+      wsi, busy_response("503: others are saving at the moment: try again in a second\n"),
+      service_of(wsi).scratch);
+}
+
+/// A connection answers one request, and every answer says so. libwebsockets does not show the raw
+/// head. A line that a proxy reads as a length may be none to libwebsockets, so later bytes may be
+/// a body.
+int on_request(lws* wsi, HttpSlot& slot) {
+  const Site& site = site_of(wsi);
+  if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
+  // libwebsockets does not parse chunks and would take them for the next request.
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
+    return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
+  if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
+    slot.exchange = new LwsHttpExchange(service_of(wsi).answered);
+    const std::uint64_t bytes = body_length(wsi).value_or(0);
+    if (bytes >= 1 && bytes <= max_upload_bytes) return on_upload(wsi, *slot.exchange);
+    const int status = bytes < 1 ? 411 : 413;
+    const std::string why = fmt::format("{}: {}", status, upload_length_rule);
+    note_refused(wsi, "upload refused: " + why);
+    if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"),
+                                   service_of(wsi).scratch) != 0)
+      return close_connection;
+    const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
+    return body_follows ? keep_reading : close_connection;
+  }
+  if (!is_get_or_head(wsi)) return refuse_request(wsi, 405, "only GET and HEAD are served here");
+  // The body of a GET has no meaning, and libwebsockets would report it while the answer is being
+  // sent.
+  if (const auto bytes = body_length(wsi); bytes != 0)
+    return refuse_request(wsi, bytes ? 413 : 400, "a GET needs no body");
+  slot.exchange = new LwsHttpExchange(service_of(wsi).answered);
+  const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+  const HttpHandler handler = [&](const HttpRequest& request) {
+    return respond(wsi, host, request);
+  };
+  return slot.exchange->begin(wsi, handler, site_address(wsi, host));
+}
+
+/// Called before the connection has a lws. Operators and probes get in even when others do not. A
+/// proxy has one address for all its clients.
+int on_accept(lws* listener, int descriptor) {
+  const Site& site = site_of(listener);
+  if (!site.accept) return keep_reading;
+  std::array<char, 64> peer{};
+  lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
+  const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : limited_as(peer.data());
+  const auto why =
+      service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
+  if (!why) return keep_reading;
+  site.on_refused(fmt::format("{}: {}", peer.data(), *why));
+  return close_connection;
+}
+
+int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std::size_t length) {
+  switch (reason) {
+    case LWS_CALLBACK_FILTER_NETWORK_CONNECTION:
+      return on_accept(wsi, static_cast<int>(reinterpret_cast<std::intptr_t>(in)));
+    case LWS_CALLBACK_WSI_CREATE:
+      service_of(wsi).gate.opened(wsi);
+      return 0;
+    case LWS_CALLBACK_WSI_DESTROY:
+      service_of(wsi).gate.closed(wsi);
+      return 0;
+    case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+      return confirm_upgrade(wsi);
+    case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
+      note_refused(wsi, "request refused: this is no proxy");
+      return close_connection;
+    case LWS_CALLBACK_HTTP:
+      return on_request(wsi, *slot);
+    case LWS_CALLBACK_HTTP_BODY:
+      if (!slot || !slot->exchange) return 0;
+      return slot->exchange->take_body(wsi, {static_cast<const char*>(in), length});
+    case LWS_CALLBACK_HTTP_BODY_COMPLETION:
+      if (!slot || !slot->exchange) return 0;
+      return slot->exchange->end_body(wsi, site_of(wsi).uploads);
+    case LWS_CALLBACK_TIMER:
+      if (!slot || !slot->exchange) return 0;
+      return slot->exchange->on_timer(wsi);
+    case LWS_CALLBACK_HTTP_WRITEABLE:
+      if (!slot || !slot->exchange) return 0;
+      return slot->exchange->on_writable(wsi, service_of(wsi).scratch);
+    case LWS_CALLBACK_HTTP_DROP_PROTOCOL:
+    case LWS_CALLBACK_CLOSED_HTTP:
+      if (slot) forget(wsi, *slot);
+      return 0;
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:  // a websocket that did not ask for catgs.v1
+      return refuse_request(wsi, 400, "ask for subprotocol catgs.v1");
+    case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
+      for (const auto& connection : service_of(wsi).waker->take()) connection->service_woken();
+      return 0;
+    default:
+      return lws_callback_http_dummy(wsi, reason, slot, in, length);
+  }
+}
+
+int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
+                 std::span<const std::byte> bytes) {
+  switch (reason) {
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
+      const Site& site = site_of(wsi);
+      if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
+      // libwebsockets accepts any protocol version and any method.
+      if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
+          request_header(wsi, WSI_TOKEN_VERSION) != "13")
+        return refuse_request(wsi, 400, "open websockets by GET, Sec-WebSocket-Version 13");
+      const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
+      const std::string host = request_header(wsi, WSI_TOKEN_HOST);
+      if (site.accept && host_allowed(wsi, host) &&
+          origin_allowed(origin, host, site.allowed_origins))
+        return 0;
+      note_refused_origin(wsi, "websocket", origin, host);
+      lws_return_http_status(wsi, 403, "this origin is not allowed");
+      return -1;
+    }
+    case LWS_CALLBACK_ESTABLISHED: {
+      auto connection =
+          std::make_shared<LwsWebsocket>(wsi, service_of(wsi).waker, client_address_of(wsi));
+      slot->connection = new std::shared_ptr<LwsWebsocket>(connection);
+      connection->service_listen(site_of(wsi).accept(connection));
+      return 0;
+    }
+    case LWS_CALLBACK_RECEIVE:
+      return (*slot->connection)->service_receive(bytes);
+    case LWS_CALLBACK_TIMER:
+      return (*slot->connection)->service_timer();
+    case LWS_CALLBACK_SERVER_WRITEABLE:
+      return (*slot->connection)->service_writeable(service_of(wsi).scratch);
+    case LWS_CALLBACK_WS_PEER_INITIATED_CLOSE:
+      (*slot->connection)->service_peer_closes(bytes);
+      return 0;
+    case LWS_CALLBACK_CLOSED:
+      if (slot && slot->connection) {
+        (*slot->connection)->service_closed();
+        delete std::exchange(slot->connection, nullptr);
+      }
+      return 0;
+    default:
+      return 0;
+  }
+}
+
+int http_callback(lws* wsi, lws_callback_reasons reason, void* user, void* in, std::size_t length) {
+  ++service_of(wsi).callbacks;
+  return guarded([&] { return on_http(wsi, reason, static_cast<HttpSlot*>(user), in, length); });
+}
+
+int websocket_callback(lws* wsi, lws_callback_reasons reason, void* user, void* in,
+                       std::size_t length) {
+  ++service_of(wsi).callbacks;
+  return guarded([&] {
+    return on_websocket(wsi, reason, static_cast<WebsocketSlot*>(user),
+                        {static_cast<const std::byte*>(in), length});
+  });
+}
+
+}  // namespace
+
+// The buffer holds one whole message. Larger messages arrive in pieces and are refused.
+const lws_protocols service_protocols[] = {
+    {"http", http_callback, sizeof(HttpSlot), 0, 0, nullptr, 0},
+    {"catgs.v1", websocket_callback, sizeof(WebsocketSlot), wire::max_client_message_bytes, 0,
+     nullptr, 0},
+    {nullptr, nullptr, 0, 0, 0, nullptr, 0},
+};
+
+void pause_where_nothing_happens(Service& service) {
+  constexpr std::chrono::milliseconds pause{2};
+  const bool asked = std::exchange(service.callbacks, 0) > 0;
+  if (!asked && !service.idle_rounds.take(Clock::now())) std::this_thread::sleep_for(pause);
+}
+
+}  // namespace catgs

@@ -1,0 +1,43 @@
+#include "server/scenes/link_preview.h"
+
+#include <fmt/format.h>
+
+#include "server/net/http.h"
+#include "server/scenes/poster.h"
+
+namespace catgs {
+namespace {
+
+/// Percent-encodes a part of a path: all bytes but letters, digits and "-._~".
+std::string url_part(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                       std::string_view("-._~").find(c) != std::string_view::npos;
+    out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string preview_elements(const LinkPreview& preview) {
+  std::string out;
+  const auto add = [&](std::string_view kind, std::string_view name, std::string_view content) {
+    out += fmt::format("<meta {}=\"{}\" content=\"{}\" />\n", kind, name, escape_html(content));
+  };
+  add("property", "og:type", "website");
+  add("property", "og:title", preview.title);
+  add("property", "og:description",
+      fmt::format("Walk through this 3D capture of {} Gaussians in your browser.",
+                  preview.gaussians));
+  if (!preview.has_poster || preview.site.empty()) return out;
+  add("property", "og:image",
+      fmt::format("{}/api/scenes/{}/poster.jpg", preview.site, url_part(preview.scene_id)));
+  add("property", "og:image:width", std::to_string(poster_size_px.x));
+  add("property", "og:image:height", std::to_string(poster_size_px.y));
+  add("name", "twitter:card", "summary_large_image");
+  return out;
+}
+
+}  // namespace catgs

@@ -1,0 +1,136 @@
+#include "server/scenes/scene_api.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "server/base/scene_id.h"
+#include "server/scenes/link_preview.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::string_view sidecar_part = "/sidecar";
+
+constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
+
+/// The token of "Authorization: Bearer TOKEN"; empty: none.
+std::string_view bearer_token(std::string_view authorization) {
+  constexpr std::string_view scheme = "Bearer ";
+  return authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "";
+}
+
+HttpResponse json_response(std::shared_ptr<const std::string> body) {
+  HttpResponse response;
+  response.content_type = "application/json";
+  response.body = std::move(body);
+  return response;
+}
+
+/// Builds the answer to "GET /api/scenes".
+std::shared_ptr<const std::string> scene_list(
+    const std::vector<const SceneLibrary::Listing*>& scenes) {
+  auto list = nlohmann::json::array();
+  for (const auto* scene : scenes)
+    list.push_back({{"id", scene->id},
+                    {"title", scene->title},
+                    {"gaussians", scene->gaussians},
+                    {"loaded", scene->loaded}});
+  return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
+}
+
+HttpResponse unauthorized(std::string_view why) {
+  return text_response(401, fmt::format("401: {}\nSend it as Authorization: Bearer TOKEN\n", why));
+}
+
+}  // namespace
+
+std::optional<HttpResponse> SceneApi::respond(const HttpRequest& request) {
+  if (request.path == "/api/scenes") return list_scenes(permit_of(request));
+  for (const Part part : {Part::tours, Part::poster})
+    if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
+      return part_of_scene(scenes_.resolve(*id), part, permit_of(request));
+  return std::nullopt;
+}
+
+/// Only for scenes that are shown without a token. Programs that make previews have no token, and a
+/// preview must not reveal more than the page.
+std::string SceneApi::preview(const HttpRequest& request) {
+  constexpr std::string_view name = "scene=";
+  const auto argument = std::ranges::find_if(
+      request.arguments, [&](const std::string& text) { return text.starts_with(name); });
+  const auto listing = scenes_.listing();
+  const auto scene =
+      argument == request.arguments.end()
+          ? listing->begin()
+          : std::ranges::find(*listing, scenes_.resolve(argument->substr(name.size())),
+                              &SceneLibrary::Listing::id);
+  if (scene == listing->end() || authorize_("")(scene->id, Use::own_session)) return {};
+  return preview_elements(
+      {request.site, scene->id, scene->title, scene->gaussians, scene->poster != nullptr});
+}
+
+/// Lists the scenes that the permit allows. Like hello, the list tells strangers nothing about
+/// other scenes.
+HttpResponse SceneApi::list_scenes(const Permit& permit) {
+  const auto listing = scenes_.listing();
+  std::vector<const SceneLibrary::Listing*> shown;
+  Refusal refusal = listing->empty() ? permit({}, Use::list) : std::nullopt;
+  for (const auto& scene : *listing) {
+    if (auto refused = permit(scene.id, Use::list))
+      refusal = std::move(refused);
+    else
+      shown.push_back(&scene);
+  }
+  if (shown.empty() && refusal) return unauthorized(*refusal);
+  if (shown.size() < listing->size()) return json_response(scene_list(shown));
+  if (listed_.lock() != listing) {
+    listed_ = listing;
+    whole_list_ = scene_list(shown);
+  }
+  return json_response(whole_list_);
+}
+
+HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part, const Permit& permit) {
+  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
+  const auto listing = scenes_.listing();
+  const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
+  if (found == listing->end()) return text_response(404, "404: " + no_such_scene(scene_id) + "\n");
+  if (part == Part::tours) {
+    static const ToursAnswers none;
+    const ToursAnswers& tours = found->tours ? *found->tours : none;
+    return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
+  }
+  if (!found->poster)
+    return text_response(404, "404: the scene has no poster, or waits for its first visit\n");
+  HttpResponse response;
+  response.content_type = "image/jpeg";
+  response.cache_control = "private, max-age=60";
+  response.body = found->poster;
+  return response;
+}
+
+std::optional<HttpResponse> SceneApi::refuse_upload(const HttpRequest& request) {
+  const auto wish = scene_of(request.path, sidecar_part);
+  if (!wish) return text_response(405, "405: only the sidecars of scenes are saved here\n");
+  const std::string scene_id = scenes_.resolve(*wish);
+  const Permit permit = permit_of(request);
+  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
+  if (const auto refused = permit(scene_id, Use::save))
+    return text_response(403, "403: " + *refused + "\n");
+  if (std::ranges::count(*scenes_.listing(), scene_id, &SceneLibrary::Listing::id) == 0)
+    return text_response(404, "404: " + no_such_scene(scene_id) + "\n");
+  return std::nullopt;
+}
+
+Permit SceneApi::permit_of(const HttpRequest& request) {
+  return authorize_(std::string(bearer_token(request.authorization)));
+}
+
+std::string SceneApi::saved_scene(const HttpRequest& request) const {
+  return scenes_.resolve(scene_of(request.path, sidecar_part).value());
+}
+
+}  // namespace catgs

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/access/authorize.h"
+#include "server/net/http.h"
+#include "server/scenes/scene_library.h"
+
+namespace catgs {
+
+/// Answers requests for "/api/scenes" and paths below it on the public port. Network thread.
+class SceneApi {
+ public:
+  /// `scenes` must outlive this object.
+  SceneApi(const SceneLibrary& scenes, Authorize authorize)
+      : scenes_(scenes), authorize_(std::move(authorize)) {}
+
+  /// Returns nothing for any other path.
+  std::optional<HttpResponse> respond(const HttpRequest& request);
+  /// The elements of the page's head that messengers show for a link; empty: none.
+  std::string preview(const HttpRequest& request);
+  /// Returns the refusal of a request "PUT /api/scenes/ID/sidecar", or nothing if its sender may
+  /// save.
+  std::optional<HttpResponse> refuse_upload(const HttpRequest& request);
+  /// The id of the scene that an accepted request saves.
+  [[nodiscard]] std::string saved_scene(const HttpRequest& request) const;
+
+ private:
+  enum class Part { tours, poster };
+  /// The permit of the request's token.
+  Permit permit_of(const HttpRequest& request);
+  HttpResponse list_scenes(const Permit& permit);
+  HttpResponse part_of_scene(std::string_view scene_id, Part part, const Permit& permit);
+
+  const SceneLibrary& scenes_;
+  const Authorize authorize_;
+  // The cached answer for clients that may see every scene of a listing.
+  std::weak_ptr<const std::vector<SceneLibrary::Listing>> listed_;
+  std::shared_ptr<const std::string> whole_list_;
+};
+
+}  // namespace catgs

@@ -1,0 +1,141 @@
+#include "server/scenes/scene_catalog.h"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/scene.h"
+#include "render_core/synth/synth.h"
+#include "server/net/http.h"
+#include "server/scenes/poster.h"
+#include "server/scenes/scene_ids.h"
+#include "server/scenes/tours.h"
+
+namespace catgs {
+namespace {
+
+template <typename T>
+T parse_number(const std::string& spec, std::string_view text) {
+  T value{};
+  const char* end = text.data() + text.size();
+  if (text.empty() || std::from_chars(text.data(), end, value).ptr != end)
+    throw InputError("--scene " + spec, {}, fmt::format("\"{}\" is not a number", text),
+                     "give synth:city:300000 or synth:city:300000:SEED");
+  return value;
+}
+
+/// synth:KIND:COUNT[:SEED]
+Scene synthesize(const std::string& spec) {
+  std::vector<std::string_view> parts;
+  for (std::string_view rest = spec; !rest.empty();) {
+    const auto colon = std::min(rest.find(':'), rest.size());
+    parts.push_back(rest.substr(0, colon));
+    rest.remove_prefix(std::min(colon + 1, rest.size()));
+  }
+  if (parts.size() < 3 || parts.size() > 4)
+    throw InputError("--scene " + spec, {}, "is incomplete", "give synth:city:300000");
+  const auto count = parse_number<std::size_t>(spec, parts[2]);
+  const std::uint64_t seed = parts.size() == 4 ? parse_number<std::uint64_t>(spec, parts[3]) : 1;
+  return synthesize(parse_synth_kind(parts[1]), count, seed);
+}
+
+/// Only streamed SOG folders have levels of detail to choose from.
+bool has_levels(const std::string& spec) {
+  if (is_synthetic(spec)) return false;
+  std::error_code error;
+  if (!std::filesystem::exists(spec, error))
+    throw InputError("--scene " + spec, {}, "there is no such file or folder",
+                     "check the path, or try --scene synth:city:300000");
+  return locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
+}
+
+Scene load(const std::string& spec, const ServerConfig& config, LoadOptions options) {
+  if (is_synthetic(spec)) return synthesize(spec);
+  if (has_levels(spec)) {
+    if (config.lod >= 0) options.lod = config.lod;
+    if (config.gaussian_budget > 0)
+      options.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
+  }
+  return load_scene(spec, options);
+}
+
+SceneFacts facts_of(const Scene& scene, std::string id) {
+  SceneFacts facts;
+  facts.scene_id = std::move(id);
+  facts.title = printable(scene.name);
+  facts.gaussians = scene.cloud.size();
+  facts.up = scene.hints.up;
+  facts.start_pose = scene.hints.start_pose;
+  facts.focus = scene.hints.focus;
+  facts.limits_min = scene.hints.limits.min;
+  facts.limits_max = scene.hints.limits.max;
+  facts.near_z = scene.hints.near_z;
+  return facts;
+}
+
+}  // namespace
+
+std::shared_ptr<const SceneEntry> load_scene(
+    const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
+    const ServerConfig& config, const RendererOptions& core, int threads,
+    const std::function<void(double)>& progress) {
+  spdlog::info("loading {}", spec);
+  LoadOptions options;
+  options.threads = threads;
+  options.progress = progress;
+  Scene scene = load(spec, config, std::move(options));
+  auto entry = std::make_shared<SceneEntry>();
+  entry->facts = facts_of(scene, id_of(scene.name));
+  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
+  if (!is_synthetic(spec)) {
+    entry->sidecar = locate_scene(spec).hints.sidecar;
+    const std::optional<std::string> text = sidecar_text(entry->sidecar);
+    if (text) entry->sidecar_tag = etag_of(*text);
+    entry->tours = ToursAnswers(tours_of(entry->sidecar, text));
+  }
+  auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
+  entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
+  entry->renderer = std::move(made.renderer);
+  entry->poster = make_poster(*entry->renderer, entry->facts);
+  spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}",
+               entry->facts.scene_id, entry->facts.gaussians, scene.format,
+               static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
+  return entry;
+}
+
+std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& config,
+                                                           const RendererOptions& core) {
+  if ((config.lod >= 0 || config.gaussian_budget > 0) && config.scene_folders.empty() &&
+      std::ranges::none_of(config.scenes, has_levels))
+    throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
+                     "no scene has levels of detail to choose from",
+                     "levels and budgets are for streamed SOG folders");
+  const SceneIds ids(config.scenes, config.scene_folders);
+  std::vector<std::shared_ptr<const SceneEntry>> entries;
+  for (const auto& spec : config.scenes) {
+    const auto id_of = [&](const std::string& name) { return ids.id_of(spec, name); };
+    auto entry = load_scene(spec, id_of, config, core, core.pool->threads());
+    const std::string& id = entry->facts.scene_id;
+    if (std::ranges::any_of(entries, [&](const auto& e) { return e->facts.scene_id == id; }))
+      throw InputError("--scene " + spec, {}, "is there already, as " + id, "name it once");
+    // The banner shows the first scene's renderer.
+    if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)
+      spdlog::info("scene {}: renderer {}", entry->facts.scene_id, entry->renderer_text);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
+}  // namespace catgs

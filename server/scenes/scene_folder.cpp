@@ -1,0 +1,101 @@
+#include "server/scenes/scene_folder.h"
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "render_core/base/error.h"
+#include "render_core/base/printable.h"
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/formats/json_field.h"
+
+namespace catgs {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool has_scene_extension(const fs::path& path) {
+  constexpr std::array extensions = {".ply", ".splat", ".spz", ".sog"};
+  return std::ranges::count(extensions, path.extension().string()) > 0;
+}
+
+bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
+
+/// True if a folder looks like a scene. People keep other folders beside their scenes.
+bool is_scene_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path / "lod-meta.json", error) || fs::exists(path / "meta.json", error) ||
+         fs::is_directory(path / "point_cloud", error);
+}
+
+/// The newest file counts, because the files of a folder may be replaced one by one or all at once.
+fs::file_time_type time_of(const fs::path& path) {
+  std::error_code error;
+  auto newest = fs::last_write_time(path, error);
+  if (fs::is_directory(path, error))
+    for (const auto& entry : fs::directory_iterator(path, error))
+      newest = std::max(newest, fs::last_write_time(entry.path(), error));
+  return newest;
+}
+
+}  // namespace
+
+std::vector<fs::path> SceneFolders::list() const {
+  std::vector<fs::path> paths;
+  for (const fs::path& folder : folders_) {
+    std::error_code error;
+    fs::directory_iterator entries(folder, error);
+    if (error)
+      throw InputError("--scene-folder " + folder.string(), {}, error.message(),
+                       "name a folder that the server may read");
+    for (const auto& entry : entries) {
+      const bool scene = entry.is_directory(error) ? is_scene_folder(entry.path())
+                                                   : has_scene_extension(entry.path());
+      if (scene && !is_hidden(entry.path())) paths.push_back(entry.path());
+    }
+  }
+  std::ranges::sort(paths);
+  return paths;
+}
+
+std::vector<FoundScene> SceneFolders::scan() {
+  std::vector<fs::path> paths = list();
+  if (paths.size() > max_scenes) {
+    if (!std::exchange(told_of_too_many_, true))
+      spdlog::warn("--scene-folder: {} scenes are too many, the first {} are offered", paths.size(),
+                   max_scenes);
+    paths.resize(max_scenes);
+  }
+  std::map<fs::path, Known> known;
+  std::vector<FoundScene> scenes;
+  std::set<std::string> ids;
+  for (const fs::path& path : paths) {
+    const auto changed = time_of(path);
+    const auto before = known_.find(path);
+    Known& now = known[path];
+    if (before != known_.end() && before->second.changed == changed) {
+      now = std::move(before->second);
+    } else {
+      now.changed = changed;
+      try {
+        std::string name = printable(to_utf8(locate_scene(path).name));
+        std::string id = ids_.id_of(path.string(), name);
+        now.scene = {path, std::move(name), std::move(id), read_scene_size(path, options_),
+                     changed};
+        now.good = true;
+      } catch (
+          const std::exception& error) {  // it may be half copied: its next change is read again
+        spdlog::warn("not offered: {}", error.what());
+      }
+    }
+    if (now.good && ids.insert(now.scene.id).second) scenes.push_back(now.scene);
+  }
+  known_ = std::move(known);
+  return scenes;
+}
+
+}  // namespace catgs

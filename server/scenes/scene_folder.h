@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "render_core/scene/files/scene_size.h"
+#include "server/scenes/scene_ids.h"
+
+namespace catgs {
+
+/// A scene found in a folder, as described by its headers.
+struct FoundScene {
+  std::filesystem::path path;
+  std::string name;  // for people
+  std::string id;
+  SceneSize size;
+  /// Modification time of the file, or of the newest one directly in its folder. A new value means
+  /// a new scene.
+  std::filesystem::file_time_type changed;
+};
+
+/// Scans folders for scenes repeatedly. Only headers of new and changed scenes are read, because a
+/// folder may be a slow mount of an object store. Not thread-safe.
+class SceneFolders {
+ public:
+  SceneFolders(std::vector<std::filesystem::path> folders, SceneIds ids, LoadOptions options)
+      : folders_(std::move(folders)), ids_(std::move(ids)), options_(std::move(options)) {}
+
+  /// Lists the present scenes in order of path: scene files, SOG folders and training output
+  /// folders directly in the folders. At most max_scenes are listed; a warning names further ones.
+  /// Unreadable scenes are left out and reported once. A path is listed once, even if its folder is
+  /// named twice. Throws InputError if a folder itself cannot be read.
+  std::vector<FoundScene> scan();
+
+  static constexpr std::size_t max_scenes = 10'000;
+
+ private:
+  struct Known {
+    std::filesystem::file_time_type changed;
+    bool good = false;
+    FoundScene scene;
+  };
+  std::vector<std::filesystem::path> list() const;
+
+  const std::vector<std::filesystem::path> folders_;
+  const SceneIds ids_;
+  const LoadOptions options_;
+  std::map<std::filesystem::path, Known> known_;
+  bool told_of_too_many_ = false;
+};
+
+}  // namespace catgs

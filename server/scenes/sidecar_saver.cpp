@@ -1,0 +1,182 @@
+#include "server/scenes/sidecar_saver.h"
+
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/base/error.h"
+#include "server/base/replace_file.h"
+#include "server/scenes/poster.h"
+#include "server/scenes/tours.h"
+
+namespace catgs {
+namespace {
+
+SceneHints hints_of(const SceneFacts& facts) {
+  SceneHints hints;
+  hints.up = facts.up;
+  hints.start_pose = facts.start_pose;
+  hints.near_z = facts.near_z;
+  hints.limits = {facts.limits_min, facts.limits_max};
+  hints.focus = facts.focus;
+  return hints;
+}
+
+/// The scene's entry with its new sidecar applied.
+std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar& sidecar,
+                                          const std::optional<std::string>& text) {
+  SceneHints hints = hints_of(entry.facts);
+  use_sidecar(sidecar, entry.sidecar.filename().string(), hints);
+  auto scene = std::make_shared<SceneEntry>(entry);
+  scene->facts.up = hints.up;
+  scene->facts.start_pose = hints.start_pose;
+  scene->facts.near_z = hints.near_z;
+  scene->facts.limits_min = hints.limits.min;
+  scene->facts.limits_max = hints.limits.max;
+  scene->facts.focus = hints.focus;
+  scene->tours = ToursAnswers(tours_of(entry.sidecar, text));
+  scene->sidecar_tag = text ? etag_of(*text) : "";
+  return scene;
+}
+
+Sidecar sidecar_in(const std::filesystem::path& file, std::string_view text) {
+  return read_sidecar(MemorySource(file.string(), std::as_bytes(std::span(text))));
+}
+
+HttpResponse tagged(int status, std::string text, std::string etag) {
+  HttpResponse response = text_response(status, std::move(text));
+  response.etag = std::move(etag);
+  return response;
+}
+
+HttpResponse stopping() { return busy_response("503: the server stops\n"); }
+
+}  // namespace
+
+std::future<HttpResponse> SidecarSaver::save(std::string scene_id, std::string json,
+                                             Precondition precondition,
+                                             std::shared_ptr<const UploadPlace> place) {
+  auto request = std::make_shared<Request>(
+      Request{std::move(scene_id), std::move(json), std::move(precondition), std::move(place)});
+  auto future = request->answer.get_future();
+  boost::asio::post(io_, [this, request = std::move(request)] {
+    if (stopped_) return request->answer.set_value(stopping());
+    waiting_.push_back(request);
+    start_next();
+  });
+  return future;
+}
+
+void SidecarSaver::stop() {
+  stopped_ = true;
+  for (const SharedRequest& request : waiting_) request->answer.set_value(stopping());
+  waiting_.clear();
+}
+
+/// Saves run first, because those that wait together need only one poster.
+void SidecarSaver::start_next() {
+  while (!busy_ && !waiting_.empty()) {
+    const SharedRequest request = std::move(waiting_.front());
+    waiting_.pop_front();
+    if (!request->place->abandoned()) start_save(request);
+  }
+  while (!busy_ && !stopped_ && !posters_due_.empty())
+    start_poster(posters_due_.extract(posters_due_.begin()).value());
+}
+
+void SidecarSaver::start_save(const SharedRequest& request) {
+  request->entry = scenes_.in_memory(request->scene_id);
+  if (!request->entry)
+    return request->answer.set_value(
+        text_response(409, "409: the scene is not in memory: open it, then save\n"));
+  if (request->entry->sidecar.empty())
+    return request->answer.set_value(
+        text_response(409, "409: this scene is no file: there is nowhere to save beside it\n"));
+  busy_ = true;
+  boost::asio::post(writer_, [this, request] {
+    Outcome outcome;
+    try {
+      outcome = write(*request);
+    } catch (const std::exception& failure) {  // memory, say: it costs this save only
+      spdlog::error("scene {}: a save failed: {}", request->scene_id, failure.what());
+      outcome.answer = text_response(500, "500: the server failed to save: try again\n");
+    }
+    boost::asio::post(io_,
+                      [this, request, outcome = std::move(outcome)] { finish(*request, outcome); });
+  });
+}
+
+SidecarSaver::Outcome SidecarSaver::write(const Request& request) {
+  const SceneEntry& scene = *request.entry;
+  const std::filesystem::path& file = scene.sidecar;
+  Sidecar sidecar;
+  try {
+    sidecar = check_sent_sidecar(request.json);
+  } catch (const InputError& mistake) {
+    return {text_response(400, fmt::format("400: {}\n", mistake.what()))};
+  }
+  try {
+    // Read it once, because another server may replace it meanwhile.
+    const std::optional<std::string> there = sidecar_text(file);
+    const std::string current = there ? etag_of(*there) : "";
+    if (!request.precondition.holds(current)) {
+      spdlog::info("scene {}: an author's sidecar was made from an older one than {}",
+                   request.scene_id, file.string());
+      Outcome refused{
+          tagged(412, "412: somebody else saved this scene since you opened it\n", current)};
+      try {
+        if (current != scene.sidecar_tag)
+          refused.revised = revised(scene, there ? sidecar_in(file, *there) : Sidecar(), there);
+      } catch (const InputError& broken) {
+        spdlog::warn("scene {}: goes on as it was: {}", request.scene_id, broken.what());
+      }
+      return refused;
+    }
+    auto shown = revised(scene, sidecar, request.json);  // throws before any file is changed
+    if (request.place->abandoned()) return {text_response(503, "503: the connection is closed\n")};
+    if (there != request.json) replace_file(file, request.json);  // which keeps the one before
+    spdlog::info("scene {}: an author saved {} ({} bytes)", request.scene_id, file.string(),
+                 request.json.size());
+    return {tagged(200, "saved\n", etag_of(request.json)), std::move(shown)};
+  } catch (const InputError& unwritable) {
+    spdlog::warn("scene {}: an author cannot save: {}", request.scene_id, unwritable.what());
+    std::string why = unwritable.what();
+    const std::string path = file.string();  // for the operator's log only
+    if (why.starts_with(path)) why.replace(0, path.size(), file.filename().string());
+    return {text_response(409, fmt::format("409: {}\n", why))};
+  }
+}
+
+void SidecarSaver::finish(Request& request, const Outcome& outcome) {
+  busy_ = false;
+  if (outcome.revised) {
+    if (!outcome.revised->poster || !same_poster(outcome.revised->facts, request.entry->facts))
+      posters_due_.insert(request.scene_id);
+    scenes_.revise(request.scene_id, outcome.revised);
+  }
+  request.answer.set_value(outcome.answer);
+  start_next();
+}
+
+void SidecarSaver::start_poster(const std::string& scene_id) {
+  auto scene = scenes_.in_memory(scene_id);
+  if (!scene) return;
+  busy_ = true;
+  boost::asio::post(writer_, [this, scene_id, scene = std::move(scene)] {
+    auto shown = std::make_shared<SceneEntry>(*scene);
+    if (auto poster = make_poster(*shown->renderer, shown->facts))
+      shown->poster = std::move(poster);
+    boost::asio::post(io_, [this, scene_id, shown = std::move(shown)] {
+      busy_ = false;
+      scenes_.revise(scene_id, shown);
+      start_next();
+    });
+  });
+}
+
+}  // namespace catgs

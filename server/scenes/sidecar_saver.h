@@ -1,0 +1,75 @@
+#pragma once
+
+#include <deque>
+#include <future>
+#include <memory>
+#include <set>
+#include <string>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/thread_pool.hpp>
+
+#include "server/net/http.h"
+#include "server/net/upload_places.h"
+#include "server/scenes/scene_library.h"
+
+namespace catgs {
+
+/// Writes the sidecars that authors send and applies them. Clients that arrive or reload afterwards
+/// get the new start view and tours. Present clients are not disturbed. The poster is rendered
+/// again when no save waits. Values that a sidecar leaves out stay as they are until a restart.
+class SidecarSaver {
+ public:
+  /// `io` runs the session thread and outlives this object.
+  SidecarSaver(SceneLibrary& scenes, boost::asio::io_context& io) : scenes_(scenes), io_(io) {}
+  ~SidecarSaver() { writer_.join(); }
+  SidecarSaver(const SidecarSaver&) = delete;
+  SidecarSaver& operator=(const SidecarSaver&) = delete;
+
+  /// Any thread. The future is ready when visitors get the saved sidecar. The caller has checked
+  /// the sender's permission. If the sidecar on disk does not meet `precondition`, it is kept and
+  /// applied, as another server may have written it. The answer is then 412 with its tag. Requests
+  /// run one after the other; one with an abandoned place is dropped without an answer. If two
+  /// servers share a folder and save at the same moment, both may find the old sidecar. The later
+  /// save then wins.
+  std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition,
+                                 std::shared_ptr<const UploadPlace> place);
+
+  /// Session thread. The current save finishes. Waiting and later saves are answered with 503.
+  void stop();
+
+ private:
+  struct Request {
+    std::string scene_id;
+    std::string json;
+    Precondition precondition;
+    std::shared_ptr<const UploadPlace> place;
+    std::shared_ptr<const SceneEntry> entry{};
+    std::promise<HttpResponse> answer{};
+  };
+  struct Outcome {
+    HttpResponse answer;
+    std::shared_ptr<const SceneEntry> revised{};  // null: the scene stays as it is
+  };
+  using SharedRequest = std::shared_ptr<Request>;
+
+  // Session thread.
+  void start_next();
+  void start_save(const SharedRequest& request);
+  void start_poster(const std::string& scene_id);
+  void finish(Request& request, const Outcome& outcome);
+  // Writer thread.
+  static Outcome write(const Request& request);
+
+  SceneLibrary& scenes_;
+  boost::asio::io_context& io_;
+  // Session thread.
+  std::deque<SharedRequest> waiting_;
+  std::set<std::string> posters_due_;  // ids of scenes
+  bool busy_ = false;                  // the writer thread works on one of them
+  bool stopped_ = false;
+  // A separate thread, so that neither sockets nor visits wait for a slow disk.
+  boost::asio::thread_pool writer_{1};
+};
+
+}  // namespace catgs

@@ -1,0 +1,146 @@
+#include "server/scenes/tours.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <span>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/json_field.h"
+#include "server/net/http.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::uint64_t max_bytes = 4 << 20;
+// These limits must match web_client/src/tour/limits.ts; tests/web_client/tours.test.ts compares
+// them.
+constexpr std::size_t max_tours = 32;
+constexpr std::size_t max_stops = 256;
+constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters
+
+bool is_file(const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(file, error);
+}
+
+nlohmann::json sidecar_tours(const std::filesystem::path& sidecar, std::string_view text) {
+  const MemorySource file(sidecar.string(), std::as_bytes(std::span(text)));
+  const nlohmann::json document = read_json(file, max_bytes);
+  const auto tours = JsonField(file.name(), document).find("tours");
+  if (!tours) return nullptr;
+  static_cast<void>(tours->size());  // throws if it is no array
+  return tours->value();
+}
+
+nlohmann::json viewer_settings(const std::filesystem::path& sidecar) {
+  const std::array candidates = {std::filesystem::path(sidecar).replace_extension(".settings.json"),
+                                 sidecar.parent_path() / "settings.json"};
+  for (const auto& path : candidates) {
+    if (!is_file(path)) continue;
+    try {
+      nlohmann::json settings = read_json(FileSource(path), max_bytes);
+      // Many programs write a settings.json. The viewer's file has animation tracks.
+      if (settings.is_object() && settings.contains("animTracks")) return settings;
+    } catch (const InputError& error) {
+      spdlog::warn("no tours from it: {}", error.what());
+    }
+  }
+  return nullptr;
+}
+
+/// Refuses unknown members. Otherwise a typing error would go unnoticed, and nested values would be
+/// unchecked.
+void check_members(const JsonField& object, std::initializer_list<std::string_view> known) {
+  static_cast<void>(object.find("title"));  // throws if it is no object
+  for (const auto& [name, value] : object.value().items())
+    if (std::ranges::find(known, name) == known.end())
+      object.fail(fmt::format("unknown field '{}'", name),
+                  fmt::format("known are {}", fmt::join(known, ", ")));
+}
+
+void check_text(const std::optional<JsonField>& field) {
+  if (field && field->text().size() > max_text_bytes)
+    field->fail(fmt::format("has more than {} bytes", max_text_bytes));
+}
+
+void check_number(const std::optional<JsonField>& field, float low, float high) {
+  if (field && !(field->number() >= low && field->number() <= high))
+    field->fail(fmt::format("is not in {}…{}", low, high));
+}
+
+void check_stop(const JsonField& stop) {
+  check_members(stop, {"title", "caption", "position", "look_at", "orientation", "fov_deg",
+                       "marker", "stay_s"});
+  check_text(stop.find("title"));
+  check_text(stop.find("caption"));
+  static_cast<void>(stop.at("position").place());
+  if (const auto target = stop.find("look_at"))
+    static_cast<void>(target->place());
+  else
+    static_cast<void>(stop.at("orientation").orientation());
+  if (const auto marker = stop.find("marker")) static_cast<void>(marker->place());
+  check_number(stop.find("fov_deg"), 5.0f, 160.0f);
+  check_number(stop.find("stay_s"), 0.0f, 3600.0f);
+}
+
+void check_tour(const JsonField& tour) {
+  check_members(tour, {"title", "autoplay", "stops"});
+  check_text(tour.find("title"));
+  if (const auto autoplay = tour.find("autoplay"); autoplay && !autoplay->value().is_boolean())
+    autoplay->fail("is not true or false");
+  const JsonField stops = tour.at("stops");
+  if (stops.size() > max_stops)
+    stops.fail(fmt::format("has {} entries, at most {}", stops.size(), max_stops));
+  for (std::size_t i = 0; i < stops.size(); ++i) check_stop(stops[i]);
+}
+
+}  // namespace
+
+Sidecar check_sent_sidecar(std::string_view json) {
+  const MemorySource source("sidecar", std::as_bytes(std::span(json)));
+  const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
+  Sidecar sidecar = read_sidecar(source);
+  if (const auto tours = JsonField(source.name(), document).find("tours")) {
+    if (tours->size() > max_tours)
+      tours->fail(fmt::format("has {} entries, at most {}", tours->size(), max_tours));
+    for (std::size_t i = 0; i < tours->size(); ++i) check_tour((*tours)[i]);
+  }
+  return sidecar;
+}
+
+std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text) {
+  nlohmann::json document{
+      {"tours", nullptr}, {"etag", nullptr}, {"settings", viewer_settings(sidecar)}};
+  if (text) {
+    document["tours"] = sidecar_tours(sidecar, *text);
+    document["etag"] = etag_of(*text);
+  }
+  return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+ToursAnswers::ToursAnswers(std::string_view document) {
+  const auto answer = [&](bool may_save) {
+    return std::make_shared<const std::string>(
+        fmt::format(R"({{"may_save":{},"document":{}}})", may_save, document));
+  };
+  for_viewers = answer(false);
+  for_authors = answer(true);
+}
+
+std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar) {
+  if (!is_file(sidecar)) return std::nullopt;
+  const std::vector<std::byte> bytes = FileSource(sidecar).read_all(max_bytes);
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+}  // namespace catgs

@@ -1,0 +1,227 @@
+#include "server/visit/admission_desk.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/base/log_session.h"
+#include "server/base/scene_id.h"
+#include "server/flow/frame_size.h"
+#include "server/net/trusted_proxies.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::chrono::seconds time_to_measure{3};  // at most, for a moving camera
+
+double megapixels(glm::ivec2 size_px) { return 1e-6 * size_px.x * size_px.y; }
+
+}  // namespace
+
+AdmissionDesk::AdmissionDesk(const VisitContext& around, const PlaceList& places,
+                             const MachineUse& machine)
+    : around_(around),
+      places_(places),
+      machine_(machine),
+      budget_({static_cast<double>(around.options.cpus),
+               static_cast<double>(around.devices.views().size())},
+              around.options.min_fps),
+      queue_(around.options.max_queue) {}
+
+SceneAnswer AdmissionDesk::find_scene(const std::string& scene_id, TimePoint now) const {
+  if (around_.scenes.has(scene_id)) return around_.scenes.want(scene_id, now);
+  return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(scene_id), false};
+}
+
+std::variant<std::string, ErrorMessage> AdmissionDesk::choose(const Hello& hello) const {
+  const std::string wanted = hello.scene_id.empty() ? around_.scenes.default_scene()
+                                                    : around_.scenes.resolve(hello.scene_id);
+  // Check the token first, so that a refusal tells nothing about the scenes here.
+  if (const auto refusal = around_.authorize(hello.token)(wanted, Use::own_session))
+    return ErrorMessage{ErrorCode::unauthorized, *refusal, true};
+  if (!around_.scenes.has(wanted))
+    return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(wanted), true};
+  if (!best_encoder(around_.encoders, hello.decoders)) {
+    std::string offer;
+    for (const auto& encoder : around_.encoders)
+      offer += (offer.empty() ? "" : "; ") + encoder.text;
+    return ErrorMessage{ErrorCode::no_common_codec,
+                        "the client decodes nothing that this server encodes: " + offer, true};
+  }
+  return wanted;
+}
+
+AdmissionBudget::Offer AdmissionDesk::offer_for(const Hello& hello,
+                                                std::span<const SessionDemand> present) const {
+  if (shut_ || admitted_ >= around_.options.max_sessions) return {Room::no};
+  const FlowWish wish = wish_within(around_.options.policy, hello.settings, hello.viewport_px);
+  return budget_.offer(present, {std::nullopt, megapixels(wish.size_px), wish.fps});
+}
+
+std::vector<Place*> AdmissionDesk::admitted_places() const {
+  std::vector<Place*> admitted;
+  for (const auto& place : places_)
+    if (place->visitor().admitted_at) admitted.push_back(place.get());
+  return admitted;
+}
+
+std::vector<SessionDemand> AdmissionDesk::demands() const {
+  const TimePoint now = Clock::now();
+  std::vector<SessionDemand> demands;
+  for (Place* const place : admitted_places()) {
+    const Visit& visit = place->visit();
+    const PicturePlan& plan = visit.stream().plan();
+    const bool fresh =
+        now - *place->visitor().admitted_at < time_to_measure && !visit.life().rests(now);
+    demands.push_back({place->usage().frame_cost(), megapixels(plan.moving().size_px),
+                       plan.moving().fps, fresh, plan.pixel_share()});
+  }
+  return demands;
+}
+
+void AdmissionDesk::set_pixel_share(Place& place, double share) {
+  PicturePlan& plan = place.visit().stream().plan();
+  const double work = frame_work(megapixels(plan.moving().size_px));
+  plan.use_pixel_share(share);
+  around_.frames.changed(place);
+  const glm::ivec2 size_px = plan.moving().size_px;
+  place.usage().scale_frame_cost(frame_work(megapixels(size_px)) / work);
+  const LogSession about(place.id());
+  spdlog::debug("its pictures are {}x{} from now on: there is room for {:.0f} % of their pixels",
+                size_px.x, size_px.y, 100.0 * share);
+}
+
+void AdmissionDesk::grow_pictures() {
+  if (!queue_.empty()) return;
+  if (const auto growth = budget_.growth(demands()))
+    set_pixel_share(*admitted_places()[growth->session], growth->pixel_share);
+}
+
+AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
+  place.visitor().token = hello.token;
+  const std::string& id = place.id();
+  auto choice = choose(hello);
+  if (auto* error = std::get_if<ErrorMessage>(&choice)) {
+    queue_.leave(id);
+    return std::move(*error);
+  }
+  const std::string address = limited_as(place.audience().address());
+  const auto same_address = std::ranges::count_if(places_, [&](const auto& other) {
+    return other->visitor().admitted_at && limited_as(other->audience().address()) == address;
+  });
+  if (same_address >= around_.options.max_sessions_per_address) {
+    queue_.leave(id);
+    return ErrorMessage{
+        ErrorCode::server_full,
+        fmt::format("{} sessions from {} already: close one first", same_address, address), true};
+  }
+  const bool its_turn = queue_.empty() || turn_ == id;
+  const auto offer =
+      its_turn ? offer_for(hello, demands()) : AdmissionBudget::Offer{.room = Room::no};
+  if (its_turn) measuring_ = offer.room == Room::unknown;
+  if (offer.room == Room::yes) {
+    // A client that waits for its scene holds no place: the scene may fail to load.
+    queue_.leave(id);
+    auto scene = find_scene(std::get<std::string>(choice), Clock::now());
+    if (const auto* awaited = std::get_if<SceneAwaited>(&scene)) return *awaited;
+    if (auto* error = std::get_if<ErrorMessage>(&scene)) return std::move(*error);
+    return let_in(place, hello, std::get<0>(std::move(scene)), offer);
+  }
+  if (const auto position = queue_.join(id, Clock::now())) return place_in_queue(*position);
+  return ErrorMessage{
+      ErrorCode::server_full,
+      measuring_
+          ? fmt::format("it is being measured what sessions cost here, and {} wait for it: try "
+                        "again in {} s",
+                        queue_.size(), time_to_measure.count())
+          : fmt::format("all {} places are taken, and {} wait for one: try again in a minute",
+                        admitted_, queue_.size()),
+      true};
+}
+
+Admission AdmissionDesk::let_in(Place& place, const Hello& hello,
+                                std::shared_ptr<const SceneEntry> scene,
+                                const AdmissionBudget::Offer& offer) {
+  const auto present = admitted_places();
+  ++admitted_;
+  around_.metrics.sessions_admitted.Increment();
+  for (std::size_t i = 0; i < offer.kept.size(); ++i)
+    if (offer.kept[i] < 1.0)
+      set_pixel_share(*present[i],
+                      offer.kept[i] * present[i]->visit().stream().plan().pixel_share());
+  const glm::ivec2 size_px =
+      wish_within(around_.options.policy, hello.settings, hello.viewport_px).size_px;
+  Visitor& visitor = place.visitor();
+  visitor.encoder = best_encoder(around_.encoders, hello.decoders).value();
+  visitor.admitted_at = Clock::now();
+  const LogSession about(place.id());
+  spdlog::info("{} looks at {}, {}x{}, {}", place.audience().address(), scene->facts.scene_id,
+               hello.viewport_px.x, hello.viewport_px.y, encoder_name(visitor.encoder.kind));
+  return {std::move(scene), visitor.encoder,
+          machine_.initial_effort(admitted_, scaled_size(size_px, std::sqrt(offer.pixel_share))),
+          offer.pixel_share};
+}
+
+void AdmissionDesk::leave(Place& place, TimePoint now) {
+  if (const auto admitted_at = place.visitor().admitted_at) {
+    --admitted_;
+    queue_.session_ended(now - *admitted_at);
+  }
+  queue_.leave(place.id());
+}
+
+void AdmissionDesk::on_newcomer(TimePoint now) {
+  if (queue_.size() > 1) ask_waiting(now);
+}
+
+void AdmissionDesk::ask_waiting(TimePoint now) {
+  measuring_ = false;
+  for (const auto& [id, since] : queue_.waiting()) {
+    Visit& visit = find_place(places_, id)->visit();
+    if (now - since >= around_.options.policy.longest_wait) {
+      queue_.leave(id);
+      visit.fail(ErrorCode::server_full,
+                 fmt::format("no place came free within {} minutes: try again later",
+                             std::chrono::floor<std::chrono::minutes>(now - since).count()));
+      continue;
+    }
+    const Room room = offer_for(visit.waiting_hello(), demands()).room;
+    measuring_ = room == Room::unknown;
+    if (measuring_ || (room == Room::no && now - since >= around_.options.policy.overtaken_at_most))
+      return;
+    if (room == Room::no) continue;
+    // It leaves the queue, admitted or refused, or is told to wait on.
+    turn_ = id;
+    visit.ask_again(now);
+    turn_.clear();
+  }
+}
+
+void AdmissionDesk::admit_waiting(TimePoint now) {
+  ask_waiting(now);
+  queue_told_ = now;
+  int position = 0;
+  for (const auto& [id, since] : queue_.waiting())
+    find_place(places_, id)->visit().say(place_in_queue(++position), now);
+}
+
+QueuePlace AdmissionDesk::place_in_queue(int position) const {
+  return {position, measuring_ ? time_to_measure * position : queue_.estimate(position, admitted_)};
+}
+
+void AdmissionDesk::on_tick(TimePoint now) {
+  grow_pictures();
+  if (measuring_ || now - queue_told_ >= speak_at_least_every) admit_waiting(now);
+  const auto demanded = demands();
+  const auto load = budget_.load(demanded);
+  Metrics& metrics = around_.metrics;
+  metrics.sessions.Set(admitted_);
+  metrics.sessions_waiting.Set(static_cast<double>(queue_.size()));
+  metrics.seats.Set(shut_ ? 0 : budget_.seats(demanded, around_.options.max_sessions));
+  metrics.cpu_budget_used.Set(load.cpus);
+  metrics.gpu_budget_used.Set(load.gpus);
+}
+
+}  // namespace catgs

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/visit/admission_budget.h"
+#include "server/visit/admission_queue.h"
+#include "server/visit/machine_use.h"
+#include "server/visit/place.h"
+
+namespace catgs {
+
+/// Admits clients, grants their pixels and keeps the queue of waiting clients. Session thread only.
+class AdmissionDesk {
+ public:
+  /// All three arguments outlive the desk.
+  AdmissionDesk(const VisitContext& around, const PlaceList& places, const MachineUse& machine);
+
+  /// Returns the id of the scene that a hello may open. The client must support a codec of this
+  /// server. Room is not checked.
+  [[nodiscard]] std::variant<std::string, ErrorMessage> choose(const Hello& hello) const;
+  [[nodiscard]] SceneAnswer find_scene(const std::string& scene_id, TimePoint now) const;
+  AdmissionAnswer admit(Place& place, const Hello& hello);
+  /// A client said hello. It may need less room than the clients that wait already.
+  void on_newcomer(TimePoint now);
+  /// The place takes no room any more and leaves the queue.
+  void leave(Place& place, TimePoint now);
+  /// Asks waiting clients that would find room now to try again. The others are told their
+  /// position.
+  void admit_waiting(TimePoint now);
+  void on_tick(TimePoint now);
+  /// No client is admitted any more.
+  void shut() { shut_ = true; }
+  [[nodiscard]] bool is_shut() const { return shut_; }
+  [[nodiscard]] int admitted() const { return admitted_; }
+
+ private:
+  /// The offer that this hello would get beside `present`.
+  [[nodiscard]] AdmissionBudget::Offer offer_for(const Hello& hello,
+                                                 std::span<const SessionDemand> present) const;
+  /// The admitted places. demands() has their measured demands in the same order.
+  [[nodiscard]] std::vector<Place*> admitted_places() const;
+  [[nodiscard]] std::vector<SessionDemand> demands() const;
+  Admission let_in(Place& place, const Hello& hello, std::shared_ptr<const SceneEntry> scene,
+                   const AdmissionBudget::Offer& offer);
+  void set_pixel_share(Place& place, double share);
+  /// Gives pixels back where there is room for them.
+  void grow_pictures();
+  void ask_waiting(TimePoint now);
+  [[nodiscard]] QueuePlace place_in_queue(int position) const;
+
+  const VisitContext& around_;
+  const PlaceList& places_;
+  const MachineUse& machine_;
+  const AdmissionBudget budget_;
+  AdmissionQueue queue_;
+  int admitted_ = 0;
+  bool shut_ = false;
+  std::string turn_;        // id of the queued session that is being asked
+  bool measuring_ = false;  // the head of the queue waits for measured costs
+  TimePoint queue_told_{};
+};
+
+}  // namespace catgs

@@ -1,0 +1,107 @@
+#include "server/visit/audience.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "server/net/wire.h"
+#include "server/visit/visit_policy.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+// An IDR is many times the size of other frames, and the visitor pays for it too.
+constexpr auto min_idr_interval = 1s;
+
+/// The visitor's secrets stay the visitor's, and so does the choice of the scene.
+Welcome for_spectators(Welcome welcome) {
+  welcome.resume_token.clear();
+  welcome.watch_token.clear();
+  welcome.scene_ids = {welcome.scene.scene_id};
+  welcome.watching = true;
+  return welcome;
+}
+
+}  // namespace
+
+void Audience::attach(std::shared_ptr<ClientConnection> connection) {
+  if (visitor_)
+    visitor_->dismiss(CloseCode::going_away, "the session goes on in another connection");
+  address_ = connection->connection().peer_address();
+  visitor_ = std::move(connection);
+}
+
+std::size_t Audience::queued_frames() const {
+  return visitor_ ? visitor_->connection().queued_frames() : 0;
+}
+
+void Audience::close(CloseCode code, std::string_view reason) {
+  if (visitor_) visitor_->connection().close(code, reason);
+}
+
+void Audience::send(const ServerMessage& message, TimePoint now) {
+  if (visitor_) visitor_->connection().send(wire::serialize(message));
+  if (const auto* welcome = std::get_if<Welcome>(&message))
+    tell_spectators(for_spectators(*welcome), now);
+  else if (std::holds_alternative<StreamConfig>(message) || std::holds_alternative<Drain>(message))
+    tell_spectators(message, now);
+}
+
+std::vector<std::uint64_t> Audience::send(OutgoingFrame frame, TimePoint now) {
+  const bool idr = frame.ticket.idr;
+  if (idr) last_idr_ = now;
+  if (!spectators_.empty()) last_said_ = now;
+  for (Spectator& s : spectators_) {
+    if (s.waits_for_idr && !idr) continue;
+    s.waits_for_idr = !s.connection->connection().send(frame).empty();
+  }
+  if (!visitor_) return {};
+  return visitor_->connection().send(std::move(frame));
+}
+
+void Audience::add(std::shared_ptr<ClientConnection> spectator, Welcome welcome) {
+  spectator->connection().send(wire::serialize(for_spectators(std::move(welcome))));
+  spectators_.push_back({std::move(spectator), true});
+}
+
+void Audience::remove(const ClientConnection& spectator) {
+  std::erase_if(spectators_, [&](const Spectator& s) { return s.connection.get() == &spectator; });
+}
+
+void Audience::on_message(ClientConnection& spectator, const ClientMessage& message) {
+  if (std::holds_alternative<RequestIdr>(message))
+    for (Spectator& s : spectators_)
+      if (s.connection.get() == &spectator) s.waits_for_idr = true;
+  if (!std::holds_alternative<Bye>(message)) return;
+  remove(spectator);
+  spectator.dismiss(CloseCode::normal, "bye");
+}
+
+void Audience::tell_spectators(const ServerMessage& message, TimePoint now) {
+  if (spectators_.empty()) return;
+  last_said_ = now;
+  const OutgoingMessage outgoing = wire::serialize(message);
+  for (Spectator& s : spectators_) s.connection->connection().send(outgoing);
+}
+
+bool Audience::wants_idr(TimePoint now) const {
+  return now - last_idr_ >= min_idr_interval &&
+         std::ranges::any_of(spectators_, &Spectator::waits_for_idr);
+}
+
+void Audience::keep_talking(TimePoint now) {
+  if (now - last_said_ < speak_at_least_every) return;
+  tell_spectators(heartbeat_at(now), now);
+}
+
+void Audience::dismiss_spectators() {
+  for (const Spectator& s : std::exchange(spectators_, {})) {
+    s.connection->connection().send(wire::serialize(
+        ErrorMessage{ErrorCode::session_ended, "the session that you watched has ended", true}));
+    s.connection->dismiss(CloseCode::normal, "the session has ended");
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/visit/client_connection.h"
+
+namespace catgs {
+
+/// The receivers of a visit's frames: its visitor, if connected, and spectators. Spectators get the
+/// frames as encoded for the visitor, who never waits for them. A spectator that reads too slowly
+/// misses frames up to the next IDR. Session thread only.
+class Audience {
+ public:
+  Audience(int max_spectators, std::string address)
+      : max_spectators_(static_cast<std::size_t>(max_spectators)), address_(std::move(address)) {}
+
+  /// `connection` becomes the visitor's connection. The previous one is closed.
+  void attach(std::shared_ptr<ClientConnection> connection);
+  /// The visitor's connection was lost or moves to another place.
+  void detach() { visitor_.reset(); }
+  [[nodiscard]] bool is_visitor(const ClientConnection& connection) const {
+    return visitor_.get() == &connection;
+  }
+  [[nodiscard]] bool connected() const { return visitor_ != nullptr; }
+  /// The address of the visitor's last connection.
+  [[nodiscard]] const std::string& address() const { return address_; }
+  [[nodiscard]] std::size_t queued_frames() const;
+  void close(CloseCode code, std::string_view reason);
+
+  /// Sends to the visitor. Spectators get the messages that concern them too.
+  void send(const ServerMessage& message, TimePoint now);
+  /// Sends to everybody who can decode the frame. Returns the ids of the visitor's frames that were
+  /// dropped.
+  std::vector<std::uint64_t> send(OutgoingFrame frame, TimePoint now);
+
+  [[nodiscard]] bool full() const { return spectators_.size() >= max_spectators_; }
+  [[nodiscard]] std::size_t spectators() const { return spectators_.size(); }
+  /// The spectator is sent `welcome` first, without the visitor's secrets. Frames follow from the
+  /// next IDR on.
+  void add(std::shared_ptr<ClientConnection> spectator, Welcome welcome);
+  void remove(const ClientConnection& spectator);
+  /// Handles a farewell or a lost decoder. Spectators' other messages are ignored.
+  void on_message(ClientConnection& spectator, const ClientMessage& message);
+  /// Call it at least four times a second. True: a spectator waits for an IDR and the last one was
+  /// sent a second or more ago.
+  [[nodiscard]] bool wants_idr(TimePoint now) const;
+  /// Sends spectators a heartbeat after almost a second of silence.
+  void keep_talking(TimePoint now);
+  /// Closes all spectators' connections: the session has ended or may not be watched any more.
+  void dismiss_spectators();
+
+ private:
+  struct Spectator {
+    std::shared_ptr<ClientConnection> connection;
+    bool waits_for_idr = true;
+  };
+  void tell_spectators(const ServerMessage& message, TimePoint now);
+
+  std::shared_ptr<ClientConnection> visitor_;  // null: lost
+  const std::size_t max_spectators_;
+  std::string address_;
+  std::vector<Spectator> spectators_;
+  TimePoint last_idr_{};
+  TimePoint last_said_{};  // to spectators
+};
+
+}  // namespace catgs

@@ -1,0 +1,75 @@
+#include "server/visit/machine_use.h"
+
+#include <cmath>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "server/base/log_session.h"
+#include "server/visit/device_loads.h"
+
+namespace catgs {
+
+MachineUse::MachineUse(const VisitContext& around)
+    : around_(around),
+      effort_(around.options.cpus, around.options.presets),
+      cpu_seconds_charged_(process_cpu_seconds()),
+      charged_(Clock::now()) {}
+
+void MachineUse::on_tick(const PlaceList& places, int admitted, TimePoint now) {
+  charge_cpu(places, now);
+  report_loads(places);
+  control_effort(places, admitted, now);
+  around_.metrics.processors_busy.Set(busy_);
+}
+
+void MachineUse::charge_cpu(const PlaceList& places, TimePoint now) {
+  const double used = process_cpu_seconds();
+  const double seconds = used - std::exchange(cpu_seconds_charged_, used);
+  const double interval_s =
+      std::chrono::duration<double>(now - std::exchange(charged_, now)).count();
+  if (interval_s <= 0) return;
+  constexpr double span_s = 1.0;
+  busy_ += (seconds / interval_s / around_.options.cpus - busy_) *
+           (1.0 - std::exp(-interval_s / span_s));
+  std::vector<double> busy_seconds;
+  for (const auto& place : places) busy_seconds.push_back(place->usage().take_busy_seconds(now));
+  const auto shares = share_out(seconds, busy_seconds);
+  for (std::size_t i = 0; i < places.size(); ++i)
+    places[i]->usage().charge_cpu(shares[i], interval_s);
+}
+
+void MachineUse::report_loads(const PlaceList& places) {
+  std::vector<DeviceSession> sessions;
+  for (const auto& place : places)
+    if (const auto device = place->visit().stream().device())
+      sessions.push_back({*device, place->usage().gpu_load()});
+  around_.devices.set_loads(device_loads(sessions));
+}
+
+void MachineUse::control_effort(const PlaceList& places, int admitted, TimePoint now) {
+  std::vector<EffortControl::Session> encoding;
+  PlaceList encoders;
+  for (const auto& place : places) {
+    const Visit& visit = place->visit();
+    const StreamControl& stream = visit.stream();
+    if (stream.encoder_kind() != EncoderKind::x264 || !visit.life().on_show() || stream.opening())
+      continue;
+    const SessionUsage& usage = place->usage();
+    const EncoderEffort effort = stream.plan().effort();
+    const std::chrono::duration<double> interval = visit.frame_interval();
+    encoding.push_back({effort, usage.encoder_load() * effort.threads,
+                        usage.encode_seconds() / interval.count(), stream.plan().moving().size_px});
+    encoders.push_back(place);
+  }
+  for (const auto& [index, effort] : effort_.update(busy_, admitted, encoding, now)) {
+    around_.metrics.effort_changes.Increment();
+    const LogSession about(encoders[index]->id());
+    spdlog::debug("libx264 goes on with {}, {} threads: processors {:.0f} % busy",
+                  effort_presets[static_cast<std::size_t>(effort.preset)].name, effort.threads,
+                  100.0 * busy_);
+    encoders[index]->visit().stream().plan().use_effort(effort);
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,95 @@
+#include "server/visit/picture_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/flow/frame_size.h"
+
+namespace catgs {
+namespace {
+
+// Less effort for a still saves nothing: 54 kB of libx264's ultrafast show what 37 kB of superfast
+// do.
+constexpr int least_still_preset = 2;
+static_assert(effort_presets[least_still_preset].name == "superfast");
+
+}  // namespace
+
+FlowWish wish_within(const VisitPolicy& policy, const Settings& settings, glm::ivec2 viewport_px) {
+  const int fps = settings.max_fps > 0 ? settings.max_fps : policy.default_fps;
+  const int kbps =
+      settings.max_bitrate_kbps > 0 ? settings.max_bitrate_kbps : policy.default_bitrate_kbps;
+  const glm::ivec2 wish_px = settings.size_px.x > 0 ? settings.size_px : viewport_px;
+  return {frame_size(wish_px, policy.max_pixels), std::min(fps, policy.max_fps),
+          std::min(kbps, policy.max_bitrate_kbps), settings.fixed_quality};
+}
+
+glm::ivec2 still_size_within(const VisitPolicy& policy, const Settings& settings,
+                             glm::ivec2 viewport_px) {
+  const glm::ivec2 moving_px = wish_within(policy, settings, viewport_px).size_px;
+  if (settings.fixed_quality || settings.still_size_px.x == 0) return moving_px;
+  const glm::ivec2 still_px = frame_size(settings.still_size_px, policy.max_pixels);
+  return still_px.x * still_px.y > moving_px.x * moving_px.y ? still_px : moving_px;
+}
+
+void PicturePlan::begin(const Hello& hello, const EncoderEffort& effort, double pixel_share) {
+  viewport_px_ = hello.viewport_px;
+  settings_ = hello.settings;
+  effort_ = effort;
+  pixel_share_ = pixel_share;
+  update();
+}
+
+void PicturePlan::wish(const Settings& settings, TimePoint now) {
+  if (settings == settings_) return;
+  settings_ = settings;
+  settings_wait_ = true;
+  follow_settings(now);
+}
+
+void PicturePlan::on_tick(TimePoint now) {
+  follow_settings(now);
+  if (flow_.update(now)) update();
+}
+
+void PicturePlan::use_effort(const EncoderEffort& effort) {
+  effort_ = effort;
+  apply(effort_, moving_);
+}
+
+void PicturePlan::use_pixel_share(double share) {
+  pixel_share_ = share;
+  update();
+}
+
+EncoderSettings PicturePlan::still() const {
+  EncoderSettings still = moving_;
+  if (still_size_px() == moving_.size_px) return still;
+  EncoderEffort effort = effort_;
+  effort.preset = std::max(effort.preset, least_still_preset);
+  apply(effort, still);
+  still.size_px = still_size_px();
+  still.fps = std::min(still.fps, still_fps);  // sizes the VBV that its first picture finds full
+  return still;
+}
+
+void PicturePlan::follow_settings(TimePoint now) {
+  if (!settings_wait_ || within(settings_followed_, policy_.settings_gap, now)) return;
+  settings_wait_ = false;
+  settings_followed_ = now;
+  larger_stills_ = true;
+  update();
+}
+
+void PicturePlan::update() {
+  FlowWish wish = wish_within(policy_, settings_, viewport_px_);
+  wish.size_px = scaled_size(wish.size_px, std::sqrt(pixel_share_));
+  flow_.set_wish(wish);
+  moving_.size_px = scaled_size(wish.size_px, flow_.rung().scale);
+  moving_.fps = wish.fps;
+  moving_.bitrate_kbps = wish.bitrate_kbps;
+  apply(effort_, moving_);
+  still_size_px_ = still_size_within(policy_, settings_, viewport_px_);
+}
+
+}  // namespace catgs

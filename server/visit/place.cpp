@@ -1,0 +1,175 @@
+#include "server/visit/place.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/base/log.h"
+#include "server/base/log_session.h"
+#include "server/net/wire.h"
+#include "server/schedule/on_session_thread.h"
+
+namespace catgs {
+namespace {
+
+/// Logs an error, and counts it where it closes a connection.
+void note_error(std::string_view session_id, const std::string& address, const ErrorMessage& error,
+                Metrics& metrics) {
+  const LogSession about(session_id);
+  const std::string line = fmt::format("{}: {}", address, error.message);
+  if (error.code == ErrorCode::internal || error.code == ErrorCode::render_failed)
+    spdlog::warn(line);
+  else
+    log_refusal(line);
+  if (error.code == ErrorCode::bad_message) metrics.bad_messages.Increment();
+  if (error.fatal) metrics.sessions_refused.Increment();
+}
+
+}  // namespace
+
+Place::Place(const VisitContext& around, Admissions& admissions, std::string session_id,
+             std::string address)
+    : around_(around),
+      admissions_(admissions),
+      id_(std::move(session_id)),
+      executor_(around.executor),
+      visit_(around.options.policy, *this, Clock::now()),
+      audience_(around.options.max_spectators, std::move(address)) {}
+
+Place::~Place() { executor_->close(std::move(stream_)); }
+
+void Place::on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
+                       TimePoint received) {
+  if (!audience_.is_visitor(from)) return audience_.on_message(from, message);
+  visit_.on_link(link, received);
+  const auto* hello = std::get_if<Hello>(&message);
+  if (hello && visit_.life().state() == VisitState::awaiting_hello)
+    return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
+  if (const auto* pose = std::get_if<PoseSample>(&message))
+    return around_.frames.pose_arrived(*this, *pose, received);
+  if (const auto* ack = std::get_if<Ack>(&message))
+    return around_.frames.seen(*this, *ack, received);
+  visit_.on_message(message, received);
+  around_.frames.changed(*this);
+}
+
+void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::size_t packet_bytes,
+                          TimePoint now) {
+  if (!audience_.is_visitor(by)) return;
+  usage_.frame_sent(ticket, now);
+  visit_.on_frame_sent(ticket, packet_bytes);
+}
+
+void Place::on_close(ClientConnection& closed, bool by_leaving) {
+  if (!audience_.is_visitor(closed)) return audience_.remove(closed);
+  audience_.detach();
+  if (by_leaving || !visitor_.admitted_at)
+    visit_.end("the client has left");
+  else
+    visit_.on_lost(Clock::now());
+  around_.frames.changed(*this);
+  if (visit_.life().state() == VisitState::closed) admissions_.leave(*this);
+}
+
+void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why) {
+  if (audience_.is_visitor(from)) {
+    visit_.fail(code, why);
+    return around_.frames.changed(*this);
+  }
+  audience_.remove(from);
+  const ErrorMessage error{code, std::string(why), true};
+  note_error(id_, from.connection().peer_address(), error, around_.metrics);
+  from.connection().send(wire::serialize(error));
+  from.dismiss(CloseCode::policy_violation, why);
+}
+
+SceneAnswer Place::find_scene(const std::string& wish) {
+  const std::string scene_id = around_.scenes.resolve(wish);
+  if (const auto refusal = around_.authorize(visitor_.token)(scene_id, Use::own_session))
+    return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
+  return admissions_.find_scene(scene_id, Clock::now());
+}
+
+std::vector<std::string> Place::scene_ids() {
+  std::vector<std::string> ids = around_.scenes.scene_ids();
+  const Permit permit = around_.authorize(visitor_.token);
+  std::erase_if(ids, [&](const std::string& id) { return permit(id, Use::own_session); });
+  return ids;
+}
+
+void Place::sign(Welcome& welcome) {
+  const SessionTokens& tokens = around_.tokens;
+  welcome.session_id = id_;
+  welcome.resume_token =
+      tokens.resume_token(id_, welcome.scene.scene_id, around_.options.wall_clock_s());
+  if (may_be_watched()) welcome.watch_token = tokens.watch_token(id_);
+}
+
+bool Place::may_be_watched() const {
+  return around_.options.max_spectators > 0 &&
+         !around_.authorize(visitor_.token)(visit_.stream().scene()->facts.scene_id, Use::watch);
+}
+
+void Place::send(const ServerMessage& message) {
+  if (const auto* error = std::get_if<ErrorMessage>(&message))
+    note_error(id_, audience_.address(), *error, around_.metrics);
+  audience_.send(message, Clock::now());
+}
+
+std::vector<std::uint64_t> Place::send(OutgoingFrame frame) {
+  return around_.frames.send(*this, std::move(frame));
+}
+
+void Place::open_stream(StreamSettings settings) {
+  executor_->open(stream_, std::move(settings),
+                  on_session_thread<StreamOpened>(
+                      around_.io, [self = shared_from_this()](const StreamOpened& opened) {
+                        self->around_.frames.stream_opened(*self, opened);
+                      }));
+}
+
+std::optional<EncoderChoice> Place::other_encoder(Fault why) {
+  const EncoderChoice had = visitor_.encoder;
+  const bool failed = why == Fault::encoder_failed;
+  if (!failed && had.kind == EncoderKind::nvenc) around_.metrics.encoders_refused.Increment();
+  auto other = instead_of_nvenc(around_.encoders, had);
+  if (!other) return std::nullopt;  // the visit reports why it ends
+  const LogSession about(id_);
+  spdlog::warn("{} {}: {}", had.text, failed ? "failed" : "cannot be opened", other->text);
+  visitor_.encoder = *other;
+  return other;
+}
+
+void Place::on_tick(TimePoint now) {
+  visit_.on_tick(now);
+  audience_.keep_talking(now);
+  if (audience_.wants_idr(now)) visit_.stream().idr().request();
+}
+
+void Place::account_for(const FrameResult& result, TimePoint now) {
+  const FrameTicket& ticket = result.frame.ticket;
+  Metrics& metrics = around_.metrics;
+  const LogSession about(id_);
+  if (!result.ok) spdlog::warn("a frame failed: {}", result.message);
+  (!result.ok       ? metrics.frames_failed
+   : ticket.refined ? metrics.frames_refined
+                    : metrics.frames_rendered)
+      .Increment();
+  metrics.list_entries_overflowed.Increment(static_cast<double>(result.stats.overflowed_entries));
+  const auto& stage_ms = result.stats.stage_ms;
+  const double device_s = 1e-3 * std::accumulate(stage_ms.begin(), stage_ms.end(), 0.0);
+  const glm::dvec2 size_px = ticket.size_px, moving_px = visit_.stream().plan().moving().size_px;
+  usage_.frame_ended(ticket, visit_.stream().device() ? device_s : 0.0, now,
+                     size_px.x * size_px.y / (moving_px.x * moving_px.y));
+}
+
+std::shared_ptr<Place> find_place(const PlaceList& places, std::string_view session_id) {
+  const auto it =
+      std::ranges::find_if(places, [&](const auto& place) { return place->id() == session_id; });
+  return it == places.end() ? nullptr : *it;
+}
+
+}  // namespace catgs

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/visit/audience.h"
+#include "server/visit/session_usage.h"
+#include "server/visit/visit.h"
+#include "server/visit/visit_context.h"
+
+namespace catgs {
+
+class Place;
+using PlaceList = std::vector<std::shared_ptr<Place>>;
+
+/// Serves a place. The owner of all places implements it.
+class Admissions {
+ public:
+  virtual ~Admissions() = default;
+  /// Hands the connection to the place of its resume or watch token, or begins the newcomer's
+  /// visit.
+  virtual void on_hello(const std::shared_ptr<ClientConnection>& from,
+                        std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) = 0;
+  virtual AdmissionAnswer admit(Place& place, const Hello& hello) = 0;
+  virtual SceneAnswer find_scene(const std::string& scene_id, TimePoint now) = 0;
+  [[nodiscard]] virtual std::uint32_t admitted() const = 0;
+  /// The place's visit has ended.
+  virtual void leave(Place& place) = 0;
+};
+
+/// The visitor, as of the last hello, and what it was granted.
+struct Visitor {
+  std::string token;      // it may be valid for one scene only
+  EncoderChoice encoder;  // of the streams that are opened from here on
+  std::optional<TimePoint> admitted_at;
+};
+
+/// One visit's place in the server: its Visit, its Audience, its stream on the executor and its
+/// usage of the machine. Code that changes the Visit from outside must tell Frames. Session thread
+/// only.
+class Place final : public VisitHost, public std::enable_shared_from_this<Place> {
+ public:
+  /// `around` and `admissions` outlive the place, except for its destructor.
+  Place(const VisitContext& around, Admissions& admissions, std::string session_id,
+        std::string address);
+  ~Place() override;  // any thread but the executor's
+
+  // Called by its connections.
+  void on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
+                  TimePoint received);
+  void on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::size_t packet_bytes,
+                     TimePoint now);
+  /// `by_leaving`: the page was closed and the visitor will not come back.
+  void on_close(ClientConnection& closed, bool by_leaving);
+  /// Closes the connection of a message that cannot be accepted.
+  void refuse(ClientConnection& from, ErrorCode code, std::string_view why);
+
+  // VisitHost
+  AdmissionAnswer admit(const Hello& hello) override { return admissions_.admit(*this, hello); }
+  SceneAnswer find_scene(const std::string& wish) override;
+  std::vector<std::string> scene_ids() override;
+  std::uint32_t session_count() override { return admissions_.admitted(); }
+  void sign(Welcome& welcome) override;
+  void send(const ServerMessage& message) override;
+  std::vector<std::uint64_t> send(OutgoingFrame frame) override;
+  void close(CloseCode code, std::string_view reason) override { audience_.close(code, reason); }
+  void open_stream(StreamSettings settings) override;
+  std::optional<EncoderChoice> other_encoder(Fault why) override;
+
+  void on_tick(TimePoint now);
+  /// Accounts for a frame's result and its cost.
+  void account_for(const FrameResult& result, TimePoint now);
+  /// True if the visitor's token allows spectators. A resume may bring another token.
+  [[nodiscard]] bool may_be_watched() const;
+  [[nodiscard]] std::optional<FrameCandidate> next_frame() const { return visit_.next_frame(); }
+  [[nodiscard]] const std::string& id() const { return id_; }
+  [[nodiscard]] Visit& visit() { return visit_; }
+  [[nodiscard]] Audience& audience() { return audience_; }
+  [[nodiscard]] Visitor& visitor() { return visitor_; }
+  [[nodiscard]] SessionUsage& usage() { return usage_; }
+  [[nodiscard]] const std::shared_ptr<Stream>& stream() const { return stream_; }
+
+ private:
+  const VisitContext& around_;
+  Admissions& admissions_;
+  const std::string id_;  // of the session
+  const std::shared_ptr<FrameExecutor> executor_;
+  std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
+  Visitor visitor_;
+  Visit visit_;
+  SessionUsage usage_;
+  Audience audience_;
+};
+
+/// Returns null if no place has this id.
+std::shared_ptr<Place> find_place(const PlaceList& places, std::string_view session_id);
+
+}  // namespace catgs

@@ -1,0 +1,212 @@
+#include "server/visit/places.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/access/signed_token.h"
+#include "server/base/log_session.h"
+#include "server/base/scene_id.h"
+#include "server/net/trusted_proxies.h"
+#include "server/net/wire.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::chrono::milliseconds tick_interval{250};
+
+}  // namespace
+
+Places::Places(VisitContext around) : around_(std::move(around)), tick_timer_(around_.io) {
+  tick();
+}
+
+std::shared_ptr<ConnectionListener> Places::accept(std::shared_ptr<Connection> connection) {
+  const std::string address = connection->peer_address();
+  auto place = std::make_shared<Place>(around_, *this, random_id(), address);
+  auto client =
+      std::make_shared<ClientConnection>(around_.io, around_.metrics, std::move(connection),
+                                         [this, address] { forget_connection(address); });
+  boost::asio::post(around_.io, [this, client, place] { add(client, place); });
+  return client;
+}
+
+void Places::add(const std::shared_ptr<ClientConnection>& connection,
+                 const std::shared_ptr<Place>& place) {
+  const VisitOptions& options = around_.options;
+  const std::string address = limited_as(place->audience().address());
+  const int same_address = ++connections_by_address_[address];
+  ++connections_;
+  places_.push_back(place);
+  connection->belong_to(*place);
+  const auto refuse = [&](std::string_view why) {
+    place->visit().fail(ErrorCode::server_full, why);
+  };
+  if (desk_.is_shut())
+    refuse("this server is shutting down");
+  else if (connections_ > options.max_sessions * (1 + options.max_spectators) + options.max_queue +
+                              options.max_greeting)
+    refuse("too many connections: try again in a minute");
+  else if (same_address > options.max_sessions_per_address)
+    refuse(
+        fmt::format("{} connections from {} already: close one first", same_address - 1, address));
+}
+
+void Places::forget_connection(const std::string& address) {
+  --connections_;
+  const auto it = connections_by_address_.find(limited_as(address));
+  if (--it->second == 0) connections_by_address_.erase(it);
+}
+
+void Places::on_hello(const std::shared_ptr<ClientConnection>& from,
+                      std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) {
+  if (!hello.watch_token.empty()) return watch(from, *newcomer, hello, now);
+  const auto resumed =
+      around_.tokens.read_resume_token(hello.resume_token, around_.options.wall_clock_s());
+  if (resumed && hello.version >= wire::version) {
+    // The name may by now mean a scene other than the one that was shown.
+    if (hello.scene_id.empty() || hello.scene_id == name_in(resumed->scene_id))
+      hello.scene_id = resumed->scene_id;
+    if (const auto known = find_place(places_, resumed->session_id)) {
+      if (resume(from, *newcomer, *known, hello, now)) return;
+    } else {
+      // The session comes from another server of the fleet, or its grace is over. It keeps its id.
+      newcomer->audience().detach();
+      const auto place = std::ranges::find(places_, newcomer);
+      newcomer = std::make_shared<Place>(around_, *this, resumed->session_id,
+                                         newcomer->audience().address());
+      *place = newcomer;
+      from->belong_to(*newcomer);
+    }
+  }
+  newcomer->visit().on_message(hello, now);
+  desk_.on_newcomer(now);
+}
+
+bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
+                    Place& known, const Hello& hello, TimePoint now) {
+  const auto choice = desk_.choose(hello);
+  const auto* scene_id = std::get_if<std::string>(&choice);
+  if (!scene_id || !known.visit().life().resumable()) return false;
+  // The session's own scene is in memory. A client that selects another scene starts anew and may
+  // have to wait.
+  auto found = desk_.find_scene(*scene_id, now);
+  auto* scene = std::get_if<std::shared_ptr<const SceneEntry>>(&found);
+  if (!scene) return false;
+  around_.metrics.sessions_resumed.Increment();
+  newcomer.audience().detach();
+  leave(newcomer);
+  Visitor& visitor = known.visitor();
+  visitor.token = hello.token;
+  const auto best =
+      best_encoder(around_.encoders, hello.decoders);  // choose() has checked that there is one
+  if (visitor.encoder.codec != best->codec) visitor.encoder = *best;
+  connection->belong_to(known);
+  const LogSession about(known.id());
+  spdlog::info("{} is back", known.audience().address());
+  const PicturePlan& plan = known.visit().stream().plan();
+  known.visit().on_resumed(
+      hello, {std::move(*scene), visitor.encoder, plan.effort(), plan.pixel_share()}, now);
+  if (!known.may_be_watched()) known.audience().dismiss_spectators();
+  around_.frames.changed(known);
+  return true;
+}
+
+void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
+                   const Hello& hello, TimePoint now) {
+  const auto refuse = [&](ErrorCode code, std::string_view why) {
+    newcomer.visit().fail(code, why);
+  };
+  const auto id = around_.tokens.read_watch_token(hello.watch_token);
+  if (!id) return refuse(ErrorCode::unauthorized, "this link to watch a session is not valid here");
+  const auto host = find_place(places_, *id);
+  if (!host || !host->visit().life().resumable())
+    return refuse(ErrorCode::session_ended, "the session of this link has ended");
+  Visit& visit = host->visit();
+  Audience& audience = host->audience();
+  if (const auto why =
+          around_.authorize(hello.token)(visit.stream().scene()->facts.scene_id, Use::watch))
+    return refuse(ErrorCode::unauthorized, *why);
+  if (!host->may_be_watched())
+    return refuse(ErrorCode::unauthorized,
+                  "the session of this link is not to be watched any more");
+  if (visit.life().state() != VisitState::live)
+    return refuse(ErrorCode::server_full, "the session of this link is about to start");
+  if (std::ranges::count(hello.decoders, visit.stream().config().codec) == 0)
+    return refuse(ErrorCode::no_common_codec,
+                  "the client cannot decode what the session of this link is encoded as");
+  if (audience.full())
+    return refuse(ErrorCode::server_full,
+                  fmt::format("{} people watch this session already", audience.spectators()));
+  newcomer.audience().detach();
+  leave(newcomer);
+  connection->watch(*host);
+  audience.add(connection, visit.stream().welcome());
+  const LogSession about(host->id());
+  spdlog::info("{} watches", connection->connection().peer_address());
+  if (audience.wants_idr(now)) visit.stream().idr().request();
+  around_.frames.changed(*host);
+}
+
+void Places::leave(Place& place) {
+  const auto it = std::ranges::find(places_, &place, [](const auto& p) { return p.get(); });
+  if (it == places_.end()) return;
+  const TimePoint now = Clock::now();
+  if (place.visitor().admitted_at) {
+    const VisitStatistics& seen = place.visit().statistics();
+    const LogSession about(place.id());
+    spdlog::info("ended after {} frames, {} bytes, {} dropped", seen.frames_sent(),
+                 seen.bytes_sent(), seen.frames_dropped());
+  }
+  desk_.leave(place, now);
+  around_.frames.withdraw(place);
+  place.audience().dismiss_spectators();
+  places_.erase(it);
+  desk_.admit_waiting(now);
+}
+
+void Places::tick() {
+  if (stopped_) return;
+  around_.options.on_tick();
+  const TimePoint now = Clock::now();
+  around_.scenes.on_tick(now);
+  PlaceList gone;
+  for (const auto& place : places_) {
+    place->on_tick(now);
+    if (!place->audience().connected() && place->visit().life().state() == VisitState::closed)
+      gone.push_back(place);
+  }
+  for (const auto& place : gone) leave(*place);
+  machine_.on_tick(places_, desk_.admitted(), now);
+  desk_.on_tick(now);
+  for (const auto& place : places_) around_.frames.changed(*place);
+  around_.metrics.connections.Set(connections_);
+  reports_.publish(places_, around_.encoders, around_.metrics);
+  tick_timer_.expires_after(tick_interval);
+  tick_timer_.async_wait([this](const boost::system::error_code& error) {
+    if (!error) tick();
+  });
+}
+
+void Places::drain(std::chrono::milliseconds deadline) {
+  desk_.shut();
+  const Drain drain{static_cast<std::uint32_t>(deadline.count())};
+  for (const auto& place : places_) place->visit().say(drain, Clock::now());
+}
+
+void Places::close_all() {
+  for (const auto& place : places_) {
+    place->visit().end("the server is shutting down");
+    around_.frames.changed(*place);
+  }
+}
+
+void Places::stop_timer() {
+  stopped_ = true;  // cancel() does not take back a handler that is queued: that would re-arm
+  tick_timer_.cancel();
+}
+
+}  // namespace catgs

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <unordered_map>
+
+#include <boost/asio/steady_timer.hpp>
+
+#include "server/visit/admission_desk.h"
+#include "server/visit/machine_use.h"
+#include "server/visit/place.h"
+#include "server/visit/session_report.h"
+
+namespace catgs {
+
+/// Owns all places and accepts connections. All functions except accept() and published_json() run
+/// on the session thread, so that visits need no lock.
+class Places final : public Admissions {
+ public:
+  explicit Places(VisitContext around);
+
+  /// Any thread. Makes the listener of a new websocket.
+  std::shared_ptr<ConnectionListener> accept(std::shared_ptr<Connection> connection);
+  /// Any thread. Returns the sessions as JSON, at most one tick old.
+  [[nodiscard]] std::string published_json() const { return reports_.json(); }
+
+  /// Tells every client that the server is going away, and admits no more.
+  void drain(std::chrono::milliseconds deadline);
+  /// Closes the connections that are still open after drain().
+  void close_all();
+  void stop_timer();
+  [[nodiscard]] int connections() const { return connections_; }
+
+  // Admissions
+  void on_hello(const std::shared_ptr<ClientConnection>& from, std::shared_ptr<Place> newcomer,
+                Hello hello, TimePoint now) override;
+  AdmissionAnswer admit(Place& place, const Hello& hello) override {
+    return desk_.admit(place, hello);
+  }
+  SceneAnswer find_scene(const std::string& scene_id, TimePoint now) override {
+    return desk_.find_scene(scene_id, now);
+  }
+  [[nodiscard]] std::uint32_t admitted() const override {
+    return static_cast<std::uint32_t>(desk_.admitted());
+  }
+  void leave(Place& place) override;
+
+ private:
+  void add(const std::shared_ptr<ClientConnection>& connection,
+           const std::shared_ptr<Place>& place);
+  void forget_connection(const std::string& address);
+  /// Makes the newcomer a spectator of the session in its watch token, or refuses it.
+  void watch(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
+             const Hello& hello, TimePoint now);
+  /// Continues the session of a resume token. False: the session cannot continue.
+  bool resume(const std::shared_ptr<ClientConnection>& connection, Place& newcomer, Place& known,
+              const Hello& hello, TimePoint now);
+  void tick();
+
+  const VisitContext around_;
+  PlaceList places_;
+  MachineUse machine_{around_};
+  AdmissionDesk desk_{around_, places_, machine_};
+  SessionReports reports_;
+  boost::asio::steady_timer tick_timer_;
+  bool stopped_ = false;
+  int connections_ = 0;
+  std::unordered_map<std::string, int> connections_by_address_;  // by limited_as()
+};
+
+}  // namespace catgs

@@ -1,0 +1,124 @@
+#include "server/visit/stream_control.h"
+
+#include <cassert>
+#include <utility>
+
+#include "render_core/base/build_info.h"
+
+namespace catgs {
+
+bool StreamControl::begin(Admission admission, const Hello& hello) {
+  const bool goes_on = admission.scene == scene_ && admission.encoder.kind == encoder_.kind;
+  encoder_ = std::move(admission.encoder);
+  enter_scene(std::move(admission.scene));
+  plan_.begin(hello, admission.effort, admission.pixel_share);
+  idr_.begin();
+  if (goes_on) describe_plan();
+  return goes_on;
+}
+
+void StreamControl::enter_scene(std::shared_ptr<const SceneEntry> scene) {
+  scene_ = std::move(scene);
+  welcome_due_ = true;
+}
+
+void StreamControl::open() {
+  assert(scene_);
+  outdated_ = !ready();
+  if (outdated_) return;
+  use_ = Use::opening;
+  describe_plan();
+  host_.open_stream({scene_->renderer, encoder_.kind, plan_.moving()});
+}
+
+void StreamControl::describe_plan() {
+  config_.size_px = plan_.moving().size_px;
+  config_.fps = plan_.moving().fps;
+  config_.bitrate_kbps = plan_.moving().bitrate_kbps;
+}
+
+void StreamControl::on_opened(const StreamOpened& opened) {
+  assert(opening());
+  use_ = Use::none;
+  if (opened.fault == Fault::encoder_unavailable && change_encoder(opened.fault)) return;
+  if (!opened.ok) return;
+  if (outdated_) return open();
+  config_.codec = opened.codec;
+  config_.codec_string = opened.codec_string;
+  config_.encoder = encoder_.text;
+  device_ = opened.device;
+  encoded_as_.reset();
+  plan_.allow_larger_stills(true);
+  idr_.begin();
+}
+
+bool StreamControl::change_encoder(Fault why) {
+  auto other = host_.other_encoder(why);
+  if (!other) return false;
+  encoder_ = *std::move(other);
+  open();
+  return true;
+}
+
+FrameOrder StreamControl::begin_frame(bool still, TimePoint now) {
+  assert(ready());
+  use_ = Use::drawing;
+  FrameOrder order;
+  order.ticket.still = still;
+  order.ticket.codec = config_.codec;
+  // A still of the same size uses the encoder in motion. Its refinements continue that stream, even
+  // when the settings for motion have changed.
+  order.encoding = !still ? plan_.moving() : shows_still_size() ? *encoded_as_ : plan_.still();
+  if (encoded_as_ != order.encoding) idr_.begin();
+  encoded_as_ = order.encoding;
+  described_ = plan_.moving();
+  order.force_idr = idr_.take(now);
+  return order;
+}
+
+void StreamControl::end_frame() {
+  use_ = Use::none;
+  if (outdated_) open();
+}
+
+bool StreamControl::describe(const FrameResult& made) {
+  if (!made.frame.ticket.idr) return false;
+  StreamConfig config = config_;
+  config.size_px = made.frame.ticket.size_px;
+  config.fps = described_.fps;
+  config.bitrate_kbps = described_.bitrate_kbps;
+  config.codec_string = made.codec_string;
+  return std::exchange(config_, config) != config;
+}
+
+bool StreamControl::mend(const FrameResult& failed) {
+  idr_.missed();
+  // NVENC that fails is replaced, whatever the frame.
+  if (failed.fault == Fault::encoder_failed && change_encoder(failed.fault)) return true;
+  const bool of_larger_still =
+      failed.frame.ticket.still && encoded_as_ && encoded_as_->size_px != plan_.moving().size_px;
+  if (of_larger_still && failed.fault != Fault::device_failed) {
+    plan_.allow_larger_stills(false);  // the picture exceeds the memory or the encoder's level
+    return true;
+  }
+  return failed.fault == Fault::encoder_unavailable && change_encoder(failed.fault);
+}
+
+ServerMessage StreamControl::introduction() {
+  if (std::exchange(welcome_due_, false)) return welcome();
+  return config_;
+}
+
+Welcome StreamControl::welcome() const {
+  assert(scene_);
+  Welcome welcome;
+  welcome.scene = scene_->facts;
+  welcome.config = config_;
+  welcome.renderer = scene_->renderer_text;
+  welcome.server_version = build_version;
+  welcome.scene_ids = host_.scene_ids();
+  host_.sign(welcome);
+  return welcome;
+}
+
+}  // namespace catgs
