@@ -12,6 +12,19 @@ export async function list_scenes(page_url: string, token: string): Promise<read
   }
 }
 
+/** What people call the scene: its id ("hall-kdfmqrtv") without the digest of its path. */
+export function scene_name(scene_id: string): string {
+  return scene_id.replace(/^(.+)-[b-df-hjkmnp-tv]{8}$/, '$1');
+}
+
+/** Names for a list of scenes, and ids where several have the same name. */
+export function scene_labels(scene_ids: readonly string[]): readonly string[] {
+  const names = scene_ids.map(scene_name);
+  const seen = new Set<string>();
+  const shared = new Set(names.filter((name) => seen.size === seen.add(name).size));
+  return names.map((name, i) => (shared.has(name) ? (scene_ids[i] ?? name) : name));
+}
+
 /** The page's address with this scene, or with the server's first one where `scene_id` is empty. */
 export function scene_address(page_url: string, scene_id = ''): string {
   const url = new URL(page_url);

@@ -7,6 +7,10 @@ function can_be_token(text: string): boolean {
   return !controls && new TextEncoder().encode(text).length <= most_bytes;
 }
 
+const fragment_of = (href: string): URLSearchParams => new URLSearchParams(new URL(href).hash.slice(1));
+
+export const has_token = (href: string): boolean => fragment_of(href).has('token');
+
 /** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
   private value_: string;
@@ -23,7 +27,7 @@ export class AccessToken {
   ) {
     this.value_ = storage_?.getItem(storage_key) ?? '';
     const url = new URL(location.href);
-    const fragment = new URLSearchParams(url.hash.slice(1));
+    const fragment = fragment_of(location.href);
     const token = fragment.get('token');
     if (token === null) return;
     fragment.delete('token');

@@ -12,6 +12,7 @@ interface AuthorTools {
   eye(): Eye;
   scene(): SceneSetup | undefined;
   scene_id(): string;
+  file_name(): string; // of the scene, without extension
   /** The point in the middle of the view; undefined: nothing is there. */
   place_ahead(): Promise<Vec3 | undefined>;
   /** The tours have changed. */
@@ -129,7 +130,7 @@ export class AuthorPanel {
   private download(): void {
     const sidecar = this.sidecar();
     if (sidecar === undefined) return;
-    const name = `${this.tools_.scene_id()}.json`;
+    const name = `${this.tools_.file_name()}.json`;
     save_file(new Blob([sidecar], { type: 'application/json' }), name);
     this.saved_changes_ = this.changes_;
     this.done_.textContent =

@@ -1,6 +1,7 @@
 // Leads visitors through a scene: tours, shared views, and the page around this one.
 import { browser_timers, type Clock } from '../base/clock';
 import type { Eye } from '../camera/eye';
+import { scene_name } from '../session/scenes';
 import type { AccessToken } from '../session/token';
 import { text } from '../text';
 import { fetch_tours, read_document } from '../tour/load';
@@ -83,7 +84,8 @@ export class Guide {
     return new AuthorPanel({
       eye: () => camera.eye,
       scene: () => camera.scene,
-      scene_id: () => this.file_name(),
+      scene_id: () => navigation.scene_id,
+      file_name: () => this.file_name(),
       place_ahead: () => navigation.place_ahead(),
       changed: (tours) => {
         this.tour_view_.show_tours(tours);
@@ -146,7 +148,7 @@ export class Guide {
     if (shared.stop_index !== undefined && !shared.eye) this.player_.go_to(shared.stop_index, true);
     this.embed_.say({
       catgs: 'ready',
-      scene: scene_id,
+      scene: scene_name(scene_id),
       stops: (tours[0]?.stops ?? []).map(({ title }) => title),
     });
   }
@@ -178,6 +180,6 @@ export class Guide {
   }
 
   private file_name(): string {
-    return this.parts_.navigation.scene_id || 'scene';
+    return scene_name(this.parts_.navigation.scene_id) || 'scene';
   }
 }

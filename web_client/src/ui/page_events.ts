@@ -1,6 +1,10 @@
+import { has_token } from '../session/token';
 import type { WorkerClient } from '../worker/client';
 
-/** Tells the worker when the page is hidden, is online again, or closes. */
+/**
+ * Tells the worker when the page is hidden, is online again, or closes. A link with a token that is opened
+ * in this tab changes no more than the fragment, and the page begins anew with it.
+ */
 export function bind_page_events(worker: WorkerClient): void {
   let waits = false;
   worker.on('state', ({ state }) => {
@@ -11,6 +15,9 @@ export function bind_page_events(worker: WorkerClient): void {
   });
   window.addEventListener('online', () => {
     if (waits) worker.post({ kind: 'retry' });
+  });
+  window.addEventListener('hashchange', () => {
+    if (has_token(location.href)) location.reload();
   });
   window.addEventListener('pagehide', (event) => {
     if (!event.persisted) worker.post({ kind: 'stop' });

@@ -1,15 +1,16 @@
-import { scene_address } from '../session/scenes';
+import { scene_address, scene_labels } from '../session/scenes';
 import { by_id } from './dom';
 
 /** Fills the list with this id with links to the scenes. Hides the list when there are none. */
 export function show_scene_links(list_id: string, ids: readonly string[], current?: string): void {
   const list = by_id(list_id, HTMLUListElement);
   list.hidden = ids.length === 0;
+  const labels = scene_labels(ids);
   list.replaceChildren(
-    ...ids.map((id) => {
+    ...ids.map((id, i) => {
       const link = document.createElement('a');
       link.href = scene_address(location.href, id);
-      link.textContent = id;
+      link.textContent = labels[i] ?? id;
       if (id === current) link.setAttribute('aria-current', 'page');
       const item = document.createElement('li');
       item.append(link);

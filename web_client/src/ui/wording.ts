@@ -1,5 +1,6 @@
 // Chooses the text for each situation: what happened, and what to do. Pure.
 import type { DecoderRung } from '../decode/ladder';
+import { scene_name } from '../session/scenes';
 import type { SessionState } from '../session/state';
 import { text } from '../text';
 import { Error_Code } from '../wire/wire';
@@ -86,7 +87,7 @@ function unknown_scene_card(message: string, scene_ids: readonly string[]): Card
     title,
     text: sentence(message) + check,
     action: {
-      label: first === undefined ? actions.open_first : actions.open(first),
+      label: first === undefined ? actions.open_first : actions.open(scene_name(first)),
       does: 'open',
       scene_id: first ?? '',
     },
