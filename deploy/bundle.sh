@@ -1,16 +1,22 @@
 #!/usr/bin/env bash
-# Packs the programs with the shared libraries that they need into one archive, for machines that
-# have neither these libraries nor a way to install them (a GPU node, say).
+# Packs the programs and their shared libraries into one archive, for a machine that has neither
+# these libraries nor a way to install them (a GPU node, say).
 #
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
-# DIR is a finished build (default: build/run, else build/release, else build/cuda). The archive
-# holds bin/ (start the programs from here), lib/, where they were built the web client, and catgs-load
-# with its scenarios (share/catgs/load), by which deployments are sized, and in share/doc the licences
-# of all that is not ours: read NOTICES.md there before you pass it on. Most of lib/
-# comes with libavcodec, which is linked against every codec that the distribution has. The other
-# machine needs the same processor family, a glibc at least as new, and libstdc++; for CUDA its own
-# driver.
+# DIR is a finished build (default: build/run, else build/release, else build/cuda). FILE is
+# build/catgs-bundle.tar.xz by default. The archive holds:
+#
+#   bin/               the programs: start them here
+#   lib/               their libraries, most of which come with libavcodec: it is linked against
+#                      every codec of the distribution
+#   share/catgs/web    the web client, if it was built
+#   share/catgs/load   scenarios of catgs-load, to size a deployment, if catgs-load was built
+#   share/doc          licences of all that is in it: read NOTICES.md there before you pass the
+#                      archive on
+#
+# The other machine needs the same processor family, libstdc++, and a glibc at least as new. For
+# CUDA it needs its own driver.
 set -euo pipefail
 # shellcheck source=deploy/lib.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
@@ -51,7 +57,7 @@ for program in catgs-server catgs-render catgs-load; do
   [[ -x $build/bin/$program ]] || continue
   install -s "$build/bin/$program" "$root/libexec/$program"
   absent=$(ldd "$build/bin/$program" | grep 'not found' || true)
-  [[ -z $absent ]] || fail "$EXIT_FAILED" "$program lacks libraries here already:" "$absent"
+  [[ -z $absent ]] || fail "$EXIT_FAILED" "$program already lacks libraries on this machine:" "$absent"
   # The C and C++ run-time libraries stay the other machine's: they belong to its loader and driver.
   while read -r library; do
     cp -Lu -- "$library" "$root/lib/"
@@ -66,7 +72,7 @@ WRAPPER
 done
 # What the libraries' licences ask for: their texts, and the versions whose sources belong to them.
 mkdir -p "$root/share/doc/licenses"
-cp -- "$SOURCE_DIR/deploy/NOTICES.md" "$root/share/doc/"
+cp -- "$SOURCE_DIR"/{LICENSE,deploy/NOTICES.md} "$root/share/doc/"
 while read -r package; do
   dpkg-query -W -f '${Package} ${Version} (source: ${source:Package} ${source:Version})\n' "$package" | head -n 1 >>"$root/share/doc/PACKAGES"
   mkdir "$root/share/doc/licenses/$package"

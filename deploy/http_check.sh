@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # usage: http_check.sh PORT PATH [HOST]
-# Exit status 0 when that answers 200: a health check for images that have no curl.
+# Exits with 0 if http://HOST:PORT/PATH answers 200: a health check for images without curl.
 set -euo pipefail
 
 host=${3:-127.0.0.1}

@@ -17,7 +17,7 @@ build_packages=(
 )
 lan_packages=(openssl qrencode iproute2)
 test_packages=(libgtest-dev libgmock-dev python3 shellcheck cppcheck clang-format-14 clang libclang-rt-dev
-  haproxy)
+  haproxy universal-ctags)
 # What reads deploy/ and docker/: containers without a Docker engine, and the tools of operators.
 # runc and kubectl often come from elsewhere, and those conflict with the packages.
 deploy_test_packages=(
@@ -183,7 +183,7 @@ detect_distribution() {
     *)
       fail "$EXIT_UNSUPPORTED" \
         "This is ${distribution}; the scripts know Debian 12 and Ubuntu 24.04." \
-        "Elsewhere a Debian container does it (Docker or podman, on Linux):" \
+        "Elsewhere, use a Debian container (Docker or podman, on Linux):" \
         "  docker run -it --rm --network host -v \"$SOURCE_DIR:/catgs\" -w /catgs debian:12 ./deploy/${0##*/}"
       ;;
   esac
@@ -330,7 +330,7 @@ lock_build() {
   mkdir -p "${file%/*}"
   exec {build_lock}>>"$file"
   flock -n "$build_lock" && return
-  echo "Another script builds in ${file%/*}: waiting for it (Ctrl-C leaves it alone)."
+  echo "Another script builds in ${file%/*}: waiting for it (Ctrl-C stops waiting)."
   flock "$build_lock"
 }
 

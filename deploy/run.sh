@@ -15,13 +15,13 @@ SCENE is a .ply, .splat, .spz or .sog file, a streamed SOG folder or a training 
   --port N     listen on port N (default 8080)
   --lan        also serve other devices in this network: all interfaces, a token, TLS with a
                self-signed certificate, and a QR code of the link for your phone
-  --no-cuda    build for the CPU even where a GPU and nvcc are found
+  --no-cuda    build for the CPU even if there are a GPU and nvcc
   --log FILE   the build's full log (default build/run/run.log)
   -h, --help   this text
 
 Every other option goes to catgs-server, with the word behind it as its value:
   deploy/run.sh --encoder jpeg garden.ply --fps 30
-build/run/bin/catgs-server --help lists them. A list is given by repeating its option.
+build/run/bin/catgs-server --help lists them. Repeat an option that takes several values.
 
 Exit status: 0 stopped with Ctrl-C, 1 a step failed, 2 wrong usage, 3 packages are missing and
 installing them needs root, 4 not Debian 12 or Ubuntu 24.04, 5 the port is in use.
@@ -37,43 +37,6 @@ lan=0
 allow_cuda=1
 log=$build_dir/run.log
 demo_scene=$build_dir/scenes/city.ply
-
-# The server's options, by the table in its source: there before anything is built.
-server_option_names() {
-  tr '\n' ' ' <"$SOURCE_DIR/server/config.cpp" |
-    grep -oE '((list|origins|integer|text|flag|choice<[A-Za-z:]+>)\( *|return \{)"[a-z0-9-]+", ' |
-    sed -E 's/.*"(.*)".*/--\1/'
-  printf -- '--config\n'
-}
-
-# nearest WORD: of the words on standard input the one with the fewest letters to change, if few.
-nearest() {
-  awk -v word="$1" '
-    function least(a, b) { return a < b ? a : b }
-    function distance(a, b,   i, j, d) {
-      for (i = 0; i <= length(a); i++) d[i, 0] = i
-      for (j = 0; j <= length(b); j++) d[0, j] = j
-      for (i = 1; i <= length(a); i++)
-        for (j = 1; j <= length(b); j++)
-          d[i, j] = least(least(d[i - 1, j], d[i, j - 1]) + 1,
-                          d[i - 1, j - 1] + (substr(a, i, 1) != substr(b, j, 1)))
-      return d[length(a), length(b)]
-    }
-    BEGIN { best = length(word) / 3 + 1 }
-    { d = distance(word, $0); if (d < best) { best = d; found = $0 } }
-    END { print found }'
-}
-
-# A mistyped option is told at once; its value once there is a server to ask.
-check_option_name() {
-  local names suggestion
-  names=$(server_option_names)
-  ! grep -qxF -e "$1" <<<"$names" || return 0
-  suggestion=$(printf '%s\n--port\n--lan\n--no-cuda\n--log\n' "$names" | nearest "$1")
-  fail "$EXIT_USAGE" "Unknown option: $1${suggestion:+ (did you mean $suggestion?)}" \
-    "run.sh's own options: ./deploy/run.sh --help. The server's:" \
-    "$(sort <<<"$names" | tr '\n' ' ' | fold -s -w 96 | sed 's/^/    /')"
-}
 
 parse_arguments() {
   while (($# > 0)); do
@@ -92,12 +55,8 @@ parse_arguments() {
         exit 0
         ;;
       --open | --admin-open) server_options+=("$1") ;;  # the server's only ones without a value
-      -*=*)
-        check_option_name "${1%%=*}"
-        server_options+=("$1")
-        ;;
+      -*=*) server_options+=("$1") ;;
       -*)
-        check_option_name "$1"
         server_options+=("$1")
         if (($# > 1)) && [[ $2 != -* || $2 == -[0-9]* ]]; then
           server_options+=("$2")
@@ -267,7 +226,7 @@ server_says() { sed -n "s/.*$1: \([^\"]*\).*/\1/p" "$server_log" | tail -n 1; }
 # The ids of the scenes, as the server's log tells in either format, ready for an address.
 scene_ids() {
   sed -n 's/.*\( info \|"message":"\)scene \(.*\): [0-9]* Gaussians, .*/\2/p' "$server_log" |
-    sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/&/%26/g; s/+/%2B/g'
+    sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/&/%26/g; s/+/%2B/g; s/\\/%5C/g; s/\[/%5B/g; s/\]/%5D/g; s/"/%22/g; s/</%3C/g; s/>/%3E/g'
 }
 
 # row NAME TEXT...: one line of the welcome for each text, named once.
@@ -309,7 +268,7 @@ print_welcome() {
   echo
   row Try "${hints[@]}"
   if [[ -n $gpu_name && $cuda_choice == OFF ]] && ((allow_cuda)); then
-    echo "  Your $gpu_name waits for nvcc: install the CUDA toolkit"
+    echo "  Your $gpu_name needs nvcc: install the CUDA toolkit"
     echo "  (https://developer.nvidia.com/cuda-downloads) and start again."
   fi
 }
@@ -318,7 +277,7 @@ print_welcome() {
 # SIGTERM when they have had the time of --drain-wait and --drain-deadline to go elsewhere.
 stop_serving() {
   trap - INT TERM HUP
-  printf '\nStopping: open pages are told.\n'
+  printf '\nStopping: telling open pages.\n'
   stop_groups "$1"
   printf 'Stopped.\n'
   exit 0

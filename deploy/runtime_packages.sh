@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # usage: runtime_packages.sh PROGRAM...
-# Names the Debian packages with the shared libraries that the programs load, one per line: what an
-# image or a machine needs to run, but not to build, them.
+# Prints the Debian packages of the shared libraries that the programs load, one per line. A machine
+# needs these to run the programs, but not to build them.
 set -euo pipefail
 
 for program in "$@"; do

@@ -8,12 +8,12 @@ usage() {
   cat <<'USAGE'
 usage: deploy/test.sh [--quick | --full] [--log FILE]
 
-Installs what build and tests need, builds, and runs the tests.
+Installs what the build and the tests need, builds, and runs the tests.
 
   --quick      unit, integration and lint tests only (minutes, once built)
-  (default)    and the load and browser tests
-  --full       and the sanitizer builds, clang-tidy over all files, a start from nothing in a fresh Debian, images
-               and a fleet of containers
+  (default)    also the load and browser tests
+  --full       also the sanitizer builds, clang-tidy over all files, a start from nothing in a fresh
+               Debian, images, and a fleet of containers
   --log FILE   the full log (default build/release/test.log)
   -h, --help   this text
 
