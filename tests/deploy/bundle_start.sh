@@ -57,6 +57,7 @@ debootstrap "${options[@]}" "${target[@]}" >"$work/log" 2>&1 || die "$(tail -n 5
 tar -C "$work/root" -xJf "$work/bundle.tar.xz"
 notices=$work/root/catgs/share/doc
 grep -q GPL "$notices/NOTICES.md" || die "no notices"
+cmp "$source_dir/LICENSE" "$notices/LICENSE" || die "no licence of ours"
 [[ -s $notices/licenses/libx264-164/copyright || -n $(find "$notices/licenses" -path '*x264*' -name copyright) ]] || die "no licence of libx264"
 while read -r library; do
   [[ -f $library ]] || die "$library is missing"

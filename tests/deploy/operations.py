@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Checks what operators deploy, each subcommand with the tool that will read it in the end.
 
+  operations.py alerts                  every alert has a section in ALERTS.md, and a test in which it fires
   operations.py prometheus              rules and configurations (promtool), and when alerts fire
   operations.py grafana                 the dashboard's panels, and that what it needs is provisioned
   operations.py haproxy                 both configurations (haproxy -c)
@@ -79,18 +80,24 @@ def dashboard_expressions():
     return [(title, text.replace("$instance", ".*")) for title, text in dashboard_check.expressions(dashboard())]
 
 
-def check_prometheus(_):
-    promtool = tool("promtool")
-    findings = run(promtool, "check", "config", DEPLOY / "prometheus/prometheus.yaml")
-    findings += run(promtool, "test", "rules", DEPLOY / "prometheus/alerts_test.yaml")
+def check_alerts(_):
+    findings = []
     tests = (DEPLOY / "prometheus/alerts_test.yaml").read_text()
-    runbook = (DEPLOY / "README.md").read_text()
+    sections = set(re.findall(r"^## (\w+)$", (DEPLOY / "ALERTS.md").read_text(), re.M))
     for rule in alerts():
         name = rule["alert"]
         if f"alertname: {name}\n        exp_alerts:" not in tests:
             findings.append(f"alerts_test.yaml: {name} is never seen to fire")
-        if rule["annotations"]["runbook"] != f"deploy/README.md#{name.lower()}" or f"### {name}\n" not in runbook:
-            findings.append(f"deploy/README.md: no section {name}")
+        if rule["annotations"]["runbook"] != f"deploy/ALERTS.md#{name.lower()}" or name not in sections:
+            findings.append(f"deploy/ALERTS.md: no section {name}")
+    unknown = sections - {rule["alert"] for rule in alerts()}
+    return findings + [f"deploy/ALERTS.md: there is no alert {name}" for name in unknown]
+
+
+def check_prometheus(_):
+    promtool = tool("promtool")
+    findings = run(promtool, "check", "config", DEPLOY / "prometheus/prometheus.yaml")
+    findings += run(promtool, "test", "rules", DEPLOY / "prometheus/alerts_test.yaml")
     with tempfile.TemporaryDirectory() as folder:
         # The compose file's configuration names the rules by their place in the container.
         config = pathlib.Path(folder, "prometheus.yaml")
@@ -344,11 +351,11 @@ def check_settings(options):
     findings = []
     shown = subprocess.run([options.server, "--scene", "synth:city:1000", "--print-config"], capture_output=True, text=True, check=True)
     known = set(re.findall(r"^(\S+) = ", shown.stdout, re.M))
-    # run.sh refuses unknown ones before there is a server, by the table in its source.
-    function = re.search(r"^server_option_names\(\) \{.*?^\}", (DEPLOY / "run.sh").read_text(), re.M | re.S)
-    names = subprocess.run(["bash", "-c", f"SOURCE_DIR='{DEPLOY.parent}'; {function[0]}; server_option_names"], capture_output=True, text=True, check=True)
-    listed = {name.removeprefix("--") for name in names.stdout.split()}
-    findings += [f"deploy/run.sh: --{name} is not what catgs-server knows" for name in listed ^ (known | {"config"})]
+    # run.sh takes the word behind an option as its value, but not behind these.
+    listed = re.search(r"^ *(--[a-z-]+(?: \| --[a-z-]+)+)\) server_options", (DEPLOY / "run.sh").read_text(), re.M)
+    without_value = set(re.findall(r"^(\S+) = (?:true|false) ", shown.stdout, re.M))
+    if {name.removeprefix("--") for name in listed[1].split(" | ")} != without_value:
+        findings.append(f"deploy/run.sh: the options without a value are {sorted(without_value)}")
     with tempfile.TemporaryDirectory() as folder:
         stand_in = pathlib.Path(folder, "file")
         stand_in.write_text("a-secret-of-more-than-sixteen-bytes\n")
@@ -362,28 +369,28 @@ def check_settings(options):
         for name in set(re.findall(r"\bCATGS_[A-Z_]+\b", text)) - {"CATGS_COMMIT"}:
             if name[6:].lower().replace("_", "-") not in known:
                 findings.append(f"{file}: the server has no setting for {name}")
-    return findings + runbook_findings(dict(re.findall(r"^(\S+) = (.*?)  # default$", shown.stdout, re.M)) | {"scene": "[]"})
+    return findings + page_findings(dict(re.findall(r"^(\S+) = (.*?)  # default$", shown.stdout, re.M)) | {"scene": "[]"})
 
 
-def runbook_findings(defaults):
-    """The runbook's table has each setting once, with the default that the program prints."""
+def page_findings(defaults):
+    """The table of SETTINGS.md has each setting once, with the default that the program prints."""
     findings = []
     named = {}
-    section = (DEPLOY / "README.md").read_text().split("\n## Settings\n")[1].split("\n## ")[0]
+    section = (DEPLOY / "SETTINGS.md").read_text().split("\n## Settings\n")[1].split("\n## ")[0]
     for names, values in re.findall(r"^\| (`--[^|]*) \| ([^|]*)\|", section, re.M):
         names = re.findall(r"`--([a-z0-9-]+)`", names)
         values = re.findall(r"`([^`]*)`", values) or [""] * len(names)
         for name, value in zip(names, values, strict=True):
-            findings += [f"deploy/README.md: --{name} stands there twice"] * (name in named)
+            findings += [f"deploy/SETTINGS.md: --{name} stands there twice"] * (name in named)
             named[name] = value
     shown = {name: "" if value in ("false", "[]") else value.strip('"') for name, value in defaults.items()}
     for name in sorted(named.keys() | shown.keys()):
         if named.get(name) != shown.get(name):
-            findings.append(f"deploy/README.md: --{name} is {named.get(name, 'missing')!r} there, {shown.get(name, 'unknown')!r} in the program")
+            findings.append(f"deploy/SETTINGS.md: --{name} is {named.get(name, 'missing')!r} there, {shown.get(name, 'unknown')!r} in the program")
     return findings
 
 
-CHECKS = {"prometheus": check_prometheus, "grafana": check_grafana, "haproxy": check_haproxy, "systemd": check_systemd,
+CHECKS = {"alerts": check_alerts, "prometheus": check_prometheus, "grafana": check_grafana, "haproxy": check_haproxy, "systemd": check_systemd,
           "kubernetes": check_kubernetes, "compose": check_compose, "notices": check_notices, "metrics": check_metrics, "settings": check_settings}
 
 

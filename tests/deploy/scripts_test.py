@@ -247,18 +247,6 @@ class Serving(Machine):
         self.assertNotIn("catgs-render", self.calls())
         self.assertEqual(len(self.server_calls()), 1)
 
-    def test_a_mistyped_option_is_told_before_anything_is_built(self):
-        for option, nearest in (("--prot", "--port"), ("--max-sesions=4", "--max-sessions"),
-                                ("--bitrat", "--bitrate")):
-            result = self.serve(option, "9", "--log", str(self.folder / "log"))
-            self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
-            self.assertIn(f"Unknown option: {option.split('=')[0]} (did you mean {nearest}?)\n",
-                          result.stderr)
-            self.assertIn("--encoder", result.stderr)
-        result = self.serve("--zzzzzzzz", *self.options())
-        self.assertIn("Unknown option: --zzzzzzzz\n", result.stderr)
-        self.assertEqual(self.calls(), "")
-
     def test_two_in_one_clone_build_one_after_the_other(self):
         self.stand_in("ninja", 'echo begin >>"$HOME/order"; sleep 1; echo end >>"$HOME/order"')
         outputs = []

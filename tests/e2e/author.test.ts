@@ -4,7 +4,7 @@ import path from 'node:path';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Pose } from '#client/camera/eye';
-import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { close_pages, keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import {
   access_token,
@@ -23,7 +23,6 @@ const desktop = { viewport: { width: 1280, height: 720 } };
 
 let browser: Browser;
 let workshop: RunningServer;
-const open_pages: WatchedPage[] = [];
 
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '100000');
@@ -33,9 +32,7 @@ beforeAll(async () => {
   workshop = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
 });
 
-afterEach(async () => {
-  for (const { page } of open_pages.splice(0)) await page.context().close();
-});
+afterEach(close_pages);
 
 afterAll(async () => {
   await browser.close();
@@ -50,7 +47,6 @@ async function open_as(
   options: BrowserContextOptions = desktop,
 ): Promise<WatchedPage> {
   const watched = await new_page(browser, options);
-  open_pages.push(watched);
   await watched.page.goto(`${workshop.url}${query}#token=${access_token(role, key_file)}`);
   await settle(watched.page);
   return watched;

@@ -1,14 +1,13 @@
 // Tours, links and frames against the real server, and the inputs that lead through a scene.
 import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
-import { createServer } from 'node:http';
-import type { AddressInfo } from 'node:net';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import type { Browser, BrowserContextOptions } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
 import type { Pose } from '#client/camera/eye';
-import { keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { close_pages, keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
+import { start_other_site } from './support/other_site';
 import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
 import { scratch_folder } from './support/scenes';
 
@@ -20,7 +19,6 @@ const patience = { timeout: 60_000, interval: 100 };
 
 let browser: Browser;
 let server: RunningServer;
-const open_pages: WatchedPage[] = [];
 
 interface Sidecar {
   focus: [number, number, number];
@@ -59,9 +57,7 @@ beforeAll(async () => {
   server = await start_server(scene, ['--min-fps', '0']);
 });
 
-afterEach(async () => {
-  for (const { page } of open_pages.splice(0)) await page.context().close();
-});
+afterEach(close_pages);
 
 afterAll(async () => {
   await browser.close();
@@ -73,7 +69,6 @@ const desktop = { viewport: { width: 1280, height: 720 } };
 
 async function open(options: BrowserContextOptions = desktop, url = server.url): Promise<WatchedPage> {
   const watched = await new_page(browser, options);
-  open_pages.push(watched);
   await watched.page.goto(url);
   await settle(watched.page);
   return watched;
@@ -266,15 +261,10 @@ describe('sharing', () => {
   });
 
   it('another page drives it in a frame, if the server lets it', async () => {
-    const host = createServer((_request, response) => {
-      response.setHeader('content-type', 'text/html');
-      response.end(`<!doctype html><title>host</title><iframe width="600" height="340"></iframe>`);
-    });
-    await new Promise<void>((resolve) => host.listen(0, '127.0.0.1', resolve));
-    const origin = `http://127.0.0.1:${(host.address() as AddressInfo).port}`;
+    const host = await start_other_site('<iframe width="600" height="340"></iframe>');
+    const { origin } = host;
     const open_frame = async (address: string): Promise<WatchedPage> => {
       const watched = await new_page(browser);
-      open_pages.push(watched);
       await watched.page.goto(origin);
       await watched.page.evaluate((src) => {
         const heard: unknown[] = [];
@@ -344,7 +334,6 @@ describe('ways to move', () => {
 
   it('a gamepad moves, looks, and presses the buttons of the tour', async () => {
     const watched = await new_page(browser);
-    open_pages.push(watched);
     const { page, errors } = watched;
     await page.addInitScript(() => {
       const pad = {

@@ -8,6 +8,7 @@ import type { Pose } from '#client/camera/eye';
 import type { StatsSnapshot } from '#client/stats/metrics';
 import {
   choose_full_size,
+  close_pages,
   insecure_host,
   keep_screenshot,
   launch_browser,
@@ -25,7 +26,6 @@ const scene = path.join(folder, 'city.ply');
 
 let browser: Browser;
 let server: RunningServer;
-const open_pages: WatchedPage[] = [];
 
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '30000');
@@ -33,9 +33,7 @@ beforeAll(async () => {
   server = await start_server(scene);
 });
 
-afterEach(async () => {
-  for (const { page } of open_pages.splice(0)) await page.context().close();
-});
+afterEach(close_pages);
 
 afterAll(async () => {
   await browser.close();
@@ -46,7 +44,6 @@ afterAll(async () => {
 
 async function open_viewer(options?: BrowserContextOptions, url = server.url): Promise<WatchedPage> {
   const watched = await new_page(browser, options);
-  open_pages.push(watched);
   await watched.page.goto(url);
   return watched;
 }
@@ -267,6 +264,17 @@ describe('trouble', () => {
     expect(invited.url()).toBe(guarded.url);
     await invited.reload();
     await settle(invited);
+    // Links that are pasted into a tab that shows the page.
+    const paste = async (into: Page, token: string): Promise<void> => {
+      const loaded = into.waitForEvent('load');
+      await into.goto(`${guarded.url}#token=${token}`);
+      await loaded;
+    };
+    await paste(page, 'a-long-and-secret-token');
+    await settle(page);
+    expect(page.url()).toBe(guarded.url);
+    await paste(invited, 'wrong');
+    await invited.getByText('Access token needed').waitFor();
     expect(guarded.log()).not.toContain('a-long-and-secret-token');
     await guarded.stop();
   });
@@ -365,7 +373,6 @@ describe('trouble', () => {
         }
       };`)]);
     const watched = await new_page(browser);
-    open_pages.push(watched);
     const { page } = watched;
     const warnings: string[] = [];
     page.on('console', (message) => warnings.push(message.text()));

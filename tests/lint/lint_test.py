@@ -2,10 +2,14 @@
 """Plants one fault of each kind and requires that `lint.py rules` reports it, and nothing else."""
 
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
+import tempfile
 import unittest
 
+import declarations
 import lint
 
 CLEAN = ["#pragma once", "#include <vector>", '#include "render_core/math/camera.h"']
@@ -30,8 +34,8 @@ class RuleFindings(unittest.TestCase):
                                        'import { create } from "@bufbuild/protobuf";'), [])
 
     def test_layering(self):
-        self.expect_one("neither server nor wire", "render_core/cpu/a.cpp",
-                        '#include "server/session/session.h"')
+        self.expect_one("does not lie above", "render_core/cpu/a.cpp",
+                        '#include "server/visit/visit.h"')
         self.expect_one("no network", "render_core/scene/a.cpp", "#include <libavcodec/avcodec.h>")
         self.expect_one("does not lie above", "render_core/scene/a.cpp",
                         '#include "render_core/renderer.h"')
@@ -68,14 +72,6 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("marker word", "server/a.cpp", "// TO" "DO: later")
         self.expect_one("#pragma once", "server/a.h", "int x;")
 
-    def test_functions_have_an_end(self):
-        body = ["int f(int a) {"] + ["  a += 1;"] * lint.MAX_FUNCTION_LINES + ["}"]
-        self.expect_one("f has 72 lines", "server/a.cpp", *body)
-        self.expect_one("g has 73 lines", "server/a.cpp", "class A {", " public:", "  void g(",
-                        "      int a) {", *["    a += 1;"] * lint.MAX_FUNCTION_LINES, "  }", "};")
-        self.assertEqual(self.findings("server/a.cpp", "namespace a {", *body[:60], "}",
-                                       *["int x;"] * 60, "}"), [])
-
     def test_banned_calls(self):
         self.expect_one("beyond its buffer", "server/a.cpp", "  strcpy(to, from);")
         self.expect_one("half a number", "server/net/a.cpp", "  return std::stoi(text);")
@@ -93,32 +89,54 @@ class RuleFindings(unittest.TestCase):
         self.assertEqual(len(findings), 1, findings)
         self.assertIn("README.md:2: links to media/gone.webp", findings[0])
 
-    def test_the_security_page_names_what_is_there(self):
+    def test_the_security_pages_name_what_is_there(self):
         code = {"server/a.h": "constexpr int max_a = 3;", "tests/a.cpp": "TEST_F(A, IsBounded) {"}
         row = "| a | 3 | `server/a.h: max_a` | refused | `A.IsBounded`, `A.*` |"
         self.assertEqual(list(lint.security_findings("S.md", [row], code)), [])
         gone = ["`server/a.h: max_b`", "`server/b.h: max_a`", "`A.IsGone`", "`B.*`"]
         self.assertEqual(len(list(lint.security_findings("S.md", gone, code))), len(gone))
 
-    def test_the_security_page_tells_the_values_of_constants(self):
-        def findings(told: str, definition: str) -> int:
-            row = f"| a | {told} | `a.h: max_a` | refused | |"
-            return len(list(lint.security_findings("S.md", [row], {"a.h": definition})))
-        for told, value in [("3", "3"), ("64 KiB", "64 * 1024"), ("4, 16 MiB", "16 << 20"),
-                            ("2^20", "std::size_t{1} << 20"), ("30 s", "30 * LWS_US_PER_SEC"),
-                            ("10 million", "10'000'000"), ("3840 x 2160", "3840 * 2160"),
-                            ("`--max-a`", "7"), ("7", "other(7)")]:
-            self.assertEqual(findings(told, f"constexpr int max_a = {value};"), 0, told)
-        self.assertEqual(findings("30 s", "milliseconds max_a{30'000};"), 0)
-        self.assertEqual(findings("3", "constexpr int max_a = 4;"), 1)
-        self.assertEqual(findings("64 KiB", "constexpr int max_a = 64 * 1024 + 1;"), 1)
-        self.assertEqual(findings("30 s", "milliseconds max_a{30'001};"), 1)
+    def test_every_page_whose_table_names_tests_is_checked(self):
+        root = pathlib.Path(lint.__file__).parents[2]
+        pages = {f"deploy/{page.name}" for page in (root / "deploy").glob("*.md")
+                 if re.search(r"^\|.*`[A-Z]\w*\.[A-Z]\w*`", page.read_text("utf-8"), re.M)}
+        self.assertEqual(pages, set(lint.SECURITY_PAGES))
 
-    def test_missing_tool_is_a_skip(self):
-        result = subprocess.run([sys.executable, lint.__file__, "shell"], env={"PATH": "/nonexistent"},
-                                capture_output=True, text=True, check=False)
-        self.assertEqual(result.returncode, lint.EXIT_SKIPPED)
-        self.assertIn("shellcheck", result.stdout)
+
+@unittest.skipUnless(shutil.which("ctags"), "universal-ctags is not installed")
+class Declarations(unittest.TestCase):
+    def findings(self, code):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            for path, lines in code.items():
+                (root / path).parent.mkdir(parents=True, exist_ok=True)
+                (root / path).write_text("\n".join(lines) + "\n", "utf-8")
+            tags = declarations.ctags("ctags", root, list(code))
+        texts = {path: "\n".join(lines) for path, lines in code.items()}
+        return [*declarations.size_findings(tags), *declarations.unused_findings(tags, texts),
+                *declarations.unreached_findings(texts)]
+
+    def test_long_functions_and_constructors(self):
+        body = ["    a();"] * declarations.MAX_FUNCTION_LINES
+        found = self.findings({"server/a.cpp": ["void a() {", *body, "}", "struct B {", "  B() {", *body, "  }", "};",
+                                                "B::B() : b(B{}) {", *body, "}"]})
+        self.assertEqual(sorted(line.split(":", 2)[2].split(",")[0] for line in found),
+                         [" B has 72 lines", " B has 72 lines", " a has 72 lines"])
+
+    def test_large_classes(self):
+        many = [f"  int f{i}();" for i in range(26)] + [f"  int x{i}_;" for i in range(21)]
+        used = " ".join(f"f{i} x{i}_" for i in range(26))
+        found = self.findings({"server/a.h": ["class A {", *many, "};"],
+                               "server/a.cpp": ['#include "server/a.h"', f"A a; {used}"]})
+        self.assertEqual(found, ["server/a.h:1: A has 26 methods, the limit is 25: split it",
+                                 "server/a.h:1: A has 21 fields, the limit is 20: split it"])
+
+    def test_what_nothing_uses(self):
+        found = self.findings({"server/a.h": ["int used();  // unused", "int unused();"],
+                               "server/a.cpp": ['#include "server/a.h"', "int unused() {", "  return used();", "}"],
+                               "server/b.h": ["#pragma once"]})
+        self.assertEqual(found, ["server/a.cpp:2: nothing of the product uses unused",
+                                 "server/b.h:1: no file includes it"])
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """What strangers do to a server, for strangers.py.
 
 Each misdeed has the answer that it must get, the line that it writes into the log and the counters
-that it moves. They are those of a server that listens on a loopback address and asks for no tokens.
-tests/server/net tests each of them once, and many more.
+that it moves. They are those of a server that listens on a loopback address. tests/server/net tests
+each of them once, and many more.
 """
 
 import itertools
@@ -16,7 +16,9 @@ TEXT, FRAGMENT, BINARY, CLOSE, PING, PONG = 0x81, 0x02, 0x82, 0x88, 0x89, 0x8a  
 BAD_MESSAGE, UNAUTHORIZED, UNKNOWN_SCENE, RATE_LIMITED = 1, 2, 3, 7  # of proto/catgs.proto
 NOTHING = rb"\Z"
 FLOOD_FRAMES = 400_000  # of 6 bytes: 2.3 MiB, where 1.8 may come within a second
-SIDECAR = "/api/scenes/any/sidecar"
+SCRIPT = "/the/page's/script.js"  # whose name has a digest
+SIDECAR = "/api/scenes/hall/sidecar"  # of a scene that authors save, where there are authors
+SAVES, SAVED_BYTES = 50, 958_000
 HIDDEN = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"  # where the body of another request is
 
 
@@ -27,6 +29,9 @@ class Misdeed(NamedTuple):
     line: str = ""
     moves: tuple[str, ...] = ()
     resets: bool = False  # does not wait for an answer
+    reads: bool = True  # otherwise it has room for little, takes nothing and goes on to send bytes
+    closes: bool = False  # the same, but all that was sent arrives
+    times: int = 1  # on one connection after the other
 
 
 def request(method: str, path: str = "/", headers: str = "", body: str = "", host: str = "localhost") -> bytes:
@@ -60,8 +65,9 @@ def field(number: int, value: int | float | bytes | str) -> bytes:
     return varint(number << 3 | 2) + varint(len(value)) + value
 
 
-def hello(more: bytes, width_px: int = 64) -> bytes:
-    return field(1, field(1, 1) + field(3, width_px) + field(4, 64) + field(5, 1.0) + field(6, b"\1\2") + more)
+def hello(more: bytes, width_px: int = 64, link: str = "") -> bytes:
+    token = field(7, link) if link else b""
+    return field(1, field(1, 1) + field(3, width_px) + field(4, 64) + field(5, 1.0) + field(6, b"\1\2") + token + more)
 
 
 def refused(name: str, sends: bytes, status: int, why: str) -> Misdeed:
@@ -88,8 +94,6 @@ def flood(name: str, first: int) -> Misdeed:
 NO_HTTP = rb"HTTP/1\.0 403 "  # libwebsockets' own answer, which nothing counts
 ONE_ANSWER = rb"HTTP/1\.1 404 (?:(?!HTTP/1\.).)*\Z"  # connection: close, whatever is behind the request
 NO_CLIENT_MESSAGE = "message: not a ClientMessage of catgs.v1"
-NO_AUTHORS = ("upload refused: 403: nobody can save on this server: it was started without --token-key-file, which "
-              "links of role author are made with")
 MISDEEDS = [
     refused("foreign Host", request("GET", host="evil.example"), 403,
             "request refused: this server is not known as evil.example (--allow-origin)"),
@@ -99,13 +103,10 @@ MISDEEDS = [
             "request refused: 400: open websockets by GET, Sec-WebSocket-Version 13"),
     refused("h2c", request("GET", headers="Connection: Upgrade\r\nUpgrade: h2c\r\n"), 400,
             "request refused: 400: HTTP/1.1 and websockets are spoken here, not h2c"),
-    refused("sidecar without a token", request("PUT", SIDECAR, "Content-Length: 2\r\n", "{}"), 403, NO_AUTHORS),
     refused("sidecar of a foreign Origin", request("PUT", SIDECAR, "Content-Length: 2\r\nOrigin: null\r\n", "{}"), 403,
             "upload refused: origin null is not allowed at localhost (--allow-origin)"),
     refused("sidecar of 99 MB", request("PUT", SIDECAR, "Content-Length: 99999999\r\n", "{"), 413,
             "upload refused: 413: a Content-Length of 1 to 1048576 is needed"),
-    Misdeed("sidecar that stays away", request("PUT", SIDECAR, "Content-Length: 99\r\n", "{"), NOTHING,
-            f"127.0.0.1: {NO_AUTHORS}", (REQUESTS,)),
     refused("GET with a body", request("GET", headers="Content-Length: 5\r\n", body="hello"), 413,
             "request refused: 413: a GET needs no body"),
     refused("chunks", request("GET", headers="Transfer-Encoding: chunked\r\n", body="0\r\n\r\n"), 411,
@@ -119,6 +120,7 @@ MISDEEDS = [
     Misdeed("length behind a bare CR", request("GET", "/nowhere", f"X: 1\rContent-Length: {len(HIDDEN)}\r\n", HIDDEN),
             ONE_ANSWER),
     Misdeed("chunks before a space", request("GET", "/nowhere", "Transfer-Encoding : chunked\r\n", HIDDEN), ONE_ANSWER),
+    Misdeed("unread answer", request("GET", SCRIPT, body="x"), NOTHING, reads=False),
     Misdeed("path that climbs", request("GET", "/../../etc/passwd"), rb"HTTP/1\.1 404 "),
     Misdeed("encoded path that climbs", request("GET", "/%2e%2e%2f%2e%2e%2fetc%2fpasswd"), rb"HTTP/1\.1 404 "),
     Misdeed("unknown method", request("NONSENSE"), NO_HTTP),
@@ -140,16 +142,48 @@ MISDEEDS = [
     closed("Pause before Hello", frame(BINARY, field(8, b"")), 1008, "the first message has to be a hello",
            BAD_MESSAGE),
     closed("no Hello", b"", 1008, "no hello within the time limit", BAD_MESSAGE),
-    closed("unknown scene", frame(BINARY, hello(field(2, "atlantis"))), 1008, 'there is no scene "atlantis" here',
-           UNKNOWN_SCENE, bad=False),
-    closed("unsigned link to watch", frame(BINARY, hello(field(10, "nobody.signed.this"))), 1008,
-           "this link to watch a session is not valid here", UNAUTHORIZED, bad=False),
-    # A new session: the token does no harm.
-    Misdeed("unsigned resume token, Bye", upgrade(frame(BINARY, hello(field(8, field(1, "nobody.signed.this"))))
-                                                  + frame(BINARY, field(9, b""))),
-            rb"HTTP/1\.1 101 .*" + re.escape(frame(CLOSE, struct.pack(">H", 1000) + b"bye", b""))),
     Misdeed("ping of 126 bytes", upgrade(frame(PING, b"p" * 126)), rb"HTTP/1\.1 101 .*\r\n\r\n\Z"),
     flood("flood of pings", PING),
     flood("flood of pongs", PONG),
     Misdeed("upgrade and reset", upgrade(), NOTHING, resets=True),
 ]
+
+
+def put(headers: str, body: str) -> bytes:
+    return request("PUT", SIDECAR, f"{headers}Content-Length: {len(body)}\r\n", body)
+
+
+def by_access(link: str) -> list[Misdeed]:
+    """Those whose answer is another one where tokens are asked for."""
+    status, why = ((401, "this server needs an access token: open the link you were given") if link else
+                   (403, "nobody can save on this server: it was started without --token-key-file, which links of "
+                    "role author are made with"))
+    no_save = f"upload refused: {status}: {why}"
+    return [
+        refused("sidecar without a token", put("", "{}"), status, no_save),
+        Misdeed("sidecar that stays away", request("PUT", SIDECAR, "Content-Length: 99\r\n", "{"), NOTHING,
+                f"127.0.0.1: {no_save}", (REQUESTS,)),
+        closed("unknown scene", frame(BINARY, hello(field(2, "atlantis"), link=link)), 1008,
+               'there is no scene "atlantis" here, or there are several of this name: ask for a new link', UNKNOWN_SCENE, bad=False),
+        closed("unsigned link to watch", frame(BINARY, hello(field(10, "nobody.signed.this"), link=link)), 1008,
+               "this link to watch a session is not valid here", UNAUTHORIZED, bad=False),
+        # A new session: the token does no harm.
+        Misdeed("unsigned resume token, Bye", upgrade(frame(BINARY, hello(field(8, field(1, "nobody.signed.this")),
+                                                                          link=link)) + frame(BINARY, field(9, b""))),
+                rb"HTTP/1\.1 101 .*" + re.escape(frame(CLOSE, struct.pack(">H", 1000) + b"bye", b""))),
+    ]
+
+
+def by_authors(link: str) -> list[Misdeed]:
+    """Large saves, and many in quick succession whose answers nobody waits for."""
+    token = f"Authorization: Bearer {link}\r\n"
+    sidecar = '{"start_pose": {"position": [0, 0, 1], "look_at": [0, 0, 9]}}'.ljust(SAVED_BYTES)
+    save, stale = put(token, sidecar), put(f'{token}If-Match: "stale"\r\n', sidecar)
+    return [Misdeed("save", save, rb"HTTP/1\.1 200 "), Misdeed("stale save", stale, rb"HTTP/1\.1 412 "),
+            Misdeed("saves without end", save, NOTHING, closes=True, times=SAVES),
+            Misdeed("stale saves without end", stale, NOTHING, closes=True, times=SAVES)]
+
+
+def all_misdeeds(link: str = "") -> list[Misdeed]:
+    """At a server that asks for no tokens, or at one where `link` is an author's."""
+    return MISDEEDS + by_access(link) + (by_authors(link) if link else [])

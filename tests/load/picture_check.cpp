@@ -11,7 +11,8 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/renderer.h"
-#include "server/scene_catalog.h"
+#include "server/base/scene_id.h"
+#include "server/scenes/scene_catalog.h"
 
 namespace catgs::load {
 namespace {
@@ -76,7 +77,8 @@ void check_pictures(const std::string& scene, RunReport& report) {
   for (GroupReport& group : report.groups) {
     for (const auto& session : group.sessions) {
       for (PictureSample& sample : session->pictures) {
-        if (sample.scene_id != entry->facts.scene_id) {
+        // The server may have the same scene in another folder.
+        if (name_in(sample.scene_id) != name_in(entry->facts.scene_id)) {
           throw InputError("--check-scene", scene,
                            fmt::format("is \"{}\", but a session saw \"{}\"", entry->facts.scene_id,
                                        sample.scene_id));

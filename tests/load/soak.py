@@ -9,11 +9,12 @@ Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose t
 resume, stand still; in each round one generator more is killed. Meanwhile strangers go round
 misdeeds.py and must be refused each time as is told there. Once a second the server's memory,
 descriptors and threads are read from /proc, every five seconds /metrics, and nvidia-smi where there
-is one. --out gets samples.jsonl, misdeeds.txt, soak.json and soak.html.
+is one. --out gets samples.jsonl, misdeeds.txt and soak.json.
 
-Without --attach it starts the catgs-server beside the program, and stops it at the end. With it the
-server is one that runs already, on a loopback address and without tokens, and stays; a later run with
-the same --out and the same process goes on where the last one ended and judges both together.
+Without --attach it starts the catgs-server beside the program, and stops it at the end; strangers then
+also save like an author who never ends. With it the server is one that runs already, on a loopback
+address and without tokens, and stays; a later run with the same --out and the same process goes on
+where the last one ended and judges both together.
 
 Flat: see soak_report.py. Errors: since the first of these runs the server's log must have no line of
 level warning or above but those that the strangers caused, and these as often as they did; the
@@ -27,9 +28,11 @@ Exit status: 0 flat and no error; 1 otherwise; 2 it could not be run.
 import argparse
 import collections
 import json
+import os
 import pathlib
 import random
 import re
+import secrets
 import shutil
 import signal
 import subprocess
@@ -41,10 +44,12 @@ import urllib.error
 import urllib.request
 
 import soak_report
+from misdeeds import all_misdeeds
 from strangers import Strangers
 
 SCENARIO = pathlib.Path(__file__).parent / "scenarios" / "soak.toml"
 SCENES = {"park": 2, "square": 3}  # of the scenario, with their seeds
+SAVED_SCENE = "hall.ply"  # that misdeeds.py saves
 # Longer than a lost client's session is kept.
 SETTLE_S = 40.0
 SAMPLE_S, SCRAPE_S = 1.0, 5.0
@@ -194,16 +199,27 @@ def make_scenes(program: pathlib.Path, folder: pathlib.Path) -> None:
     render = program.parent / "catgs-render"
     if not render.exists():
         raise Cannot(f"{render} is missing, which makes the scenes: ninja -C {program.parent.parent} catgs-render")
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, seed in SCENES.items():
-        subprocess.run([render, "synth", "city", "--gaussians", "50000", "--seed", str(seed),
-                        folder / f"{name}.ply"], check=True, stdout=subprocess.DEVNULL)
+    (folder / "scenes").mkdir(parents=True, exist_ok=True)
+    files = [(2000, 1, SAVED_SCENE), *((50_000, seed, f"scenes/{name}.ply") for name, seed in SCENES.items())]
+    for gaussians, seed, file in files:
+        subprocess.run([render, "synth", "city", "--gaussians", str(gaussians), "--seed", str(seed), folder / file],
+                       check=True, stdout=subprocess.DEVNULL)
 
 
-def start_server(program: pathlib.Path, out: pathlib.Path) -> tuple[subprocess.Popen, str, str]:
-    """The process, its address for clients and its admin address."""
-    make_scenes(program, out / "scenes")
-    arguments = tomllib.loads(SCENARIO.read_text("utf-8"))["server"]["args"]
+def make_link(program: pathlib.Path, key: pathlib.Path) -> str:
+    """An author's, who may save every scene."""
+    key.write_text(secrets.token_hex(32), "utf-8")
+    said = subprocess.run([program.parent / "catgs-server", "token", "--role", "author", "--expires", "30d",
+                           "--token-key-file", key], check=True, capture_output=True, text=True)
+    return said.stdout.strip()
+
+
+def start_server(program: pathlib.Path, out: pathlib.Path) -> tuple[subprocess.Popen, str, str, str]:
+    """The process, its address for clients, its admin address and an author's link."""
+    make_scenes(program, out)
+    link = make_link(program, out / "key")
+    arguments = [*tomllib.loads(SCENARIO.read_text("utf-8"))["server"]["args"], "--scene", SAVED_SCENE,
+                 "--token-key-file", "key"]
     log = out / "server.log"
     with log.open("wb") as file:
         # pylint: disable=consider-using-with
@@ -215,7 +231,7 @@ def start_server(program: pathlib.Path, out: pathlib.Path) -> tuple[subprocess.P
         admin = re.search(r"metrics: (http://[\d.:]+)/", text)
         port = re.search(r"open http://([\d.:]+)/", text)
         if admin and port:
-            return server, f"ws://{port.group(1)}", admin.group(1)
+            return server, f"ws://{port.group(1)}", admin.group(1), link
         time.sleep(0.1)
     server.kill()
     raise Cannot(f"the server does not serve: {log}")
@@ -297,10 +313,11 @@ def read_samples(path: pathlib.Path) -> list[dict[str, float]]:
 
 def soak(arguments: argparse.Namespace) -> bool:
     arguments.out.mkdir(parents=True, exist_ok=True)
-    server = None
+    server, link = None, ""
     log = arguments.server_log
     if arguments.attach is None:
-        server, url, admin = start_server(arguments.program, arguments.out)
+        server, url, admin, link = start_server(arguments.program, arguments.out)
+        os.environ["CATGS_TOKEN"] = link  # of the generators
         log = arguments.out / "server.log"
     else:
         url, admin = arguments.url, arguments.admin
@@ -308,7 +325,7 @@ def soak(arguments: argparse.Namespace) -> bool:
         process = Process(server.pid if server else arguments.attach, admin)
         samples_file = arguments.out / "samples.jsonl"
         first = begin(samples_file, process, log)
-        strangers = Strangers(url, misdeeds_of(samples_file))
+        strangers = Strangers(url, misdeeds_of(samples_file), all_misdeeds(link))
         sampler = Sampler(process, samples_file)
         sampler.start()
         try:
@@ -329,7 +346,6 @@ def soak(arguments: argparse.Namespace) -> bool:
     samples = read_samples(samples_file)
     report = soak_report.judge(samples) | {"rounds": rounds, "errors": errors, "misdeeds": strangers.done()}
     (arguments.out / "soak.json").write_text(json.dumps(report, indent=2) + "\n", "utf-8")
-    (arguments.out / "soak.html").write_text(soak_report.to_html(report, samples), "utf-8")
     print(soak_report.to_text(report))
     return report["flat"] and not errors
 

@@ -5,6 +5,7 @@ import collections
 import math
 import pathlib
 import random
+import socket
 import socketserver
 import tempfile
 import threading
@@ -78,12 +79,6 @@ class Flatness(unittest.TestCase):
         self.assertFalse(soak_report.judge(leaking)["quantities"]["device_mb"]["flat"])
         self.assertNotIn("device_mb", soak_report.judge(samples(lambda s: 150.0))["quantities"])
 
-    def test_the_page_shows_each_quantity_and_error(self):
-        report = self.judge(lambda s: 150.0) | {"rounds": 3, "errors": ["log: <bad>"]}
-        page = soak_report.to_html(report, samples(lambda s: 150.0))
-        for text in ("Memory, resident", "Open descriptors", "Threads", "log: &lt;bad&gt;", "1 errors"):
-            self.assertIn(text, page)
-        self.assertIn("1 errors", soak_report.to_text(report))
 
 
 class Findings(unittest.TestCase):
@@ -135,7 +130,7 @@ class Findings(unittest.TestCase):
         for caused in (2, 4):
             self.assertEqual(soak.moved(before, after, collections.Counter({misdeeds.REQUESTS: caused})),
                              [f"{misdeeds.REQUESTS} grew by 3, and strangers caused {caused}"])
-        for misdeed in misdeeds.MISDEEDS:
+        for misdeed in misdeeds.all_misdeeds("a link"):
             self.assertLessEqual(set(misdeed.moves), set(soak.NEVER), misdeed.name)
 
 
@@ -215,8 +210,29 @@ class StrangersTest(unittest.TestCase):
             self.assertEqual(crowd.errors(), ["stranger, deed: was not hung up after 0 s: b''"])
 
     def test_misdeeds_have_names_of_their_own(self):
-        names = [misdeed.name for misdeed in misdeeds.MISDEEDS]
-        self.assertEqual(len(set(names)), len(names))
+        for link in ("", "a link"):
+            names = [misdeed.name for misdeed in misdeeds.all_misdeeds(link)]
+            self.assertEqual(len(set(names)), len(names))
+
+    def test_saves_without_end_are_an_authors(self):
+        loops = [misdeed for misdeed in misdeeds.all_misdeeds("a link") if misdeed.closes]
+        self.assertEqual([b"If-Match" in loop.sends for loop in loops], [False, True])
+        self.assertFalse([misdeed.name for misdeed in misdeeds.all_misdeeds() if misdeed.closes])
+
+    def test_who_closes_comes_as_often_as_told_and_waits_for_nothing(self):
+        deed = misdeeds.Misdeed("deed", b"PUT /", misdeeds.NOTHING, closes=True, times=3)
+        with tempfile.TemporaryDirectory() as folder, socket.create_server(("127.0.0.1", 0)) as door:
+            crowd = strangers.Strangers(f"ws://127.0.0.1:{door.getsockname()[1]}", pathlib.Path(folder) / "misdeeds.txt",
+                                        [deed], 0.0)
+            crowd.stopped.set()
+            with crowd:
+                pass
+            door.settimeout(0.0)
+            for _ in range(deed.times):
+                with door.accept()[0] as visit:
+                    self.assertEqual((visit.recv(9), visit.recv(9)), (b"PUT /", b""))
+            self.assertRaises(BlockingIOError, door.accept)
+            self.assertEqual((crowd.errors(), crowd.done()), ([], {"deed": 1}))
 
 
 if __name__ == "__main__":

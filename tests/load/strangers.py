@@ -15,13 +15,14 @@ import struct
 import threading
 import time
 import urllib.parse
+import urllib.request
 from typing import Callable
 
-from misdeeds import MISDEEDS, Misdeed
+from misdeeds import SCRIPT, Misdeed
 
-PACE_S = 0.4  # the log takes ten lines a second about refusals: refusals_per_second in server/log.cpp
-# The longest of the server's limits is request_timeout_s, 10 s; compilers may run beside it.
-PATIENCE_S = 30.0
+PACE_S = 0.4  # the log takes ten lines a second about refusals: refusals_per_second in server/base/log.cpp
+# The longest of the server's limits is piece_timeout_s, 30 s; compilers may run beside it.
+PATIENCE_S = 60.0
 RESET = struct.pack("ii", 1, 0)  # of SO_LINGER
 
 
@@ -37,11 +38,14 @@ class Stranger:
     def hung_up(self) -> bool:
         """Takes what has come."""
         try:
+            if not self.misdeed.reads:
+                self.connection.send(b"x")
+                return False
             while chunk := self.connection.recv(1 << 16):
                 self.came += chunk
         except BlockingIOError:
             return False
-        except ConnectionResetError:
+        except (ConnectionResetError, BrokenPipeError):
             pass
         return True
 
@@ -53,12 +57,11 @@ class Stranger:
 class Strangers:
     """As a context: go round until it is left, which waits until all are hung up."""
 
-    def __init__(self, url: str, path: pathlib.Path, misdeeds: list[Misdeed] | None = None,
-                 patience_s: float = PATIENCE_S):
+    def __init__(self, url: str, path: pathlib.Path, misdeeds: list[Misdeed], patience_s: float = PATIENCE_S):
         parts = urllib.parse.urlsplit(url)
         self.address = (parts.hostname, parts.port)
         self.path = path  # of the names of what was done to this process, by earlier runs too
-        self.misdeeds, self.patience_s = MISDEEDS if misdeeds is None else misdeeds, patience_s
+        self.misdeeds, self.patience_s = misdeeds, patience_s
         self.there: list[Stranger] = []
         self.wrong: dict[str, list[str]] = {}
         self.stopped = threading.Event()
@@ -112,16 +115,31 @@ class Strangers:
             self._look()
 
     def _do(self, misdeed: Misdeed) -> None:
-        connection = socket.create_connection(self.address, timeout=10.0)
+        sends = misdeed.sends
+        if (wanted := SCRIPT.encode()) in sends:
+            sends = sends.replace(wanted, self._script())
         with self.path.open("a", encoding="utf-8") as file:
             file.write(misdeed.name + "\n")
-        connection.sendall(misdeed.sends)
-        connection.setblocking(False)
-        if misdeed.resets:
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
-            connection.close()
-        else:
-            self.there.append(Stranger(misdeed, connection, time.monotonic() + self.patience_s))
+        for _ in range(misdeed.times):
+            connection = socket.socket()
+            connection.settimeout(10.0)
+            if not misdeed.reads:
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_MAXSEG, 536)
+            connection.connect(self.address)
+            connection.sendall(sends)
+            connection.setblocking(False)
+            if misdeed.resets:
+                connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+            if misdeed.resets or misdeed.closes:
+                connection.close()
+            else:
+                self.there.append(Stranger(misdeed, connection, time.monotonic() + self.patience_s))
+
+    def _script(self) -> bytes:
+        host, port = self.address
+        with urllib.request.urlopen(f"http://{host}:{port}/", timeout=10.0) as page:
+            return re.search(rb'src="\.([^"]+\.js)"', page.read()).group(1)
 
     def _look(self) -> None:
         for stranger in self.there[:]:

@@ -8,6 +8,7 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -34,7 +35,14 @@ bool read_some(int descriptor, std::string& to) {
 
 }  // namespace
 
-RawSocket::RawSocket(int port) : descriptor_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+RawSocket::RawSocket(int port, bool narrow)
+    : descriptor_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  if (narrow) {
+    const int bytes = 4096;
+    const int segment_bytes = 536;  // the peer's kernel makes room for a number of these
+    ::setsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+    ::setsockopt(descriptor_, IPPROTO_TCP, TCP_MAXSEG, &segment_bytes, sizeof segment_bytes);
+  }
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
@@ -68,11 +76,26 @@ bool RawSocket::send(std::string_view bytes) {
   return true;
 }
 
+void RawSocket::end_sending() { ::shutdown(descriptor_, SHUT_WR); }
+
+void RawSocket::send_and_close(std::string_view bytes) {
+  // The system waits for more, and then sends the end with it.
+  ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_MORE);
+  ::close(std::exchange(descriptor_, -1));
+}
+
 std::string RawSocket::receive(std::chrono::milliseconds patience) {
   std::string received;
   while (readable(descriptor_, patience) && read_some(descriptor_, received)) {
   }
   return received;
+}
+
+bool RawSocket::receive_bytes(std::size_t count, std::string& received) {
+  const std::size_t wanted = received.size() + count;
+  while (received.size() < wanted)
+    if (!readable(descriptor_, long_patience) || !read_some(descriptor_, received)) return false;
+  return true;
 }
 
 bool RawSocket::receive_until(std::string_view text, std::string& received) {

@@ -12,7 +12,7 @@ namespace catgs::test {
 /// client sends. Throws std::system_error when it cannot connect.
 class RawSocket {
  public:
-  explicit RawSocket(int port);
+  explicit RawSocket(int port, bool narrow = false);  // narrow: its kernel takes little unread
   ~RawSocket();
   RawSocket(RawSocket&& other) noexcept;
   RawSocket& operator=(RawSocket&& other) noexcept;
@@ -21,8 +21,14 @@ class RawSocket {
 
   /// False when the peer has closed.
   bool send(std::string_view bytes);
+  /// The peer reads the end of the stream; its answer still comes.
+  void end_sending();
+  /// Closes with them: a few bytes and the end arrive at the same time.
+  void send_and_close(std::string_view bytes);
   /// What arrives until the peer is silent for `patience` or closes.
   std::string receive(std::chrono::milliseconds patience);
+  /// Appends as much as that; false when the peer closes before, or is silent for twenty seconds.
+  bool receive_bytes(std::size_t count, std::string& received);
   /// Appends to what was received until `text` is in it; false when the peer closes or says nothing
   /// for twenty seconds: a bound against hanging.
   bool receive_until(std::string_view text, std::string& received);

@@ -226,16 +226,7 @@ void WireClient::close(int code) {
   }));
 }
 
-void WireClient::send_pose(std::uint64_t pose_id, float x) {
-  v1::ClientMessage message;
-  auto& pose = *message.mutable_pose();
-  pose.set_pose_id(pose_id);
-  pose.set_client_time_us(static_cast<std::int64_t>(pose_id) * 1000);
-  pose.mutable_world_from_camera()->mutable_position()->set_x(x);
-  pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
-  pose.set_fov_y_rad(1.0f);
-  send(message);
-}
+void WireClient::send_pose(std::uint64_t pose_id, float x) { send(pose_message(pose_id, x)); }
 
 void WireClient::send_ack(std::uint64_t frame_id, bool dropped) {
   v1::ClientMessage message;
@@ -253,6 +244,17 @@ v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec) {
   hello.set_viewport_width_px(static_cast<std::uint32_t>(width_px));
   hello.set_viewport_height_px(static_cast<std::uint32_t>(height_px));
   hello.add_decoders(codec);
+  return message;
+}
+
+v1::ClientMessage pose_message(std::uint64_t pose_id, float x) {
+  v1::ClientMessage message;
+  auto& pose = *message.mutable_pose();
+  pose.set_pose_id(pose_id);
+  pose.set_client_time_us(static_cast<std::int64_t>(pose_id) * 1000);
+  pose.mutable_world_from_camera()->mutable_position()->set_x(x);
+  pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
+  pose.set_fov_y_rad(1.0f);
   return message;
 }
 

@@ -113,6 +113,7 @@ class WireClient {
 };
 
 v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec);
+v1::ClientMessage pose_message(std::uint64_t pose_id, float x);
 
 /// The hello of a client that was here before; pose 0: without one.
 v1::ClientMessage resuming_hello(const std::string& resume_token, std::uint64_t pose_id = 0);

@@ -3,8 +3,8 @@ import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
 import { QualityChoice } from '#client/session/quality';
-import { scene_address } from '#client/session/scenes';
-import { AccessToken } from '#client/session/token';
+import { scene_address, scene_labels, scene_name } from '#client/session/scenes';
+import { AccessToken, has_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { Settling } from '#client/ui/automation';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
@@ -46,6 +46,12 @@ describe('access token', () => {
     }
   });
 
+  it('is found in the fragment alone', () => {
+    expect(has_token('http://host/?scene=city#at=1,2&token=x')).toBe(true);
+    expect(has_token('http://host/#token')).toBe(true);
+    for (const href of ['http://host/?token=x', 'http://host/#stop=1', 'http://host/']) expect(has_token(href)).toBe(false);
+  });
+
   it('works without storage', () => {
     const history = { state: null, replaceState: () => undefined };
     const token_of = (href: string): string => new AccessToken({ href }, history, undefined).value;
@@ -69,6 +75,21 @@ describe('scene address', () => {
     const page = 'http://host/tour/?scene=nope&lang=en';
     expect(scene_address(page, 'a b&c')).toBe('http://host/tour/?scene=a+b%26c&lang=en');
     expect(scene_address('http://host/', 'city')).toBe('http://host/?scene=city');
+  });
+});
+
+describe('names of scenes', () => {
+  it('are their ids without digests', () => {
+    expect(scene_name('hall-kdfmqrtv')).toBe('hall');
+    for (const id of ['city', 'scan-20240131', 'hall-building', 'hall-2', '-kdfmqrtv', 'hall-KDFMQRTV', '']) {
+      expect(scene_name(id)).toBe(id);
+    }
+  });
+
+  it('say in a list which of several of a name it is', () => {
+    expect(scene_labels(['city', 'hall-kdfmqrtv', 'attic-bbcdnpvv', 'hall-bbcdnpvv'])).toEqual([
+      'city', 'hall-kdfmqrtv', 'attic', 'hall-bbcdnpvv',
+    ]);
   });
 });
 

@@ -53,11 +53,11 @@ describe('tours of a sidecar', () => {
 
   it('have the same limits here and at the server', () => {
     const server = ['tours.cpp', 'tours.h']
-      .map((name) => readFileSync(new URL(`../../server/${name}`, import.meta.url), 'utf8'))
+      .map((name) => readFileSync(new URL(`../../server/scenes/${name}`, import.meta.url), 'utf8'))
       .join('');
     const limit = (name: string): number => {
       const found = new RegExp(`constexpr std::size_t ${name} = (\\d[\\d']*)(?: << (\\d+))?;`).exec(server);
-      if (!found) throw new Error(`server/tours.* have no ${name}`);
+      if (!found) throw new Error(`server/scenes/tours.* have no ${name}`);
       return Number(found[1]!.replaceAll("'", '')) * 2 ** Number(found[2] ?? 0);
     };
     expect(limits.max_tours).toBe(limit('max_tours'));

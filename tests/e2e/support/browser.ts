@@ -1,7 +1,7 @@
 // Chromium as the tests use it, and a page that records everything that went wrong in it.
 import { existsSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { chromium, type Browser, type BrowserContextOptions, type Page } from 'playwright-core';
+import { chromium, type Browser, type BrowserContext, type BrowserContextOptions, type Page } from 'playwright-core';
 import { artefacts, chromium_path } from './paths';
 
 
@@ -34,11 +34,19 @@ export interface WatchedPage {
   readonly errors: string[];
 }
 
+const open_contexts: BrowserContext[] = [];
+
+/** Closes the pages that new_page() has made since the last call. */
+export async function close_pages(): Promise<void> {
+  for (const context of open_contexts.splice(0)) await context.close();
+}
+
 export async function new_page(
   browser: Browser,
   options: BrowserContextOptions = { viewport: { width: 640, height: 360 } },
 ): Promise<WatchedPage> {
   const context = await browser.newContext(options);
+  open_contexts.push(context);
   const page = await context.newPage();
   const errors: string[] = [];
   page.on('console', (message) => {

@@ -4,14 +4,14 @@
 #include <variant>
 
 #include "proto/catgs.pb.h"
-#include "server/access.h"
-#include "server/link_preview.h"
+#include "server/access/access.h"
+#include "server/access/session_tokens.h"
+#include "server/access/signed_token.h"
 #include "server/net/http.h"
 #include "server/net/static_files.h"
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
-#include "server/session/session_tokens.h"
-#include "server/signed_token.h"
+#include "server/scenes/link_preview.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
 

@@ -7,7 +7,7 @@
 
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/formats/streamed_sog.h"
-#include "server/tours.h"
+#include "server/scenes/tours.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
 
@@ -111,7 +111,8 @@ struct SidecarFolder {
 void parse_tours(Bytes input) {
   static SidecarFolder folder;
   folder.file.rewrite(input);
-  require(read_tours(folder.sidecar).size() >= std::string(R"({"settings":,"tours":})").size(),
+  require(tours_of(folder.sidecar, sidecar_text(folder.sidecar)).size() >=
+              std::string(R"({"settings":,"tours":})").size(),
           "two parts");
 }
 

@@ -1,5 +1,6 @@
 #include "render_core/base/printable.h"
 
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -7,6 +8,20 @@
 
 namespace catgs {
 namespace {
+
+enum class Category { printable, unprintable, unassigned };
+struct CategoryRange {
+  std::uint32_t first, last;
+  Category category;
+};
+#include "unicode_categories.inc"  // by write_categories.py
+
+TEST(Printable, FollowsTheUnicodeData) {
+  for (const auto& [first, last, category] : categories)
+    for (std::uint32_t c = first; c <= last && category != Category::unassigned; ++c)
+      EXPECT_EQ(is_printable(c), category == Category::printable) << std::hex << c;
+  EXPECT_FALSE(is_printable(0x13430) || is_printable(0x1343f)) << "assigned by Unicode 15.0";
+}
 
 TEST(Printable, ControlCharactersComeOutByTheirBytes) {
   EXPECT_EQ(printable({"a\0\t\n\x1b[2J\x7f", 9}), R"(a\x00\x09\x0a\x1b[2J\x7f)");

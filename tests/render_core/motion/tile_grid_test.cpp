@@ -92,11 +92,11 @@ TEST(GuardSets, OfLongLensesStayWithinBounds) {
 TEST(GuardSets, EndWhereTilesWouldHaveTooManyPixels) {
   const Camera key = camera_at({});
   const Pose end = turned(6, {0, 1, 0});
-  EXPECT_FALSE(in_guard_set(make_guard_set(key, end, 1.0), key, end, end));
+  EXPECT_FALSE(in_guard_set(make_guard_set(key, end, most_tau(key)), key, end, end));
   Camera wide = key;
   wide.focal_px = {600.0f, 600.0f};
   const Pose less = turned(3.5f, {0, 1, 0});
-  EXPECT_FALSE(in_guard_set(make_guard_set(wide, less, 1.0), wide, less, less));
+  EXPECT_FALSE(in_guard_set(make_guard_set(wide, less, most_tau(wide)), wide, less, less));
 }
 
 /// A Gaussian of a random cloud, seen by a camera at the origin.

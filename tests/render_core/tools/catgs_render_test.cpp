@@ -296,15 +296,14 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
          "--device: chooses among CUDA devices");
   expect(frames("--script still --out " + path("a.png")), "one picture for 1200 frames");
   expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
-  expect(frames(still + "--window 2 --out x"), "--window: means nothing to the exact pipeline");
+  expect(frames(still + "--window 2 --out x"), "--window: has no effect on the exact pipeline");
   expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
-  expect(frames("--trace x --duration 2 --out x"),
-         "--duration: means nothing to a recorded trace (it is of a script)");
-  expect(frames("--trace x --seed 1 --out x"), "--seed: means nothing to a recorded trace");
+  expect(frames("--trace x --duration 2 --out x"), "--duration: has no effect on a recorded trace");
+  expect(frames("--trace x --seed 1 --out x"), "--seed: has no effect on a recorded trace");
   expect(frames(still + "--pipeline catgs --grid fixed --guard-px 1 --out x"),
-         "--guard-px: means nothing to the fixed grid (use --grid warp)");
+         "--guard-px: has no effect on the fixed grid (use --grid warp)");
   expect(frames(still + "--pipeline catgs --max-deviation-px 1 --out x"),
-         "--max-deviation-px: means nothing to the warp grid (use --grid fixed or shift)");
+         "--max-deviation-px: has no effect on the warp grid (use --grid fixed or shift)");
   expect(run(fmt::format("bench {} --script still --frames :2 --warmup 100000000000", scene())),
          "--warmup: 100000000000 frames of a path of 2");
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");
@@ -327,7 +326,7 @@ TEST_F(CatgsRender, InfoDescribesTheScene) {
   const Outcome text = run("info " + scene());
   ASSERT_EQ(text.exit_code, 0) << text.out;
   EXPECT_THAT(text.out, AllOf(HasSubstr("3DGS ply"), HasSubstr("400, SH degree 0"),
-                              HasSubstr("first sight     estimated")));
+                              HasSubstr("first view      estimated")));
   const auto json = nlohmann::json::parse(run("info --json " + scene()).out);
   EXPECT_EQ(json.at("gaussians"), 400);
   EXPECT_EQ(json.at("sanitize").at("dropped"), 0);

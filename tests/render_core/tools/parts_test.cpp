@@ -78,10 +78,10 @@ TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
   refused({.pipeline = "fast"}, "--pipeline: unknown \"fast\" (one of exact, vanilla, catgs)");
   refused({.pipeline = "catgs", .order = "old"}, "--order: unknown \"old\"");
   refused({.pipeline = "catgs", .window = 65}, "--window: is out of range");
-  refused({.window = 4}, "--window: means nothing to the exact pipeline");
-  refused({.pipeline = "vanilla", .order = "key"}, "--order: means nothing to the vanilla");
-  refused({.no_cache = true}, "--no-cache: means nothing");
-  refused({.constant_velocity = true}, "--constant-velocity: means nothing");
+  refused({.window = 4}, "--window: has no effect on the exact pipeline");
+  refused({.pipeline = "vanilla", .order = "key"}, "--order: has no effect on the vanilla");
+  refused({.no_cache = true}, "--no-cache: has no effect");
+  refused({.constant_velocity = true}, "--constant-velocity: has no effect");
 }
 
 GaussianCloud small_cloud() {

@@ -1,6 +1,7 @@
 // Integration: a whole server under which something fails.
 
 #include <atomic>
+#include <filesystem>
 #include <future>
 #include <utility>
 
@@ -17,8 +18,8 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/scene/files/save_scene.h"
-#include "server/log.h"
-#include "server/scene_library.h"
+#include "server/base/log.h"
+#include "server/scenes/scene_library.h"
 #include "server/schedule/frame_executor.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/descriptor_limit.h"
@@ -29,6 +30,7 @@
 namespace {
 
 std::atomic<bool> network_fails{false};
+std::atomic<int> services{0};  // of the network thread
 
 }  // namespace
 
@@ -37,6 +39,7 @@ struct lws_context;
 extern "C" int lws_service(lws_context* context, int timeout_ms) {
   static const auto service =
       reinterpret_cast<decltype(&lws_service)>(::dlsym(RTLD_NEXT, "lws_service"));
+  ++services;
   return network_fails ? -1 : service(context, timeout_ms);
 }
 
@@ -266,6 +269,75 @@ TEST(ServerFaults, EndsForItsSupervisorWhenTheNetworkThreadFails) {
   network_fails = false;
 }
 
+/// How often libwebsockets looks what there is to do.
+int services_in(std::chrono::milliseconds time) {
+  const int before = services;
+  std::this_thread::sleep_for(time);
+  return services - before;
+}
+
+/// One connection that takes no more of its answer while libwebsockets has something to read of it.
+class UnreadAnswer : public testing::Test {
+ protected:
+  UnreadAnswer() {
+    folder_.write("index.html", "<!doctype html>");
+    folder_.write("large.bin", std::string(large_bytes, 'l'));
+    server_.emplace([&](ServerConfig& config) { config.client_dir = folder_.path().string(); });
+    socket_.emplace(server_->port());
+  }
+  void expect_whole_answer() {
+    const std::string reply = socket_->receive(5s);
+    EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, large_bytes);
+  }
+
+  static constexpr std::size_t large_bytes = 16 << 20;  // more than sockets hold
+  static constexpr std::string_view request = "GET /large.bin HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  const TemporaryFolder folder_;
+  std::optional<RunningServer> server_;
+  std::optional<RawSocket> socket_;
+};
+
+TEST_F(UnreadAnswer, KeepsNoThreadBusyByBytesThatCameWithTheRequest) {
+  socket_->send(std::string(request) + "x");
+  EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
+  expect_whole_answer();
+}
+
+TEST_F(UnreadAnswer, KeepsNoThreadBusyByBytesThatComeLater) {
+  socket_->send(request);
+  std::string head;
+  ASSERT_TRUE(socket_->receive_until("\r\n\r\n", head));
+  socket_->send(std::string(100'000, 'x'));
+  EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
+}
+
+TEST_F(UnreadAnswer, KeepsNoThreadBusyWhereTheClientHasNoMoreToSay) {
+  socket_->send(request);
+  socket_->end_sending();
+  EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
+  expect_whole_answer();
+}
+
+TEST(ServerFaults, ClosingAWebsocketThatReadsNothingKeepsNoThreadBusy) {
+  const TemporaryFolder folder;
+  save_scene(random_cloud(1, 0), folder / "a.ply");
+  for (int i = 0; i < 3000; ++i)  // a welcome has all names
+    std::filesystem::create_hard_link(
+        folder / "a.ply", folder / (std::to_string(i) + std::string(100, 'n') + ".ply"));
+  const RunningServer server([&](ServerConfig& config) { config.scene_folders = {folder.path()}; });
+  RawSocket socket(server.port(), true);
+  socket.send(handshake(server.port()));
+  socket.send(
+      client_frame(ws_fin | ws_binary, hello_message(64, 64, v1::CODEC_H264).SerializeAsString()));
+  std::string received;
+  ASSERT_TRUE(socket.receive_until("nnnnn", received));
+  const std::string refused = client_frame(ws_fin | ws_text, "hello");
+  socket.send(refused);
+  ASSERT_TRUE(eventually([&] { return metric(server, "catgs_bad_messages_total") == 1.0; }));
+  socket.send(refused);
+  EXPECT_LT(services_in(1s), 5000);  // tens of thousands without the pauses
+}
+
 /// A library under --renderer auto whose first scene the processors render, and what it answers
 /// when it has tried to load another one.
 class SecondScene : public testing::Test {
@@ -283,12 +355,13 @@ class SecondScene : public testing::Test {
     SceneLibrary library(
         config, {RendererKind::automatic, std::make_shared<ThreadPool>(1), "auto", devices_}, io,
         metrics_);
-    EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library.want("attic", Clock::now())));
+    const std::string attic = library.resolve("attic");
+    EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library.want(attic, Clock::now())));
     const TimePoint end = Clock::now() + std::chrono::seconds(20);  // a bound against hanging
     while (metrics_.scene_loads_failed.Value() + metrics_.scenes_loaded.Value() == 0 &&
            Clock::now() < end)
       io.run_for(std::chrono::milliseconds(5));
-    return library.want("attic", Clock::now());
+    return library.want(attic, Clock::now());
   }
 
   const TemporaryFolder folder_;

@@ -162,6 +162,19 @@ TEST_F(HttpConformance, ALargeAnswerComesWhole) {
   EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, large_bytes);
 }
 
+/// libwebsockets gives an answer five seconds.
+TEST_F(HttpConformance, ALargeAnswerComesWholeToASlowClient) {
+  RawSocket socket(server->port(), true);
+  socket.send("GET /large.bin HTTP/1.1\r\n" + host() + "\r\n");
+  std::string reply;
+  for (int i = 0; i < 65; ++i) {
+    ASSERT_TRUE(socket.receive_bytes(1 << 16, reply)) << "cut off after " << reply.size();
+    std::this_thread::sleep_for(100ms);
+  }
+  reply += socket.receive(20s);
+  EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, large_bytes);
+}
+
 /// What comes behind a request may be its body to a proxy, which reads another length than the
 /// server does, or any: then another visitor would get the answer to it.
 TEST_F(HttpConformance, AConnectionAnswersOneRequest) {
@@ -284,9 +297,9 @@ TEST_F(HttpConformance, HeadersHaveAnEnd) {
   expect_alive();
 }
 
-/// Slow senders, the silent, and websockets that do not answer pings: all at once, because each
-/// takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30 (server/net/net_server.cpp),
-/// `body_time_us` 30 (server/net/lws_http.cpp).
+/// Slow senders, the silent, who does not read, and websockets that do not answer pings: all at
+/// once, because each takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30
+/// (server/net/net_server.cpp), `body_time_us` and `piece_timeout_s` 30 (server/net/lws_http.cpp).
 TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
   const std::size_t before = open_descriptors();
   {
@@ -299,6 +312,8 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
     }
     std::vector<RawSocket> silent;
     for (int i = 0; i < 20; ++i) silent.emplace_back(server->port());
+    RawSocket reads_nothing(server->port(), true);
+    reads_nothing.send("GET /large.bin HTTP/1.1\r\n" + host() + "\r\n");
     RawSocket half_open(server->port());
     half_open.send(handshake(server->port()));
     half_open.send(client_frame(ws_fin | ws_binary,
@@ -322,6 +337,7 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
     expect_alive();
     // Its kernel acknowledges what the server sends, but no pong comes.
     EXPECT_TRUE(half_open.closed_within(45s));
+    EXPECT_TRUE(eventually([&] { return !reads_nothing.send("x"); }));
   }
   EXPECT_TRUE(falls_to(before + 4));
 }

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/save_scene.h"
-#include "server/scene_id.h"
+#include "server/base/scene_id.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/support/server_client.h"
 
@@ -55,9 +55,9 @@ class SceneLibraryTest : public FolderTest {
   nlohmann::json listing() {
     return nlohmann::json::parse(http_get(server_->port(), "/api/scenes").body).at("scenes");
   }
-  bool loaded(const std::string& id) {
+  bool loaded(const std::string& name) {
     for (const auto& scene : listing())
-      if (scene.at("id") == id) return scene.at("loaded");
+      if (scene.at("title") == name) return scene.at("loaded");
     return false;
   }
   std::string metrics() { return http_get(server_->admin_port(), "/metrics").body; }
@@ -82,7 +82,7 @@ TEST_F(SceneLibraryTest, LoadsAnExhibitWhenSomebodyAsksForIt) {
   client->send(hello("attic"));
   EXPECT_TRUE(client->receive_message(v1::ServerMessage::kQueue).queue().for_scene());
   const auto welcome = client->receive_message(v1::ServerMessage::kWelcome).welcome();
-  EXPECT_EQ(welcome.scene().scene_id(), "attic");
+  EXPECT_EQ(name_in(welcome.scene().scene_id()), "attic");
   EXPECT_EQ(welcome.scene().gaussians(), 5000u);
   EXPECT_EQ(welcome.scene_ids_size(), 3);
   client->send_pose(1);
@@ -107,7 +107,7 @@ TEST_F(SceneLibraryTest, MakesRoomOnlyWhenNobodyLooksAnyMore) {
   const auto second = connect();
   eventually([&] { return metrics().find("catgs_sessions 0") != std::string::npos; },
              "the first has left");
-  EXPECT_EQ(visit(*second, "barn").scene().scene_id(), "barn");
+  EXPECT_EQ(name_in(visit(*second, "barn").scene().scene_id()), "barn");
   EXPECT_FALSE(loaded("attic"));
   EXPECT_THAT(metrics(), HasSubstr("catgs_scenes_released_total 1"));
   EXPECT_TRUE(loaded("city")) << "what --scene names stays";
@@ -116,12 +116,13 @@ TEST_F(SceneLibraryTest, MakesRoomOnlyWhenNobodyLooksAnyMore) {
 TEST_F(SceneLibraryTest, AVisitorGoesFromSceneToScene) {
   start();
   const auto client = connect();
-  EXPECT_EQ(visit(*client, "city").scene().scene_id(), "city");
+  EXPECT_EQ(name_in(visit(*client, "city").scene().scene_id()), "city");
   v1::ClientMessage select;
   select.mutable_select_scene()->set_scene_id("attic");
   client->send(select);
-  EXPECT_EQ(client->receive_message(v1::ServerMessage::kWelcome).welcome().scene().scene_id(),
-            "attic");
+  EXPECT_EQ(
+      name_in(client->receive_message(v1::ServerMessage::kWelcome).welcome().scene().scene_id()),
+      "attic");
   client->send_pose(1);
   EXPECT_TRUE(client->receive_frame().header.idr());
 }
@@ -142,7 +143,7 @@ TEST_F(SceneLibraryTest, RefusesWhatIsTooLargeOrBroken) {
   EXPECT_THAT(error.message(), HasSubstr("could not be loaded"));
   EXPECT_THAT(metrics(), HasSubstr("catgs_scene_loads_failed_total 1"));
   const auto client = connect();
-  EXPECT_EQ(visit(*client, "attic").scene().scene_id(), "attic") << "the others go on";
+  EXPECT_EQ(name_in(visit(*client, "attic").scene().scene_id()), "attic") << "the others go on";
 }
 
 TEST_F(SceneLibraryTest, ServesAFolderAlone) {
@@ -152,7 +153,7 @@ TEST_F(SceneLibraryTest, ServesAFolderAlone) {
   });
   EXPECT_TRUE(loaded("attic")) << "a server that is up can show something";
   const auto client = connect();
-  EXPECT_EQ(client->greet().scene().scene_id(), "attic");
+  EXPECT_EQ(name_in(client->greet().scene().scene_id()), "attic");
 }
 
 /// As a part of a path: every byte that is no letter as %41.

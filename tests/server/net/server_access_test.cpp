@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
-#include "server/access.h"
+#include "server/access/access.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"

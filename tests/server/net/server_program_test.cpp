@@ -172,6 +172,20 @@ TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
   EXPECT_EQ(program.exit_status(), 2);
 }
 
+TEST(ServerProgram, ATokenForANameSaysWhatThatMeans) {
+  const TemporaryFolder folder;
+  const std::string key = folder.write("key", std::string(32, 'k')).string();
+  Program named({"token", "--token-key-file", key, "--scene", "hall"}, "one file.\n");
+  EXPECT_THAT(named.log(), HasSubstr("\"hall\" is a name"));
+  EXPECT_EQ(named.exit_status(), 0);
+  Program saves({"token", "--token-key-file", key, "--scene", "hall", "--role", "author"}, "tells");
+  EXPECT_THAT(saves.log(), AllOf(HasSubstr("--scene hall"), HasSubstr("needs the id")));
+  EXPECT_EQ(saves.exit_status(), 2);
+  Program exact({"token", "--token-key-file", key, "--scene", "hall-kdfmqrtv"}, "#token=TOKEN\n");
+  EXPECT_THAT(exact.log(), Not(HasSubstr("is a name")));
+  EXPECT_EQ(exact.exit_status(), 0);
+}
+
 TEST(ServerProgram, ASecondSigtermEndsTheDrainAtOnce) {
   Program program({"--drain-wait", "600"});
   WireClient client(program.port());

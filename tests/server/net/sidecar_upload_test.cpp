@@ -3,15 +3,18 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/synth/synth.h"
-#include "server/access.h"
+#include "server/access/access.h"
 #include "server/net/http.h"
+#include "server/net/upload_places.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
@@ -38,8 +41,16 @@ class SidecarUpload : public testing::Test {
     });
   }
 
-  [[nodiscard]] std::string token(const std::string& role, const std::string& of = "") const {
-    return make_link_token({of, role, 1'000'000'000'000}, read_key_file("", key_file));
+  /// `life`: links of another one are others.
+  [[nodiscard]] std::string token(const std::string& role, const std::string& of = "",
+                                  std::int64_t life = 1'000'000'000'000) const {
+    return make_link_token({of, role, life}, read_key_file("", key_file));
+  }
+  static std::string head(const std::string& by, std::size_t body_bytes) {
+    return fmt::format(
+        "PUT /api/scenes/hall/sidecar HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer {}\r\n"
+        "Content-Length: {}\r\n\r\n",
+        by, body_bytes);
   }
   HttpReply put(const std::string& by, std::map<std::string, std::string> headers = {},
                 std::string_view body = sidecar, const std::string& id = "hall") {
@@ -213,11 +224,70 @@ TEST_F(SidecarUpload, SaysWhereNothingCanBeWritten) {
 
 /// Where the server keeps its scenes is the operator's matter.
 TEST_F(SidecarUpload, TellsNobodyTheServersFolders) {
-  folder.write("hall.json", "{");
-  const HttpReply refused = put(token("author"), {{"if-match", "\"other\""}});
+  std::filesystem::create_directory(folder / "hall.json");  // no file can replace it
+  const HttpReply refused = put(token("author"));
   EXPECT_EQ(refused.status, 409);
   EXPECT_THAT(refused.body, HasSubstr("hall.json"));
   EXPECT_THAT(refused.body, Not(HasSubstr(scene.parent_path().string())));
+}
+
+TEST_F(SidecarUpload, BeyondItsPlacesIsToldToComeAgain) {
+  std::vector<RawSocket> slow;  // who sends everything but the end
+  const auto begin = [&](const std::string& by) {
+    slow.emplace_back(server->port());
+    slow.back().send(head(by, sidecar.size()) + std::string(sidecar.substr(1)));
+  };
+  const std::string greedy = token("author");
+  const std::string others[] = {token("author", "", 2'000'000'000'000),
+                                token("author", "", 3'000'000'000'000)};
+  for (std::size_t i = 0; i < UploadPlaces::places_of_a_link; ++i) begin(greedy);
+  ASSERT_TRUE(eventually([&] { return put(greedy).status == 503; }));
+  const HttpReply refused = put(greedy);
+  EXPECT_EQ(refused.headers.at("retry-after"), "1");
+  EXPECT_EQ(refused.headers.at("connection"), "close");
+  EXPECT_THAT(refused.body, HasSubstr("others are saving"));
+  EXPECT_EQ(put(others[0]).status, 200) << "there are places that one link cannot have";
+  EXPECT_GE(metric(*server, "catgs_uploads_refused_total"), 2.0);
+
+  // The place of the last one is free a little after its answer.
+  ASSERT_TRUE(eventually([&] {
+    begin(others[0]);
+    return put(others[1]).status == 503;
+  })) << "all are taken";
+  EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
+  slow.clear();
+  EXPECT_TRUE(eventually([&] { return put(greedy).status == 200; })) << "they are free again";
+}
+
+/// What it sent has come with the end of its connection.
+TEST_F(SidecarUpload, OfWhoHasGoneIsNotSaved) {
+  RawSocket gone(server->port());
+  gone.send_and_close(head(token("author"), sidecar.size()) + std::string(sidecar));
+  const std::string other(R"({"tours": [{"title": "Other", "stops": []}]})");
+  EXPECT_EQ(put(token("author"), {{"if-none-match", "*"}}, other).status, 200);
+  EXPECT_EQ(tours_as(token("author"))["document"]["tours"][0]["title"], "Other");
+}
+
+TEST_F(SidecarUpload, UnderWayWhenTheServerStopsIsAnswered) {
+  const std::string author = token("author");
+  std::vector<RawSocket> late;
+  for (std::size_t i = 0; i < UploadPlaces::places_of_a_link; ++i) {
+    late.emplace_back(server->port());
+    late.back().send(head(author, sidecar.size()) + std::string(sidecar.substr(0, 9)));
+  }
+  ASSERT_TRUE(eventually([&] { return put(author).status == 503; })) << "they are there";
+  const bool saved_before = std::filesystem::exists(folder / "hall.json");
+  server->stop();
+  bool saved = saved_before;
+  for (RawSocket& one : late) {
+    one.send(sidecar.substr(9));
+    std::string answer;
+    ASSERT_TRUE(one.receive_until("\r\n\r\n", answer)) << answer;
+    EXPECT_THAT(answer, testing::AnyOf(HasSubstr(" 200 "), HasSubstr(" 503 ")));
+    saved |= answer.find(" 200 ") != answer.npos;
+  }
+  server->join();
+  EXPECT_EQ(std::filesystem::exists(folder / "hall.json"), saved);
 }
 
 }  // namespace

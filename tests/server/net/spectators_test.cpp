@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "server/access.h"
+#include "server/access/access.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,7 +1,9 @@
 #include "server/schedule/scheduler.h"
 
 #include <algorithm>
-#include <array>
+#include <optional>
+#include <random>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -13,64 +15,195 @@ namespace {
 
 using namespace std::chrono_literals;
 
+/// Somebody who offers a frame, and counts how often that was asked.
+struct Source {
+  Source(std::optional<FrameCandidate> offer = {}) : frame(offer) {}
+  [[nodiscard]] std::optional<FrameCandidate> next_frame() const {
+    ++asked;
+    return frame;
+  }
+  std::optional<FrameCandidate> frame;
+  mutable int asked = 0;
+};
+using Scheduler = FrameScheduler<Source>;
+
+const TimePoint now = TimePoint{} + 1h;
+
+/// Whose turn it is; null: nobody's.
+const Source* take(Scheduler& scheduler, TimePoint at) {
+  const auto turn = scheduler.take(at);
+  return turn ? &turn->source : nullptr;
+}
+
+/// Who of these would be chosen first.
+const Source* first_of(Scheduler& scheduler, std::initializer_list<Source*> sources, TimePoint at) {
+  for (Source* source : sources) scheduler.changed(*source, at);
+  const auto turn = scheduler.take(at);
+  for (Source* source : sources) scheduler.withdraw(*source);
+  if (!turn) return nullptr;
+  scheduler.frame_ended(turn->frame);
+  return &turn->source;
+}
+
+/// Starts a frame as if it was the only one.
+void run(Scheduler& scheduler, Source source) {
+  scheduler.changed(source, now);
+  EXPECT_TRUE(scheduler.take(now));
+}
+
 TEST(FrameScheduler, TakesTheEarliestDeadlineOfThoseReady) {
-  const TimePoint now = TimePoint{} + 1h;
-  const FrameScheduler scheduler(1);
-  const std::array candidates = {FrameCandidate{now, now + 16ms}, FrameCandidate{now, now + 8ms},
-                                 FrameCandidate{now + 1ms, now + 2ms}};
-  EXPECT_EQ(scheduler.choose(candidates, now), 1u);
-  EXPECT_EQ(scheduler.choose(candidates, now + 1ms), 2u);
-  EXPECT_FALSE(scheduler.choose({}, now));
+  Scheduler scheduler(3);
+  Source late{FrameCandidate{now, now + 16ms}};
+  Source soon{FrameCandidate{now, now + 8ms}};
+  Source not_ready{FrameCandidate{now + 1ms, now + 2ms}};
+  for (Source* source : {&late, &soon, &not_ready}) scheduler.changed(*source, now);
+  EXPECT_EQ(scheduler.next_ready(), now + 1ms);
+  EXPECT_EQ(take(scheduler, now), &soon);
+  EXPECT_EQ(take(scheduler, now + 1ms), &not_ready);
+  EXPECT_EQ(take(scheduler, now + 1ms), &late);
+  EXPECT_EQ(take(scheduler, now + 1ms), nullptr);
+  EXPECT_FALSE(scheduler.next_ready());
 }
 
 TEST(FrameScheduler, WhatTakesLongerStartsEarlier) {
-  const TimePoint now = TimePoint{} + 1h;
-  const std::array candidates = {FrameCandidate{now, now + 10ms, 2ms},
-                                 FrameCandidate{now, now + 12ms, 8ms}};
-  EXPECT_EQ(FrameScheduler(1).choose(candidates, now), 1u);
+  Scheduler scheduler(1);
+  Source quick{FrameCandidate{now, now + 10ms, 2ms}};
+  Source slow{FrameCandidate{now, now + 12ms, 8ms}};
+  EXPECT_EQ(first_of(scheduler, {&quick, &slow}, now), &slow);
 }
 
 TEST(FrameScheduler, CountsSlots) {
-  FrameScheduler scheduler(2);
-  const FrameCandidate frame;
-  scheduler.frame_started(frame);
+  Scheduler scheduler(2);
+  Source source{FrameCandidate{now, now}};
+  run(scheduler, source);
   EXPECT_TRUE(scheduler.has_free_slot());
-  scheduler.frame_started(frame);
+  run(scheduler, source);
   EXPECT_FALSE(scheduler.has_free_slot());
-  scheduler.frame_ended(frame);
-  EXPECT_TRUE(scheduler.has_free_slot());
+  scheduler.changed(source, now);
+  EXPECT_EQ(take(scheduler, now), nullptr);
+  scheduler.frame_ended(*source.frame);
+  EXPECT_EQ(take(scheduler, now), &source);
+}
+
+TEST(FrameScheduler, AChangeAsksNobodyElse) {
+  std::vector<Source> sources(1000);
+  Scheduler scheduler(2);
+  for (Source& source : sources) scheduler.changed(source, now);
+  for (Source& source : sources) source.asked = 0;
+  sources[7].frame = FrameCandidate{now, now + 16ms};
+  scheduler.changed(sources[7], now);
+  EXPECT_EQ(take(scheduler, now), &sources[7]);
+  EXPECT_LE(std::exchange(sources[7].asked, 0), 2);
+  EXPECT_TRUE(std::ranges::all_of(sources, [](const Source& source) { return source.asked == 0; }));
+}
+
+TEST(FrameScheduler, StartsWhatASourceOffersNow) {
+  Scheduler scheduler(3);
+  Source source{FrameCandidate{now, now + 16ms}};
+  scheduler.changed(source, now);
+  source.frame.reset();
+  EXPECT_EQ(take(scheduler, now), nullptr) << "it changed its mind, and told nobody";
+  source.frame = FrameCandidate{now, now + 16ms};
+  scheduler.changed(source, now);
+  source.frame->ready = now + 5ms;
+  scheduler.changed(source, now);
+  EXPECT_EQ(take(scheduler, now + 4ms), nullptr);
+  EXPECT_EQ(take(scheduler, now + 5ms), &source);
+  EXPECT_EQ(take(scheduler, now + 5ms), nullptr) << "until it offers another";
+}
+
+TEST(FrameScheduler, KnowsSinceWhenAFrameCouldHaveStarted) {
+  Scheduler scheduler(2);
+  Source source{FrameCandidate{now + 2ms, now + 16ms}};
+  scheduler.changed(source, now);
+  source.frame->ready = now + 3ms;  // another pose: still the same wait
+  scheduler.changed(source, now + 2ms);
+  EXPECT_EQ(scheduler.take(now + 9ms)->ready, now + 2ms);
+  scheduler.changed(source, now + 10ms);
+  EXPECT_EQ(scheduler.take(now + 11ms)->ready, now + 10ms);
 }
 
 TEST(FrameScheduler, KeyFramesOfADeviceMakeWayForSubFramesWhileTheyCan) {
-  const TimePoint now = TimePoint{} + 1h;
-  FrameScheduler scheduler(4);
-  const FrameCandidate key{now, now + 16ms, 10ms, true, 0};
-  const FrameCandidate other_device{now, now + 17ms, 10ms, true, 1};
-  const FrameCandidate sub{now, now + 16ms, 3ms, false, 0};
-  EXPECT_EQ(scheduler.choose(std::array{sub, key}, now), 1u);
-  scheduler.frame_started(key);
-  EXPECT_EQ(scheduler.choose(std::array{sub, key}, now), 0u);
-  EXPECT_EQ(scheduler.choose(std::array{sub, key}, now + 6ms), 1u) << "it can wait no longer";
-  EXPECT_EQ(scheduler.choose(std::array{key}, now), 0u) << "no slot stays empty";
-  EXPECT_EQ(scheduler.choose(std::array{sub, other_device}, now), 1u);
-  scheduler.frame_ended(key);
-  EXPECT_EQ(scheduler.choose(std::array{sub, key}, now), 1u);
+  Scheduler scheduler(4);
+  Source key{FrameCandidate{now, now + 16ms, 10ms, true, 0}};
+  Source other_device{FrameCandidate{now, now + 17ms, 10ms, true, 1}};
+  Source sub{FrameCandidate{now, now + 16ms, 3ms, false, 0}};
+  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now), &key);
+  run(scheduler, key);
+  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now), &sub);
+  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now + 6ms), &key) << "it can wait no longer";
+  EXPECT_EQ(first_of(scheduler, {&key}, now), &key) << "no slot stays empty";
+  EXPECT_EQ(first_of(scheduler, {&sub, &other_device}, now), &other_device);
+  scheduler.frame_ended(*key.frame);
+  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now), &key);
 }
 
 TEST(FrameScheduler, ADeviceThatCannotKeepUpLeavesTheOthersTheirSlots) {
-  const TimePoint now = TimePoint{} + 1h;
-  FrameScheduler scheduler(5, 2);
-  const FrameCandidate late{now, now - 100ms, 10ms, false, 0};
-  const FrameCandidate punctual{now, now + 16ms, 3ms, false, 1};
+  Scheduler scheduler(5, 2);
+  Source late{FrameCandidate{now, now - 100ms, 10ms, false, 0}};
+  Source punctual{FrameCandidate{now, now + 16ms, 3ms, false, 1}};
   for (int i = 0; i < 3; ++i) {
-    EXPECT_EQ(scheduler.choose(std::array{punctual, late}, now), 1u);
-    scheduler.frame_started(late);
+    EXPECT_EQ(first_of(scheduler, {&punctual, &late}, now), &late);
+    run(scheduler, late);
   }
   EXPECT_TRUE(scheduler.has_free_slot());
-  EXPECT_EQ(scheduler.choose(std::array{punctual, late}, now), 0u);
-  EXPECT_EQ(scheduler.choose(std::array{late}, now), std::nullopt);
-  scheduler.frame_ended(late);
-  EXPECT_EQ(scheduler.choose(std::array{late}, now), 0u);
+  EXPECT_EQ(first_of(scheduler, {&punctual, &late}, now), &punctual);
+  EXPECT_EQ(first_of(scheduler, {&late}, now), nullptr);
+  scheduler.frame_ended(*late.frame);
+  EXPECT_EQ(first_of(scheduler, {&late}, now), &late);
+}
+
+// Against the plain search through all of them.
+TEST(FrameScheduler, ChoosesAsASearchThroughAllWould) {
+  std::mt19937 random(1);
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  constexpr int slots = 6, devices = 2;
+  Scheduler scheduler(slots, devices);
+  std::vector<Source> sources(50);
+  std::vector<FrameCandidate> running;
+  TimePoint at = now;
+  const auto search = [&]() -> const Source* {
+    const Source* best = nullptr;
+    std::pair<bool, TimePoint> best_rank;
+    for (const Source& source : sources) {
+      const auto& frame = source.frame;
+      const auto on_device = [&](const auto& r) { return r.device == frame->device; };
+      const auto key_on_device = [&](const auto& r) { return on_device(r) && r.key; };
+      if (!frame || frame->ready > at || std::ssize(running) == slots ||
+          std::ranges::count_if(running, on_device) == slots / devices)
+        continue;
+      const bool can_wait = frame->key && std::ranges::count_if(running, key_on_device) > 0 &&
+                            frame->latest_start() > at;
+      const std::pair rank{can_wait, frame->latest_start()};
+      if (best && best_rank <= rank) continue;
+      best = &source;
+      best_rank = rank;
+    }
+    return best;
+  };
+  int taken = 0;
+  for (int step = 0; step < 5000; ++step) {
+    at += 1us * below(2000);
+    Source& source = sources[random() % sources.size()];
+    if (below(5) == 0)
+      source.frame.reset();
+    else  // with the step in it, so that no two are equal
+      source.frame = FrameCandidate{at + 1us * below(4000), at + 1us * below(20'000) + 1ns * step,
+                                    1us * below(9000), below(3) == 0, below(devices)};
+    scheduler.changed(source, at);
+    if (!running.empty() && below(3) > 0) {
+      scheduler.frame_ended(running.back());
+      running.pop_back();
+    }
+    const Source* const expected = search();
+    ASSERT_EQ(take(scheduler, at), expected) << step;
+    if (!expected) continue;
+    ++taken;
+    Source& chosen = sources[static_cast<std::size_t>(expected - sources.data())];
+    running.push_back(*chosen.frame);
+    chosen.frame.reset();
+  }
+  EXPECT_GT(taken, 1000);
 }
 
 /// Sessions on one device in simulated time.
@@ -82,56 +215,45 @@ struct Overload {
     int window_left = 0;
     bool busy = false;
     int frames = 0;
+
+    [[nodiscard]] std::optional<FrameCandidate> next_frame() const {
+      if (busy) return std::nullopt;
+      const bool key = window_left == 0;
+      return FrameCandidate{next_start, next_start + interval, key ? key_cost : sub_cost, key, 0};
+    }
   };
   struct Running {
-    std::size_t session;
+    Load* session;
     FrameCandidate frame;
     TimePoint end;
   };
 
-  FrameScheduler scheduler{2};
+  FrameScheduler<Load> scheduler{2};
   std::vector<Load> loads;
   std::vector<Running> running;
-  TimePoint now = TimePoint{} + 1h;
-
-  [[nodiscard]] FrameCandidate candidate(const Load& load) const {
-    const bool key = load.window_left == 0;
-    return {load.next_start, load.next_start + load.interval, key ? load.key_cost : load.sub_cost,
-            key, 0};
-  }
-
-  void start_frames() {
-    while (scheduler.has_free_slot()) {
-      std::vector<FrameCandidate> candidates;
-      std::vector<std::size_t> owners;
-      for (std::size_t i = 0; i < loads.size(); ++i) {
-        if (loads[i].busy) continue;
-        candidates.push_back(candidate(loads[i]));
-        owners.push_back(i);
-      }
-      const auto chosen = scheduler.choose(candidates, now);
-      if (!chosen) return;
-      Load& load = loads[owners[*chosen]];
-      load.busy = true;
-      load.window_left = load.window_left == 0 ? 4 : load.window_left - 1;
-      load.next_start = std::max(load.next_start, now - load.interval) + load.interval;
-      scheduler.frame_started(candidates[*chosen]);
-      running.push_back({owners[*chosen], candidates[*chosen], now + candidates[*chosen].cost});
-    }
-  }
 
   void run(Clock::duration duration) {
-    const TimePoint end = now + duration;
-    for (Load& load : loads) load.next_start = now;
-    for (; now < end; now += 500us) {
+    TimePoint time = now;
+    for (Load& load : loads) {
+      load.next_start = now;
+      scheduler.changed(load, time);
+    }
+    for (; time < now + duration; time += 500us) {
       std::erase_if(running, [&](const Running& r) {
-        if (r.end > now) return false;
+        if (r.end > time) return false;
         scheduler.frame_ended(r.frame);
-        loads[r.session].busy = false;
-        ++loads[r.session].frames;
+        r.session->busy = false;
+        ++r.session->frames;
+        scheduler.changed(*r.session, time);
         return true;
       });
-      start_frames();
+      while (const auto turn = scheduler.take(time)) {
+        Load& load = turn->source;
+        load.busy = true;
+        load.window_left = load.window_left == 0 ? 4 : load.window_left - 1;
+        load.next_start = std::max(load.next_start, time - load.interval) + load.interval;
+        running.push_back({&load, turn->frame, time + turn->frame.cost});
+      }
     }
   }
 };

@@ -124,7 +124,7 @@ TEST_F(Paper, TheReportHoldsTheScriptsSeedAndDuration) {
 TEST_F(Paper, OptionsOfScriptsAreRefusedWithoutOne) {
   const Outcome outcome = paper(fmt::format("--table list {} --seed 3", cloud_case()));
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.out, HasSubstr("--seed: means nothing to a recorded trace"));
+  EXPECT_THAT(outcome.out, HasSubstr("--seed: has no effect on a recorded trace"));
 }
 
 TEST_F(Paper, OptionsThatWouldChangeNothingAreRefused) {
@@ -137,7 +137,7 @@ TEST_F(Paper, OptionsThatWouldChangeNothingAreRefused) {
        {"--baseline x", "--images x", "--keep-fraction 1", "--variant '--window 2'", "--every 2",
         "--images x --image-rate 5", "--dram-bytes-per-s 1"}) {
     EXPECT_THAT(complaint(fmt::format("--table list {} {}", cloud_case(), option)),
-                HasSubstr("means nothing to the tables that were asked for (it is of --table"))
+                HasSubstr("has no effect on the requested tables (it belongs to --table"))
         << option;
   }
   EXPECT_THAT(complaint(fmt::format("--table quality {} --image-rate 5", cloud_case())),
@@ -152,7 +152,7 @@ TEST_F(Paper, TheGuardIsOfTheRowsThatHaveOne) {
   const Outcome refused =
       paper(fmt::format("--table ablation {} --variant '--grid shift --guard-px 1'", cloud_case()));
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.out, HasSubstr("--guard-px: means nothing to the shift grid"));
+  EXPECT_THAT(refused.out, HasSubstr("--guard-px: has no effect on the shift grid"));
 }
 
 TEST_F(Paper, AblationTakesOnePartAwayAtATime) {
@@ -383,7 +383,7 @@ TEST_F(PaperPhotographs, HaveToBePng) {
   std::filesystem::remove(folder_ / "photos/images/frame_000003.png");
   const Outcome outcome = paper(arguments());
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.out, HasSubstr("frame_000003.png: does not exist (photographs are read as"));
+  EXPECT_THAT(outcome.out, HasSubstr("frame_000003.png: does not exist (photographs must be PNG"));
 }
 
 TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {
@@ -411,7 +411,7 @@ TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(paper(fmt::format("--table ablation {} --variant '--windows 2'", cloud_case())),
          "--variant: --windows 2: ");
   expect(paper(fmt::format("--table ablation {} --variant '--pipeline exact'", cloud_case())),
-         "is not of the catgs pipeline");
+         "selects another pipeline");
   expect(paper(fmt::format("--table ablation {} --variant '--window 99'", cloud_case())),
          "--window: is out of range");
 }

@@ -72,10 +72,10 @@ TEST_F(TraceWindows, NameMistakes) {
     EXPECT_THAT(outcome.out, HasSubstr(message));
   };
   expect(path("none.tum"), "none.tum: cannot be opened");
-  expect(path("glide.tum") + " --variant '--pipeline exact'", "is not of the catgs pipeline");
+  expect(path("glide.tum") + " --variant '--pipeline exact'", "selects another pipeline");
   expect(path("glide.tum") + " --window 99", "--window: is out of range");
   expect(path("glide.tum") + " --fps 0", "--fps");
-  expect(path("glide.tum") + " --depths 2 1", "--depths: the nearest comes first");
+  expect(path("glide.tum") + " --depths 2 1", "--depths: the nearest");
   expect(path("glide.tum") + " --size 12", "--size: \"12\" is not a picture size");
 }
 

@@ -1,0 +1,26 @@
+// A web site of somebody else, on this machine.
+import { createServer } from 'node:http';
+import type { AddressInfo } from 'node:net';
+
+export interface OtherSite {
+  readonly origin: string;
+  /** Paths that browsers have asked for. */
+  readonly asked: string[];
+  close(): void;
+}
+
+/** Answers every request with this page. */
+export async function start_other_site(html: string): Promise<OtherSite> {
+  const asked: string[] = [];
+  const http = createServer((request, response) => {
+    asked.push(request.url ?? '');
+    response.setHeader('content-type', 'text/html');
+    response.end(`<!doctype html><title>other site</title>${html}`);
+  });
+  await new Promise<void>((resolve) => http.listen(0, '127.0.0.1', resolve));
+  return {
+    origin: `http://127.0.0.1:${(http.address() as AddressInfo).port}`,
+    asked,
+    close: () => http.close(),
+  };
+}

@@ -1,0 +1,23 @@
+#!/usr/bin/env python3
+"""Writes the general categories of all characters, as Python's unicodedata has them, as a C++ header.
+
+Unassigned characters are told apart: a later Unicode may make them anything.
+"""
+
+import itertools
+import sys
+import unicodedata
+
+
+def kind(code_point: int) -> str:
+    category = unicodedata.category(chr(code_point))
+    if category in ("Cc", "Cf", "Zl", "Zp"):
+        return "unprintable"
+    return "unassigned" if category == "Cn" else "printable"
+
+
+print("constexpr CategoryRange categories[] = {")
+for name, run in itertools.groupby(range(sys.maxunicode + 1), kind):
+    points = list(run)
+    print(f"    {{0x{points[0]:x}, 0x{points[-1]:x}, Category::{name}}},")
+print("};")

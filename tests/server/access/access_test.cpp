@@ -1,0 +1,200 @@
+#include "server/access/access.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Optional;
+using testing::ThrowsMessage;
+
+constexpr std::string_view key = "0123456789abcdef0123456789abcdef";
+
+class AccessTest : public testing::Test {
+ protected:
+  static Refusal refusal(AccessControl& access, std::string_view token, std::string_view scene_id,
+                         std::int64_t now_unix_s, Use use = Use::own_session) {
+    return access.permit(token, now_unix_s, one_hall)(scene_id, use);
+  }
+  /// Of a server on which one scene alone is called "hall".
+  static std::string one_hall(std::string_view wish) {
+    return wish == "hall" ? "hall-bcdfghjk" : std::string(wish);
+  }
+  const test::TemporaryFolder folder;
+};
+
+TEST_F(AccessTest, LinksCarryTheirGrant) {
+  const std::string token = make_link_token({"city", "viewer", 1000}, key);
+  const auto grant = read_link_token(token, key);
+  ASSERT_TRUE(grant);
+  EXPECT_EQ(grant->scene_id, "city");
+  EXPECT_EQ(grant->role, "viewer");
+  EXPECT_EQ(grant->expires_unix_s, 1000);
+  EXPECT_FALSE(read_link_token(token, "another key of some length"));
+}
+
+TEST_F(AccessTest, AChangedLinkIsNoLink) {
+  const std::string token = make_link_token({"city", "viewer", 1000}, key);
+  for (std::size_t i = 0; i < token.size(); ++i) {
+    // The last digit of a part has bits that mean nothing. A link has one form nevertheless, as
+    // what it may have is counted by that.
+    for (const char digit :
+         std::string_view("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")) {
+      std::string changed = token;
+      changed[i] = digit;
+      EXPECT_EQ(read_link_token(changed, key).has_value(), changed == token) << changed;
+    }
+  }
+  EXPECT_FALSE(read_link_token(token + " ", key));
+  EXPECT_FALSE(read_link_token(" " + token, key));
+  for (const char* nonsense : {"", ".", "a", "a.b", "=.=", "....", "!!!.!!!"})
+    EXPECT_FALSE(read_link_token(nonsense, key)) << nonsense;
+}
+
+TEST_F(AccessTest, LinksExpireAndBelongToAScene) {
+  AccessControl access({}, folder.write("key", std::string(key) + "\n"));
+  const std::string token = make_link_token({"city", "viewer", 1000}, key);
+  EXPECT_FALSE(refusal(access, token, "city", 999));
+  EXPECT_THAT(refusal(access, token, "city", 1000), Optional(HasSubstr("expired")));
+  EXPECT_THAT(refusal(access, token, "garden", 999), Optional(HasSubstr("another scene")));
+  EXPECT_FALSE(refusal(access, make_link_token({"", "viewer", 1000}, key), "garden", 999));
+  EXPECT_TRUE(refusal(access, "", "city", 0));
+  EXPECT_TRUE(refusal(access, "guess", "city", 0));
+}
+
+TEST_F(AccessTest, LinksBelongToOneOfSeveralScenesOfAName) {
+  AccessControl access({}, folder.write("key", std::string(key) + "\n"));
+  const std::string named = make_link_token({"hall", "author", 1000}, key);
+  EXPECT_FALSE(refusal(access, named, "hall-bcdfghjk", 0, Use::save));
+  const std::string other = make_link_token({"hall-vvvvvvvv", "author", 1000}, key);
+  EXPECT_FALSE(refusal(access, other, "hall-vvvvvvvv", 0, Use::save));
+  EXPECT_THAT(refusal(access, other, "hall-bcdfghjk", 0, Use::save),
+              Optional(HasSubstr("made for another scene called \"hall\"")));
+  EXPECT_THAT(refusal(access, other, "garden-bcdfghjk", 0), Optional(HasSubstr("another scene")));
+}
+
+TEST_F(AccessTest, RolesSayWhatALinkIsFor) {
+  AccessControl access({}, folder.write("key", std::string(key) + "\n"));
+  const auto may = [&](const char* role, Use use) {
+    return !refusal(access, make_link_token({"city", role, 1000}, key), "city", 0, use);
+  };
+  for (const char* role : {"viewer", "author", "spectator", "solo"}) {
+    EXPECT_TRUE(may(role, Use::list)) << role;
+    EXPECT_EQ(may(role, Use::save), std::string_view(role) == "author") << role;
+  }
+  EXPECT_TRUE(may("author", Use::own_session));
+  EXPECT_TRUE(may("viewer", Use::own_session));
+  EXPECT_TRUE(may("viewer", Use::watch));
+  EXPECT_FALSE(may("spectator", Use::own_session));
+  EXPECT_TRUE(may("spectator", Use::watch));
+  EXPECT_TRUE(may("solo", Use::own_session));
+  EXPECT_FALSE(may("solo", Use::watch));
+  EXPECT_THROW(make_link_token({"city", "emperor", 1000}, key), InputError);
+  EXPECT_THROW(make_link_token({"no\nid", "viewer", 1000}, key), InputError);
+}
+
+TEST_F(AccessTest, OnlyLinksMakeAuthors) {
+  AccessControl open({}, {});
+  EXPECT_FALSE(refusal(open, "", "city", 0));
+  EXPECT_THAT(refusal(open, "", "city", 0, Use::save), Optional(HasSubstr("--token-key-file")));
+  AccessControl by_file(folder.write("tokens", "open-sesame\n"),
+                        folder.write("key", std::string(key) + "\n"));
+  EXPECT_FALSE(refusal(by_file, "open-sesame", "city", 0));
+  EXPECT_THAT(refusal(by_file, "open-sesame", "city", 0, Use::save),
+              Optional(HasSubstr("role author")));
+  const std::string link = make_link_token({"city", "author", 1000}, key);
+  EXPECT_FALSE(refusal(by_file, link, "city", 999, Use::save));
+  EXPECT_TRUE(refusal(by_file, link, "city", 1000, Use::save)) << "expired";
+  EXPECT_TRUE(refusal(by_file, link, "garden", 999, Use::save)) << "another scene";
+}
+
+TEST_F(AccessTest, StaticTokensAreReadAgain) {
+  const auto path = folder.write("tokens", "# first\nalpha-alpha\n");
+  AccessControl access(path, {});
+  EXPECT_FALSE(refusal(access, "alpha-alpha", "city", 0));
+  EXPECT_TRUE(refusal(access, "alpha-alph", "city", 0));
+  EXPECT_TRUE(refusal(access, "# first", "city", 0));
+
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  folder.write("tokens", "beta-beta\n");
+  std::filesystem::last_write_time(path, later);
+  EXPECT_TRUE(refusal(access, "alpha-alpha", "city", 0));
+  EXPECT_FALSE(refusal(access, "beta-beta", "city", 0));
+
+  folder.write("tokens", "x\n");  // too short: the good ones stay
+  std::filesystem::last_write_time(path, later + std::chrono::seconds(2));
+  EXPECT_FALSE(refusal(access, "beta-beta", "city", 0));
+}
+
+TEST_F(AccessTest, APermitChecksItsTokenOnceForAllScenes) {
+  const auto path = folder.write("tokens", "alpha-alpha\n");
+  AccessControl access(path, {});
+  const Permit permit = access.permit("alpha-alpha", 0, one_hall);
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  folder.write("tokens", "beta-beta\n");
+  std::filesystem::last_write_time(path, later);
+  EXPECT_FALSE(permit("city", Use::own_session)) << "nothing is read for another scene";
+  EXPECT_TRUE(refusal(access, "alpha-alpha", "city", 0)) << "the next request finds it gone";
+}
+
+TEST_F(AccessTest, WithoutFilesEverybodyMayEnter) {
+  AccessControl access({}, {});
+  EXPECT_FALSE(refusal(access, "", "city", 0));
+}
+
+TEST_F(AccessTest, FilesThatCannotBeReadAreNamedWithTheirFlag) {
+  const auto says = [](const char* flag, const std::string& path, const char* why) {
+    return ThrowsMessage<InputError>(
+        AllOf(HasSubstr(flag), HasSubstr(path), HasSubstr(why), HasSubstr("check the path")));
+  };
+  const std::string absent = folder / "absent";
+  EXPECT_THAT([&] { AccessControl(absent, {}); },
+              says("--token-file", absent, "No such file or directory"));
+  EXPECT_THAT([&] { AccessControl({}, absent); },
+              says("--token-key-file", absent, "No such file or directory"));
+  EXPECT_THAT([&] { AccessControl(folder.path(), {}); },
+              says("--token-file", folder.path().string(), "it is a folder"));
+}
+
+TEST_F(AccessTest, NamesWhatIsWrong) {
+  EXPECT_THAT(
+      [&] { read_key_file("--token-key-file", folder.write("short", "abc")); },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("--token-key-file"), HasSubstr("openssl rand"))));
+  EXPECT_THROW(AccessControl(folder.write("empty", "# nothing\n"), {}), InputError);
+  EXPECT_THROW(make_link_token({"city", "A B", 0}, key), InputError);
+  for (const char* text : {"", "7", "d", "7x", "-1d", "0s", "7d ", "99999999d"})
+    EXPECT_THROW(parse_duration(text), InputError) << text;
+}
+
+TEST_F(AccessTest, LinksHaveALongestLife) {
+  for (const char* text : {"3651d", "99999d", "1000000d"})
+    EXPECT_THAT([&] { parse_duration(text); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr("too long"), HasSubstr("3650 days"))));
+  EXPECT_EQ(parse_duration("3650d"), std::chrono::days(3650));
+  EXPECT_EQ(parse_duration("7d"), std::chrono::hours(168));
+  EXPECT_EQ(parse_duration("90s"), std::chrono::seconds(90));
+}
+
+TEST_F(AccessTest, TokensAndKeysHaveALength) {
+  const auto tokens = [this](std::size_t bytes) {
+    AccessControl(folder.write("tokens", std::string(bytes, 't')), {});
+  };
+  EXPECT_NO_THROW(tokens(8));
+  EXPECT_NO_THROW(tokens(512));
+  EXPECT_THROW(tokens(7), InputError);
+  EXPECT_THROW(tokens(513), InputError);
+  const auto key_of = [this](std::size_t bytes) {
+    return read_key_file("--token-key-file", folder.write("key", std::string(bytes, 'k')));
+  };
+  EXPECT_EQ(key_of(16).size(), 16u);
+  EXPECT_THROW(key_of(15), InputError);
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,42 @@
+#include "server/base/metrics.h"
+
+#include <ctime>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(Metrics, ADeviceHasOneGaugeThatFollowsItsViews) {
+  Metrics metrics;
+  EXPECT_THAT(metrics.scrape(), Not(HasSubstr("catgs_device_views{")));
+  metrics.set_views(0, 2);
+  metrics.set_views(1, 3);
+  metrics.set_views(0, 0);
+  EXPECT_THAT(metrics.scrape(), HasSubstr("\ncatgs_device_views{device=\"0\"} 0\n"));
+  EXPECT_THAT(metrics.scrape(), HasSubstr("\ncatgs_device_views{device=\"1\"} 3\n"));
+  EXPECT_THAT(metrics.scrape(), Not(HasSubstr("{device=\"0\"} 2")));
+}
+
+TEST(Metrics, TellsWhatTheProcessTakes) {
+  const auto value = [](const std::string& text, const std::string& name) {
+    const auto at = text.find("\n" + name + " ");
+    return at == std::string::npos ? -1.0 : std::stod(text.substr(at + name.size() + 2));
+  };
+  const std::string text = Metrics().scrape();
+  EXPECT_GT(value(text, "process_cpu_seconds_total"), 0.0);
+  EXPECT_GT(value(text, "process_resident_memory_bytes"), 1e6);
+  EXPECT_GE(value(text, "process_open_fds"), 3.0);
+  EXPECT_GE(value(text, "process_max_fds"), value(text, "process_open_fds"));
+  const auto now_s = static_cast<double>(std::time(nullptr));
+  EXPECT_LE(value(text, "process_start_time_seconds"), now_s + 1.0);
+  EXPECT_GT(value(text, "process_start_time_seconds"), now_s - 3600.0);
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,76 @@
+#include "server/scenes/scene_catalog.h"
+
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+/// A streamed SOG folder with levels of 200 and 50 Gaussians, and a splat file without levels.
+class SceneCatalog : public FolderTest {
+ protected:
+  void SetUp() override {
+    nlohmann::json lods;
+    for (const int level : {0, 1}) {
+      const std::size_t count = level == 0 ? 200 : 50;
+      const std::string folder = "streamed/" + std::to_string(level);
+      for (const auto& [file, content] : encode_sog(random_cloud(count, 0), 2))
+        write(folder + "/" + file, content);
+      lods[std::to_string(level)] = {{"file", level}, {"offset", 0}, {"count", count}};
+    }
+    write("streamed/lod-meta.json", nlohmann::json{{"version", 1},
+                                                   {"lodLevels", 2},
+                                                   {"filenames", {"0/meta.json", "1/meta.json"}},
+                                                   {"tree", {{"lods", lods}}}}
+                                        .dump());
+    save_scene(random_cloud(30, 0), folder_ / "plain.splat");
+    config_.scenes = {folder_ / "streamed", folder_ / "plain.splat"};
+  }
+  std::uint64_t gaussians(std::size_t scene) {
+    return load_scenes(config_, {.pool = std::make_shared<ThreadPool>(2)})
+        .at(scene)
+        ->facts.gaussians;
+  }
+
+  ServerConfig config_;
+};
+
+TEST_F(SceneCatalog, ChoosesTheLevelOfStreamedScenesOnly) {
+  EXPECT_EQ(gaussians(0), 200u);
+  config_.lod = 1;
+  EXPECT_EQ(gaussians(0), 50u);
+  EXPECT_EQ(gaussians(1), 30u);
+}
+
+TEST_F(SceneCatalog, KeepsABudget) {
+  config_.gaussian_budget = 199;
+  EXPECT_EQ(gaussians(0), 50u);
+  config_.gaussian_budget = 200;
+  EXPECT_EQ(gaussians(0), 200u);
+}
+
+TEST_F(SceneCatalog, RefusesALevelThatNoSceneHas) {
+  config_.lod = 2;
+  EXPECT_THAT([&] { gaussians(0); }, ThrowsMessage<InputError>(HasSubstr("no level 2")));
+  config_.scenes = {folder_ / "plain.splat", "synth:city:1000"};
+  EXPECT_THAT([&] { gaussians(0); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--lod"), HasSubstr("streamed SOG"))));
+}
+
+TEST_F(SceneCatalog, NamesASceneThatIsNotThere) {
+  const std::string absent = folder_ / "absent.ply";
+  config_.scenes = {absent};
+  EXPECT_THAT([&] { gaussians(0); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--scene " + absent), HasSubstr("check"))));
+}
+
+}  // namespace
+}  // namespace catgs::test

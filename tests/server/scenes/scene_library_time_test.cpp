@@ -1,0 +1,322 @@
+// Scenes of a folder as time passes: loads end when the test lets them, and a minute takes no time.
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <sstream>
+#include <thread>
+
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
+#include "server/base/metrics.h"
+#include "server/base/scene_id.h"
+#include "server/scenes/scene_library.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+using Entry = std::shared_ptr<const SceneEntry>;
+
+/// The demo city in memory, and three scenes in a folder, of which two fit beside it.
+class SceneLibraryTime : public FolderTest {
+ protected:
+  void SetUp() override {
+    // 236 bytes each as decoded: 1.2 MB.
+    for (const char* name : {"a.ply", "b.ply", "c.ply"})
+      save_scene(random_cloud(5000, 3), folder_ / name);
+    config_.scenes = {"synth:city:1000"};
+    config_.scene_folders = {folder_.path()};
+    config_.scene_memory_mb = 3;
+    start();
+  }
+  void start() {
+    library_ = std::make_unique<SceneLibrary>(
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
+        [this] { return now_; });
+  }
+
+  /// What the loader is through with comes to be known.
+  void run_until(const std::function<bool()>& holds) {
+    for (int i = 0; i < 20'000 && !holds(); ++i) {
+      io_.restart();
+      io_.poll();
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_TRUE(holds());
+  }
+  std::string id(const std::string& name) const { return library_->resolve(name); }
+  bool has(const std::string& name) const { return library_->has(id(name)); }
+  std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const std::string& id : library_->scene_ids()) names.emplace_back(name_in(id));
+    return names;
+  }
+  bool in_memory(const std::string& name) const { return library_->in_memory(id(name)) != nullptr; }
+  bool awaited(const std::string& name) {
+    return std::holds_alternative<SceneAwaited>(library_->want(id(name), now_));
+  }
+  ErrorMessage refusal(const std::string& name) {
+    const auto answer = library_->want(id(name), now_);
+    const auto* error = std::get_if<ErrorMessage>(&answer);
+    return error ? *error : ErrorMessage{};
+  }
+  Entry load(const std::string& name) {
+    EXPECT_TRUE(awaited(name));
+    library_->on_tick(now_);
+    run_until([&] { return in_memory(name); });
+    return library_->in_memory(id(name));
+  }
+  /// So much later.
+  void tick(std::chrono::seconds later) { library_->on_tick(now_ += later); }
+
+  boost::asio::io_context io_;
+  Metrics metrics_;
+  ServerConfig config_;
+  std::unique_ptr<SceneLibrary> library_;
+  TimePoint now_ = TimePoint{} + 1h;  // passes by tick() alone
+};
+
+TEST_F(SceneLibraryTime, ListingsShareWhatPagesGetOfAScene) {
+  const auto tours_of_a = [&] {
+    const auto listing = library_->listing();
+    return std::ranges::find(*listing, id("a"), &SceneLibrary::Listing::id)->tours;
+  };
+  EXPECT_FALSE(tours_of_a());
+  const Entry a = load("a");
+  EXPECT_EQ(tours_of_a()->for_viewers, a->tours.for_viewers) << "the same, not one like it";
+  load("b");
+  EXPECT_EQ(tours_of_a()->for_authors, a->tours.for_authors);
+}
+
+TEST_F(SceneLibraryTime, OneIsLoadedAnotherWaitsAndTheThirdIsRefused) {
+  EXPECT_TRUE(awaited("a"));
+  EXPECT_TRUE(awaited("b"));
+  const ErrorMessage refused = refusal("c");
+  EXPECT_EQ(refused.code, ErrorCode::server_full);
+  EXPECT_THAT(refused.message, HasSubstr("other scenes are being loaded"));
+  EXPECT_TRUE(awaited("a")) << "who wants the same waits with the first";
+  run_until([&] { return in_memory("a") && in_memory("b"); });
+  EXPECT_TRUE(awaited("c"));
+}
+
+TEST_F(SceneLibraryTime, AfterTenSecondsTheLeastRecentlyUsedGoes) {
+  load("a");
+  load("b");
+  EXPECT_TRUE(awaited("c"));
+  tick(6s);
+  library_->want(id("a"), now_);
+  tick(3s);
+  EXPECT_TRUE(in_memory("a") && in_memory("b")) << "ten seconds at least";
+  tick(2s);
+  EXPECT_TRUE(in_memory("a"));
+  EXPECT_FALSE(in_memory("b"));
+  run_until([&] { return in_memory("c"); });
+}
+
+TEST_F(SceneLibraryTime, WhatSomebodyLooksAtNeverGoes) {
+  Entry seen = load("a");
+  const Entry also_seen = load("b");
+  tick(3600s);
+  const ErrorMessage refused = refusal("c");
+  EXPECT_EQ(refused.code, ErrorCode::server_full);
+  EXPECT_THAT(refused.message, HasSubstr("no memory for \"c\""));
+  tick(3600s);
+  EXPECT_TRUE(in_memory("a") && in_memory("b"));
+  seen.reset();
+  EXPECT_TRUE(awaited("c"));
+  tick(1s);
+  EXPECT_FALSE(in_memory("a"));
+  EXPECT_TRUE(in_memory("b"));
+}
+
+TEST_F(SceneLibraryTime, AReplacedFileIsLoadedAnewWhenNobodyLooksAtTheOldOne) {
+  Entry old = load("a");
+  const auto before = std::filesystem::last_write_time(folder_ / "a.ply");
+  save_scene(random_cloud(100, 0), folder_ / "a.ply");
+  std::filesystem::last_write_time(folder_ / "a.ply", before + 2s);
+  tick(31s);
+  run_until([&] { return library_->listing()->at(1).gaussians == 100; });
+  tick(1s);
+  EXPECT_EQ(library_->in_memory(id("a")), old);
+  old.reset();
+  tick(1s);
+  EXPECT_FALSE(in_memory("a"));
+  EXPECT_EQ(load("a")->facts.gaussians, 100u);
+}
+
+TEST_F(SceneLibraryTime, AMountThatHangsHoldsUpNobodyElse) {
+  std::promise<void> mount;
+  load("b");
+  {
+    // The loader frees this one, and stays in it.
+    const auto free = [&mount](const SceneEntry* entry) {
+      mount.get_future().wait();
+      delete entry;
+    };
+    library_->revise(id("a"), Entry(new SceneEntry(*load("a")), free));
+  }
+  tick(3600s);
+  library_->want(id("b"), now_);
+  EXPECT_TRUE(awaited("c"));
+  tick(1s);
+  EXPECT_FALSE(in_memory("a"));
+  for (int hour = 0; hour < 3; ++hour) {
+    tick(3600s);
+    EXPECT_TRUE(std::holds_alternative<Entry>(library_->want(id("b"), now_)));
+    EXPECT_TRUE(awaited("c")) << "who asked for it waits";
+    EXPECT_THAT(names(), ElementsAre("city", "a", "b", "c"));
+  }
+  EXPECT_TRUE(awaited("a"));
+  save_scene(random_cloud(5000, 3), folder_ / "d.ply");
+  mount.set_value();
+  run_until([&] { return in_memory("c"); });
+}
+
+TEST_F(SceneLibraryTime, FilesThatComeAndGoAreNoticed) {
+  EXPECT_THAT(names(), ElementsAre("city", "a", "b", "c"));
+  std::filesystem::rename(folder_ / "b.ply", folder_ / "d.ply");
+  tick(31s);
+  run_until([&] { return has("d"); });
+  EXPECT_THAT(names(), ElementsAre("city", "a", "c", "d"));
+  EXPECT_FALSE(has("b"));
+  load("d");
+}
+
+TEST_F(SceneLibraryTime, AFileThatComesBackWhileItIsLookedAtIsTheSceneThatItWas) {
+  Entry seen = load("a");
+  std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  EXPECT_THAT(names(), ElementsAre("city", "b", "c"));
+  tick(1s);
+  EXPECT_EQ(library_->in_memory(id("a")), seen) << "who looks at it goes on";
+  std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 4; });
+  EXPECT_THAT(names(), ElementsAre("city", "a", "b", "c"));
+  seen.reset();
+  tick(1s);
+  EXPECT_TRUE(in_memory("a")) << "the same file: nothing is outdated";
+  std::filesystem::remove(folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  tick(1s);
+  EXPECT_FALSE(has("a"));
+}
+
+TEST_F(SceneLibraryTime, NewcomersAreNotGivenASceneWhoseFileIsGone) {
+  config_.scenes.clear();
+  start();
+  const Entry seen = library_->in_memory(id("a"));
+  EXPECT_EQ(name_in(library_->default_scene()), "a");
+  std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 2; });
+  EXPECT_TRUE(has("a")) << "somebody looks at it";
+  EXPECT_EQ(name_in(library_->default_scene()), "b");
+  EXPECT_THAT(names(), ElementsAre("b", "c"));
+  std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  EXPECT_EQ(name_in(library_->default_scene()), "a");
+}
+
+/// Beside "a" comes another file of its name, and the first one goes.
+TEST_F(SceneLibraryTime, TheLogTellsWhichFileAnIdOfASharedNameBelongsTo) {
+  const TemporaryFolder annex;
+  save_scene(random_cloud(10, 0), annex / "a.ply");
+  // Of the same name as `folder_`, so that ids are made of whole paths.
+  const std::filesystem::path twin = annex / folder_.path().filename();
+  std::filesystem::create_directory(twin);
+  std::ostringstream log;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "library test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  config_.scene_folders = {folder_.path().string(), annex.path().string(), twin.string()};
+  start();
+  library_.reset();
+  spdlog::set_default_logger(before);
+  const SceneIds ids({}, config_.scene_folders);
+  for (const auto& file : {folder_ / "a.ply", annex / "a.ply"})
+    EXPECT_THAT(log.str(), HasSubstr("scene " + ids.id_of(file.string(), "a") + " is " +
+                                     file.string() + ", one of several called \"a\""));
+  EXPECT_THAT(log.str(), Not(HasSubstr((folder_ / "b.ply").string() + ", one of several")));
+  EXPECT_THAT(log.str(), HasSubstr(twin.string() + " have the same name"));
+}
+
+TEST_F(SceneLibraryTime, NoIdComesToMeanAnotherFile) {
+  const TemporaryFolder annex;
+  config_.scene_folders.push_back(annex.path().string());
+  start();
+  const std::string first = id("a");
+  EXPECT_TRUE(library_->has(first));
+  save_scene(random_cloud(10, 0), annex / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 5; });
+  const std::string second = SceneIds({}, config_.scene_folders).id_of(annex / "a.ply", "a");
+  EXPECT_NE(first, second);
+  EXPECT_TRUE(library_->has(first) && library_->has(second));
+  EXPECT_FALSE(has("a")) << "which of them?";
+  std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 4; });
+  EXPECT_FALSE(library_->has(first));
+  EXPECT_TRUE(library_->has(second));
+  EXPECT_FALSE(has("a")) << "it meant the one that is gone";
+  std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
+  tick(31s);
+  run_until([&] { return library_->has(first); });
+  start();
+  EXPECT_TRUE(library_->has(first) && library_->has(second)) << "and not by the order of scans";
+  EXPECT_EQ(load(first)->facts.gaussians, 5000u);
+  EXPECT_EQ(load(second)->facts.gaussians, 10u);
+}
+
+TEST_F(SceneLibraryTime, AFileThatReplacesTheOnlyOneOfItsNameIsAnotherScene) {
+  const std::string first = id("a");
+  std::filesystem::remove(folder_ / "a.ply");
+  save_scene(random_cloud(10, 0), folder_ / "a.splat");
+  tick(31s);
+  run_until([&] { return !library_->has(first); });
+  EXPECT_THAT(names(), ElementsAre("city", "a", "b", "c"));
+  EXPECT_FALSE(has("a")) << "a link that names it may have been made for the first";
+  start();
+  EXPECT_TRUE(has("a")) << "which a server that never saw the first cannot know";
+}
+
+TEST_F(SceneLibraryTime, AFileOfBothSettingsIsOneScene) {
+  config_.scenes = {folder_ / "b.ply"};
+  start();
+  EXPECT_THAT(names(), ElementsAre("b", "a", "c"));
+  EXPECT_TRUE(in_memory("b"));
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  EXPECT_TRUE(in_memory("b"));
+  config_.scenes = {folder_ / "b.ply", folder_ / "b.ply"};
+  EXPECT_THROW(start(), InputError);
+}
+
+TEST_F(SceneLibraryTime, AFileThatGoesBeforeItIsLoadedIsForgotten) {
+  EXPECT_TRUE(awaited("a"));
+  EXPECT_TRUE(awaited("b"));
+  std::filesystem::remove(folder_ / "b.ply");
+  tick(31s);
+  run_until([&] { return library_->listing()->size() == 3; });
+  run_until([&] {
+    tick(31s);
+    return !has("b");
+  });
+}
+
+}  // namespace
+}  // namespace catgs::test

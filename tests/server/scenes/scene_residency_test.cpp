@@ -1,0 +1,157 @@
+#include "server/scenes/scene_residency.h"
+
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using Wish = SceneResidency::Wish;
+
+class SceneResidencyTest : public testing::Test {
+ protected:
+  Wish want(const std::string& id, std::uint64_t bytes) {
+    return residency_.want(id, bytes, now_, in_use_);
+  }
+  std::optional<SceneResidency::Step> next() { return residency_.next(now_, in_use_); }
+  /// It is wanted, loaded and left.
+  void visit(const std::string& id, std::uint64_t bytes) {
+    ASSERT_EQ(want(id, bytes), Wish::awaited) << id;
+    const auto step = next();
+    ASSERT_TRUE(step && step->load == id) << id;
+    residency_.loaded(id, bytes, now_);
+  }
+
+  TimePoint now_{};
+  std::set<std::string> used_;
+  const SceneResidency::InUse in_use_ = [this](const std::string& id) {
+    return used_.contains(id);
+  };
+  SceneResidency residency_{{.budget_bytes = 100, .min_residency = 60s}};
+};
+
+TEST_F(SceneResidencyTest, LoadsOnDemandOneAtATime) {
+  EXPECT_EQ(want("a", 30), Wish::awaited);
+  EXPECT_EQ(want("a", 30), Wish::awaited) << "a second visitor waits for the same";
+  const auto step = next();
+  ASSERT_TRUE(step);
+  EXPECT_EQ(step->load, "a");
+  EXPECT_THAT(step->release, IsEmpty());
+  EXPECT_FALSE(next()) << "it is under way";
+  EXPECT_EQ(want("a", 30), Wish::awaited);
+  EXPECT_FALSE(residency_.resident("a"));
+  residency_.loaded("a", 31, now_);
+  EXPECT_EQ(want("a", 30), Wish::resident);
+  EXPECT_EQ(residency_.bytes(), 31u) << "what it really takes";
+}
+
+TEST_F(SceneResidencyTest, OneWaitsWhileOneIsLoadedAndOthersAreRefused) {
+  want("a", 10);
+  next();
+  EXPECT_EQ(want("b", 10), Wish::awaited);
+  EXPECT_EQ(want("c", 10), Wish::busy);
+  EXPECT_FALSE(next());
+  residency_.loaded("a", 10, now_);
+  EXPECT_EQ(next()->load, "b");
+  EXPECT_EQ(want("c", 10), Wish::awaited);
+}
+
+TEST_F(SceneResidencyTest, TheLeastRecentlyUsedGoes) {
+  visit("a", 40);
+  now_ += 1s;
+  visit("b", 40);
+  now_ += 120s;
+  residency_.note_use("a", now_);
+  EXPECT_EQ(want("c", 40), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("b"));
+  EXPECT_FALSE(residency_.resident("b"));
+  EXPECT_TRUE(residency_.resident("a"));
+}
+
+TEST_F(SceneResidencyTest, NoMoreGoThanHaveTo) {
+  visit("a", 30);
+  now_ += 1s;
+  visit("b", 30);
+  now_ += 1s;
+  visit("c", 30);
+  now_ += 120s;
+  want("d", 65);
+  EXPECT_THAT(next()->release, ElementsAre("a", "b"));
+  EXPECT_EQ(residency_.bytes(), 30u);
+}
+
+TEST_F(SceneResidencyTest, ASceneInUseNeverGoes) {
+  visit("a", 60);
+  used_ = {"a"};
+  now_ += 1h;
+  EXPECT_EQ(want("b", 60), Wish::no_room);
+  EXPECT_FALSE(next());
+  visit("c", 40);
+  now_ += 1h;
+  EXPECT_EQ(want("b", 60), Wish::no_room) << "nor is another sent away in vain";
+  EXPECT_TRUE(residency_.resident("c"));
+  used_.clear();
+  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("a"));
+}
+
+TEST_F(SceneResidencyTest, ASceneStaysForAMinuteAndTheNextOneWaitsForThat) {
+  visit("a", 60);
+  now_ += 59s;
+  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_FALSE(next());
+  EXPECT_EQ(want("a", 60), Wish::resident) << "it is still there for who comes back";
+  now_ += 1s;
+  const auto step = next();
+  ASSERT_TRUE(step);
+  EXPECT_THAT(step->release, ElementsAre("a"));
+  EXPECT_EQ(step->load, "b");
+}
+
+TEST_F(SceneResidencyTest, WhoWaitsHearsWhenTheRoomIsTakenAgain) {
+  visit("a", 60);
+  EXPECT_EQ(want("b", 60), Wish::awaited);
+  used_ = {"a"};
+  now_ += 60s;
+  EXPECT_FALSE(next());
+  EXPECT_EQ(want("b", 60), Wish::no_room);
+  EXPECT_EQ(want("c", 10), Wish::awaited) << "it blocks nobody";
+}
+
+TEST_F(SceneResidencyTest, RefusesWhatNeverFits) {
+  EXPECT_EQ(want("a", 101), Wish::too_large);
+  EXPECT_EQ(want("a", 100), Wish::awaited);
+  residency_.pin("p", 20);
+  EXPECT_EQ(want("b", 81), Wish::too_large) << "pinned scenes never go";
+  SceneResidency unbounded({});
+  EXPECT_EQ(unbounded.want("a", 1ull << 50, now_, in_use_), Wish::awaited);
+}
+
+TEST_F(SceneResidencyTest, PinnedScenesStay) {
+  residency_.pin("p", 50);
+  EXPECT_EQ(want("p", 50), Wish::resident);
+  now_ += 1h;
+  visit("a", 50);
+  now_ += 1h;
+  EXPECT_EQ(want("b", 50), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("a"));
+}
+
+TEST_F(SceneResidencyTest, AFailureLeavesRoomForTheNext) {
+  want("a", 100);
+  next();
+  want("b", 50);
+  residency_.failed("a");
+  EXPECT_FALSE(residency_.resident("a"));
+  EXPECT_EQ(next()->load, "b");
+  residency_.loaded("b", 50, now_);
+  EXPECT_EQ(want("a", 50), Wish::awaited) << "it may be tried again";
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,156 @@
+// Saves that wait for their turn. The test runs the session thread's handlers one by one.
+
+#include "server/scenes/sidecar_saver.h"
+
+#include <chrono>
+#include <functional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
+#include "server/base/metrics.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using Saved = std::future<HttpResponse>;
+
+bool is_ready(const Saved& answer) { return answer.wait_for(0s) == std::future_status::ready; }
+
+std::string sidecar_at(int z) {
+  return fmt::format(R"({{"start_pose": {{"position": [0, 0, {}], "look_at": [0, 0, 99]}}}})", z);
+}
+
+class SidecarSaverTest : public FolderTest {
+ protected:
+  void SetUp() override {
+    save_scene(random_cloud(500, 3), folder_ / "hall.ply");
+    ServerConfig config;
+    config.scenes = {(folder_ / "hall.ply").string(), "synth:city:1000"};
+    library_ = std::make_unique<SceneLibrary>(
+        config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_);
+    saver_ = std::make_unique<SidecarSaver>(*library_, io_);
+    hall_ = library_->resolve("hall");
+    scene_ = library_->in_memory(hall_);
+    posters_.insert(scene_->poster);
+  }
+  void TearDown() override { saver_.reset(); }
+
+  /// Until now nothing is done: handlers run by steps() and run_until() alone.
+  Saved save(const std::string& json, const std::string& if_match = "") {
+    return saver_->save(hall_, json, {if_match, ""}, place_);
+  }
+  void steps(int handlers) {
+    io_.restart();
+    for (int i = 0; i < handlers; ++i) ASSERT_EQ(io_.run_one(), 1u);
+  }
+  /// Notes each poster that visitors get meanwhile.
+  void run_until(const std::function<bool()>& holds) {
+    for (int i = 0; i < 20'000 && !holds(); ++i) {
+      io_.restart();
+      while (io_.poll_one() > 0) posters_.insert(library_->in_memory(hall_)->poster);
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_TRUE(holds());
+  }
+  /// Whatever was asked for before is done when a save of a scene that is no file is answered.
+  void run_all() {
+    for (int i = 0; i < 2; ++i) {  // its poster may follow a save
+      const Saved last = saver_->save("city", "{}", {}, place_);
+      run_until([&] { return is_ready(last); });
+    }
+  }
+  [[nodiscard]] std::string on_disk() const {
+    return sidecar_text(folder_ / "hall.json").value_or("");
+  }
+
+  boost::asio::io_context io_;
+  Metrics metrics_;
+  std::unique_ptr<SceneLibrary> library_;
+  std::unique_ptr<SidecarSaver> saver_;
+  std::string hall_;                                      // the scene's id
+  std::shared_ptr<const SceneEntry> scene_;               // before any save
+  std::set<std::shared_ptr<const std::string>> posters_;  // that visitors got
+  std::shared_ptr<UploadPlace> place_ = std::make_shared<UploadPlace>();
+};
+
+TEST_F(SidecarSaverTest, WhoHasGoneBeforeTheirTurnSavesNothing) {
+  const auto place = std::make_shared<UploadPlace>();
+  const std::weak_ptr<const UploadPlace> held = place;
+  Saved gone = saver_->save(hall_, sidecar_at(1), {}, place);
+  Saved stays = save(sidecar_at(2), "*");
+  place->abandon();
+  run_until([&] { return is_ready(stays); });
+  EXPECT_EQ(stays.get().status, 412) << "there is nothing that it could replace";
+  EXPECT_EQ(on_disk(), "");
+  EXPECT_EQ(held.use_count(), 1) << "the saver keeps nothing of it";
+}
+
+TEST_F(SidecarSaverTest, ARefusalChangesNothingAndRendersNothing) {
+  Saved stale = save(sidecar_at(1), "\"another\"");
+  Saved wrong = save("{\"start_pose\": 1}");
+  run_until([&] { return is_ready(stale) && is_ready(wrong); });
+  EXPECT_EQ(stale.get().status, 412);
+  EXPECT_EQ(wrong.get().status, 400);
+  run_all();
+  EXPECT_EQ(library_->in_memory(hall_), scene_);
+}
+
+TEST_F(SidecarSaverTest, WhatSomebodyBrokeOnTheDiskIsNotReplacedUnseen) {
+  folder_.write("hall.json", "{broken");
+  Saved stale = save(sidecar_at(1), "\"another\"");
+  run_until([&] { return is_ready(stale); });
+  EXPECT_EQ(stale.get().status, 412);
+  EXPECT_EQ(on_disk(), "{broken");
+  EXPECT_EQ(library_->in_memory(hall_), scene_);
+}
+
+TEST_F(SidecarSaverTest, SavesThatWaitTogetherGetOnePoster) {
+  std::vector<Saved> saves;
+  for (const int z : {1, 2, 3}) saves.push_back(save(sidecar_at(z)));
+  run_until([&] { return is_ready(saves.back()); });
+  for (Saved& answer : saves) EXPECT_EQ(answer.get().status, 200);
+  EXPECT_EQ(on_disk(), sidecar_at(3));
+  EXPECT_FLOAT_EQ(library_->in_memory(hall_)->facts.start_pose.position.z, 3.0f);
+  run_until([&] { return library_->in_memory(hall_)->poster != scene_->poster; });
+  run_all();
+  EXPECT_EQ(posters_.size(), 2u) << "the one before, and one";
+}
+
+TEST_F(SidecarSaverTest, ToursAloneNeedNoPoster) {
+  Saved tours = save(R"({"tours": [{"title": "Hall", "stops": []}]})");
+  run_until([&] { return is_ready(tours); });
+  EXPECT_EQ(tours.get().status, 200);
+  run_all();
+  EXPECT_THAT(*library_->in_memory(hall_)->tours.for_viewers, HasSubstr("Hall"));
+  EXPECT_EQ(posters_.size(), 1u);
+}
+
+TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
+  Saved begun = save(sidecar_at(1));
+  Saved waits = save(sidecar_at(2));
+  steps(2);
+  saver_->stop();
+  ASSERT_TRUE(is_ready(waits));
+  const HttpResponse refused = waits.get();
+  EXPECT_EQ(refused.status, 503);
+  EXPECT_GT(refused.retry_after_s, 0);
+  Saved later = save(sidecar_at(3));
+  run_until([&] { return is_ready(begun) && is_ready(later); });
+  EXPECT_EQ(begun.get().status, 200);
+  EXPECT_EQ(later.get().status, 503);
+  EXPECT_EQ(on_disk(), sidecar_at(1)) << "what was told to be saved is there";
+  io_.restart();
+  EXPECT_EQ(io_.poll(), 0u) << "nothing goes on, no poster either";
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,169 @@
+#include "server/scenes/tours.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/files/save_scene.h"
+#include "server/net/http.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+class Tours : public FolderTest {
+ protected:
+  void SetUp() override { save_scene(random_cloud(30, 0), folder_ / "museum.splat"); }
+  nlohmann::json read() {
+    return nlohmann::json::parse(
+        tours_of(folder_ / "museum.json", sidecar_text(folder_ / "museum.json")));
+  }
+};
+
+TEST_F(Tours, AreEmptyWithoutFiles) {
+  EXPECT_TRUE(read()["tours"].is_null());
+  EXPECT_TRUE(read()["settings"].is_null());
+  EXPECT_TRUE(read()["etag"].is_null());
+  EXPECT_FALSE(sidecar_text(folder_ / "museum.json"));
+}
+
+TEST_F(Tours, ComeFromTheSidecarAndTheViewersSettings) {
+  write("museum.json", R"({"up": "-y", "tours": [{"title": "Hall"}]})");
+  write("settings.json", R"({"version": 2, "animTracks": [], "annotations": [{"title": "Door"}]})");
+  EXPECT_EQ(read()["tours"][0]["title"], "Hall");
+  EXPECT_EQ(read()["settings"]["annotations"][0]["title"], "Door");
+  EXPECT_EQ(read()["etag"], etag_of(sidecar_text(folder_ / "museum.json").value()));
+  write("museum.settings.json", R"({"version": 2, "animTracks": [1]})");
+  EXPECT_EQ(read()["settings"]["animTracks"].size(), 1u) << "the scene's own come first";
+}
+
+TEST_F(Tours, OfATextAreThoseOfThatTextWhateverIsOnTheDisk) {
+  write("museum.json", R"({"tours": [{"title": "Hall"}]})");
+  const std::string newer(R"({"tours": [{"title": "Tower"}]})");
+  const auto document = nlohmann::json::parse(tours_of(folder_ / "museum.json", newer));
+  EXPECT_EQ(document["tours"][0]["title"], "Tower");
+  EXPECT_EQ(document["etag"], etag_of(newer));
+  EXPECT_TRUE(nlohmann::json::parse(tours_of(folder_ / "museum.json", {}))["tours"].is_null());
+}
+
+TEST_F(Tours, AreAnsweredWithWhetherTheyMayBeSaved) {
+  const ToursAnswers answers(R"({"tours":[]})");
+  EXPECT_EQ(*answers.for_viewers, R"({"may_save":false,"document":{"tours":[]}})");
+  EXPECT_EQ(*answers.for_authors, R"({"may_save":true,"document":{"tours":[]}})");
+}
+
+TEST_F(Tours, LeaveForeignAndBrokenSettingsAlone) {
+  write("museum.settings.json", "{ broken");
+  write("settings.json", R"({"editor.fontSize": 12})");
+  EXPECT_TRUE(read()["settings"].is_null());
+}
+
+TEST_F(Tours, RefuseWhatIsNestedWithoutEnd) {
+  const std::string deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  write("museum.settings.json", R"({"animTracks": 1, "a": )" + deep + "}");
+  EXPECT_TRUE(read()["settings"].is_null());
+  write("museum.json", R"({"tours": )" + deep + "}");
+  EXPECT_THAT([&] { tours_of(folder_ / "museum.json", sidecar_text(folder_ / "museum.json")); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("nested deeper than 256")));
+}
+
+TEST_F(Tours, AreRefusedBeyondFourMebibytes) {
+  const auto padded = [](std::size_t bytes, std::string text) {
+    text.resize(bytes, ' ');
+    return text;
+  };
+  write("museum.settings.json", padded(4 << 20, R"({"animTracks": 1})"));
+  EXPECT_FALSE(read()["settings"].is_null());
+  write("museum.settings.json", padded((4 << 20) + 1, R"({"animTracks": 1})"));
+  EXPECT_TRUE(read()["settings"].is_null());
+  write("museum.json", padded(4 << 20, R"({"tours": []})"));
+  EXPECT_FALSE(read()["tours"].is_null());
+  write("museum.json", padded((4 << 20) + 1, R"({"tours": []})"));
+  EXPECT_THAT([&] { read(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("at most 4194304 make sense")));
+}
+
+TEST_F(Tours, SayWhatIsWrongInASidecar) {
+  write("museum.json", R"({"tours": {"title": "Hall"}})");
+  EXPECT_THAT([&] { tours_of(folder_ / "museum.json", sidecar_text(folder_ / "museum.json")); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("tours: is not an array")));
+}
+
+constexpr std::string_view stop = R"({"position": [0, 1, 2], "look_at": [0, 1, 3])";
+
+std::string with_stop(const std::string& more) {
+  return fmt::format(R"({{"tours": [{{"title": "Hall", "stops": [{}{}}}]}}]}})", stop, more);
+}
+
+TEST(SentSidecar, OfAWholeTourIsTaken) {
+  const Sidecar sidecar = check_sent_sidecar(
+      R"({"up": "-y", "near": 0.1, "tours": [{"title": "Hall", "autoplay": true, "stops": [
+          {"title": "Door", "caption": "Oak.", "position": [1, 2, 3], "orientation": [0, 0, 0, 1],
+           "fov_deg": 60, "marker": [1, 2, 4], "stay_s": 8}]}]})");
+  EXPECT_FLOAT_EQ(sidecar.near_z.value(), 0.1f);
+  EXPECT_NO_THROW(check_sent_sidecar(with_stop("")));
+  EXPECT_NO_THROW(check_sent_sidecar("{}"));
+}
+
+TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
+  const auto mistake = [](const std::string& json) -> std::string {
+    try {
+      check_sent_sidecar(json);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(mistake("{ broken"), HasSubstr("sidecar: byte "));
+  EXPECT_THAT(mistake("[]"), HasSubstr("is not a JSON object"));
+  EXPECT_THAT(mistake(R"({"near": -1})"), HasSubstr("near: is not positive"));
+  EXPECT_THAT(mistake(R"({"start_pose":{"position":[3e38,3e38,3e38],"look_at":[0,0,0]}})"),
+              HasSubstr("start_pose.position: is no place"));
+  EXPECT_THAT(mistake(R"({"poster": 1})"), HasSubstr("unknown field 'poster'"));
+  EXPECT_THAT(mistake(R"({"tours": {}})"), HasSubstr("tours: is not an array"));
+  EXPECT_THAT(mistake(R"({"tours": [1]})"), HasSubstr("tours[0]: is not an object"));
+  EXPECT_THAT(mistake(R"({"tours": [{"title": "Hall"}]})"), HasSubstr("'stops' is missing"));
+  EXPECT_THAT(mistake(R"({"tours": [{"stops": [], "autoplay": 1}]})"),
+              HasSubstr("tours[0].autoplay"));
+  EXPECT_THAT(mistake(with_stop(R"(, "fov_deg": 400)")), HasSubstr("tours[0].stops[0].fov_deg"));
+  EXPECT_THAT(mistake(with_stop(R"(, "stay_s": -1)")), HasSubstr("stay_s: is not in 0"));
+  EXPECT_THAT(mistake(with_stop(R"(, "marker": [0, 0])")), HasSubstr("marker"));
+  EXPECT_THAT(mistake(with_stop(R"(, "captoin": "x")")), HasSubstr("unknown field 'captoin'"));
+  EXPECT_THAT(mistake(with_stop(R"(, "caption": 7)")), HasSubstr("caption: is not a text"));
+  const auto caption = [](std::size_t bytes) {
+    return with_stop(fmt::format(R"(, "caption": "{}")", std::string(bytes, 'x')));
+  };
+  EXPECT_EQ(mistake(caption(16'000)), "");
+  EXPECT_THAT(mistake(caption(16'001)), HasSubstr("caption: has more than"));
+  EXPECT_THAT(mistake(R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})"),
+              HasSubstr("'orientation' is missing"));
+  const auto turned = [](const char* orientation) {
+    return fmt::format(
+        R"({{"tours": [{{"stops": [{{"position": [0, 0, 0], "orientation": {}}}]}}]}})",
+        orientation);
+  };
+  EXPECT_EQ(mistake(turned("[0, 0, 0.995, 0]")), "") << "pages round them";
+  EXPECT_THAT(mistake(turned("[0, 0, 0, 0]")),
+              HasSubstr("tours[0].stops[0].orientation: is no unit quaternion"));
+  const auto tours = [](std::size_t count) {
+    const std::vector<std::string> all(count, R"({"stops": []})");
+    return fmt::format(R"({{"tours": [{}]}})", fmt::join(all, ","));
+  };
+  EXPECT_EQ(mistake(tours(32)), "");
+  EXPECT_THAT(mistake(tours(33)), HasSubstr("tours: has 33 entries, at most 32"));
+  const auto stops = [](std::size_t count) {
+    const std::vector<std::string> all(count, std::string(stop) + "}");
+    return fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", fmt::join(all, ","));
+  };
+  EXPECT_EQ(mistake(stops(256)), "");
+  EXPECT_THAT(mistake(stops(257)), HasSubstr("tours[0].stops: has 257 entries, at most 256"));
+  EXPECT_EQ(mistake(std::string((1 << 20) - 2, ' ') + "{}"), "");
+  EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "") << "too large";
+}
+
+}  // namespace
+}  // namespace catgs::test

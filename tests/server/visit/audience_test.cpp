@@ -1,0 +1,108 @@
+#include "server/visit/audience.h"
+
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct FakeConnection final : Connection {
+  int messages = 0;
+  std::vector<std::uint64_t> frames;
+  bool full = false;  // of frames that are not read
+  std::optional<CloseCode> closed;
+
+  void send(OutgoingMessage) override { ++messages; }
+  std::vector<std::uint64_t> send(OutgoingFrame frame) override {
+    if (full) return {frame.ticket.frame_id};
+    frames.push_back(frame.ticket.frame_id);
+    return {};
+  }
+  void close(CloseCode code, std::string_view) override { closed = code; }
+  [[nodiscard]] std::string peer_address() const override { return "192.0.2.1"; }
+  [[nodiscard]] std::size_t queued_frames() const override { return 0; }
+};
+
+class AudienceTest : public testing::Test {
+ protected:
+  std::shared_ptr<FakeConnection> join() {
+    auto connection = std::make_shared<FakeConnection>();
+    spectators.push_back(std::make_shared<ClientConnection>(io, metrics, connection, [] {}));
+    audience.add(spectators.back(), Welcome{});
+    return connection;
+  }
+  void frame(std::uint64_t id, bool idr = false) {
+    OutgoingFrame outgoing;
+    outgoing.ticket.frame_id = id;
+    outgoing.ticket.idr = idr;
+    audience.send(outgoing, now);
+  }
+
+  TimePoint now = TimePoint{} + 1h;
+  boost::asio::io_context io;
+  Metrics metrics;
+  Audience audience{2, "192.0.2.2"};
+  std::vector<std::shared_ptr<ClientConnection>> spectators;
+};
+
+TEST_F(AudienceTest, FramesBeginWithAnIdr) {
+  const auto spectator = join();
+  EXPECT_EQ(spectator->messages, 1) << "the welcome";
+  EXPECT_TRUE(audience.wants_idr(now));
+  frame(1);
+  EXPECT_TRUE(spectator->frames.empty()) << "nothing that it could decode";
+  frame(2, true);
+  frame(3);
+  EXPECT_EQ(spectator->frames, (std::vector<std::uint64_t>{2, 3}));
+  EXPECT_FALSE(audience.wants_idr(now + 1h));
+}
+
+TEST_F(AudienceTest, ASlowOneDropsToTheNextIdrAndDisturbsNobody) {
+  const auto good = join();
+  const auto slow = join();
+  EXPECT_TRUE(audience.full());
+  frame(1, true);
+  slow->full = true;
+  frame(2);
+  slow->full = false;
+  frame(3);
+  EXPECT_EQ(slow->frames, (std::vector<std::uint64_t>{1}));
+  EXPECT_EQ(good->frames, (std::vector<std::uint64_t>{1, 2, 3}));
+  EXPECT_FALSE(audience.wants_idr(now + 999ms)) << "an IDR a second at most, whoever waits";
+  EXPECT_TRUE(audience.wants_idr(now + 1s));
+  now += 1s;
+  frame(4, true);
+  frame(5);
+  EXPECT_EQ(slow->frames, (std::vector<std::uint64_t>{1, 4, 5}));
+}
+
+TEST_F(AudienceTest, ALostDecoderAsksForItself) {
+  const auto spectator = join();
+  frame(1, true);
+  audience.on_message(*spectators[0], RequestIdr{});
+  frame(2);
+  EXPECT_EQ(spectator->frames, (std::vector<std::uint64_t>{1}));
+  EXPECT_TRUE(audience.wants_idr(now + 1s));
+}
+
+TEST_F(AudienceTest, IsNeverSilentForLong) {
+  const auto spectator = join();
+  for (auto waited = 0ms; waited < 10s; waited += 250ms) audience.keep_talking(now + waited);
+  EXPECT_GE(spectator->messages, 1 + 10);
+  EXPECT_LE(spectator->messages, 1 + 14);
+}
+
+TEST_F(AudienceTest, EndsWithTheSession) {
+  const auto first = join();
+  const auto second = join();
+  audience.remove(*spectators[0]);
+  EXPECT_EQ(audience.spectators(), 1u);
+  audience.dismiss_spectators();
+  EXPECT_EQ(second->closed, CloseCode::normal);
+  EXPECT_FALSE(first->closed);
+  EXPECT_EQ(audience.spectators(), 0u);
+}
+
+}  // namespace
+}  // namespace catgs

@@ -1,0 +1,47 @@
+// What a client is told of the frames that it was sent.
+
+#include "server/visit/visit_statistics.h"
+
+#include <gtest/gtest.h>
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(VisitStatisticsTest, AreToldOnceASecondWhileFramesFlow) {
+  TimePoint now = TimePoint{} + 1h;
+  const FlowControl flow;
+  VisitStatistics statistics(now);
+  FrameTicket ticket;
+  statistics.frame_sent(ticket, 100);
+  ticket.speculated = true;
+  statistics.frame_sent(ticket, 50);
+  ticket.refined = true;
+  statistics.frame_sent(ticket, 50);
+  statistics.frames_lost(2);
+  EXPECT_FALSE(statistics.take(flow, 3, now += 999ms));
+  const auto stats = statistics.take(flow, 3, now += 1ms);
+  ASSERT_TRUE(stats);
+  EXPECT_FLOAT_EQ(stats->fps, 3.0f);
+  EXPECT_FLOAT_EQ(stats->bitrate_kbps, 1.6f);
+  EXPECT_EQ(stats->key_frames, 1u);
+  EXPECT_EQ(stats->sub_frames, 1u);
+  EXPECT_EQ(stats->dropped_packets, 2u);
+  EXPECT_EQ(stats->sessions, 3u);
+  EXPECT_EQ(stats->target_bitrate_kbps, flow.bitrate_kbps());
+
+  EXPECT_FALSE(statistics.take(flow, 3, now += 1s)) << "the heartbeat speaks for a still picture";
+  statistics.frame_sent({}, 100);
+  const auto next = statistics.take(flow, 3, now += 1s);
+  ASSERT_TRUE(next);
+  EXPECT_FLOAT_EQ(next->fps, 1.0f);
+  EXPECT_EQ(next->dropped_packets, 0u) << "told already";
+  statistics.frame_dropped_by_client();
+  EXPECT_EQ(statistics.frames_sent(), 4u);
+  EXPECT_EQ(statistics.frames_dropped(), 3u);
+  EXPECT_EQ(statistics.bytes_sent(), 300u);
+}
+
+}  // namespace
+}  // namespace catgs
