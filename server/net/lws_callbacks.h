@@ -16,8 +16,8 @@
 
 namespace catgs {
 
-constexpr double idle_rounds_per_second = 500.0;
-constexpr double idle_round_burst = 1000.0;
+constexpr double idle_rounds_per_second = 3'000.0;
+constexpr double idle_round_burst = 3'000.0;
 
 /// The state that callbacks need besides their site. The context's user pointer points to it.
 struct Service {

@@ -20,6 +20,11 @@ constexpr double segment_burst = 1200.0;
 constexpr double segment_bytes = 1024.0;  // a longer one counts as several
 constexpr lws_usec_t look_every_us = 250'000;
 
+/// All websockets look at the same times. libwebsockets 4.1.6 does not block in the last
+/// millisecond before a timer. 64 websockets with timers of their own made 6,000 idle rounds a
+/// second.
+lws_usec_t until_next_look() { return look_every_us - lws_now_usecs() % look_every_us; }
+
 /// Small writes leave at once. The next packet leaves the ring only when hardly anything is unsent,
 /// so that waiting packets are counted and can be dropped.
 void tune_socket(int fd) {
@@ -120,11 +125,11 @@ void LwsWebsocket::service_listen(std::shared_ptr<ConnectionListener> listener) 
   listener_ = std::move(listener);
   const tcp_info info = info_of(wsi_);
   arrived_ = {info.tcpi_data_segs_in, info.tcpi_bytes_received};
-  lws_set_timer_usecs(wsi_, look_every_us);
+  lws_set_timer_usecs(wsi_, until_next_look());
 }
 
 int LwsWebsocket::service_timer() {
-  lws_set_timer_usecs(wsi_, look_every_us);
+  lws_set_timer_usecs(wsi_, until_next_look());
   const tcp_info info = info_of(wsi_);
   const double segments = info.tcpi_data_segs_in - arrived_.segments;
   const auto bytes = static_cast<double>(info.tcpi_bytes_received - arrived_.bytes);
