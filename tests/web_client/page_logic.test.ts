@@ -1,6 +1,6 @@
 // The logic of the page.
 import { readFileSync } from 'node:fs';
-import { describe, expect, it } from 'vitest';
+import { beforeEach, describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
 import { QualityChoice } from '#client/session/quality';
 import { scene_address, scene_labels, scene_name } from '#client/session/scenes';
@@ -145,26 +145,28 @@ describe('automatic height', () => {
 });
 
 describe('settling', () => {
-  it('waits for the newest pose and for the last refinement', async () => {
-    const time = new FakeTime();
-    let current = false;
-    const settling = new Settling(
-      () => current,
-      () => time.now_us() / 1000,
-      (delay_ms, action) => time.after(delay_ms, action),
-    );
-    let settled = false;
-    const done = settling.wait().then(() => {
+  const time = new FakeTime();
+  let current: boolean;
+  let settling: Settling;
+  let settled: boolean;
+  const after = async (ms: number): Promise<boolean> => {
+    time.advance(ms);
+    await Promise.resolve();
+    await Promise.resolve();
+    return settled;
+  };
+
+  beforeEach(() => {
+    current = settled = false;
+    settling = new Settling(() => current, time, time);
+    void settling.wait().then(() => {
       settled = true;
     });
-    const after = async (ms: number): Promise<boolean> => {
-      time.advance(ms);
-      await Promise.resolve();
-      await Promise.resolve();
-      return settled;
-    };
     time.advance(1);
     settling.presented();
+  });
+
+  it('waits for the newest pose and for the last refinement', async () => {
     expect(await after(5000)).toBe(false);
     current = true;
     settling.presented();
@@ -174,7 +176,12 @@ describe('settling', () => {
     settling.presented(); // a refinement begins the wait anew
     expect(await after(1500)).toBe(false);
     expect(await after(100)).toBe(true);
-    await done;
+  });
+
+  it('needs no further picture when the camera is known to rest only after the last one', async () => {
+    expect(await after(100)).toBe(false);
+    current = true;
+    expect(await after(1000)).toBe(true);
   });
 });
 

@@ -1,5 +1,5 @@
 // window.catgs: a small interface for tests and for pages that drive the viewer (README.md).
-import { browser_timers, type Clock } from '../base/clock';
+import { browser_timers, type Clock, type Timers } from '../base/clock';
 import type { CameraController } from '../camera/camera_controller';
 import type { Pose } from '../camera/eye';
 import { same_angle_rad, same_view } from '../camera/same_view';
@@ -42,12 +42,12 @@ export class Settling {
   /** `is_current`: whether the shown picture is that of the present camera. */
   constructor(
     private readonly is_current_: () => boolean,
-    private readonly now_ms_: () => number,
-    private readonly after_: (delay_ms: number, action: () => void) => () => void,
+    private readonly clock_: Clock,
+    private readonly timers_: Timers,
   ) {}
 
   presented(): void {
-    const now_ms = this.now_ms_();
+    const now_ms = this.clock_.now_us() / 1000;
     this.interval_ms_ = this.last_shown_ms_ > 0 ? now_ms - this.last_shown_ms_ : 0;
     this.last_shown_ms_ = now_ms;
     this.look();
@@ -63,14 +63,15 @@ export class Settling {
   private look(): void {
     this.cancel_();
     if (this.waiting_.length === 0) return;
-    if (!this.is_current_()) return; // the next presented() looks again
     const quiet_ms = Math.max(least_quiet_ms, Math.min(this.interval_ms_, 1000) * quiet_intervals);
-    const left_ms = this.last_shown_ms_ + quiet_ms - this.now_ms_();
-    if (left_ms <= 0) {
+    const left_ms = this.last_shown_ms_ + quiet_ms - this.clock_.now_us() / 1000;
+    const is_current = this.is_current_();
+    if (is_current && left_ms <= 0) {
       for (const resolve of this.waiting_.splice(0)) resolve();
       return;
     }
-    this.cancel_ = this.after_(left_ms, () => this.look());
+    // On a busy page the last picture comes before the camera is known to rest.
+    this.cancel_ = this.timers_.after(is_current ? left_ms : least_quiet_ms, () => this.look());
   }
 }
 
@@ -83,8 +84,8 @@ export function make_automation(
   let shown: Shown | undefined;
   const settling = new Settling(
     () => shown !== undefined && !loop.pending && shows_camera(shown, camera, loop.pose_id),
-    () => clock.now_us() / 1000,
-    (delay_ms, action) => browser_timers.after(delay_ms, action),
+    clock,
+    browser_timers,
   );
   worker.on('presented', (message) => {
     shown = message;
