@@ -1,56 +1,31 @@
 // Making a tour in the browser, and saving it to the real server.
 import { mkdirSync, readFileSync, rmSync, unlinkSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { BrowserContextOptions, Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
 import type { Pose } from '#client/camera/eye';
-import { close_pages, keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { keep_screenshot, open, windows, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
-import {
-  access_token,
-  catgs_render,
-  start_server,
-  stop_servers,
-  type RunningServer,
-} from './support/programs';
+import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
 import { scratch_folder } from './support/scenes';
 
-const { folder, remove } = scratch_folder();
+const folder = scratch_folder();
 const scene = path.join(folder, 'mine.ply');
 const sidecar = path.join(folder, 'mine.json');
 const key_file = path.join(folder, 'key');
-const desktop = { viewport: { width: 1280, height: 720 } };
 
-let browser: Browser;
 let workshop: RunningServer;
 
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '100000');
   unlinkSync(sidecar); // the sidecar of the scene that was just made
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
-  browser = await launch_browser();
   workshop = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
 });
 
-afterEach(close_pages);
-
-afterAll(async () => {
-  await browser.close();
-  await stop_servers();
-  remove();
-});
-
 /** Opens the page by a link of the role. */
-async function open_as(
-  role: string,
-  query = '',
-  options: BrowserContextOptions = desktop,
-): Promise<WatchedPage> {
-  const watched = await new_page(browser, options);
-  await watched.page.goto(`${workshop.url}${query}#token=${access_token(role, key_file)}`);
-  await settle(watched.page);
-  return watched;
-}
+const open_as = (role: string, query = '', options: BrowserContextOptions = windows.desktop): Promise<WatchedPage> =>
+  open(`${workshop.url}${query}#token=${access_token(role, key_file)}`, options);
 
 describe('an author', () => {
   /** Makes two stops, moves the second one to the front, and lets visits begin there. */
@@ -150,16 +125,13 @@ describe('an author', () => {
     await page.getByRole('button', { name: 'Download the file' }).click();
     const file = await download;
     expect(file.suggestedFilename()).toBe('mine.json');
-    const { tours } = JSON.parse(readFileSync(await file.path(), 'utf8')) as {
-      tours: unknown;
-    };
+    const { tours } = JSON.parse(readFileSync(await file.path(), 'utf8')) as { tours: unknown };
     expect(tours).toMatchObject([{ stops: expect.any(Array) as unknown }]);
     await page.getByText('link of role author').waitFor();
   });
 
   it('sees the card of a preview in a window too narrow for it beside the panel', async () => {
-    const options = { viewport: { width: 1000, height: 640 } };
-    const { page } = await open_as('author', '?author', options);
+    const { page } = await open_as('author', '?author', { viewport: { width: 1000, height: 640 } });
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     expect(await page.locator('#tour').isHidden()).toBe(true);
     await page.getByRole('button', { name: 'Preview' }).click();
@@ -167,11 +139,8 @@ describe('an author', () => {
     expect(await page.locator('#author-panel').isHidden()).toBe(true);
   });
 
-  it.each([
-    ['phone', { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true }],
-    ['dark', { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' }],
-  ] as const)('has room to see and to write: %s', async (name, options) => {
-    const { page } = await open_as('author', '?author', options);
+  it.each(['phone', 'desktop-dark'] as const)('has room to see and to write: %s', async (name) => {
+    const { page } = await open_as('author', '?author', windows[name]);
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     await settle(page);
@@ -179,7 +148,7 @@ describe('an author', () => {
     const { top, bottom } = await page.evaluate(() =>
       document.getElementById('author-panel')!.getBoundingClientRect().toJSON() as DOMRect,
     );
-    const { height } = options.viewport;
+    const { height } = windows[name].viewport;
     expect(bottom).toBeLessThanOrEqual(height);
     if (name === 'phone') expect(top).toBeGreaterThan(0.4 * height);
   });

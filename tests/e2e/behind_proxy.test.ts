@@ -1,29 +1,21 @@
 // What a client says of itself does not get through HAProxy as the compose file runs it.
 import { get } from 'node:http';
-import { afterAll, beforeAll, expect, it } from 'vitest';
-import { start_haproxy, type Haproxy } from './support/haproxy';
-import { start_server, stop_servers } from './support/programs';
+import { beforeAll, expect, it } from 'vitest';
+import { start_haproxy } from './support/haproxy';
+import { start_server } from './support/programs';
 import { scratch_folder } from './support/scenes';
 
-const { folder, remove } = scratch_folder();
-
-let proxy: Haproxy;
+let proxy: string; // its address
 
 beforeAll(async () => {
   const options = ['--bind', '0.0.0.0', '--open', '--trusted-proxy', '127.0.0.1'];
   const server = await start_server('synth:city:2000', options);
-  proxy = await start_haproxy(folder, [server.port, server.port]);
-});
-
-afterAll(async () => {
-  await proxy.close();
-  await stop_servers();
-  remove();
+  proxy = await start_haproxy(scratch_folder(), [server.port, server.port]);
 });
 
 function ask(headers: Record<string, string>): Promise<{ status: number; text: string }> {
   return new Promise((resolve, reject) => {
-    get(proxy.url, { headers, agent: false }, (reply) => {
+    get(proxy, { headers, agent: false }, (reply) => {
       let text = '';
       reply.on('data', (chunk: Buffer) => (text += chunk.toString()));
       reply.on('end', () => resolve({ status: reply.statusCode ?? 0, text }));

@@ -1,37 +1,26 @@
 // Each control by each input device, against a server that follows a script.
-import type { Browser, CDPSession, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import type { CDPSession, Page } from 'playwright-core';
+import { afterEach, beforeAll, describe, expect, it } from 'vitest';
 import { rotate, sub, conjugate, type Vec3 } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
-import { launch_browser, new_page, type WatchedPage } from './support/browser';
+import { open as open_page, type WatchedPage } from './support/browser';
 import { pose_of, settle } from './support/camera';
 import { start_fake_server, type FakeServer } from './support/fake_server';
+import { plug_in_gamepad } from './support/gamepad';
 import { painted_jpeg, stream_of } from './support/painted';
 
-let browser: Browser;
 let server: FakeServer;
 let watched: WatchedPage;
 
 beforeAll(async () => {
-  browser = await launch_browser();
-  server = await start_fake_server(stream_of(await painted_jpeg(browser)));
+  server = await start_fake_server(stream_of(await painted_jpeg()));
 });
 
-afterEach(async () => {
-  expect(watched.errors).toEqual([]);
-  await watched.page.context().close();
-});
-
-afterAll(async () => {
-  await server.close();
-  await browser.close();
-});
+afterEach(() => expect(watched.errors).toEqual([]));
 
 async function open(touch = false): Promise<Page> {
   const viewport = { width: 640, height: 360 };
-  watched = await new_page(browser, touch ? { viewport, hasTouch: true, isMobile: true } : { viewport });
-  await watched.page.goto(server.url);
-  await settle(watched.page);
+  watched = await open_page(server.url, { viewport, hasTouch: touch, isMobile: touch });
   return watched.page;
 }
 
@@ -204,32 +193,12 @@ describe('fingers', () => {
 describe('a gamepad', () => {
   it('moves by its sticks and triggers, looks, and presses its buttons', async () => {
     const page = await open();
-    await page.evaluate(() => {
-      const button = (): { value: number; pressed: boolean } => ({ value: 0, pressed: false });
-      const pad = { connected: true, mapping: 'standard', axes: [0, 0, 0, 0], buttons: Array.from({ length: 17 }, button) };
-      Object.assign(window, { pad });
-      navigator.getGamepads = () => [pad as unknown as Gamepad];
-      window.dispatchEvent(new Event('gamepadconnected'));
-    });
-    const set = (axes: number[], pressed = -1): Promise<void> =>
-      page.evaluate(
-        ([values, index]) => {
-          const { pad } = window as unknown as {
-            pad: { axes: number[]; buttons: { value: number; pressed: boolean }[] };
-          };
-          pad.axes = values;
-          pad.buttons.forEach((one, i) => {
-            one.pressed = i === index;
-            one.value = one.pressed ? 1 : 0;
-          });
-        },
-        [axes, pressed] as const,
-      );
+    const set = await plug_in_gamepad(page);
     await page.keyboard.press('KeyM'); // fly
     const push = (axes: number[], button = -1) => async (): Promise<void> => {
       const before = JSON.stringify(await pose_of(page));
       await set(axes, button);
-      await expect.poll(async () => JSON.stringify(await pose_of(page)), { timeout: 10_000 }).not.toBe(before);
+      await expect.poll(async () => JSON.stringify(await pose_of(page))).not.toBe(before);
       await set([0, 0, 0, 0]);
     };
     expect_most((await change_by(page, push([0, -1, 0, 0]))).moved, 'forward');

@@ -3,21 +3,16 @@ import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { afterAll, beforeAll, expect, it } from 'vitest';
 import { createServer, type ViteDevServer } from 'vite';
-import type { Browser } from 'playwright-core';
-import { launch_browser, new_page } from './support/browser';
-import { start_fake_server, welcome, type FakeServer } from './support/fake_server';
+import { new_page } from './support/browser';
+import { at_hello, start_fake_server, welcome, type FakeServer } from './support/fake_server';
 
 const client_dir = fileURLToPath(new URL('../../web_client', import.meta.url));
 
-let browser: Browser;
 let server: FakeServer;
 let vite: ViteDevServer;
 
 beforeAll(async () => {
-  browser = await launch_browser();
-  server = await start_fake_server((peer, body) => {
-    if (body.case === 'hello') peer.say(welcome());
-  });
+  server = await start_fake_server(at_hello(welcome()));
   process.env['CATGS_SERVER_URL'] = server.url;
   vite = await createServer({
     root: client_dir,
@@ -31,15 +26,11 @@ beforeAll(async () => {
 afterAll(async () => {
   delete process.env['CATGS_SERVER_URL'];
   await vite.close();
-  await server.close();
-  await browser.close();
 });
 
 it('talks to the server, and leaves Vite its own socket', async () => {
-  const { page } = await new_page(browser);
-  const vite_connected = page.waitForEvent('console', (line) =>
-    line.text().includes('[vite] connected'),
-  );
+  const { page } = await new_page();
+  const vite_connected = page.waitForEvent('console', (line) => line.text().includes('[vite] connected'));
   const url = vite.resolvedUrls!.local[0]!;
   await page.goto(`${url}?scene=garden`);
   await page.getByText('Demo city').waitFor();

@@ -1,60 +1,36 @@
 // What pages of other sites, links and texts of strangers do to the viewer in a real browser: nothing.
-import { readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
-import type { Browser, Page } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
-import { close_pages, insecure_host, launch_browser, new_page, type WatchedPage } from './support/browser';
+import type { Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { insecure_host, new_page, open as open_settled, type WatchedPage } from './support/browser';
 import { pose_of, settle } from './support/camera';
 import { start_other_site, type OtherSite } from './support/other_site';
-import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
-import { scratch_folder } from './support/scenes';
+import { catgs_render, start_server, type RunningServer } from './support/programs';
+import { scratch_folder, write_tours } from './support/scenes';
 
 // A file's name has no slash.
 const hostile = '<img src=x onerror=document.body.dataset.taken=1><b>bold';
-const { folder, remove } = scratch_folder();
+const folder = scratch_folder();
 const scene = path.join(folder, `${hostile}.ply`);
 
-let browser: Browser;
 let server: RunningServer;
 let foreign: OtherSite;
 
-interface Sidecar {
-  focus: number[];
-  start_pose: { position: number[] };
-  tours?: unknown;
-}
-
-function write_tour(): void {
-  const file = path.join(folder, `${hostile}.json`);
-  const sidecar = JSON.parse(readFileSync(file, 'utf8')) as Sidecar;
-  const { focus, start_pose } = sidecar;
-  const stop = (number: number) => ({
-    ...{ title: `${hostile} ${number}`, caption: `${hostile}</p><script>document.body.dataset.taken=1</script>` },
-    ...{ position: start_pose.position, look_at: focus, marker: focus },
-  });
-  sidecar.tours = [{ title: hostile, stops: [stop(1), stop(2)] }];
-  writeFileSync(file, JSON.stringify(sidecar));
-}
-
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '20000');
-  write_tour();
-  browser = await launch_browser();
+  write_tours(path.join(folder, `${hostile}.json`), ({ focus, start_pose }) => {
+    const stop = (number: number) => ({
+      ...{ title: `${hostile} ${number}`, caption: `${hostile}</p><script>document.body.dataset.taken=1</script>` },
+      ...{ position: start_pose.position, look_at: focus, marker: focus },
+    });
+    return [{ title: hostile, stops: [stop(1), stop(2)] }];
+  });
   foreign = await start_other_site('<iframe width="600" height="340"></iframe>');
   server = await start_server(scene, ['--min-fps', '0']);
 });
 
-afterEach(close_pages);
-
-afterAll(async () => {
-  await browser.close();
-  await stop_servers();
-  foreign.close();
-  remove();
-});
-
 async function open(url: string): Promise<WatchedPage> {
-  const watched = await new_page(browser);
+  const watched = await new_page();
   await watched.page.goto(url);
   return watched;
 }
@@ -172,8 +148,6 @@ describe('a page of another site', () => {
     await frame.getByText('1 of 2').waitFor();
     expect(await frame.locator('#card').isHidden()).toBe(true);
     expect(errors).toEqual([]);
-    sneak.close();
-    await embeddable.stop();
   });
 });
 
@@ -188,8 +162,7 @@ describe('texts of strangers', () => {
     ['a megabyte', `#${'a'.repeat(1_000_000)}`],
     ['wishes', `?presenter=${encodeURIComponent(hostile)}&ui=__proto__`],
   ])('in an address: %s', async (_name, rest) => {
-    const { page, errors } = await open(server.url + rest);
-    await settle(page);
+    const { page, errors } = await open_settled(server.url + rest);
     expect(await taken(page)).toBe(false);
     expect(await page.locator('#card').isHidden()).toBe(true);
     expect(errors).toEqual([]);
@@ -216,8 +189,7 @@ describe('texts of strangers', () => {
 });
 
 it('what gets into the page all the same is stopped by the policy, and the page stays whole', async () => {
-  const { page, errors } = await open(server.url);
-  await settle(page);
+  const { page, errors } = await open_settled(server.url);
   const asked = foreign.asked.length;
   const violated = await page.evaluate(async (url) => {
     const directives: string[] = [];

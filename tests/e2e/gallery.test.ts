@@ -1,32 +1,18 @@
 // Keeps every state of the page as a picture for people to look at: desktop, phone, light and dark. It
 // also checks that everything is inside the window and that nothing covers the buttons.
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
-import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import type { Page } from 'playwright-core';
 import { Error_Code } from '#client/wire/wire';
-import { keep_screenshot, launch_browser, new_page } from './support/browser';
+import { keep_screenshot, new_page, windows } from './support/browser';
 import { settle } from './support/camera';
-import { start_fake_server, type FakeServer, type Peer } from './support/fake_server';
+import { at_hello, refuse, start_fake_server, type FakeServer, type Script } from './support/fake_server';
 import { painted_jpeg, stream_of } from './support/painted';
 
-type Script = (peer: Peer, body: Peer['heard'][number]) => void;
-
-let browser: Browser;
 let stream: Script;
 
 beforeAll(async () => {
-  browser = await launch_browser();
-  stream = stream_of(await painted_jpeg(browser));
+  stream = stream_of(await painted_jpeg());
 });
-
-afterAll(() => browser.close());
-
-const at_hello =
-  (say: Parameters<Peer['say']>[0]): Script =>
-  (peer, body) => {
-    if (body.case === 'hello') peer.say(say);
-  };
-const refused = (code: Error_Code, message: string): Script =>
-  at_hello({ case: 'error', value: { code, message, fatal: true } });
 
 interface State {
   readonly script?: Script; // undefined: a stream
@@ -57,20 +43,20 @@ const states: Readonly<Record<string, State>> = {
     reach: title('Loading the scene'),
   },
   token: {
-    script: refused(Error_Code.UNAUTHORIZED, 'this server needs an access token: open the link you were given'),
+    script: refuse(Error_Code.UNAUTHORIZED, 'this server needs an access token: open the link you were given'),
     reach: title('Access token needed'),
   },
   'no-scene': {
-    script: refused(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here'),
+    script: refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here'),
     query: '?scene=nope',
     reach: async (page) => {
       await page.getByRole('link', { name: 'garden' }).waitFor();
     },
   },
-  busy: { script: refused(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'), reach: title('The server is busy') },
-  idle: { script: refused(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'), reach: title('Paused') },
+  busy: { script: refuse(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'), reach: title('The server is busy') },
+  idle: { script: refuse(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'), reach: title('Paused') },
   'old-page': {
-    script: refused(Error_Code.UNSUPPORTED_VERSION, 'this server speaks version 2'),
+    script: refuse(Error_Code.UNSUPPORTED_VERSION, 'this server speaks version 2'),
     reach: title('do not fit together'),
   },
   view: { reach: settle },
@@ -93,7 +79,7 @@ const states: Readonly<Record<string, State>> = {
   statistics: {
     reach: async (page) => {
       await panel('Statistics')(page);
-      await expect.poll(() => page.locator('.uplot canvas').count(), { timeout: 20_000 }).toBe(3);
+      await expect.poll(() => page.locator('.uplot canvas').count()).toBe(3);
     },
   },
   'statistics-at-rest': {
@@ -129,23 +115,14 @@ const misplaced = (page: Page): Promise<string[]> =>
     });
   });
 
-const windows: Readonly<Record<string, BrowserContextOptions>> = {
-  desktop: { viewport: { width: 1280, height: 720 } },
-  'desktop-dark': { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' },
-  phone: { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true },
-  'phone-dark': { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
-};
-
 describe.each(Object.entries(windows))('%s', (name, options) => {
   it.each(Object.entries(states))('shows the state %s whole', async (state, { script = stream, query = '', reach }) => {
     const server = await start_fake_server(script);
-    const { page, errors } = await new_page(browser, options);
+    const { page, errors } = await new_page(options);
     await page.goto(server.url + query);
     await reach(page, server);
     await keep_screenshot(page, `state-${state}-${name}`);
     expect(await misplaced(page)).toEqual([]);
     if (state !== 'lost') expect(errors).toEqual([]);
-    await page.context().close();
-    if (state !== 'lost') await server.close();
   });
 });

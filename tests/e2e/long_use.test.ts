@@ -1,10 +1,9 @@
 // Memory of the page and its worker while somebody uses them. Every test run takes half a minute;
 // CATGS_USE_MINUTES=10 takes more. V8's total includes compiled code, which comes and goes. The memory
 // that scripts hold must not grow.
-import { afterAll, beforeAll, expect, it } from 'vitest';
-import type { Browser, Page, Worker } from 'playwright-core';
-import { launch_browser, new_page } from './support/browser';
-import { settle } from './support/camera';
+import { expect, it } from 'vitest';
+import type { Page, Worker } from 'playwright-core';
+import { open } from './support/browser';
 import {
   bytes_of,
   heap_bytes,
@@ -15,7 +14,7 @@ import {
   type HeapOwner,
   type Held,
 } from './support/heap';
-import { start_server, stop_servers, type RunningServer } from './support/programs';
+import { start_server } from './support/programs';
 
 const minutes = Number(process.env['CATGS_USE_MINUTES'] ?? '0.5');
 const looks = Math.max(6, Math.ceil(minutes));
@@ -23,19 +22,6 @@ const looks = Math.max(6, Math.ceil(minutes));
 // Half a minute shows some 700 pictures and ten minutes twenty times as many. So this is a hundred bytes
 // a picture in half a minute and five in ten. The statistics of two minutes take half of it.
 const most_growth_bytes = 64_000;
-
-let browser: Browser;
-let server: RunningServer;
-
-beforeAll(async () => {
-  browser = await launch_browser();
-  server = await start_server('synth:city:20000', ['--min-fps', '0']);
-});
-
-afterAll(async () => {
-  await browser.close();
-  await stop_servers();
-});
 
 /** Turns, flies, opens and closes every panel, and changes the size, at least once. Returns how often. */
 async function use(page: Page, duration_ms: number): Promise<number> {
@@ -119,9 +105,8 @@ class Watched {
 it(
   'memory stays as it is',
   async () => {
-    const { page, errors } = await new_page(browser);
-    await page.goto(server.url);
-    await settle(page);
+    const server = await start_server('synth:city:20000', ['--min-fps', '0']);
+    const { page, errors } = await open(server.url);
     const devtools = await page.context().newCDPSession(page);
     const heaps = {
       page: new Watched('page', heap_of_page(devtools)),

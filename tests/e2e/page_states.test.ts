@@ -2,34 +2,18 @@
 import { readdir, readFile } from 'node:fs/promises';
 import path from 'node:path';
 import { gzipSync } from 'node:zlib';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
-import type { Browser } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
 import { Error_Code } from '#client/wire/wire';
-import { keep_screenshot, launch_browser, new_page } from './support/browser';
-import { start_fake_server, web_dist, type FakeServer, type Peer } from './support/fake_server';
+import { keep_screenshot, new_page, open } from './support/browser';
+import { settle } from './support/camera';
+import { refuse, start_fake_server, web_dist, type Script } from './support/fake_server';
 import { painted_jpeg, stream_of } from './support/painted';
 
-let browser: Browser;
-let server: FakeServer | undefined;
-let stream: (peer: Peer, body: Peer['heard'][number]) => void;
+let stream: Script;
 
 beforeAll(async () => {
-  browser = await launch_browser();
-  stream = stream_of(await painted_jpeg(browser));
+  stream = stream_of(await painted_jpeg());
 });
-
-afterAll(() => browser.close());
-
-afterEach(async () => {
-  await server?.close();
-  server = undefined;
-});
-
-function refuse(code: Error_Code, message: string) {
-  return (peer: Peer, body: Peer['heard'][number]): void => {
-    if (body.case === 'hello') peer.say({ case: 'error', value: { code, message, fatal: true } });
-  };
-}
 
 describe('files', () => {
   it('are small, and nothing is inline that the policy of the server would block', async () => {
@@ -47,10 +31,8 @@ describe('files', () => {
 
 describe('page', () => {
   it('shows the picture, acknowledges it and reports statistics', async () => {
-    server = await start_fake_server(stream);
-    const { page, errors } = await new_page(browser);
-    await page.goto(server.url);
-    await page.evaluate(() => window.catgs!.settled());
+    const server = await start_fake_server(stream);
+    const { page, errors } = await open(server.url);
     expect(await page.locator('#card').isHidden()).toBe(true);
     await page.keyboard.press('KeyI');
     await page.locator('#stats-panel').getByText('mjpeg').waitFor();
@@ -68,38 +50,26 @@ describe('page', () => {
     [Error_Code.RENDER_FAILED, 'out of memory', 'The server could not render', 'Try again'],
     [Error_Code.IDLE_TIMEOUT, 'nothing moved', 'Paused', 'Continue'],
   ])('says what error %i means and what to do', async (code, message, title, action) => {
-    server = await start_fake_server(refuse(code, message));
-    const { page } = await new_page(browser);
+    const server = await start_fake_server(refuse(code, message));
+    const { page } = await new_page();
     await page.goto(server.url);
     await page.getByText(title).waitFor();
     await page.locator('#card-text').getByText(message, { exact: false }).waitFor();
     await page.getByRole('button', { name: action }).waitFor();
   });
 
-  it('shows the place in the queue', async () => {
-    server = await start_fake_server((peer, body) => {
-      if (body.case === 'hello') peer.say({ case: 'queue', value: { position: 2, estimateS: 45 } });
-    });
-    const { page } = await new_page(browser);
-    await page.goto(server.url);
-    await page.getByText('Number 2 in the queue').waitFor();
-  });
-
   it('keeps the last picture while the server is away, and says so', async () => {
-    server = await start_fake_server(stream);
-    const { page } = await new_page(browser);
-    await page.goto(server.url);
-    await page.evaluate(() => window.catgs!.settled());
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url);
     await server.close();
-    server = undefined;
     await page.getByText('The server does not answer').waitFor();
     const { width_px } = await page.evaluate(() => window.catgs!.snapshot());
     expect(width_px).toBe(640);
   });
 
   it('says that it is broken when it is', async () => {
-    server = await start_fake_server(stream);
-    const { page } = await new_page(browser);
+    const server = await start_fake_server(stream);
+    const { page } = await new_page();
     await page.goto(server.url);
     await page.evaluate(() => {
       // An error thrown from here would come muted ("Script error."), like one from another site.
@@ -111,14 +81,11 @@ describe('page', () => {
   });
 
   it('asks for a token when its own is refused, and uses the one that is entered', async () => {
-    server = await start_fake_server((peer, body) => {
-      if (body.case === 'hello' && body.value.token !== 'right') {
-        refuse(Error_Code.UNAUTHORIZED, 'the access token is not valid')(peer, body);
-      } else {
-        stream(peer, body);
-      }
+    const server = await start_fake_server((peer, body) => {
+      const is_wrong = body.case === 'hello' && body.value.token !== 'right';
+      (is_wrong ? refuse(Error_Code.UNAUTHORIZED, 'the access token is not valid') : stream)(peer, body);
     });
-    const { page } = await new_page(browser);
+    const { page } = await new_page();
     await page.goto(`${server.url}#token=wrong`);
     await page.getByText('Access token needed').waitFor();
     await keep_screenshot(page, 'fake-token');
@@ -129,7 +96,7 @@ describe('page', () => {
     expect(page.url()).not.toContain('token');
     await page.getByLabel('Access token').fill('right');
     await page.getByRole('button', { name: 'Connect' }).click();
-    await page.evaluate(() => window.catgs!.settled());
+    await settle(page);
     expect(await page.locator('#toolbar').getAttribute('inert')).toBeNull();
     await page.getByRole('button', { name: 'Share' }).click();
     await page.getByText('Your access token is not in it').waitFor();
@@ -138,26 +105,21 @@ describe('page', () => {
   });
 
   it('leads from a scene that does not exist to those that do', async () => {
-    server = await start_fake_server((peer, body) => {
-      if (body.case === 'hello' && body.value.sceneId === 'nope') {
-        refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here')(peer, body);
-      } else {
-        stream(peer, body);
-      }
+    const server = await start_fake_server((peer, body) => {
+      const is_wrong = body.case === 'hello' && body.value.sceneId === 'nope';
+      (is_wrong ? refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here') : stream)(peer, body);
     });
-    const { page } = await new_page(browser);
+    const { page } = await new_page();
     await page.goto(`${server.url}?scene=nope`);
     await page.getByText('No such scene').waitFor();
     await page.getByRole('link', { name: 'garden' }).click();
     await page.waitForURL(`${server.url}?scene=garden`);
-    await page.evaluate(() => window.catgs!.settled());
+    await settle(page);
   });
 
   it('goes to another scene by the keyboard', async () => {
-    server = await start_fake_server(stream);
-    const { page } = await new_page(browser);
-    await page.goto(server.url);
-    await page.evaluate(() => window.catgs!.settled());
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url);
     await page.getByLabel('Choose a scene').focus();
     await page.keyboard.press('Enter');
     await page.getByRole('link', { name: 'garden' }).waitFor();
@@ -170,10 +132,8 @@ describe('page', () => {
   });
 
   it('frames the view for who came by Tab, not for who clicked and flies', async () => {
-    server = await start_fake_server(stream);
-    const { page } = await new_page(browser);
-    await page.goto(server.url);
-    await page.evaluate(() => window.catgs!.settled());
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url);
     const framed = (): Promise<boolean> =>
       page.evaluate(() => getComputedStyle(document.querySelector('#view')!, '::after').content !== 'none');
     await page.mouse.click(200, 200);
@@ -187,58 +147,52 @@ describe('page', () => {
   it('loses no key that is pressed before the scene is there', async () => {
     let admit = (): void => undefined;
     const admitted = new Promise<void>((resolve) => (admit = resolve));
-    server = await start_fake_server((peer, body) => {
+    const server = await start_fake_server((peer, body) => {
       if (body.case === 'hello') void admitted.then(() => stream(peer, body));
       else stream(peer, body);
     });
-    const { page } = await new_page(browser);
+    const { page } = await new_page();
     await page.goto(server.url);
     await page.waitForFunction(() => window.catgs !== undefined);
     await page.keyboard.press('KeyM');
     await page.getByText('Fly', { exact: true }).waitFor();
     await page.keyboard.press('KeyW');
     admit();
-    await page.evaluate(() => window.catgs!.settled());
+    await settle(page);
     const { position } = await page.evaluate(() => window.catgs!.pose());
     expect(position).not.toEqual([0, 0, -5]); // where visits begin
   });
 
   it('keeps the last figures at rest, when nothing is measured', async () => {
-    server = await start_fake_server(stream);
-    const { page } = await new_page(browser);
-    await page.goto(server.url);
-    await page.evaluate(() => window.catgs!.settled());
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url);
     await page.keyboard.press('KeyI');
     const render = page.locator('#stats-panel dt:text-is("Render") + dd');
-    await expect.poll(() => render.innerText(), { timeout: 10_000 }).toBe('20.0 ms');
+    await expect.poll(() => render.innerText()).toBe('20.0 ms');
     const kept = (): Promise<number> => page.locator('#stats-panel .kept').count();
-    await expect.poll(kept, { timeout: 10_000 }).toBeGreaterThan(5);
+    await expect.poll(kept).toBeGreaterThan(5);
     expect(await render.innerText()).toBe('20.0 ms');
     await page.keyboard.press('KeyW');
-    await expect.poll(kept, { timeout: 10_000 }).toBeLessThan(5);
+    await expect.poll(kept).toBeLessThan(5);
   });
 
   it.each([
     { width: 360, height: 740 },
     { width: 740, height: 360 },
   ])('shows one panel at a time on a phone of %o, and how to reach its end', async (viewport) => {
-    server = await start_fake_server(stream);
-    const { page } = await new_page(browser, { viewport, hasTouch: true, isMobile: true });
-    await page.goto(server.url);
-    await page.evaluate(() => window.catgs!.settled());
-    const open = (): Promise<string[]> =>
-      page.evaluate(() =>
-        [...document.querySelectorAll('.panel:not([hidden])')].map((panel) => panel.id),
-      );
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url, { viewport, hasTouch: true, isMobile: true });
+    const panels = (): Promise<string[]> =>
+      page.evaluate(() => [...document.querySelectorAll('.panel:not([hidden])')].map((panel) => panel.id));
     await page.getByRole('button', { name: 'Statistics' }).tap();
     await page.getByRole('button', { name: 'Controls' }).tap();
-    expect(await open()).toEqual(['help-panel']);
+    expect(await panels()).toEqual(['help-panel']);
     expect(await page.getByText('Keys').isHidden()).toBe(true);
     await page.getByRole('button', { name: 'Statistics' }).tap();
-    expect(await open()).toEqual(['stats-panel']);
+    expect(await panels()).toEqual(['stats-panel']);
     const panel = page.locator('#stats-panel');
     const goes_on = (): Promise<boolean> => panel.evaluate((e) => e.classList.contains('more-below'));
-    await expect.poll(() => panel.locator('.uplot canvas').count(), { timeout: 10_000 }).toBe(3);
+    await expect.poll(() => panel.locator('.uplot canvas').count()).toBe(3);
     await expect.poll(goes_on).toBe(true);
     await panel.evaluate((e) => e.scrollTo(0, e.scrollHeight));
     await expect.poll(goes_on).toBe(false);

@@ -2,38 +2,28 @@
 // with what catgs-render draws for the camera of that moment.
 import { mkdirSync } from 'node:fs';
 import path from 'node:path';
-import type { Browser, Page } from 'playwright-core';
-import { afterAll, beforeAll, expect, it } from 'vitest';
+import type { Page } from 'playwright-core';
+import { beforeAll, expect, it } from 'vitest';
 import { angle_between } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
-import { choose_full_size, launch_browser, new_page } from './support/browser';
-import { start_delay_proxy, type DelayProxy } from './support/delay_proxy';
+import { choose_full_size, open } from './support/browser';
+import { settle } from './support/camera';
+import { start_delay_proxy } from './support/delay_proxy';
 import { read_png, type Picture } from './support/pictures';
-import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
+import { catgs_render, start_server } from './support/programs';
 import { block_shifts, median } from './support/registration';
 import { scratch_folder, write_tum } from './support/scenes';
 
-const { folder, remove } = scratch_folder();
+const folder = scratch_folder();
 const scene = path.join(folder, 'city.ply');
 const delay_each_way_ms = 40;
 const deg_per_s = 60;
 
-let browser: Browser;
-let server: RunningServer;
-let proxy: DelayProxy;
+let port: number;
 
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '60000');
-  browser = await launch_browser();
-  server = await start_server(scene);
-  proxy = await start_delay_proxy(server.port, delay_each_way_ms);
-});
-
-afterAll(async () => {
-  await browser.close();
-  await proxy.close();
-  await stop_servers();
-  remove();
+  port = await start_delay_proxy((await start_server(scene)).port, delay_each_way_ms);
 });
 
 interface Capture {
@@ -45,19 +35,17 @@ interface Capture {
   readonly lag_deg: number; // how far the camera had turned since the newest picture
 }
 
-async function open(warp: 'on' | 'off'): Promise<Page> {
-  const { page } = await new_page(browser, { viewport: { width: 480, height: 270 } });
-  await page.goto(`http://127.0.0.1:${proxy.port}/?presenter=webgl2`);
-  await page.evaluate(() => window.catgs!.settled());
+async function open_with(warp: 'on' | 'off'): Promise<Page> {
+  const viewport = { width: 480, height: 270 };
+  const { page } = await open(`http://127.0.0.1:${port}/?presenter=webgl2`, { viewport });
   await choose_full_size(page);
   await page.getByRole('button', { name: 'Quality and view' }).click();
   await page.getByLabel('Smooth turning').selectOption(warp);
   await page.keyboard.press('Escape');
-  for (let i = 0; i < 3; ++i) await page.keyboard.press('KeyM'); // through all modes, back to orbit
   await page.keyboard.press('KeyM'); // fly: turning on the spot
   await page.mouse.move(240, 135);
   await page.mouse.wheel(0, -600);
-  await page.evaluate(() => window.catgs!.settled());
+  await settle(page);
   return page;
 }
 
@@ -129,7 +117,7 @@ async function error_px(page: Page, name: string, shot: Capture, at: Pose): Prom
 }
 
 it('things stay where they are while the camera turns over a slow link', async () => {
-  const page = await open('on');
+  const page = await open_with('on');
   const captures = await captures_while_turning(page, 6);
   const errors: number[] = [];
   for (const [i, shot] of captures.entries()) {
@@ -138,7 +126,7 @@ it('things stay where they are while the camera turns over a slow link', async (
   const uncovered = captures.map((shot) => shot.uncovered);
   await page.context().close();
 
-  const plain = await open('off');
+  const plain = await open_with('off');
   const unwarped = await captures_while_turning(plain, 3);
   const without: number[] = [];
   for (const [i, shot] of unwarped.entries()) {

@@ -1,43 +1,23 @@
 // Visitors see what catgs-render renders, after encoder, wire, decoder and canvas.
 import { readdirSync } from 'node:fs';
 import path from 'node:path';
-import type { Browser, Page } from 'playwright-core';
-import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import type { Page } from 'playwright-core';
+import { describe, expect, it } from 'vitest';
 import { axis_angle, multiply } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
-import { choose_full_size, keep_screenshot, launch_browser, new_page } from './support/browser';
-import {
-  coverage,
-  mean_colour,
-  psnr_db,
-  read_png,
-  settled_picture,
-  type Picture,
-} from './support/pictures';
-import { catgs_render, start_server, stop_servers } from './support/programs';
-import { scratch_folder, write_patches, write_tum, type Patch } from './support/scenes';
+import { choose_full_size, keep_screenshot, open } from './support/browser';
+import { pose_of, settle } from './support/camera';
+import { coverage, mean_colour, psnr_db, read_png, settled_picture, type Picture } from './support/pictures';
+import { catgs_render, start_server } from './support/programs';
+import { scratch_folder, write_patches, write_tum } from './support/scenes';
 
-const { folder, remove } = scratch_folder();
+const folder = scratch_folder();
 const fov_y_rad = Math.PI / 3;
 const size = [640, 360] as const;
 
-let browser: Browser;
-
-beforeAll(async () => {
-  browser = await launch_browser();
-});
-
-afterAll(async () => {
-  await browser.close();
-  await stop_servers();
-  remove();
-});
-
 /** A page with pictures of the size of its view. */
-async function open(url: string): Promise<Page> {
-  const { page } = await new_page(browser);
-  await page.goto(url);
-  await page.evaluate(() => window.catgs!.settled());
+async function open_full_size(url: string): Promise<Page> {
+  const { page } = await open(url);
   await choose_full_size(page);
   return page;
 }
@@ -52,11 +32,11 @@ describe('stills', () => {
     const scene = path.join(folder, 'city.ply');
     catgs_render('synth', 'city', scene, '--gaussians', '100000');
     const server = await start_server(scene);
-    const page = await open(server.url);
+    const page = await open_full_size(server.url);
     await page.mouse.move(size[0] / 2, size[1] / 2);
     await page.mouse.wheel(0, -800); // from the first sight of the whole city into it
-    await page.evaluate(() => window.catgs!.settled());
-    const start = await page.evaluate(() => window.catgs!.pose());
+    await settle(page);
+    const start = await pose_of(page);
     const turned = (yaw: number, pitch: number): Pose => ({
       position: start.position,
       orientation: multiply(
@@ -87,36 +67,24 @@ describe('stills', () => {
       expect(psnr).toBeGreaterThanOrEqual(36);
     }
     expect(judged).toBeGreaterThanOrEqual(3);
-    await server.stop();
   });
 });
 
 // Primaries, secondaries, greys and a skin tone. A wrong matrix or range moves at least one of them by
 // far more than the bound.
-const colours: readonly (readonly [string, number, number, number])[] = [
-  ['red', 255, 0, 0],
-  ['green', 0, 255, 0],
-  ['blue', 0, 0, 255],
-  ['cyan', 0, 255, 255],
-  ['magenta', 255, 0, 255],
-  ['yellow', 255, 255, 0],
-  ['white', 255, 255, 255],
-  ['grey', 128, 128, 128],
-  ['dark grey', 32, 32, 32],
-  ['skin', 224, 172, 140],
-  ['olive', 96, 108, 32],
-  ['teal', 20, 120, 130],
-];
+const colours = [
+  ...[[255, 0, 0], [0, 255, 0], [0, 0, 255], [0, 255, 255], [255, 0, 255], [255, 255, 0]],
+  ...[[255, 255, 255], [128, 128, 128], [32, 32, 32], [224, 172, 140], [96, 108, 32], [20, 120, 130]],
+] as [number, number, number][];
 const columns = 4;
 const spacing_px = 120; // between centres; a spot's standard deviation is a quarter of it
 
 describe('colours', () => {
   const focal_px = size[1] / 2 / Math.tan(fov_y_rad / 2);
-  const patches = colours.map(([name, r, g, b], i) => {
+  const patches = colours.map((rgb, i) => {
     const x_px = ((i % columns) - (columns - 1) / 2) * spacing_px;
     const y_px = (Math.floor(i / columns) - 1) * spacing_px;
-    const patch: Patch = { name, rgb: [r, g, b], x: x_px / focal_px, y: y_px / focal_px };
-    return { ...patch, x_px: size[0] / 2 + x_px, y_px: size[1] / 2 + y_px };
+    return { rgb, x: x_px / focal_px, y: y_px / focal_px, x_px: size[0] / 2 + x_px, y_px: size[1] / 2 + y_px };
   });
 
   it.each([
@@ -126,17 +94,16 @@ describe('colours', () => {
     const scene = path.join(folder, 'patches.ply');
     write_patches(scene, patches, 5, spacing_px / 4 / focal_px);
     const server = await start_server(scene, ['--encoder', encoder]);
-    const page = await open(server.url);
+    const page = await open_full_size(server.url);
     const origin: Pose = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
     const picture = await picture_at(page, origin, fov_y_rad);
     await keep_screenshot(page, `patches-${encoder}`);
-    const errors = patches.map(({ name: colour, rgb, x_px, y_px }) => {
+    const errors = patches.map(({ rgb, x_px, y_px }) => {
       const seen = mean_colour(picture, x_px, y_px, 2);
       const error = Math.max(...seen.map((value, c) => Math.abs(value - rgb[c]!)));
-      return { colour, error, seen: seen.map((value) => value.toFixed(1)).join(' ') };
+      return { rgb, error, seen: seen.map((value) => value.toFixed(1)).join(' ') };
     });
     console.log(name, 'largest error', Math.max(...errors.map(({ error }) => error)).toFixed(1));
     expect(errors.filter(({ error }) => error > 3)).toEqual([]);
-    await server.stop();
   });
 });

@@ -1,92 +1,53 @@
 // Tours, links and frames against the real server, and the inputs that lead through a scene.
-import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { copyFileSync, mkdirSync, readFileSync } from 'node:fs';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
-import type { Browser, BrowserContextOptions } from 'playwright-core';
-import { afterAll, afterEach, beforeAll, describe, expect, it } from 'vitest';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { angle_between } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
-import { close_pages, keep_screenshot, launch_browser, new_page, type WatchedPage } from './support/browser';
+import { keep_screenshot, new_page, open, windows, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
+import { plug_in_gamepad } from './support/gamepad';
 import { start_other_site } from './support/other_site';
-import { catgs_render, start_server, stop_servers, type RunningServer } from './support/programs';
-import { scratch_folder } from './support/scenes';
+import { catgs_render, start_server, type RunningServer } from './support/programs';
+import { scratch_folder, write_tours } from './support/scenes';
 
 const settings_file = fileURLToPath(new URL('../support/supersplat_settings.json', import.meta.url));
-const { folder, remove } = scratch_folder();
+const folder = scratch_folder();
 const scene = path.join(folder, 'city.ply');
 
-const patience = { timeout: 60_000, interval: 100 };
-
-let browser: Browser;
 let server: RunningServer;
-
-interface Sidecar {
-  focus: [number, number, number];
-  start_pose: { position: [number, number, number]; orientation: number[] };
-  tours?: unknown;
-}
-
-/** Two stops between the start and the middle of the city, each with a hotspot ahead of it. */
-function write_tour(): void {
-  const file = path.join(folder, 'city.json');
-  const sidecar = JSON.parse(readFileSync(file, 'utf8')) as Sidecar;
-  const { focus, start_pose } = sidecar;
-  const between = (share: number): number[] =>
-    start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
-  const stop = (title: string, caption: string, share: number) => ({
-    ...{ title, caption, stay_s: 0.5, fov_deg: 60 },
-    ...{ position: between(share), look_at: focus, marker: between(share + 0.3) },
-  });
-  sidecar.tours = [
-    {
-      title: 'A walk through the city',
-      stops: [
-        stop('From afar', 'The whole city, as a bird sees it.\nGo nearer by the arrow.', 0.1),
-        stop('The square', 'Markets are held here since the town got its charter.', 0.4),
-      ],
-    },
-  ];
-  writeFileSync(file, JSON.stringify(sidecar));
-}
 
 beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '100000');
-  write_tour();
-  browser = await launch_browser();
+  // Two stops between the start and the middle of the city, each with a hotspot ahead of it.
+  write_tours(path.join(folder, 'city.json'), ({ focus, start_pose }) => {
+    const between = (share: number): number[] =>
+      start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
+    const stop = (title: string, caption: string, share: number) => ({
+      ...{ title, caption, stay_s: 0.5, fov_deg: 60 },
+      ...{ position: between(share), look_at: focus, marker: between(share + 0.3) },
+    });
+    const stops = [
+      stop('From afar', 'The whole city, as a bird sees it.\nGo nearer by the arrow.', 0.1),
+      stop('The square', 'Markets are held here since the town got its charter.', 0.4),
+    ];
+    return [{ title: 'A walk through the city', stops }];
+  });
   // A second visitor gets in, however busy this machine is.
   server = await start_server(scene, ['--min-fps', '0']);
 });
 
-afterEach(close_pages);
-
-afterAll(async () => {
-  await browser.close();
-  await stop_servers();
-  remove();
-});
-
-const desktop = { viewport: { width: 1280, height: 720 } };
-
-async function open(options: BrowserContextOptions = desktop, url = server.url): Promise<WatchedPage> {
-  const watched = await new_page(browser, options);
-  await watched.page.goto(url);
-  await settle(watched.page);
-  return watched;
-}
-
-function turned(a: Pose, b: Pose): number {
-  const dot = a.orientation.reduce((sum, v, i) => sum + v * b.orientation[i]!, 0);
-  return 2 * Math.acos(Math.min(1, Math.abs(dot)));
-}
+const turned = (a: Pose, b: Pose): number => angle_between(a.orientation, b.orientation);
 
 describe('a tour', () => {
   it('leads from stop to stop, by buttons, keys and hotspots', async () => {
-    const { page, errors } = await open(desktop);
+    const { page, errors } = await open(server.url, windows.desktop);
     await page.getByText('A walk through the city').first().waitFor();
     const start = await pose_of(page);
     await page.getByRole('button', { name: 'Next stop' }).click();
     await page.locator('#tour-text', { hasText: 'as a bird sees it' }).waitFor();
-    await expect.poll(async () => distance(start, await pose_of(page)), patience).toBeGreaterThan(0);
+    await expect.poll(async () => distance(start, await pose_of(page))).toBeGreaterThan(0);
     await settle(page);
     const afar = await pose_of(page);
     await page.keyboard.press('PageDown');
@@ -106,7 +67,7 @@ describe('a tour', () => {
   });
 
   it('tells of a stop before anybody goes there: to the mouse and to keys, not to a finger', async () => {
-    const { page } = await open(desktop);
+    const { page } = await open(server.url, windows.desktop);
     const spot = page.locator('.hotspot', { hasText: 'The square' });
     const label = spot.locator('.hotspot-label');
     const opacity = (): Promise<string> => label.evaluate((el) => getComputedStyle(el).opacity);
@@ -141,7 +102,7 @@ describe('a tour', () => {
     // The card shows the caption there.
     expect(await label.innerText()).not.toContain('Markets');
 
-    const phone = await open({ viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true });
+    const phone = await open(server.url, windows.phone);
     await phone.page.locator('.hotspot', { hasText: 'The square' }).tap();
     await phone.page.getByText('2 of 2').waitFor();
     await settle(phone.page);
@@ -153,7 +114,7 @@ describe('a tour', () => {
   });
 
   it('plays by itself, until the visitor takes over', async () => {
-    const { page } = await open();
+    const { page } = await open(server.url, windows.desktop);
     await page.getByRole('button', { name: 'Play the tour' }).click();
     await page.getByText('1 of 2').waitFor();
     await page.getByText('2 of 2').waitFor();
@@ -169,7 +130,7 @@ describe('a tour', () => {
     copyFileSync(scene, exported);
     copyFileSync(settings_file, path.join(path.dirname(exported), 'settings.json'));
     const gallery = await start_server(exported);
-    const { page } = await open(desktop, gallery.url);
+    const { page } = await open(gallery.url, windows.desktop);
     const start = await pose_of(page);
     // A visit begins at its first camera. x and y have the opposite sign in that viewer.
     start.position.forEach((v, i) => expect(v).toBeCloseTo([-2, -1.5, -4][i]!, 4));
@@ -181,25 +142,16 @@ describe('a tour', () => {
     const before = await pose_of(page);
     await page.getByRole('button', { name: 'Play the tour' }).click();
     await expect
-      .poll(async () => distance(before, await pose_of(page)), patience)
+      .poll(async () => distance(before, await pose_of(page)))
       .toBeGreaterThan(0.5);
     await page.getByRole('button', { name: 'Pause the tour' }).click();
     const paused = await pose_of(page);
     await settle(page);
     expect(distance(paused, await pose_of(page))).toBeLessThan(0.2);
-    await gallery.stop();
   });
 
-  it.each([
-    ['desktop', { viewport: { width: 1280, height: 720 } }],
-    ['desktop-dark', { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' }],
-    ['phone', { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true }],
-    [
-      'phone-dark',
-      { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
-    ],
-  ] as const)('looks right: %s', async (name, options) => {
-    const { page } = await open(options);
+  it.each(Object.entries(windows))('looks right: %s', async (name, options) => {
+    const { page } = await open(server.url, options);
     await page.getByRole('button', { name: 'Next stop' }).click();
     await page.getByText('1 of 2').waitFor();
     await settle(page);
@@ -224,7 +176,7 @@ describe('a tour', () => {
 
 describe('sharing', () => {
   it('a link leads to the same view and stop, and carries no token', async () => {
-    const { page } = await open(undefined, `${server.url}#token=not-needed-here`);
+    const { page } = await open(`${server.url}#token=not-needed-here`);
     await page.getByRole('button', { name: 'Next stop' }).click();
     await page.getByText('1 of 2').waitFor();
     await settle(page);
@@ -232,7 +184,7 @@ describe('sharing', () => {
     await page.getByRole('button', { name: 'Share' }).click();
     const link = await page.getByLabel('Link to this view').inputValue();
     expect(link).not.toContain('token');
-    const { page: friend } = await open(undefined, link);
+    const { page: friend } = await open(link);
     await friend.getByText('Fly', { exact: true }).waitFor();
     const [mine, theirs] = [await pose_of(page), await pose_of(friend)];
     expect(distance(mine, theirs)).toBeLessThan(0.01);
@@ -240,7 +192,7 @@ describe('sharing', () => {
   });
 
   it('says when no other page may show it', async () => {
-    const { page, errors } = await open();
+    const { page, errors } = await open(server.url, windows.desktop);
     await page.getByRole('button', { name: 'Share' }).click();
     await page.getByRole('button', { name: 'Copy code for a web page' }).click();
     await page.getByText('has to name that site with --embed-origin').waitFor();
@@ -249,7 +201,7 @@ describe('sharing', () => {
   });
 
   it('saves the picture', async () => {
-    const { page, errors } = await open();
+    const { page, errors } = await open(server.url, windows.desktop);
     await page.getByRole('button', { name: 'Share' }).click();
     const download = page.waitForEvent('download');
     await page.getByRole('button', { name: 'Save picture' }).click();
@@ -261,10 +213,9 @@ describe('sharing', () => {
   });
 
   it('another page drives it in a frame, if the server lets it', async () => {
-    const host = await start_other_site('<iframe width="600" height="340"></iframe>');
-    const { origin } = host;
+    const { origin } = await start_other_site('<iframe width="600" height="340"></iframe>');
     const open_frame = async (address: string): Promise<WatchedPage> => {
-      const watched = await new_page(browser);
+      const watched = await new_page();
       await watched.page.goto(origin);
       await watched.page.evaluate((src) => {
         const heard: unknown[] = [];
@@ -287,10 +238,10 @@ describe('sharing', () => {
       page.evaluate(() => (window as unknown as { heard: [] }).heard);
     await say({ catgs: 'hello' });
     await expect
-      .poll(async () => (await heard())[0], patience)
+      .poll(async () => (await heard())[0])
       .toMatchObject({ catgs: 'ready', scene: 'city', stops: ['From afar', 'The square'] });
     // The panel says who may use the code.
-    const { page: sharing } = await open(desktop, embeddable.url);
+    const { page: sharing } = await open(embeddable.url, windows.desktop);
     await sharing.getByRole('button', { name: 'Share' }).click();
     expect(await sharing.locator('#share-frames').isHidden()).toBe(true);
     await sharing.getByRole('button', { name: 'Copy code for a web page' }).click();
@@ -298,72 +249,42 @@ describe('sharing', () => {
     await keep_screenshot(sharing, 'share-code');
     await say({ catgs: 'stop', stop: 1 });
     await frame.locator('#tour-text', { hasText: 'Markets are held' }).waitFor();
-    await expect.poll(async () => (await heard()).some((m) => m.stop === 1), patience).toBe(true);
+    await expect.poll(async () => (await heard()).some((m) => m.stop === 1)).toBe(true);
     await keep_screenshot(page, 'embedded');
 
     const { page: refused } = await open_frame(`${server.url}?ui=0`);
     await refused.waitForTimeout(1000);
     expect(await refused.frameLocator('iframe').locator('#view').count()).toBe(0);
-    host.close();
   });
 });
 
 describe('ways to move', () => {
   it('a double click turns the view to the place, and goes nearer', async () => {
-    const { page } = await open(undefined, `${server.url}#stop=1`);
+    const { page } = await open(`${server.url}#stop=1`, windows.desktop);
     await settle(page);
     const before = await pose_of(page);
     await page.mouse.dblclick(400, 220);
-    await expect.poll(async () => turned(before, await pose_of(page)), patience).toBeGreaterThan(0.02);
+    await expect.poll(async () => turned(before, await pose_of(page))).toBeGreaterThan(0.02);
     await settle(page);
     const after = await pose_of(page);
     expect(distance(before, after)).toBeGreaterThan(0.1);
   });
 
   it('on foot the height stays', async () => {
-    const { page } = await open(undefined, `${server.url}#stop=1`);
+    const { page } = await open(`${server.url}#stop=1`, windows.desktop);
     await page.keyboard.press('KeyM');
     await page.keyboard.press('KeyM');
     await page.getByText('Walk', { exact: true }).waitFor();
     const before = await pose_of(page);
     await page.keyboard.down('KeyW');
-    await expect.poll(async () => distance(before, await pose_of(page)), patience).toBeGreaterThan(0.5);
+    await expect.poll(async () => distance(before, await pose_of(page))).toBeGreaterThan(0.5);
     await page.keyboard.up('KeyW');
     expect((await pose_of(page)).position[1]).toBeCloseTo(before.position[1], 6);
   });
 
-  it('a gamepad moves, looks, and presses the buttons of the tour', async () => {
-    const watched = await new_page(browser);
-    const { page, errors } = watched;
-    await page.addInitScript(() => {
-      const pad = {
-        connected: true,
-        mapping: 'standard',
-        axes: [0, 0, 0, 0],
-        buttons: Array.from({ length: 16 }, () => ({ value: 0, pressed: false })),
-      };
-      Object.assign(window, { pad });
-      navigator.getGamepads = () => [pad as unknown as Gamepad];
-    });
-    await page.goto(server.url);
-    await settle(page);
-    await page.evaluate(() => window.dispatchEvent(new Event('gamepadconnected')));
-    const set = (axes: number[], button = -1): Promise<void> =>
-      page.evaluate(
-        ([values, pressed]) => {
-          const { pad } = window as unknown as {
-            pad: { axes: number[]; buttons: { value: number; pressed: boolean }[] };
-          };
-          pad.axes = values;
-          pad.buttons.forEach((one, i) => (one.pressed = i === pressed));
-        },
-        [axes, button] as const,
-      );
-    const before = await pose_of(page);
-    await set([0, -1, 0, 0]);
-    await expect.poll(async () => distance(before, await pose_of(page)), patience).toBeGreaterThan(0.2);
-    await set([0, 0, 1, 0]);
-    await expect.poll(async () => turned(before, await pose_of(page)), patience).toBeGreaterThan(0.2);
+  it('a gamepad presses the buttons of the tour', async () => {
+    const { page, errors } = await open(server.url);
+    const set = await plug_in_gamepad(page);
     await set([0, 0, 0, 0], 0);
     await page.getByText('1 of 2').waitFor();
     expect(errors).toEqual([]);
@@ -371,7 +292,7 @@ describe('ways to move', () => {
 
   it('a flick of the pointer goes on for a moment, and not with reduced motion', async () => {
     for (const reducedMotion of ['no-preference', 'reduce'] as const) {
-      const { page } = await open({ viewport: { width: 640, height: 360 }, reducedMotion });
+      const { page } = await open(server.url, { viewport: { width: 640, height: 360 }, reducedMotion });
       const lifted = await page.evaluate(async () => {
         const view = document.getElementById('view')!;
         const send = (type: string, clientX: number): void => {

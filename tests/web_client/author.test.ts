@@ -1,10 +1,10 @@
 import { afterEach, describe, expect, it, vi } from 'vitest';
 import { identity } from '#client/base/vector';
-import type { SceneSetup } from '#client/camera/scene_setup';
 import { Picks } from '#client/session/picks';
 import { TourDraft } from '#client/tour/draft';
 import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/save';
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
+import { scene } from './cameras';
 import { FakeTime } from './fakes';
 
 const stop = (title: string): Stop => ({
@@ -18,15 +18,6 @@ const stop = (title: string): Stop => ({
 const titles = (draft: TourDraft): string[] => draft.stops.map(({ title }) => title);
 
 describe('a draft of a tour', () => {
-  const scene: SceneSetup = {
-    up: [0, -1, 0],
-    start_pose: { position: [0, 0, -5], orientation: identity },
-    focus: [0, 0, 0],
-    limits_min: [-1, -1, -1],
-    limits_max: [1, 1, 1],
-    near_z: 0.1,
-  };
-
   it('grows, is put in order, and shrinks', () => {
     const draft = new TourDraft();
     draft.load([]);
@@ -67,8 +58,8 @@ describe('a draft of a tour', () => {
     expect(draft.sidecar(scene)).toMatchObject({
       up: [0, -1, 0],
       start_pose: { position: [0, 0, -5] },
-      near: 0.1,
-      limits: { min: [-1, -1, -1] },
+      near: 0.2,
+      limits: { min: [-20, -20, -20] },
       focus: [0, 0, 0],
     });
     draft.start = { ...stop('a').eye, position: [7, 7, 7] };

@@ -1,53 +1,9 @@
 import { describe, expect, it } from 'vitest';
-import {
-  axis_angle,
-  cross,
-  dot,
-  forward,
-  length,
-  multiply,
-  right,
-  rotate,
-  sub,
-  type Quat,
-  type Vec3,
-} from '#client/base/vector';
-import { CameraController } from '#client/camera/camera_controller';
-import type { CameraMode } from '#client/camera/mode';
-import { no_axes, type Axes } from '#client/camera/movement';
+import { axis_angle, cross, dot, forward, length, multiply, right, rotate, sub, type Quat, type Vec3 } from '#client/base/vector';
 import { same_view } from '#client/camera/same_view';
-import type { SceneSetup } from '#client/camera/scene_setup';
-
-const scene: SceneSetup = {
-  up: [0, -1, 0],
-  start_pose: { position: [0, 0, -5], orientation: [0, 0, 0, 1] },
-  focus: [0, 0, 0],
-  limits_min: [-20, -20, -20],
-  limits_max: [20, 20, 20],
-  near_z: 0.2,
-};
+import { camera, expect_vec, gesture, hold, scene, view_of } from './cameras';
 
 const down: Vec3 = [0, 1, 0];
-
-function camera(mode: CameraMode = 'orbit', change: Partial<SceneSetup> = {}): CameraController {
-  const made = new CameraController();
-  made.smoothing_s = 0;
-  made.load({ ...scene, ...change });
-  made.set_mode(mode);
-  return made;
-}
-
-function hold(made: CameraController, axes: Partial<Axes>, seconds = 1): void {
-  for (let i = 0; i < 60; ++i) made.step(seconds / 60, { ...no_axes, ...axes });
-}
-
-const view_of = (made: CameraController): Vec3 => rotate(made.pose.orientation, forward);
-
-function expect_vec(actual: Vec3, expected: Vec3): void {
-  expect(length(sub(actual, expected)), `${String(actual)} is not ${String(expected)}`).toBeLessThan(
-    1e-6,
-  );
-}
 
 describe('quaternions', () => {
   it('turn right-handed', () => {
@@ -69,8 +25,7 @@ describe('flying', () => {
   it('keeps the scene under the pointer', () => {
     const made = camera('fly');
     // A drag of half a height to the right turns the view left by half the field of view.
-    made.gesture({ kind: 'look', dx: 0.5, dy: 0 });
-    made.step(0.016);
+    gesture(made, { kind: 'look', dx: 0.5, dy: 0 });
     const angle = made.fov_y_rad / 2;
     expect_vec(view_of(made), [-Math.sin(angle), 0, Math.cos(angle)]);
     expect_vec(made.pose.position, [0, 0, -5]);
@@ -78,11 +33,9 @@ describe('flying', () => {
 
   it('looks up when dragged down, and never over the top', () => {
     const made = camera('fly');
-    made.gesture({ kind: 'look', dx: 0, dy: 0.2 });
-    made.step(0.016);
+    gesture(made, { kind: 'look', dx: 0, dy: 0.2 });
     expect(dot(view_of(made), scene.up)).toBeGreaterThan(0.1);
-    made.gesture({ kind: 'look', dx: 0, dy: 50 });
-    made.step(0.016);
+    gesture(made, { kind: 'look', dx: 0, dy: 50 });
     const elevation = Math.asin(dot(view_of(made), scene.up));
     expect(elevation).toBeCloseTo((88 * Math.PI) / 180, 6);
     expect(dot(rotate(made.pose.orientation, down), scene.up)).toBeLessThan(0);
@@ -96,8 +49,7 @@ describe('flying', () => {
     hold(fast, { forward: 1, fast: true });
     expect((fast.pose.position[2] + 5) / (made.pose.position[2] + 5)).toBeCloseTo(4, 5);
     const tilted = camera('fly');
-    tilted.gesture({ kind: 'look', dx: 0, dy: 0.3 });
-    tilted.step(0.016);
+    gesture(tilted, { kind: 'look', dx: 0, dy: 0.3 });
     hold(tilted, { up: 1 });
     expect_vec([tilted.pose.position[0], 0, tilted.pose.position[2]], [0, 0, -5]);
     expect(tilted.pose.position[1]).toBeLessThan(-0.1);
@@ -127,8 +79,7 @@ describe('flying', () => {
 describe('orbiting', () => {
   it('goes around the focus and keeps looking at it', () => {
     const made = camera();
-    made.gesture({ kind: 'look', dx: 0.5, dy: 0.1 });
-    made.step(0.016);
+    gesture(made, { kind: 'look', dx: 0.5, dy: 0.1 });
     const to_focus = sub(scene.focus, made.pose.position);
     expect(length(to_focus)).toBeCloseTo(5, 6);
     expect(dot(to_focus, view_of(made))).toBeCloseTo(5, 6);
@@ -139,33 +90,27 @@ describe('orbiting', () => {
 
   it('comes closer by the wheel, but not through the focus', () => {
     const made = camera();
-    made.gesture({ kind: 'dolly', steps: 1 });
-    made.step(0.016);
+    gesture(made, { kind: 'dolly', steps: 1 });
     expect(made.pose.position[2]).toBeCloseTo(-5 * 0.88, 6);
-    made.gesture({ kind: 'dolly', steps: 500 });
-    made.step(0.016);
+    gesture(made, { kind: 'dolly', steps: 500 });
     expect(made.pose.position[2]).toBeCloseTo(-scene.near_z * 1.5, 6);
-    made.gesture({ kind: 'dolly', steps: -1 });
-    made.step(0.016);
+    gesture(made, { kind: 'dolly', steps: -1 });
     expect(made.pose.position[2]).toBeLessThan(-scene.near_z * 1.5);
   });
 
   it('pans with the pointer and takes the focus along', () => {
     const made = camera();
-    made.gesture({ kind: 'pan', dx: 0.5, dy: 0 });
-    made.step(0.016);
+    gesture(made, { kind: 'pan', dx: 0.5, dy: 0 });
     const half_height = 5 * Math.tan(made.fov_y_rad / 2);
     expect_vec(made.pose.position, [-half_height, 0, -5]);
-    made.gesture({ kind: 'look', dx: 0.5, dy: 0 });
-    made.step(0.016);
+    gesture(made, { kind: 'look', dx: 0.5, dy: 0 });
     expect(length(sub(made.pose.position, [-half_height, 0, 0]))).toBeCloseTo(5, 6);
   });
 
   it('stops at the limits instead of leaving its circle', () => {
     const made = camera('orbit', { limits_min: [-3, -20, -20], limits_max: [3, 20, 20] });
     for (let i = 0; i < 100; ++i) {
-      made.gesture({ kind: 'look', dx: 0.01, dy: 0 });
-      made.step(0.016);
+      gesture(made, { kind: 'look', dx: 0.01, dy: 0 });
     }
     expect(made.pose.position[0]).toBeGreaterThanOrEqual(-3);
     expect(length(made.pose.position)).toBeCloseTo(5, 6);
@@ -182,13 +127,11 @@ describe('orbiting', () => {
 
   it('orbits what it looks at after a flight', () => {
     const made = camera('fly');
-    made.gesture({ kind: 'look', dx: 0.6, dy: 0 });
-    made.step(0.016);
+    gesture(made, { kind: 'look', dx: 0.6, dy: 0 });
     const ahead = view_of(made);
     made.set_mode('orbit');
     const before = made.pose.position;
-    made.gesture({ kind: 'dolly', steps: 1 });
-    made.step(0.016);
+    gesture(made, { kind: 'dolly', steps: 1 });
     const moved = sub(made.pose.position, before);
     expect(dot(moved, ahead)).toBeCloseTo(length(moved), 6);
     expect(length(moved)).toBeGreaterThan(0.1);
@@ -241,8 +184,7 @@ describe('any mode', () => {
     const made = camera('fly', { start_pose: { position: [0, 0, -5], orientation: tilted } });
     expect(made.step(0.016)).toBe(false); // not by itself
     for (let i = 0; i < 200; ++i) {
-      made.gesture({ kind: 'look', dx: 0.002, dy: 0 });
-      made.step(0.016);
+      gesture(made, { kind: 'look', dx: 0.002, dy: 0 });
     }
     expect(dot(rotate(made.pose.orientation, right), scene.up)).toBeCloseTo(0, 3);
   });

@@ -1,11 +1,11 @@
 // The samples that leave the page.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
-import { identity } from '#client/base/vector';
-import { CameraController } from '#client/camera/camera_controller';
+import type { CameraController } from '#client/camera/camera_controller';
 import { CameraLoop } from '#client/camera/camera_loop';
 import type { CameraSample } from '#client/camera/eye';
 import { Inertia } from '#client/camera/inertia';
 import { no_axes, type Axes } from '#client/camera/movement';
+import { camera as make_camera } from './cameras';
 
 describe('the camera loop', () => {
   let refreshes: (() => void)[] = [];
@@ -31,24 +31,9 @@ describe('the camera loop', () => {
     axes = no_axes;
     touched = false;
     vi.stubGlobal('requestAnimationFrame', (draw: () => void) => refreshes.push(draw));
-    camera = new CameraController();
-    camera.smoothing_s = 0;
-    camera.load({
-      up: [0, -1, 0],
-      start_pose: { position: [0, 0, -5], orientation: identity },
-      focus: [0, 0, 0],
-      limits_min: [-20, -20, -20],
-      limits_max: [20, 20, 20],
-      near_z: 0.2,
-    });
-    loop = new CameraLoop(
-      camera,
-      () => axes,
-      () => touched,
-      new Inertia(),
-      { now_us: () => now_us },
-      (sample) => sent.push(sample),
-    );
+    camera = make_camera();
+    const clock = { now_us: () => now_us };
+    loop = new CameraLoop(camera, () => axes, () => touched, new Inertia(), clock, (sample) => sent.push(sample));
     loop.enable();
   });
   afterEach(() => vi.unstubAllGlobals());

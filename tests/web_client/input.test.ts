@@ -5,6 +5,13 @@ import { Pointers, wheel_gesture, type PointerSample } from '#client/input/point
 
 const height_px = 400;
 
+/** Pointers that are down. */
+function held(...samples: PointerSample[]): Pointers {
+  const pointers = new Pointers();
+  for (const one of samples) pointers.down(one);
+  return pointers;
+}
+
 const sample = (change: Partial<PointerSample>): PointerSample => ({
   id: 1,
   type: 'mouse',
@@ -54,11 +61,8 @@ describe('keys', () => {
 
 describe('mouse', () => {
   it('looks with the primary button, in fractions of the height', () => {
-    const pointers = new Pointers();
-    pointers.down(sample({}));
-    expect(pointers.move(sample({ x: 140, y: 80 }), height_px)).toEqual([
-      { kind: 'look', dx: 0.1, dy: -0.05 },
-    ]);
+    const pointers = held(sample({}));
+    expect(pointers.move(sample({ x: 140, y: 80 }), height_px)).toEqual([{ kind: 'look', dx: 0.1, dy: -0.05 }]);
   });
 
   it.each([
@@ -66,11 +70,8 @@ describe('mouse', () => {
     ['the middle button', { buttons: 4 }],
     ['shift', { shift: true }],
   ])('pans with %s', (_name, change) => {
-    const pointers = new Pointers();
-    pointers.down(sample(change));
-    expect(pointers.move(sample({ ...change, x: 120 }), height_px)).toEqual([
-      { kind: 'pan', dx: 0.05, dy: 0 },
-    ]);
+    const pointers = held(sample(change));
+    expect(pointers.move(sample({ ...change, x: 120 }), height_px)).toEqual([{ kind: 'pan', dx: 0.05, dy: 0 }]);
   });
 
   it('does nothing while no button is held', () => {
@@ -94,15 +95,12 @@ describe('touch', () => {
     sample({ id, type: 'touch', x, y });
 
   it('looks with one finger', () => {
-    const pointers = new Pointers();
-    pointers.down(finger(1, 10, 10));
+    const pointers = held(finger(1, 10, 10));
     expect(pointers.move(finger(1, 10, 50), height_px)).toEqual([{ kind: 'look', dx: 0, dy: 0.1 }]);
   });
 
   it('pans with two fingers by their mean', () => {
-    const pointers = new Pointers();
-    pointers.down(finger(1, 100, 100));
-    pointers.down(finger(2, 200, 100));
+    const pointers = held(finger(1, 100, 100), finger(2, 200, 100));
     const moves = [
       ...pointers.move(finger(1, 140, 100), height_px),
       ...pointers.move(finger(2, 240, 100), height_px),
@@ -114,23 +112,16 @@ describe('touch', () => {
   });
 
   it('pinches: spreading comes closer', () => {
-    const pointers = new Pointers();
-    pointers.down(finger(1, 100, 100));
-    pointers.down(finger(2, 200, 100));
+    const pointers = held(finger(1, 100, 100), finger(2, 200, 100));
     const moves = pointers.move(finger(2, 213, 100), height_px);
     const dolly = moves.find((gesture) => gesture.kind === 'dolly');
     expect(dolly?.steps).toBeCloseTo(1, 9);
   });
 
   it('ignores a third finger, and goes on looking when one of two is lifted', () => {
-    const pointers = new Pointers();
-    pointers.down(finger(1, 100, 100));
-    pointers.down(finger(2, 200, 100));
-    pointers.down(finger(3, 300, 100));
+    const pointers = held(finger(1, 100, 100), finger(2, 200, 100), finger(3, 300, 100));
     expect(pointers.move(finger(3, 310, 100), height_px)).toEqual([]);
     pointers.up(1);
-    expect(pointers.move(finger(2, 240, 100), height_px)).toEqual([
-      { kind: 'look', dx: 0.1, dy: 0 },
-    ]);
+    expect(pointers.move(finger(2, 240, 100), height_px)).toEqual([{ kind: 'look', dx: 0.1, dy: 0 }]);
   });
 });

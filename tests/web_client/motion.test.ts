@@ -1,48 +1,20 @@
 // Walking, flights, and the glide after a gesture.
 import { describe, expect, it } from 'vitest';
-import {
-  angle_between,
-  axis_angle,
-  identity,
-  look_at,
-  rotate,
-  slerp,
-  type Vec3,
-} from '#client/base/vector';
-import { CameraController } from '#client/camera/camera_controller';
+import { angle_between, axis_angle, identity, look_at, rotate, slerp, type Vec3 } from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import { glide, glide_time_s } from '#client/camera/flight';
 import { Inertia } from '#client/camera/inertia';
-import { no_axes, sum_of, type Axes } from '#client/camera/movement';
+import { no_axes, sum_of } from '#client/camera/movement';
 import { place_of, ray_through } from '#client/camera/ray';
 import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
 import { DoubleTap } from '#client/input/pointers';
+import { camera, expect_vec, hold, view_of } from './cameras';
 
-const scene: SceneSetup = {
-  up: [0, -1, 0],
+const eye_level: Partial<SceneSetup> = {
   start_pose: { position: [0, -1.7, -5], orientation: identity },
   focus: [0, -1.7, 0],
-  limits_min: [-20, -20, -20],
-  limits_max: [20, 20, 20],
-  near_z: 0.2,
 };
-
-function camera(mode: 'orbit' | 'fly' | 'walk'): CameraController {
-  const made = new CameraController();
-  made.smoothing_s = 0;
-  made.load(scene);
-  made.set_mode(mode);
-  return made;
-}
-
-const hold = (made: CameraController, axes: Partial<Axes>, seconds = 1): void => {
-  for (let i = 0; i < 60; ++i) made.step(seconds / 60, { ...no_axes, ...axes });
-};
-
-function expect_vec(actual: Vec3, expected: Vec3, digits = 5): void {
-  actual.forEach((v, i) => expect(v).toBeCloseTo(expected[i]!, digits));
-}
 
 const eye = (position: Vec3, yaw: number): Eye => ({
   position,
@@ -52,7 +24,7 @@ const eye = (position: Vec3, yaw: number): Eye => ({
 
 describe('walking', () => {
   it('keeps its height, wherever it looks', () => {
-    const made = camera('walk');
+    const made = camera('walk', eye_level);
     made.gesture({ kind: 'look', dx: 0, dy: -0.4 });
     hold(made, { forward: 1 });
     const [, height, z] = made.pose.position;
@@ -66,8 +38,8 @@ describe('walking', () => {
   });
 
   it('is as fast uphill as ahead', () => {
-    const level = camera('walk');
-    const looks_down = camera('walk');
+    const level = camera('walk', eye_level);
+    const looks_down = camera('walk', eye_level);
     looks_down.gesture({ kind: 'look', dx: 0, dy: -0.9 });
     looks_down.step(0.1);
     hold(level, { forward: 1 });
@@ -76,13 +48,13 @@ describe('walking', () => {
   });
 
   it('changes its height by Q and E only', () => {
-    const made = camera('walk');
+    const made = camera('walk', eye_level);
     hold(made, { up: 1 });
     expect(made.pose.position[1]).toBeLessThan(-2);
   });
 
   it('goes to a place that was pointed at, up to a step before it', () => {
-    const made = camera('walk');
+    const made = camera('walk', eye_level);
     made.focus_on([6, 0, -5]);
     expect(made.at_rest).toBe(false);
     hold(made, {}, 10);
@@ -91,23 +63,23 @@ describe('walking', () => {
     expect(y).toBeCloseTo(-1.7, 6);
     expect(z).toBeCloseTo(-5, 6);
     expect(x).toBeCloseTo(5.5, 6);
-    expect_vec(rotate(made.pose.orientation, [0, 0, 1]), [1, 0, 0]);
+    expect_vec(view_of(made), [1, 0, 0]);
   });
 });
 
 describe('a double click', () => {
   it('turns an orbiting camera to the place, which it then goes around', () => {
-    const made = camera('orbit');
+    const made = camera('orbit', eye_level);
     made.focus_on([2, -1.7, 1]);
     hold(made, {}, 10);
-    const view = rotate(made.pose.orientation, [0, 0, 1]);
+    const view = view_of(made);
     const [x, , z] = made.pose.position;
     expect(view[0] / view[2]).toBeCloseTo((2 - x) / (1 - z), 4);
     const before = made.sight_distance;
     made.gesture({ kind: 'look', dx: 0.2, dy: 0 });
     hold(made, {}, 0.1);
     expect(made.sight_distance).toBeCloseTo(before, 4);
-    const turned = rotate(made.pose.orientation, [0, 0, 1]);
+    const turned = view_of(made);
     expect(turned[0]).not.toBeCloseTo(view[0], 2);
   });
 
@@ -160,7 +132,7 @@ describe('a flight', () => {
 
   it('ends when the visitor takes over, and says whether it arrived', () => {
     const heard: boolean[] = [];
-    const made = camera('fly');
+    const made = camera('fly', eye_level);
     made.fly(glide(made.eye, to, 1), (arrived) => heard.push(arrived));
     hold(made, {}, 0.5);
     made.gesture({ kind: 'look', dx: 0.1, dy: 0 });

@@ -75,6 +75,7 @@ describe('scene address', () => {
     const page = 'http://host/tour/?scene=nope&lang=en';
     expect(scene_address(page, 'a b&c')).toBe('http://host/tour/?scene=a+b%26c&lang=en');
     expect(scene_address('http://host/', 'city')).toBe('http://host/?scene=city');
+    expect(scene_address('http://host/?scene=x&ui=0')).toBe('http://host/?ui=0');
   });
 });
 
@@ -202,42 +203,23 @@ describe('wording', () => {
   });
 
   it('tells what happened and when it tries again', () => {
-    const card = card_for(
-      { phase: 'waiting', cause: 'unreachable', retry_in_ms: 3000, message: '' },
-      true,
-    );
-    expect(card).toMatchObject({
-      title: 'The server does not answer',
-      text: 'Trying again in 3 s.',
-      action: { does: 'retry' },
-    });
+    const card = card_for({ phase: 'waiting', cause: 'unreachable', retry_in_ms: 3000, message: '' }, true);
+    expect(card).toMatchObject({ text: expect.stringContaining('in 3 s') as unknown, action: { does: 'retry' } });
+    expect(card?.title).toContain('does not answer');
   });
 
   it('offers the scenes that there are, and without any says where the name is', () => {
     const state = { phase: 'failed', code: Error_Code.UNKNOWN_SCENE, message: 'no' } as const;
-    expect(card_for(state, false, ['city', 'hall'])).toMatchObject({
-      text: 'No. Open one of these:',
-      scene_ids: ['city', 'hall'],
-    });
-    expect(card_for(state, false, ['city'])?.action).toEqual({
-      label: 'Open city',
-      does: 'open',
-      scene_id: 'city',
-    });
+    expect(card_for(state, false, ['city', 'hall'])?.scene_ids).toEqual(['city', 'hall']);
+    expect(card_for(state, false, ['city'])?.action).toEqual({ label: 'Open city', does: 'open', scene_id: 'city' });
     expect(card_for(state, false)?.text).toContain('?scene=');
     expect(card_for(state, false)?.action).toMatchObject({ does: 'open', scene_id: '' });
-    expect(scene_address('https://a.example/?scene=x&ui=0', 'hall')).toBe(
-      'https://a.example/?scene=hall&ui=0',
-    );
-    expect(scene_address('https://a.example/?scene=x&ui=0')).toBe('https://a.example/?ui=0');
   });
 
   it('leaves a refused token to the words of the server', () => {
     const message = 'this server needs an access token: open the link you were given';
     const state = { phase: 'failed', code: Error_Code.UNAUTHORIZED, message } as const;
-    expect(card_for(state, false)?.text).toBe(
-      'This server needs an access token: open the link you were given.',
-    );
+    expect(card_for(state, false)?.text).toBe(`T${message.slice(1)}.`);
   });
 
   it('explains JPEG by what is missing', () => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { axis_angle, identity, multiply, angle_between, type Vec3 } from '#client/base/vector';
+import { add, angle_between, axis_angle, identity, multiply, rotate, type Vec3 } from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import { place_of } from '#client/camera/ray';
 import { TurnForecast } from '#client/present/turn_forecast';
@@ -45,11 +45,7 @@ describe('a warped picture', () => {
     const picture = eye({ position: [0, 0, -5] });
     const view = eye({ position: [0.6, 0.2, -5.1], orientation: turn });
     // On the plane through the focus, five ahead of the view.
-    const middle: Vec3 = [0, 0, 5];
-    const on_plane = (x: number, y: number): Vec3 => {
-      const rotated = [x, y, middle[2]] as Vec3;
-      return add_rotated(view, rotated);
-    };
+    const on_plane = (x: number, y: number): Vec3 => add(view.position, rotate(view.orientation, [x, y, 5]));
     for (const [x, y] of [[0, 0], [1, 0.5], [-2, -1]] as const) {
       expect_same_place(on_plane(x, y), picture, view, 5);
     }
@@ -76,26 +72,6 @@ describe('a warped picture', () => {
     expect(uncovered_share(behind)).toBe(1);
   });
 });
-
-function add_rotated(by: Eye, inside: Vec3): Vec3 {
-  // place_of() undoes this: camera axes to the world.
-  const [x, y, z] = inside;
-  const column = (axis: Vec3, s: number): Vec3 => {
-    const q = by.orientation;
-    const t = [
-      2 * (q[1] * axis[2] - q[2] * axis[1]),
-      2 * (q[2] * axis[0] - q[0] * axis[2]),
-      2 * (q[0] * axis[1] - q[1] * axis[0]),
-    ] as const;
-    return [
-      s * (axis[0] + q[3] * t[0] + q[1] * t[2] - q[2] * t[1]),
-      s * (axis[1] + q[3] * t[1] + q[2] * t[0] - q[0] * t[2]),
-      s * (axis[2] + q[3] * t[2] + q[0] * t[1] - q[1] * t[0]),
-    ];
-  };
-  const [a, b, c] = [column([1, 0, 0], x), column([0, 1, 0], y), column([0, 0, 1], z)];
-  return by.position.map((v, i) => v + a[i]! + b[i]! + c[i]!) as unknown as Vec3;
-}
 
 describe('the forecast of a turn', () => {
   const eye_at = (yaw: number): Eye => eye({ orientation: axis_angle(up, yaw) });

@@ -14,62 +14,34 @@ const bytes_of = (hex: string): ArrayBuffer => {
   return buffer.slice(byteOffset, byteOffset + byteLength);
 };
 
-const hex_of = (body: ClientBody): string =>
-  Buffer.from(encode_client_message(body)).toString('hex');
-
 describe('client messages', () => {
-  it('encodes hello', () => {
-    const hello = {
-      version: 1,
-      sceneId: 'city',
-      viewportWidthPx: 640,
-      viewportHeightPx: 360,
-      decoders: [Codec.H264, Codec.MJPEG],
-      token: 'secret',
-      settings: { widthPx: 640, heightPx: 360, maxFps: 30 },
-    };
-    expect(hex_of({ case: 'hello', value: hello })).toBe(golden.client_hello);
-  });
+  const settings = { widthPx: 640, heightPx: 360, maxFps: 30 };
+  const decoders = [Codec.H264, Codec.MJPEG];
+  const viewport = { viewportWidthPx: 640, viewportHeightPx: 360 };
+  const position = { x: 1, y: -2.5, z: 0.125 };
+  const worldFromCamera = { position, orientation: { x: 0, y: 0.6, z: 0, w: 0.8 } };
+  const times = { receivedUs: 1000n, decodedUs: 2000n, presentedUs: 3000n, poseAgeUs: 2500 };
 
-  it('encodes a pose', () => {
-    const pose = {
-      poseId: 300n,
-      clientTimeUs: 1234567890123n,
-      worldFromCamera: {
-        position: { x: 1, y: -2.5, z: 0.125 },
-        orientation: { x: 0, y: 0.6, z: 0, w: 0.8 },
-      },
-      fovYRad: 1,
-    };
-    expect(hex_of({ case: 'pose', value: pose })).toBe(golden.client_pose);
-  });
-
-  it('encodes an acknowledgement', () => {
-    const ack = {
-      frameId: 7n,
-      receivedUs: 1000n,
-      decodedUs: 2000n,
-      presentedUs: 3000n,
-      poseAgeUs: 2500,
-    };
-    expect(hex_of({ case: 'ack', value: ack })).toBe(golden.client_ack);
+  it.each<[ClientBody, string]>([
+    [
+      { case: 'hello', value: { version: 1, sceneId: 'city', ...viewport, decoders, token: 'secret', settings } },
+      golden.client_hello,
+    ],
+    [
+      { case: 'pose', value: { poseId: 300n, clientTimeUs: 1234567890123n, worldFromCamera, fovYRad: 1 } },
+      golden.client_pose,
+    ],
+    [{ case: 'ack', value: { frameId: 7n, ...times } }, golden.client_ack],
+  ])('are encoded: $case', (body, hex) => {
+    expect(Buffer.from(encode_client_message(body)).toString('hex')).toBe(hex);
   });
 });
 
 describe('server messages', () => {
   it('decodes an error', () => {
+    const value = { code: Error_Code.SERVER_FULL, message: '8 of 8 sessions are in use', fatal: true };
     const incoming = decode_server_message(bytes_of(golden.server_error));
-    expect(incoming).toMatchObject({
-      kind: 'message',
-      body: {
-        case: 'error',
-        value: {
-          code: Error_Code.SERVER_FULL,
-          message: '8 of 8 sessions are in use',
-          fatal: true,
-        },
-      },
-    });
+    expect(incoming).toMatchObject({ kind: 'message', body: { case: 'error', value } });
   });
 
   it('decodes a stream configuration', () => {

@@ -2,16 +2,28 @@
 import { existsSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
 import { chromium, type Browser, type BrowserContext, type BrowserContextOptions, type Page } from 'playwright-core';
+import { afterEach } from 'vitest';
+import { settle } from './camera';
+import { clean_up } from './clean_up';
 import { artefacts, chromium_path } from './paths';
-
 
 export const insecure_host = 'plain.test';
 
-export async function launch_browser(): Promise<Browser> {
+/** Windows for people to look at. */
+export const windows = {
+  desktop: { viewport: { width: 1280, height: 720 } },
+  'desktop-dark': { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' },
+  phone: { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true },
+  'phone-dark': { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
+} as const satisfies Record<string, BrowserContextOptions>;
+
+let browser: Browser | undefined;
+
+async function launch_browser(): Promise<Browser> {
   if (!existsSync(chromium_path)) {
     throw new Error(`no Chromium at ${chromium_path}: apt install chromium, or set CATGS_CHROMIUM`);
   }
-  return chromium.launch({
+  const launched = await chromium.launch({
     executablePath: chromium_path,
     headless: true,
     args: [
@@ -26,6 +38,8 @@ export async function launch_browser(): Promise<Browser> {
       `--host-resolver-rules=MAP ${insecure_host} 127.0.0.1`,
     ],
   });
+  clean_up(() => launched.close());
+  return launched;
 }
 
 export interface WatchedPage {
@@ -36,15 +50,15 @@ export interface WatchedPage {
 
 const open_contexts: BrowserContext[] = [];
 
-/** Closes the pages that new_page() has made since the last call. */
-export async function close_pages(): Promise<void> {
+afterEach(async () => {
   for (const context of open_contexts.splice(0)) await context.close();
-}
+});
 
+/** A page that is closed after the test, in a browser that all tests of a file share. */
 export async function new_page(
-  browser: Browser,
   options: BrowserContextOptions = { viewport: { width: 640, height: 360 } },
 ): Promise<WatchedPage> {
+  browser ??= await launch_browser();
   const context = await browser.newContext(options);
   open_contexts.push(context);
   const page = await context.newPage();
@@ -54,6 +68,14 @@ export async function new_page(
   });
   page.on('pageerror', (error) => errors.push(String(error)));
   return { page, errors };
+}
+
+/** A page that shows its first picture. */
+export async function open(url: string, options?: BrowserContextOptions): Promise<WatchedPage> {
+  const watched = await new_page(options);
+  await watched.page.goto(url);
+  await settle(watched.page);
+  return watched;
 }
 
 /**

@@ -1,13 +1,9 @@
 // A TCP proxy in user space that delays every byte by the same time.
 import { connect, createServer, type AddressInfo, type Socket } from 'node:net';
+import { clean_up } from './clean_up';
 
-export interface DelayProxy {
-  readonly port: number;
-  close(): Promise<void>;
-}
-
-/** Forwards to a port of this machine; `delay_ms` each way. */
-export async function start_delay_proxy(to_port: number, delay_ms: number): Promise<DelayProxy> {
+/** Forwards to a port of this machine; `delay_ms` each way. Returns its own port. */
+export async function start_delay_proxy(to_port: number, delay_ms: number): Promise<number> {
   const sockets = new Set<Socket>();
   const later = (from: Socket, to: Socket): void => {
     sockets.add(from);
@@ -22,11 +18,9 @@ export async function start_delay_proxy(to_port: number, delay_ms: number): Prom
     later(upstream, client);
   });
   await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
-  return {
-    port: (server.address() as AddressInfo).port,
-    close: async () => {
-      for (const socket of sockets) socket.destroy();
-      await new Promise((resolve) => server.close(resolve));
-    },
-  };
+  clean_up(() => {
+    for (const socket of sockets) socket.destroy();
+    server.close();
+  });
+  return (server.address() as AddressInfo).port;
 }

@@ -1,6 +1,6 @@
 // A server that follows the script of a test. It serves the built client over HTTP with the real server's
 // Content-Security-Policy, and speaks catgs.v1 on a WebSocket.
-import { createServer, type Server } from 'node:http';
+import { createServer } from 'node:http';
 import { readFile } from 'node:fs/promises';
 import type { AddressInfo } from 'node:net';
 import path from 'node:path';
@@ -9,10 +9,12 @@ import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/p
 import {
   ClientMessageSchema,
   Codec,
+  Error_Code,
   FrameHeaderSchema,
   ServerMessageSchema,
   type ClientMessage,
 } from '#client/wire/wire';
+import { clean_up } from './clean_up';
 import { build_dir } from './paths';
 
 export const web_dist = path.join(build_dir, 'web_client/dist');
@@ -43,16 +45,23 @@ export interface Peer {
 
 export interface FakeServer {
   readonly url: string;
-  readonly port: number;
   readonly peers: Peer[];
   close(): Promise<void>;
 }
 
-/** Serves until closed; `script` is called for each message of each client. */
-export async function start_fake_server(
-  script: (peer: Peer, body: Body) => void,
-  port = 0,
-): Promise<FakeServer> {
+/** Called for each message of each client. */
+export type Script = (peer: Peer, body: Body) => void;
+
+export const at_hello =
+  (say: ServerBody): Script =>
+  (peer, body) => {
+    if (body.case === 'hello') peer.say(say);
+  };
+
+export const refuse = (code: Error_Code, message: string): Script =>
+  at_hello({ case: 'error', value: { code, message, fatal: true } });
+
+export async function start_fake_server(script: Script): Promise<FakeServer> {
   const http = createServer((request, response) => {
     const name = new URL(request.url ?? '/', 'http://localhost').pathname;
     if (name === '/api/scenes') {
@@ -86,18 +95,14 @@ export async function start_fake_server(
       script(peer, body);
     });
   });
-  await listen(http, port);
-  const bound = (http.address() as AddressInfo).port;
-  return {
-    url: `http://127.0.0.1:${bound}/`,
-    port: bound,
-    peers,
-    close: async () => {
-      for (const socket of sockets.clients) socket.terminate();
-      http.closeAllConnections();
-      await new Promise((resolve) => http.close(resolve));
-    },
+  await new Promise<void>((resolve) => http.listen(0, '127.0.0.1', resolve));
+  const close = async (): Promise<void> => {
+    for (const socket of sockets.clients) socket.terminate();
+    http.closeAllConnections();
+    await new Promise((resolve) => http.close(resolve));
   };
+  clean_up(close);
+  return { url: `http://127.0.0.1:${(http.address() as AddressInfo).port}/`, peers, close };
 }
 
 function make_peer(socket: WebSocket): Peer {
@@ -118,13 +123,6 @@ function make_peer(socket: WebSocket): Peer {
     },
     close: () => socket.close(),
   };
-}
-
-function listen(http: Server, port: number): Promise<void> {
-  return new Promise((resolve, reject) => {
-    http.once('error', reject);
-    http.listen(port, '127.0.0.1', resolve);
-  });
 }
 
 /** A welcome to a small scene whose pictures are JPEGs of 640x360. */

@@ -3,12 +3,9 @@ import { spawn } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { createServer, type AddressInfo } from 'node:net';
 import path from 'node:path';
+import { clean_up } from './clean_up';
 import { haproxy_path, source_dir } from './paths';
-
-export interface Haproxy {
-  readonly url: string;
-  close(): Promise<void>;
-}
+import { end } from './programs';
 
 function free_port(): Promise<number> {
   return new Promise((resolve) => {
@@ -32,27 +29,20 @@ function configuration(port: number, servers: readonly number[]): string {
   );
 }
 
-/** Resolves when both servers are known to be ready. */
-export async function start_haproxy(folder: string, servers: readonly number[]): Promise<Haproxy> {
+/** Resolves when both servers are known to be ready. Returns its address. */
+export async function start_haproxy(folder: string, servers: readonly number[]): Promise<string> {
   const port = await free_port();
   const file = path.join(folder, 'haproxy.cfg');
   writeFileSync(file, configuration(port, servers));
   const child = spawn(haproxy_path, ['-db', '-f', file], { stdio: ['ignore', 'ignore', 'pipe'] });
+  clean_up(() => end(child, 'SIGKILL'));
   let log = '';
   child.stderr.on('data', (chunk: Buffer) => (log += chunk.toString()));
   const url = `http://127.0.0.1:${port}/`;
   for (let tries = 0; ; ++tries) {
     if (child.exitCode !== null || tries > 200) throw new Error(`haproxy does not answer:\n${log}`);
     const reply = await fetch(`${url}readyz`).catch(() => null);
-    if (reply?.status === 200) break;
+    if (reply?.status === 200) return url;
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
-  return {
-    url,
-    close: () =>
-      new Promise((resolve) => {
-        child.once('exit', () => resolve());
-        child.kill('SIGKILL');
-      }),
-  };
 }

@@ -1,11 +1,11 @@
 // Pictures for a server that follows a script.
-import type { Browser } from 'playwright-core';
 import { Codec } from '#client/wire/wire';
-import { welcome, type Peer } from './fake_server';
+import { new_page } from './browser';
+import { welcome, type Script } from './fake_server';
 
 /** A JPEG file with some blobs, so that a screenshot shows whether it is the right way up. */
-export async function painted_jpeg(browser: Browser): Promise<Uint8Array> {
-  const page = await browser.newPage();
+export async function painted_jpeg(): Promise<Uint8Array> {
+  const { page } = await new_page();
   const url = await page.evaluate(() => {
     const canvas = document.createElement('canvas');
     canvas.width = 640;
@@ -22,14 +22,14 @@ export async function painted_jpeg(browser: Browser): Promise<Uint8Array> {
     }
     return canvas.toDataURL('image/jpeg', 0.9);
   });
-  await page.close();
+  await page.context().close();
   return Buffer.from(url.split(',')[1]!, 'base64');
 }
 
 /** Sends a welcome, and answers every pose with the picture. */
 export const stream_of =
-  (jpeg: Uint8Array) =>
-  (peer: Peer, body: Peer['heard'][number]): void => {
+  (jpeg: Uint8Array): Script =>
+  (peer, body) => {
     if (body.case === 'hello') peer.say(welcome());
     if (body.case !== 'pose') return;
     peer.frame(

@@ -2,14 +2,8 @@
 import { execFileSync, spawn, type ChildProcess } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import path from 'node:path';
+import { clean_up } from './clean_up';
 import { build_dir } from './paths';
-
-const running = new Set<ChildProcess>();
-
-/** Call this at the end of a file, so that a failed test leaves no server behind. */
-export async function stop_servers(): Promise<void> {
-  await Promise.all([...running].map((child) => end(child, 'SIGKILL')));
-}
 
 function program(name: string): string {
   const file = path.join(build_dir, 'bin', name);
@@ -51,8 +45,7 @@ export async function start_server(scene: string, args: string[] = []): Promise<
     ],
     { stdio: ['ignore', 'pipe', 'pipe'] },
   );
-  running.add(child);
-  child.once('exit', () => running.delete(child));
+  clean_up(() => end(child, 'SIGKILL'));
   let log = '';
   const url = await new Promise<string>((resolve, reject) => {
     const read = (chunk: Buffer): void => {
@@ -73,7 +66,7 @@ export async function start_server(scene: string, args: string[] = []): Promise<
   };
 }
 
-function end(child: ChildProcess, signal: 'SIGKILL' | 'SIGTERM'): Promise<void> {
+export function end(child: ChildProcess, signal: 'SIGKILL' | 'SIGTERM'): Promise<void> {
   return new Promise((resolve) => {
     if (child.exitCode !== null || child.signalCode !== null) {
       resolve();

@@ -1,13 +1,27 @@
 // Scenes and camera paths that tests write for themselves.
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
+import type { Vec3 } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
+import { clean_up } from './clean_up';
 
-/** Makes a folder, and a function that removes it. */
-export function scratch_folder(): { folder: string; remove: () => void } {
+/** Makes a folder for the tests of a file. */
+export function scratch_folder(): string {
   const folder = mkdtempSync(path.join(tmpdir(), 'catgs-e2e-'));
-  return { folder, remove: () => rmSync(folder, { recursive: true, force: true }) };
+  clean_up(() => rmSync(folder, { recursive: true, force: true }));
+  return folder;
+}
+
+export interface Sidecar {
+  readonly focus: Vec3;
+  readonly start_pose: Pose;
+}
+
+/** Adds tours to the sidecar of a scene. */
+export function write_tours(file: string, make: (sidecar: Sidecar) => readonly object[]): void {
+  const sidecar = JSON.parse(readFileSync(file, 'utf8')) as Sidecar;
+  writeFileSync(file, JSON.stringify({ ...sidecar, tours: make(sidecar) }));
 }
 
 /** `timestamp tx ty tz qx qy qz qw`, one line per pose. */
@@ -19,7 +33,6 @@ export function write_tum(file: string, poses: readonly Pose[]): void {
 }
 
 export interface Patch {
-  readonly name: string;
   readonly rgb: readonly [number, number, number]; // 0…255
   /** Centre in the plane that the camera at the origin looks at, in units of its distance. */
   readonly x: number;

@@ -1,0 +1,11 @@
+// Ends what the tests of a file have started, however they ended.
+import { afterAll } from 'vitest';
+
+const actions: (() => unknown)[] = [];
+
+/** Runs the action after the last test of the file. What was started last ends first. */
+export const clean_up = (action: () => unknown): number => actions.push(action);
+
+afterAll(async () => {
+  for (const action of actions.splice(0).reverse()) await action();
+});
