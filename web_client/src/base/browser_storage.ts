@@ -1,15 +1,7 @@
 /** Undefined where the visitor blocks site data: browsers then throw on mere access. */
-export function session_storage(): Storage | undefined {
+export function browser_storage(kind: 'localStorage' | 'sessionStorage'): Storage | undefined {
   try {
-    return sessionStorage;
-  } catch {
-    return undefined;
-  }
-}
-
-export function local_storage(): Storage | undefined {
-  try {
-    return localStorage;
+    return window[kind];
   } catch {
     return undefined;
   }

@@ -1,4 +1,4 @@
-import { add, length, scale, sub, type Vec3 } from '../base/vector';
+import { add, length, scale, type Vec3 } from '../base/vector';
 
 /** What visitors ask of a camera, in any mode. */
 interface Movement {
@@ -12,6 +12,15 @@ interface Movement {
 const none: Movement = { yaw: 0, pitch: 0, pan: [0, 0, 0], climb: 0, dolly: 0 };
 const rest_threshold = 1e-4;
 
+/** a + times * b. */
+const sum = (a: Movement, b: Movement, times: number): Movement => ({
+  yaw: a.yaw + b.yaw * times,
+  pitch: a.pitch + b.pitch * times,
+  pan: add(a.pan, scale(b.pan, times)),
+  climb: a.climb + b.climb * times,
+  dolly: a.dolly + b.dolly * times,
+});
+
 /** Hands out the movement that visitors ask for bit by bit, so that the camera glides. Pure. */
 export class Smoothing {
   private left_ = none;
@@ -20,15 +29,7 @@ export class Smoothing {
   time_s = 0.05;
 
   ask(more: Partial<Movement>): void {
-    const { yaw, pitch, pan, climb, dolly } = { ...none, ...more };
-    const left = this.left_;
-    this.left_ = {
-      yaw: left.yaw + yaw,
-      pitch: left.pitch + pitch,
-      pan: add(left.pan, pan),
-      climb: left.climb + climb,
-      dolly: left.dolly + dolly,
-    };
+    this.left_ = sum(this.left_, { ...none, ...more }, 1);
   }
 
   clear(): void {
@@ -53,20 +54,8 @@ export class Smoothing {
       return left;
     }
     const share = 1 - Math.exp(-dt_s / this.time_s);
-    const due: Movement = {
-      yaw: left.yaw * share,
-      pitch: left.pitch * share,
-      pan: scale(left.pan, share),
-      climb: left.climb * share,
-      dolly: left.dolly * share,
-    };
-    this.left_ = {
-      yaw: left.yaw - due.yaw,
-      pitch: left.pitch - due.pitch,
-      pan: sub(left.pan, due.pan),
-      climb: left.climb - due.climb,
-      dolly: left.dolly - due.dolly,
-    };
+    const due = sum(none, left, share);
+    this.left_ = sum(left, due, -1);
     return due;
   }
 }

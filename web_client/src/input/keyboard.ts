@@ -1,4 +1,4 @@
-import { no_axes, type Axes } from '../camera/movement';
+import { no_axes, sum_of, type Axes } from '../camera/movement';
 
 // Keys by position (KeyboardEvent.code), so that WASD has the same shape on every layout.
 const movement: Readonly<Record<string, Partial<Axes>>> = {
@@ -13,8 +13,6 @@ const movement: Readonly<Record<string, Partial<Axes>>> = {
   ArrowUp: { turn_up: 1 },
   ArrowDown: { turn_up: -1 },
 };
-
-const clamp = (v: number): number => Math.min(1, Math.max(-1, v));
 
 // A tap moves the camera for this many steps, however short it was. This holds too when it comes before
 // the scene is loaded.
@@ -57,24 +55,11 @@ export class HeldKeys {
   /** Call this once for each step of the camera. */
   axes(): Axes {
     if (this.held_.size === 0) return no_axes;
-    const sum = { ...no_axes };
+    const held = [...this.held_.keys()].map((code) => movement[code] ?? {});
     for (const [code, hold] of this.held_) {
       hold.steps += 1;
       if (hold.released && hold.steps >= least_steps) this.held_.delete(code);
-      const axes = movement[code] ?? {};
-      sum.right += axes.right ?? 0;
-      sum.up += axes.up ?? 0;
-      sum.forward += axes.forward ?? 0;
-      sum.turn_right += axes.turn_right ?? 0;
-      sum.turn_up += axes.turn_up ?? 0;
     }
-    return {
-      right: clamp(sum.right),
-      up: clamp(sum.up),
-      forward: clamp(sum.forward),
-      turn_right: clamp(sum.turn_right),
-      turn_up: clamp(sum.turn_up),
-      fast: this.fast_,
-    };
+    return sum_of(...held, { fast: this.fast_ });
   }
 }

@@ -1,8 +1,9 @@
+import { ask_server } from '../base/server';
+
 /** Ids of the scenes that this token may see; empty when the server does not answer. */
 export async function list_scenes(page_url: string, token: string): Promise<readonly string[]> {
   try {
-    const headers: HeadersInit = token ? { authorization: `Bearer ${token}` } : {};
-    const response = await fetch(new URL('./api/scenes', page_url), { headers });
+    const response = await ask_server(page_url, token, 'scenes');
     if (!response.ok) return [];
     const { scenes } = (await response.json()) as { scenes: readonly { id: string }[] };
     return scenes.map(({ id }) => id);

@@ -111,11 +111,7 @@ export class Session {
   }
 
   set_viewport(width_px: number, height_px: number): void {
-    this.greeting_ = {
-      ...this.greeting_,
-      viewportWidthPx: width_px,
-      viewportHeightPx: height_px,
-    };
+    this.greeting_ = { ...this.greeting_, viewportWidthPx: width_px, viewportHeightPx: height_px };
   }
 
   /** A hidden page needs no pictures. */
@@ -215,12 +211,7 @@ export class Session {
       case 'queue':
         if (link === this.link_) {
           const { position, estimateS, forScene } = body.value;
-          this.listener_.state({
-            phase: 'queued',
-            position,
-            estimate_s: estimateS,
-            for_scene: forScene,
-          });
+          this.listener_.state({ phase: 'queued', position, estimate_s: estimateS, for_scene: forScene });
         }
         break;
       case 'stats':

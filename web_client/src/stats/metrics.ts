@@ -9,21 +9,20 @@ interface Percentiles {
   readonly p95: number;
 }
 
+/** What a frame goes through, in order. `network`: the round trip, for the first picture of each pose. */
+export const stages = ['wait', 'render', 'encode', 'send', 'network', 'decode', 'present'] as const;
+export type Stage = (typeof stages)[number];
+
+const of_stages = <T>(make: (stage: Stage) => T): Record<Stage, T> =>
+  Object.fromEntries(stages.map((stage) => [stage, make(stage)])) as Record<Stage, T>;
+
 /** Latency of pictures of a moving camera; NaN where nothing was measured. */
 export interface Motion {
   /** Presentation time minus sample time of the pose, for the first picture of each pose. */
   readonly motion_to_photon_ms: Percentiles;
   readonly pose_age_ms: Percentiles;
   /** Means over frames, from the server's header and the client's clock. */
-  readonly stages_ms: {
-    readonly wait: number;
-    readonly render: number;
-    readonly encode: number;
-    readonly send: number;
-    readonly network: number; // round trip, for the first picture of each pose
-    readonly decode: number;
-    readonly present: number;
-  };
+  readonly stages_ms: Readonly<Record<Stage, number>>;
   /** Mean number of sub-frames that key frames promise, and the share of frames that are sub-frames. */
   readonly window: number;
   readonly sub_share: number;
@@ -52,15 +51,7 @@ export class Metrics {
   private readonly bytes_ = new TimeWindow(span_us);
   private readonly motion_us_ = new TimeWindow(span_us);
   private readonly pose_age_ = new PoseAge(span_us, 1e6 / 60);
-  private readonly stages_us_ = {
-    wait: new TimeWindow(span_us),
-    render: new TimeWindow(span_us),
-    encode: new TimeWindow(span_us),
-    send: new TimeWindow(span_us),
-    network: new TimeWindow(span_us),
-    decode: new TimeWindow(span_us),
-    present: new TimeWindow(span_us),
-  };
+  private readonly stages_us_ = of_stages(() => new TimeWindow(span_us));
   private readonly windows_ = new TimeWindow(span_us);
   private readonly subs_ = new TimeWindow(span_us);
   private last_pose_id_ = -1n;
@@ -93,19 +84,19 @@ export class Metrics {
     if (is_first) this.pose_age_.shown(header.poseId, pose_time_us, now_us);
     // A still comes late on purpose, perhaps in another size, and is a key frame without a window.
     if (header.still) return;
-    const stages = this.stages_us_;
+    const of = this.stages_us_;
     if (is_first) {
       this.motion_us_.push(now_us, now_us - pose_time_us);
-      stages.network.push(now_us, network_us(frame));
+      of.network.push(now_us, network_us(frame));
       this.windows_.push(now_us, header.window);
       this.subs_.push(now_us, header.speculated ? 1 : 0);
     }
-    stages.wait.push(now_us, header.waitUs);
-    stages.render.push(now_us, header.renderUs);
-    stages.encode.push(now_us, header.encodeUs);
-    stages.send.push(now_us, header.sendWaitUs);
-    stages.decode.push(now_us, frame.decoded_us - frame.received_us);
-    stages.present.push(now_us, now_us - frame.decoded_us);
+    of.wait.push(now_us, header.waitUs);
+    of.render.push(now_us, header.renderUs);
+    of.encode.push(now_us, header.encodeUs);
+    of.send.push(now_us, header.sendWaitUs);
+    of.decode.push(now_us, frame.decoded_us - frame.received_us);
+    of.present.push(now_us, now_us - frame.decoded_us);
   }
 
   dropped(): void {
@@ -136,24 +127,14 @@ export class Metrics {
       const values = of(window);
       return sum(values) / values.length;
     };
-    const mean_ms = (window: TimeWindow): number => mean(window) / 1000;
     const percentiles_ms = (window: TimeWindow | PoseAge): Percentiles => {
       const values = of(window);
       return { p50: percentile(values, 0.5) / 1000, p95: percentile(values, 0.95) / 1000 };
     };
-    const stages = this.stages_us_;
     return {
       motion_to_photon_ms: percentiles_ms(this.motion_us_),
       pose_age_ms: percentiles_ms(this.pose_age_),
-      stages_ms: {
-        wait: mean_ms(stages.wait),
-        render: mean_ms(stages.render),
-        encode: mean_ms(stages.encode),
-        send: mean_ms(stages.send),
-        network: mean_ms(stages.network),
-        decode: mean_ms(stages.decode),
-        present: mean_ms(stages.present),
-      },
+      stages_ms: of_stages((stage) => mean(this.stages_us_[stage]) / 1000),
       window: mean(this.windows_),
       sub_share: mean(this.subs_),
     };

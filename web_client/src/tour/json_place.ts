@@ -1,4 +1,4 @@
-import type { Vec3 } from '../base/vector';
+import { unit, type Quat, type Vec3 } from '../base/vector';
 import { max_text_characters } from './limits';
 
 /** A value of a document that people wrote. Its errors name its place: "tours[0].title: …". */
@@ -57,5 +57,14 @@ export class JsonPlace {
 
   vec3(): Vec3 {
     return this.numbers(3) as unknown as Vec3;
+  }
+
+  orientation(): Quat {
+    return unit(this.numbers(4) as unknown as Quat);
+  }
+
+  /** A vertical field of view, written in degrees. */
+  fov_rad(): number {
+    return (this.number(5, 160) * Math.PI) / 180;
   }
 }

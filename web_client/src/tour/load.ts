@@ -1,5 +1,6 @@
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { ask_server, scene_path } from '../base/server';
 import { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 
@@ -58,9 +59,7 @@ export async function fetch_tours(
 ): Promise<{ document: TourDocument; may_save: boolean }> {
   const nothing = { document: {}, may_save: false };
   try {
-    const headers: HeadersInit = token ? { authorization: `Bearer ${token}` } : {};
-    const address = new URL(`./api/scenes/${encodeURIComponent(scene_id)}/tours`, page_url);
-    const response = await fetch(address, { headers });
+    const response = await ask_server(page_url, token, scene_path(scene_id, 'tours'));
     return response.ok ? { ...nothing, ...((await response.json()) as object) } : nothing;
   } catch (error) {
     console.warn('the tours of the scene could not be read', error);

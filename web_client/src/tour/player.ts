@@ -49,13 +49,14 @@ export class TourPlayer {
     private readonly changed_: (state: TourState) => void,
   ) {}
 
-  load(tours: readonly Tour[]): void {
+  /** `stays`: no tour starts by itself, whatever it says. */
+  load(tours: readonly Tour[], stays = false): void {
     this.pause();
     this.tours_ = tours;
     this.tour_index_ = 0;
     this.stop_index_ = undefined;
     const first = tours.findIndex(({ starts_itself }) => starts_itself);
-    if (first >= 0 && !this.env_.reduced_motion) {
+    if (first >= 0 && !stays && !this.env_.reduced_motion) {
       this.tour_index_ = first;
       this.play();
     }

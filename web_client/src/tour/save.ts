@@ -1,4 +1,5 @@
 // Saves a scene's sidecar to the server. The server accepts it from authors.
+import { ask_server, scene_path } from '../base/server';
 import { max_sidecar_bytes } from './limits';
 
 /** Tag (ETag) of a sidecar; null: there is none; undefined: the server did not say. */
@@ -22,12 +23,12 @@ export async function save_sidecar(
   const body = new Blob([sidecar], { type: 'application/json' });
   if (body.size > max_sidecar_bytes)
     return { kind: 'refused', why: `${body.size} bytes are too many, ${max_sidecar_bytes} fit` };
-  const address = new URL(`./api/scenes/${encodeURIComponent(scene_id)}/sidecar`, page_url);
-  const headers: Record<string, string> = { authorization: `Bearer ${token}` };
+  const headers: Record<string, string> = {};
   if (made_from === null) headers['if-none-match'] = '*';
   else if (made_from !== undefined) headers['if-match'] = made_from;
   try {
-    const response = await fetch(address, { method: 'PUT', body, headers });
+    const request = { method: 'PUT', body, headers };
+    const response = await ask_server(page_url, token, scene_path(scene_id, 'sidecar'), request);
     const tag = response.headers.get('etag');
     if (response.ok) return { kind: 'saved', tag: tag ?? undefined };
     if (response.status === 412) return { kind: 'changed', tag };

@@ -1,5 +1,5 @@
 // Tours through a scene: stops to visit, or a film of the camera. Pure.
-import { look_at, unit, type Vec3 } from '../base/vector';
+import { look_at, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { JsonPlace } from './json_place';
@@ -48,18 +48,11 @@ export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour
 function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   const position = stop.at('position').vec3();
   const target = stop.find('look_at')?.vec3();
-  const orientation = target
-    ? look_at(position, target, up)
-    : unit(stop.at('orientation').numbers(4) as [number, number, number, number]);
-  const fov_deg = stop.find('fov_deg')?.number(5, 160);
+  const orientation = target ? look_at(position, target, up) : stop.at('orientation').orientation();
   return {
     title: stop.find('title')?.text() ?? '',
     caption: stop.find('caption')?.text() ?? '',
-    eye: {
-      position,
-      orientation,
-      fov_y_rad: fov_deg === undefined ? fov_y_rad : (fov_deg * Math.PI) / 180,
-    },
+    eye: { position, orientation, fov_y_rad: stop.find('fov_deg')?.fov_rad() ?? fov_y_rad },
     marker: stop.find('marker')?.vec3(),
     stay_s: stop.find('stay_s')?.number(0, 3600),
   };

@@ -5,8 +5,8 @@ import { text } from '../text';
 import { TourDraft } from '../tour/draft';
 import { max_text_characters } from '../tour/limits';
 import { save_sidecar, type SidecarTag } from '../tour/save';
-import type { Tour } from '../tour/tour';
-import { by_id, on_click, save_file } from './dom';
+import type { Stop, Tour } from '../tour/tour';
+import { by_id, make, on_click, save_file } from './dom';
 
 interface AuthorTools {
   eye(): Eye;
@@ -152,46 +152,36 @@ export class AuthorPanel {
     const count = this.draft_.stops.length;
     by_id('author-hint', HTMLElement).hidden = count > 0;
     this.preview_.disabled = count === 0;
-    this.list_.replaceChildren(
-      ...this.draft_.stops.map((stop, i) => {
-        const item = document.createElement('li');
-        const title = document.createElement('input');
-        title.value = stop.title;
-        title.maxLength = 200;
-        title.setAttribute('aria-label', text.author.title(i + 1));
-        title.addEventListener('input', () => this.change(i, { title: title.value }));
-        const caption = document.createElement('textarea');
-        caption.value = stop.caption;
-        caption.rows = 2;
-        caption.maxLength = max_text_characters;
-        caption.placeholder = text.author.caption_here;
-        caption.setAttribute('aria-label', text.author.caption(i + 1));
-        caption.addEventListener('input', () => this.change(i, { caption: caption.value }));
-        const buttons = document.createElement('div');
-        const button = (name: string, action: () => void, sign = name, enabled = true): void => {
-          const made = document.createElement('button');
-          made.type = 'button';
-          made.textContent = sign;
-          if (sign !== name) made.ariaLabel = made.title = name;
-          made.disabled = !enabled;
-          made.addEventListener('click', action);
-          buttons.append(made);
-        };
-        button(text.author.show, () => this.tools_.go_to(i));
-        button(text.author.view_here, () => void this.view_here(i));
-        button(text.author.up(i + 1), () => this.move(i, -1), '↑', i > 0);
-        button(text.author.down(i + 1), () => this.move(i, 1), '↓', i < count - 1);
-        const remove = (): void => {
-          this.draft_.remove(i);
-          this.edited();
-        };
-        button(text.author.remove(i + 1), remove, '×');
-        item.append(title, caption, buttons);
-        item.classList.toggle('open', i === this.open_);
-        item.addEventListener('focusin', () => this.open(i));
-        return item;
-      }),
+    this.list_.replaceChildren(...this.draft_.stops.map((stop, i) => this.row_of(stop, i)));
+  }
+
+  /** The fields and buttons of a stop. */
+  private row_of(stop: Stop, i: number): HTMLElement {
+    const words = text.author;
+    const title = make('input', { value: stop.title, maxLength: 200, 'aria-label': words.title(i + 1) });
+    title.addEventListener('input', () => this.change(i, { title: title.value }));
+    const caption = make('textarea', {
+      ...{ value: stop.caption, rows: 2, maxLength: max_text_characters },
+      ...{ placeholder: words.caption_here, 'aria-label': words.caption(i + 1) },
+    });
+    caption.addEventListener('input', () => this.change(i, { caption: caption.value }));
+    const button = (name: string, onclick: () => void, sign = name, disabled = false): HTMLElement => {
+      const said = sign === name ? {} : { 'aria-label': name, title: name };
+      return make('button', { type: 'button', disabled, onclick, ...said }, sign);
+    };
+    const buttons = make(
+      'div',
+      {},
+      button(words.show, () => this.tools_.go_to(i)),
+      button(words.view_here, () => void this.view_here(i)),
+      button(words.up(i + 1), () => this.move(i, -1), '↑', i === 0),
+      button(words.down(i + 1), () => this.move(i, 1), '↓', i === this.draft_.stops.length - 1),
+      button(words.remove(i + 1), () => this.remove(i), '×'),
     );
+    const item = make('li', {}, title, caption, buttons);
+    item.classList.toggle('open', i === this.open_);
+    item.addEventListener('focusin', () => this.open(i));
+    return item;
   }
 
   private change(index: number, change: { title?: string; caption?: string }): void {
@@ -202,6 +192,11 @@ export class AuthorPanel {
   private async view_here(index: number): Promise<void> {
     const eye = this.tools_.eye();
     this.draft_.change(index, { eye, marker: await this.tools_.place_ahead() });
+    this.edited();
+  }
+
+  private remove(index: number): void {
+    this.draft_.remove(index);
     this.edited();
   }
 

@@ -5,14 +5,29 @@ export function by_id<T extends HTMLElement>(id: string, type: new () => T): T {
   return element;
 }
 
+type Attributes = Readonly<Record<`aria-${string}`, string>>;
+
+/** Makes an element. ARIA goes by attributes, because Firefox has properties for it since version 119 only. */
+export function make<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  properties: Partial<HTMLElementTagNameMap[K]> & Attributes = {},
+  ...children: (Node | string)[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries<unknown>(properties)) {
+    if (name.startsWith('aria-')) element.setAttribute(name, String(value));
+    else Reflect.set(element, name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
 export function on_click(id: string, action: () => void): void {
   by_id(id, HTMLButtonElement).addEventListener('click', action);
 }
 
 export function save_file(blob: Blob, name: string): void {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
+  const link = make('a', { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

@@ -1,6 +1,5 @@
 // Lets the page that shows this one in a frame drive it. The server names the pages that may do so
 // (--embed-origin). Browsers do not load this page in other frames, so the parent window is one of them.
-import { unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { JsonPlace } from '../tour/json_place';
 import { max_stops } from '../tour/limits';
@@ -77,11 +76,10 @@ export class EmbedApi {
   }
 
   private set_pose(message: JsonPlace): void {
-    const fov_deg = message.find('fov_deg')?.number(5, 160);
     this.target_.set_eye({
       position: message.at('position').vec3(),
-      orientation: unit(message.at('orientation').numbers(4) as [number, number, number, number]),
-      fov_y_rad: fov_deg === undefined ? this.target_.eye().fov_y_rad : (fov_deg * Math.PI) / 180,
+      orientation: message.at('orientation').orientation(),
+      fov_y_rad: message.find('fov_deg')?.fov_rad() ?? this.target_.eye().fov_y_rad,
     });
   }
 

@@ -1,6 +1,5 @@
 // Leads visitors through a scene: tours, shared views, and the page around this one.
 import { browser_timers, type Clock } from '../base/clock';
-import type { Eye } from '../camera/eye';
 import { scene_name } from '../session/scenes';
 import type { AccessToken } from '../session/token';
 import { text } from '../text';
@@ -89,7 +88,7 @@ export class Guide {
       place_ahead: () => navigation.place_ahead(),
       changed: (tours) => {
         this.tour_view_.show_tours(tours);
-        this.player_.load(tours.map((tour) => ({ ...tour, starts_itself: false })));
+        this.player_.load(tours, true);
       },
       go_to: (stop_index) => {
         this.player_.choose(0);
@@ -138,11 +137,8 @@ export class Guide {
     this.tour_view_.show_tours(tours);
     this.author_?.load(tours, may_save ? token : undefined, document.etag);
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
-    const stays =
-      shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
-    this.player_.load(
-      stays ? tours.map((tour) => ({ ...tour, starts_itself: false })) : tours,
-    );
+    const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
+    this.player_.load(tours, stays);
     if (load === 1 && this.author_) toolbar.open('author');
     if (shared.tour_index !== undefined) this.player_.choose(shared.tour_index);
     if (shared.stop_index !== undefined && !shared.eye) this.player_.go_to(shared.stop_index, true);
@@ -162,14 +158,9 @@ export class Guide {
   }
 
   private tour_changed(state: TourState): void {
-    const eye: Eye = this.parts_.navigation.eye;
     this.tour_view_.show(state);
-    this.hotspots_.show(state, eye);
-    this.embed_.say({
-      catgs: 'stop',
-      stop: state.stop_index ?? null,
-      playing: state.playing,
-    });
+    this.hotspots_.show(state, this.parts_.navigation.eye);
+    this.embed_.say({ catgs: 'stop', stop: state.stop_index ?? null, playing: state.playing });
   }
 
   private address(): string {

@@ -4,7 +4,7 @@ import { text } from '../text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import type { WorkerClient } from '../worker/client';
-import { by_id } from './dom';
+import { by_id, make } from './dom';
 import type { Navigation } from './navigation';
 
 /** Shows the stops of a tour as buttons in the picture. */
@@ -66,14 +66,10 @@ export class Hotspots {
     this.tour_ = tour;
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
-      const button = document.createElement('button');
-      button.type = 'button';
-      button.className = 'hotspot';
-      button.hidden = true; // until it is placed
-      const number = document.createElement('span');
-      number.textContent = String(i + 1);
-      number.setAttribute('aria-hidden', 'true');
-      button.append(number, label_of(stop, i, button));
+      const number = make('span', { 'aria-hidden': 'true' }, String(i + 1));
+      // It is hidden until it is placed.
+      const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, number);
+      button.append(label_of(stop, i, button));
       button.addEventListener('click', () => this.go_to_(i));
       for (const arrival of ['pointerenter', 'focus']) {
         button.addEventListener(arrival, () => this.host_.classList.remove('labels-dismissed'));
@@ -86,21 +82,13 @@ export class Hotspots {
 
 /** Title and caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
 function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLElement {
-  const label = document.createElement('span');
-  label.className = 'hotspot-label';
-  const name = document.createElement('span');
-  name.className = 'hotspot-name';
-  name.textContent = stop.title || text.tour.stop_numbered(index + 1);
-  label.append(name);
+  const title = stop.title || text.tour.stop_numbered(index + 1);
+  const label = make('span', { className: 'hotspot-label' }, make('span', { className: 'hotspot-name' }, title));
   if (stop.caption) {
     // The title alone is the name of the button; the caption describes it.
-    const caption = document.createElement('span');
-    caption.className = 'hotspot-caption';
-    caption.id = `hotspot-caption-${index}`;
-    caption.textContent = stop.caption;
-    caption.setAttribute('aria-hidden', 'true');
-    button.setAttribute('aria-describedby', caption.id);
-    label.append(caption);
+    const id = `hotspot-caption-${index}`;
+    label.append(make('span', { id, className: 'hotspot-caption', 'aria-hidden': 'true' }, stop.caption));
+    button.setAttribute('aria-describedby', id);
   }
   return label;
 }

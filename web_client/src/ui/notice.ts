@@ -1,4 +1,4 @@
-import { by_id } from './dom';
+import { by_id, on_click } from './dom';
 
 const passing_ms = 20_000;
 
@@ -9,19 +9,17 @@ export class Notice {
   private readonly text_ = by_id('notice-text', HTMLElement);
 
   constructor() {
-    by_id('notice-close', HTMLButtonElement).addEventListener('click', () => {
-      this.notice_.hidden = true;
-    });
+    on_click('notice-close', () => this.hide());
   }
 
   show(message: string, passing = false): void {
     clearTimeout(this.timer_);
-    if (passing) {
-      this.timer_ = setTimeout(() => {
-        this.notice_.hidden = true;
-      }, passing_ms);
-    }
+    if (passing) this.timer_ = setTimeout(() => this.hide(), passing_ms);
     this.text_.textContent = message;
     this.notice_.hidden = false;
+  }
+
+  private hide(): void {
+    this.notice_.hidden = true;
   }
 }

@@ -1,3 +1,4 @@
+import { ask_server, scene_path } from '../base/server';
 import { list_scenes } from '../session/scenes';
 import { by_id } from './dom';
 
@@ -11,9 +12,7 @@ export class Poster {
     try {
       const id = scene_id || (await list_scenes(page_url, token))[0];
       if (!id) return;
-      const address = new URL(`./api/scenes/${encodeURIComponent(id)}/poster.jpg`, page_url);
-      const headers: HeadersInit = token ? { authorization: `Bearer ${token}` } : {};
-      const response = await fetch(address, { headers });
+      const response = await ask_server(page_url, token, scene_path(id, 'poster.jpg'));
       if (!response.ok) return;
       const blob = await response.blob();
       if (this.over_ || !blob.type.startsWith('image/')) return;

@@ -1,7 +1,7 @@
 import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
 import type { WorkerClient } from '../worker/client';
-import { by_id } from './dom';
+import { by_id, on_click } from './dom';
 import type { Navigation } from './navigation';
 import type { StreamSize } from './stream_size';
 
@@ -23,13 +23,9 @@ export class QualityPanel {
     size.addEventListener('change', chosen);
     fps.addEventListener('change', chosen);
     const warp = by_id('view-warp', HTMLSelectElement);
-    warp.addEventListener('change', () => {
-      worker.post({ kind: 'warp', mode: warp.value as WarpMode });
-    });
-    this.fov_.addEventListener('input', () => {
-      navigation_.set_fov(this.fov_.valueAsNumber / degrees);
-    });
-    by_id('view-flip', HTMLButtonElement).addEventListener('click', () => navigation_.flip_up());
+    warp.addEventListener('change', () => worker.post({ kind: 'warp', mode: warp.value as WarpMode }));
+    this.fov_.addEventListener('input', () => navigation_.set_fov(this.fov_.valueAsNumber / degrees));
+    on_click('view-flip', () => navigation_.flip_up());
     navigation_.changed.listen(() => this.show());
     this.show();
   }

@@ -1,5 +1,5 @@
 import { scene_address, scene_labels } from '../session/scenes';
-import { by_id } from './dom';
+import { by_id, make } from './dom';
 
 /** Fills the list with this id with links to the scenes. Hides the list when there are none. */
 export function show_scene_links(list_id: string, ids: readonly string[], current?: string): void {
@@ -8,13 +8,9 @@ export function show_scene_links(list_id: string, ids: readonly string[], curren
   const labels = scene_labels(ids);
   list.replaceChildren(
     ...ids.map((id, i) => {
-      const link = document.createElement('a');
-      link.href = scene_address(location.href, id);
-      link.textContent = labels[i] ?? id;
+      const link = make('a', { href: scene_address(location.href, id) }, labels[i] ?? id);
       if (id === current) link.setAttribute('aria-current', 'page');
-      const item = document.createElement('li');
-      item.append(link);
-      return item;
+      return make('li', {}, link);
     }),
   );
 }

@@ -1,5 +1,5 @@
 import type { SceneFacts } from '../wire/wire';
-import { by_id } from './dom';
+import { by_id, make } from './dom';
 import { show_scene_links } from './scene_links';
 
 /** Shows the name of the scene, with a list of all scenes where there are several. */
@@ -22,9 +22,8 @@ export class SceneTitle {
   /** `scene_ids`: the scenes that this visitor may see. */
   show(scene: SceneFacts, scene_ids: readonly string[]): void {
     const name = scene.title || scene.sceneId;
-    const count = document.createElement('small');
-    count.textContent = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
-    by_id('scene-name', HTMLElement).replaceChildren(name, count);
+    const count = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
+    by_id('scene-name', HTMLElement).replaceChildren(name, make('small', {}, count));
     show_scene_links('scene-list', scene_ids, scene.sceneId);
     this.chooser_.hidden = scene_ids.length < 2;
     by_id('scene-title', HTMLElement).hidden = false;

@@ -1,7 +1,7 @@
 import { text as words } from '../text';
 import { embed_code, frame_sites } from '../tour/share';
 import type { Snapshot } from '../worker/messages';
-import { by_id, save_file } from './dom';
+import { by_id, make, on_click, save_file } from './dom';
 
 interface ShareSource {
   address(): string;
@@ -20,14 +20,12 @@ export class SharePanel {
   private readonly frames_ = by_id('share-frames', HTMLElement);
 
   constructor(private readonly source_: ShareSource) {
-    const click = (id: string, action: () => Promise<void>): void =>
-      by_id(id, HTMLButtonElement).addEventListener('click', () => void action());
-    click('share-copy', () => this.hand_over(source_.address(), words.share.link_copied));
-    click('share-embed', async () => {
-      await this.hand_over(embed_code(source_.address()), words.share.code_copied);
-      await this.tell_of_frames();
+    on_click('share-copy', () => void this.hand_over(source_.address(), words.share.link_copied));
+    on_click('share-embed', () => {
+      void this.hand_over(embed_code(source_.address()), words.share.code_copied);
+      void this.tell_of_frames();
     });
-    click('share-picture', () => this.save_picture());
+    on_click('share-picture', () => void this.save_picture());
     this.link_.addEventListener('focus', () => this.link_.select());
   }
 
@@ -71,8 +69,7 @@ export class SharePanel {
     const snapshot = await this.source_.snapshot();
     if (!snapshot) return;
     const { width_px, height_px, rgba } = snapshot;
-    const canvas = document.createElement('canvas');
-    [canvas.width, canvas.height] = [width_px, height_px];
+    const canvas = make('canvas', { width: width_px, height: height_px });
     canvas.getContext('2d')?.putImageData(new ImageData(rgba, width_px, height_px), 0, 0);
     const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
     if (blob) save_file(blob, `${this.source_.name()}.png`);

@@ -1,22 +1,22 @@
 // The plots of the statistics panel. They load when the panel is first opened.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { sum } from '../base/time_window';
 import type { StatsHistory } from '../stats/history';
-import type { StatsSnapshot } from '../stats/metrics';
+import { stages, type Stage, type StatsSnapshot } from '../stats/metrics';
 import { text } from '../text';
+import { make } from './dom';
 
-type Stage = keyof StatsSnapshot['stages_ms'];
-
-/** Stages in the order of a frame, with colours for both light and dark pages. */
-const stages: readonly (readonly [stage: Stage, colour: string])[] = [
-  ['wait', '#8d99ae'],
-  ['render', '#e07a3f'],
-  ['encode', '#d9b23a'],
-  ['send', '#6fae5c'],
-  ['network', '#3d9fa8'],
-  ['decode', '#4b7bd6'],
-  ['present', '#9a68c4'],
-];
+/** For both light and dark pages. */
+const colours: Readonly<Record<Stage, string>> = {
+  wait: '#8d99ae',
+  render: '#e07a3f',
+  encode: '#d9b23a',
+  send: '#6fae5c',
+  network: '#3d9fa8',
+  decode: '#4b7bd6',
+  present: '#9a68c4',
+};
 
 const height_px = 104;
 
@@ -57,6 +57,13 @@ const line = (label: string, stroke: string, scale: string): uPlot.Series => ({
   points: { show: false },
 });
 
+interface Curve {
+  readonly label: string;
+  readonly unit: string;
+  readonly colour: string;
+  readonly value: (stats: StatsSnapshot) => number;
+}
+
 interface Chart {
   readonly plot: uPlot;
   readonly data: (history: StatsHistory) => (number | null)[][];
@@ -66,7 +73,20 @@ export class StatsCharts {
   private readonly charts_: Chart[];
 
   constructor(private readonly host_: HTMLElement) {
-    this.charts_ = [this.latency(), this.rates(), this.caches()];
+    const { fps, bitrate, window, sub_share } = text.plots;
+    this.charts_ = [
+      this.latency(),
+      this.two_scales(
+        text.plots.rates,
+        { label: fps, unit: 'fps', colour: '#4b7bd6', value: (s) => s.fps_shown },
+        { label: bitrate, unit: 'Mb/s', colour: '#e07a3f', value: (s) => s.bitrate_kbps / 1000, scale: 'bits' },
+      ),
+      this.two_scales(
+        text.plots.caches,
+        { label: window, unit: 'W', colour: '#6fae5c', value: (s) => s.window },
+        { label: sub_share, unit: '%', colour: '#9a68c4', value: (s) => s.sub_share * 100, scale: 'share' },
+      ),
+    ];
     new ResizeObserver(() => {
       const width = this.width();
       for (const { plot } of this.charts_) plot.setSize({ width, height: height_px });
@@ -82,56 +102,36 @@ export class StatsCharts {
 
   /** Stages are stacked, so the topmost line is close to the motion to photon. */
   private latency(): Chart {
-    const upwards = stages.map((_, i) => stages.slice(0, i + 1).map(([stage]) => stage));
-    const total =
-      (names: readonly Stage[]) =>
+    const drawn = [...stages].reverse();
+    const up_to =
+      (last: Stage) =>
       ({ stages_ms }: StatsSnapshot): number =>
-        names.reduce((sum, name) => sum + (Number.isFinite(stages_ms[name]) ? stages_ms[name] : 0), 0);
-    const drawn = stages.map(([stage, colour], i) => ({ stage, colour, names: upwards[i]! })).reverse();
+        sum(stages.slice(0, stages.indexOf(last) + 1).map((stage) => stages_ms[stage]).filter(Number.isFinite));
     return {
       plot: this.plot(
         text.plots.latency,
-        drawn.map(({ stage, colour }) => ({ ...line(text.stages[stage].label, colour, 'y'), fill: colour })),
+        drawn.map((stage) => ({ ...line(text.stages[stage].label, colours[stage], 'y'), fill: colours[stage] })),
         [axis(this.host_, 'ms')],
       ),
-      data: (history) => drawn.map(({ names }) => history.column(total(names))),
+      data: (history) => drawn.map((stage) => history.column(up_to(stage))),
     };
   }
 
-  private rates(): Chart {
-    const right = { side: 1, scale: 'bits', grid: { show: false } } as const;
+  /** Two curves; the second one has a scale of its own, at the right. */
+  private two_scales(title: string, left: Curve, right: Curve & { scale: string }): Chart {
+    const { scale } = right;
     return {
       plot: this.plot(
-        text.plots.rates,
-        [line(text.plots.fps, '#4b7bd6', 'y'), line(text.plots.bitrate, '#e07a3f', 'bits')],
-        [axis(this.host_, 'fps'), axis(this.host_, 'Mb/s', right)],
+        title,
+        [line(left.label, left.colour, 'y'), line(right.label, right.colour, scale)],
+        [axis(this.host_, left.unit), axis(this.host_, right.unit, { side: 1, scale, grid: { show: false } })],
       ),
-      data: (history) => [
-        history.column((s) => s.fps_shown),
-        history.column((s) => s.bitrate_kbps / 1000),
-      ],
-    };
-  }
-
-  private caches(): Chart {
-    const right = { side: 1, scale: 'share', grid: { show: false } } as const;
-    return {
-      plot: this.plot(
-        text.plots.caches,
-        [line(text.plots.window, '#6fae5c', 'y'), line(text.plots.sub_share, '#9a68c4', 'share')],
-        [axis(this.host_, 'W'), axis(this.host_, '%', right)],
-      ),
-      data: (history) => [
-        history.column((s) => s.window),
-        history.column((s) => s.sub_share * 100),
-      ],
+      data: (history) => [history.column(left.value), history.column(right.value)],
     };
   }
 
   private plot(title: string, series: uPlot.Series[], axes: uPlot.Axis[]): uPlot {
-    const heading = document.createElement('h3');
-    heading.textContent = title;
-    this.host_.append(heading);
+    this.host_.append(make('h3', {}, title));
     const from_zero: uPlot.Scale = { range: (_, _low, high) => [0, Math.max(high * 1.1, 1)] };
     return new uPlot(
       {

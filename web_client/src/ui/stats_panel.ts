@@ -2,7 +2,7 @@ import { StatsHistory } from '../stats/history';
 import type { StatsReport } from '../stats/metrics';
 import { text } from '../text';
 import type { WorkerClient } from '../worker/client';
-import { by_id, save_file } from './dom';
+import { by_id, make, save_file } from './dom';
 import type { StatsCharts } from './stats_charts';
 import { rest_note, row_texts, slowest_stage, stats_rows } from './stats_rows';
 import type { Toolbar } from './toolbar';
@@ -10,21 +10,17 @@ import type { Toolbar } from './toolbar';
 const interval_ms = 250;
 
 /** Facts about the server, and how this page shows pictures. */
-interface Facts {
-  readonly renderer: string;
-  readonly encoder: string;
-  readonly presenter: string;
-  readonly server_version: string;
-}
+const facts = ['renderer', 'encoder', 'presenter', 'server_version'] as const;
+type Facts = Readonly<Record<(typeof facts)[number], string>>;
 
 /** The statistics overlay. Reads nothing and draws nothing while it is hidden. */
 export class StatsPanel {
   private readonly values_: HTMLElement[] = [];
-  private readonly fact_cells_: Record<keyof Facts, HTMLElement>;
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
   private readonly history_ = new StatsHistory();
-  private readonly rest_ = document.createElement('p');
-  private readonly plots_ = document.createElement('div');
+  private readonly rest_ = make('p', { hidden: true });
+  private readonly plots_ = make('div', { className: 'plots' });
+  private readonly about_ = make('dl');
   private charts_: StatsCharts | undefined;
   private opened_ = false;
   private timer_: ReturnType<typeof setInterval> | undefined;
@@ -33,31 +29,14 @@ export class StatsPanel {
     private readonly worker_: WorkerClient,
     toolbar: Toolbar,
   ) {
-    const list = document.createElement('dl');
-    for (const row of stats_rows) {
-      const value = document.createElement('span');
-      add_row(list, row.label, row.title).append(value);
+    const list = make('dl');
+    for (const { label, title } of stats_rows) {
+      const value = make('span');
+      list.append(make('dt', { title: title ?? '' }, label), make('dd', {}, value));
       this.values_.push(value);
     }
-    const about = document.createElement('dl');
-    const fact = (label: string): HTMLElement => {
-      const cell = add_row(about, label);
-      cell.className = 'reason';
-      return cell;
-    };
-    this.fact_cells_ = {
-      renderer: fact(text.stats.renderer),
-      encoder: fact(text.stats.encoder),
-      presenter: fact(text.stats.presenter),
-      server_version: fact(text.stats.server_version),
-    };
-    this.rest_.hidden = true;
-    this.plots_.className = 'plots';
-    const save = document.createElement('button');
-    save.type = 'button';
-    save.textContent = text.stats.save;
-    save.addEventListener('click', () => this.save());
-    by_id('stats-panel', HTMLElement).append(this.rest_, list, this.plots_, about, save);
+    const save = make('button', { type: 'button', onclick: () => this.save() }, text.stats.save);
+    by_id('stats-panel', HTMLElement).append(this.rest_, list, this.plots_, this.about_, save);
     worker_.on('welcome', ({ welcome }) => {
       this.show_facts({ renderer: welcome.renderer, server_version: welcome.serverVersion });
     });
@@ -68,11 +47,14 @@ export class StatsPanel {
     });
   }
 
-  private show_facts(facts: Partial<Facts>): void {
-    this.facts_ = { ...this.facts_, ...facts };
-    for (const key of Object.keys(this.fact_cells_) as (keyof Facts)[]) {
-      this.fact_cells_[key].textContent = this.facts_[key];
-    }
+  private show_facts(known: Partial<Facts>): void {
+    this.facts_ = { ...this.facts_, ...known };
+    this.about_.replaceChildren(
+      ...facts.flatMap((fact) => [
+        make('dt', {}, text.stats[fact]),
+        make('dd', { className: 'reason' }, this.facts_[fact]),
+      ]),
+    );
   }
 
   private watch(shown: boolean): void {
@@ -118,13 +100,4 @@ export class StatsPanel {
     const json = this.history_.to_json(this.facts_, new Date().toISOString());
     save_file(new Blob([json], { type: 'application/json' }), 'catgs-statistics.json');
   }
-}
-
-function add_row(list: HTMLElement, label: string, title?: string): HTMLElement {
-  const term = document.createElement('dt');
-  term.textContent = label;
-  if (title) term.title = title;
-  const cell = document.createElement('dd');
-  list.append(term, cell);
-  return cell;
 }

@@ -1,8 +1,6 @@
 // Texts of the statistics overlay. Pure.
-import type { StatsReport, StatsSnapshot } from '../stats/metrics';
+import { stages, type Stage, type StatsReport, type StatsSnapshot } from '../stats/metrics';
 import { text } from '../text';
-
-type Stage = keyof StatsSnapshot['stages_ms'];
 
 interface Row {
   readonly label: string;
@@ -28,10 +26,7 @@ const stage_row = (stage: Stage): Row => ({
 
 /** The stage that takes most of a frame's time; undefined before a measurement. */
 export function slowest_stage(stages_ms: StatsSnapshot['stages_ms']): Stage | undefined {
-  const stages = Object.keys(stages_ms) as Stage[];
-  return stages
-    .filter((stage) => stages_ms[stage] > 0)
-    .sort((a, b) => stages_ms[b] - stages_ms[a])[0];
+  return stages.filter((stage) => stages_ms[stage] > 0).sort((a, b) => stages_ms[b] - stages_ms[a])[0];
 }
 
 /** Gives a dash before the first picture. */
@@ -56,7 +51,7 @@ export const stats_rows: readonly Row[] = [
     label: text.stats.bitrate,
     text: once_shown((s) => measured([s.bitrate_kbps / 1000], 2, 'Mb/s')),
   },
-  ...(Object.keys(text.stages) as Stage[]).map(stage_row),
+  ...stages.map(stage_row),
   { label: text.stats.picture, text: once_shown((s) => `${s.width_px} × ${s.height_px}`) },
   {
     label: text.stats.window,

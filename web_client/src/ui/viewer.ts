@@ -1,5 +1,5 @@
 // Makes the parts of the page and starts the worker. Parts listen to each other without passing through here.
-import { local_storage, session_storage } from '../base/browser_storage';
+import { browser_storage } from '../base/browser_storage';
 import { clock_from } from '../base/clock';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
@@ -28,9 +28,10 @@ export function mount_viewer(card: CardView): SessionStatus {
   const wishes = new URLSearchParams(location.search);
   const view = by_id('view', HTMLElement);
   const clock = clock_from(performance.timeOrigin);
-  const token = new AccessToken(location, history, session_storage());
+  const token = new AccessToken(location, history, browser_storage('sessionStorage'));
   const reduced_motion = matchMedia('(prefers-reduced-motion: reduce)').matches;
-  const rung = remembered_rung(local_storage(), navigator.userAgent, Date.now());
+  const storage = browser_storage('localStorage');
+  const rung = remembered_rung(storage, navigator.userAgent, Date.now());
   // `?ui=0`, for frames of other pages: nothing but the picture and the tour.
   document.body.classList.toggle('bare', wishes.get('ui') === '0');
 
@@ -52,9 +53,7 @@ export function mount_viewer(card: CardView): SessionStatus {
   worker.on('presented', () => poster.end());
   worker.on('notice', ({ message }) => notice.show(message, true));
   worker.on('fallback', ({ message }) => notice.show(text.jpeg.failed_now(message)));
-  worker.on('rung', ({ rung: proved }) => {
-    remember_rung(proved, local_storage(), navigator.userAgent, Date.now());
-  });
+  worker.on('rung', ({ rung: proved }) => remember_rung(proved, storage, navigator.userAgent, Date.now()));
 
   const scene_id = wishes.get('scene') ?? '';
   void poster.show(location.href, scene_id, token.value);

@@ -1,6 +1,7 @@
 // The worker does everything between socket and canvas, so that a busy page delays no picture.
 import { browser_timers, clock_from } from '../base/clock';
 import type { CameraSample, Eye } from '../camera/eye';
+import type { Ray } from '../camera/ray';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
 import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make_decoder';
@@ -25,11 +26,13 @@ const scope = self as unknown as {
   onunhandledrejection: ((event: PromiseRejectionEvent) => void) | null;
 };
 
+const say = (message: FromWorker, transfer: Transferable[] = []): void => scope.postMessage(message, transfer);
+
 let client: Client | undefined;
 
 // The page sees uncaught exceptions as the worker's error event, but no rejections.
 scope.onunhandledrejection = ({ reason }) => {
-  scope.postMessage({ kind: 'broken', message: String(reason) });
+  say({ kind: 'broken', message: String(reason) });
 };
 
 scope.onmessage = ({ data }) => {
@@ -40,7 +43,7 @@ scope.onmessage = ({ data }) => {
   try {
     client = new Client(data);
   } catch (error) {
-    scope.postMessage({ kind: 'broken', message: String(error) });
+    say({ kind: 'broken', message: String(error) });
   }
 };
 
@@ -101,14 +104,7 @@ class Client {
         );
         break;
       case 'pick':
-        this.session_.send({
-          case: 'pick',
-          value: {
-            id: message.id,
-            origin: wire_vector(message.ray.origin),
-            direction: wire_vector(message.ray.direction),
-          },
-        });
+        this.pick(message.id, message.ray);
         break;
       case 'hidden':
         this.session_.set_paused(message.hidden);
@@ -124,11 +120,7 @@ class Client {
         this.session_.stop();
         break;
       case 'get_stats':
-        scope.postMessage({
-          kind: 'stats',
-          request: message.request,
-          stats: this.metrics_.snapshot(this.clock_.now_us()),
-        });
+        say({ kind: 'stats', request: message.request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
         break;
       case 'get_snapshot':
         this.post_snapshot(message.request);
@@ -136,13 +128,17 @@ class Client {
     }
   }
 
+  private pick(id: number, { origin, direction }: Ray): void {
+    const value = { id, origin: wire_vector(origin), direction: wire_vector(direction) };
+    this.session_.send({ case: 'pick', value });
+  }
+
   private make_pipeline(): FramePipeline {
     const now_us = (): number => this.clock_.now_us();
     return new FramePipeline(
       {
         now_us,
-        make_decoder: (config, failures, events) =>
-          this.make_decoder(config, failures, events),
+        make_decoder: (config, failures, events) => this.make_decoder(config, failures, events),
         on_refresh: (draw) => scope.requestAnimationFrame(draw),
         draw: (picture, { renderPose, fovYRad, widthPx, heightPx }) =>
           this.display_.draw(picture, eye_of(renderPose, fovYRad), widthPx, heightPx),
@@ -152,7 +148,7 @@ class Client {
         presented: (frame, presented_us) => {
           this.shown_ = frame.header;
           this.metrics_.presented(frame, presented_us);
-          scope.postMessage({
+          say({
             kind: 'presented',
             pose_id: Number(frame.header.poseId),
             pose: eye_of(frame.header.renderPose, 0),
@@ -175,12 +171,12 @@ class Client {
         random: Math.random,
       },
       {
-        state: (state) => scope.postMessage({ kind: 'state', state }),
-        welcome: (welcome) => scope.postMessage({ kind: 'welcome', welcome }),
+        state: (state) => say({ kind: 'state', state }),
+        welcome: (welcome) => say({ kind: 'welcome', welcome }),
         config: (config) => {
           this.metrics_.configured(config);
           this.pipeline_.configure(config);
-          scope.postMessage({ kind: 'config', config });
+          say({ kind: 'config', config });
         },
         frame: (header, payload) => {
           this.metrics_.received(payload.length, this.clock_.now_us());
@@ -188,9 +184,8 @@ class Client {
         },
         stream_ended: () => this.pipeline_.end_stream(),
         stats: (stats) => this.metrics_.server_said(stats),
-        picked: ({ id, hit, distance }) =>
-          scope.postMessage({ kind: 'picked', id, distance: hit ? distance : undefined }),
-        notice: (message) => scope.postMessage({ kind: 'notice', message }),
+        picked: ({ id, hit, distance }) => say({ kind: 'picked', id, distance: hit ? distance : undefined }),
+        notice: (message) => say({ kind: 'notice', message }),
       },
       {
         sceneId: start.scene_id,
@@ -206,9 +201,8 @@ class Client {
   private send_camera(): void {
     const { camera_: camera } = this;
     if (!camera) return;
-    this.session_.send_pose(
-      pose_message(camera.pose_id, camera.time_us, this.widened(camera.eye), camera.at_rest),
-    );
+    const eye = this.widened(camera.eye);
+    this.session_.send_pose(pose_message(camera.pose_id, camera.time_us, eye, camera.at_rest));
   }
 
   /** Frame sizes and fields of view change together, with the overscan. */
@@ -223,12 +217,8 @@ class Client {
   }
 
   private tell_presenter(): void {
-    scope.postMessage({
-      kind: 'presenter',
-      description: `${this.presenter_.description}, warp ${this.display_.warp_state}`,
-      warps: this.display_.warps,
-      overscan: this.display_.overscan,
-    });
+    const { warps, overscan, warp_state } = this.display_;
+    say({ kind: 'presenter', description: `${this.presenter_.description}, warp ${warp_state}`, warps, overscan });
   }
 
   /** Decoders that failed are not tried again. The next stream begins with the one that worked. */
@@ -246,25 +236,19 @@ class Client {
 
   private settle_on(rung: DecoderRung): void {
     this.rung_ = rung;
-    scope.postMessage({ kind: 'rung', rung });
+    say({ kind: 'rung', rung });
   }
 
   private fall_back(message: string): void {
-    scope.postMessage({ kind: 'fallback', message });
+    say({ kind: 'fallback', message });
     this.settle_on('jpeg');
     this.session_.greet_anew({ decoders: [Codec.MJPEG] });
   }
 
   private post_snapshot(request: number): void {
-    const picture = this.display_.read();
-    if (!this.shown_ || !picture) {
-      scope.postMessage({ kind: 'snapshot', request, snapshot: undefined });
-      return;
-    }
-    scope.postMessage(
-      { kind: 'snapshot', request, snapshot: { header: this.shown_, ...picture } },
-      [picture.rgba.buffer],
-    );
+    const picture = this.shown_ && this.display_.read();
+    const snapshot = this.shown_ && picture && { header: this.shown_, ...picture };
+    say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
   }
 }
 

@@ -1,0 +1,14 @@
+/** Asks the server for `path` below /api/, with the token where this visitor has one. */
+export function ask_server(
+  page_url: string,
+  token: string,
+  path: string,
+  { headers, ...request }: Omit<RequestInit, 'headers'> & { headers?: Record<string, string> } = {},
+): Promise<Response> {
+  const authorization: Record<string, string> = token ? { authorization: `Bearer ${token}` } : {};
+  return fetch(new URL(`./api/${path}`, page_url), { ...request, headers: { ...headers, ...authorization } });
+}
+
+/** Path of something that belongs to a scene. */
+export const scene_path = (scene_id: string, what: string): string =>
+  `scenes/${encodeURIComponent(scene_id)}/${what}`;
