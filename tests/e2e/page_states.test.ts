@@ -44,20 +44,6 @@ describe('page', () => {
     expect(errors).toEqual([]);
   });
 
-  it.each([
-    [Error_Code.SERVER_FULL, '16 of 16 sessions are in use', 'The server is busy', 'Try now'],
-    [Error_Code.UNSUPPORTED_VERSION, 'too new', 'Page and server do not fit together', 'Reload'],
-    [Error_Code.RENDER_FAILED, 'out of memory', 'The server could not render', 'Try again'],
-    [Error_Code.IDLE_TIMEOUT, 'nothing moved', 'Paused', 'Continue'],
-  ])('says what error %i means and what to do', async (code, message, title, action) => {
-    const server = await start_fake_server(refuse(code, message));
-    const { page } = await new_page();
-    await page.goto(server.url);
-    await page.getByText(title).waitFor();
-    await page.locator('#card-text').getByText(message, { exact: false }).waitFor();
-    await page.getByRole('button', { name: action }).waitFor();
-  });
-
   it('keeps the last picture while the server is away, and says so', async () => {
     const server = await start_fake_server(stream);
     const { page } = await open(server.url);

@@ -77,13 +77,9 @@ async function captures_while_turning(page: Page, count: number): Promise<Captur
         if (sweep > captured_sweep && along > 0.8 * sweep_rad) {
           captured_sweep = sweep;
           const shot = await catgs.snapshot();
-          let text = '';
-          for (let i = 0; i < shot.rgba.length; i += 8192) {
-            text += String.fromCharCode(...shot.rgba.subarray(i, i + 8192));
-          }
           const { x, y, z, w } = shot.header.renderPose!.orientation!;
           const rendered: Pose['orientation'] = [x, y, z, w];
-          found.push({ ...shot, header: undefined, rendered, rgba: btoa(text), now: catgs.pose() });
+          found.push({ ...shot, header: undefined, rendered, now: catgs.pose() });
         }
       }
       return found;
@@ -91,7 +87,7 @@ async function captures_while_turning(page: Page, count: number): Promise<Captur
     [deg_per_s, count] as const,
   );
   return raw.map(({ width_px, height_px, rgba, view, rendered, now }) => ({
-    picture: { width: width_px, height: height_px, rgba: Buffer.from(rgba, 'base64') },
+    picture: { width: width_px, height: height_px, rgba },
     drawn: view,
     now,
     fov_y_rad: view.fov_y_rad,
@@ -100,38 +96,36 @@ async function captures_while_turning(page: Page, count: number): Promise<Captur
   }));
 }
 
-/** Median shift of blocks between a capture and its reference. */
-async function error_px(page: Page, name: string, shot: Capture, at: Pose): Promise<number> {
-  const out = path.join(folder, name);
-  mkdirSync(out, { recursive: true });
-  const trace = path.join(out, 'pose.tum');
-  write_tum(trace, [at]);
-  catgs_render(
-    ...['frames', scene, '--trace', trace, '--out', path.join(out, 'images')],
-    ...['--size', `${shot.picture.width}x${shot.picture.height}`],
-    ...['--fov-deg', String((shot.fov_y_rad * 180) / Math.PI)],
-  );
-  const truth = await read_png(page, path.join(out, 'images', 'frame_000000.png'));
-  const shifts = block_shifts(shot.picture, truth);
-  return shifts.length >= 5 ? median(shifts.map(({ dx, dy }) => Math.hypot(dx, dy))) : NaN;
+/** Median shift of blocks between each capture and what catgs-render draws for that camera. */
+async function errors_px(page: Page, name: string, shots: Capture[], camera: 'drawn' | 'now'): Promise<number[]> {
+  const errors: number[] = [];
+  for (const [i, shot] of shots.entries()) {
+    const out = path.join(folder, `${name}-${i}`);
+    mkdirSync(out);
+    const trace = path.join(out, 'pose.tum');
+    write_tum(trace, [shot[camera]]);
+    catgs_render(
+      ...['frames', scene, '--trace', trace, '--out', path.join(out, 'images')],
+      ...['--size', `${shot.picture.width}x${shot.picture.height}`],
+      ...['--fov-deg', String((shot.fov_y_rad * 180) / Math.PI)],
+    );
+    const truth = await read_png(page, path.join(out, 'images', 'frame_000000.png'));
+    const shifts = block_shifts(shot.picture, truth);
+    errors.push(shifts.length >= 5 ? median(shifts.map(({ dx, dy }) => Math.hypot(dx, dy))) : NaN);
+  }
+  return errors;
 }
 
 it('things stay where they are while the camera turns over a slow link', async () => {
   const page = await open_with('on');
   const captures = await captures_while_turning(page, 6);
-  const errors: number[] = [];
-  for (const [i, shot] of captures.entries()) {
-    errors.push(await error_px(page, `warp-${i}`, shot, shot.drawn));
-  }
+  const errors = await errors_px(page, 'warp', captures, 'drawn');
   const uncovered = captures.map((shot) => shot.uncovered);
   await page.context().close();
 
   const plain = await open_with('off');
   const unwarped = await captures_while_turning(plain, 3);
-  const without: number[] = [];
-  for (const [i, shot] of unwarped.entries()) {
-    without.push(await error_px(plain, `plain-${i}`, shot, shot.now));
-  }
+  const without = await errors_px(plain, 'plain', unwarped, 'now');
   const list = (values: number[], digits: number): string =>
     values.map((v) => v.toFixed(digits)).join(' ');
   console.log(

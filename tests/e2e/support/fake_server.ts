@@ -6,6 +6,7 @@ import type { AddressInfo } from 'node:net';
 import path from 'node:path';
 import { WebSocketServer, type WebSocket } from 'ws';
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
+import { BinaryWriter } from '@bufbuild/protobuf/wire';
 import {
   ClientMessageSchema,
   Codec,
@@ -114,12 +115,7 @@ function make_peer(socket: WebSocket): Peer {
     },
     frame(header, payload) {
       const bytes = toBinary(FrameHeaderSchema, create(FrameHeaderSchema, header));
-      if (bytes.length > 16383) throw new Error('frame header too long for two varint bytes');
-      const length =
-        bytes.length < 128
-          ? Buffer.of(bytes.length)
-          : Buffer.of((bytes.length & 0x7f) | 0x80, bytes.length >> 7);
-      socket.send(Buffer.concat([Buffer.of(2), length, bytes, payload]));
+      socket.send(new BinaryWriter().raw(Uint8Array.of(2)).bytes(bytes).raw(payload).finish());
     },
     close: () => socket.close(),
   };

@@ -5,58 +5,30 @@ import type { Page } from 'playwright-core';
 export interface Picture {
   readonly width: number;
   readonly height: number;
-  readonly rgba: Uint8Array;
+  readonly rgba: Uint8Array | Uint8ClampedArray;
 }
-
-interface Encoded {
-  width: number;
-  height: number;
-  base64: string;
-}
-
-const decoded = ({ width, height, base64 }: Encoded): Picture => ({
-  width,
-  height,
-  rgba: Buffer.from(base64, 'base64'),
-});
 
 /** The picture that the page shows, once it has come to rest. */
-export async function settled_picture(page: Page): Promise<Picture> {
-  const encoded = await page.evaluate(async (): Promise<Encoded> => {
+export const settled_picture = (page: Page): Promise<Picture> =>
+  page.evaluate(async () => {
     const { catgs } = window;
     if (!catgs) throw new Error('the page has no window.catgs');
     await catgs.settled();
     const { width_px, height_px, rgba } = await catgs.snapshot();
-    const url = await new Promise<string>((resolve) => {
-      const reader = new FileReader();
-      reader.onload = () => resolve(reader.result as string);
-      reader.readAsDataURL(new Blob([rgba]));
-    });
-    return { width: width_px, height: height_px, base64: url.slice(url.indexOf(',') + 1) };
+    return { width: width_px, height: height_px, rgba };
   });
-  return decoded(encoded);
-}
 
 /** `page` may be any page: only its decoder is used. */
-export async function read_png(page: Page, file: string): Promise<Picture> {
-  const base64 = readFileSync(file).toString('base64');
-  const encoded = await page.evaluate(async (png): Promise<Encoded> => {
-    const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }), {
+export const read_png = (page: Page, file: string): Promise<Picture> =>
+  page.evaluate(async (png) => {
+    const bitmap = await createImageBitmap(new Blob([png], { type: 'image/png' }), {
       colorSpaceConversion: 'none',
     });
     const { width, height } = bitmap;
     const context = new OffscreenCanvas(width, height).getContext('2d')!;
     context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, width, height);
-    let text = '';
-    for (let i = 0; i < data.length; i += 8192) {
-      text += String.fromCharCode(...data.subarray(i, i + 8192));
-    }
-    return { width, height, base64: btoa(text) };
-  }, base64);
-  return decoded(encoded);
-}
+    return { width, height, rgba: context.getImageData(0, 0, width, height).data };
+  }, new Uint8Array(readFileSync(file)));
 
 /** PSNR over the RGB values of all pixels. */
 export function psnr_db(a: Picture, b: Picture): number {

@@ -1,6 +1,6 @@
+import { ask_server, scene_path } from '../base/server';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import { ask_server, scene_path } from '../base/server';
 import { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 

@@ -1,5 +1,6 @@
 // Converts between bytes and typed messages of subprotocol "catgs.v1" (../../../proto/README.md).
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
+import { BinaryReader } from '@bufbuild/protobuf/wire';
 import {
   ClientMessageSchema,
   FrameHeaderSchema,
@@ -52,17 +53,10 @@ export function decode_server_message(data: ArrayBuffer): Incoming {
       return body.case === undefined ? { kind: 'unknown' } : { kind: 'message', body };
     }
     case kind_frame: {
-      const [header_length, header_begin] = read_varint(bytes, 1);
-      const header_end = header_begin + header_length;
-      if (header_end > bytes.length) {
-        throw new WireError(
-          `frame header of ${header_length} bytes in a message of ${bytes.length} bytes`,
-        );
-      }
-      const header = parse(() =>
-        fromBinary(FrameHeaderSchema, bytes.subarray(header_begin, header_end)),
-      );
-      return { kind: 'frame', header, payload: bytes.subarray(header_end) };
+      const frame = bytes.subarray(1);
+      const reader = new BinaryReader(frame);
+      const header = parse(() => fromBinary(FrameHeaderSchema, reader.bytes())); // behind its length
+      return { kind: 'frame', header, payload: frame.subarray(reader.pos) };
     }
     default:
       return { kind: 'unknown' };
@@ -72,18 +66,6 @@ export function decode_server_message(data: ArrayBuffer): Incoming {
 /** Encodes one binary WebSocket message to the server. */
 export function encode_client_message(body: ClientBody): Uint8Array {
   return toBinary(ClientMessageSchema, create(ClientMessageSchema, { body }));
-}
-
-/** Reads a base-128 varint of Protobuf, at most 32 bits. Returns its value and the offset behind it. */
-function read_varint(bytes: Uint8Array, offset: number): [value: number, end: number] {
-  let value = 0;
-  for (let shift = 0; shift < 35; shift += 7) {
-    const byte = bytes[offset++];
-    if (byte === undefined) throw new WireError('frame header length is cut off');
-    value += (byte & 0x7f) * 2 ** shift;
-    if (byte < 0x80) return [value, offset];
-  }
-  throw new WireError('frame header length is longer than 5 bytes');
 }
 
 function parse<T>(from_binary: () => T): T {
