@@ -1,15 +1,5 @@
 // The viewer's own camera: what gestures, held keys and flights do to it. Pure: no DOM, no clock.
-import {
-  add,
-  axis_angle,
-  conjugate,
-  dot,
-  right,
-  rotate,
-  scale,
-  unit,
-  type Vec3,
-} from '../base/vector';
+import { add, axis_angle, conjugate, dot, right, rotate, scale, unit, type Vec3 } from '../base/vector';
 import { CameraRig, default_fov_y_rad } from './camera_rig';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';

@@ -74,7 +74,7 @@ function bind_pointers(
 
 function bind_keys(keys: HeldKeys, listener: ViewInputListener): void {
   window.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || is_typing(event.target)) return;
+    if (!is_for_page(event)) return;
     if (!keys.down(event.code, event.shiftKey)) return;
     event.preventDefault();
     listener.keys_changed();
@@ -103,9 +103,10 @@ function bind_focus(view: HTMLElement): void {
   view.addEventListener('focus', mark);
 }
 
-/** Whether a key belongs to a form field rather than to the camera. */
-export function is_typing(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && target.matches('input, select, textarea');
+/** Whether a key is ours, and neither a form field's nor a shortcut of the browser. */
+export function is_for_page({ ctrlKey, metaKey, altKey, target }: KeyboardEvent): boolean {
+  const is_typing = target instanceof HTMLElement && target.matches('input, select, textarea');
+  return !ctrlKey && !metaKey && !altKey && !is_typing;
 }
 
 function sample_of(event: PointerEvent): PointerSample {

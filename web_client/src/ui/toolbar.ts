@@ -1,6 +1,6 @@
 import { Signal } from '../base/signal';
 import type { CameraMode } from '../camera/mode';
-import { is_typing } from '../input/view_input';
+import { is_for_page } from '../input/view_input';
 import { text } from '../text';
 import { by_id, on_click } from './dom';
 import type { Navigation } from './navigation';
@@ -63,8 +63,7 @@ export class Toolbar {
       Escape: () => this.close_all(),
     };
     window.addEventListener('keydown', (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-      if (!this.bar_.inert && !is_typing(event.target)) actions[event.code]?.();
+      if (!this.bar_.inert && !event.repeat && is_for_page(event)) actions[event.code]?.();
     });
   }
 

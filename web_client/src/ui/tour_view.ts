@@ -1,4 +1,4 @@
-import { is_typing } from '../input/view_input';
+import { is_for_page } from '../input/view_input';
 import { text } from '../text';
 import type { TourPlayer, TourState } from '../tour/player';
 import type { Tour } from '../tour/tour';
@@ -22,11 +22,9 @@ export class TourView {
       Space: () => player.toggle(),
     };
     window.addEventListener('keydown', (event) => {
-      const { target } = event;
-      if (event.ctrlKey || event.metaKey || event.altKey || is_typing(target)) return;
-      if (event.code === 'Space' && target instanceof HTMLButtonElement) return; // a click
+      if (event.code === 'Space' && event.target instanceof HTMLButtonElement) return; // a click
       const action = actions[event.code];
-      if (!action || !this.has_tours_) return;
+      if (!action || !this.has_tours_ || !is_for_page(event)) return;
       event.preventDefault();
       action();
     });
