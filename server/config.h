@@ -92,8 +92,8 @@ void apply_flag(const Setting& setting, const std::vector<std::string>& values,
                 ServerConfig& config, ConfigSources& sources);
 
 /// Checks combinations of values: missing scenes, half a TLS pair, public access without tokens.
-/// Throws InputError with the remedy.
-void validate(const ServerConfig& config);
+/// Throws InputError with the remedy. `sources` tells which values were given.
+void validate(const ServerConfig& config, const ConfigSources& sources = {});
 
 /// The effective configuration as a TOML file, each line with its source.
 std::string print_config(const ServerConfig& config, const ConfigSources& sources);

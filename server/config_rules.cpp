@@ -9,7 +9,7 @@
 
 namespace catgs {
 
-void validate(const ServerConfig& config) {
+void validate(const ServerConfig& config, const ConfigSources& sources) {
   if (config.scenes.empty() && config.scene_folders.empty())
     throw InputError("--scene", {}, "no scene is given",
                      "give a file, or try --scene synth:city:300000");
@@ -21,6 +21,11 @@ void validate(const ServerConfig& config) {
                      "scenes of --scene stay in memory");
   if (config.lod >= 0 && config.gaussian_budget > 0)
     throw InputError("--lod, --budget", {}, "both are given", "give one of them");
+  // The default of one is no contradiction to the other.
+  if (sources.contains("min-fps") && config.min_fps > config.fps)
+    throw InputError(fmt::format("--min-fps {}", config.min_fps), {},
+                     fmt::format("is above --fps {}, which no session exceeds", config.fps),
+                     fmt::format("give at most {}", config.fps));
   if (config.tls_cert.empty() != config.tls_key.empty())
     throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
                      "--tls-cert and --tls-key belong together");

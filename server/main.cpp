@@ -62,7 +62,8 @@ void add_options(CLI::App& app, CommandLine& line) {
                "the files that they name");
   const ServerConfig defaults;
   for (const auto& setting : settings()) {
-    const std::string name = "--" + setting.name;
+    // Scenes may also stand without their flag: catgs-server hall.ply
+    const std::string name = "--" + setting.name + (setting.name == "scene" ? ",scenes" : "");
     if (setting.kind == Setting::Kind::flag) {
       app.add_flag(name, line.flags[setting.name], setting.help);
       continue;
@@ -106,7 +107,7 @@ int serve(const CommandLine& line) {
   ConfigSources sources;
   const ServerConfig config = effective_config(line, sources);
   if (line.print_config) std::cout << print_config(config, sources);
-  validate(config);
+  validate(config, sources);
   set_up_log(config.log_format, config.log_level);
   if (const std::string unknown = unknown_variables(variable_names()); !unknown.empty())
     spdlog::warn("the environment has variables that are no settings: {}", unknown);
@@ -129,7 +130,7 @@ int run(int argc, char** argv) {
       "Flags override CATGS_<NAME> variables, and these override --config FILE (TOML).\n"
       "Exit codes: 0 ended as asked, 1 failed (also when a required GPU cannot be used),\n"
       "2 bad usage, scene or configuration.\n"
-      "Example: catgs-server --scene synth:city:300000");
+      "Example: catgs-server synth:city:300000");
   CommandLine line;
   add_options(app, line);
   int exit_code = exit_ok;

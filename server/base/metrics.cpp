@@ -5,6 +5,7 @@
 
 #include <prometheus/text_serializer.h>
 
+#include "render_core/base/build_info.h"
 #include "server/base/log.h"
 #include "server/base/process_metrics.h"
 
@@ -18,6 +19,12 @@ const Histogram::BucketBoundaries latency_buckets_s = {
     0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.1, 0.15, 0.25, 0.5, 1.0, 2.0};
 
 }  // namespace
+
+Metrics::Metrics() {
+  gauge("catgs_build_info", "Always 1; the labels tell the build",
+        {{"version", build_version}, {"commit", build_commit}})
+      .Set(1.0);
+}
 
 prometheus::Gauge& Metrics::gauge(const char* name, const char* help,
                                   const prometheus::Labels& labels) {

@@ -18,7 +18,7 @@ namespace catgs {
 /// grow with visitors. Thread-safe.
 class Metrics {
  public:
-  Metrics() = default;
+  Metrics();
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;
 

@@ -52,6 +52,27 @@ std::variant<std::monostate, in_addr, in6_addr> parse_address(std::string_view a
   return {};
 }
 
+constexpr std::string_view letters_and_digits =
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
+
+bool has_only(std::string_view text, std::string_view others) {
+  return std::ranges::all_of(text, [&](char c) {
+    return letters_and_digits.find(c) != text.npos || others.find(c) != text.npos;
+  });
+}
+
+/// RFC 3986, for a path or a part of a query.
+std::string percent_encoded(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (has_only({&c, 1}, "-._~/=:@,!"))
+      out += c;
+    else
+      out += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return out;
+}
+
 /// True for an address, or a name that no outsider can register.
 bool is_local(std::string_view name) {
   if (name.empty()) return false;
@@ -140,6 +161,18 @@ std::optional<std::string_view> scene_of(std::string_view path, std::string_view
       path.size() <= folder.size() + what.size())
     return std::nullopt;
   return path.substr(folder.size(), path.size() - folder.size() - what.size());
+}
+
+HttpResponse redirect_to_https(std::string_view host, const HttpRequest& request) {
+  if (host.empty() || !has_only(host, ".-_:[]"))
+    return text_response(400, "400: this port speaks https\n");
+  std::string location = fmt::format("https://{}{}", host, percent_encoded(request.path));
+  for (std::size_t i = 0; i < request.arguments.size(); ++i)
+    location += fmt::format("{}{}", i == 0 ? '?' : '&', percent_encoded(request.arguments[i]));
+  HttpResponse response =
+      text_response(308, fmt::format("308: this port speaks https: {}\n", location));
+  response.location = std::move(location);
+  return response;
 }
 
 std::string escape_html(std::string_view text) {

@@ -32,6 +32,7 @@ struct HttpResponse {
   std::string etag;       // empty: none
   bool gzip = false;      // `body` is compressed
   int retry_after_s = 0;  // 0: no header Retry-After
+  std::string location;   // empty: no header Location
   std::shared_ptr<const std::string> body;
 };
 
@@ -112,6 +113,10 @@ bool host_allowed(std::string_view host, Names names, const std::vector<std::str
 
 /// Returns the id in "/api/scenes/ID<what>".
 std::optional<std::string_view> scene_of(std::string_view path, std::string_view what);
+
+/// Answers a plain HTTP request to a port that serves https: status 308 to the same page, or 400 if
+/// `host` is none. The browser keeps the fragment, which may be a token.
+HttpResponse redirect_to_https(std::string_view host, const HttpRequest& request);
 
 /// Escapes text for HTML content or a quoted attribute.
 std::string escape_html(std::string_view text);

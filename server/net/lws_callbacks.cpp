@@ -64,6 +64,8 @@ int on_upload(lws* wsi, LwsHttpExchange& exchange) {
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
+  if (lacks_tls(wsi) && !is_get_or_head(wsi))
+    return refuse_request(wsi, 400, "this port speaks https");
   // libwebsockets does not parse chunks and would take them for the next request.
   if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
     return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
@@ -88,7 +90,7 @@ int on_request(lws* wsi, HttpSlot& slot) {
   slot.exchange = new LwsHttpExchange(service_of(wsi).answered);
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
   const HttpHandler handler = [&](const HttpRequest& request) {
-    return respond(wsi, host, request);
+    return lacks_tls(wsi) ? redirect_to_https(host, request) : respond(wsi, host, request);
   };
   return slot.exchange->begin(wsi, handler, site_address(wsi, host));
 }

@@ -211,6 +211,7 @@ int LwsHttpExchange::write_headers(lws* wsi) {
   HeaderWriter headers(wsi, response_.status, response_.content_type, unwritten_);
   headers.add("cache-control:", response_.cache_control);
   if (!response_.etag.empty()) headers.add("etag:", response_.etag);
+  if (!response_.location.empty()) headers.add("location:", response_.location);
   if (response_.retry_after_s > 0)
     headers.add("retry-after:", std::to_string(response_.retry_after_s));
   if (response_.gzip) headers.add("content-encoding:", "gzip");

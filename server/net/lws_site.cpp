@@ -61,6 +61,8 @@ bool host_allowed(lws* wsi, const std::string& host) {
   return host_allowed(host, site.names, site.allowed_origins);
 }
 
+bool lacks_tls(lws* wsi) { return site_of(wsi).tls && lws_is_ssl(wsi) == 0; }
+
 void note_refused(lws* wsi, std::string_view why) {
   site_of(wsi).on_refused(fmt::format("{}: {}", client_address_of(wsi), why));
 }
@@ -89,6 +91,7 @@ const char* fault_of_head(lws* wsi) {
 int confirm_upgrade(lws* wsi) {
   // Do not use the callback's text: libwebsockets has already answered requests that it does not
   // know, and the text may be gone.
+  if (lacks_tls(wsi)) return refuse_request(wsi, 400, "this port speaks https and wss");
   const std::string protocol = request_header(wsi, WSI_TOKEN_UPGRADE);
   if (::strcasecmp(protocol.c_str(), "websocket") == 0) {
     const std::string connection = request_header(wsi, WSI_TOKEN_CONNECTION);

@@ -22,6 +22,7 @@ struct Site {
   std::vector<std::string> allowed_origins;
   std::string policy;
   Names names = Names::loopback;
+  bool tls = false;
   TrustedProxies proxies;
   std::function<void(const std::string&)> on_refused;
 };
@@ -37,6 +38,9 @@ std::string site_address(lws* wsi, const std::string& host);
 /// True if the request is for one of Site::names. TLS requests are, except on loopback: a page that
 /// resolves its own name to this server has no certificate for it.
 bool host_allowed(lws* wsi, const std::string& host);
+
+/// True for a plain HTTP request to a port that serves https.
+bool lacks_tls(lws* wsi);
 
 /// Reports to Site::on_refused whose request is refused, and why.
 void note_refused(lws* wsi, std::string_view why);

@@ -110,7 +110,10 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   if (endpoint.address.find(':') == std::string::npos)
     info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
   if (tls) {
-    info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
+    // Plain HTTP gets in, too, and is answered with the https address (lacks_tls).
+    info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT |
+                    LWS_SERVER_OPTION_ALLOW_NON_SSL_ON_SSL_PORT |
+                    LWS_SERVER_OPTION_ALLOW_HTTP_ON_HTTPS_LISTENER;
     info.ssl_cert_filepath = tls->tls_certificate.c_str();
     info.ssl_private_key_filepath = tls->tls_key.c_str();
     info.alpn = "http/1.1";
@@ -139,6 +142,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
             options.allowed_origins,
             content_security_policy(options.embed_origins),
             names_of(options.listen, options.asks_for_tokens),
+            tls,
             TrustedProxies(options.trusted_proxies),
             options.on_refused};
   s.admin_site = {std::move(options.admin_http),
@@ -147,6 +151,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
                   options.allowed_origins,
                   content_security_policy({}),
                   names_of(options.admin_listen, false),
+                  false,
                   {},
                   options.on_refused};
   s.idle_policy.secs_since_valid_ping = ping_after_s;

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <filesystem>
 #include <optional>
+#include <set>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -124,12 +126,11 @@ std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& c
                      "levels and budgets are for streamed SOG folders");
   const SceneIds ids(config.scenes, config.scene_folders);
   std::vector<std::shared_ptr<const SceneEntry>> entries;
+  std::set<std::string> keys;
   for (const auto& spec : config.scenes) {
+    if (!keys.insert(scene_key(spec)).second) continue;  // given twice
     const auto id_of = [&](const std::string& name) { return ids.id_of(spec, name); };
     auto entry = load_scene(spec, id_of, config, core, core.pool->threads());
-    const std::string& id = entry->facts.scene_id;
-    if (std::ranges::any_of(entries, [&](const auto& e) { return e->facts.scene_id == id; }))
-      throw InputError("--scene " + spec, {}, "is there already, as " + id, "name it once");
     // The banner shows the first scene's renderer.
     if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)
       spdlog::info("scene {}: renderer {}", entry->facts.scene_id, entry->renderer_text);

@@ -32,6 +32,10 @@ std::string with_digest(std::string_view name, std::string_view path) {
 
 }  // namespace
 
+std::string scene_key(const std::string& spec) {
+  return is_synthetic(spec) ? spec : scene_path(spec).string();
+}
+
 SceneIds::SceneIds(const std::vector<std::string>& scenes,
                    const std::vector<std::string>& folders) {
   for (const std::string& given : folders) {

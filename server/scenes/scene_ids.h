@@ -11,6 +11,10 @@ namespace catgs {
 /// True if --scene names a procedural scene, synth:KIND:COUNT[:SEED].
 inline bool is_synthetic(std::string_view spec) { return spec.starts_with("synth:"); }
 
+/// What two values of --scene have in common if they name the same scene: its path as given, made
+/// absolute, or the words of a procedural scene.
+std::string scene_key(const std::string& spec);
+
 /// Makes the ids of scenes. An id depends only on the settings and the scene's path. Other files
 /// never change an id, and an id never comes to mean another file. The path is used as given,
 /// without resolving symbolic links, as for sidecars. Only the name of its last folder counts, so

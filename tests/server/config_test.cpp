@@ -200,6 +200,16 @@ TEST_F(ConfigTest, LevelAndBudgetExcludeEachOther) {
   EXPECT_EQ(config.gaussian_budget, 1'000'000);
 }
 
+TEST_F(ConfigTest, NoSessionIsPromisedMoreThanItsNominalRate) {
+  read_toml("scene = \"a.ply\"\nfps = 5\n");
+  EXPECT_NO_THROW(validate(config, sources)) << "the default of min-fps contradicts nothing";
+  read_flag("min-fps", {"6"});
+  EXPECT_THAT([&] { validate(config, sources); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("--min-fps 6"), HasSubstr("--fps 5"))));
+  read_flag("min-fps", {"5"});
+  EXPECT_NO_THROW(validate(config, sources));
+}
+
 TEST_F(ConfigTest, DevicesAreAListInEveryLayer) {
   EXPECT_THAT(print_config(config, sources), HasSubstr("device = \"all\"  # default\n"));
   read_toml("device = [1, 0]\nscene = \"a.ply\"\n");

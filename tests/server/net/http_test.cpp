@@ -80,6 +80,15 @@ TEST(HostAllowed, LoopbackIsTheWholeNetwork127) {
   EXPECT_FALSE(is_loopback({"127.0.0.1\0.evil.example", 23})) << "its end is not at the zero byte";
 }
 
+TEST(RedirectToHttps, KeepsThePageAndNothingBreaksItsLine) {
+  const HttpRequest page{
+      .path = "/a b\r\nx: y", .if_none_match = {}, .arguments = {"scene=\xc3\xa9&", "author"}};
+  EXPECT_EQ(redirect_to_https("[::1]:8443", page).location,
+            "https://[::1]:8443/a%20b%0D%0Ax:%20y?scene=%C3%A9%26&author");
+  for (const char* host : {"", "a b", "a\r\nx", "a/b", "a@b"})
+    EXPECT_EQ(redirect_to_https(host, page).status, 400) << host;
+}
+
 TEST(ContentSecurityPolicy, NamesWhoMayEmbed) {
   EXPECT_THAT(content_security_policy({}), HasSubstr("frame-ancestors 'none'"));
   EXPECT_THAT(content_security_policy({"https://museum.example"}),

@@ -247,6 +247,16 @@ TEST(ServerAccess, ServesTlsWithTheGivenCertificate) {
     const TlsReply reply = tls_get(server.port(), "/healthz");
     EXPECT_EQ(reply.protocol, "http/1.1");
     EXPECT_THAT(reply.text, testing::StartsWith("HTTP/1.1 200"));
+    // Without TLS it only says where the page is.
+    const HttpReply plain = http_get(server.port(), "/?scene=city");
+    EXPECT_EQ(plain.status, 308);
+    EXPECT_EQ(plain.headers.at("location"),
+              "https://127.0.0.1:" + std::to_string(server.port()) + "/?scene=city");
+    EXPECT_EQ(http_put(server.port(), "/api/scenes/city/sidecar", "{}").status, 400);
+    RawSocket socket(server.port());
+    socket.send(handshake(server.port()));
+    std::string answer;
+    EXPECT_TRUE(socket.receive_until(" 400 ", answer)) << answer;
   }
   std::filesystem::remove(key);
   ServerConfig config;

@@ -40,7 +40,7 @@ class Program {
                                       "off",          "--drain-wait", "1"};
     words.insert(words.end(), more.begin(), more.end());
     if (std::ranges::count(more, "--scene") + std::ranges::count(more, "--scene-folder") == 0)
-      words.insert(words.end(), {"--scene", "synth:city:2000"});
+      words.insert(words.begin() + 1, {"synth:city:2000", "synth:city:2000"});  // one scene
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -106,6 +106,8 @@ TEST(ServerProgram, EndsCleanlyOnSigterm) {
   EXPECT_THAT(program.log(), HasSubstr("http://127.0.0.1:"));
   EXPECT_THAT(program.log(), HasSubstr("renderer: CPU"));
   EXPECT_EQ(http_get(program.port(), "/readyz").status, 200);
+  const std::string scenes = http_get(program.port(), "/api/scenes").body;
+  EXPECT_EQ(scenes.find("\"id\""), scenes.rfind("\"id\"")) << scenes;
   program.signal(SIGTERM);
   while (http_get(program.port(), "/readyz").status != 503)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
