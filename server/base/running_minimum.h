@@ -16,8 +16,8 @@ class RunningMinimum {
   explicit RunningMinimum(std::chrono::seconds span = std::chrono::seconds(5)) : span_(span) {}
 
   void add(std::int64_t value, TimePoint now) {
-    if (now - start_ >= span_) {
-      previous_ = now - start_ < 2 * span_ ? current_ : std::nullopt;
+    if (!start_ || now - *start_ >= span_) {
+      previous_ = start_ && now - *start_ < 2 * span_ ? current_ : std::nullopt;
       current_.reset();
       start_ = now;
     }
@@ -36,7 +36,7 @@ class RunningMinimum {
 
  private:
   std::chrono::seconds span_;
-  TimePoint start_{};
+  std::optional<TimePoint> start_;
   std::optional<std::int64_t> current_;
   std::optional<std::int64_t> previous_;
 };

@@ -142,7 +142,7 @@ SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
     residency_.note_use(id, now);
     return book.entry;
   }
-  if (now < book.retry_at)
+  if (book.retry_at && now < *book.retry_at)
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("the scene \"{}\" could not be loaded", name_in(id)), false};
   const auto wish = residency_.want(id, book.found.size.bytes(), now, in_use());
@@ -179,7 +179,7 @@ void SceneLibrary::on_tick(TimePoint now) {
   }
   for (const std::string& id : outdated) release(id);
   start_next(now);
-  if (!config_.scene_folders.empty() && now >= next_scan_) start_scan(now);
+  if (next_scan_ && now >= *next_scan_) start_scan(now);
 }
 
 void SceneLibrary::start_next(TimePoint now) {
@@ -285,7 +285,7 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
     book.gone = false;
     if (book.found.changed != scene.changed) {
       book.outdated = book.entry != nullptr;
-      book.retry_at = {};
+      book.retry_at.reset();
     }
     book.found = std::move(scene);
   }

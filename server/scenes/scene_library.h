@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,10 +70,10 @@ class SceneLibrary final : public SceneSource {
     FoundScene found;                         // for scenes of --scene only name and size
     std::shared_ptr<const SceneEntry> entry;  // while in memory
     bool pinned = false;
-    bool outdated = false;  // the file has changed since
-    bool gone = false;      // the file is gone: not offered any more
-    bool told = false;      // the log has named its path, as others share its name
-    TimePoint retry_at{};   // after a failure
+    bool outdated = false;                // the file has changed since
+    bool gone = false;                    // the file is gone: not offered any more
+    bool told = false;                    // the log has named its path, as others share its name
+    std::optional<TimePoint> retry_at{};  // after a failure
 
     /// True if a user besides the shelf holds the scene.
     [[nodiscard]] bool in_use() const;
@@ -111,8 +112,8 @@ class SceneLibrary final : public SceneSource {
   std::map<std::string, Book> shelf_;
   std::string preferred_scene_;  // the default scene while its file exists
   SceneResidency residency_;
-  double bytes_per_second_ = 100e6;  // of the last load
-  TimePoint next_scan_{};
+  double bytes_per_second_ = 100e6;     // of the last load
+  std::optional<TimePoint> next_scan_;  // nothing without folders
   bool scanning_ = false;
 
   mutable std::mutex published_mutex_;  // guards the next two

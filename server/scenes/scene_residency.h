@@ -70,8 +70,8 @@ class SceneResidency {
   struct Resident {
     std::uint64_t bytes = 0;
     bool pinned = false;
-    TimePoint since{};
-    TimePoint last_use{};
+    TimePoint since;
+    TimePoint last_use;
   };
   struct Waiting {
     std::string id;

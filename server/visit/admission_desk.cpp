@@ -213,7 +213,7 @@ QueuePlace AdmissionDesk::place_in_queue(int position) const {
 
 void AdmissionDesk::on_tick(TimePoint now) {
   grow_pictures();
-  if (measuring_ || now - queue_told_ >= speak_at_least_every) admit_waiting(now);
+  if (measuring_ || !queue_told_ || now - *queue_told_ >= speak_at_least_every) admit_waiting(now);
   const auto demanded = demands();
   const auto load = budget_.load(demanded);
   Metrics& metrics = around_.metrics;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -60,7 +61,7 @@ class AdmissionDesk {
   bool shut_ = false;
   std::string turn_;        // id of the queued session that is being asked
   bool measuring_ = false;  // the head of the queue waits for measured costs
-  TimePoint queue_told_{};
+  std::optional<TimePoint> queue_told_;
 };
 
 }  // namespace catgs

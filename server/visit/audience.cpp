@@ -87,12 +87,12 @@ void Audience::tell_spectators(const ServerMessage& message, TimePoint now) {
 }
 
 bool Audience::wants_idr(TimePoint now) const {
-  return now - last_idr_ >= min_idr_interval &&
+  return (!last_idr_ || now - *last_idr_ >= min_idr_interval) &&
          std::ranges::any_of(spectators_, &Spectator::waits_for_idr);
 }
 
 void Audience::keep_talking(TimePoint now) {
-  if (now - last_said_ < speak_at_least_every) return;
+  if (last_said_ && now - *last_said_ < speak_at_least_every) return;
   tell_spectators(heartbeat_at(now), now);
 }
 

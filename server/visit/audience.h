@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -64,8 +65,8 @@ class Audience {
   const std::size_t max_spectators_;
   std::string address_;
   std::vector<Spectator> spectators_;
-  TimePoint last_idr_{};
-  TimePoint last_said_{};  // to spectators
+  std::optional<TimePoint> last_idr_;
+  std::optional<TimePoint> last_said_;  // to spectators
 };
 
 }  // namespace catgs
