@@ -38,6 +38,7 @@ void LoadContext::for_blocks(std::size_t count, std::size_t block,
     }
   });
   if (failure) std::rethrow_exception(failure);
+  report(1.0);  // the other threads may have run every block
 }
 
 LoadContext LoadContext::part(double from, double to) const {

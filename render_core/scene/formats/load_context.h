@@ -15,9 +15,9 @@ class LoadContext {
       : pool_(pool), progress_(std::move(progress)) {}
 
   /// Calls body(begin, end) for consecutive ranges of at most `block` of the indices [0, count), on
-  /// several threads, and reports progress as they end. Unlike with ThreadPool::parallel_for,
-  /// `body` may throw. The exception of the first failing range is rethrown here after the others
-  /// have ended or been skipped.
+  /// several threads, and reports progress as they end, 1 at last. Unlike with
+  /// ThreadPool::parallel_for, `body` may throw. The exception of the first failing range is
+  /// rethrown here after the others have ended or been skipped.
   void for_blocks(std::size_t count, std::size_t block,
                   const std::function<void(std::size_t begin, std::size_t end)>& body) const;
 
