@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """usage: report.py JUNIT_XML LOG
 
-Prints what a CTest run left to know: the failed tests with the end of their output, the skipped
-ones with their reason, the summary line. Exit status 1 when a test failed or no run was recorded.
+Prints what a CTest run left to know: the failed tests with the end of their output, those that
+passed at their second try only, the skipped ones with their reason, the summary line. Exit status 1
+when a test failed or no run was recorded. LOG holds what CTest printed.
 """
 
 import pathlib
@@ -13,6 +14,8 @@ import xml.etree.ElementTree as ElementTree
 OUTPUT_LINES = 15
 # GoogleTest prints "file:line: Skipped" and the reason below it; scripts print "SKIPPED: reason".
 SKIP_REASON = re.compile(r"(?:: Skipped\n|SKIPPED: )(.+)")
+# The JUnit file records the last try alone; CTest's terminal output has a line of each.
+FAILED_TRY = re.compile(r"Test +#\d+: (.+?) \.*\*\*\*(?!Skipped|Not Run)")
 
 
 def skip_reason(output: str) -> str:
@@ -28,12 +31,13 @@ def group_by_reason(skipped: list) -> dict:
 
 
 def main() -> int:
-    results, log = pathlib.Path(sys.argv[1]), sys.argv[2]
+    results, log = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
     if not results.is_file():
         print(f"CTest recorded no result. The whole log: {log}", file=sys.stderr)
         return 1
     suite = ElementTree.parse(results).getroot()
-    failed, skipped = [], []
+    failed_try = set(FAILED_TRY.findall(log.read_text(errors="replace")))
+    failed, skipped, unsteady = [], [], []
     for case in suite.iter("testcase"):
         output = case.findtext("system-out") or ""
         # A test whose program is missing is "notrun" as well; only a declared skip is no failure.
@@ -42,9 +46,13 @@ def main() -> int:
             skipped.append((case.get("name"), skip_reason(output)))
         elif case.get("status") != "run":
             failed.append((case.get("name"), [message, *output.splitlines()[-OUTPUT_LINES:]]))
+        elif case.get("name") in failed_try:
+            unsteady.append(case.get("name"))
     for name, lines in failed:
         print(f"\nFAILED {name}")
         print("\n".join(f"    {line}" for line in lines))
+    if unsteady:
+        print(f"\nPassed at the second try only, {len(unsteady)}: {', '.join(unsteady)}")
     if skipped:
         print(f"\nSkipped, {len(skipped)}:")
         for reason, names in group_by_reason(skipped).items():

@@ -12,6 +12,7 @@ PASSING = 'add_test(passes "/bin/true")\n'
 SKIPPED = ('add_test(skips "/bin/sh" "-c" "echo SKIPPED: no such device; exit 77")\n'
            'set_tests_properties(skips PROPERTIES SKIP_RETURN_CODE 77)\n')
 FAILING = 'add_test(fails "/bin/sh" "-c" "echo the reason; exit 1")\n'
+UNSTEADY = 'add_test(unsteady "/bin/sh" "-c" "test -e tried || { : > tried; exit 1; }")\n'
 MISSING = 'add_test(missing "/nonexistent/program")\n'
 
 
@@ -20,10 +21,13 @@ class Report(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder)
             (path / "CTestTestfile.cmake").write_text(tests)
-            subprocess.run(["ctest", "--test-dir", folder, "--output-junit", folder + "/tests.xml"],
-                           capture_output=True, check=False)
-            return subprocess.run([sys.executable, "-B", REPORT, folder + "/tests.xml", "the.log"],
-                                  capture_output=True, text=True, check=False)
+            with open(path / "the.log", "w") as log:
+                subprocess.run(["ctest", "--test-dir", folder, "--repeat", "until-pass:2",
+                                "--output-junit", folder + "/tests.xml"],
+                               stdout=log, stderr=subprocess.STDOUT, check=False)
+            return subprocess.run(
+                [sys.executable, "-B", REPORT, folder + "/tests.xml", folder + "/the.log"],
+                capture_output=True, text=True, check=False)
 
     def test_skips_are_listed_with_their_reason_and_do_not_fail(self):
         result = self.report(PASSING + SKIPPED)
@@ -42,6 +46,12 @@ class Report(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn("FAILED fails", result.stdout)
         self.assertIn("the reason", result.stdout)
+
+    def test_a_second_try_that_passes_is_named(self):
+        result = self.report(PASSING + SKIPPED + UNSTEADY)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertIn("Passed at the second try only, 1: unsteady\n", result.stdout)
+        self.assertIn("2 tests passed, 0 failed, 1 skipped of 3", result.stdout)
 
     def test_a_program_that_is_not_there_is_a_failure(self):
         result = self.report(PASSING + MISSING)
