@@ -15,10 +15,10 @@ struct Outcome {
   std::string out;  // stdout and stderr together
 };
 
-/// Runs catgs-render with these arguments, as a shell reads them.
-inline Outcome run(const std::string& arguments) {
+/// Runs a command as a shell reads it.
+inline Outcome run_command(const std::string& command) {
   Outcome outcome;
-  FILE* pipe = popen(fmt::format("{} {} 2>&1", CATGS_RENDER, arguments).c_str(), "r");
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return outcome;
   char buffer[4096];
   for (std::size_t n = 0; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) {
@@ -26,6 +26,11 @@ inline Outcome run(const std::string& arguments) {
   }
   outcome.exit_code = WEXITSTATUS(pclose(pipe));
   return outcome;
+}
+
+/// Runs catgs-render with these arguments.
+inline Outcome run(const std::string& arguments) {
+  return run_command(fmt::format("{} {}", CATGS_RENDER, arguments));
 }
 
 }  // namespace catgs::test
