@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 
 namespace catgs::load {
@@ -16,5 +17,7 @@ inline std::int64_t now_us() {
 inline Clock::time_point clock_time(std::int64_t time_us) {
   return Clock::time_point(std::chrono::microseconds(time_us));
 }
+
+inline std::int64_t microseconds(double seconds) { return std::llround(1e6 * seconds); }
 
 }  // namespace catgs::load

@@ -6,6 +6,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/websocket/stream_base.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "render_core/base/error.h"
 #include "tests/load/pose_replay.h"
@@ -98,7 +99,7 @@ void Connection::say_hello() {
   v1::ClientMessage message;
   v1::Hello& hello = *message.mutable_hello();
   hello.set_version(wire_version);
-  hello.set_scene_id(settings_.scene_id);
+  hello.set_scene_id(settings_.wishes.scene);
   hello.set_viewport_width_px(static_cast<std::uint32_t>(settings_.size_px.x));
   hello.set_viewport_height_px(static_cast<std::uint32_t>(settings_.size_px.y));
   hello.add_decoders(v1::CODEC_H264);
@@ -111,10 +112,10 @@ void Connection::say_hello() {
     sizes.set_still_width_px(hello.viewport_width_px());
     sizes.set_still_height_px(hello.viewport_height_px());
   }
-  hello.mutable_settings()->set_max_fps(static_cast<std::uint32_t>(settings_.fps));
+  hello.mutable_settings()->set_max_fps(static_cast<std::uint32_t>(settings_.wishes.fps));
   hello.mutable_settings()->set_max_bitrate_kbps(
-      static_cast<std::uint32_t>(settings_.max_bitrate_kbps));
-  hello.mutable_settings()->set_fixed_quality(settings_.fixed_quality);
+      static_cast<std::uint32_t>(settings_.wishes.max_bitrate_kbps));
+  hello.mutable_settings()->set_fixed_quality(settings_.wishes.fixed_quality);
   if (!state_.resume_token.empty()) {
     hello.mutable_resume()->set_token(state_.resume_token);
     if (state_.last_pose) *hello.mutable_resume()->mutable_pose() = *state_.last_pose;
@@ -130,8 +131,9 @@ asio::awaitable<void> Connection::send_poses() {
                                        settings_.offset * static_cast<double>(replay.span_us())));
   begin_us_ = now_us();
   std::int64_t moving_since_us = begin_us_;
+  const std::int64_t move_us = microseconds(settings_.manners.move_for_s);
   while (true) {
-    if (settings_.rest_us > 0 && now_us() - moving_since_us >= settings_.move_us) {
+    if (settings_.manners.rest_for_s > 0.0 && now_us() - moving_since_us >= move_us) {
       co_await rest();
       moving_since_us = now_us();
     }
@@ -150,7 +152,7 @@ asio::awaitable<void> Connection::send_poses() {
     sample.set_pose_id(state_.next_pose_id++);
     sample.set_client_time_us(now);
     *sample.mutable_world_from_camera() = to_wire(*newest);
-    sample.set_fov_y_rad(settings_.fov_y_rad);
+    sample.set_fov_y_rad(glm::radians(settings_.wishes.fov_y_deg));
     state_.last_pose = sample;
     report_.stats.pose_sent(sample.pose_id(), now);
     say(message);
@@ -170,7 +172,8 @@ asio::awaitable<void> Connection::rest() {
   constexpr std::int64_t refresh_us = 16'667;
   if (!state_.last_pose) co_return;
   const std::int64_t since_us = state_.last_pose->client_time_us();
-  const std::int64_t end_us = std::min(now_us() + settings_.rest_us, settings_.stop_us);
+  const std::int64_t rest_us = microseconds(settings_.manners.rest_for_s);
+  const std::int64_t end_us = std::min(now_us() + rest_us, settings_.stop_us);
   report_.rest = {++report_.rests, state_.last_pose->pose_id(), since_us};
   co_await wait_until(clock_time(std::min(since_us + refresh_us, end_us)));
   v1::ClientMessage message;
@@ -180,7 +183,7 @@ asio::awaitable<void> Connection::rest() {
   co_await wait_until(clock_time(end_us));
   if (now_us() >= settings_.stop_us) --report_.rests;  // cut short: proves nothing
   report_.rest.reset();
-  begin_us_ += settings_.rest_us;
+  begin_us_ += rest_us;
 }
 
 bool Connection::stalled() const {
@@ -191,10 +194,10 @@ bool Connection::stalled() const {
 /// Poses that no client would send so often. They say where the camera is already.
 asio::awaitable<void> Connection::flood() {
   constexpr std::int64_t wake_us = 5'000;
-  if (settings_.flood_hz == 0) co_await wait_until(Clock::time_point::max());
+  if (settings_.manners.flood_hz == 0) co_await wait_until(Clock::time_point::max());
   while (!state_.last_pose) co_await wait_until(clock_time(now_us() + wake_us));
   std::int64_t sent_us = now_us();
-  const std::int64_t interval_us = 1'000'000 / settings_.flood_hz;
+  const std::int64_t interval_us = 1'000'000 / settings_.manners.flood_hz;
   while (true) {
     co_await wait_until(clock_time(sent_us + std::max(wake_us, interval_us)));
     for (const std::int64_t now = now_us(); sent_us < now; sent_us += interval_us) {
@@ -205,12 +208,13 @@ asio::awaitable<void> Connection::flood() {
   }
 }
 
-/// Ends the connection without a word at the run's next multiple of reconnect_every_us.
+/// Ends the connection without a word at the run's next multiple of reconnect_every_s.
 asio::awaitable<void> Connection::drop_line() {
-  if (settings_.reconnect_every_us == 0) co_await wait_until(Clock::time_point::max());
+  const std::int64_t every_us = microseconds(settings_.manners.reconnect_every_s);
+  if (every_us == 0) co_await wait_until(Clock::time_point::max());
   const std::int64_t since_us = now_us() - settings_.run_begin_us;
-  const std::int64_t round = since_us / settings_.reconnect_every_us + 1;
-  const std::int64_t drop_us = settings_.run_begin_us + round * settings_.reconnect_every_us;
+  const std::int64_t round = since_us / every_us + 1;
+  const std::int64_t drop_us = settings_.run_begin_us + round * every_us;
   co_await wait_until(clock_time(std::min(drop_us, settings_.stop_us)));
   if (drop_us >= settings_.stop_us) co_await wait_until(Clock::time_point::max());
 }
@@ -254,7 +258,7 @@ void Connection::take_message(const v1::ServerMessage& message) {
     report_.stats.error("the server says: " + message.error().message().substr(0, 200));
     const auto code = message.error().code();
     const bool transient = code == v1::Error::RENDER_FAILED || code == v1::Error::INTERNAL ||
-                           code == v1::Error::SERVER_FULL || settings_.flood_hz > 0;
+                           code == v1::Error::SERVER_FULL || settings_.manners.flood_hz > 0;
     if (message.error().fatal() && !transient) end_ = End::refused;
   }
 }
@@ -298,7 +302,7 @@ void Connection::take_frame(const FrameMessage& frame) {
 }
 
 void Connection::acknowledge(v1::Ack ack, std::int64_t presented_us) {
-  if (!settings_.acknowledge) return;
+  if (!settings_.manners.acknowledge) return;
   if (!ack.dropped()) {
     ack.set_decoded_us(presented_us);
     ack.set_presented_us(presented_us);

@@ -32,8 +32,8 @@ DecodeStage::DecodeStage(const SessionSettings& settings, asio::thread_pool& dec
       filled_(executor) {}
 
 bool DecodeStage::has_work() const {
-  if (!settings_.decode) return settings_.decode_us > 0;
-  return !settings_.only_pictures || picture_is_due();
+  if (!settings_.manners.decode) return settings_.manners.decode_time_s > 0.0;
+  return !settings_.manners.only_pictures || picture_is_due();
 }
 
 bool DecodeStage::picture_is_due() const {
@@ -49,7 +49,7 @@ void DecodeStage::take(const FrameMessage& frame, const v1::Ack& ack) {
   const bool independent = frame.header.idr() || frame.header.codec() == v1::CODEC_MJPEG;
   const bool full = queue_.size() == max_queued;
   wait_for_idr_ = full || (wait_for_idr_ && !independent);
-  if (wait_for_idr_ && settings_.only_pictures) {
+  if (wait_for_idr_ && settings_.manners.only_pictures) {
     callbacks_.acknowledge(ack, now_us());
     return callbacks_.request_idr();
   }
@@ -75,7 +75,7 @@ asio::awaitable<void> DecodeStage::run() {
 
 asio::awaitable<void> DecodeStage::decode(Item& item) {
   const std::int64_t begin_us = now_us();
-  if (settings_.decode) {
+  if (settings_.manners.decode) {
     Decoded decoded = co_await decode_on_pool(item);
     const bool fits =
         decoded.picture.size_px == glm::ivec2(item.header.width_px(), item.header.height_px());
@@ -93,7 +93,8 @@ asio::awaitable<void> DecodeStage::decode(Item& item) {
       keep_picture(item, decoded);
     }
   }
-  if (settings_.decode_us > 0) co_await wait_until(clock_time(begin_us + settings_.decode_us));
+  if (settings_.manners.decode_time_s > 0.0)
+    co_await wait_until(clock_time(begin_us + microseconds(settings_.manners.decode_time_s)));
   callbacks_.acknowledge(item.ack, now_us());
 }
 
@@ -120,7 +121,7 @@ asio::awaitable<DecodeStage::Decoded> DecodeStage::decode_on_pool(const Item& it
 
 void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
   if (!picture_is_due()) return;
-  wait_for_idr_ = wait_for_idr_ || settings_.only_pictures;
+  wait_for_idr_ = wait_for_idr_ || settings_.manners.only_pictures;
   report_.pictures.push_back({.render_pose = from_wire(item.header.render_pose()),
                               .fov_y_rad = item.header.fov_y_rad(),
                               .near_z = scene_.near_z(),

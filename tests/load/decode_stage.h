@@ -20,8 +20,8 @@ namespace catgs::load {
 
 /// Where a session decodes what it received, one frame after the other: really (`decode`; with
 /// `only_pictures` from an IDR at the time of a picture until that is kept), or only for as long as
-/// it would take (`decode_us`). Bounded: what does not fit is dropped, and decoding goes on with
-/// the next IDR.
+/// it would take (`decode_time_s`). Bounded: what does not fit is dropped, and decoding goes on
+/// with the next IDR.
 class DecodeStage {
  public:
   /// What a decoder tells its session.

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "tests/load/clock.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {
@@ -15,8 +16,6 @@ namespace {
 
 constexpr std::int64_t min_retransmission_timeout_us = 200'000;  // Linux's TCP_RTO_MIN
 constexpr std::size_t min_queue_bytes = 2 * LinkShaper::segment_bytes;
-
-std::int64_t microseconds(double seconds) { return std::llround(1e6 * seconds); }
 
 /// What stands before the first `mark`; `text` keeps what stands behind it.
 std::string_view take_until(std::string_view& text, char mark) {

@@ -27,8 +27,6 @@ namespace {
 
 namespace asio = boost::asio;
 
-std::int64_t microseconds(double seconds) { return std::llround(1e6 * seconds); }
-
 /// Traces are read once and shared; scripts are made for each session when its scene is known.
 class TrajectoryMaker {
  public:
@@ -51,7 +49,8 @@ class TrajectoryMaker {
       script.seed += static_cast<std::uint64_t>(session);
       script.duration_s = duration_s_;
       constexpr int display_hz = 60;
-      script.rate_hz = options_.pose_hz > 0 ? options_.pose_hz : std::max(display_hz, options_.fps);
+      script.rate_hz =
+          options_.pose_hz > 0 ? options_.pose_hz : std::max(display_hz, options_.wishes.fps);
       return std::make_shared<const Trajectory>(make_script(script, scene));
     }
     const auto& trace = traces_[static_cast<std::size_t>(session) % traces_.size()];
@@ -71,7 +70,7 @@ void check(const GroupOptions& group, double duration_s) {
         end_s <= duration_s)) {
     throw InputError("--duration, --ramp", "", "the run must last longer than its ramp");
   }
-  if (!(group.fov_y_deg > 6.0f && group.fov_y_deg < 160.0f)) {
+  if (!(group.wishes.fov_y_deg > 6.0f && group.wishes.fov_y_deg < 160.0f)) {
     throw InputError("--fov-deg", "", "must lie between 6 and 160 degrees");
   }
   for (const std::string& size : group.sizes) (void)parse_size("--size", size);
@@ -123,11 +122,11 @@ class Run {
     const GroupOptions& group = options_.groups[index];
     GroupReport& report = report_.groups.emplace_back();
     report.name = group.name;
-    report.nominal_fps = group.fps;
+    report.nominal_fps = group.wishes.fps;
     report.series = std::make_unique<TimeSeries>(begin_us_);
     for (int i = 0; i < group.sessions; ++i) {
       report.sessions.push_back(
-          std::make_unique<SessionReport>(static_cast<double>(group.fps), report.series.get()));
+          std::make_unique<SessionReport>(report.nominal_fps, report.series.get()));
       start_session(group, *trajectories_[index], i, *report.sessions.back());
     }
   }
@@ -165,40 +164,29 @@ class Run {
     SessionSettings settings;
     settings.url = url_;
     settings.token = options_.token;
-    settings.scene_id = group.scene;
+    settings.wishes = group.wishes;
+    settings.manners = group.manners;
     settings.size_px =
         parse_size("--size", group.sizes[static_cast<std::size_t>(number) % group.sizes.size()]);
     if (!group.moving_size.empty())
       settings.moving_size_px = parse_size("--moving-size", group.moving_size);
     report.still_size_px = settings.size_px;
-    settings.move_us = microseconds(group.move_for_s);
-    settings.rest_us = microseconds(group.rest_for_s);
-    settings.fps = group.fps;
-    settings.max_bitrate_kbps = group.max_bitrate_kbps;
-    settings.fixed_quality = group.fixed_quality;
-    settings.fov_y_rad = group.fov_y_deg * std::numbers::pi_v<float> / 180.0f;
     // Multiples of the golden ratio spread any number of sessions evenly over a trace.
     const double golden = number * std::numbers::phi;
     settings.offset = golden - std::floor(golden);
-    settings.decode = group.decode;
-    settings.only_pictures = group.only_pictures;
-    settings.decode_us = microseconds(group.decode_time_s);
-    settings.acknowledge = group.acknowledge;
-    settings.flood_hz = group.flood_hz;
-    settings.reconnect_every_us = microseconds(group.reconnect_every_s);
     // At most four a session: they are kept in memory until the end.
     settings.pictures = static_cast<std::size_t>(
-        group.decode ? std::min(4, (options_.pictures + sessions_ - 1) / sessions_) : 0);
+        group.manners.decode ? std::min(4, (options_.pictures + sessions_ - 1) / sessions_) : 0);
     settings.run_begin_us = begin_us_;
     settings.start_us =
         begin_us_ + microseconds(group.start_s + group.ramp_s * number / group.sessions);
     settings.stop_us =
         begin_us_ + microseconds(group.end_s > 0.0 ? group.end_s : options_.duration_s);
-    if (group.stall_for_s > 0.0) {
-      settings.stall_from_us = begin_us_ + microseconds(group.stall_at_s);
+    if (group.manners.stall_for_s > 0.0) {
+      settings.stall_from_us = begin_us_ + microseconds(group.manners.stall_at_s);
       // Whoever stalls for ever still ends with the run.
-      settings.stall_to_us =
-          std::min(settings.stop_us, settings.stall_from_us + microseconds(group.stall_for_s));
+      settings.stall_to_us = std::min(
+          settings.stop_us, settings.stall_from_us + microseconds(group.manners.stall_for_s));
     }
     return settings;
   }

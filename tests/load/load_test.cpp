@@ -34,8 +34,8 @@ LoadOptions small_load(const std::string& url) {
   group.sessions = 3;
   group.script.script = "head";
   group.sizes = {"160x90"};
-  group.fps = 30;
-  group.decode = true;
+  group.wishes.fps = 30;
+  group.manners.decode = true;
   return options;
 }
 
@@ -110,8 +110,8 @@ TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
   // One frame is too few for what --min-fps goes by.
   const RunningServer server([](ServerConfig& config) { config.min_fps = 0; });
   LoadOptions options = small_load(url_of(server));
-  options.groups[0].acknowledge = false;
-  options.groups[0].decode = false;
+  options.groups[0].manners.acknowledge = false;
+  options.groups[0].manners.decode = false;
   const RunReport run = run_load(options);
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_TRUE(report->stats.connected);
@@ -123,8 +123,8 @@ TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
 TEST(Load, OneSilentClientDisturbsNobody) {
   const RunningServer server;
   LoadOptions silent = small_load(url_of(server));
-  silent.groups[0].acknowledge = false;
-  silent.groups[0].decode = false;
+  silent.groups[0].manners.acknowledge = false;
+  silent.groups[0].manners.decode = false;
   silent.groups[0].sessions = 1;
   std::jthread stalled([&] { run_load(silent); });
   expect_clean(run_load(small_load(url_of(server))));
@@ -133,7 +133,7 @@ TEST(Load, OneSilentClientDisturbsNobody) {
 TEST(Load, ARefusedSessionDoesNotComeBack) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
-  options.groups[0].scene = "no such scene";
+  options.groups[0].wishes.scene = "no such scene";
   options.groups[0].sessions = 1;
   const RunReport run = run_load(options);
   EXPECT_FALSE(run.groups[0].sessions[0]->stats.connected);
@@ -175,7 +175,7 @@ TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
 TEST(Load, SessionsComeBackWhenTheirSocketsAreDropped) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
-  options.groups[0].reconnect_every_s = 1.0;
+  options.groups[0].manners.reconnect_every_s = 1.0;
   const RunReport run = run_load(options);
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_EQ(report->stats.reconnects, 2u) << "at 1 and 2 s of 3";
@@ -188,8 +188,8 @@ TEST(Load, SessionsComeBackWhenTheirSocketsAreDropped) {
 TEST(Load, AStalledClientGoesOnWhereItStopped) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
-  options.groups[0].stall_at_s = 1.0;
-  options.groups[0].stall_for_s = 0.5;
+  options.groups[0].manners.stall_at_s = 1.0;
+  options.groups[0].manners.stall_for_s = 0.5;
   expect_clean(run_load(options));
 }
 
@@ -197,8 +197,8 @@ TEST(Load, AStallWithoutAnEndEndsWithTheRun) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
   options.duration_s = 2.0;
-  options.groups[0].stall_at_s = 1.0;
-  options.groups[0].stall_for_s = 7 * 24 * 3600.0;
+  options.groups[0].manners.stall_at_s = 1.0;
+  options.groups[0].manners.stall_for_s = 7 * 24 * 3600.0;
   const RunReport run = run_load(options);  // or the test's time limit ends it
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_TRUE(report->stats.connected);
@@ -212,7 +212,7 @@ TEST(Load, AFloodingClientIsTurnedAwayAndDisturbsNobody) {
   GroupOptions flood = options.groups[0];
   flood.name = "flood";
   flood.sessions = 1;
-  flood.flood_hz = 5000;
+  flood.manners.flood_hz = 5000;
   options.groups.push_back(flood);
   const RunReport run = run_load(options);
   expect_clean(run);
@@ -292,7 +292,7 @@ TEST(Load, DecodesJustThePicturesThatAreKept) {
   const RunningServer server;
   LoadOptions options = small_load(url_of(server));
   options.pictures = 6;
-  options.groups[0].only_pictures = true;
+  options.groups[0].manners.only_pictures = true;
   const RunReport run = run_load(options);
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_EQ(report->pictures.size(), 2u);
@@ -327,7 +327,7 @@ TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {
     });
   }
   refused([](LoadOptions& options) { options.groups[0].ramp_s = 3.0; });
-  refused([](LoadOptions& options) { options.groups[0].fov_y_deg = 0.0f; });
+  refused([](LoadOptions& options) { options.groups[0].wishes.fov_y_deg = 0.0f; });
 }
 
 }  // namespace

@@ -19,7 +19,6 @@
 #include "tests/load/record.h"
 #include "tests/load/report.h"
 #include "tests/load/run_scenario.h"
-#include "tests/load/units.h"
 
 namespace catgs::load {
 namespace {
@@ -32,8 +31,7 @@ struct ProgramOptions {
   Scenario scenario;  // what no scenario file says
   GroupOptions group;
   std::string file, server, server_log, url, token;
-  std::string duration, ramp = "0s", link, decode_time = "0s", reconnect_every = "0s";
-  std::string move_for = "0s", rest_for = "0s";
+  double duration_s = -1.0;  // not given
   bool insecure = false;
   std::string json, html;
   std::vector<std::string> without;
@@ -42,57 +40,6 @@ struct ProgramOptions {
 
 // Options that a scenario file replaces.
 constexpr const char* client_group = "Clients";
-
-void add_client_options(CLI::App& app, ProgramOptions& options) {
-  GroupOptions& group = options.group;
-  app.option_defaults()->group(client_group);
-  app.add_option("--sessions", group.sessions, "Clients at the same time")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  app.add_option("--ramp", options.ramp, "Spread the starts over this time")->capture_default_str();
-  auto* trace = app.add_option("--trace", group.traces,
-                               "TUM files, replayed at their own times, forth and back; sessions "
-                               "take turns and begin at different places");
-  app.add_flag("--anchor", group.anchor, "Move traces to the scene's start pose")->needs(trace);
-  app.add_option("--script", group.script.script, "orbit, walk, head, drone, still or tour:FILE")
-      ->excludes(trace);
-  app.add_option("--seed", group.script.seed, "Of the script; each session adds its number")
-      ->capture_default_str();
-  app.add_option("--scene", group.scene, "Scene id (default: the server's first)");
-  app.add_option("--size", group.sizes, "Wanted frame sizes, pixels; sessions take turns")
-      ->capture_default_str();
-  app.add_option("--moving-size", group.moving_size,
-                 "Wanted while the camera moves; --size then is that of pictures at rest");
-  auto* rest = app.add_option("--rest-for", options.rest_for,
-                              "Stop and go: no poses for this long, again and again");
-  app.add_option("--move-for", options.move_for, "Between two rests")->needs(rest);
-  app.add_option("--fps", group.fps, "Wanted and nominal frame rate")
-      ->check(CLI::Range(1, 240))
-      ->capture_default_str();
-  app.add_option("--pose-hz", group.pose_hz, "Poses of a script; 0: display rate, 60 or --fps")
-      ->check(CLI::Range(0, 1000));
-  app.add_option("--max-bitrate-kbps", group.max_bitrate_kbps, "0: the server's default")
-      ->check(CLI::Range(0, 200'000))
-      ->capture_default_str();
-  app.add_flag("--fixed-quality", group.fixed_quality,
-               "Ask the server not to adapt bitrate, size and rate to the link");
-  app.add_option("--fov-deg", group.fov_y_deg, "Vertical field of view")->capture_default_str();
-  app.add_option("--link", options.link,
-                 "Each session's line: rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,"
-                 "loss=1%,burst=4,queue=200ms; each part may be left out");
-  auto* decode = app.add_flag("--decode", group.decode, "Decode every frame and check its size");
-  app.add_flag("--only-pictures", group.only_pictures,
-               "Decode only what is compared with --check-scene, from an IDR of its own on")
-      ->needs(decode);
-  app.add_option("--decode-time", options.decode_time, "Play a decoder that takes this long");
-  app.add_flag("!--no-acks", group.acknowledge,
-               "Never acknowledge a frame: the server must stop sending");
-  app.add_option("--flood-hz", group.flood_hz, "Send so many messages a second too many")
-      ->check(CLI::Range(0, 100'000));
-  app.add_option("--reconnect-every", options.reconnect_every,
-                 "Drop all sockets at once, again and again");
-  app.option_defaults()->group("Options");
-}
 
 void add_options(CLI::App& app, ProgramOptions& options) {
   auto* file = app.add_option("--scenario", options.file, "TOML file with a whole run");
@@ -103,8 +50,10 @@ void add_options(CLI::App& app, ProgramOptions& options) {
                  "beside this program)");
   app.add_option("--server-log", options.server_log, "Its log (default: catgs-load-server.log)")
       ->default_val("catgs-load-server.log");
-  app.add_option("--duration", options.duration, "Of the whole run (default: 30s)");
-  add_client_options(app, options);
+  add_duration(app, "--duration", options.duration_s, "Of the whole run (default: 30s)");
+  app.option_defaults()->group(client_group);
+  add_client_options(app, options.group);
+  app.option_defaults()->group("Options");
   for (CLI::Option* option : app.get_options()) {
     const bool of_clients = option->get_group() == client_group;
     if (of_clients) option->excludes(file);
@@ -141,14 +90,7 @@ Scenario scenario_of(const ProgramOptions& options) {
   Scenario scenario = options.scenario;
   if (options.file.empty()) {
     if (options.url.empty()) throw InputError("--url, --scenario", "", "one of them is needed");
-    GroupOptions group = options.group;
-    group.ramp_s = parse_duration_s("--ramp", options.ramp);
-    group.link = parse_link("--link", options.link);
-    group.decode_time_s = parse_duration_s("--decode-time", options.decode_time);
-    group.move_for_s = parse_duration_s("--move-for", options.move_for);
-    group.rest_for_s = parse_duration_s("--rest-for", options.rest_for);
-    group.reconnect_every_s = parse_duration_s("--reconnect-every", options.reconnect_every);
-    scenario.load.groups = {group};
+    scenario.load.groups = {options.group};
   } else {
     scenario = read_scenario(options.file);
     for (const std::string& name : options.without) leave_out(name, scenario);
@@ -156,9 +98,7 @@ Scenario scenario_of(const ProgramOptions& options) {
       scenario.check_scene = options.scenario.check_scene;
     }
   }
-  if (!options.duration.empty()) {
-    scenario.load.duration_s = parse_duration_s("--duration", options.duration);
-  }
+  if (options.duration_s >= 0.0) scenario.load.duration_s = options.duration_s;
   scenario.load.url = options.url;
   scenario.load.token = options.token;
   scenario.load.insecure = options.insecure;
@@ -191,16 +131,16 @@ nlohmann::ordered_json settings_json(const Scenario& scenario) {
                                {"seed", group.script.seed},
                                {"ramp_s", group.ramp_s},
                                {"sizes", group.sizes},
-                               {"fps", group.fps},
+                               {"fps", group.wishes.fps},
                                {"link", group.link.text},
-                               {"decode", group.decode}});
+                               {"decode", group.manners.decode}});
   }
   return json;
 }
 
 struct RecordFlags {
   RecordOptions options;
-  std::string out, duration;
+  std::string out;
 };
 
 void add_record_command(CLI::App& app, RecordFlags& flags) {
@@ -213,14 +153,12 @@ void add_record_command(CLI::App& app, RecordFlags& flags) {
   record->add_flag("--insecure", flags.options.insecure, "Accept any TLS certificate");
   record->add_option("--listen", flags.options.listen, "Port on this machine for the browser")
       ->capture_default_str();
-  record->add_option("--duration", flags.duration, "Stop after this time (default: Ctrl-C)");
+  add_duration(*record, "--duration", flags.options.duration_s,
+               "Stop after this time (default: Ctrl-C)");
   record->add_option("--out", flags.out, "TUM file to write")->required();
 }
 
 int run_record(RecordFlags& flags) {
-  if (!flags.duration.empty()) {
-    flags.options.duration_s = parse_duration_s("--duration", flags.duration);
-  }
   flags.options.on_listening = [](std::uint16_t port) {
     fmt::print(stderr, "open http://127.0.0.1:{}/ and move; Ctrl-C ends the recording\n", port);
   };

@@ -7,9 +7,37 @@
 #include "render_core/motion/script.h"
 #include "tests/load/link.h"
 
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
 namespace catgs::load {
 
 inline constexpr const char* unnamed_group = "all";
+
+/// What a client asks the server for.
+struct Wishes {
+  std::string scene;  // empty: the server's first
+  int fps = 60;
+  int max_bitrate_kbps = 0;    // 0: the server's default
+  bool fixed_quality = false;  // the server keeps bitrate, size and rate, whatever the link does
+  float fov_y_deg = 60.0f;
+};
+
+/// How well a client behaves. Times are seconds.
+struct Manners {
+  double move_for_s = 0.0;  // stop and go: poses for this long, …
+  double rest_for_s = 0.0;  // … then none for this long; 0: never
+  bool decode = false;
+  bool only_pictures = false;      // decode around the pictures that are kept, not all of the time
+  double decode_time_s = 0.0;      // that decoding a frame takes, at least
+  bool acknowledge = true;         // false plays a client that has stopped reading its screen
+  int flood_hz = 0;                // messages a second beyond what a client would send
+  double reconnect_every_s = 0.0;  // 0: never; all sockets are dropped at the same time
+  double stall_at_s = 0.0;   // neither reads nor writes from here on, as a stopped process …
+  double stall_for_s = 0.0;  // … for this long; 0: no stall
+};
 
 /// Clients that are alike. Times are seconds since the run began.
 struct GroupOptions {
@@ -19,32 +47,24 @@ struct GroupOptions {
   double ramp_s = 0.0;  // spreads the starts
   double end_s = 0.0;   // 0: the run's end
 
-  // What they look at and from where. Sessions take turns through traces and sizes.
-  std::string scene;  // empty: the server's first
+  // From where they look. Sessions take turns through traces and sizes.
   std::vector<std::string> traces;
   bool anchor = false;
   ScriptOptions script;
+  int pose_hz = 0;  // of a script; 0: display rate, as browsers do: 60, or fps where that is more
   std::vector<std::string> sizes = {"1280x720"};
   std::string moving_size;  // smaller than those while the camera moves; empty: as they are
-  double move_for_s = 0.0;  // stop and go: poses for this long, …
-  double rest_for_s = 0.0;  // … then none for this long; 0: never
-  int fps = 60;
-  int pose_hz = 0;  // of a script; 0: display rate, as browsers do: 60, or fps where that is more
-  int max_bitrate_kbps = 0;
-  bool fixed_quality = false;  // the server keeps bitrate, size and rate, whatever the link does
-  float fov_y_deg = 60.0f;
 
-  // How well they behave.
+  Wishes wishes;
+  Manners manners;
   LinkSettings link;
-  bool decode = false;
-  bool only_pictures = false;  // decode around the pictures that are kept, not all of the time
-  double decode_time_s = 0.0;  // that decoding a frame takes, at least
-  bool acknowledge = true;
-  int flood_hz = 0;                // messages a second beyond what a client would send
-  double reconnect_every_s = 0.0;  // 0: never; all sockets are dropped at the same time
-  double stall_at_s = 0.0;   // neither reads nor writes from here on, as a stopped process …
-  double stall_for_s = 0.0;  // … for this long; 0: no stall
 };
+
+/// Declares the options of a group: flags of the command line, keys of a scenario's clients.
+void add_client_options(CLI::App& app, GroupOptions& group);
+/// An option whose value is a duration, such as 500ms.
+CLI::Option* add_duration(CLI::App& app, const std::string& flag, double& seconds,
+                          const std::string& help = {});
 
 /// Something that happens to the server during a run.
 struct TimedAction {

@@ -22,7 +22,7 @@ void check_names(const std::vector<Requirement>& requirements, const Scenario& s
   RunReport empty;
   for (const GroupOptions& group : scenario.load.groups) {
     empty.groups.push_back(
-        {group.name, static_cast<double>(group.fps), std::make_unique<TimeSeries>(0), {}});
+        {group.name, static_cast<double>(group.wishes.fps), std::make_unique<TimeSeries>(0), {}});
   }
   Metrics metrics = collect_metrics(empty, scenario.bounds);
   if (server != nullptr) append(metrics, server->metrics());

@@ -14,6 +14,7 @@
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/scene.h"
 #include "tests/load/clock.h"
+#include "tests/load/options.h"
 #include "tests/load/run_report.h"
 #include "tests/load/url.h"
 
@@ -27,26 +28,14 @@ struct SessionSettings {
   Url url;
   std::string via_port;  // of a LinkProxy on this machine; empty: straight to the server
   std::string token;
-  std::string scene_id;
+  Wishes wishes;
+  Manners manners;
   glm::ivec2 size_px{0};
-  glm::ivec2 moving_size_px{0};           // 0: the same
-  std::int64_t move_us = 0, rest_us = 0;  // stop and go
-  int fps = 60;
-  int max_bitrate_kbps = 0;  // 0: the server's default
-  bool fixed_quality = false;
-  float fov_y_rad = 1.0f;
+  glm::ivec2 moving_size_px{0};  // 0: the same
   MakeTrajectory make_trajectory;
   double offset = 0.0;  // where in the trajectory to begin, share of its length
-
-  bool decode = false;
-  bool only_pictures = false;           // decode around the pictures that are kept
-  std::int64_t decode_us = 0;           // that decoding a frame takes, at least
-  bool acknowledge = true;              // false plays a client that has stopped reading its screen
-  int flood_hz = 0;                     // messages a second beyond what a client would send
-  std::int64_t reconnect_every_us = 0;  // of the run's time; 0: never
   std::int64_t stall_from_us = 0, stall_to_us = 0;
   std::size_t pictures = 0;  // to keep, evenly spread over its time
-
   std::int64_t run_begin_us = 0, start_us = 0, stop_us = 0;
 };
 
