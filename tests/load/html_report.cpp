@@ -7,6 +7,7 @@
 
 #include "render_core/base/build_info.h"
 #include "server/net/http.h"
+#include "tests/load/report.h"
 #include "tests/load/svg_plot.h"
 
 namespace catgs::load {
@@ -74,8 +75,7 @@ std::vector<Curve> over_time(const RunReport& report, double duration_s, Value v
 std::vector<Curve> distribution(const RunReport& report, DurationHistogram SessionStats::*member) {
   std::vector<Curve> curves;
   for (const GroupReport& group : report.groups) {
-    DurationHistogram all;
-    for (const auto& session : group.sessions) all.add(session->stats.*member);
+    const DurationHistogram all = merged(group.sessions, member);
     Curve& curve = curves.emplace_back();
     curve.name = group.name;
     if (all.count() == 0) continue;
@@ -88,44 +88,34 @@ std::vector<Curve> distribution(const RunReport& report, DurationHistogram Sessi
 }
 
 std::string time_plots(const Scenario& scenario, const RunReport& report) {
-  std::string html;
-  const double duration_s = scenario.load.duration_s;
+  const auto plot = [&](const char* title, const char* unit, std::vector<double> bounds,
+                        auto value) {
+    return line_plot({.title = title, .x_unit = "s", .y_unit = unit, .bounds = std::move(bounds)},
+                     over_time(report, scenario.load.duration_s, value));
+  };
   const auto per_session = [](const GroupReport& group, double sum) {
     return sum / (group.series->bin_s() * static_cast<double>(group.sessions.size()));
   };
-  html += line_plot({.title = "Pose sent to frame received, p95",
-                     .x_unit = "s",
-                     .y_unit = "ms",
-                     .bounds = {scenario.bounds.pose_to_frame_p95_ms}},
-                    over_time(report, duration_s, [](const auto&, const SeriesBin& bin) {
-                      return bin.pose_to_frame.percentile_ms(0.95);
-                    }));
-  html += line_plot({.title = "Age of the pose on show, p95 of all ticks",
-                     .x_unit = "s",
-                     .y_unit = "ms",
-                     .bounds = {scenario.bounds.pose_age_p95_ms}},
-                    over_time(report, duration_s, [](const auto&, const SeriesBin& bin) {
-                      return bin.pose_age.percentile_ms(0.95);
-                    }));
-  html += line_plot({.title = "Frames of a session", .x_unit = "s", .y_unit = "1/s"},
-                    over_time(report, duration_s, [&](const auto& group, const SeriesBin& bin) {
-                      return per_session(group, static_cast<double>(bin.frames));
-                    }));
-  html += line_plot({.title = "Bitrate of a session", .x_unit = "s", .y_unit = "kbit/s"},
-                    over_time(report, duration_s, [&](const auto& group, const SeriesBin& bin) {
-                      return per_session(group, 8e-3 * static_cast<double>(bin.bytes));
-                    }));
-  html += line_plot({.title = "Size of a frame", .x_unit = "s", .y_unit = "megapixels"},
-                    over_time(report, duration_s, [](const auto&, const SeriesBin& bin) {
-                      return bin.frames == 0 ? std::nan("")
-                                             : 1e-6 * static_cast<double>(bin.pixels) /
-                                                   static_cast<double>(bin.frames);
-                    }));
-  html += line_plot({.title = "Sessions that got a frame", .x_unit = "s", .y_unit = ""},
-                    over_time(report, duration_s, [](const auto&, const SeriesBin& bin) {
-                      return static_cast<double>(bin.sessions);
-                    }));
-  return html;
+  return plot("Pose sent to frame received, p95", "ms", {scenario.bounds.pose_to_frame_p95_ms},
+              [](const auto&, const SeriesBin& bin) {
+                return bin.pose_to_frame.percentile_ms(0.95);
+              }) +
+         plot("Age of the pose on show, p95 of all ticks", "ms", {scenario.bounds.pose_age_p95_ms},
+              [](const auto&, const SeriesBin& bin) { return bin.pose_age.percentile_ms(0.95); }) +
+         plot("Frames of a session", "1/s", {},
+              [&](const auto& group, const SeriesBin& bin) {
+                return per_session(group, static_cast<double>(bin.frames));
+              }) +
+         plot("Bitrate of a session", "kbit/s", {},
+              [&](const auto& group, const SeriesBin& bin) {
+                return per_session(group, 8e-3 * static_cast<double>(bin.bytes));
+              }) +
+         plot("Size of a frame", "megapixels", {},
+              [](const auto&, const SeriesBin& bin) {  // without frames 0 / 0: no point
+                return 1e-6 * static_cast<double>(bin.pixels) / static_cast<double>(bin.frames);
+              }) +
+         plot("Sessions that got a frame", "", {},
+              [](const auto&, const SeriesBin& bin) { return static_cast<double>(bin.sessions); });
 }
 
 std::string usage_plots(const std::vector<UsageSample>& usage) {
@@ -171,9 +161,8 @@ std::string stage_table(const RunReport& report) {
       "<th>p99</th><th>max</th></tr>\n";
   for (const NamedHistogram& histogram : named_histograms()) {
     DurationHistogram all;
-    for (const GroupReport& group : report.groups) {
-      for (const auto& session : group.sessions) all.add(session->stats.*histogram.member);
-    }
+    for (const GroupReport& group : report.groups)
+      all.add(merged(group.sessions, histogram.member));
     if (all.count() == 0) continue;
     html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
                         escape_html(histogram.meaning), number(all.percentile_ms(0.5)),
@@ -198,12 +187,10 @@ std::string to_html(const Scenario& scenario, const Outcome& outcome) {
   std::string facts = fmt::format("catgs-load {} ({}), {:g} s", build_version, build_commit,
                                   scenario.load.duration_s);
   for (const GroupReport& group : outcome.report.groups) {
-    const auto& sessions = group.sessions;
-    const auto admitted =
-        std::ranges::find_if(sessions, [](const auto& s) { return s->stats.connected; });
-    if (admitted == sessions.end()) continue;
-    facts += fmt::format(" · {} · {}", (*admitted)->renderer, (*admitted)->encoder);
-    break;
+    if (const SessionReport* first = admitted(group.sessions)) {
+      facts += fmt::format(" · {} · {}", first->renderer, first->encoder);
+      break;
+    }
   }
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
@@ -215,13 +202,16 @@ std::string to_html(const Scenario& scenario, const Outcome& outcome) {
   html += "<h2>Over time</h2>\n<div class=\"plots\">\n";
   html += time_plots(scenario, outcome.report) + usage_plots(outcome.usage) + "</div>\n";
   html += "<h2>Distributions</h2>\n<div class=\"plots\">\n";
-  const PlotSettings share{
-      .x_unit = "ms", .y_unit = "% of frames up to x", .max_y = 100.0, .log_x = true};
-  PlotSettings settings = share;
-  settings.title = "Pose sent to frame received";
-  html += line_plot(settings, distribution(outcome.report, &SessionStats::pose_to_frame));
-  settings.title = "Between two frames";
-  html += line_plot(settings, distribution(outcome.report, &SessionStats::frame_interval));
+  const auto plot = [&](const char* what, DurationHistogram SessionStats::*member) {
+    return line_plot({.title = what,
+                      .x_unit = "ms",
+                      .y_unit = "% of frames up to x",
+                      .max_y = 100.0,
+                      .log_x = true},
+                     distribution(outcome.report, member));
+  };
+  html += plot("Pose sent to frame received", &SessionStats::pose_to_frame);
+  html += plot("Between two frames", &SessionStats::frame_interval);
   html += "</div>\n" + stage_table(outcome.report) + metric_list(outcome.metrics);
   return html + "</body></html>\n";
 }

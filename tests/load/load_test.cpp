@@ -39,18 +39,57 @@ LoadOptions small_load(const std::string& url) {
   return options;
 }
 
-/// Returns once a session of the server has got a frame. Throws after twenty seconds: a bound
-/// against hanging, not a measurement.
-void wait_for_frames(const RunningServer& server) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (std::chrono::steady_clock::now() < deadline) {
-    const auto sessions =
-        nlohmann::json::parse(test::http_get(server.admin_port(), "/api/sessions").body);
-    for (const auto& session : sessions)
-      if (session.at("frames_sent").get<int>() > 0) return;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+/// A small load with changes, on a server of its own.
+template <typename Change>
+RunReport run_small_load(Change change) {
+  const RunningServer server;
+  LoadOptions options = small_load(url_of(server));
+  change(options, options.groups[0]);
+  return run_load(options);
+}
+
+/// A server with a certificate that nobody trusts.
+class TlsServer {
+ public:
+  [[nodiscard]] std::string url() const {
+    return "wss://127.0.0.1:" + std::to_string(server_.port());
   }
-  throw std::runtime_error("no session got a frame");
+
+ private:
+  const test::TemporaryFolder folder_;
+  const RunningServer server_{[this](ServerConfig& config) {
+    config.tls_cert = folder_ / "certificate.pem";
+    config.tls_key = folder_ / "key.pem";
+    test::write_self_signed(config.tls_cert, config.tls_key);
+  }};
+};
+
+struct RecordedRun {
+  RunReport run;
+  Trajectory poses;
+};
+
+/// A session that looks at the server through a recorder.
+RecordedRun record_a_run(const std::string& url, bool insecure) {
+  LoadOptions options = small_load("");
+  options.groups[0].sessions = 1;
+  options.duration_s = 2.0;
+  RecordedRun recorded;
+  std::jthread load;
+  RecordOptions record;
+  record.url = url;
+  record.insecure = insecure;
+  record.listen = 0;
+  record.duration_s = 3.0;
+  record.on_listening = [&](std::uint16_t port) {
+    load = std::jthread([&recorded, options, port]() mutable {
+      options.url = "ws://127.0.0.1:" + std::to_string(port);
+      recorded.run = run_load(options);
+    });
+  };
+  recorded.poses = record_poses(record);
+  load.join();
+  return recorded;
 }
 
 /// What went wrong, for the test's log.
@@ -91,13 +130,8 @@ TEST(Load, MjpegDecodesToo) {
 }
 
 TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
-  const test::TemporaryFolder folder;
-  test::write_self_signed(folder / "certificate.pem", folder / "key.pem");
-  const RunningServer server([&](ServerConfig& config) {
-    config.tls_cert = folder / "certificate.pem";
-    config.tls_key = folder / "key.pem";
-  });
-  LoadOptions options = small_load("wss://127.0.0.1:" + std::to_string(server.port()));
+  const TlsServer server;
+  LoadOptions options = small_load(server.url());
   options.insecure = true;
   expect_clean(run_load(options));
   options.insecure = false;
@@ -131,11 +165,10 @@ TEST(Load, OneSilentClientDisturbsNobody) {
 }
 
 TEST(Load, ARefusedSessionDoesNotComeBack) {
-  const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.groups[0].wishes.scene = "no such scene";
-  options.groups[0].sessions = 1;
-  const RunReport run = run_load(options);
+  const RunReport run = run_small_load([](LoadOptions&, GroupOptions& group) {
+    group.wishes.scene = "no such scene";
+    group.sessions = 1;
+  });
   EXPECT_FALSE(run.groups[0].sessions[0]->stats.connected);
   EXPECT_EQ(run.groups[0].sessions[0]->stats.errors, 1u) << errors_of(run);
   EXPECT_EQ(run.groups[0].sessions[0]->stats.reconnects, 0u);
@@ -164,7 +197,8 @@ TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
   options.groups[0].sessions = 1;
   RunReport run;
   std::jthread load([&] { run = run_load(options); });
-  wait_for_frames(*server);
+  EXPECT_TRUE(
+      test::eventually([&] { return test::metric(*server, "catgs_frames_sent_total") > 0; }));
   server.reset();
   load.join();
   EXPECT_TRUE(run.groups[0].sessions[0]->stats.connected);
@@ -173,10 +207,8 @@ TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
 }
 
 TEST(Load, SessionsComeBackWhenTheirSocketsAreDropped) {
-  const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.groups[0].manners.reconnect_every_s = 1.0;
-  const RunReport run = run_load(options);
+  const RunReport run = run_small_load(
+      [](LoadOptions&, GroupOptions& group) { group.manners.reconnect_every_s = 1.0; });
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_EQ(report->stats.reconnects, 2u) << "at 1 and 2 s of 3";
     EXPECT_GE(report->stats.recovery.count(), 1u);
@@ -186,20 +218,18 @@ TEST(Load, SessionsComeBackWhenTheirSocketsAreDropped) {
 }
 
 TEST(Load, AStalledClientGoesOnWhereItStopped) {
-  const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.groups[0].manners.stall_at_s = 1.0;
-  options.groups[0].manners.stall_for_s = 0.5;
-  expect_clean(run_load(options));
+  expect_clean(run_small_load([](LoadOptions&, GroupOptions& group) {
+    group.manners.stall_at_s = 1.0;
+    group.manners.stall_for_s = 0.5;
+  }));
 }
 
 TEST(Load, AStallWithoutAnEndEndsWithTheRun) {
-  const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.duration_s = 2.0;
-  options.groups[0].manners.stall_at_s = 1.0;
-  options.groups[0].manners.stall_for_s = 7 * 24 * 3600.0;
-  const RunReport run = run_load(options);  // or the test's time limit ends it
+  const RunReport run = run_small_load([](LoadOptions& options, GroupOptions& group) {
+    options.duration_s = 2.0;
+    group.manners.stall_at_s = 1.0;
+    group.manners.stall_for_s = 7 * 24 * 3600.0;
+  });  // or the test's time limit ends it
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_TRUE(report->stats.connected);
     EXPECT_EQ(report->stats.decode_errors, 0u);
@@ -221,10 +251,9 @@ TEST(Load, AFloodingClientIsTurnedAwayAndDisturbsNobody) {
 }
 
 TEST(Load, ALinkDelaysButLosesNothing) {
-  const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.groups[0].link = parse_link("", "rate=20mbit,delay=20ms,jitter=5ms,loss=1%,burst=2");
-  const RunReport run = run_load(options);
+  const RunReport run = run_small_load([](LoadOptions&, GroupOptions& group) {
+    group.link = parse_link("", "rate=20mbit,delay=20ms,jitter=5ms,loss=1%,burst=2");
+  });
   expect_clean(run);
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_GE(report->stats.pose_to_frame.percentile_ms(0.0), 40.0)
@@ -234,54 +263,16 @@ TEST(Load, ALinkDelaysButLosesNothing) {
 
 TEST(Record, SavesThePosesThatPassBy) {
   const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.groups[0].sessions = 1;
-  options.duration_s = 2.0;
-  RunReport run;
-  std::jthread load;
-  RecordOptions record;
-  record.url = url_of(server);
-  record.listen = 0;
-  record.duration_s = 3.0;
-  record.on_listening = [&](std::uint16_t port) {
-    load = std::jthread([&run, options, port]() mutable {
-      options.url = "ws://127.0.0.1:" + std::to_string(port);
-      run = run_load(options);
-    });
-  };
-  const Trajectory poses = record_poses(record);
-  load.join();
+  const auto [run, poses] = record_a_run(url_of(server), false);
   expect_clean(run);
   EXPECT_EQ(poses.size(), run.groups[0].sessions[0]->stats.poses_sent);
   EXPECT_EQ(poses.at(0).time_us, 0);
 }
 
-TEST(Load, RecordsOverTlsAndTrustsNoUnknownCertificate) {
-  const test::TemporaryFolder folder;
-  test::write_self_signed(folder / "certificate.pem", folder / "key.pem");
-  const RunningServer server([&](ServerConfig& config) {
-    config.tls_cert = folder / "certificate.pem";
-    config.tls_key = folder / "key.pem";
-  });
+TEST(Record, GoesOverTlsAndTrustsNoUnknownCertificate) {
+  const TlsServer server;
   for (const bool insecure : {true, false}) {
-    LoadOptions options = small_load("");
-    options.groups[0].sessions = 1;
-    options.duration_s = 1.5;
-    RunReport run;
-    std::jthread load;
-    RecordOptions record;
-    record.url = "wss://127.0.0.1:" + std::to_string(server.port());
-    record.insecure = insecure;
-    record.listen = 0;
-    record.duration_s = 2.5;
-    record.on_listening = [&](std::uint16_t port) {
-      load = std::jthread([&run, options, port]() mutable {
-        options.url = "ws://127.0.0.1:" + std::to_string(port);
-        run = run_load(options);
-      });
-    };
-    const Trajectory poses = record_poses(record);
-    load.join();
+    const auto [run, poses] = record_a_run(server.url(), insecure);
     const SessionStats& stats = run.groups[0].sessions[0]->stats;
     EXPECT_EQ(stats.connected, insecure);
     EXPECT_EQ(poses.size(), insecure ? stats.poses_sent : 0u);
@@ -289,11 +280,10 @@ TEST(Load, RecordsOverTlsAndTrustsNoUnknownCertificate) {
 }
 
 TEST(Load, DecodesJustThePicturesThatAreKept) {
-  const RunningServer server;
-  LoadOptions options = small_load(url_of(server));
-  options.pictures = 6;
-  options.groups[0].manners.only_pictures = true;
-  const RunReport run = run_load(options);
+  const RunReport run = run_small_load([](LoadOptions& options, GroupOptions& group) {
+    options.pictures = 6;
+    group.manners.only_pictures = true;
+  });
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_EQ(report->pictures.size(), 2u);
     EXPECT_EQ(report->stats.decode_errors, 0u);

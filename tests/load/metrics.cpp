@@ -134,6 +134,12 @@ double value_of(const Metrics& metrics, std::string_view name) {
   return found == metrics.end() ? std::nan("") : found->second;
 }
 
+DurationHistogram merged(const SessionReports& sessions, DurationHistogram SessionStats::*member) {
+  DurationHistogram all;
+  for (const auto& session : sessions) all.add(session->stats.*member);
+  return all;
+}
+
 double mean_psnr_db(const SessionReport& session) {
   if (session.pictures.empty()) return std::nan("");
   double sum = 0.0, count = 0.0;
@@ -170,9 +176,7 @@ Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
   add("sessions_held", held);
   add("held", held == static_cast<double>(sessions.size()) ? 1.0 : 0.0);
   for (const NamedHistogram& histogram : histograms) {
-    DurationHistogram all;
-    for (const auto& session : sessions) all.add(session->stats.*histogram.member);
-    add_durations(histogram.name, all, metrics);
+    add_durations(histogram.name, merged(sessions, histogram.member), metrics);
   }
   const Range fps = range_of(sessions, [](const SessionStats& stats) { return stats.fps(); });
   add("fps_min", fps.min);

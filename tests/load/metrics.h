@@ -51,6 +51,8 @@ struct NamedCount {
 };
 std::span<const NamedCount> named_counts();
 
+DurationHistogram merged(const SessionReports& sessions, DurationHistogram SessionStats::*member);
+
 /// PSNR of the mean squared error of a session's checked pictures; NaN without any.
 double mean_psnr_db(const SessionReport& session);
 

@@ -20,13 +20,6 @@ std::map<std::string, std::uint64_t> all_errors(const SessionReports& sessions) 
   return errors;
 }
 
-/// Of the first session that was admitted.
-const SessionReport* admitted(const SessionReports& sessions) {
-  const auto found =
-      std::ranges::find_if(sessions, [](const auto& session) { return session->stats.connected; });
-  return found == sessions.end() ? nullptr : found->get();
-}
-
 Json session_json(const SessionReport& session, double nominal_fps, const HoldBounds& bounds) {
   const SessionStats& stats = session.stats;
   Json json = {{"connected", stats.connected},
@@ -89,6 +82,12 @@ void append_table(const GroupReport& group, const HoldBounds& bounds, std::strin
 }
 
 }  // namespace
+
+const SessionReport* admitted(const SessionReports& sessions) {
+  const auto found =
+      std::ranges::find_if(sessions, [](const auto& session) { return session->stats.connected; });
+  return found == sessions.end() ? nullptr : found->get();
+}
 
 Json to_json(const RunReport& report, const Metrics& metrics, const HoldBounds& bounds) {
   Json json;

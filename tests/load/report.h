@@ -8,6 +8,9 @@
 
 namespace catgs::load {
 
+/// The first session that was; null if none was.
+const SessionReport* admitted(const SessionReports& sessions);
+
 nlohmann::ordered_json to_json(const RunReport& report, const Metrics& metrics,
                                const HoldBounds& bounds);
 
