@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <limits>
+#include <sstream>
 
 namespace catgs::fuzz {
 namespace {
@@ -98,6 +100,11 @@ void change_bytes(const Material& from, std::string& text) {
       text.resize(place);
       break;
   }
+}
+
+std::vector<std::string> words_of(std::string_view text) {
+  std::istringstream in{std::string(text)};
+  return {std::istream_iterator<std::string>(in), {}};
 }
 
 std::string mutant(const Material& material, Change change, std::size_t max_bytes) {

@@ -5,6 +5,8 @@
 #include <random>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace catgs::fuzz {
 
@@ -31,13 +33,15 @@ using Change = void (*)(const Material& material, std::string& text);
 /// Bits, numbers, words of the format, ranges that are erased, doubled or taken from another input.
 void change_bytes(const Material& material, std::string& text);
 
-/// Values of a JSON document that are erased, repeated, exchanged, replaced by those of another
-/// input or by ones that parsers err with, keys of other members, deeper nesting. Takes what is no
-/// JSON for what it resembles most.
+/// Values of a JSON document that are erased, repeated, replaced by those of another place or input
+/// or by ones that parsers err with, other keys, deeper nesting. Changes bytes of what is no JSON.
 void change_json(const Material& material, std::string& text);
 
 /// Lines and words of a header of text, up to "end_header", and bytes of what follows it.
 void change_header(const Material& material, std::string& text);
+
+/// What stands between the spaces of `text`.
+std::vector<std::string> words_of(std::string_view text);
 
 /// One of the material's inputs with a few changes, by `change` where it is not null and by bytes,
 /// not longer than `max_bytes`. The same for the same `random`.

@@ -18,12 +18,14 @@
 namespace catgs::fuzz {
 
 const std::vector<Target>& targets() {
-  static const std::vector<Target> all = {
-      ply(),         compressed_ply(), splat(),          spz(),          sog(),
-      zip(),         webp(),           lod_tree(),       streamed_sog(), sidecar(),
-      cameras(),     tours(),          sent_sidecar(),   tum(),          colmap(),
-      scene_size(),  config(),         client_message(), http(),         token(),
-      signed_token()};
+  static const std::vector<Target> all = [] {
+    std::vector<Target> joined;
+    for (const auto& of_file :
+         {ply_targets(), splat_spz_targets(), sog_targets(), scene_json_targets(),
+          text_files_targets(), scene_size_targets(), network_targets()})
+      joined.insert(joined.end(), of_file.begin(), of_file.end());
+    return joined;
+  }();
   return all;
 }
 

@@ -34,32 +34,19 @@ struct Target {
   std::size_t max_bytes = 4096;
 };
 
-/// All of them; a new one is added here and in CMakeLists.txt.
+// By the files of targets/.
+std::vector<Target> network_targets();
+std::vector<Target> ply_targets();
+std::vector<Target> scene_json_targets();
+std::vector<Target> scene_size_targets();
+std::vector<Target> sog_targets();
+std::vector<Target> splat_spz_targets();
+std::vector<Target> text_files_targets();
+
+/// All of them.
 const std::vector<Target>& targets();
 /// Throws std::out_of_range with the names that there are.
 const Target& target_called(std::string_view name);
-
-Target ply();
-Target compressed_ply();
-Target splat();
-Target spz();
-Target sog();
-Target zip();
-Target webp();
-Target lod_tree();
-Target streamed_sog();
-Target scene_size();
-Target sidecar();
-Target cameras();
-Target tours();
-Target sent_sidecar();
-Target tum();
-Target colmap();
-Target config();
-Target client_message();
-Target http();
-Target token();
-Target signed_token();
 
 /// Ends the process with `what` unless `promise` holds: libFuzzer keeps the input.
 void require(bool promise, const char* what);

@@ -284,40 +284,31 @@ std::map<std::string, std::string> token_seeds() {
 
 }  // namespace
 
-Target client_message() {
-  return {.name = "client_message",
-          .parse = parse_client_message,
-          .seeds = client_message_seeds,
-          .dictionary = {std::string("\0\0\xc0\x7f", 4), std::string("\0\0\x80\x7f", 4),
-                         std::string("\0\0\x80\x3f", 4), "\xff\xff\xff\xff\xff\xff\xff\xff\xff\1"},
-          .max_bytes = 1024};
-}
-
-Target http() {
-  return {.name = "http",
-          .parse = parse_request,
-          .seeds = request_seeds,
-          .dictionary = {"/index.html", "/assets/", "..", "%2e", "%00", "://", "[::1]",
-                         "::ffff:", "10.0.0.1", "2001:db8::", "https://friend.example", ", ",
-                         "/api/scenes/", "/tours", "\"", "*", "W/", "&quot;"},
-          .max_bytes = 512};
-}
-
-Target token() {
-  return {.name = "token",
-          .parse = parse_token,
-          .seeds = token_seeds,
-          .dictionary = {".", "=", "-", "_"},
-          .max_bytes = 512};
-}
-
-Target signed_token() {
-  return {.name = "signed_token",
-          .parse = parse_signed,
-          .seeds = signed_seeds,
-          .dictionary = {"viewer", "spectator", "author", "\n", ":", "9223372036854775807",
-                         "-9223372036854775808"},
-          .max_bytes = 256};
+std::vector<Target> network_targets() {
+  return {{.name = "client_message",
+           .parse = parse_client_message,
+           .seeds = client_message_seeds,
+           .dictionary = {std::string("\0\0\xc0\x7f", 4), std::string("\0\0\x80\x7f", 4),
+                          std::string("\0\0\x80\x3f", 4), "\xff\xff\xff\xff\xff\xff\xff\xff\xff\1"},
+           .max_bytes = 1024},
+          {.name = "http",
+           .parse = parse_request,
+           .seeds = request_seeds,
+           .dictionary = {"/index.html", "/assets/", "..", "%2e", "%00", "://", "[::1]",
+                          "::ffff:", "10.0.0.1", "2001:db8::", "https://friend.example", ", ",
+                          "/api/scenes/", "/tours", "\"", "*", "W/", "&quot;"},
+           .max_bytes = 512},
+          {.name = "token",
+           .parse = parse_token,
+           .seeds = token_seeds,
+           .dictionary = {".", "=", "-", "_"},
+           .max_bytes = 512},
+          {.name = "signed_token",
+           .parse = parse_signed,
+           .seeds = signed_seeds,
+           .dictionary = {"viewer", "spectator", "author", "\n", ":", "9223372036854775807",
+                          "-9223372036854775808"},
+           .max_bytes = 256}};
 }
 
 }  // namespace catgs::fuzz

@@ -60,59 +60,30 @@ std::map<std::string, std::string> compressed_seeds() {
           {"degree_3", test::encode_compressed_ply(test::random_cloud(5, 3), true)}};
 }
 
-const std::vector<std::string> header_words = {"ply\n",
-                                               "format ",
-                                               "ascii ",
-                                               "binary_little_endian ",
-                                               "binary_big_endian ",
-                                               "1.0\n",
-                                               "char ",
-                                               "uchar ",
-                                               "short ",
-                                               "ushort ",
-                                               "int ",
-                                               "uint ",
-                                               "float ",
-                                               "double ",
-                                               "int8 ",
-                                               "uint8 ",
-                                               "float32 ",
-                                               "float64 ",
-                                               "list ",
-                                               "element ",
-                                               "vertex ",
-                                               "property ",
-                                               "comment ",
-                                               "obj_info ",
-                                               "face ",
-                                               "end_header\n"};
-
-std::vector<std::string> with_header_words(std::vector<std::string> words) {
-  words.insert(words.end(), header_words.begin(), header_words.end());
-  return words;
+std::vector<std::string> header_words(std::string_view words) {
+  return words_of(std::string(words) +
+                  " ply format ascii binary_little_endian binary_big_endian 1.0 char uchar short "
+                  "ushort int uint float double int8 uint8 float32 float64 list element vertex "
+                  "property comment obj_info face end_header");
 }
 
 }  // namespace
 
-Target ply() {
-  return {.name = "ply",
-          .parse = parse_plain,
-          .seeds = plain_seeds,
-          .dictionary = with_header_words({"f_dc_0", "f_rest_0", "f_rest_44", "opacity", "scale_0",
-                                           "rot_0", "nan", "inf", "1e39", "4294967296"}),
-          .change = change_header,
-          .max_bytes = 8192};
-}
-
-Target compressed_ply() {
-  return {.name = "compressed_ply",
-          .parse = parse_compressed,
-          .seeds = compressed_seeds,
-          .dictionary = with_header_words({"chunk ", "sh ", "packed_position", "packed_rotation",
-                                           "packed_scale", "packed_color", "min_x", "max_scale_z",
-                                           "min_r", "f_rest_0", "f_rest_8"}),
-          .change = change_header,
-          .max_bytes = 16384};
+std::vector<Target> ply_targets() {
+  return {{.name = "ply",
+           .parse = parse_plain,
+           .seeds = plain_seeds,
+           .dictionary = header_words(
+               "f_dc_0 f_rest_0 f_rest_44 opacity scale_0 rot_0 nan inf 1e39 4294967296"),
+           .change = change_header,
+           .max_bytes = 8192},
+          {.name = "compressed_ply",
+           .parse = parse_compressed,
+           .seeds = compressed_seeds,
+           .dictionary = header_words("chunk sh packed_position packed_rotation packed_scale "
+                                      "packed_color min_x max_scale_z min_r f_rest_0 f_rest_8"),
+           .change = change_header,
+           .max_bytes = 16384}};
 }
 
 }  // namespace catgs::fuzz

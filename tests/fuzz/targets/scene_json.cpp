@@ -142,80 +142,48 @@ std::map<std::string, std::string> tours_seeds() {
                        "look_at":[0,0,0],"caption":"c","seconds":4}]}]})"}};
 }
 
-const std::vector<std::string> json_words = {"null",
-                                             "true",
-                                             "false",
-                                             "-0",
-                                             "1e400",
-                                             "1e39",
-                                             "[[[[",
-                                             "]]]]",
-                                             "{\"",
-                                             "\":",
-                                             "\\u0000",
-                                             "\\ud800",
-                                             "18446744073709551616",
-                                             "-1",
-                                             "0.1"};
-
-std::vector<std::string> with_json_words(std::vector<std::string> words) {
-  words.insert(words.end(), json_words.begin(), json_words.end());
+/// The keys of a format as documents have them, and what parsers of JSON err with.
+std::vector<std::string> json_words(std::string_view keys) {
+  std::vector<std::string> words = words_of(
+      R"(null true false -0 1e400 1e39 [[[[ ]]]] {" ": \u0000 \ud800 18446744073709551616 -1 0.1)");
+  for (const std::string& key : words_of(keys)) words.push_back(fmt::format("\"{}\":", key));
   return words;
 }
 
 }  // namespace
 
-Target lod_tree() {
-  return {.name = "lod_tree",
-          .parse = parse_lod_tree,
-          .seeds = lod_tree_seeds,
-          .dictionary = with_json_words(
-              {"\"lodLevels\":", "\"filenames\":", "\"tree\":", "\"children\":", "\"lods\":",
-               "\"file\":", "\"offset\":", "\"count\":", "\"environment\":", "\"version\":"}),
-          .change = change_json,
-          .max_bytes = 8192};
-}
-
-Target sidecar() {
-  return {.name = "sidecar",
-          .parse = parse_sidecar,
-          .seeds = sidecar_seeds,
-          .dictionary =
-              with_json_words({"\"up\":", "\"near\":", "\"focus\":", "\"start_pose\":",
-                               "\"position\":", "\"look_at\":", "\"orientation\":", "\"limits\":",
-                               "\"min\":", "\"max\":", "\"tours\":", "\"-y\"", "\"+z\""}),
-          .change = change_json};
-}
-
-Target cameras() {
-  return {.name = "cameras",
-          .parse = parse_cameras,
-          .seeds = cameras_seeds,
-          .dictionary = with_json_words(
-              {"\"position\":", "\"rotation\":", "\"frames\":", "\"transform_matrix\":"}),
-          .change = change_json};
-}
-
-Target tours() {
-  return {.name = "tours",
-          .parse = parse_tours,
-          .seeds = tours_seeds,
-          .dictionary = with_json_words(
-              {"\"tours\":", "\"animTracks\":", "\"annotations\":", "\"cameras\":"}),
-          .change = change_json,
-          .max_bytes = 65536};
-}
-
-Target sent_sidecar() {
-  return {.name = "sent_sidecar",
-          .parse = parse_sent_sidecar,
-          .seeds = sent_sidecar_seeds,
-          .dictionary =
-              with_json_words({"\"tours\":", "\"stops\":", "\"title\":", "\"caption\":",
-                               "\"autoplay\":", "\"fov_deg\":", "\"marker\":", "\"stay_s\":",
-                               "\"position\":", "\"look_at\":", "\"orientation\":", "\"up\":"}),
-          .change = change_json,
-          .max_bytes = 65536};
+std::vector<Target> scene_json_targets() {
+  return {{.name = "lod_tree",
+           .parse = parse_lod_tree,
+           .seeds = lod_tree_seeds,
+           .dictionary = json_words(
+               "lodLevels filenames tree children lods file offset count environment version"),
+           .change = change_json,
+           .max_bytes = 8192},
+          {.name = "sidecar",
+           .parse = parse_sidecar,
+           .seeds = sidecar_seeds,
+           .dictionary = json_words(
+               "up near focus start_pose position look_at orientation limits min max tours -y +z"),
+           .change = change_json},
+          {.name = "cameras",
+           .parse = parse_cameras,
+           .seeds = cameras_seeds,
+           .dictionary = json_words("position rotation frames transform_matrix"),
+           .change = change_json},
+          {.name = "tours",
+           .parse = parse_tours,
+           .seeds = tours_seeds,
+           .dictionary = json_words("tours animTracks annotations cameras"),
+           .change = change_json,
+           .max_bytes = 65536},
+          {.name = "sent_sidecar",
+           .parse = parse_sent_sidecar,
+           .seeds = sent_sidecar_seeds,
+           .dictionary = json_words("tours stops title caption autoplay fov_deg marker stay_s "
+                                    "position look_at orientation up"),
+           .change = change_json,
+           .max_bytes = 65536}};
 }
 
 }  // namespace catgs::fuzz

@@ -54,13 +54,13 @@ std::map<std::string, std::string> scene_size_seeds() {
 
 }  // namespace
 
-Target scene_size() {
-  return {.name = "scene_size",
-          .parse = parse_scene_size,
-          .seeds = scene_size_seeds,
-          .dictionary = {"ply\n", "element vertex ", "property float f_rest_0\n", "NGSP", "PK\3\4",
-                         "\x1f\x8b", "\"count\":", "\"bands\":", "268435457"},
-          .max_bytes = 16384};
+std::vector<Target> scene_size_targets() {
+  return {{.name = "scene_size",
+           .parse = parse_scene_size,
+           .seeds = scene_size_seeds,
+           .dictionary = {"ply\n", "element vertex ", "property float f_rest_0\n", "NGSP", "PK\3\4",
+                          "\x1f\x8b", "\"count\":", "\"bands\":", "268435457"},
+           .max_bytes = 16384}};
 }
 
 }  // namespace catgs::fuzz

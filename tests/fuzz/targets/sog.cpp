@@ -200,48 +200,37 @@ std::map<std::string, std::string> webp_seeds() {
 
 }  // namespace
 
-Target sog() {
-  return {.name = "sog",
-          .parse = parse_sog,
-          .seeds = sog_seeds,
-          .dictionary = {"\"version\":",      "\"count\":",   "\"means\":",  "\"shape\":",
-                         "\"mins\":",         "\"maxs\":",    "\"scales\":", "\"codebook\":",
-                         "\"sh0\":",          "\"shN\":",     "\"bands\":",  "\"files\":",
-                         "\"quats\":",        "null",         "1e39",        "meta.json",
-                         "means_l.webp",      "means_u.webp", "quats.webp",  "scales.webp",
-                         "sh0.webp",          "RIFF",         "WEBPVP8L",    "shN_labels.webp",
-                         "shN_centroids.webp"},
-          .change = change_sog,
-          .max_bytes = 16384};
-}
-
-Target streamed_sog() {
-  return {.name = "streamed_sog",
-          .parse = parse_streamed_sog,
-          .seeds = streamed_sog_seeds,
-          .dictionary = {"\"lodLevels\":", "\"filenames\":", "\"tree\":", "\"children\":",
-                         "\"lods\":", "\"file\":", "\"offset\":", "\"count\":", "\"environment\":",
-                         "lod-meta.json", "a/meta.json", "b.sog", "c.sog"},
-          .change = change_sog,
-          .max_bytes = 16384};
-}
-
-Target zip() {
-  return {.name = "zip",
-          .parse = parse_zip,
-          .seeds = zip_seeds,
-          .dictionary = {"PK\3\4", "PK\1\2", "PK\5\6", "PK\6\6", "PK\6\7", "PK\7\10", "meta.json",
-                         std::string("\10\0", 2), std::string("\1\0", 2), "../"},
-          .max_bytes = 2048};
-}
-
-Target webp() {
-  return {.name = "webp",
-          .parse = parse_webp,
-          .seeds = webp_seeds,
-          .dictionary = {"RIFF", "WEBP", "VP8L", "VP8X", "VP8 ", "ALPH", "ANIM", "ANMF", "ICCP",
-                         "EXIF"},
-          .max_bytes = 1024};
+std::vector<Target> sog_targets() {
+  return {
+      {.name = "sog",
+       .parse = parse_sog,
+       .seeds = sog_seeds,
+       .dictionary = words_of(
+           R"("version": "count": "means": "shape": "mins": "maxs": "scales": "codebook": "sh0": "shN":
+               "bands": "files": "quats": null 1e39 meta.json means_l.webp means_u.webp quats.webp
+               scales.webp sh0.webp RIFF WEBPVP8L shN_labels.webp shN_centroids.webp)"),
+       .change = change_sog,
+       .max_bytes = 16384},
+      {.name = "streamed_sog",
+       .parse = parse_streamed_sog,
+       .seeds = streamed_sog_seeds,
+       .dictionary = words_of(
+           R"("lodLevels": "filenames": "tree": "children": "lods": "file": "offset": "count":
+               "environment": lod-meta.json a/meta.json b.sog c.sog)"),
+       .change = change_sog,
+       .max_bytes = 16384},
+      {.name = "zip",
+       .parse = parse_zip,
+       .seeds = zip_seeds,
+       .dictionary = {"PK\3\4", "PK\1\2", "PK\5\6", "PK\6\6", "PK\6\7", "PK\7\10", "meta.json",
+                      std::string("\10\0", 2), std::string("\1\0", 2), "../"},
+       .max_bytes = 2048},
+      {.name = "webp",
+       .parse = parse_webp,
+       .seeds = webp_seeds,
+       .dictionary = {"RIFF", "WEBP", "VP8L", "VP8X", "VP8 ", "ALPH", "ANIM", "ANMF", "ICCP",
+                      "EXIF"},
+       .max_bytes = 1024}};
 }
 
 }  // namespace catgs::fuzz

@@ -73,22 +73,20 @@ std::map<std::string, std::string> unpacked_spz_seeds() {
 
 }  // namespace
 
-Target splat() {
-  return {.name = "splat",
-          .parse = parse_splat,
-          .seeds = splat_seeds,
-          .dictionary = {"\xff\xff\xff\x7f", std::string("\0\0\x80\x7f", 4)},
-          .max_bytes = 2048};
-}
-
-Target spz() {
-  return {.name = "spz",
-          .parse = parse_spz,
-          .seeds = unpacked_spz_seeds,
-          .dictionary = {"NGSP", "\x1f\x8b", std::string("\1\0\0\0", 4), std::string("\2\0\0\0", 4),
-                         std::string("\3\0\0\0", 4), std::string("\4\0\0\0", 4),
-                         std::string("\x28\xb5\x2f\xfd", 4), "\xff\xff\xff\xff"},
-          .max_bytes = 2048};
+std::vector<Target> splat_spz_targets() {
+  return {
+      {.name = "splat",
+       .parse = parse_splat,
+       .seeds = splat_seeds,
+       .dictionary = {"\xff\xff\xff\x7f", std::string("\0\0\x80\x7f", 4)},
+       .max_bytes = 2048},
+      {.name = "spz",
+       .parse = parse_spz,
+       .seeds = unpacked_spz_seeds,
+       .dictionary = {"NGSP", "\x1f\x8b", std::string("\1\0\0\0", 4), std::string("\2\0\0\0", 4),
+                      std::string("\3\0\0\0", 4), std::string("\4\0\0\0", 4),
+                      std::string("\x28\xb5\x2f\xfd", 4), "\xff\xff\xff\xff"},
+       .max_bytes = 2048}};
 }
 
 }  // namespace catgs::fuzz

@@ -124,29 +124,23 @@ std::vector<std::string> setting_names() {
 
 }  // namespace
 
-Target tum() {
-  return {.name = "tum",
-          .parse = parse_tum,
-          .seeds = tum_seeds,
-          .dictionary = {"nan", "inf", "1e308", "1e-320", "9e9", "-0", " 0 0 0 1\n", "#"},
-          .max_bytes = 1024};
-}
-
-Target colmap() {
-  return {.name = "colmap",
-          .parse = parse_colmap,
-          .seeds = colmap_seeds,
-          .dictionary = {"PINHOLE", "SIMPLE_PINHOLE", "nan", "inf", "1e308", "1e39", "#", "\r\n",
-                         "18446744073709551615"},
-          .max_bytes = 1024};
-}
-
-Target config() {
-  return {.name = "config",
-          .parse = parse_config,
-          .seeds = config_seeds,
-          .dictionary = setting_names(),
-          .max_bytes = 2048};
+std::vector<Target> text_files_targets() {
+  return {{.name = "tum",
+           .parse = parse_tum,
+           .seeds = tum_seeds,
+           .dictionary = {"nan", "inf", "1e308", "1e-320", "9e9", "-0", " 0 0 0 1\n", "#"},
+           .max_bytes = 1024},
+          {.name = "colmap",
+           .parse = parse_colmap,
+           .seeds = colmap_seeds,
+           .dictionary = {"PINHOLE", "SIMPLE_PINHOLE", "nan", "inf", "1e308", "1e39", "#", "\r\n",
+                          "18446744073709551615"},
+           .max_bytes = 1024},
+          {.name = "config",
+           .parse = parse_config,
+           .seeds = config_seeds,
+           .dictionary = setting_names(),
+           .max_bytes = 2048}};
 }
 
 }  // namespace catgs::fuzz
