@@ -40,20 +40,11 @@ fi
 build=$1
 system=${2:-debian}
 require_tools debootstrap xz unshare ip
-unshare --mount --pid --net --fork true 2>/dev/null || skip "namespaces are not allowed here"
+require_namespaces
 work=$(mktemp -d)
 trap 'rm -rf --one-file-system "$work"' EXIT
 "$source_dir/deploy/bundle.sh" --build "$build" --out "$work/bundle.tar.xz"
-mkdir -p "$cache/$system"
-options=(--variant=minbase "--cache-dir=$cache/$system")
-target=(bookworm "$work/root")
-if [[ $system == ubuntu ]]; then
-  # Debian's debootstrap may not know the name noble, and has no keys of Ubuntu's: see fresh_start.sh.
-  target=(noble "$work/root" "" gutsy)
-  [[ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ]] || options+=(--no-check-gpg)
-fi
-say "debootstrap $system"
-debootstrap "${options[@]}" "${target[@]}" >"$work/log" 2>&1 || die "$(tail -n 5 "$work/log")"
+make_system "$system" "$work/root" "$cache/$system"
 tar -C "$work/root" -xJf "$work/bundle.tar.xz"
 notices=$work/root/catgs/share/doc
 grep -q GPL "$notices/NOTICES.md" || die "no notices"

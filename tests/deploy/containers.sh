@@ -1,7 +1,7 @@
 # shellcheck shell=bash
-# Containers without a Docker engine, for the tests beside this file: podman and buildah with a
-# storage of their own, and a Debian base made by debootstrap under the name that the Dockerfile
-# asks for. Sourced, never run.
+# For the tests beside this file: minimal systems by debootstrap, and containers without a Docker
+# engine (podman and buildah with a storage of their own, and a Debian base under the name that the
+# Dockerfile asks for). Sourced, never run.
 
 readonly EXIT_SKIPPED=77
 source_dir=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -31,6 +31,29 @@ require_tools() {
   for tool in "$@"; do
     command -v "$tool" >/dev/null || skip "$tool is not installed (deploy/test.sh --full installs it)"
   done
+}
+
+# require_namespaces: skips the whole test where there are none.
+require_namespaces() {
+  unshare --mount --pid --net --fork true 2>/dev/null || skip "namespaces are not allowed here"
+}
+
+# make_system debian|ubuntu ROOT CACHE: a minimal Debian 12 or Ubuntu 24.04; the log is ROOT.log.
+make_system() {
+  local system=$1 root=$2 cache=$3
+  local -a options=(--variant=minbase "--cache-dir=$cache")
+  # No mirror is named: debootstrap knows each distribution's own.
+  local -a target=(bookworm "$root")
+  if [[ $system == ubuntu ]]; then
+    # Debian's debootstrap may not know the name noble; all Ubuntu suites share the script of gutsy.
+    target=(noble "$root" "" gutsy)
+    options+=("--components=main,universe")
+    # Debian does not carry Ubuntu's keys; inside, apt checks signatures with the real ones.
+    [[ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ]] || options+=(--no-check-gpg)
+  fi
+  say "debootstrap $system"
+  mkdir -p "$cache"
+  debootstrap "${options[@]}" "${target[@]}" >"$root.log" 2>&1 || die "$(tail -n 20 "$root.log")"
 }
 
 # Storage, networks and limits of our own: nothing of the machine's containers is seen or touched.
@@ -66,10 +89,7 @@ remove_containers() {
 # The stand-in for Debian's own image, which no registry is asked for.
 ensure_base_image() {
   buildah inspect --type image "$base_image" >/dev/null 2>&1 && return
-  say "debootstrap: $base_image"
-  mkdir -p "$cache/debootstrap"
-  debootstrap --variant=minbase "--cache-dir=$cache/debootstrap" bookworm "$work/root" \
-    >"$work/debootstrap.log" 2>&1 || die "$(tail -n 5 "$work/debootstrap.log")"
+  make_system debian "$work/root" "$cache/debootstrap"
   rm -rf "$work/root/var/cache/apt/archives/"*.deb "$work/root/var/lib/apt/lists/"*
   tar -C "$work/root" -c . | podman import - "$base_image" >/dev/null
   rm -rf -- "$work/root"

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Proves deploy/run.sh and deploy/test.sh on a machine that has nothing: see usage below.
 set -euo pipefail
+# shellcheck source=tests/deploy/containers.sh
+source "$(dirname -- "${BASH_SOURCE[0]}")/containers.sh"
 
 usage() {
   cat <<'USAGE'
@@ -17,38 +19,16 @@ Times are printed, and judged by the reader.
 USAGE
 }
 
-readonly EXIT_SKIPPED=77
 readonly PORT=8173
-source_dir=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.." && pwd)
 system=debian
 test_options=(--quick)
-
-skip() {
-  echo "SKIPPED: $1"
-  exit "$EXIT_SKIPPED"
-}
-
-say() { printf '%s  %s\n' "$(date +%T)" "$*"; }
 
 # ---- outside: the root file system -------------------------------------------------------------
 
 make_root() {
   local root=$1 cache=$2
-  local -a options=(--variant=minbase "--cache-dir=$cache/debootstrap")
-  # No mirror is named: debootstrap knows each distribution's own.
-  local -a target=(bookworm "$root")
-  if [[ $system == ubuntu ]]; then
-    # Debian's debootstrap may not know the name noble; all Ubuntu suites share the script of gutsy.
-    target=(noble "$root" "" gutsy)
-    options+=("--components=main,universe")
-    # Debian does not carry Ubuntu's keys; inside, apt checks signatures with the real ones.
-    [[ -e /usr/share/keyrings/ubuntu-archive-keyring.gpg ]] || options+=(--no-check-gpg)
-  fi
-  mkdir -p "$cache/debootstrap" "$cache/archives/partial"
-  debootstrap "${options[@]}" "${target[@]}" >"$root.log" 2>&1 || {
-    tail -n 20 "$root.log"
-    return 1
-  }
+  mkdir -p "$cache/archives/partial"
+  make_system "$system" "$root" "$cache/debootstrap"
   if [[ $system == ubuntu ]]; then
     sed -n 's/ noble / noble-updates /p' "$root/etc/apt/sources.list" >"$root.updates"
     cat "$root.updates" >>"$root/etc/apt/sources.list"
@@ -161,16 +141,14 @@ main() {
   if (($# > 0)); then
     test_options=("$@")
   fi
-  ((EUID == 0)) || skip "needs root"
-  command -v debootstrap >/dev/null || skip "debootstrap is not installed"
-  unshare --mount --pid --net --fork true 2>/dev/null || skip "namespaces are not allowed here"
+  require_tools debootstrap
+  require_namespaces
 
   local cache=${XDG_CACHE_HOME:-$HOME/.cache}/catgs-debs/$system root
   root=$(mktemp -d)
   # shellcheck disable=SC2064  # the folder of now, not of then
   trap "rm -rf --one-file-system '$root' '$root.log'" EXIT
   chmod 755 "$root"
-  say "debootstrap $system"
   make_root "$root" "$cache"
   write_environment "$root"
   say "a minimal $system with a clone of $(git -C "$source_dir" rev-parse --short HEAD)"

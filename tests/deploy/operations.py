@@ -58,6 +58,11 @@ def run(*command, **options):
     return [f"{' '.join(map(str, command))}: status {result.returncode}", *(result.stdout + result.stderr).splitlines()]
 
 
+def untrue(wanted, where=""):
+    """The findings of what is wanted: names of facts, and whether they hold."""
+    return [f"{where and where + ': '}not true: {what}" for what, holds in wanted.items() if not holds]
+
+
 def load_yaml(text):
     try:
         import yaml
@@ -127,7 +132,7 @@ def check_grafana(_):
         "Grafana's first page is our dashboard": (DOCKER / mounted.get(os.path.dirname(home), "nowhere") / os.path.basename(home)).is_file(),
         "provisioning is mounted": (DOCKER / mounted.get("/etc/grafana/provisioning", "nowhere")).resolve() == provisioning,
     }
-    return findings + [f"not true: {what}" for what, holds in wanted.items() if not holds]
+    return findings + untrue(wanted)
 
 
 def check_haproxy(_):
@@ -186,7 +191,7 @@ def pod_findings(where, spec, drain_s):
         for mount in container.get("volumeMounts", []):
             wanted[f"volume {mount['name']} exists"] = mount["name"] in volumes
             wanted[f"volume {mount['name']} is read-only"] = mount.get("readOnly", False) or mount["name"] == "tmp"
-    return [f"{where}: not true: {name}" for name, holds in wanted.items() if not holds]
+    return untrue(wanted, where)
 
 
 def drain_seconds(config):
@@ -235,7 +240,7 @@ def check_kubernetes(_):
             scaled = objects["ScaledObject", "catgs-server"]["spec"]
             wanted["KEDA scales the Deployment"] = scaled["scaleTargetRef"]["name"] == deployment["metadata"]["name"]
             wanted["one server can go"] = scaled["minReplicaCount"] >= 2
-        findings += [f"{name}: not true: {what}" for what, holds in wanted.items() if not holds]
+        findings += untrue(wanted, name)
     return findings + agones_findings(kubectl)
 
 
@@ -256,7 +261,7 @@ def agones_findings(kubectl):
         "the autoscaler's fleet exists": objects["FleetAutoscaler", "catgs-server"]["spec"]["fleetName"] == "catgs-server",
         "the allocation's fleet exists": allocation["spec"]["selectors"][0]["matchLabels"]["agones.dev/fleet"] == "catgs-server",
     }
-    return findings + [f"overlays/agones: not true: {what}" for what, holds in wanted.items() if not holds]
+    return findings + untrue(wanted, "overlays/agones")
 
 
 def check_compose(_):

@@ -48,6 +48,10 @@ class Machine(unittest.TestCase):
         self.addCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)
         (self.folder / "bin").mkdir()
+        # A system PATH, so that neither a CUDA toolkit nor a sudo of this machine is found first.
+        self.environment = {"PATH": f"{self.folder}/bin:/usr/bin:/bin", "HOME": str(self.folder),
+                            "CATGS_OS_RELEASE": str(self.folder / "os-release"),
+                            "CUDA_HOME": str(self.folder / "no-toolkit")}
         self.os_release(DEBIAN)
         self.stand_in("nvidia-smi", "exit 9")
 
@@ -60,16 +64,16 @@ class Machine(unittest.TestCase):
         path.write_text(f'#!/bin/bash\necho "{name} $*" >>"{self.folder}/calls"\n{script}\n')
         path.chmod(0o755)
 
+    def without_root_and_packages(self):
+        for name, script in (("id", "echo 1000"), ("sudo", "exit 1"), ("dpkg-query", "exit 1")):
+            self.stand_in(name, script)
+
     def calls(self):
         path = self.folder / "calls"
         return path.read_text() if path.exists() else ""
 
     def run_script(self, *command):
-        # A system PATH, so that neither a CUDA toolkit nor a sudo of this machine is found first.
-        environment = {"PATH": f"{self.folder}/bin:/usr/bin:/bin", "HOME": str(self.folder),
-                       "CATGS_OS_RELEASE": str(self.folder / "os-release"),
-                       "CUDA_HOME": str(self.folder / "no-toolkit")}
-        return subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, text=True,
+        return subprocess.run(command, env=self.environment, stdin=subprocess.DEVNULL, text=True,
                               capture_output=True, check=False, timeout=120)
 
     def run_library(self, commands):
@@ -94,9 +98,7 @@ class Scripts(Machine):
             self.assertIn("docker run", result.stderr)
 
     def test_without_root_it_prints_the_line_and_installs_nothing(self):
-        self.stand_in("id", "echo 1000")
-        self.stand_in("sudo", "exit 1")
-        self.stand_in("dpkg-query", "exit 1")
+        self.without_root_and_packages()
         self.stand_in("apt-get", "exit 0")
         result = self.run_script(RUN, *self.options())
         self.assertEqual(result.returncode, 3, result.stdout + result.stderr)
@@ -105,18 +107,14 @@ class Scripts(Machine):
 
     def test_ubuntu_gets_its_own_boost(self):
         self.os_release('ID=ubuntu\nVERSION_ID="24.04"\n')
-        self.stand_in("id", "echo 1000")
-        self.stand_in("sudo", "exit 1")
-        self.stand_in("dpkg-query", "exit 1")
+        self.without_root_and_packages()
         result = self.run_script(TEST, "--log", str(self.folder / "log"))
         self.assertEqual(result.returncode, 3, result.stdout + result.stderr)
         self.assertIn("libboost1.83-dev", result.stderr)
         self.assertIn("libgtest-dev", result.stderr)
 
     def test_the_full_tests_get_what_they_deploy_with(self):
-        self.stand_in("id", "echo 1000")
-        self.stand_in("sudo", "exit 1")
-        self.stand_in("dpkg-query", "exit 1")
+        self.without_root_and_packages()
         for name in ("runc", "kubectl"):
             self.stand_in(name, "exit 0")
         options = ["--log", str(self.folder / "log")]
@@ -201,8 +199,6 @@ class Serving(Machine):
         self.checkout = self.folder / "checkout"
         shutil.copytree(SOURCE_DIR / "deploy", self.checkout / "deploy",
                         ignore=shutil.ignore_patterns("media"))
-        (self.checkout / "server").mkdir()
-        shutil.copy(SOURCE_DIR / "server/config.cpp", self.checkout / "server")
         self.bin = self.checkout / "build/run/bin"
         self.bin.mkdir(parents=True)
         for name, script in (("catgs-server", SERVER), ("catgs-render", 'touch "${@: -1}"')):
@@ -267,10 +263,8 @@ class Serving(Machine):
         """run.sh while this stand-in of the server goes on."""
         self.stand_in("serves", server)
         (self.folder / "bin/serves").rename(self.bin / "catgs-server")
-        environment = {"PATH": f"{self.folder}/bin:/usr/bin:/bin", "HOME": str(self.folder),
-                       "CATGS_OS_RELEASE": str(self.folder / "os-release")}
         with subprocess.Popen([str(self.checkout / "deploy/run.sh"), *self.options()],
-                              env=environment, stdout=subprocess.PIPE, text=True) as script:
+                              env=self.environment, stdout=subprocess.PIPE, text=True) as script:
             while "Try" not in script.stdout.readline():
                 pass
             yield script
