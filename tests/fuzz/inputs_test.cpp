@@ -48,7 +48,7 @@ std::vector<std::string> corpus_of(const Target& target) {
 /// again.
 struct Mutants {
   std::uint64_t seed = 1;
-  int most = 300;
+  int most = 1000;
   std::chrono::steady_clock::time_point end = std::chrono::steady_clock::time_point::max();
 };
 
