@@ -262,14 +262,7 @@ v1::ClientMessage resuming_hello(const std::string& resume_token, std::uint64_t 
   v1::ClientMessage message = hello_message(160, 96, v1::CODEC_H264);
   auto& resume = *message.mutable_hello()->mutable_resume();
   resume.set_token(resume_token);
-  if (pose_id > 0) {
-    auto& pose = *resume.mutable_pose();
-    pose.set_pose_id(pose_id);
-    pose.set_client_time_us(static_cast<std::int64_t>(pose_id) * 1000);
-    pose.mutable_world_from_camera()->mutable_position()->set_x(0.1f);
-    pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
-    pose.set_fov_y_rad(1.0f);
-  }
+  if (pose_id > 0) *resume.mutable_pose() = pose_message(pose_id, 0.1f).pose();
   return message;
 }
 
