@@ -265,7 +265,7 @@ void Connection::take_message(const v1::ServerMessage& message) {
 
 void Connection::take_welcome(const v1::Welcome& welcome) {
   const std::int64_t now = now_us();
-  if (state_.resume_token.empty()) report_.stats.admission.add(now - hello_us_);
+  if (state_.resume_token.empty()) report_.stats.durations.admission.add(now - hello_us_);
   state_.resume_token = welcome.resume_token();
   report_.renderer = welcome.renderer();
   report_.encoder = welcome.config().encoder();

@@ -54,7 +54,7 @@ void DecodeStage::take(const FrameMessage& frame, const v1::Ack& ack) {
     return callbacks_.request_idr();
   }
   if (wait_for_idr_) {
-    ++report_.stats.frames_skipped;
+    ++report_.stats.counts.frames_skipped;
     v1::Ack dropped = ack;
     dropped.set_dropped(true);
     callbacks_.acknowledge(dropped, 0);
@@ -80,7 +80,7 @@ asio::awaitable<void> DecodeStage::decode(Item& item) {
     const bool fits =
         decoded.picture.size_px == glm::ivec2(item.header.width_px(), item.header.height_px());
     if (!decoded.status.ok || !fits) {
-      ++report_.stats.decode_errors;
+      ++report_.stats.counts.decode_errors;
       report_.stats.error(fits || !decoded.status.ok
                               ? "a frame cannot be decoded: " + decoded.status.message
                               : "a decoded picture has another size than its header says");

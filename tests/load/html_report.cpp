@@ -72,7 +72,7 @@ std::vector<Curve> over_time(const RunReport& report, double duration_s, Value v
 }
 
 /// Share of values up to x, from the histogram's percentiles.
-std::vector<Curve> distribution(const RunReport& report, DurationHistogram SessionStats::*member) {
+std::vector<Curve> distribution(const RunReport& report, DurationHistogram Durations::*member) {
   std::vector<Curve> curves;
   for (const GroupReport& group : report.groups) {
     const DurationHistogram all = merged(group.sessions, member);
@@ -202,7 +202,7 @@ std::string to_html(const Scenario& scenario, const Outcome& outcome) {
   html += "<h2>Over time</h2>\n<div class=\"plots\">\n";
   html += time_plots(scenario, outcome.report) + usage_plots(outcome.usage) + "</div>\n";
   html += "<h2>Distributions</h2>\n<div class=\"plots\">\n";
-  const auto plot = [&](const char* what, DurationHistogram SessionStats::*member) {
+  const auto plot = [&](const char* what, DurationHistogram Durations::*member) {
     return line_plot({.title = what,
                       .x_unit = "ms",
                       .y_unit = "% of frames up to x",
@@ -210,8 +210,8 @@ std::string to_html(const Scenario& scenario, const Outcome& outcome) {
                       .log_x = true},
                      distribution(outcome.report, member));
   };
-  html += plot("Pose sent to frame received", &SessionStats::pose_to_frame);
-  html += plot("Between two frames", &SessionStats::frame_interval);
+  html += plot("Pose sent to frame received", &Durations::pose_to_frame);
+  html += plot("Between two frames", &Durations::frame_interval);
   html += "</div>\n" + stage_table(outcome.report) + metric_list(outcome.metrics);
   return html + "</body></html>\n";
 }

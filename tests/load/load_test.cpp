@@ -101,18 +101,18 @@ void expect_clean(const RunReport& run) {
   for (const auto& report : run.groups.at(0).sessions) {
     const SessionStats& stats = report->stats;
     EXPECT_TRUE(stats.connected);
-    EXPECT_EQ(stats.errors, 0u) << errors_of(run);
-    EXPECT_EQ(stats.reconnects, 0u);
-    EXPECT_EQ(stats.admission.count(), 1u);
-    EXPECT_GE(stats.frames, 5u);
-    EXPECT_GE(stats.idrs, 1u);
-    EXPECT_GT(stats.poses_sent, 30u);
-    EXPECT_EQ(stats.decode_errors, 0u);
-    EXPECT_EQ(stats.frames_skipped, 0u);
+    EXPECT_EQ(stats.counts.errors, 0u) << errors_of(run);
+    EXPECT_EQ(stats.counts.reconnects, 0u);
+    EXPECT_EQ(stats.durations.admission.count(), 1u);
+    EXPECT_GE(stats.counts.frames, 5u);
+    EXPECT_GE(stats.counts.idrs, 1u);
+    EXPECT_GT(stats.counts.poses_sent, 30u);
+    EXPECT_EQ(stats.counts.decode_errors, 0u);
+    EXPECT_EQ(stats.counts.frames_skipped, 0u);
     // All but the frames on their way at the end were decoded; credits bound those.
-    EXPECT_GE(stats.decode.count() + 8, stats.frames);
-    EXPECT_GT(stats.pose_to_frame.count(), 0u);
-    EXPECT_GT(stats.pose_age.count(), 0u);
+    EXPECT_GE(stats.durations.decode.count() + 8, stats.counts.frames);
+    EXPECT_GT(stats.durations.pose_to_frame.count(), 0u);
+    EXPECT_GT(stats.durations.pose_age.count(), 0u);
   }
 }
 
@@ -149,8 +149,9 @@ TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {
   const RunReport run = run_load(options);
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_TRUE(report->stats.connected);
-    EXPECT_EQ(report->stats.frames, 1u) << "without a measured round trip one may be in flight";
-    EXPECT_GT(report->stats.poses_sent, 30u);
+    EXPECT_EQ(report->stats.counts.frames, 1u)
+        << "without a measured round trip one may be in flight";
+    EXPECT_GT(report->stats.counts.poses_sent, 30u);
   }
 }
 
@@ -170,8 +171,8 @@ TEST(Load, ARefusedSessionDoesNotComeBack) {
     group.sessions = 1;
   });
   EXPECT_FALSE(run.groups[0].sessions[0]->stats.connected);
-  EXPECT_EQ(run.groups[0].sessions[0]->stats.errors, 1u) << errors_of(run);
-  EXPECT_EQ(run.groups[0].sessions[0]->stats.reconnects, 0u);
+  EXPECT_EQ(run.groups[0].sessions[0]->stats.counts.errors, 1u) << errors_of(run);
+  EXPECT_EQ(run.groups[0].sessions[0]->stats.counts.reconnects, 0u);
 }
 
 TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
@@ -185,8 +186,8 @@ TEST(Load, AServerThatIsNotThereIsTriedAgainUntilTheEnd) {
   const RunReport run = run_load(options);
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_FALSE(report->stats.connected);
-    EXPECT_GE(report->stats.reconnects, 1u);
-    EXPECT_EQ(report->stats.errors, report->stats.reconnects + 1);
+    EXPECT_GE(report->stats.counts.reconnects, 1u);
+    EXPECT_EQ(report->stats.counts.errors, report->stats.counts.reconnects + 1);
   }
   EXPECT_EQ(value_of(collect_metrics(run, {}), "sessions_connected"), 0.0);
 }
@@ -202,18 +203,18 @@ TEST(Load, AServerThatGoesAwayIsReportedAsLost) {
   server.reset();
   load.join();
   EXPECT_TRUE(run.groups[0].sessions[0]->stats.connected);
-  EXPECT_GE(run.groups[0].sessions[0]->stats.errors, 1u);
-  EXPECT_GE(run.groups[0].sessions[0]->stats.reconnects, 1u);
+  EXPECT_GE(run.groups[0].sessions[0]->stats.counts.errors, 1u);
+  EXPECT_GE(run.groups[0].sessions[0]->stats.counts.reconnects, 1u);
 }
 
 TEST(Load, SessionsComeBackWhenTheirSocketsAreDropped) {
   const RunReport run = run_small_load(
       [](LoadOptions&, GroupOptions& group) { group.manners.reconnect_every_s = 1.0; });
   for (const auto& report : run.groups[0].sessions) {
-    EXPECT_EQ(report->stats.reconnects, 2u) << "at 1 and 2 s of 3";
-    EXPECT_GE(report->stats.recovery.count(), 1u);
-    EXPECT_EQ(report->stats.errors, 0u) << errors_of(run);
-    EXPECT_EQ(report->stats.decode_errors, 0u);
+    EXPECT_EQ(report->stats.counts.reconnects, 2u) << "at 1 and 2 s of 3";
+    EXPECT_GE(report->stats.durations.recovery.count(), 1u);
+    EXPECT_EQ(report->stats.counts.errors, 0u) << errors_of(run);
+    EXPECT_EQ(report->stats.counts.decode_errors, 0u);
   }
 }
 
@@ -232,7 +233,7 @@ TEST(Load, AStallWithoutAnEndEndsWithTheRun) {
   });  // or the test's time limit ends it
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_TRUE(report->stats.connected);
-    EXPECT_EQ(report->stats.decode_errors, 0u);
+    EXPECT_EQ(report->stats.counts.decode_errors, 0u);
   }
 }
 
@@ -256,7 +257,7 @@ TEST(Load, ALinkDelaysButLosesNothing) {
   });
   expect_clean(run);
   for (const auto& report : run.groups[0].sessions) {
-    EXPECT_GE(report->stats.pose_to_frame.percentile_ms(0.0), 40.0)
+    EXPECT_GE(report->stats.durations.pose_to_frame.percentile_ms(0.0), 40.0)
         << "no frame answers before a round trip";
   }
 }
@@ -265,7 +266,7 @@ TEST(Record, SavesThePosesThatPassBy) {
   const RunningServer server;
   const auto [run, poses] = record_a_run(url_of(server), false);
   expect_clean(run);
-  EXPECT_EQ(poses.size(), run.groups[0].sessions[0]->stats.poses_sent);
+  EXPECT_EQ(poses.size(), run.groups[0].sessions[0]->stats.counts.poses_sent);
   EXPECT_EQ(poses.at(0).time_us, 0);
 }
 
@@ -275,7 +276,7 @@ TEST(Record, GoesOverTlsAndTrustsNoUnknownCertificate) {
     const auto [run, poses] = record_a_run(server.url(), insecure);
     const SessionStats& stats = run.groups[0].sessions[0]->stats;
     EXPECT_EQ(stats.connected, insecure);
-    EXPECT_EQ(poses.size(), insecure ? stats.poses_sent : 0u);
+    EXPECT_EQ(poses.size(), insecure ? stats.counts.poses_sent : 0u);
   }
 }
 
@@ -286,11 +287,11 @@ TEST(Load, DecodesJustThePicturesThatAreKept) {
   });
   for (const auto& report : run.groups[0].sessions) {
     EXPECT_EQ(report->pictures.size(), 2u);
-    EXPECT_EQ(report->stats.decode_errors, 0u);
-    EXPECT_EQ(report->stats.frames_skipped, 0u) << "what is not decoded is not missed";
-    EXPECT_GE(report->stats.decode.count(), 2u);
-    EXPECT_LT(report->stats.decode.count(), report->stats.frames / 2);
-    EXPECT_LE(report->stats.idrs, 1u + 2 * 4) << "one for each, and what asking takes";
+    EXPECT_EQ(report->stats.counts.decode_errors, 0u);
+    EXPECT_EQ(report->stats.counts.frames_skipped, 0u) << "what is not decoded is not missed";
+    EXPECT_GE(report->stats.durations.decode.count(), 2u);
+    EXPECT_LT(report->stats.durations.decode.count(), report->stats.counts.frames / 2);
+    EXPECT_LE(report->stats.counts.idrs, 1u + 2 * 4) << "one for each, and what asking takes";
   }
 }
 

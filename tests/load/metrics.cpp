@@ -15,26 +15,26 @@ namespace catgs::load {
 namespace {
 
 constexpr NamedHistogram histograms[] = {
-    {"admission", "hello -> welcome", &SessionStats::admission},
-    {"pose_to_frame", "pose sent -> frame received", &SessionStats::pose_to_frame},
-    {"pose_age", "age of the picture at each tick", &SessionStats::pose_age},
-    {"frame_interval", "between frames", &SessionStats::frame_interval},
-    {"recovery", "interruption -> next frame", &SessionStats::recovery},
-    {"wait", "server: pose received -> render", &SessionStats::wait},
-    {"render", "server: render", &SessionStats::render},
-    {"encode", "server: encode", &SessionStats::encode},
-    {"send", "server: encoded -> socket", &SessionStats::send},
-    {"decode", "client: decode", &SessionStats::decode}};
+    {"admission", "hello -> welcome", &Durations::admission},
+    {"pose_to_frame", "pose sent -> frame received", &Durations::pose_to_frame},
+    {"pose_age", "age of the picture at each tick", &Durations::pose_age},
+    {"frame_interval", "between frames", &Durations::frame_interval},
+    {"recovery", "interruption -> next frame", &Durations::recovery},
+    {"wait", "server: pose received -> render", &Durations::wait},
+    {"render", "server: render", &Durations::render},
+    {"encode", "server: encode", &Durations::encode},
+    {"send", "server: encoded -> socket", &Durations::send},
+    {"decode", "client: decode", &Durations::decode}};
 
-constexpr NamedCount counts[] = {{"frames", &SessionStats::frames},
-                                 {"bytes", &SessionStats::bytes},
-                                 {"idrs", &SessionStats::idrs},
-                                 {"repeated_poses", &SessionStats::repeated_poses},
-                                 {"poses_sent", &SessionStats::poses_sent},
-                                 {"errors", &SessionStats::errors},
-                                 {"decode_errors", &SessionStats::decode_errors},
-                                 {"frames_skipped", &SessionStats::frames_skipped},
-                                 {"reconnects", &SessionStats::reconnects}};
+constexpr NamedCount counts[] = {{"frames", &Counts::frames},
+                                 {"bytes", &Counts::bytes},
+                                 {"idrs", &Counts::idrs},
+                                 {"repeated_poses", &Counts::repeated_poses},
+                                 {"poses_sent", &Counts::poses_sent},
+                                 {"errors", &Counts::errors},
+                                 {"decode_errors", &Counts::decode_errors},
+                                 {"frames_skipped", &Counts::frames_skipped},
+                                 {"reconnects", &Counts::reconnects}};
 
 // A picture at rest with this much, of chroma at half the size too, is one that stays.
 constexpr double sharp_db = 38.0;
@@ -134,9 +134,9 @@ double value_of(const Metrics& metrics, std::string_view name) {
   return found == metrics.end() ? std::nan("") : found->second;
 }
 
-DurationHistogram merged(const SessionReports& sessions, DurationHistogram SessionStats::*member) {
+DurationHistogram merged(const SessionReports& sessions, DurationHistogram Durations::*member) {
   DurationHistogram all;
-  for (const auto& session : sessions) all.add(session->stats.*member);
+  for (const auto& session : sessions) all.add(session->stats.durations.*member);
   return all;
 }
 
@@ -154,9 +154,9 @@ double mean_psnr_db(const SessionReport& session) {
 bool holds(const SessionReport& session, double nominal_fps, const HoldBounds& bounds) {
   const SessionStats& stats = session.stats;
   return stats.fps() >= 0.95 * nominal_fps &&
-         stats.frame_interval.percentile_ms(0.99) <= 2e3 / nominal_fps &&
-         stats.pose_to_frame.percentile_ms(0.95) <= bounds.pose_to_frame_p95_ms &&
-         stats.pose_age.percentile_ms(0.95) <= bounds.pose_age_p95_ms &&
+         stats.durations.frame_interval.percentile_ms(0.99) <= 2e3 / nominal_fps &&
+         stats.durations.pose_to_frame.percentile_ms(0.95) <= bounds.pose_to_frame_p95_ms &&
+         stats.durations.pose_age.percentile_ms(0.95) <= bounds.pose_age_p95_ms &&
          mean_psnr_db(session) >= bounds.psnr_db;
 }
 
@@ -194,7 +194,7 @@ Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
   for (const NamedCount& count : counts) {
     double sum = 0.0;
     for (const auto& session : sessions) {
-      sum += static_cast<double>(session->stats.*count.member);
+      sum += static_cast<double>(session->stats.counts.*count.member);
     }
     add(count.name, sum);
   }

@@ -41,17 +41,17 @@ double value_of(const Metrics& metrics, std::string_view name);
 struct NamedHistogram {
   const char* name;
   const char* meaning;
-  DurationHistogram SessionStats::*member;
+  DurationHistogram Durations::*member;
 };
 std::span<const NamedHistogram> named_histograms();
 
 struct NamedCount {
   const char* name;
-  std::uint64_t SessionStats::*member;
+  std::uint64_t Counts::*member;
 };
 std::span<const NamedCount> named_counts();
 
-DurationHistogram merged(const SessionReports& sessions, DurationHistogram SessionStats::*member);
+DurationHistogram merged(const SessionReports& sessions, DurationHistogram Durations::*member);
 
 /// PSNR of the mean squared error of a session's checked pictures; NaN without any.
 double mean_psnr_db(const SessionReport& session);

@@ -152,19 +152,19 @@ TEST(SessionStats, MeasuresOnTheClientsClock) {
   stats.frame_received(frame(1, 1), 1'030'000);
   stats.frame_received(frame(2, 2), 1'050'000);
   stats.finished(1'080'000);
-  EXPECT_EQ(stats.errors, 0u);
-  EXPECT_EQ(stats.pose_to_frame.count(), 2u);
-  EXPECT_DOUBLE_EQ(stats.pose_to_frame.mean_ms(), 35.0);
-  EXPECT_EQ(stats.frame_interval.count(), 1u);
-  EXPECT_DOUBLE_EQ(stats.frame_interval.mean_ms(), 20.0);
+  EXPECT_EQ(stats.counts.errors, 0u);
+  EXPECT_EQ(stats.durations.pose_to_frame.count(), 2u);
+  EXPECT_DOUBLE_EQ(stats.durations.pose_to_frame.mean_ms(), 35.0);
+  EXPECT_EQ(stats.durations.frame_interval.count(), 1u);
+  EXPECT_DOUBLE_EQ(stats.durations.frame_interval.mean_ms(), 20.0);
   // Ticks at 1000, 1010, 1020 have no picture yet: 0, 10, 20 ms since the start; at 1030, 1040 see
   // pose 1 (30, 40 ms old); at 1050, 1060, 1070 pose 2 (40, 50, 60).
-  EXPECT_EQ(stats.pose_age.count(), 8u);
-  EXPECT_DOUBLE_EQ(stats.pose_age.mean_ms(), 31.25);
-  EXPECT_DOUBLE_EQ(stats.pose_age.max_ms(), 60.0);
+  EXPECT_EQ(stats.durations.pose_age.count(), 8u);
+  EXPECT_DOUBLE_EQ(stats.durations.pose_age.mean_ms(), 31.25);
+  EXPECT_DOUBLE_EQ(stats.durations.pose_age.max_ms(), 60.0);
   EXPECT_DOUBLE_EQ(stats.fps(), 25.0);
   EXPECT_DOUBLE_EQ(stats.bitrate_kbps(), 200.0);
-  EXPECT_EQ(stats.idrs, 1u);
+  EXPECT_EQ(stats.counts.idrs, 1u);
 }
 
 TEST(SessionStats, AFreezeAgesThePicture) {
@@ -173,7 +173,7 @@ TEST(SessionStats, AFreezeAgesThePicture) {
   stats.pose_sent(1, 0);
   stats.frame_received(frame(1, 1), 20'000);
   stats.finished(2'000'000);
-  EXPECT_NEAR(stats.pose_age.percentile_ms(1.0), 1983.0, 16.0);
+  EXPECT_NEAR(stats.durations.pose_age.percentile_ms(1.0), 1983.0, 16.0);
 }
 
 TEST(SessionStats, RefinementsAreNoNewPoses) {
@@ -182,9 +182,9 @@ TEST(SessionStats, RefinementsAreNoNewPoses) {
   stats.pose_sent(1, 1'000);
   stats.frame_received(frame(1, 1), 20'000);
   stats.frame_received(frame(2, 1), 90'000);
-  EXPECT_EQ(stats.pose_to_frame.count(), 1u);
-  EXPECT_EQ(stats.repeated_poses, 1u);
-  EXPECT_EQ(stats.errors, 0u);
+  EXPECT_EQ(stats.durations.pose_to_frame.count(), 1u);
+  EXPECT_EQ(stats.counts.repeated_poses, 1u);
+  EXPECT_EQ(stats.counts.errors, 0u);
 }
 
 TEST(SessionStats, CountsWhatCannotBe) {
@@ -197,10 +197,10 @@ TEST(SessionStats, CountsWhatCannotBe) {
   stats.frame_received(frame(3, 2), 3);
   stats.frame_received(frame(4, 1), 4);  // back in time
   stats.frame_received(frame(4, 2), 5);  // same frame again
-  EXPECT_EQ(stats.errors, 4u);
+  EXPECT_EQ(stats.counts.errors, 4u);
   EXPECT_EQ(stats.error_counts.size(), 3u);
   for (int i = 0; i < 1000; ++i) stats.error("error " + std::to_string(i));
-  EXPECT_EQ(stats.errors, 1004u);
+  EXPECT_EQ(stats.counts.errors, 1004u);
   EXPECT_LE(stats.error_counts.size(), 33u);
 }
 
@@ -212,10 +212,10 @@ TEST(SessionStats, AReconnectionIsNoFrameInterval) {
   stats.started(5'000'000);
   stats.pose_sent(2, 5'000'000);
   stats.frame_received(frame(1, 2), 5'020'000);
-  EXPECT_EQ(stats.frame_interval.count(), 0u);
-  EXPECT_EQ(stats.errors, 0u);
-  EXPECT_DOUBLE_EQ(stats.pose_to_frame.max_ms(), 20.0);
-  EXPECT_GT(stats.pose_age.max_ms(), 4900.0);  // the picture stood still meanwhile
+  EXPECT_EQ(stats.durations.frame_interval.count(), 0u);
+  EXPECT_EQ(stats.counts.errors, 0u);
+  EXPECT_DOUBLE_EQ(stats.durations.pose_to_frame.max_ms(), 20.0);
+  EXPECT_GT(stats.durations.pose_age.max_ms(), 4900.0);  // the picture stood still meanwhile
 }
 
 std::vector<std::byte> bytes_of(std::initializer_list<int> values) {

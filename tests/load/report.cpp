@@ -27,11 +27,11 @@ Json session_json(const SessionReport& session, double nominal_fps, const HoldBo
                {"measured_s", stats.measured_s()},
                {"fps", stats.fps()},
                {"bitrate_kbps", stats.bitrate_kbps()},
-               {"pose_to_frame_p95_ms", stats.pose_to_frame.percentile_ms(0.95)},
-               {"pose_age_p95_ms", stats.pose_age.percentile_ms(0.95)},
-               {"frame_interval_p99_ms", stats.frame_interval.percentile_ms(0.99)},
+               {"pose_to_frame_p95_ms", stats.durations.pose_to_frame.percentile_ms(0.95)},
+               {"pose_age_p95_ms", stats.durations.pose_age.percentile_ms(0.95)},
+               {"frame_interval_p99_ms", stats.durations.frame_interval.percentile_ms(0.99)},
                {"psnr_db", mean_psnr_db(session)}};
-  for (const NamedCount& count : named_counts()) json[count.name] = stats.*count.member;
+  for (const NamedCount& count : named_counts()) json[count.name] = stats.counts.*count.member;
   return json;
 }
 

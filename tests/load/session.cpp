@@ -19,19 +19,19 @@ boost::asio::awaitable<void> run_session(SessionSettings settings, SessionContex
   SessionState state;
   std::chrono::milliseconds pause = first_pause;
   while (now_us() < settings.stop_us) {
-    const std::uint64_t frames_before = report.stats.frames;
+    const std::uint64_t frames_before = report.stats.counts.frames;
     Connection connection(settings, context, state, report, executor);
     const Connection::End end = co_await connection.run();
     if (end != Connection::End::lost) break;
     report.stats.interrupted(now_us());
-    if (report.stats.frames > frames_before) pause = first_pause;
+    if (report.stats.counts.frames > frames_before) pause = first_pause;
     // Half of the pause is jitter: a fleet of clients must not come back at once.
     const auto wait = pause / 2 + std::chrono::milliseconds(jitter() % (pause.count() / 2 + 1));
     pause = std::min(2 * pause, longest_pause);
     if (Clock::now() + wait >= clock_time(settings.stop_us)) break;
     boost::asio::steady_timer timer(executor, wait);
     co_await timer.async_wait(boost::asio::use_awaitable);
-    ++report.stats.reconnects;
+    ++report.stats.counts.reconnects;
   }
   report.stats.finished(now_us());
 }

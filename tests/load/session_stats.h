@@ -20,6 +20,28 @@ struct ReceivedFrame {
   std::uint32_t wait_us = 0, render_us = 0, encode_us = 0, send_us = 0;  // on the server
 };
 
+struct Durations {
+  DurationHistogram admission;      // first hello sent -> welcome: a place, the scene in memory
+  DurationHistogram pose_to_frame;  // pose sent -> first frame that echoes it received
+  DurationHistogram pose_age;       // at each nominal tick: age of the pose behind the newest frame
+  DurationHistogram frame_interval;  // between receptions
+  DurationHistogram recovery;        // interruption -> next frame received
+  DurationHistogram wait, render, encode, send;
+  DurationHistogram decode;  // on this machine
+};
+
+struct Counts {
+  std::uint64_t frames = 0;
+  std::uint64_t repeated_poses = 0;  // frames that echo a pose again: a still picture refined
+  std::uint64_t bytes = 0;
+  std::uint64_t idrs = 0;
+  std::uint64_t poses_sent = 0;
+  std::uint64_t errors = 0;
+  std::uint64_t decode_errors = 0;
+  std::uint64_t frames_skipped = 0;  // not decoded: the decoder's queue was full
+  std::uint64_t reconnects = 0;
+};
+
 /// The books of one session, all on the client's own clock. Pure; memory is bounded.
 class SessionStats {
  public:
@@ -37,7 +59,7 @@ class SessionStats {
   void may_recover(std::int64_t now_us) { interrupted_us_ = started_ ? now_us : -1; }
   void pose_sent(std::uint64_t pose_id, std::int64_t now_us);
   void frame_received(const ReceivedFrame& frame, std::int64_t now_us);
-  void frame_decoded(std::int64_t duration_us) { decode.add(duration_us); }
+  void frame_decoded(std::int64_t duration_us) { durations.decode.add(duration_us); }
   /// Something went wrong; equal descriptions are counted together, up to a bounded number of
   /// different ones.
   void error(const std::string& description);
@@ -51,22 +73,8 @@ class SessionStats {
     return 1e-6 * static_cast<double>(end_us_ - start_us_);
   }
 
-  DurationHistogram admission;      // first hello sent -> welcome: a place, the scene in memory
-  DurationHistogram pose_to_frame;  // pose sent -> first frame that echoes it received
-  DurationHistogram pose_age;       // at each nominal tick: age of the pose behind the newest frame
-  DurationHistogram frame_interval;  // between receptions
-  DurationHistogram recovery;        // interruption -> next frame received
-  DurationHistogram wait, render, encode, send;
-  DurationHistogram decode;  // on this machine
-  std::uint64_t frames = 0;
-  std::uint64_t repeated_poses = 0;  // frames that echo a pose again: a still picture refined
-  std::uint64_t bytes = 0;
-  std::uint64_t idrs = 0;
-  std::uint64_t poses_sent = 0;
-  std::uint64_t errors = 0;
-  std::uint64_t decode_errors = 0;
-  std::uint64_t frames_skipped = 0;  // not decoded: the decoder's queue was full
-  std::uint64_t reconnects = 0;
+  Durations durations;
+  Counts counts;
   bool connected = false;  // at least once
   std::map<std::string, std::uint64_t> error_counts;
 
