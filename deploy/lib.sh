@@ -232,17 +232,11 @@ ensure_packages() {
   if (($(id -u) != 0)); then
     sudo -v
   fi
-  step "Install ${#missing[@]} packages" install_packages "${root_command[@]}" -- "${missing[@]}"
+  step "Install ${#missing[@]} packages" install_packages "${missing[@]}"
 }
 
-# install_packages [ROOT_COMMAND] -- NAME...
+# install_packages NAME...: with the root_command of ensure_packages.
 install_packages() {
-  local -a root_command=()
-  while [[ $1 != -- ]]; do
-    root_command+=("$1")
-    shift
-  done
-  shift
   local -a apt=("${root_command[@]}" env DEBIAN_FRONTEND=noninteractive
     apt-get -o DPkg::Lock::Timeout=120 -o Dpkg::Use-Pty=0)
   "${apt[@]}" update
@@ -307,15 +301,8 @@ configure_build() {
     step_done "Configure: unchanged"
     return
   fi
-  step "Configure with CMake (build/$preset)" run_cmake "$preset" "$@"
+  step "Configure with CMake (build/$preset)" cmake -S "$SOURCE_DIR" --preset "$preset" "$@"
   printf '%s' "$wanted" >"$stamp"
-}
-
-run_cmake() {
-  local preset=$1
-  shift
-  cd "$SOURCE_DIR"
-  cmake --preset "$preset" "$@"
 }
 
 # build_all PRESET TITLE: everything that the preset's configuration holds.
