@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iterator>
 #include <string>
 #include <string_view>
@@ -107,8 +108,9 @@ void change_json(const Material& from, std::string& text) {
       parent.erase(child);
       break;
     case 1: {
-      const std::size_t times = any_length(from, 14) / written(content).size();
-      for (std::size_t i = 0; i <= times; ++i) add_child(from, parent, content);
+      const std::size_t room = any_length(from, 14) / written(content).size();
+      const std::size_t times = 1 + std::min(any_length(from, 9), room);
+      for (std::size_t i = 0; i < times; ++i) add_child(from, parent, content);
       break;
     }
     case 2:  // under another key, or elsewhere in the array
