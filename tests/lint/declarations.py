@@ -10,7 +10,7 @@ from typing import Iterator, NamedTuple
 MAX_FUNCTION_LINES = 70
 MAX_METHODS = 25
 MAX_FIELDS = 20
-# A ratchet like LONGER_FILES of lint.py: functions by "file: name", classes by name.
+# A ratchet: these may shrink, never grow. Functions by "file: name", classes by name.
 LONGER_FUNCTIONS = {
     "tests/render_core/scene/formats/encoders.cpp: encode_sog": 101,
 }

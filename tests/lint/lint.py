@@ -118,8 +118,6 @@ BANNED_CALLS = [
 ]
 
 MAX_LINES = 450
-# A ratchet: files above the limit may shrink, never grow, and leave this table when they fit.
-LONGER_FILES: dict[str, int] = {}
 
 # Pages whose tables name constants of the sources, and tests.
 SECURITY_PAGES = ("deploy/SECURITY.md", "deploy/FAULTS.md", "deploy/LIMITS.md")
@@ -168,11 +166,8 @@ def layer_findings(path: str, number: int, target: str) -> Iterator[str]:
 
 def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
     """Findings of `rules` for one file, as 'file:line: text'."""
-    limit = LONGER_FILES.get(path, MAX_LINES)
-    if len(lines) > limit:
-        yield f"{path}:{len(lines)}: {len(lines)} lines, the limit is {limit}: split the file"
-    if path in LONGER_FILES and len(lines) <= MAX_LINES:
-        yield f"{path}:1: fits {MAX_LINES} lines again: take it out of LONGER_FILES"
+    if len(lines) > MAX_LINES:
+        yield f"{path}:{len(lines)}: {len(lines)} lines, the limit is {MAX_LINES}: split the file"
     # Highway includes its *-inl.h once per instruction set.
     if re.search(r"(?<!-inl)\.(h|cuh)$", path) and "#pragma once" not in lines:
         yield f"{path}:1: no #pragma once"
@@ -231,34 +226,27 @@ def check_rules(root: pathlib.Path) -> int:
             code[path] = "\n".join(lines)
     for page in SECURITY_PAGES:
         findings += security_findings(page, (root / page).read_text("utf-8").splitlines(), code)
-    missing = [f"{path}:1: in LONGER_FILES, but there is no such file"
-               for path in LONGER_FILES if not (root / path).is_file()]
-    print("\n".join(findings + missing))
-    return 1 if findings or missing else 0
+    print("\n".join(findings))
+    return 1 if findings else 0
 
 
-def find_tool(name: str, version: str | None = None) -> str | None:
+class Missing(Exception):
+    """A tool is not installed."""
+
+
+def find_tool(name: str, version: str = "") -> str:
     """The tool's path; with `version` either name-version or a plain name of that major version."""
-    if version is None:
-        return shutil.which(name)
-    if tool := shutil.which(f"{name}-{version}"):
+    if tool := version and shutil.which(f"{name}-{version}"):
         return tool
     tool = shutil.which(name)
-    if tool and re.search(rf"version {version}\.", subprocess.run(
-            [tool, "--version"], capture_output=True, text=True, check=True).stdout):
+    if tool and (not version or re.search(rf"version {version}\.", subprocess.run(
+            [tool, "--version"], capture_output=True, text=True, check=True).stdout)):
         return tool
-    return None
-
-
-def skipped(tool: str) -> int:
-    print(f"SKIPPED: {tool} is not installed")
-    return EXIT_SKIPPED
+    raise Missing(f"{name} {version}".strip())
 
 
 def check_declarations(root: pathlib.Path) -> int:
     tool = find_tool("ctags")
-    if tool is None:
-        return skipped("universal-ctags")
     code = {path: (root / path).read_text("utf-8") for path in source_files(root) if CXX.search(path)}
     product = {path: text for path, text in code.items() if not path.startswith("tests/")}
     tags = declarations.ctags(tool, root, list(code))
@@ -270,8 +258,6 @@ def check_declarations(root: pathlib.Path) -> int:
 
 def check_shell(root: pathlib.Path) -> int:
     tool = find_tool("shellcheck")
-    if tool is None:
-        return skipped("shellcheck")
     scripts = [path for path in source_files(root) if is_shell(root, path)]
     return subprocess.run([tool, "--external-sources", "--format=gcc", *scripts],
                           cwd=root, check=False).returncode
@@ -279,8 +265,6 @@ def check_shell(root: pathlib.Path) -> int:
 
 def check_format(root: pathlib.Path) -> int:
     tool = find_tool("clang-format", "14")
-    if tool is None:
-        return skipped("clang-format 14")
     sources = [path for path in source_files(root) if CXX.search(path)]
     return subprocess.run([tool, "--dry-run", "-Werror", *sources], cwd=root, check=False).returncode
 
@@ -294,8 +278,6 @@ CPPCHECK_SUPPRESSED = ["cppcheckError", "internalAstError", "invalidFunctionArg"
 
 def check_cppcheck(root: pathlib.Path) -> int:
     tool = find_tool("cppcheck")
-    if tool is None:
-        return skipped("cppcheck")
     # Not Highway's file, which includes itself once for each instruction set.
     sources = [path for path in source_files(root)
                if re.match(r"(server|render_core)/.*\.cpp$", path) and not path.endswith("/kernels.cpp")]
@@ -319,8 +301,6 @@ def changed_files(root: pathlib.Path) -> set[str]:
 
 def check_tidy(root: pathlib.Path, build: pathlib.Path, only_changed: bool) -> int:
     tool = find_tool("clang-tidy", "14")
-    if tool is None:
-        return skipped("clang-tidy 14")
     commands = json.loads((build / "compile_commands.json").read_text("utf-8"))
     ours = re.compile(rf"^{re.escape(str(root))}/(render_core|server)/.*\.cpp$")
     sources = sorted({c["file"] for c in commands if ours.match(c["file"])})
@@ -351,12 +331,16 @@ def main() -> int:
     parser.add_argument("--changed", action="store_true", help="tidy: what the newest commit changed")
     arguments = parser.parse_args()
     root = arguments.root.resolve()
-    if arguments.check == "tidy":
-        if arguments.build is None:
-            parser.error("tidy needs --build")
-        return check_tidy(root, arguments.build.resolve(), arguments.changed)
-    return {"rules": check_rules, "declarations": check_declarations, "shell": check_shell, "format": check_format,
-            "cppcheck": check_cppcheck}[arguments.check](root)
+    if arguments.check == "tidy" and arguments.build is None:
+        parser.error("tidy needs --build")
+    checks = {"rules": check_rules, "declarations": check_declarations, "shell": check_shell, "format": check_format,
+              "cppcheck": check_cppcheck,
+              "tidy": lambda root: check_tidy(root, arguments.build.resolve(), arguments.changed)}
+    try:
+        return checks[arguments.check](root)
+    except Missing as tool:
+        print(f"SKIPPED: {tool} is not installed")
+        return EXIT_SKIPPED
 
 
 if __name__ == "__main__":

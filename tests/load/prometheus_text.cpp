@@ -1,9 +1,10 @@
 #include "tests/load/prometheus_text.h"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <regex>
+#include <sstream>
 
 namespace catgs::load {
 namespace {
@@ -23,26 +24,25 @@ double number(std::string_view text) {
 }
 
 /// NAME{LABEL="VALUE",…} NUMBER
-Line parse_line(std::string_view text) {
+Line parse_line(const std::string& text) {
+  static const std::regex form(R"(([^{ ]+)(?:\{(.*)\})? (\S+))");
+  static const std::regex label(R"re((\w+)="([^"]*)")re");
   Line line;
-  const std::size_t space = text.rfind(' ');
-  const std::size_t brace = std::min(text.find('{'), space);
-  line.family = text.substr(0, brace);
-  line.value = number(text.substr(space + 1));
-  std::string_view labels = text.substr(brace, space - brace);
-  while (true) {
-    const std::size_t begin = labels.find("=\"");
-    if (begin == std::string_view::npos) return line;
-    const std::size_t end = labels.find('"', begin + 2);
-    const std::string_view name = labels.substr(1, begin - 1);  // behind { or ,
-    const std::string_view value = labels.substr(begin + 2, end - begin - 2);
-    if (name == "le") {
+  std::smatch parts;
+  if (!std::regex_match(text, parts, form)) return line;
+  line.family = parts[1];
+  line.value = number(parts[3].str());
+  const std::string labels = parts[2];
+  for (std::sregex_iterator found(labels.begin(), labels.end(), label), end; found != end;
+       ++found) {
+    const std::string value = (*found)[2];
+    if ((*found)[1] == "le") {
       line.le = value;
     } else {
-      line.labels.append(line.labels.empty() ? "" : "_").append(value);
+      line.labels += (line.labels.empty() ? "" : "_") + value;
     }
-    labels.remove_prefix(std::min(end + 1, labels.size()));
   }
+  return line;
 }
 
 std::string series_name(std::string family, const std::string& labels) {
@@ -77,11 +77,9 @@ double percentile_ms(const std::map<double, double>& cumulative, double share) {
 
 PrometheusSnapshot parse_prometheus(std::string_view text) {
   PrometheusSnapshot snapshot;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view raw = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    if (raw.empty() || raw.front() == '#') continue;
+  std::istringstream lines{std::string(text)};
+  for (std::string raw; std::getline(lines, raw);) {
+    if (raw.empty() || raw.starts_with('#')) continue;
     Line line = parse_line(raw);
     if (!line.le.empty() && cut(line.family, "_seconds_bucket")) {
       snapshot.histograms[series_name(line.family, line.labels)].cumulative[number(line.le)] =

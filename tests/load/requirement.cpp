@@ -1,9 +1,9 @@
 #include "tests/load/requirement.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 
@@ -22,21 +22,17 @@ std::string_view trim(std::string_view text) {
 
 Requirement::Requirement(std::string_view text) : text_(text) {
   // Longer operators first: "<=" begins with "<".
-  constexpr std::array<std::pair<std::string_view, Operator>, 6> operators = {
-      {{"<=", Operator::less_equal},
-       {">=", Operator::greater_equal},
-       {"==", Operator::equal},
-       {"!=", Operator::not_equal},
-       {"<", Operator::less},
-       {">", Operator::greater}}};
+  static const std::pair<std::string_view, Comparison> operators[] = {
+      {"<=", std::less_equal<>()},   {">=", std::greater_equal<>()}, {"==", std::equal_to<>()},
+      {"!=", std::not_equal_to<>()}, {"<", std::less<>()},           {">", std::greater<>()}};
   const std::size_t at = std::min(text.find_first_of("<>=!"), text.size());
   const std::string_view rest = text.substr(at);
   const auto found = std::ranges::find_if(
       operators, [&](const auto& entry) { return rest.starts_with(entry.first); });
   metric_ = trim(text.substr(0, at));
-  bool good = found != operators.end() && !metric_.empty();
+  bool good = found != std::end(operators) && !metric_.empty();
   if (good) {
-    operator_ = found->second;
+    compare_ = found->second;
     const std::string_view number = trim(rest.substr(found->first.size()));
     const char* end = number.data() + number.size();
     const auto [stop, error] = std::from_chars(number.data(), end, bound_);
@@ -60,24 +56,7 @@ void Requirement::check_name(const Metrics& metrics) const {
 
 double Requirement::value(const Metrics& metrics) const { return value_of(metrics, metric_); }
 
-bool Requirement::holds(const Metrics& metrics) const {
-  const double measured = value(metrics);
-  switch (operator_) {
-    case Operator::less:
-      return measured < bound_;
-    case Operator::less_equal:
-      return measured <= bound_;
-    case Operator::greater:
-      return measured > bound_;
-    case Operator::greater_equal:
-      return measured >= bound_;
-    case Operator::equal:
-      return measured == bound_;
-    case Operator::not_equal:
-      return measured != bound_;
-  }
-  return false;
-}
+bool Requirement::holds(const Metrics& metrics) const { return compare_(value(metrics), bound_); }
 
 std::string Requirement::explain(const Metrics& metrics) const {
   return fmt::format("{}: is {:.6g}", text_, value(metrics));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -26,11 +27,11 @@ class Requirement {
   [[nodiscard]] std::string explain(const Metrics& metrics) const;
 
  private:
-  enum class Operator { less, less_equal, greater, greater_equal, equal, not_equal };
+  using Comparison = std::function<bool(double, double)>;
 
   std::string text_;
   std::string metric_;
-  Operator operator_ = Operator::less;
+  Comparison compare_;
   double bound_ = 0.0;
 };
 

@@ -1,27 +1,13 @@
 #include "tests/load/url.h"
 
 #include <algorithm>
-#include <charconv>
+#include <regex>
 
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
 
 namespace catgs::load {
-namespace {
-
-[[noreturn]] void refuse(std::string_view text, std::string_view what) {
-  throw InputError("--url", "", fmt::format("\"{}\" {}", text, what),
-                   "like ws://127.0.0.1:8080 or wss://example.org");
-}
-
-bool is_port(std::string_view text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && value >= 1 && value <= 65535;
-}
-
-}  // namespace
 
 std::string Url::authority() const {
   const bool ipv6 = host.find(':') != std::string::npos;
@@ -29,43 +15,23 @@ std::string Url::authority() const {
 }
 
 Url parse_url(std::string_view text) {
-  Url url;
-  std::string_view rest = text;
-  if (rest.starts_with("ws://")) {
-    rest.remove_prefix(5);
-    url.port = "80";
-  } else if (rest.starts_with("wss://")) {
-    rest.remove_prefix(6);
-    url.port = "443";
-    url.tls = true;
-  } else {
-    refuse(text, "does not begin with ws:// or wss://");
-  }
+  static const std::regex form(
+      R"((wss?)://(\[[0-9A-Fa-f:.]+\]|[^:/?#@[\]]+)(?::([0-9]{1,5}))?(/[^?#@]*)?)");
+  std::cmatch parts;
   // A token in the address would end up in logs and in the shell's history.
-  if (rest.find_first_of("?#@") != std::string_view::npos) {
-    refuse(text, "has a query, fragment or user; tokens go to --token");
+  if (!std::regex_match(text.data(), text.data() + text.size(), parts, form)) {
+    throw InputError("--url", "", fmt::format("\"{}\" is no address of a server", text),
+                     "like ws://127.0.0.1:8080 or wss://example.org; tokens go to --token");
   }
-  const std::size_t slash = std::min(rest.find('/'), rest.size());
-  std::string_view authority = rest.substr(0, slash);
-  if (slash < rest.size()) url.path = rest.substr(slash);
-
-  std::size_t colon = authority.rfind(':');
-  if (authority.starts_with('[')) {
-    const std::size_t bracket = authority.find(']');
-    if (bracket == std::string_view::npos) refuse(text, "has an open bracket");
-    url.host = authority.substr(1, bracket - 1);
-    authority.remove_prefix(bracket + 1);
-    colon = authority.starts_with(':') ? 0 : std::string_view::npos;
-    if (colon != 0 && !authority.empty()) refuse(text, "has something behind its host");
-  } else {
-    url.host = authority.substr(0, colon);
+  Url url;
+  url.tls = parts[1] == "wss";
+  url.host = parts[2];
+  std::erase_if(url.host, [](char c) { return c == '[' || c == ']'; });
+  url.port = parts[3].matched ? parts[3].str() : url.tls ? "443" : "80";
+  if (const int port = std::stoi(url.port); port < 1 || port > 65535) {
+    throw InputError("--url", "", fmt::format("port {} is no number of 1 to 65535", url.port));
   }
-  if (colon != std::string_view::npos) {
-    const std::string_view port = authority.substr(colon + 1);
-    if (!is_port(port)) refuse(text, "has a port that is no number of 1 to 65535");
-    url.port = port;
-  }
-  if (url.host.empty()) refuse(text, "has no host");
+  if (parts[4].matched) url.path = parts[4];
   return url;
 }
 
