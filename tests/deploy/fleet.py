@@ -182,6 +182,13 @@ class Load:
         check(not any("pose" in kind for kind in kinds), f"each session goes on at its own newest pose (errors: {kinds})")
         return report["metrics"]
 
+    def judge(self, moved, what):
+        """`moved`: sessions that had to go to another server, because theirs was `what`."""
+        metrics = self.result()
+        check(metrics["errors"] <= moved, f"{what}: {metrics['errors']:.0f} errors, at most one for each connection that ended")
+        check(metrics["recovery_max_ms"] <= 2000, f"{what}: the longest gap of a session was {metrics['recovery_max_ms']:.0f} ms")
+        check(metrics["idrs"] <= SESSIONS + moved, f"{metrics['idrs']:.0f} IDRs: one for each session, one more for each that moved")
+
 
 def run(options):
     fleet = Fleet(yaml.safe_load((SOURCE_DIR / "docker/compose.yaml").read_text()))
@@ -221,10 +228,7 @@ def run(options):
     servers["server-1"] = Metrics(fleet.address("server-1"))
     took = wait_until("the alert clears", lambda: not prometheus(watcher, firing), 60)
     check(took < 60, f"and clears {took:.0f} s after it is started again")
-    metrics = load.result()
-    check(metrics["errors"] <= moved, f"{metrics['errors']:.0f} errors: the connections that were lost")
-    check(metrics["recovery_max_ms"] <= 2000, f"killed: the longest gap of a session was {metrics['recovery_max_ms']:.0f} ms")
-    check(metrics["idrs"] <= SESSIONS + moved, f"{metrics['idrs']:.0f} IDRs: one for each session, one more for each that moved")
+    load.judge(moved, "killed")
 
     wait_until("they have left", lambda: not any(s.live() for s in servers.values()), 30)
     load = Load(options.load, proxy, 45)
@@ -238,10 +242,7 @@ def run(options):
     stopper.join()
     status = podman("inspect", "--format", "{{.State.ExitCode}}", "fleet-server-2")
     check(took < 40 and status == "0", f"drained: all sessions on the other server after {took:.1f} s, exit status {status} after {time.monotonic() - begin:.1f} s")
-    metrics = load.result()
-    check(metrics["errors"] <= moved, f"{metrics['errors']:.0f} errors: the connections that were closed at the deadline")
-    check(metrics["recovery_max_ms"] <= 2000, f"drained: the longest gap of a session was {metrics['recovery_max_ms']:.0f} ms")
-    check(metrics["idrs"] <= SESSIONS + moved, f"{metrics['idrs']:.0f} IDRs: one for each session, one more for each that moved")
+    load.judge(moved, "drained")
 
 
 def main():

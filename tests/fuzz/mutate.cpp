@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <iterator>
-#include <limits>
 #include <sstream>
 
 namespace catgs::fuzz {
@@ -22,26 +21,12 @@ Range any_range(const Material& from, const std::string& text) {
   return {begin, longest == 0 ? 0 : 1 + from.below(longest)};
 }
 
-/// Numbers around which parsers err, in one to eight bytes, least significant first.
+/// Numbers around which parsers err, in one to eight bytes, least significant first: powers of two
+/// and those beside them, infinity and NaN of floats.
 std::string edge_number(const Material& from) {
-  using Limits = std::numeric_limits<std::int64_t>;
-  constexpr std::array<std::int64_t, 16> edges = {0,
-                                                  1,
-                                                  -1,
-                                                  2,
-                                                  127,
-                                                  128,
-                                                  255,
-                                                  256,
-                                                  0x7f80'00,
-                                                  0x7fff'ffff,
-                                                  0x8000'0000,
-                                                  0xffff'ffff,
-                                                  0x7f80'0000,
-                                                  0x7fc0'0000,
-                                                  Limits::max(),
-                                                  Limits::min()};
-  auto value = static_cast<std::uint64_t>(edges[from.below(edges.size())]);
+  constexpr std::array<std::uint64_t, 2> floats = {0x7f80'0000, 0x7fc0'0000};
+  std::uint64_t value = (std::uint64_t{1} << from.below(64)) + from.below(3) - 1;
+  if (from.one_in(8)) value = from.any_of(floats);
   std::string bytes(std::size_t{1} << from.below(4), '\0');
   for (char& byte : bytes) {
     byte = static_cast<char>(value & 0xff);
