@@ -249,6 +249,7 @@ TEST(ServerProgram, EndsCleanlyAlthoughItWasStoppedWhileItDrains) {
   });
   client.receive_message(v1::ServerMessage::kDrain);
   EXPECT_EQ(client.receive_until_closed().close_code, 1001);
+  later.join();
   EXPECT_EQ(program.exit_status(), 0);
 }
 

@@ -196,7 +196,13 @@ TEST(SessionLifeOnSockets, AdmitsByWhatFramesWereMeasuredToCost) {
   ASSERT_TRUE(eventually([&] { return sessions(server)[0].at("frames_sent") >= 20; }));
   // 144 times the pixels, 240 times a second: no two threads can do that.
   WireClient huge(server.port());
-  EXPECT_LT(huge.greet(3840, 2160).config().width_px(), 3840u);
+  huge.send(hello_message(3840, 2160, v1::CODEC_H264));
+  const auto answer = huge.receive().message;
+  ASSERT_TRUE(answer);
+  // A slow machine has no room for any of its pixels beside the small one.
+  if (answer->has_queue()) return;
+  ASSERT_TRUE(answer->has_welcome()) << answer->ShortDebugString();
+  EXPECT_LT(answer->welcome().config().width_px(), 3840u);
 }
 
 TEST(SessionLifeOnSockets, TellsWhatASessionTakesAndWhereItsTimeGoes) {

@@ -37,7 +37,8 @@ TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
   EXPECT_EQ(picked->distance, 3.0f);
   session.on_message(Pick{6, glm::vec3(0.0f), {0.0f, 0.0f, -1.0f}}, now);
   EXPECT_FALSE(std::get<Picked>(host.said.back()).distance);
-  for (std::uint32_t id = 7; id < 100; ++id) session.on_message(Pick{id, {}, {}}, now);
+  for (std::uint32_t id = 7; id < 100; ++id)
+    session.on_message(Pick{id, {}, {0.0f, 0.0f, 1.0f}}, now);
   EXPECT_EQ(host.count<Picked>(), 4);
   now += 250ms;
   session.on_message(Pick{100, {}, {0.0f, 0.0f, 1.0f}}, now);
