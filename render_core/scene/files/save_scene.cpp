@@ -12,17 +12,29 @@
 
 namespace catgs {
 
+namespace {
+
+using Writer = void (*)(const GaussianCloud&, std::ostream&);
+
+Writer writer_for(const std::filesystem::path& path) {
+  if (path.string().ends_with(".compressed.ply"))
+    throw InputError(path.string(), "", "compressed PLY is only read, not written",
+                     "use .ply, .splat or .spz");
+  const std::string extension = path.extension().string();
+  if (extension == ".ply") return write_ply;
+  if (extension == ".splat") return write_splat;
+  if (extension == ".spz") return write_spz;
+  throw InputError(path.string(), "", "cannot be written: unknown extension '" + extension + "'",
+                   "use .ply, .splat or .spz");
+}
+
+}  // namespace
+
+void check_can_be_saved(const std::filesystem::path& path) { writer_for(path); }
+
 void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path) {
   assert(cloud.sizes_agree());
-  const std::string extension = path.extension().string();
-  void (*write)(const GaussianCloud&, std::ostream&) = nullptr;
-  if (extension == ".ply") write = write_ply;
-  if (extension == ".splat") write = write_splat;
-  if (extension == ".spz") write = write_spz;
-  if (!write)
-    throw InputError(path.string(), "", "cannot be written: unknown extension '" + extension + "'",
-                     "use .ply, .splat or .spz");
-
+  const Writer write = writer_for(path);
   PartFile file(path);
   try {
     write(cloud, file.stream());

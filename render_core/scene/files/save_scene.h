@@ -6,8 +6,11 @@
 
 namespace catgs {
 
+/// Throws InputError if save_scene has no writer for a file of this name.
+void check_can_be_saved(const std::filesystem::path& path);
+
 /// Writes the cloud in the format that the extension names. The file appears under its name only
-/// when it is complete. Throws InputError for an unknown extension and when writing fails.
+/// when it is complete. Throws InputError as check_can_be_saved does, and when writing fails.
 void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path);
 
 }  // namespace catgs

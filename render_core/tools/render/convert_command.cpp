@@ -35,10 +35,18 @@ void write_hints_beside(const SceneHints& hints, const std::filesystem::path& ou
   fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
 }
 
+/// Before the scene is loaded, which may take minutes.
+void check_output(const ConvertOptions& options) {
+  check_can_be_saved(options.out);
+  if (std::error_code error; std::filesystem::equivalent(options.in.path, options.out, error))
+    throw InputError(options.out, "", "is the scene that is read", "give the output another name");
+}
+
 void convert(const ConvertOptions& options, bool quiet) {
   if (!(options.keep_fraction > 0.0 && options.keep_fraction <= 1.0))
     throw InputError("--keep-fraction", "",
                      fmt::format("{} is not in (0, 1]", options.keep_fraction));
+  check_output(options);
   Scene scene = load_scene(options.in, options.threads, quiet);
   const std::size_t loaded = scene.cloud.size();
   keep_most_important(scene.cloud, options.keep_fraction);

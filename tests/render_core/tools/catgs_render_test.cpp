@@ -400,6 +400,23 @@ TEST_F(CatgsRender, ConvertPrunesAndKeepsTheHints) {
             2);
 }
 
+TEST_F(CatgsRender, ConvertRefusesToWriteOverItsInputOrAnUnwrittenFormat) {
+  const auto size = std::filesystem::file_size(path("ball.ply"));
+  std::filesystem::create_hard_link(path("ball.ply"), path("alias.ply"));
+  for (const char* name : {"ball.ply", "./ball.ply", "alias.ply"}) {
+    const Outcome outcome =
+        run(fmt::format("convert {} {} --keep-fraction 0.5", path("ball.ply"), path(name)));
+    EXPECT_EQ(outcome.exit_code, 2) << name;
+    EXPECT_THAT(outcome.out, AllOf(HasSubstr(name), HasSubstr("another name")));
+  }
+  EXPECT_EQ(std::filesystem::file_size(path("ball.ply")), size);
+  const Outcome compressed =
+      run(fmt::format("convert {} {}", path("ball.ply"), path("y.compressed.ply")));
+  EXPECT_EQ(compressed.exit_code, 2);
+  EXPECT_THAT(compressed.out, AllOf(HasSubstr("compressed PLY"), HasSubstr(".spz")));
+  EXPECT_FALSE(std::filesystem::exists(path("y.compressed.ply")));
+}
+
 TEST_F(CatgsRender, ConvertLeavesASidecarThatIsThere) {
   std::ofstream(path("ball.json")) << R"({"near": 0.125})";
   std::ofstream(path("copy.json")) << R"({"near": 0.5})";
