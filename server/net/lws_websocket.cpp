@@ -25,15 +25,6 @@ constexpr lws_usec_t look_every_us = 250'000;
 /// second.
 lws_usec_t until_next_look() { return look_every_us - lws_now_usecs() % look_every_us; }
 
-/// Small writes leave at once. The next packet leaves the ring only when hardly anything is unsent,
-/// so that waiting packets are counted and can be dropped.
-void tune_socket(int fd) {
-  const int on = 1;
-  const int lowat_bytes = 16 * 1024;
-  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &lowat_bytes, sizeof lowat_bytes);
-}
-
 tcp_info info_of(lws* wsi) {
   tcp_info info{};
   socklen_t size = sizeof info;  // an older kernel fills less, and the rest stays 0
@@ -48,6 +39,16 @@ LinkState link_state(lws* wsi) {
 }
 
 }  // namespace
+
+void tune_for_frames(int socket) {
+  const int on = 1;
+  const int lowat_bytes = 16 * 1024;
+  constexpr std::string_view congestion_control = "bbr";
+  ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  ::setsockopt(socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &lowat_bytes, sizeof lowat_bytes);
+  ::setsockopt(socket, IPPROTO_TCP, TCP_CONGESTION, congestion_control.data(),
+               congestion_control.size());
+}
 
 void LwsWaker::attach(lws_context* context) {
   const std::lock_guard lock(mutex_);
@@ -83,7 +84,7 @@ LwsWebsocket::LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::strin
       peer_address_(std::move(peer_address)),
       wsi_(wsi),
       arrivals_(segments_per_second, segment_burst, Clock::now()) {
-  tune_socket(lws_get_socket_fd(wsi));
+  tune_for_frames(lws_get_socket_fd(wsi));
 }
 
 void LwsWebsocket::send(OutgoingMessage message) {

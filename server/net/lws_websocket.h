@@ -32,6 +32,12 @@ class LwsWaker {
   std::vector<std::shared_ptr<LwsWebsocket>> pending_;
 };
 
+/// Sets up a TCP socket for a stream of frames. Small writes leave at once. The next packet leaves
+/// the ring only when hardly anything is unsent, so that waiting packets are counted and can be
+/// dropped. BBR keeps its rate where packets are lost at random. A kernel that does not offer it
+/// keeps its own congestion control.
+void tune_for_frames(int socket);
+
 /// One libwebsockets websocket. Functions that begin with `service_` run on the network thread.
 /// Only they touch `wsi_`.
 class LwsWebsocket final : public Connection, public std::enable_shared_from_this<LwsWebsocket> {

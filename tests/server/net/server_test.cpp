@@ -8,13 +8,18 @@
 #include <boost/system/system_error.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <nlohmann/json.hpp>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/synth/synth.h"
 #include "server/base/scene_id.h"
 #include "server/encode/decoder.h"
+#include "server/net/lws_websocket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -69,6 +74,22 @@ TEST(Server, SendsJpegToAClientThatDecodesNothingElse) {
   ASSERT_GE(frame.bitstream.size(), 2u);
   EXPECT_EQ(frame.bitstream[0], std::byte{0xff});
   EXPECT_EQ(frame.bitstream[1], std::byte{0xd8});
+}
+
+TEST(TuneForFrames, TakesBbrWhereTheKernelOffersIt) {
+  const int connection = ::socket(AF_INET, SOCK_STREAM, 0);
+  const auto congestion_control = [&] {
+    char name[16] = {};
+    socklen_t size = sizeof name;
+    ::getsockopt(connection, IPPROTO_TCP, TCP_CONGESTION, name, &size);
+    return std::string(name);
+  };
+  const bool offered = ::setsockopt(connection, IPPROTO_TCP, TCP_CONGESTION, "bbr", 3) == 0;
+  ::setsockopt(connection, IPPROTO_TCP, TCP_CONGESTION, "reno", 4);
+  EXPECT_EQ(congestion_control(), "reno");
+  tune_for_frames(connection);
+  EXPECT_EQ(congestion_control(), offered ? "bbr" : "reno");
+  ::close(connection);
 }
 
 TEST(Server, NewSettingsGiveANewConfigAndThenAnIdr) {
