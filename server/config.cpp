@@ -250,7 +250,7 @@ std::vector<Setting> session_settings() {
 std::vector<Setting> access_settings() {
   using C = ServerConfig;
   return {
-      flag("open", "Serve other machines without a token", &C::open),
+      flag("open", "Show scenes without a token, to other machines too", &C::open),
       flag("admin-open", "Allow an --admin-bind beyond loopback, for a private network",
            &C::admin_open),
       text("token-file", "FILE", "Access tokens, one per line; read again when it changes",

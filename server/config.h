@@ -53,9 +53,9 @@ struct ServerConfig {
   std::string log_format = "human";
   std::string log_level = "info";
 
-  /// True if viewers need a token. Without tokens, everybody may see all scenes.
+  /// True if viewers need a token. Otherwise everybody who comes without one may see all scenes.
   [[nodiscard]] bool asks_for_tokens() const {
-    return !token_file.empty() || !token_key_file.empty();
+    return !open && !(token_file.empty() && token_key_file.empty());
   }
 };
 

@@ -94,7 +94,7 @@ struct Server::State {
   State(const ServerConfig& configuration, const ServerParts& parts)
       : config(configuration),
         liveness(parts.liveness_clock),
-        access(config.token_file, config.token_key_file),
+        access(config.token_file, config.token_key_file, config.open),
         client(find_client(config.client_dir)),
         net(net_options()),
         pool(std::make_shared<ThreadPool>(config.threads)),
@@ -282,6 +282,13 @@ void Server::State::print_banner() const {
                  fmt::format("{}:{}", parse_endpoint(config.admin_bind).address, net.admin_port()));
   spdlog::info("open {}://{}:{}/ in a browser; Ctrl-C stops the server",
                config.tls_cert.empty() ? "http" : "https", host, net.port());
+  if (config.asks_for_tokens())
+    spdlog::info(
+        "visitors need {}",
+        config.token_key_file.empty()
+            ? fmt::format("a token of {} behind that address: #token=TOKEN", config.token_file)
+            : fmt::format("a link: catgs-server token --token-key-file {} makes one",
+                          config.token_key_file));
 }
 
 void Server::State::wait_for_signal() {

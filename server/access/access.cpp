@@ -105,8 +105,8 @@ std::chrono::seconds parse_duration(std::string_view text) {
 }
 
 AccessControl::AccessControl(std::filesystem::path token_file,
-                             const std::filesystem::path& key_file)
-    : token_file_(std::move(token_file)) {
+                             const std::filesystem::path& key_file, bool open)
+    : open_(open), token_file_(std::move(token_file)) {
   if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
   if (!token_file_.empty()) {
     std::error_code missing;  // read_token_file() reports it
@@ -136,6 +136,7 @@ std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
                                                          std::int64_t now_unix_s) {
   const LinkGrant everything;  // the default grant: all that viewers may do
   if (token_file_.empty() && key_.empty()) return everything;
+  if (token.empty() && open_) return everything;
   if (token.empty()) return "this server needs an access token: open the link you were given";
   if (is_static_token(token)) return everything;
   if (const auto grant = key_.empty() ? std::nullopt : read_link_token(token, key_)) {

@@ -37,11 +37,13 @@ std::string read_key_file(std::string_view flag, const std::filesystem::path& pa
 std::chrono::seconds parse_duration(std::string_view text);
 
 /// Decides who may see which scene. Without a token file and a key file, everybody may see all
-/// scenes. Only links of role "author" may change files in scenes' folders. Thread-safe.
+/// scenes. Where access is open, so may everybody who comes without a token. Only links of role
+/// "author" may change files in scenes' folders. Thread-safe.
 class AccessControl {
  public:
   /// An empty path disables that kind of token. Throws InputError if a file cannot be read.
-  AccessControl(std::filesystem::path token_file, const std::filesystem::path& key_file);
+  AccessControl(std::filesystem::path token_file, const std::filesystem::path& key_file,
+                bool open = false);
 
   /// Returns what `token` permits. `resolve` gives the id of the scene that it names. The token
   /// file is reread after a change; if that fails, its last valid content stays in force.
@@ -54,6 +56,7 @@ class AccessControl {
   void read_token_file();
   bool is_static_token(std::string_view token);
 
+  const bool open_;
   std::mutex mutex_;
   const std::filesystem::path token_file_;
   std::filesystem::file_time_type token_file_time_{};

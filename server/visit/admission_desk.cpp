@@ -36,10 +36,16 @@ SceneAnswer AdmissionDesk::find_scene(const std::string& scene_id, TimePoint now
 }
 
 std::variant<std::string, ErrorMessage> AdmissionDesk::choose(const Hello& hello) const {
-  const std::string wanted = hello.scene_id.empty() ? around_.scenes.default_scene()
-                                                    : around_.scenes.resolve(hello.scene_id);
+  const Permit permit = around_.authorize(hello.token);
+  std::string wanted = around_.scenes.resolve(hello.scene_id);
+  if (hello.scene_id.empty()) {
+    const std::vector<std::string> ids = around_.scenes.scene_ids();
+    const auto allowed = std::ranges::find_if(
+        ids, [&](const std::string& id) { return !permit(id, Use::own_session); });
+    wanted = allowed != ids.end() ? *allowed : around_.scenes.default_scene();
+  }
   // Check the token first, so that a refusal tells nothing about the scenes here.
-  if (const auto refusal = around_.authorize(hello.token)(wanted, Use::own_session))
+  if (const auto refusal = permit(wanted, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, true};
   if (!around_.scenes.has(wanted))
     return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(wanted), true};

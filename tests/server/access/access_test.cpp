@@ -114,6 +114,17 @@ TEST_F(AccessTest, OnlyLinksMakeAuthors) {
   EXPECT_TRUE(refusal(by_file, link, "garden", 999, Use::save)) << "another scene";
 }
 
+TEST_F(AccessTest, AnOpenServerShowsItsScenesWithoutATokenAndBelievesTokens) {
+  AccessControl open({}, folder.write("key", std::string(key) + "\n"), true);
+  EXPECT_FALSE(refusal(open, "", "city", 0));
+  EXPECT_TRUE(refusal(open, "", "city", 0, Use::save));
+  const std::string author = make_link_token({"city", "author", 1000}, key);
+  EXPECT_FALSE(refusal(open, author, "city", 0, Use::save));
+  EXPECT_TRUE(refusal(open, author, "garden", 0));
+  EXPECT_TRUE(refusal(open, make_link_token({"", "spectator", 1000}, key), "city", 0));
+  EXPECT_TRUE(refusal(open, "no-token-of-ours", "city", 0));
+}
+
 TEST_F(AccessTest, StaticTokensAreReadAgain) {
   const auto path = folder.write("tokens", "# first\nalpha-alpha\n");
   AccessControl access(path, {});

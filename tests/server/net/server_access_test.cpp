@@ -120,6 +120,8 @@ TEST(ServerAccess, AnswersNoForeignNameWhereNoTokenIsAskedFor) {
   const TemporaryFolder folder;
   RunningServer guarded([&](ServerConfig& config) {
     on_all_addresses(config);
+    config.open = false;
+    config.admin_open = true;
     config.token_file = folder.write("tokens", "open-sesame-1\n").string();
   });
   EXPECT_EQ(status(guarded.port(), "tours.example"), 401) << "it keeps such pages out by its token";
@@ -169,6 +171,22 @@ TEST(ServerAccess, LinksOpenTheirSceneOnly) {
   const HttpReply stranger = http_get(server.port(), "/api/scenes");
   EXPECT_EQ(stranger.status, 401);
   EXPECT_THAT(stranger.body, AllOf(HasSubstr("Bearer"), Not(HasSubstr("city"))));
+}
+
+TEST(ServerAccess, ALinkWithoutASceneInTheAddressOpensTheSceneOfItsToken) {
+  const TemporaryFolder folder;
+  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
+  RunningServer server([&](ServerConfig& config) {
+    config.scenes = {"synth:city:2000", "synth:garden:2000"};
+    config.token_key_file = key_file.string();
+    config.open = true;
+  });
+  const std::string link =
+      make_link_token({"garden", "author", 1'000'000'000'000}, read_key_file("", key_file));
+  WireClient author(server.port());
+  EXPECT_EQ(author.greet(64, 64, v1::CODEC_H264, link).scene().scene_id(), "garden");
+  WireClient anybody(server.port());
+  EXPECT_EQ(anybody.greet(64, 64).scene_ids_size(), 2);
 }
 
 TEST(ServerAccess, AdmitsByTokenAndNeverSaysIt) {
