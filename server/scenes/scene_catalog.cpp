@@ -98,6 +98,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   options.threads = threads;
   options.progress = progress;
   Scene scene = load(spec, config, std::move(options));
+  for (const std::string& note : scene.notes) spdlog::warn("{}: {}", spec, note);
   auto entry = std::make_shared<SceneEntry>();
   entry->facts = facts_of(scene, id_of(scene.name));
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);

@@ -110,6 +110,7 @@ Sidecar check_sent_sidecar(std::string_view json) {
   const MemorySource source("sidecar", std::as_bytes(std::span(json)));
   const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
   Sidecar sidecar = read_sidecar(source);
+  if (sidecar.unknown) throw InputError(source.name(), "", *sidecar.unknown);
   if (const auto tours = JsonField(source.name(), document).find("tours")) {
     if (tours->size() > max_tours)
       tours->fail(fmt::format("has {} entries, at most {}", tours->size(), max_tours));

@@ -130,12 +130,11 @@ Sidecar read_sidecar(const ByteSource& file) {
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
   static constexpr std::array known = {"up", "start_pose", "near", "limits", "focus", "tours"};
-  for (const auto& [key, value] : document.items())
-    if (std::find(known.begin(), known.end(), key) == known.end())
-      root.fail(fmt::format("unknown field '{}'", key),
-                fmt::format("known are {}", fmt::join(known, ", ")));
-
   Sidecar sidecar;
+  for (const auto& [key, value] : document.items())
+    if (std::ranges::find(known, key) == known.end())
+      sidecar.unknown =
+          fmt::format("unknown field '{}' (known are {})", key, fmt::join(known, ", "));
   if (const auto up = root.find("up")) sidecar.up = parse_up(*up);
   if (const auto pose = root.find("start_pose")) sidecar.start_pose = parse_start_pose(*pose);
   if (const auto near = root.find("near")) {
@@ -216,6 +215,9 @@ SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
   std::optional<Sidecar> sidecar;
   if (!files.sidecar.empty() && std::filesystem::is_regular_file(files.sidecar, error))
     sidecar = read_sidecar(FileSource(files.sidecar));
+  if (sidecar && sidecar->unknown)
+    notes.push_back(
+        fmt::format("{}: {} is ignored", files.sidecar.filename().string(), *sidecar->unknown));
   const CameraFile cameras = find_cameras(files, notes);
 
   std::optional<glm::vec3> up = mean_up(cameras.poses);

@@ -32,9 +32,11 @@ struct Sidecar {
   std::optional<float> near_z;
   std::optional<Bounds> limits;
   std::optional<glm::vec3> focus;
+  std::optional<std::string> unknown;  // about a field that is none of the above, for people
 };
 
-/// Throws InputError naming the field. Unknown fields are errors too.
+/// Throws InputError naming the field. An unknown field is no error, because a newer version or
+/// another program may know it.
 Sidecar read_sidecar(const ByteSource& file);
 
 /// Overwrites hints with the sidecar's fields. `name`: name of the sidecar's file.

@@ -186,7 +186,6 @@ TEST(Sidecar, ErrorsNameTheField) {
   const auto error = [](const char* text) { return input_error([&] { parse_sidecar(text); }); };
   EXPECT_THAT(error(R"({"up": )"), HasSubstr("city.json: byte"));
   EXPECT_THAT(error("[]"), HasSubstr("not a JSON object"));
-  EXPECT_THAT(error(R"({"upp": "y"})"), AllOf(HasSubstr("'upp'"), HasSubstr("start_pose")));
   EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
   EXPECT_THAT(error(R"({"up": [0, 0, 0]})"), HasSubstr("up: has no direction"));
   EXPECT_THAT(error(R"({"near": 0})"), HasSubstr("near: is not positive"));
@@ -254,6 +253,13 @@ TEST_F(Hints, TheSidecarGoesFirst) {
   expect_near(hints.start_pose.position, {9, 0, 1});
   EXPECT_GT(up(hints.start_pose).z, 0.9f);
   expect_near(hints.focus, {0, 0, 0});
+}
+
+TEST_F(Hints, AnUnknownFieldOfTheSidecarOnlyLeavesANote) {
+  write("s.json", R"({"near": 0.5, "upp": "y"})");
+  EXPECT_EQ(find().near_z, 0.5f);
+  EXPECT_THAT(notes_, testing::ElementsAre(
+                          AllOf(HasSubstr("s.json"), HasSubstr("'upp'"), HasSubstr("start_pose"))));
 }
 
 TEST_F(Hints, UnusableCameraFilesOnlyLeaveANote) {
