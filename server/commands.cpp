@@ -38,7 +38,7 @@ void add_token_command(CLI::App& app, int& exit_code) {
           "viewer; author: may also save tours; spectator: may only watch others; solo: neither "
           "watches nor is watched")
       ->capture_default_str();
-  command->add_option("--expires", options->expires, "Life of the link: 90s, 30m, 12h, 7d")
+  command->add_option("--expires", options->expires, "Lifetime of the link: 90s, 30m, 12h, 7d")
       ->capture_default_str();
   command->add_option("--token-key-file", options->key_file, "Key file of the server")->required();
   command->callback([options, &exit_code] {
@@ -60,10 +60,9 @@ void add_token_command(CLI::App& app, int& exit_code) {
                                                   : "&author")
               << "#token=TOKEN\n";
     if (by_name)
-      std::cerr
-          << "\"" << scene_id
-          << "\" is a name: the link opens whatever scene has it alone. An id that /api/scenes "
-             "lists belongs to one file.\n";
+      std::cerr << "\"" << scene_id
+                << "\" is a name: the link opens a scene only while no other has that name. An id "
+                   "that /api/scenes lists belongs to one file.\n";
     exit_code = 0;
   });
 }

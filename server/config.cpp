@@ -128,7 +128,7 @@ Choices<std::string> words(std::initializer_list<const char*> list_of_words) {
 
 Setting device() {
   return {"device", Setting::Kind::text, "all|N[,N...]",
-          "CUDA devices that render, by CUDA's numbers; each holds the scenes",
+          "CUDA devices that render, by CUDA's numbers; each holds a copy of the scenes",
           // A TOML array comes as several values.
           [](ServerConfig& c, const Values& v) {
             c.devices = parse_devices(fmt::format("{}", fmt::join(v, ",")));
@@ -201,8 +201,8 @@ std::vector<Setting> picture_settings() {
            {"cpu", RendererKind::cpu},
            {"cuda", RendererKind::cuda}}),
       device(),
-      integer("threads", "N", "Threads that render and encode; 0: one per core", &C::threads, 0,
-              1024),
+      integer("threads", "N", "Threads that render and encode; 0: one per processor", &C::threads,
+              0, 1024),
       integer("lod", "N", "Streamed SOG: level of detail, 0 is the finest; -1: by --budget",
               &C::lod, -1, 1000),
       integer("budget", "N",
@@ -225,18 +225,18 @@ std::vector<Setting> picture_settings() {
 std::vector<Setting> session_settings() {
   using C = ServerConfig;
   return {
-      integer("max-sessions", "N", "Sessions at the same time", &C::max_sessions, 1, 10'000),
+      integer("max-sessions", "N", "Most sessions at the same time", &C::max_sessions, 1, 10'000),
       integer("min-fps", "N",
               "Admit sessions while measured costs let all keep this frame rate; 0: no such limit",
               &C::min_fps, 0, 240),
-      integer("max-sessions-per-address", "N", "Sessions at the same time from one address",
+      integer("max-sessions-per-address", "N", "Most sessions at the same time from one address",
               &C::max_sessions_per_address, 1, 10'000),
-      integer("max-queue", "N", "Clients that may wait for a place; others are refused",
+      integer("max-queue", "N", "Most clients that may wait for a place; others are refused",
               &C::max_queue, 0, 10'000),
       integer("idle-timeout", "SECONDS",
               "End a session when nothing has moved for this long; 0: never", &C::idle_timeout_s, 0,
               86'400),
-      integer("max-spectators", "N", "Clients that may watch one session; 0: none",
+      integer("max-spectators", "N", "Most clients that may watch one session; 0: none",
               &C::max_spectators, 0, 1000),
       integer("drain-wait", "SECONDS",
               "After SIGTERM, time for proxies to see /readyz fail before clients are told",
@@ -258,7 +258,7 @@ std::vector<Setting> access_settings() {
       text("token-key-file", "FILE", "Key of the expiring links that 'catgs-server token' makes",
            &C::token_key_file),
       text("resume-key-file", "FILE",
-           "Key that the servers of a fleet share, so that sessions move between them "
+           "Key that the servers of a fleet share, so that sessions can move between them "
            "[the key of tokens, or a random one]",
            &C::resume_key_file),
       text("tls-cert", "FILE", "Certificate chain, PEM: serve https and wss", &C::tls_cert),

@@ -25,7 +25,7 @@ struct ServerConfig {
   std::string client_dir;                     // empty: found beside the program
   RendererKind renderer = RendererKind::automatic;
   std::vector<int> devices;  // of the CUDA core; empty: all
-  int threads = 0;           // 0: one per core
+  int threads = 0;           // 0: one per processor
   int lod = -1;              // of streamed SOG scenes; -1: by gaussian_budget
   int gaussian_budget = 0;   // of streamed SOG scenes; 0: no bound
   EncoderKind encoder = EncoderKind::automatic;

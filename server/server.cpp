@@ -256,7 +256,7 @@ void Server::run() {
   s.ready = true;
   s.print_banner();
   const Watchdog watchdog(s.liveness, [](const std::string& why) {
-    spdlog::critical("{}; the process ends, for its supervisor to start it anew", why);
+    spdlog::critical("{}; the process ends, so that its supervisor restarts it", why);
     ::_exit(1);
   });
   s.io.run();
@@ -317,7 +317,7 @@ void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::mill
 void Server::State::give_up(const std::string& why) {
   if (stop.begun) return;
   stop.failure = why;
-  spdlog::critical("{}; the process ends, for its supervisor to start it anew", stop.failure);
+  spdlog::critical("{}; the process ends, so that its supervisor restarts it", stop.failure);
   begin_stop(0ms, quick_stop_deadline);
 }
 

@@ -19,8 +19,8 @@ int processors();
 /// as threads, each frame therefore stays on its own core.
 class ThreadPool {
  public:
-  /// Starts `threads` workers for tasks; 0 means one per core. A loop runs on at most `threads`
-  /// threads, its caller included.
+  /// Starts `threads` workers for tasks; 0 means one per processor. A loop runs on at most
+  /// `threads` threads, its caller included.
   explicit ThreadPool(int threads = 0);
   ~ThreadPool();  // finishes submitted tasks, then joins
   ThreadPool(const ThreadPool&) = delete;

@@ -30,9 +30,10 @@ struct SplatTable {
   }
 };
 
-/// The lists of splats that the tiles blend. Listing decides membership, sorting the order. Memory
-/// is kept from frame to frame and bounded: where more than `max_entries` entries are needed, the
-/// farthest splats are left out of all lists, and their entries are counted.
+/// The lists of splats that the tiles blend. Listing decides which splats are in a list, and
+/// sorting decides their order. Memory is kept from frame to frame and bounded: where more than
+/// `max_entries` entries are needed, the farthest splats are left out of all lists, and their
+/// entries are counted.
 class TileLists {
  public:
   /// Starts lists for a grid of tiles. Splats are added in `segments` shares, in parallel; each

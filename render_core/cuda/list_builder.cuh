@@ -18,10 +18,10 @@ struct ListRequest {
   float min_depth;  // as in ProjectParams
 };
 
-/// The stages that make tile lists, in order, in the memory of a View. All throw CudaError. They
-/// only launch work, except that each of the two sorts first waits for a count of an earlier stage.
-/// Meanwhile the device works on the stage after that one. `shape` is the same in all stages of a
-/// frame.
+/// The stages that make the lists of Gaussians per tile, in order, in the memory of a View. All
+/// throw CudaError. They only launch work, except that each of the two sorts first waits for a
+/// count of an earlier stage. Meanwhile the device works on the stage after that one. `shape` is
+/// the same in all stages of a frame.
 class ListBuilder {
  public:
   ListBuilder(const SceneArrays& scene, ViewMemory& memory, int processors)

@@ -121,7 +121,7 @@ CATGS_HD_INLINE Trail<T> convert(const Trail<S>& t) {
 /// The right edge of a sum of convex sets is concave in y, so it is farthest out in the band at the
 /// row nearest to its peak. There it is the maximum over shares s of the path of s dx + the
 /// ellipse's edge at y - s dy, which is again concave: the best s is the one nearest to where the
-/// edge runs along the path. Likewise on the left.
+/// edge runs along the path. The left edge mirrors this.
 template <class T>
 CATGS_HD_INLINE Interval<T> columns_in_band(const Trail<T>& t, T low_y, T high_y) {
   const Whitening<T>& w = t.ellipse.w;

@@ -18,8 +18,8 @@ struct PredictorSettings {
   // Forecasts are trusted at least this much (0…1), however wrong earlier ones were. With 1 the
   // camera continues at constant velocity over the whole horizon.
   double min_confidence = 0.0;
-  // World units; the distance at which shifts count like turns. Forecasts of recorded head motion
-  // hardly depend on it, from 0.5 to 10 m. The limit between tremor and motion does.
+  // World units; the distance at which a shift counts as much as a turn. Forecasts of recorded head
+  // motion hardly depend on it, from 0.5 to 10 m. The limit between tremor and motion does.
   double lever = 3.0;
 };
 

@@ -72,7 +72,7 @@ void add_frame_options(CLI::App& command, RenderOptions& options) {
                      "CUDA core: all, or numbers of CUDA devices, like 0 or 0,1 [0]");
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
-  command.add_option("--threads", options.threads, "Number of threads; 0: one per core")
+  command.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
 }

@@ -7,7 +7,7 @@
 
 namespace catgs {
 
-/// A way to use a scene.
+/// A way to use a scene. Access (access.h) decides which uses a token's role permits.
 enum class Use {
   list,         // know that it is there
   own_session,  // move through it

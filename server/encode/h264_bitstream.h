@@ -12,8 +12,8 @@
 namespace catgs::h264 {
 
 // The part of ITU-T H.264 (08/2021) that a server must read and write by itself: NAL units in Annex
-// B byte streams, sequence parameter sets, the head of a slice. Pure functions on bytes; malformed
-// input gives nullopt, never a read past the end.
+// B byte streams, sequence parameter sets and the head of a slice. Pure functions on bytes;
+// malformed input gives nullopt, never a read past the end.
 
 enum class NalType : std::uint8_t {
   slice = 1,

@@ -67,7 +67,7 @@ class SceneLibrary final : public SceneSource {
 
  private:
   struct Book {
-    FoundScene found;                         // for scenes of --scene only name and size
+    FoundScene found;                         // for scenes of --scene, only name and size are set
     std::shared_ptr<const SceneEntry> entry;  // while in memory
     bool pinned = false;
     bool outdated = false;                // the file has changed since

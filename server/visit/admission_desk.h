@@ -13,7 +13,8 @@
 
 namespace catgs {
 
-/// Admits clients, grants their pixels and keeps the queue of waiting clients. Session thread only.
+/// Admits clients, grants their pixels and keeps the queue of waiting clients, whom it tells
+/// their positions. Session thread only.
 class AdmissionDesk {
  public:
   /// All three arguments outlive the desk.

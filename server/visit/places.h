@@ -13,7 +13,8 @@
 
 namespace catgs {
 
-/// Owns all places and accepts connections. All functions except accept() and published_json() run
+/// Owns all places and accepts connections. A lost visitor's place stays here until it resumes, or
+/// until VisitPolicy::resume_grace is over. All functions except accept() and published_json() run
 /// on the session thread, so that visits need no lock.
 class Places final : public Admissions {
  public:

@@ -20,8 +20,8 @@ namespace catgs {
 /// One client's visit: hello -> admission, perhaps after a wait -> welcome -> poses, frames, acks
 /// -> bye. While a lost client may return, all state is kept and nothing is rendered. A visit knows
 /// no socket, thread or clock: events carry their time and effects go through the host.
-/// StreamControl decides how frames are encoded; FrameLoop decides when and of what. Not
-/// thread-safe.
+/// StreamControl decides how frames are encoded; FrameLoop decides when they are due and what they
+/// show. Not thread-safe.
 class Visit {
  public:
   Visit(const VisitPolicy& policy, VisitHost& host, TimePoint now);

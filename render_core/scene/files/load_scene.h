@@ -13,7 +13,7 @@ struct LoadOptions {
   std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
   std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
   std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
-  int threads = 0;                                // 0: one per core
+  int threads = 0;                                // 0: one per processor
 };
 
 /// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .spz or

@@ -75,7 +75,7 @@ void add_convert_command(CLI::App& app) {
           "--keep-fraction", options->keep_fraction,
           "Keep the most important share of the Gaussians, by opacity times mean projected area")
       ->capture_default_str();
-  command->add_option("--threads", options->threads, "Number of threads; 0: one per core")
+  command->add_option("--threads", options->threads, "Number of threads; 0: one per processor")
       ->capture_default_str();
   command->callback([options, command] { convert(*options, is_quiet(*command)); });
 }

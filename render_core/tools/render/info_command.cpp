@@ -151,7 +151,7 @@ void add_info_command(CLI::App& app) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Describes a scene: content, defects, first view");
   add_scene_options(*command, options->scene);
-  command->add_option("--threads", options->threads, "0: one per core")->capture_default_str();
+  command->add_option("--threads", options->threads, "0: one per processor")->capture_default_str();
   command->add_flag("--json", options->json, "Print JSON, with lengths in world units");
   command->callback([options, command] { info(*options, is_quiet(*command)); });
 }

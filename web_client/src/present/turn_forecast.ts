@@ -1,4 +1,5 @@
-// Forecasts how far the view turns away from a picture before the next one replaces it. Pure.
+// Forecasts how far the view turns away from a picture before the next one replaces it. It only
+// decides the overscan: display.ts warps to the newest pose. Pure.
 import { percentile, TimeWindow } from '../base/time_window';
 import { angle_between, slerp, type Quat } from '../base/vector';
 import type { CameraSample, Eye } from '../camera/eye';
