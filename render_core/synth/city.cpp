@@ -3,7 +3,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "render_core/scene/analysis/first_sight.h"
+#include "render_core/math/look_at.h"
 #include "render_core/synth/backdrop.h"
 #include "render_core/synth/city_houses.h"
 #include "render_core/synth/city_park.h"

@@ -2,7 +2,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "render_core/scene/analysis/first_sight.h"
+#include "render_core/math/look_at.h"
 #include "render_core/synth/backdrop.h"
 #include "render_core/synth/scenes.h"
 #include "render_core/synth/shapes.h"

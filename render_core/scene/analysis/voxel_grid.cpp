@@ -12,16 +12,20 @@ namespace catgs {
 
 namespace {
 
-constexpr std::size_t max_sample = std::size_t{1} << 19;
+constexpr std::size_t max_sample = std::size_t{1} << 20;
+constexpr float max_cells = 2097152.0f;
 constexpr float two_pi = 6.2831853f;
 
 }  // namespace
 
-VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const glm::vec3& centre, float half_size)
-    : corner_(centre - half_size),
-      cell_size_(2.0f * half_size / static_cast<float>(cells_per_side)),
-      depth_(static_cast<std::size_t>(cells_per_side) * cells_per_side * cells_per_side) {
-  assert(half_size > 0.0f);
+VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const Bounds& box) : corner_(box.min) {
+  // A flat box keeps some height, so that the number of cells stays bounded.
+  const glm::vec3 extent = box.max - box.min;
+  const float longest = std::max({extent.x, extent.y, extent.z, 1e-6f});
+  const glm::vec3 sides = glm::max(extent, glm::vec3(0.01f * longest));
+  cell_size_ = std::cbrt(sides.x * sides.y * sides.z / max_cells);
+  size_ = glm::ivec3(glm::ceil(sides / cell_size_));
+  depth_.resize(index_of({0, 0, size_.z}));
   const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_sample - 1) / max_sample);
   for (std::size_t i = 0; i < cloud.size(); i += step)
     add_gaussian(cloud, i, static_cast<float>(step));
@@ -52,9 +56,8 @@ void VoxelGrid::add_gaussian(const GaussianCloud& cloud, std::size_t i, float we
 const float* VoxelGrid::cell_at(const glm::vec3& position) const {
   const glm::vec3 cell = (position - corner_) / cell_size_;
   for (int k = 0; k < 3; ++k)
-    if (!(cell[k] >= 0.0f && cell[k] < static_cast<float>(cells_per_side))) return nullptr;
-  const glm::ivec3 c(cell);
-  return depth_.data() + (c.z * cells_per_side + c.y) * cells_per_side + c.x;
+    if (!(cell[k] >= 0.0f && cell[k] < static_cast<float>(size_[k]))) return nullptr;
+  return depth_.data() + index_of(glm::ivec3(cell));
 }
 
 void VoxelGrid::add(const glm::vec3& position, float area) {
@@ -73,6 +76,18 @@ float VoxelGrid::depth_around(const glm::vec3& position) const {
     for (int y = -1; y <= 1; ++y)
       for (int z = -1; z <= 1; ++z) sum += depth_at(position + cell_size_ * glm::vec3(x, y, z));
   return sum;
+}
+
+float VoxelGrid::distance_along(const glm::vec3& from, const glm::vec3& ray) const {
+  constexpr float half_stopped = 0.6931472f;  // ln 2
+  float stopped = 0.0f;
+  for (int step = 1;; ++step) {
+    const float distance = static_cast<float>(step) * cell_size_;
+    const float* cell = cell_at(from + distance * ray);
+    if (!cell) return never;
+    stopped += *cell;
+    if (stopped > half_stopped) return distance;
+  }
 }
 
 }  // namespace catgs

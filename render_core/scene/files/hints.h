@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/math/camera.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/gaussian_cloud.h"
@@ -62,10 +64,10 @@ struct HintFiles {
 };
 
 /// Takes each hint from the first source that has it: the sidecar; the training cameras (first
-/// camera, their mean up, the box around them grown by half its diagonal); estimate_hints. A faulty
-/// sidecar throws InputError. Unusable camera files, which were not written for us, only add a
-/// note.
+/// camera, levelled by find_up(), the box around them grown by half its diagonal);
+/// estimate_hints(). A faulty sidecar throws InputError. Unusable camera files, which were not
+/// written for us, only add a note.
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
-                      std::vector<std::string>& notes);
+                      std::vector<std::string>& notes, std::shared_ptr<ThreadPool> pool);
 
 }  // namespace catgs

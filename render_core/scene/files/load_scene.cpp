@@ -1,6 +1,7 @@
 #include "render_core/scene/files/load_scene.h"
 
 #include <array>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -73,8 +74,8 @@ Decoded read_location(const SceneLocation& location, const LoadOptions& options,
 }  // namespace
 
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) {
-  ThreadPool pool(options.threads);
-  const LoadContext context(pool, options.progress);
+  const auto pool = std::make_shared<ThreadPool>(options.threads);
+  const LoadContext context(*pool, options.progress);
   const SceneLocation location = locate_scene(path);
   const bool streamed = location.kind == SceneLocation::Kind::streamed_sog_folder;
   if (!streamed && (options.lod || options.gaussian_budget))
@@ -90,7 +91,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   if (scene.cloud.empty())
     throw InputError(path.string(), "",
                      fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
-  scene.hints = find_hints(scene.cloud, location.hints, scene.notes);
+  scene.hints = find_hints(scene.cloud, location.hints, scene.notes, pool);
   context.report(1.0);
   return scene;
 }

@@ -4,13 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "render_core/scene/analysis/first_sight.h"
-#include "render_core/scene/analysis/robust_bounds.h"
-#include "render_core/scene/analysis/voxel_grid.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/surface_clouds.h"
 
 namespace catgs::test {
 namespace {
@@ -27,141 +25,6 @@ void expect_near(const glm::vec3& a, const glm::vec3& b, float tolerance = 1e-5f
 
 glm::vec3 forward(const Pose& pose) { return pose.orientation * glm::vec3(0, 0, 1); }
 glm::vec3 up(const Pose& pose) { return pose.orientation * glm::vec3(0, -1, 0); }
-
-/// Opaque discs of `size` on a surface that `place` samples.
-GaussianCloud surface(std::size_t count, float size, const std::function<glm::vec3()>& place) {
-  GaussianCloud cloud;
-  cloud.resize(count, 0);
-  for (std::size_t i = 0; i < count; ++i) {
-    cloud.mean[i] = place();
-    cloud.scale[i] = glm::vec3(size);
-    cloud.rotation[i] = glm::quat(1, 0, 0, 0);
-    cloud.opacity[i] = 0.9f;
-  }
-  return cloud;
-}
-
-/// Filled: a hollow one is a room.
-GaussianCloud ball(float radius) {
-  auto random = std::make_shared<std::mt19937>(1);
-  return surface(20000, 0.02f * radius, [=] {
-    std::normal_distribution<float> normal;
-    std::uniform_real_distribution<float> uniform(0.0f, 1.0f);
-    const glm::vec3 direction(normal(*random), normal(*random), normal(*random));
-    return radius * std::cbrt(uniform(*random)) * glm::normalize(direction);
-  });
-}
-
-/// The walls, floor and ceiling of a room 8 x 3 x 6.
-GaussianCloud room() {
-  auto random = std::make_shared<std::mt19937>(2);
-  return surface(60000, 0.05f, [=] {
-    std::uniform_real_distribution<float> uniform(-1.0f, 1.0f);
-    glm::vec3 p(uniform(*random), uniform(*random), uniform(*random));
-    const int face = std::uniform_int_distribution<int>(0, 2)(*random);
-    p[face] = p[face] < 0 ? -1.0f : 1.0f;
-    return p * glm::vec3(4.0f, 1.5f, 3.0f);
-  });
-}
-
-TEST(FirstSight, LookAtKeepsUpUprightInTheImage) {
-  const glm::vec3 eye(3, -2, 5), target(0, 0, 1);
-  const Pose pose = look_at(eye, target, down_y);
-  expect_near(forward(pose), glm::normalize(target - eye));
-  const glm::vec3 u = camera_from_world_rotation(pose) * down_y;
-  EXPECT_NEAR(u.x, 0.0f, 1e-5f);
-  EXPECT_LT(u.y, 0.0f);  // image y points down
-}
-
-TEST(FirstSight, LookAtAcceptsDegenerateDirections) {
-  for (const glm::vec3& target : {glm::vec3(0, -5, 0), glm::vec3(0, 5, 0), glm::vec3(0)}) {
-    const Pose pose = look_at(glm::vec3(0), target, down_y);
-    EXPECT_NEAR(glm::length(pose.orientation), 1.0f, 1e-5f);
-    if (target != glm::vec3(0)) expect_near(forward(pose), glm::normalize(target));
-  }
-}
-
-TEST(FirstSight, RobustBoundsIgnoreWhatEscapedAndWhatIsTransparent) {
-  GaussianCloud cloud = room();
-  for (std::size_t i = 0; i < 1000; ++i) cloud.mean[i] = glm::vec3(500.0f, 0.0f, 0.0f);
-  for (std::size_t i = 1000; i < 20000; ++i) {
-    cloud.mean[i].y = -40.0f;
-    cloud.opacity[i] = 0.01f;
-  }
-  const Bounds bounds = *robust_bounds(cloud);
-  EXPECT_NEAR(bounds.min.x, -4.0f, 0.1f);
-  EXPECT_NEAR(bounds.max.x, 4.0f, 0.1f);
-  EXPECT_NEAR(bounds.min.y, -1.5f, 0.1f);
-  EXPECT_FALSE(robust_bounds(GaussianCloud{}).has_value());
-}
-
-TEST(FirstSight, ObjectsAreSeenFromOutside) {
-  for (const float radius : {0.01f, 1.0f, 300.0f}) {
-    const GaussianCloud cloud = ball(radius);
-    const SceneHints hints = estimate_hints(cloud);
-    const float distance = glm::length(hints.start_pose.position);
-    EXPECT_GT(distance, 1.3f * radius);
-    EXPECT_LT(distance, 5.0f * radius);
-    EXPECT_GT(glm::dot(forward(hints.start_pose), -hints.start_pose.position), 0.95f * distance);
-    EXPECT_LT(hints.start_pose.position.z, 0.0f) << "not from the usual front";
-    EXPECT_LT(hints.near_z, 0.1f * radius);
-    std::size_t inside = 0;  // of an image of 16:9, 53 degrees high
-    for (const glm::vec3& mean : cloud.mean) {
-      const glm::vec3 p =
-          camera_from_world_rotation(hints.start_pose) * (mean - hints.start_pose.position);
-      inside += std::abs(p.x) < 0.889f * p.z && std::abs(p.y) < 0.5f * p.z;
-    }
-    EXPECT_GT(inside, cloud.size() * 9 / 10) << "cut off by the border of the image";
-    EXPECT_GE(up(hints.start_pose).y, -1.0f);
-    EXPECT_LT(up(hints.start_pose).y, -0.5f);
-    EXPECT_EQ(hints.source, "estimated");
-  }
-}
-
-TEST(FirstSight, RoomsAreSeenFromInside) {
-  const SceneHints hints = estimate_hints(room());
-  const glm::vec3 eye = glm::abs(hints.start_pose.position);
-  EXPECT_LT(eye.x, 4.0f);
-  EXPECT_LT(eye.y, 1.5f);
-  EXPECT_LT(eye.z, 3.0f);
-}
-
-TEST(FirstSight, TheCameraNeverStandsInsideOfACluster) {
-  // A fog ball around the middle and a wall of it on every place but one side.
-  GaussianCloud cloud = ball(1.0f);
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> uniform(-3.0f, 3.0f);
-  GaussianCloud fog = surface(60000, 0.1f, [&] {
-    return glm::vec3(uniform(random), uniform(random), std::abs(uniform(random)));
-  });
-  for (std::size_t i = 0; i < fog.size(); ++i) {
-    cloud.mean.push_back(fog.mean[i]);
-    cloud.rotation.push_back(fog.rotation[i]);
-    cloud.scale.push_back(fog.scale[i]);
-    cloud.opacity.push_back(0.1f);
-    cloud.sh.push_back(fog.sh[i]);
-  }
-  const SceneHints hints = estimate_hints(cloud);
-  const VoxelGrid grid(cloud, hints.start_pose.position, 2.0f);
-  EXPECT_LT(grid.depth_around(hints.start_pose.position), 0.2f);
-}
-
-TEST(FirstSight, AnyUpIsKept) {
-  const GaussianCloud cloud = ball(1.0f);
-  for (const glm::vec3& axis : {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)})
-    EXPECT_GT(glm::dot(up(estimate_hints(cloud, axis).start_pose), axis), 0.5f);
-}
-
-TEST(FirstSight, DegenerateCloudsGetAUsablePose) {
-  GaussianCloud one = random_cloud(1, 0);
-  for (const GaussianCloud& cloud : {one, GaussianCloud{}}) {
-    const SceneHints hints = estimate_hints(cloud);
-    EXPECT_TRUE(std::isfinite(glm::length(hints.start_pose.position)));
-    EXPECT_NEAR(glm::length(hints.start_pose.orientation), 1.0f, 1e-5f);
-    EXPECT_GT(hints.near_z, 0.0f);
-    EXPECT_LT(hints.limits.min.x, hints.limits.max.x);
-  }
-}
 
 Sidecar parse_sidecar(const std::string& text) {
   return read_sidecar(MemorySource("city.json", bytes_of(text)));
@@ -206,8 +69,9 @@ class Hints : public FolderTest {
   SceneHints find() {
     return find_hints(cloud_,
                       {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json"},
-                      notes_);
+                      notes_, pool_);
   }
+  std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
   GaussianCloud cloud_ = ball(1.0f);
   std::vector<std::string> notes_;
 };

@@ -2,7 +2,6 @@
 #include <cstdlib>
 #include <tuple>
 
-#include "render_core/scene/analysis/first_sight.h"
 #include "render_core/scene/analysis/voxel_grid.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
@@ -27,7 +26,7 @@ class SharedScenes : public ::testing::Test {
       EXPECT_LT(limits.min[k], eye[k]);
       EXPECT_GT(limits.max[k], eye[k]);
     }
-    const VoxelGrid grid(scene.cloud, eye, 0.25f * glm::distance(limits.min, limits.max));
+    const VoxelGrid grid(scene.cloud, limits);
     EXPECT_LT(grid.depth_around(eye), 0.2f) << "the first pose is inside of something";
   }
 

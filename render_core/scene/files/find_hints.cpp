@@ -1,0 +1,76 @@
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/first_sight/first_sight.h"
+#include "render_core/math/look_at.h"
+#include "render_core/scene/analysis/up_axis.h"
+#include "render_core/scene/files/hints.h"
+
+namespace catgs {
+
+namespace {
+
+struct CameraFile {
+  std::string source;
+  std::vector<Pose> poses;
+};
+
+CameraFile find_cameras(const HintFiles& files, std::vector<std::string>& notes) {
+  const auto try_file = [&](const std::filesystem::path& path, auto read) -> CameraFile {
+    std::error_code error;
+    if (path.empty() || !std::filesystem::is_regular_file(path, error)) return {};
+    try {
+      return {path.filename().string(), read(FileSource(path))};
+    } catch (const InputError& e) {
+      notes.push_back(fmt::format("not used: {}", e.what()));
+      return {};
+    }
+  };
+  CameraFile cameras = try_file(files.cameras, read_cameras_json);
+  if (cameras.poses.empty()) cameras = try_file(files.transforms, read_transforms_json);
+  return cameras;
+}
+
+void use_cameras(const CameraFile& cameras, SceneHints& hints) {
+  const Pose& first = cameras.poses.front();
+  const glm::vec3 forward = first.orientation * glm::vec3(0.0f, 0.0f, 1.0f);
+  const float ahead = glm::dot(hints.focus - first.position, forward);
+  const float scene_size = glm::distance(hints.limits.min, hints.limits.max);
+  hints.focus = first.position + forward * std::max(ahead, 0.02f * scene_size);
+  hints.start_pose = look_at(first.position, hints.focus, hints.up);
+  Bounds box{first.position, first.position};
+  for (const Pose& pose : cameras.poses) {
+    box.min = glm::min(box.min, pose.position);
+    box.max = glm::max(box.max, pose.position);
+  }
+  const float margin = std::max(0.5f * glm::distance(box.min, box.max), hints.near_z);
+  hints.limits = {box.min - margin, box.max + margin};
+  hints.source = cameras.source;
+}
+
+}  // namespace
+
+SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
+                      std::vector<std::string>& notes, std::shared_ptr<ThreadPool> pool) {
+  std::error_code error;
+  std::optional<Sidecar> sidecar;
+  if (!files.sidecar.empty() && std::filesystem::is_regular_file(files.sidecar, error))
+    sidecar = read_sidecar(FileSource(files.sidecar));
+  if (sidecar && sidecar->unknown)
+    notes.push_back(
+        fmt::format("{}: {} is ignored", files.sidecar.filename().string(), *sidecar->unknown));
+  const CameraFile cameras = find_cameras(files, notes);
+
+  const glm::vec3 up = sidecar && sidecar->up ? *sidecar->up : find_up(cloud, cameras.poses);
+  SceneHints hints = estimate_hints(cloud, up, std::move(pool));
+  if (!cameras.poses.empty()) use_cameras(cameras, hints);
+  if (sidecar) use_sidecar(*sidecar, files.sidecar.filename().string(), hints);
+  return hints;
+}
+
+}  // namespace catgs

@@ -1,0 +1,99 @@
+#include "render_core/scene/analysis/up_axis.h"
+
+#include <cmath>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/trigonometric.hpp>
+#include <gtest/gtest.h>
+
+#include "render_core/math/look_at.h"
+#include "tests/support/interiors.h"
+#include "tests/support/surface_clouds.h"
+
+namespace catgs::test {
+namespace {
+
+constexpr glm::vec3 minus_y(0, -1, 0), plus_z(0, 0, 1);
+
+float degrees_between(const glm::vec3& a, const glm::vec3& b) {
+  return glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
+}
+
+void turn(GaussianCloud& cloud, const glm::quat& by) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud.mean[i] = by * cloud.mean[i];
+    cloud.rotation[i] = by * cloud.rotation[i];
+  }
+}
+
+/// Level cameras on an arc of 90 degrees that look at the origin and down.
+std::vector<Pose> arc(float down_deg) {
+  std::vector<Pose> poses;
+  for (int i = 0; i <= 10; ++i) {
+    const float azimuth = glm::radians(9.0f * static_cast<float>(i));
+    const float height = std::tan(glm::radians(down_deg));
+    poses.push_back(
+        look_at({std::sin(azimuth), -height, -std::cos(azimuth)}, glm::vec3(0), minus_y));
+  }
+  return poses;
+}
+
+TEST(UpAxis, LookAtKeepsUpUprightInTheImage) {
+  const glm::vec3 eye(3, -2, 5), target(0, 0, 1);
+  const Pose pose = look_at(eye, target, minus_y);
+  EXPECT_LT(degrees_between(pose.orientation * glm::vec3(0, 0, 1), target - eye), 0.01f);
+  const glm::vec3 in_image = camera_from_world_rotation(pose) * minus_y;
+  EXPECT_NEAR(in_image.x, 0.0f, 1e-5f);
+  EXPECT_LT(in_image.y, 0.0f);  // image y points down
+}
+
+TEST(UpAxis, LookAtAcceptsDegenerateDirections) {
+  for (const glm::vec3& target : {glm::vec3(0, -5, 0), glm::vec3(0, 5, 0), glm::vec3(0)}) {
+    const Pose pose = look_at(glm::vec3(0), target, minus_y);
+    EXPECT_NEAR(glm::length(pose.orientation), 1.0f, 1e-5f);
+    if (target == glm::vec3(0)) continue;
+    EXPECT_LT(degrees_between(pose.orientation * glm::vec3(0, 0, 1), target), 0.01f);
+  }
+}
+
+TEST(UpAxis, FloorsTellUp) {
+  EXPECT_LT(degrees_between(find_up(hall(50000), {}), minus_y), 0.5f);
+  EXPECT_LT(degrees_between(find_up(flat(50000), {}), plus_z), 0.5f);
+}
+
+TEST(UpAxis, AHallThatWasCapturedAskewIsLevelled) {
+  GaussianCloud cloud = hall(50000);
+  const glm::quat askew = glm::angleAxis(glm::radians(14.0f), glm::normalize(glm::vec3(1, 0, 2)));
+  turn(cloud, askew);
+  EXPECT_LT(degrees_between(find_up(cloud, {}), askew * minus_y), 0.5f);
+}
+
+TEST(UpAxis, CamerasThatLookDownDoNotTiltTheHorizon) {
+  for (const float down_deg : {0.0f, 9.0f, 40.0f})
+    EXPECT_LT(degrees_between(find_up(ball(1.0f), arc(down_deg)), minus_y), 0.5f) << down_deg;
+}
+
+TEST(UpAxis, OneCameraGivesItsOwnUp) {
+  const std::vector<Pose> one = {look_at({0, 0, -3}, glm::vec3(0), glm::vec3(0, -1, 0))};
+  EXPECT_LT(degrees_between(find_up(ball(1.0f), one), minus_y), 0.5f);
+}
+
+TEST(UpAxis, CamerasThatLookStraightDownLeaveItToTheFloor) {
+  std::vector<Pose> drone;
+  for (int i = 0; i < 36; ++i) {
+    const glm::quat spin = glm::angleAxis(glm::radians(10.0f * static_cast<float>(i)), plus_z);
+    const glm::quat down = glm::angleAxis(glm::radians(180.0f), glm::vec3(1, 0, 0));
+    drone.push_back({{6, 4, 10}, spin * down});
+  }
+  EXPECT_LT(degrees_between(find_up(flat(50000), drone), plus_z), 0.5f);
+}
+
+TEST(UpAxis, AThingWithoutAFloorHasTheUsualUp) {
+  EXPECT_EQ(find_up(ball(1.0f), {}), minus_y);
+  EXPECT_EQ(find_up(GaussianCloud{}, {}), minus_y);
+}
+
+}  // namespace
+}  // namespace catgs::test
