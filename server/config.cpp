@@ -184,6 +184,8 @@ std::vector<Setting> scene_settings() {
               "Memory for all scenes on each device; for more, the least recently used scene of "
               "--scene-folder is released; 0: no bound",
               &C::scene_memory_mb, 0, 10'000'000),
+      choice<std::string>("up", "Axis that points up in scenes whose sidecar does not say so",
+                          &C::up, words({"auto", "+x", "-x", "+y", "-y", "+z", "-z"})),
       text("bind", "ADDRESS", "Address to listen on; 0.0.0.0 or :: is every interface", &C::bind),
       integer("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
       admin_bind(),

@@ -21,6 +21,7 @@ using namespace first_sight;
 struct Sight {
   Pose pose;
   glm::vec3 focus{0.0f};
+  float scale = 0.0f;  // SceneHints::scale
   Judgement seen;
   float score = 0.0f;
 };
@@ -34,13 +35,15 @@ Bounds with_surroundings(const Bounds& core) {
 }
 
 Sight best_inside(const std::vector<InnerView>& views, ViewJudge& judge) {
+  constexpr float max_eye_heights = 4.0f;  // of the scale: halls are not crossed in a second
   Sight best;
   for (const InnerView& view : views) {
     const Judgement seen = judge.judge(view.pose, 0.15f * view.ahead);
     const float score = view.openness * seen.coverage * (1.0f - seen.veil) * seen.spread;
     if (score <= best.score) continue;
     const glm::vec3 forward = view.pose.orientation * glm::vec3(0, 0, 1);
-    best = {view.pose, view.pose.position + view.ahead * forward, seen, score};
+    const float scale = std::min(view.ahead, max_eye_heights * view.height);
+    best = {view.pose, view.pose.position + view.ahead * forward, scale, seen, score};
   }
   return best;
 }
@@ -78,7 +81,7 @@ Sight best_around(const Content& content, float closer, const glm::vec3& up, Vie
       const float crowded = 1e-6f + seen.detail * seen.detail / (seen.coverage + 0.001f);
       const float score = crowded * (1.0f + seen.symmetry) * (1.0f - seen.veil) *
                           (1.0f + front_preference * std::cos(azimuth));
-      if (score > best.score) best = {pose, pose.position + ahead * forward, seen, score};
+      if (score > best.score) best = {pose, pose.position + ahead * forward, ahead, seen, score};
     }
   return best;
 }
@@ -124,6 +127,7 @@ SceneHints estimate_hints(const GaussianCloud& cloud, const glm::vec3& up,
   hints.source = "estimated";
   hints.start_pose = sight.pose;
   hints.focus = sight.focus;
+  hints.scale = std::max(sight.scale, 1e-3f * radius);
   hints.near_z = std::min(0.2f, 0.02f * radius);
   hints.limits = {glm::min(min, start) - radius, glm::max(max, start) + radius};
   return hints;

@@ -37,6 +37,7 @@ std::array<glm::vec3, directions> sphere() {
 /// What is seen from a place all around.
 struct Surroundings {
   glm::vec3 place;
+  float height = 0.0f;                       // above the ground
   float enclosure = 0.0f;                    // share of all directions that something stops
   float worth = 0.0f;                        // of the place, before a heading is chosen
   std::array<float, directions> distance{};  // to what stops the ray; `reach` where nothing does
@@ -71,6 +72,7 @@ std::optional<Surroundings> Explorer::explore(const glm::vec3& place) const {
   }
   const float below = grid_.distance_along(place, -up_), above = grid_.distance_along(place, up_);
   if (below == VoxelGrid::never) return std::nullopt;
+  around.height = below;
   around.enclosure = static_cast<float>(stopped) / directions;
   const float height = above == VoxelGrid::never ? 0.5f : below / (below + above);
   around.worth = around.enclosure * std::max(0.0f, 1.0f - std::abs(height - 0.5f) / 0.35f);
@@ -104,7 +106,7 @@ InnerView Explorer::view(const Surroundings& from, int heading) const {
   const float clear = std::min(1.0f, nearest / (too_near * mean));
   return {look_at(from.place, from.place + forward, up_),
           from.worth * facing * clear * mean / reach_,
-          ahead / static_cast<float>(std::max(1, count_ahead))};
+          ahead / static_cast<float>(std::max(1, count_ahead)), from.height};
 }
 
 /// The most open views, none of which is nearly the same as a better one.

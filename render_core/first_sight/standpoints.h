@@ -14,6 +14,7 @@ struct InnerView {
   Pose pose;
   float openness = 0.0f;  // how much and how far it sees, 0…1
   float ahead = 0.0f;     // mean distance of what is in the middle of the picture, world units
+  float height = 0.0f;    // above the ground, world units
 };
 
 struct Inside {

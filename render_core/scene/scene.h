@@ -39,6 +39,7 @@ struct SceneHints {
   float near_z = 0.2f;              // world units
   Bounds limits;                    // where the camera may go, world axes
   glm::vec3 focus{0.0f};            // the point that orbiting turns around
+  float scale = 1.0f;               // to a visitor, world units: how far free sight is, about
   std::string source;               // "sidecar scene.json", "cameras.json", "estimated"
 };
 

@@ -160,6 +160,7 @@ Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   scene.hints.start_pose =
       look_at(at(start_place.x, 11.0f, start_place.y), at(-8.0f, 4.0f, 40.0f), up);
   scene.hints.near_z = 0.2f;
+  scene.hints.scale = 14.0f;
   scene.hints.limits = {at(city_centre.x - radius, 90.0f, city_centre.y - radius),
                         at(city_centre.x + radius, 0.5f, city_centre.y + radius)};
   // On the view axis, over the middle of the crossing: an orbit stays between the houses.

@@ -188,6 +188,7 @@ Scene make_garden(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   scene.format = "procedural";
   scene.hints.start_pose = look_at(at(0.75f, 1.15f, -2.7f), at(-0.1f, 0.62f, 0.1f), up);
   scene.hints.near_z = 0.05f;
+  scene.hints.scale = 3.0f;
   scene.hints.limits = {at(-half_m, 3.0f, -half_m), at(half_m, 0.15f, half_m)};
   scene.hints.focus = at(0, 0.6f, 0);
   scene.hints.source = "procedural";

@@ -174,6 +174,7 @@ Scene make_stress(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   scene.format = "procedural";
   scene.hints.start_pose = look_at(at(0, 1.6f, -5.0f), at(0, 1.2f, 0), up);
   scene.hints.near_z = 0.2f;
+  scene.hints.scale = 5.0f;
   scene.hints.limits = {at(-room_m, 5.0f, -room_m), at(room_m, 0.2f, room_m)};
   scene.hints.focus = at(0, 1.2f, 0);
   scene.hints.source = "procedural";

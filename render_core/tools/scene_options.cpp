@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/math/axis_name.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/tools/progress.h"
@@ -32,6 +33,8 @@ void add_scene_options(CLI::App& command, SceneOptions& options, const std::stri
       .add_option("--budget", options.budget,
                   "Streamed SOG: load the finest levels with at most this many Gaussians")
       ->excludes(lod);
+  command.add_option("--up", options.up,
+                     "Axis that points up, like +z, where no sidecar says so [estimated]");
 }
 
 Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
@@ -39,6 +42,12 @@ Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
   LoadOptions load;
   load.lod = options.lod;
   load.gaussian_budget = options.budget;
+  if (options.up) {
+    load.up = axis_named(*options.up);
+    if (!load.up)
+      throw InputError("--up", "", fmt::format("\"{}\" is no axis", *options.up),
+                       "one of +x, -x, +y, -y, +z and -z; a sidecar takes any direction");
+  }
   load.threads = threads;
   load.progress = [&](double fraction) { progress.update(fraction); };
   return load_scene(options.path, load);

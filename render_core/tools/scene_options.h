@@ -17,6 +17,7 @@ struct SceneOptions {
   std::string path;
   std::optional<int> lod;
   std::optional<std::size_t> budget;
+  std::optional<std::string> up;
 };
 /// The path is the command's next positional argument.
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name = "scene");

@@ -93,6 +93,7 @@ struct SceneFacts {
   glm::vec3 limits_min{0.0f};
   glm::vec3 limits_max{0.0f};
   float near_z = 0.2f;
+  float scale = 1.0f;
 };
 
 struct StreamConfig {

@@ -237,6 +237,7 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
   fill(scene.limits_min, *out.mutable_limits_min());
   fill(scene.limits_max, *out.mutable_limits_max());
   out.set_near_z(scene.near_z);
+  out.set_scale(scene.scale);
 }
 
 void fill(const Welcome& welcome, v1::ServerMessage& out) {

@@ -16,6 +16,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
 #include "render_core/base/thread_pool.h"
+#include "render_core/math/axis_name.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
@@ -84,6 +85,7 @@ SceneFacts facts_of(const Scene& scene, std::string id) {
   facts.limits_min = scene.hints.limits.min;
   facts.limits_max = scene.hints.limits.max;
   facts.near_z = scene.hints.near_z;
+  facts.scale = scene.hints.scale;
   return facts;
 }
 
@@ -96,6 +98,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   spdlog::info("loading {}", spec);
   LoadOptions options;
   options.threads = threads;
+  options.up = axis_named(config.up);
   options.progress = progress;
   Scene scene = load(spec, config, std::move(options));
   for (const std::string& note : scene.notes) spdlog::warn("{}: {}", spec, note);

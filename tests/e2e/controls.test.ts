@@ -11,9 +11,16 @@ import { painted_jpeg, stream_of } from './support/painted';
 
 let server: FakeServer;
 let watched: WatchedPage;
+let wall_z: number | undefined; // where rays meet the scene
 
 beforeAll(async () => {
-  server = await start_fake_server(stream_of(await painted_jpeg()));
+  const stream = stream_of(await painted_jpeg());
+  server = await start_fake_server((peer, body) => {
+    stream(peer, body);
+    if (body.case !== 'pick' || wall_z === undefined) return;
+    const { id, origin, direction } = body.value;
+    peer.say({ case: 'picked', value: { id, hit: true, distance: (wall_z - origin!.z) / direction!.z } });
+  });
 });
 
 afterEach(() => expect(watched.errors).toEqual([]));
@@ -159,6 +166,44 @@ describe('the mouse', () => {
   });
 });
 
+describe('which way is up', () => {
+  it('is told by quarter turns, and by the surface in the middle of the view', async () => {
+    const page = await open();
+    await page.getByRole('button', { name: 'Quality and view' }).click();
+    const up_now = async (): Promise<Vec3> => rotate((await pose_of(page)).orientation, [0, -1, 0]);
+    await page.getByRole('button', { name: 'Turn left' }).click();
+    await expect.poll(up_now).toEqual([expect.closeTo(-1, 6), expect.closeTo(0, 6), expect.closeTo(0, 6)]);
+    await page.getByRole('button', { name: 'Turn right' }).click();
+    await expect.poll(up_now).toEqual([expect.closeTo(0, 6), expect.closeTo(-1, 6), expect.closeTo(0, 6)]);
+
+    await page.getByRole('button', { name: 'Stand on what is in the middle' }).click();
+    await page.getByText('There is no surface in the middle').waitFor();
+    wall_z = 0;
+    await page.getByRole('button', { name: 'Stand on what is in the middle' }).click();
+    // The wall has become the floor, seen from 30 degrees above it.
+    await expect.poll(async () => (await pose_of(page)).position[2]).toBeCloseTo(-2.5, 3);
+    expect((await up_now())[2]).toBeCloseTo(-Math.cos(Math.PI / 6), 3);
+  });
+});
+
+describe('speed', () => {
+  it('is chosen by wheel, keys and slider, and kept', async () => {
+    const page = await open();
+    const speed = page.locator('#view-speed-value');
+    await page.keyboard.press('KeyM'); // fly
+    await page.mouse.move(320, 180);
+    for (let i = 0; i < 4; ++i) await page.mouse.wheel(0, -100);
+    await page.locator('#notice', { hasText: 'Speed 2×' }).waitFor();
+    await page.keyboard.press('-');
+    await page.locator('#notice', { hasText: 'Speed 1.4×' }).waitFor();
+    await page.getByRole('button', { name: 'Quality and view' }).click();
+    await page.getByLabel('Speed', { exact: false }).fill('-2');
+    await expect.poll(() => speed.textContent()).toBe('0.25×');
+    await page.reload();
+    await expect.poll(() => speed.textContent()).toBe('0.25×');
+  });
+});
+
 describe('fingers', () => {
   const swipe = async (touch: CDPSession, at: (t: number) => { x: number; y: number }[]): Promise<void> => {
     await touch.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: at(0) });
@@ -187,14 +232,22 @@ describe('fingers', () => {
     await page.locator('#view-fov-value', { hasText: '90°' }).waitFor();
   });
 
+  const tap = (page: Page): Promise<void> => page.touchscreen.tap(200, 220);
+
   it('point at a place by a double tap', async () => {
     const page = await open(true);
-    const tap = (): Promise<void> => page.touchscreen.tap(200, 120);
-    await tap();
-    await tap();
-    await expect
-      .poll(() => server.peers.flatMap(({ heard }) => heard).some((body) => body.case === 'pick'))
-      .toBe(true);
+    await tap(page);
+    await tap(page);
+    await expect.poll(() => server.peers.at(-1)!.heard.some((body) => body.case === 'pick')).toBe(true);
+  });
+
+  it('walk to a place by one tap', async () => {
+    wall_z = 0;
+    const page = await open(true);
+    for (const mode of ['Orbit', 'Fly']) await page.getByRole('button', { name: mode }).tap();
+    const { moved } = await change_by(page, () => tap(page));
+    expect_most(moved, 'forward');
+    expect(moved[1]).toBeCloseTo(0, 6);
   });
 });
 

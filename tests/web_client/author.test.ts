@@ -62,8 +62,8 @@ describe('a draft of a tour', () => {
       limits: { min: [-20, -20, -20] },
       focus: [0, 0, 0],
     });
-    draft.start = { ...stop('a').eye, position: [7, 7, 7] };
-    const sidecar = draft.sidecar({ ...scene, limits_min: [0, 0, 0], limits_max: [0, 0, 0] });
+    const start_pose = { ...scene.start_pose, position: [7, 7, 7] as const };
+    const sidecar = draft.sidecar({ ...scene, start_pose, limits_min: [0, 0, 0], limits_max: [0, 0, 0] });
     expect(sidecar).not.toHaveProperty('limits');
     expect(sidecar).toMatchObject({ start_pose: { position: [7, 7, 7] } });
     const { tours } = JSON.parse(JSON.stringify(sidecar)) as { tours: unknown };

@@ -13,6 +13,7 @@ export const scene: SceneSetup = {
   limits_min: [-20, -20, -20],
   limits_max: [20, 20, 20],
   near_z: 0.2,
+  scale: 5,
 };
 
 /** A camera that moves at once. */

@@ -5,10 +5,10 @@ import type { Eye } from '#client/camera/eye';
 import { glide, glide_time_s } from '#client/camera/flight';
 import { Inertia } from '#client/camera/inertia';
 import { no_axes, sum_of } from '#client/camera/movement';
-import { place_of, ray_through } from '#client/camera/ray';
+import { place_of, ray_through, surface_of } from '#client/camera/ray';
 import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
-import { DoubleTap } from '#client/input/pointers';
+import { Taps } from '#client/input/pointers';
 import { camera, expect_vec, hold, view_of } from './cameras';
 
 const eye_level: Partial<SceneSetup> = {
@@ -83,20 +83,20 @@ describe('a double click', () => {
     expect(turned[0]).not.toBeCloseTo(view[0], 2);
   });
 
-  it('is two taps at one place in a short time, not a drag', () => {
-    const taps = new DoubleTap();
-    const tap = (time_ms: number, x: number, drag = 0): boolean => {
+  it('tells taps, double taps at one place in a short time, and drags', () => {
+    const taps = new Taps();
+    const tap = (time_ms: number, x: number, drag = 0): string => {
       taps.down(x, 10, true);
       return taps.up(time_ms, x + drag, 10);
     };
-    expect(tap(0, 10)).toBe(false);
-    expect(tap(200, 12)).toBe(true);
-    expect(tap(300, 12)).toBe(false);
-    expect(tap(900, 12)).toBe(false);
-    expect(tap(1000, 90)).toBe(false);
-    expect(tap(1100, 90, 40)).toBe(false);
+    expect(tap(0, 10)).toBe('tap');
+    expect(tap(200, 12)).toBe('double tap');
+    expect(tap(300, 12)).toBe('tap');
+    expect(tap(900, 12)).toBe('tap');
+    expect(tap(1000, 90)).toBe('tap');
+    expect(tap(1100, 90, 40)).toBe('drag');
     taps.down(90, 10, false); // a second finger
-    expect(taps.up(1150, 90, 10)).toBe(false);
+    expect(taps.up(1150, 90, 10)).toBe('drag');
   });
 
   it('sends a ray to what is seen there', () => {
@@ -108,6 +108,16 @@ describe('a double click', () => {
     expect(y).toBeCloseTo(0.8, 6);
     const back = origin.map((v, i) => v - direction[i]!) as unknown as Vec3;
     expect(place_of(back, at, 1.5)).toBeUndefined();
+  });
+
+  it('takes four points of the view for a surface that faces the eye', () => {
+    const [left, right, top, bottom]: Vec3[] = [[-1, 2, 5], [1, 2, 5], [0, 2, 6], [0, 2, 4]];
+    const floor = surface_of([left, right, top, bottom], [0, 0, 0])!;
+    expect(floor.point).toEqual([0, 2, 5]);
+    expect(floor.normal.map((v) => Math.round(v * 1e9) / 1e9 + 0)).toEqual([0, -1, 0]);
+    expect(surface_of([left, right, top, bottom], [0, 9, 0])!.normal[1]).toBeCloseTo(1, 9);
+    expect(surface_of([left, right, undefined, bottom], [0, 0, 0])).toBeUndefined();
+    expect(surface_of([left, right, left, right], [0, 0, 0])).toBeUndefined();
   });
 });
 

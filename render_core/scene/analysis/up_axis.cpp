@@ -100,16 +100,16 @@ float floor_size(const std::vector<Facet>& facets, const glm::vec3& up) {
       area[static_cast<std::size_t>(level_of(place(f).z))] += f.area;
   const auto lowest_levels = area.begin() + static_cast<int>(lower_part * levels);
   const int floor = static_cast<int>(std::max_element(area.begin(), lowest_levels) - area.begin());
-  std::array<bool, plan * plan> covered{};
+  std::vector<char> covered(plan * plan);
   for (const Facet& f : facets) {
     const glm::vec3 p = place(f);
     if (std::abs(glm::dot(f.normal, up)) < horizontal || std::abs(level_of(p.z) - floor) > 1)
       continue;
     const glm::ivec2 cell(static_cast<float>(plan) * glm::vec2(p));
     if (cell.x >= 0 && cell.x < plan && cell.y >= 0 && cell.y < plan)
-      covered[static_cast<std::size_t>(cell.y * plan + cell.x)] = true;
+      covered[static_cast<std::size_t>(cell.y * plan + cell.x)] = 1;
   }
-  const float share = static_cast<float>(std::ranges::count(covered, true)) / covered.size();
+  const float share = static_cast<float>(std::ranges::count(covered, 1)) / (plan * plan);
   const float smallest = std::min({extent.x, extent.y, extent.z});
   return share * smallest / extent.z;
 }

@@ -56,7 +56,8 @@ void use_cameras(const CameraFile& cameras, SceneHints& hints) {
 }  // namespace
 
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
-                      std::vector<std::string>& notes, std::shared_ptr<ThreadPool> pool) {
+                      const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
+                      std::shared_ptr<ThreadPool> pool) {
   std::error_code error;
   std::optional<Sidecar> sidecar;
   if (!files.sidecar.empty() && std::filesystem::is_regular_file(files.sidecar, error))
@@ -66,8 +67,10 @@ SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
         fmt::format("{}: {} is ignored", files.sidecar.filename().string(), *sidecar->unknown));
   const CameraFile cameras = find_cameras(files, notes);
 
-  const glm::vec3 up = sidecar && sidecar->up ? *sidecar->up : find_up(cloud, cameras.poses);
-  SceneHints hints = estimate_hints(cloud, up, std::move(pool));
+  std::optional<glm::vec3> told = sidecar ? sidecar->up : std::nullopt;
+  if (!told) told = up;
+  SceneHints hints =
+      estimate_hints(cloud, told ? *told : find_up(cloud, cameras.poses), std::move(pool));
   if (!cameras.poses.empty()) use_cameras(cameras, hints);
   if (sidecar) use_sidecar(*sidecar, files.sidecar.filename().string(), hints);
   return hints;

@@ -12,6 +12,7 @@
 #include <glm/mat3x3.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/math/axis_name.h"
 #include "render_core/math/look_at.h"
 #include "render_core/scene/formats/json_field.h"
 
@@ -24,15 +25,9 @@ constexpr std::uint64_t max_cameras_bytes = 16 << 20;  // 10,000 cameras take 5 
 
 glm::vec3 parse_up(const JsonField& field) {
   if (field.value().is_string()) {
-    const std::string name = field.text();
-    const std::string_view axis = name.size() == 2 && (name[0] == '+' || name[0] == '-')
-                                      ? std::string_view(name).substr(1)
-                                      : std::string_view(name);
-    const std::size_t k = axis.size() == 1 ? std::string_view("xyz").find(axis) : 3;
-    if (k >= 3) field.fail("is no axis", "write \"-y\", \"+z\", … or [x, y, z]");
-    glm::vec3 up(0.0f);
-    up[static_cast<int>(k)] = name[0] == '-' ? -1.0f : 1.0f;
-    return up;
+    const std::optional<glm::vec3> up = axis_named(field.text());
+    if (!up) field.fail("is no axis", "write \"-y\", \"+z\", … or [x, y, z]");
+    return *up;
   }
   const glm::dvec3 up = field.vec3();  // squares of large floats overflow a float
   if (glm::length(up) < 1e-6) field.fail("has no direction");

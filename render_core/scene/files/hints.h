@@ -65,9 +65,10 @@ struct HintFiles {
 
 /// Takes each hint from the first source that has it: the sidecar; the training cameras (first
 /// camera, levelled by find_up(), the box around them grown by half its diagonal);
-/// estimate_hints(). A faulty sidecar throws InputError. Unusable camera files, which were not
-/// written for us, only add a note.
+/// estimate_hints(). `up` (unit) is for a scene whose sidecar names none. A faulty sidecar throws
+/// InputError. Unusable camera files, which were not written for us, only add a note.
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
-                      std::vector<std::string>& notes, std::shared_ptr<ThreadPool> pool);
+                      const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
+                      std::shared_ptr<ThreadPool> pool);
 
 }  // namespace catgs

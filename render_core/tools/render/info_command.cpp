@@ -82,6 +82,7 @@ Json describe(const Scene& scene, double load_ms) {
             {"start_orientation_xyzw", {q.x, q.y, q.z, q.w}},
             {"focus", triple(hints.focus)},
             {"near", hints.near_z},
+            {"scale", hints.scale},
             {"limits", {{"min", triple(hints.limits.min)}, {"max", triple(hints.limits.max)}}}}},
           {"notes", scene.notes},
           {"load_ms", load_ms},
@@ -126,6 +127,7 @@ void print_text(const Json& info) {
   line("  start",
        fmt::format("{}  looking at  {}", point(hints["start_position"]), point(hints["focus"])));
   line("  near plane", fmt::format("{:.4g}", hints["near"].get<double>()));
+  line("  scale", fmt::format("{:.4g}", hints["scale"].get<double>()));
   line("  limits",
        fmt::format("{}  to  {}", point(hints["limits"]["min"]), point(hints["limits"]["max"])));
   for (const Json& note : info["notes"]) line("note", note.get<std::string>());

@@ -1,5 +1,17 @@
 // The viewer's own camera: what gestures, held keys and flights do to it. Pure: no DOM, no clock.
-import { add, axis_angle, conjugate, dot, right, rotate, scale, unit, type Vec3 } from '../base/vector';
+import {
+  add,
+  axis_angle,
+  conjugate,
+  dot,
+  forward,
+  look_at,
+  right,
+  rotate,
+  scale,
+  unit,
+  type Vec3,
+} from '../base/vector';
 import { CameraRig, default_fov_y_rad } from './camera_rig';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';
@@ -14,6 +26,7 @@ import { WalkController } from './walk_controller';
 const steepest_rad = (88 * Math.PI) / 180; // at 90 degrees "up" has no direction in the image
 const turn_rad_per_s = 1.2;
 const fast_factor = 4;
+export const fastest = 16; // and 1 / fastest the slowest
 const level_time_s = 0.25;
 
 export class CameraController {
@@ -26,6 +39,7 @@ export class CameraController {
   private readonly smoothing_ = new Smoothing();
   private mode_: CameraMode = 'orbit';
   private scene_: SceneSetup | undefined;
+  private speed_ = 1;
   private flight_: { way: Flight; time_s: number; ended: (arrived: boolean) => void } | undefined;
 
   /** Time constant of the glide after a gesture. 0 turns it off, for people who asked for reduced motion. */
@@ -48,6 +62,15 @@ export class CameraController {
 
   get up(): Vec3 {
     return this.rig_.up;
+  }
+
+  /** The visitor's own factor on the speed of keys, sticks and flight. */
+  get speed(): number {
+    return this.speed_;
+  }
+
+  set speed(factor: number) {
+    this.speed_ = Math.min(fastest, Math.max(1 / fastest, factor));
   }
 
   /** From the eye to what the visitor looks at, world units; Infinity: unknown. */
@@ -103,11 +126,7 @@ export class CameraController {
 
   /** Flies to where the mode looks at this point of the scene from. */
   focus_on(point: Vec3, at_once = false): void {
-    const to = this.controller.approach(point);
-    const ended = (arrived: boolean): void => {
-      if (arrived) this.rig_.focus = point;
-    };
-    this.fly(glide(this.eye, to, at_once ? 0 : glide_time_s(this.eye, to, this.reach)), ended);
+    this.fly_to(this.controller.approach(point), point, at_once);
   }
 
   /** Puts the camera somewhere. The caller answers for the limits. */
@@ -124,9 +143,19 @@ export class CameraController {
     this.controller.begin();
   }
 
-  /** Turns the scene over, for captures that are upside down. */
-  flip_up(): void {
-    this.rig_.flip_up();
+  /** Turns the scene in the picture, for captures that lie on their side or stand on their head. */
+  turn_up(angle_rad: number): void {
+    this.end_flight(false);
+    this.rig_.roll(angle_rad);
+    this.keep_up();
+  }
+
+  /** Makes `up` (unit) the scene's up, and flies to where a visitor sees the surface at `point` from. */
+  stand_on(point: Vec3, up: Vec3, at_once = false): void {
+    const to = this.rig_.standing_before(point, up);
+    this.rig_.up = up;
+    this.keep_up();
+    this.fly_to(to, point, at_once);
   }
 
   gesture(gesture: Gesture): void {
@@ -172,6 +201,22 @@ export class CameraController {
     return this.modes_[this.mode_];
   }
 
+  private fly_to(to: Eye, focus: Vec3, at_once: boolean): void {
+    const ended = (arrived: boolean): void => {
+      if (arrived) this.rig_.focus = focus;
+    };
+    this.fly(glide(this.eye, to, at_once ? 0 : glide_time_s(this.eye, to, this.reach)), ended);
+  }
+
+  /** The scene keeps this up, and its start is upright in it. */
+  private keep_up(): void {
+    if (!this.scene_) return;
+    const { up } = this.rig_;
+    const { position, orientation } = this.scene_.start_pose;
+    const ahead = add(position, rotate(orientation, forward));
+    this.scene_ = { ...this.scene_, up, start_pose: { position, orientation: look_at(position, ahead, up) } };
+  }
+
   private follow_flight(dt_s: number): boolean {
     const flight = this.flight_;
     if (!flight) return false;
@@ -194,7 +239,7 @@ export class CameraController {
   private hold(dt_s: number, axes: Axes): void {
     if (!is_held(axes)) return;
     const { speed, drag_rad, heading } = this.controller;
-    const way = this.reach * speed * (axes.fast ? fast_factor : 1) * dt_s;
+    const way = this.reach * this.speed * speed * (axes.fast ? fast_factor : 1) * dt_s;
     const turn = turn_rad_per_s * dt_s * Math.sign(drag_rad);
     const ahead = rotate(conjugate(this.pose.orientation), heading);
     this.smoothing_.ask({

@@ -21,6 +21,7 @@ import { limited_fov, type Eye, type Pose } from './eye';
 import type { SceneSetup } from './scene_setup';
 
 const nowhere: Vec3 = [Infinity, Infinity, Infinity];
+const standing_rad = Math.PI / 6; // how far below the horizon it then looks
 const steepest_level_rad = (85 * Math.PI) / 180; // a steeper view shows no horizon
 export const default_fov_y_rad = (60 * Math.PI) / 180;
 
@@ -29,7 +30,7 @@ export class CameraRig {
   up: Vec3 = [0, -1, 0];
   /** What an orbiting camera circles. */
   focus: Vec3 = [0, 0, 1];
-  /** From start to focus: the scene's scale to a visitor. World units. */
+  /** The scene's scale to a visitor, world units: speeds follow it. */
   reach = 1;
   /** The camera comes no nearer to its focus. World units. */
   nearest = 0.1;
@@ -58,7 +59,7 @@ export class CameraRig {
     this.focus = scene.focus;
     this.nearest = Math.max(scene.near_z, 1e-3) * 1.5;
     const to_focus = length(sub(scene.focus, start.position));
-    this.reach = Math.max(to_focus, this.nearest * 2);
+    this.reach = scene.scale > 0 ? scene.scale : Math.max(to_focus, this.nearest * 2);
     if (to_focus < this.nearest) this.focus = this.ahead(this.reach);
     // The limits always contain the start. A scene without limits has min = max.
     const unlimited = scene.limits_max.every((v, i) => v <= scene.limits_min[i]!);
@@ -112,11 +113,24 @@ export class CameraRig {
     this.pose = { position, orientation: multiply(axis_angle(view, roll * share), orientation) };
   }
 
-  /** Turns scene and camera upside down. */
-  flip_up(): void {
-    this.up = scale(this.up, -1);
+  /** Turns up and the camera about the view axis. Angles > 0 turn them clockwise in the picture. */
+  roll(angle_rad: number): void {
+    const by = axis_angle(this.view, angle_rad);
+    this.up = rotate(by, this.up);
     const { position, orientation } = this.pose;
-    this.pose = { position, orientation: multiply(axis_angle(this.view, Math.PI), orientation) };
+    this.pose = { position, orientation: multiply(by, orientation) };
+  }
+
+  /** Where a camera sees the surface at `point` from that a visitor stands on, with `up` as up. */
+  standing_before(point: Vec3, up: Vec3): Eye {
+    const level = (v: Vec3): Vec3 => sub(v, scale(up, dot(v, up)));
+    // A camera that looks straight down at the surface has its own up ahead.
+    const above = rotate(this.pose.orientation, [0, -1, 0]);
+    const ahead = normalize(level(add(this.view, scale(above, 1e-3))), right);
+    const distance = Math.max(length(sub(this.pose.position, point)), this.nearest * 2);
+    const away = sub(scale(up, Math.sin(standing_rad)), scale(ahead, Math.cos(standing_rad)));
+    const position = this.within(add(point, scale(away, distance)));
+    return { position, orientation: look_at(position, point, up), fov_y_rad: this.fov_y_rad };
   }
 
   /** Looks at the point from a third nearer. */

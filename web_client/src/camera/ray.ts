@@ -1,5 +1,5 @@
 // Converts between places in the view and rays in the scene. Pure.
-import { conjugate, normalize, rotate, sub, forward, type Vec3 } from '../base/vector';
+import { add, conjugate, cross, dot, forward, length, normalize, rotate, scale, sub, type Vec3 } from '../base/vector';
 import type { Eye } from './eye';
 
 export interface Ray {
@@ -20,4 +20,24 @@ export function place_of(point: Vec3, eye: Eye, aspect: number): readonly [numbe
   if (z <= 1e-6) return undefined;
   const tan = Math.tan(eye.fov_y_rad / 2);
   return [0.5 + x / z / tan / aspect / 2, 0.5 + y / z / tan / 2];
+}
+
+/** The middle of a surface and its normal (unit, towards the eye). */
+interface Surface {
+  readonly point: Vec3;
+  readonly normal: Vec3;
+}
+
+/**
+ * The surface around the middle of the view, by its points left, right, above and below of it; undefined
+ * where one is missing or they span no plane.
+ */
+export function surface_of(points: readonly (Vec3 | undefined)[], eye: Vec3): Surface | undefined {
+  const [left, right, top, bottom] = points;
+  if (!left || !right || !top || !bottom) return undefined;
+  const point = scale([left, right, top, bottom].reduce(add), 0.25);
+  const across = cross(sub(right, left), sub(bottom, top));
+  if (!(length(across) > 0)) return undefined;
+  const side = dot(across, sub(eye, point)) < 0 ? -1 : 1;
+  return { point, normal: normalize(scale(across, side), forward) };
 }

@@ -9,5 +9,7 @@ export interface SceneSetup {
   readonly limits_min: Vec3;
   readonly limits_max: Vec3;
   readonly near_z: number;
+  /** To a visitor; 0: unknown, and judged by the start. */
+  readonly scale: number;
   readonly start_fov_y_rad?: number;
 }

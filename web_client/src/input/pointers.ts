@@ -73,8 +73,8 @@ const tap_slack_px = 10; // fingers and hands tremble
 const double_tap_ms = 350;
 const double_tap_px = 30;
 
-/** Tells double taps and double clicks from drags. Times in ms, places in px. */
-export class DoubleTap {
+/** Tells taps, clicks and double ones from drags. Times in ms, places in px. */
+export class Taps {
   private down_: { x: number; y: number } | undefined;
   private last_: { time_ms: number; x: number; y: number } | undefined;
 
@@ -82,23 +82,25 @@ export class DoubleTap {
     this.down_ = is_only ? { x, y } : undefined;
   }
 
-  /** Returns whether this was the second tap. */
-  up(time_ms: number, x: number, y: number): boolean {
+  up(time_ms: number, x: number, y: number): 'drag' | 'tap' | 'double tap' {
     const { down_: down, last_: last } = this;
     this.down_ = this.last_ = undefined;
-    if (!down || Math.hypot(x - down.x, y - down.y) > tap_slack_px) return false;
+    if (!down || Math.hypot(x - down.x, y - down.y) > tap_slack_px) return 'drag';
     const is_second =
       last !== undefined &&
       time_ms - last.time_ms <= double_tap_ms &&
       Math.hypot(x - last.x, y - last.y) <= double_tap_px;
     if (!is_second) this.last_ = { time_ms, x, y };
-    return is_second;
+    return is_second ? 'double tap' : 'tap';
   }
 }
 
-/** `delta_mode` is that of WheelEvent. A pinch on a trackpad comes as a wheel with ctrl and small deltas. */
-export function wheel_gesture(delta_y: number, delta_mode: number, ctrl: boolean): Gesture {
+/**
+ * Notches towards the scene. `delta_mode` is that of WheelEvent. A pinch on a trackpad comes as a wheel
+ * with ctrl and small deltas.
+ */
+export function wheel_steps(delta_y: number, delta_mode: number, ctrl: boolean): number {
   const px_per_unit = delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
   const steps = (-delta_y * px_per_unit * (ctrl ? 8 : 1)) / wheel_px_per_step;
-  return { kind: 'dolly', steps: Math.min(8, Math.max(-8, steps)) };
+  return Math.min(8, Math.max(-8, steps));
 }

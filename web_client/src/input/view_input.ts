@@ -2,15 +2,20 @@
 import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
 import { HeldKeys } from './keyboard';
-import { DoubleTap, Pointers, wheel_gesture, type PointerSample } from './pointers';
+import { Pointers, Taps, wheel_steps, type PointerSample } from './pointers';
 
 interface ViewInputListener {
   gesture(gesture: Gesture): void;
+  /** `steps`: notches towards the scene. */
+  wheeled(steps: number, is_pinch: boolean): void;
   keys_changed(): void;
   /** No pointer is down any more, and nothing glides on. */
   let_go(): void;
-  /** A double click or double tap. `x`, `y`: shares of the view's width and height, y down. */
-  pointed_at(x: number, y: number): void;
+  /**
+   * A double click or double tap, or a single tap of a finger. `x`, `y`: shares of the view's width and
+   * height, y down.
+   */
+  pointed_at(x: number, y: number, is_double: boolean): void;
 }
 
 export function bind_view_input(
@@ -32,7 +37,7 @@ function bind_pointers(
   inertia: Inertia,
   listener: ViewInputListener,
 ): void {
-  const taps = new DoubleTap();
+  const taps = new Taps();
   view.addEventListener('pointerdown', (event) => {
     if (event.button === 1) event.preventDefault(); // no scrolling by the middle button
     view.setPointerCapture(event.pointerId);
@@ -49,9 +54,13 @@ function bind_pointers(
   for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
     view.addEventListener(end, (event) => {
       const lifted = pointers.up(event.pointerId);
-      if (end === 'pointerup' && taps.up(event.timeStamp, event.clientX, event.clientY)) {
-        const { left, top, width, height } = view.getBoundingClientRect();
-        listener.pointed_at((event.clientX - left) / width, (event.clientY - top) / height);
+      if (end === 'pointerup') {
+        const what = taps.up(event.timeStamp, event.clientX, event.clientY);
+        if (what === 'double tap' || (what === 'tap' && event.pointerType === 'touch')) {
+          const { left, top, width, height } = view.getBoundingClientRect();
+          const [x, y] = [(event.clientX - left) / width, (event.clientY - top) / height];
+          listener.pointed_at(x, y, what === 'double tap');
+        }
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
         listener.keys_changed();
@@ -66,7 +75,7 @@ function bind_pointers(
     (event) => {
       event.preventDefault();
       inertia.stop();
-      listener.gesture(wheel_gesture(event.deltaY, event.deltaMode, event.ctrlKey));
+      listener.wheeled(wheel_steps(event.deltaY, event.deltaMode, event.ctrlKey), event.ctrlKey);
     },
     { passive: false },
   );

@@ -44,5 +44,6 @@ export function scene_setup(scene: SceneFacts): SceneSetup {
     limits_min: vec3(scene.limitsMin),
     limits_max: vec3(scene.limitsMax),
     near_z: scene.nearZ,
+    scale: scene.scale,
   };
 }

@@ -1,5 +1,4 @@
 // A tour that an author is editing, and the sidecar made from it. Pure.
-import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
 
@@ -7,8 +6,6 @@ export class TourDraft {
   private stops_: readonly Stop[] = [];
   title = '';
   starts_itself = false;
-  /** Where visits begin; undefined: at the start of the scene. */
-  start: Eye | undefined;
   private others_: readonly Tour[] = []; // other tours of the scene, kept as they are
 
   /** Edits the first tour that has stops. */
@@ -18,7 +15,6 @@ export class TourDraft {
     this.stops_ = edited?.stops ?? [];
     this.starts_itself = edited?.starts_itself ?? false;
     this.others_ = tours.filter((tour) => tour !== edited);
-    this.start = undefined;
   }
 
   get stops(): readonly Stop[] {
@@ -54,11 +50,10 @@ export class TourDraft {
 
   /** The whole of `<scene>.json`: the facts of the scene and the tours. */
   sidecar(scene: SceneSetup): object {
-    const start = this.start ?? scene.start_pose;
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
     return {
       up: scene.up,
-      start_pose: { position: start.position, orientation: start.orientation },
+      start_pose: { position: scene.start_pose.position, orientation: scene.start_pose.orientation },
       near: scene.near_z,
       ...(limited && { limits: { min: scene.limits_min, max: scene.limits_max } }),
       focus: scene.focus,

@@ -45,9 +45,8 @@ export class AuthorPanel {
     by_id('button-author', HTMLButtonElement).hidden = false;
     on_click('author-add', () => void this.add());
     on_click('author-start', () => {
-      this.draft_.start = tools_.eye();
       tools_.start_at(tools_.eye());
-      this.changes_ += 1;
+      this.scene_changed();
       this.done_.textContent = text.author.start_set;
     });
     on_click('author-preview', () => tools_.preview());
@@ -81,6 +80,12 @@ export class AuthorPanel {
     this.autoplay_.checked = this.draft_.starts_itself;
     this.changes_ = this.saved_changes_ = 0;
     this.show();
+  }
+
+  /** Where visits begin, or which way is up, is no longer as it was saved. */
+  scene_changed(): void {
+    this.changes_ += 1;
+    this.done_.textContent = '';
   }
 
   private async add(): Promise<void> {

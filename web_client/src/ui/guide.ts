@@ -54,6 +54,7 @@ export class Guide {
     this.author_ = is_author ? this.make_author() : undefined;
     this.bind_share();
     navigation.entered.listen(({ scene }) => void this.enter(scene.sceneId));
+    navigation.up_changed.listen(() => this.author_?.scene_changed());
     navigation.taken_over.listen(() => this.player_.pause());
     navigation.pad_pressed.listen((action) => {
       if (action === 'next') this.player_.next();

@@ -8,14 +8,16 @@ import type { CameraSample, Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { Inertia } from '../camera/inertia';
 import { camera_modes, type CameraMode } from '../camera/mode';
-import { is_held, sum_of, type Axes } from '../camera/movement';
-import { ray_through } from '../camera/ray';
+import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
+import { ray_through, surface_of } from '../camera/ray';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
 import { bind_view_input } from '../input/view_input';
 import { scene_setup } from '../session/camera_messages';
 import { Picks } from '../session/picks';
 import type { SceneFacts, Welcome } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
+
+const speed_per_step = 2 ** 0.25;
 
 export class Navigation {
   readonly camera = new CameraController();
@@ -26,6 +28,10 @@ export class Navigation {
   readonly taken_over = new Signal();
   /** The mode or the field of view may have changed. */
   readonly changed = new Signal();
+  /** The visitor has said which way is up. */
+  readonly up_changed = new Signal();
+  /** The visitor has chosen another speed by wheel or key. */
+  readonly speed_chosen = new Signal<number>();
   readonly sampled = new Signal<CameraSample>();
   readonly pad_pressed = new Signal<GamepadAction>();
   private readonly inertia_ = new Inertia();
@@ -93,9 +99,37 @@ export class Navigation {
     this.moved();
   }
 
-  flip_up(): void {
-    this.camera.flip_up();
+  /** Turns the scene about the view axis. Angles > 0 turn it clockwise. */
+  turn_up(angle_rad: number): void {
+    this.camera.turn_up(angle_rad);
+    this.up_changed.emit();
     this.moved();
+  }
+
+  /** Makes the surface in the middle of the view the floor. Returns whether there is one. */
+  async stand_here(): Promise<boolean> {
+    const d = 0.04; // shares of the view: far enough apart for a direction, near enough for one surface
+    const found = await Promise.all(
+      [[-d, 0], [d, 0], [0, -d], [0, d]].map(([x, y]) => this.place_at(0.5 + x!, 0.5 + y!)),
+    );
+    const floor = surface_of(found, this.eye.position);
+    if (!floor) return false;
+    this.camera.stand_on(floor.point, floor.normal, this.reduced_motion_);
+    this.up_changed.emit();
+    this.loop.wake();
+    return true;
+  }
+
+  /** The visitor's own factor on the speed of keys, sticks and flight. */
+  set_speed(factor: number): void {
+    this.camera.speed = factor;
+    this.changed.emit();
+  }
+
+  /** `steps`: notches of a wheel, > 0 for faster. */
+  faster(steps: number): void {
+    this.set_speed(this.camera.speed * speed_per_step ** steps);
+    this.speed_chosen.emit(this.camera.speed);
   }
 
   set_fov(fov_y_rad: number): void {
@@ -120,14 +154,16 @@ export class Navigation {
 
   private bind_input(): { axes: () => Axes; is_touched: () => boolean } {
     const { keys, pointers } = bind_view_input(this.view_, this.inertia_, {
-      gesture: (gesture) => {
-        this.taken_over.emit();
-        this.camera.gesture(gesture);
-        this.loop.wake();
+      gesture: (gesture) => this.gesture(gesture),
+      wheeled: (steps, is_pinch) => {
+        if (this.camera.mode === 'fly' && !is_pinch) this.faster(steps);
+        else this.gesture({ kind: 'dolly', steps });
       },
       keys_changed: () => this.take_over(),
       let_go: () => this.loop.wake(),
-      pointed_at: (x, y) => void this.point_at(x, y),
+      pointed_at: (x, y, is_double) => {
+        if (is_double || this.camera.mode === 'walk') void this.point_at(x, y);
+      },
     });
     const pads = new Gamepads({
       moved: () => {
@@ -143,6 +179,12 @@ export class Navigation {
       axes: () => sum_of(keys.axes(), pads.axes()),
       is_touched: () => pointers.count > 0,
     };
+  }
+
+  private gesture(gesture: Gesture): void {
+    this.taken_over.emit();
+    this.camera.gesture(gesture);
+    this.loop.wake();
   }
 
   private take_over(): void {

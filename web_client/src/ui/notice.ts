@@ -1,7 +1,5 @@
 import { by_id, on_click } from './dom';
 
-const passing_ms = 20_000;
-
 /** A line at the top of the page. Visitors can dismiss it; a passing one disappears by itself. */
 export class Notice {
   private timer_: ReturnType<typeof setTimeout> | undefined;
@@ -12,9 +10,10 @@ export class Notice {
     on_click('notice-close', () => this.hide());
   }
 
-  show(message: string, passing = false): void {
+  /** `for_s`: how long; undefined: until the visitor dismisses it. */
+  show(message: string, for_s?: number): void {
     clearTimeout(this.timer_);
-    if (passing) this.timer_ = setTimeout(() => this.hide(), passing_ms);
+    if (for_s !== undefined) this.timer_ = setTimeout(() => this.hide(), for_s * 1000);
     this.text_.textContent = message;
     this.notice_.hidden = false;
   }

@@ -56,14 +56,19 @@ export class Toolbar {
     const actions: Readonly<Record<string, () => void>> = {
       KeyM: () => this.navigation_.next_mode(),
       KeyR: () => this.navigation_.reset(),
-      KeyU: () => this.navigation_.flip_up(),
+      KeyU: () => this.navigation_.turn_up(Math.PI),
       KeyF: toggle_full_screen,
       KeyI: () => this.toggle('stats'),
       KeyH: () => this.toggle('help'),
       Escape: () => this.close_all(),
     };
+    const faster: Readonly<Record<string, number>> = { '+': 2, '=': 2, '-': -2, '_': -2 };
     window.addEventListener('keydown', (event) => {
-      if (!this.bar_.inert && !event.repeat && is_for_page(event)) actions[event.code]?.();
+      if (this.bar_.inert || event.repeat || !is_for_page(event)) return;
+      actions[event.code]?.();
+      // By its sign, because its place differs from layout to layout.
+      const steps = faster[event.key];
+      if (steps) this.navigation_.faster(steps);
     });
   }
 

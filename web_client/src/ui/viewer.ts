@@ -41,7 +41,7 @@ export function mount_viewer(card: CardView): SessionStatus {
   const navigation = new Navigation(view, worker, clock, reduced_motion);
   const toolbar = new Toolbar(navigation);
   const status = new SessionStatus(card, toolbar, worker, token);
-  new QualityPanel(navigation, stream_size, worker);
+  new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
   new Guide({ view, clock, worker, navigation, toolbar, notice, token, reduced_motion });
   bind_page_events(worker);
@@ -51,7 +51,8 @@ export function mount_viewer(card: CardView): SessionStatus {
   navigation.entered.listen(({ scene, scene_ids }) => title.show(scene, scene_ids));
   const poster = new Poster();
   worker.on('presented', () => poster.end());
-  worker.on('notice', ({ message }) => notice.show(message, true));
+  navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(speed), 2));
+  worker.on('notice', ({ message }) => notice.show(message, 20));
   worker.on('fallback', ({ message }) => notice.show(text.jpeg.failed_now(message)));
   worker.on('rung', ({ rung: proved }) => remember_rung(proved, storage, navigator.userAgent, Date.now()));
 

@@ -8,6 +8,7 @@
 #include <glm/trigonometric.hpp>
 #include <gtest/gtest.h>
 
+#include "render_core/math/axis_name.h"
 #include "render_core/math/look_at.h"
 #include "tests/support/interiors.h"
 #include "tests/support/surface_clouds.h"
@@ -88,6 +89,14 @@ TEST(UpAxis, CamerasThatLookStraightDownLeaveItToTheFloor) {
     drone.push_back({{6, 4, 10}, spin * down});
   }
   EXPECT_LT(degrees_between(find_up(flat(50000), drone), plus_z), 0.5f);
+}
+
+TEST(UpAxis, AxesHaveNames) {
+  EXPECT_EQ(axis_named("-y"), minus_y);
+  EXPECT_EQ(axis_named("+z"), plus_z);
+  EXPECT_EQ(axis_named("x"), glm::vec3(1, 0, 0));
+  for (const char* text : {"", "+", "-w", "zz", "+-z", "xyz"})
+    EXPECT_FALSE(axis_named(text)) << text;
 }
 
 TEST(UpAxis, AThingWithoutAFloorHasTheUsualUp) {

@@ -69,9 +69,10 @@ class Hints : public FolderTest {
   SceneHints find() {
     return find_hints(cloud_,
                       {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json"},
-                      notes_, pool_);
+                      up_, notes_, pool_);
   }
   std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
+  std::optional<glm::vec3> up_;
   GaussianCloud cloud_ = ball(1.0f);
   std::vector<std::string> notes_;
 };
@@ -117,6 +118,22 @@ TEST_F(Hints, TheSidecarGoesFirst) {
   expect_near(hints.start_pose.position, {9, 0, 1});
   EXPECT_GT(up(hints.start_pose).z, 0.9f);
   expect_near(hints.focus, {0, 0, 0});
+}
+
+TEST_F(Hints, UpFromTheCommandLineIsForScenesWhoseSidecarNamesNone) {
+  up_ = glm::vec3(1, 0, 0);
+  write("cameras.json", cameras_json);
+  write("s.json", R"({"near": 0.5})");
+  expect_near(find().up, {1, 0, 0});
+  write("s.json", R"({"up": "+z"})");
+  expect_near(find().up, {0, 0, 1});
+}
+
+TEST_F(Hints, ScaleIsTheSameWhereverVisitsBegin) {
+  const float scale = find().scale;
+  EXPECT_GT(scale, 0.5f);
+  write("s.json", R"({"start_pose": {"position": [0, 0, -1.1], "look_at": [0, 0, -1]}})");
+  EXPECT_EQ(find().scale, scale);
 }
 
 TEST_F(Hints, AnUnknownFieldOfTheSidecarOnlyLeavesANote) {
