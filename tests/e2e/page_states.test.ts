@@ -53,6 +53,17 @@ describe('page', () => {
     expect(width_px).toBe(640);
   });
 
+  it('says that a browser is too old only when the script does not come', async () => {
+    const server = await start_fake_server(stream);
+    const { page } = await new_page();
+    await page.route('**/*.js', () => undefined); // never answered
+    await page.goto(server.url, { waitUntil: 'commit' });
+    const stays = page.getByText('the browser is too old');
+    await page.getByRole('heading', { name: 'Loading' }).waitFor();
+    expect(await stays.isVisible()).toBe(false);
+    await stays.waitFor();
+  });
+
   it('says that it is broken when it is', async () => {
     const server = await start_fake_server(stream);
     const { page } = await new_page();

@@ -2,6 +2,7 @@
 import { copyFileSync, mkdirSync, readFileSync } from 'node:fs';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
+import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { angle_between } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
@@ -174,6 +175,55 @@ describe('a tour', () => {
   });
 });
 
+describe('a tour that waits at a stop with a long caption', () => {
+  let patient: RunningServer;
+
+  beforeAll(async () => {
+    const other = path.join(folder, 'patient.ply');
+    copyFileSync(scene, other);
+    copyFileSync(path.join(folder, 'city.json'), path.join(folder, 'patient.json'));
+    write_tours(path.join(folder, 'patient.json'), ({ focus, start_pose: { position } }) => {
+      const stop = (title: string, caption: string) => ({ title, caption, position, look_at: focus, stay_s: 60 });
+      return [{ title: 'Patience', stops: [stop('The tower', 'A long story. '.repeat(40)), stop('The gate', 'Closed.')] }];
+    });
+    patient = await start_server(other, ['--min-fps', '0']);
+  });
+
+  it.each([
+    ['the key R', (page: Page) => page.keyboard.press('KeyR')],
+    ['a double click', (page: Page) => page.mouse.dblclick(640, 300)],
+  ])('that stands at a stop is paused by %s', async (_what, act) => {
+    const { page } = await open(patient.url, windows.desktop);
+    await page.getByRole('button', { name: 'Play the tour' }).click();
+    await page.getByText('1 of 2').waitFor();
+    await settle(page);
+    await act(page);
+    await page.getByRole('button', { name: 'Play the tour' }).waitFor();
+  });
+
+  it.each([
+    [640, 360],
+    [480, 270],
+    [360, 480],
+  ])('fits into a frame of %i x %i, and shows that its caption goes on', async (width, height) => {
+    const { page } = await open(`${patient.url}?ui=0#stop=1`, { viewport: { width, height } });
+    const card = page.locator('#tour');
+    await card.getByText('A long story.').waitFor();
+    await keep_screenshot(page, `tour-frame-${width}x${height}`);
+    const box = (await card.boundingBox())!;
+    expect(box.height).toBeLessThan(0.7 * height);
+    expect(box.x).toBeGreaterThanOrEqual(0);
+    expect(box.x + box.width).toBeLessThanOrEqual(width);
+    expect(box.y).toBeGreaterThanOrEqual(0);
+    expect(box.y + box.height).toBeLessThanOrEqual(height);
+    const goes_on = (): Promise<string | null> => page.locator('#tour-text').getAttribute('class');
+    await expect.poll(goes_on).toContain('more-below');
+    await page.getByRole('button', { name: 'Next stop' }).click();
+    await page.getByText('2 of 2').waitFor();
+    await expect.poll(goes_on).not.toContain('more-below');
+  });
+});
+
 describe('sharing', () => {
   it('a link leads to the same view and stop, and carries no token', async () => {
     const { page } = await open(`${server.url}#token=not-needed-here`);
@@ -189,6 +239,29 @@ describe('sharing', () => {
     const [mine, theirs] = [await pose_of(page), await pose_of(friend)];
     expect(distance(mine, theirs)).toBeLessThan(0.01);
     expect(turned(mine, theirs)).toBeLessThan(0.001);
+    await friend.getByText('1 of 2').waitFor();
+    await friend.locator('#tour-text', { hasText: 'as a bird sees it' }).waitFor();
+  });
+
+  it('a link may name the mode alone', async () => {
+    const { page } = await open(`${server.url}#mode=walk`);
+    await page.getByText('Walk', { exact: true }).waitFor();
+  });
+
+  it('a link to a place beyond the limits leads to the nearest within, and says so', async () => {
+    const { page } = await open(`${server.url}#at=1e6,-20,0,0,0,0,1,60`);
+    await page.getByText('That view is outside').waitFor();
+    expect((await pose_of(page)).position[0]).toBeLessThan(1e5);
+  });
+
+  it('what a button answers moves nothing', async () => {
+    const { page } = await open(server.url, windows.desktop);
+    await page.getByRole('button', { name: 'Share' }).click();
+    const button = page.getByRole('button', { name: 'Copy link' });
+    const before = await button.boundingBox();
+    await button.click();
+    await page.locator('#share-done', { hasText: /\S/ }).waitFor();
+    expect(await button.boundingBox()).toEqual(before);
   });
 
   it('says when no other page may show it', async () => {

@@ -230,11 +230,16 @@ describe('trouble', () => {
     expect(x).toBeCloseTo((await pose_of(page)).position[0], 3);
   });
 
-  it('a page that is no secure context gets JPEG pictures and says how to get video', async () => {
+  it('a page that is no secure context gets JPEG pictures, tells visitors what that means, and the console why', async () => {
     // The server answers to another host name only when it was told that name.
     const plain = await start_server(scene, ['--allow-origin', `http://${insecure_host}`]);
-    const { page } = await open(plain.url.replace('127.0.0.1', insecure_host));
-    await page.getByText('browsers offer their video decoder (WebCodecs) on https://').waitFor();
+    const { page } = await new_page();
+    const said: string[] = [];
+    page.on('console', (message) => said.push(message.text()));
+    await page.goto(plain.url.replace('127.0.0.1', insecure_host));
+    await page.getByText('The picture may be slower here').waitFor();
+    expect(said.join()).toContain('WebCodecs');
+    await settle(page);
     await choose_full_size(page);
     const picture = await settled_picture(page);
     expect([picture.width, picture.height]).toEqual([640, 360]);
@@ -266,7 +271,7 @@ describe('trouble', () => {
     await settle(page);
     expect(decoder_failures()).toBeGreaterThanOrEqual(2);
     expect(await page.evaluate(() => localStorage.getItem('catgs.decoder'))).toContain(rung);
-    if (rung === 'jpeg') await page.getByText('pictures come as JPEG').waitFor();
+    if (rung === 'jpeg') await page.getByText('The picture may be slower here').waitFor();
     warnings.length = 0;
     await page.reload();
     await settle(page);

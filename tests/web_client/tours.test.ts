@@ -290,6 +290,17 @@ describe('the player', () => {
     expect(state()).toMatchObject({ stop_index: 1, playing: false });
   });
 
+  it('shows the card of a stop without going there', () => {
+    const { player, flying, state } = guided();
+    player.load([tour]);
+    player.play();
+    player.show_stop(1);
+    expect(state()).toMatchObject({ stop_index: 1, playing: false });
+    expect(flying()).toBeUndefined();
+    player.show_stop(99);
+    expect(state().stop_index).toBe(1);
+  });
+
   it('ends when the visitor takes over', () => {
     const { player, time, paths, stop_flight, flying, state } = guided();
     player.load([tour]);

@@ -154,6 +154,7 @@ export const text = {
     minutes: (min: number): string => `${min} min`,
   },
   jpeg: {
+    slower: 'The picture may be slower here than elsewhere.',
     failed_lately:
       'Video could not be decoded here lately, so pictures come as JPEG, which needs more bandwidth. Video is tried again in a week, or after you clear the site data of this page.',
     no_decoder:
@@ -257,6 +258,7 @@ export const text = {
     save_picture: 'Save picture',
     link_copied: 'The link is in the clipboard.',
     code_copied: 'The code is in the clipboard.',
+    outside: 'That view is outside of what visitors may see. This is the nearest one.',
     copy_yourself: 'Copy it from the field above.',
     token: 'Your access token is not in it. Visitors need a token of their own.',
     no_frames:

@@ -20,6 +20,8 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
+export const same = (a: Vec3, b: Vec3): boolean => a.every((v, i) => v === b[i]);
+
 /** Returns `fallback` where `a` has no direction. */
 export function normalize(a: Vec3, fallback: Vec3): Vec3 {
   const n = length(a);

@@ -129,6 +129,11 @@ export class CameraController {
     this.fly_to(this.controller.approach(point), point, at_once);
   }
 
+  /** The place nearest to this one that the scene's limits allow. */
+  within(position: Vec3): Vec3 {
+    return this.rig_.within(position);
+  }
+
   /** Puts the camera somewhere. The caller answers for the limits. */
   jump(pose: Pose): void {
     this.end_flight(false);

@@ -87,6 +87,14 @@ export class TourPlayer {
     this.travel(stop_index, at_once);
   }
 
+  /** Shows the stop's card; the camera stays where it is. */
+  show_stop(stop_index: number): void {
+    this.pause();
+    if (!this.state.tour?.stops[stop_index]) return;
+    this.stop_index_ = stop_index;
+    this.tell();
+  }
+
   next(): void {
     this.go_by(1);
   }

@@ -3,7 +3,7 @@ import { unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
 
-interface SharedView {
+export interface SharedView {
   readonly eye: Eye | undefined;
   readonly mode: CameraMode | undefined;
   readonly tour_index: number | undefined;

@@ -38,6 +38,7 @@ export class CardView {
     this.card_.classList.toggle('settled', card.busy !== true);
     this.title_.textContent = card.title;
     this.text_.textContent = card.text;
+    by_id('card-stays', HTMLElement).hidden = true;
     show_scene_links('card-scenes', card.scene_ids ?? []);
     this.form_.hidden = card.asks_token !== true;
     this.action_.hidden = card.action === undefined;

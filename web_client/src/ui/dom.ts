@@ -31,3 +31,17 @@ export function save_file(blob: Blob, name: string): void {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
+
+/**
+ * Lets the style sheets show that an element scrolls further, because phones show no scroll bars. Call the
+ * returned function when its content has changed.
+ */
+export function hint_at_more(element: HTMLElement): () => void {
+  const look = (): void => {
+    const below_px = element.scrollHeight - element.clientHeight - element.scrollTop;
+    element.classList.toggle('more-below', below_px > 1);
+  };
+  element.addEventListener('scroll', look, { passive: true });
+  new ResizeObserver(look).observe(element);
+  return look;
+}

@@ -1,11 +1,12 @@
 // Leads visitors through a scene: tours, shared views, and the page around this one.
 import { browser_timers, type Clock } from '../base/clock';
+import type { Eye } from '../camera/eye';
 import { scene_name } from '../session/scenes';
 import type { AccessToken } from '../session/token';
 import { text } from '../text';
 import { fetch_tours, read_document } from '../tour/load';
 import { TourPlayer, type TourState } from '../tour/player';
-import { read_shared, share_address } from '../tour/share';
+import { read_shared, share_address, type SharedView } from '../tour/share';
 import type { WorkerClient } from '../worker/client';
 import { AuthorPanel } from './author_panel';
 import { EmbedApi } from './embed';
@@ -61,14 +62,18 @@ export class Guide {
       else if (action === 'previous') this.player_.previous();
       else if (action === 'play') this.player_.toggle();
     });
-    window.addEventListener('hashchange', () => this.apply_shared());
+    window.addEventListener('hashchange', () => {
+      const shared = read_shared(location.href);
+      this.show_view(shared);
+      this.show_stop(shared);
+    });
   }
 
   private make_embed(): EmbedApi {
     const { navigation } = this.parts_;
     return new EmbedApi({
       eye: () => navigation.eye,
-      set_eye: (eye) => navigation.put(eye),
+      set_eye: (eye) => this.put(eye),
       go_to: (stop) => this.player_.go_to(stop),
       next: () => this.player_.next(),
       previous: () => this.player_.previous(),
@@ -124,7 +129,7 @@ export class Guide {
     const token = this.parts_.token.value;
     const load = ++this.loads_;
     const shared = read_shared(location.href);
-    if (shared.eye) this.apply_shared();
+    this.show_view(shared);
     const { document, may_save } = await fetch_tours(location.href, token, scene_id);
     if (load !== this.loads_) return; // the visitor entered another scene meanwhile
     const { camera } = navigation;
@@ -141,8 +146,7 @@ export class Guide {
     const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
     this.player_.load(tours, stays);
     if (load === 1 && this.author_) toolbar.open('author');
-    if (shared.tour_index !== undefined) this.player_.choose(shared.tour_index);
-    if (shared.stop_index !== undefined && !shared.eye) this.player_.go_to(shared.stop_index, true);
+    this.show_stop(shared, true);
     this.embed_.say({
       catgs: 'ready',
       scene: scene_name(scene_id),
@@ -150,12 +154,22 @@ export class Guide {
     });
   }
 
-  private apply_shared(): void {
-    const { eye, mode, stop_index } = read_shared(location.href);
-    const { navigation } = this.parts_;
-    if (mode) navigation.set_mode(mode);
-    if (eye) navigation.put(eye);
-    else if (stop_index !== undefined) this.player_.go_to(stop_index);
+  private show_view({ eye, mode }: SharedView): void {
+    if (mode) this.parts_.navigation.set_mode(mode);
+    if (!eye) return;
+    this.player_.pause();
+    this.put(eye);
+  }
+
+  private show_stop({ eye, tour_index, stop_index }: SharedView, at_once?: boolean): void {
+    if (tour_index !== undefined) this.player_.choose(tour_index);
+    if (stop_index === undefined) return;
+    if (eye) this.player_.show_stop(stop_index);
+    else this.player_.go_to(stop_index, at_once);
+  }
+
+  private put(eye: Eye): void {
+    if (!this.parts_.navigation.put(eye)) this.parts_.notice.show(text.share.outside, 10);
   }
 
   private tour_changed(state: TourState): void {

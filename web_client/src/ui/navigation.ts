@@ -1,7 +1,7 @@
 // Moves the visitor through the scene: by pointers, keys, sticks, places pointed at, and flights.
 import { browser_timers, type Clock } from '../base/clock';
 import { Signal } from '../base/signal';
-import type { Vec3 } from '../base/vector';
+import { same, type Vec3 } from '../base/vector';
 import { CameraController } from '../camera/camera_controller';
 import { CameraLoop } from '../camera/camera_loop';
 import type { CameraSample, Eye } from '../camera/eye';
@@ -88,13 +88,17 @@ export class Navigation {
     this.camera.stop_flight();
   }
 
-  put(eye: Eye): void {
-    this.camera.jump(eye);
+  /** Puts the camera there, or as near as the scene's limits allow. Returns whether it is there. */
+  put(eye: Eye): boolean {
+    const position = this.camera.within(eye.position);
+    this.camera.jump({ ...eye, position });
     this.camera.fov_y_rad = eye.fov_y_rad;
     this.moved();
+    return same(position, eye.position);
   }
 
   reset(): void {
+    this.taken_over.emit();
     this.camera.reset();
     this.moved();
   }
@@ -212,6 +216,7 @@ export class Navigation {
     const pointed = ++this.pointed_;
     const place = await this.place_at(x, y);
     if (!place || pointed !== this.pointed_) return;
+    this.taken_over.emit();
     this.camera.focus_on(place, this.reduced_motion_);
     this.loop.wake();
   }

@@ -2,7 +2,7 @@ import { Signal } from '../base/signal';
 import type { CameraMode } from '../camera/mode';
 import { is_for_page } from '../input/view_input';
 import { text } from '../text';
-import { by_id, on_click } from './dom';
+import { by_id, hint_at_more, on_click } from './dom';
 import type { Navigation } from './navigation';
 
 const panels = ['quality', 'stats', 'share', 'author', 'help'] as const;
@@ -114,16 +114,6 @@ const element_of = (panel: Panel): HTMLElement => by_id(`${panel}-panel`, HTMLEl
 
 function overlap(a: DOMRect, b: DOMRect): boolean {
   return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
-}
-
-/** Lets panels.css show that a panel scrolls further, because phones show no scroll bars. */
-function hint_at_more(panel: HTMLElement): void {
-  const look = (): void => {
-    const below_px = panel.scrollHeight - panel.clientHeight - panel.scrollTop;
-    panel.classList.toggle('more-below', below_px > 1);
-  };
-  panel.addEventListener('scroll', look, { passive: true });
-  new ResizeObserver(look).observe(panel);
 }
 
 function toggle_full_screen(): void {

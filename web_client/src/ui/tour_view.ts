@@ -2,13 +2,15 @@ import { is_for_page } from '../input/view_input';
 import { text } from '../text';
 import type { TourPlayer, TourState } from '../tour/player';
 import type { Tour } from '../tour/tour';
-import { by_id, on_click } from './dom';
+import { by_id, hint_at_more, on_click } from './dom';
 
 /** The card of a tour: caption, buttons and keys. */
 export class TourView {
   private readonly card_ = by_id('tour', HTMLElement);
   private readonly choice_ = by_id('tour-choice', HTMLSelectElement);
   private readonly play_ = by_id('tour-play', HTMLButtonElement);
+  private readonly text_ = by_id('tour-text', HTMLElement);
+  private readonly text_changed_ = hint_at_more(this.text_);
   private has_tours_ = false;
 
   constructor(player: TourPlayer) {
@@ -45,7 +47,9 @@ export class TourView {
     this.choice_.value = String(state.tour_index);
     const name = tour?.title ?? '';
     by_id('tour-title', HTMLElement).textContent = stop ? stop.title : name || text.tour.untitled;
-    by_id('tour-text', HTMLElement).textContent = stop?.caption ?? '';
+    this.text_.textContent = stop?.caption ?? '';
+    this.text_.scrollTop = 0;
+    this.text_changed_();
     by_id('tour-place', HTMLElement).textContent =
       count === 0 ? '' : stop_index === undefined ? text.tour.stops(count) : text.tour.place(stop_index + 1, count);
     for (const id of ['tour-previous', 'tour-next']) {

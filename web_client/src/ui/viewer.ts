@@ -53,7 +53,12 @@ export function mount_viewer(card: CardView): SessionStatus {
   worker.on('presented', () => poster.end());
   navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(speed), 2));
   worker.on('notice', ({ message }) => notice.show(message, 20));
-  worker.on('fallback', ({ message }) => notice.show(text.jpeg.failed_now(message)));
+  // Visitors hear what it means to them, and the console has the reason.
+  const tell_of_jpeg = (why: string): void => {
+    console.warn(why);
+    notice.show(text.jpeg.slower, 20);
+  };
+  worker.on('fallback', ({ message }) => tell_of_jpeg(text.jpeg.failed_now(message)));
   worker.on('rung', ({ rung: proved }) => remember_rung(proved, storage, navigator.userAgent, Date.now()));
 
   const scene_id = wishes.get('scene') ?? '';
@@ -75,7 +80,7 @@ export function mount_viewer(card: CardView): SessionStatus {
     [canvas],
   );
   const jpeg = jpeg_reason(has_webcodecs(), isSecureContext, rung);
-  if (jpeg) notice.show(jpeg);
+  if (jpeg) tell_of_jpeg(jpeg);
   return status;
 }
 
