@@ -138,7 +138,7 @@ export class Guide {
     for (const problem of problems) notice.show(text.tour.unreadable(problem));
     if (start) {
       camera.start_at(start);
-      if (!shared.eye) navigation.put(start);
+      if (!shared.eye) navigation.reset();
     }
     this.tour_view_.show_tours(tours);
     this.author_?.load(tours, may_save ? token : undefined, document.etag);
