@@ -8,6 +8,7 @@
 
 #include "render_core/math/camera.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/scene_about.h"
 
 namespace catgs {
 
@@ -40,7 +41,8 @@ struct SceneHints {
   Bounds limits;                    // where the camera may go, world axes
   glm::vec3 focus{0.0f};            // the point that orbiting turns around
   float scale = 1.0f;               // to a visitor, world units: how far free sight is, about
-  std::string source;               // "sidecar scene.json", "cameras.json", "estimated"
+  SceneAbout about;
+  std::string source;  // "sidecar scene.json", "cameras.json", "estimated"
 };
 
 /// A scene ready to be rendered.

@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "render_core/math/camera.h"
+#include "render_core/scene/scene_about.h"
 #include "server/base/clock.h"
 #include "server/encode/encoder.h"
 
@@ -94,6 +95,7 @@ struct SceneFacts {
   glm::vec3 limits_max{0.0f};
   float near_z = 0.2f;
   float scale = 1.0f;
+  SceneAbout about;
 };
 
 struct StreamConfig {

@@ -238,6 +238,10 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
   fill(scene.limits_max, *out.mutable_limits_max());
   out.set_near_z(scene.near_z);
   out.set_scale(scene.scale);
+  out.set_credits(scene.about.credits);
+  out.set_licence(scene.about.licence);
+  out.set_mode(static_cast<v1::CameraMode>(scene.about.mode));  // of the same order
+  out.set_background_rgb(scene.about.background_rgb);
 }
 
 void fill(const Welcome& welcome, v1::ServerMessage& out) {

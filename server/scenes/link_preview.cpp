@@ -28,9 +28,11 @@ std::string preview_elements(const LinkPreview& preview) {
   };
   add("property", "og:type", "website");
   add("property", "og:title", preview.title);
-  add("property", "og:description",
-      fmt::format("Walk through this 3D capture of {} Gaussians in your browser.",
-                  preview.gaussians));
+  std::string description = fmt::format(
+      "Walk through this 3D capture of {} Gaussians in your browser.", preview.gaussians);
+  for (const std::string& said : {preview.about.credits, preview.about.licence})
+    if (!said.empty()) description += fmt::format(" {}.", said);
+  add("property", "og:description", description);
   if (!preview.has_poster || preview.site.empty()) return out;
   add("property", "og:image",
       fmt::format("{}/api/scenes/{}/poster.jpg", preview.site, url_part(preview.scene_id)));

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "render_core/scene/scene_about.h"
+
 namespace catgs {
 
 /// The facts that messengers and social sites show for a link to a scene.
@@ -11,6 +13,7 @@ struct LinkPreview {
   std::string_view site;  // "https://tours.example"
   std::string_view scene_id;
   std::string_view title;
+  SceneAbout about{};
   std::uint64_t gaussians = 0;
   bool has_poster = false;
 };

@@ -21,6 +21,7 @@ std::string render(Renderer& renderer, const SceneFacts& facts) {
   FrameRequest request;
   request.camera =
       make_camera(facts.start_pose, size_px, focal_from_fov_y(fov_y_rad, size_px.y), facts.near_z);
+  request.background = colour_of(facts.about.background_rgb);
   FrameView picture;
   const RenderStatus rendered = view->render(request, picture);
   if (!rendered.ok()) throw std::runtime_error(rendered.message);
@@ -44,7 +45,8 @@ std::shared_ptr<const std::string> make_poster(Renderer& renderer, const SceneFa
 
 bool same_poster(const SceneFacts& one, const SceneFacts& other) {
   return one.start_pose.position == other.start_pose.position &&
-         one.start_pose.orientation == other.start_pose.orientation && one.near_z == other.near_z;
+         one.start_pose.orientation == other.start_pose.orientation && one.near_z == other.near_z &&
+         one.about.background_rgb == other.about.background_rgb;
 }
 
 }  // namespace catgs

@@ -36,6 +36,8 @@ std::shared_ptr<const std::string> scene_list(
   for (const auto* scene : scenes)
     list.push_back({{"id", scene->id},
                     {"title", scene->title},
+                    {"credits", scene->about.credits},
+                    {"licence", scene->about.licence},
                     {"gaussians", scene->gaussians},
                     {"loaded", scene->loaded}});
   return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
@@ -68,8 +70,8 @@ std::string SceneApi::preview(const HttpRequest& request) {
           : std::ranges::find(*listing, scenes_.resolve(argument->substr(name.size())),
                               &SceneLibrary::Listing::id);
   if (scene == listing->end() || authorize_("")(scene->id, Use::own_session)) return {};
-  return preview_elements(
-      {request.site, scene->id, scene->title, scene->gaussians, scene->poster != nullptr});
+  return preview_elements({request.site, scene->id, scene->title, scene->about, scene->gaussians,
+                           scene->poster != nullptr});
 }
 
 /// Lists the scenes that the permit allows. Like hello, the list tells strangers nothing about
@@ -103,8 +105,14 @@ HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part, const
     const ToursAnswers& tours = found->tours ? *found->tours : none;
     return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
   }
-  if (!found->poster)
-    return text_response(404, "404: the scene has no poster, or waits for its first visit\n");
+  if (!found->poster) {
+    HttpResponse none = text_response(404, "404: the scene has no poster\n");
+    if (found->loaded) return none;
+    scenes_.want_poster(found->id);
+    none = text_response(404, "404: the scene is not loaded yet, and has no poster before\n");
+    none.retry_after_s = 5;
+    return none;
+  }
   HttpResponse response;
   response.content_type = "image/jpeg";
   response.cache_control = "private, max-age=60";

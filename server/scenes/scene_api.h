@@ -17,7 +17,7 @@ namespace catgs {
 class SceneApi {
  public:
   /// `scenes` must outlive this object.
-  SceneApi(const SceneLibrary& scenes, Authorize authorize)
+  SceneApi(SceneLibrary& scenes, Authorize authorize)
       : scenes_(scenes), authorize_(std::move(authorize)) {}
 
   /// Returns nothing for any other path.
@@ -37,7 +37,7 @@ class SceneApi {
   HttpResponse list_scenes(const Permit& permit);
   HttpResponse part_of_scene(std::string_view scene_id, Part part, const Permit& permit);
 
-  const SceneLibrary& scenes_;
+  SceneLibrary& scenes_;
   const Authorize authorize_;
   // The cached answer for clients that may see every scene of a listing.
   std::weak_ptr<const std::vector<SceneLibrary::Listing>> listed_;

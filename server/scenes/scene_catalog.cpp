@@ -14,7 +14,6 @@
 #include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
-#include "render_core/base/printable.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/scene/files/load_scene.h"
@@ -23,6 +22,7 @@
 #include "render_core/synth/synth.h"
 #include "server/net/http.h"
 #include "server/scenes/poster.h"
+#include "server/scenes/scene_facts.h"
 #include "server/scenes/scene_ids.h"
 #include "server/scenes/tours.h"
 
@@ -74,21 +74,6 @@ Scene load(const std::string& spec, const ServerConfig& config, LoadOptions opti
   return load_scene(spec, options);
 }
 
-SceneFacts facts_of(const Scene& scene, std::string id) {
-  SceneFacts facts;
-  facts.scene_id = std::move(id);
-  facts.title = printable(scene.name);
-  facts.gaussians = scene.cloud.size();
-  facts.up = scene.hints.up;
-  facts.start_pose = scene.hints.start_pose;
-  facts.focus = scene.hints.focus;
-  facts.limits_min = scene.hints.limits.min;
-  facts.limits_max = scene.hints.limits.max;
-  facts.near_z = scene.hints.near_z;
-  facts.scale = scene.hints.scale;
-  return facts;
-}
-
 }  // namespace
 
 std::shared_ptr<const SceneEntry> load_scene(
@@ -103,7 +88,10 @@ std::shared_ptr<const SceneEntry> load_scene(
   Scene scene = load(spec, config, std::move(options));
   for (const std::string& note : scene.notes) spdlog::warn("{}: {}", spec, note);
   auto entry = std::make_shared<SceneEntry>();
-  entry->facts = facts_of(scene, id_of(scene.name));
+  entry->name = scene.name;
+  entry->facts.scene_id = id_of(scene.name);
+  entry->facts.gaussians = scene.cloud.size();
+  use_hints(scene.hints, scene.name, entry->facts);
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
   if (!is_synthetic(spec)) {
     entry->sidecar = locate_scene(spec).hints.sidecar;

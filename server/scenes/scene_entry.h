@@ -15,6 +15,7 @@ namespace catgs {
 /// A scene as sessions see it: one copy, shared by all.
 struct SceneEntry {
   SceneFacts facts;
+  std::string name{};  // of its file, for people
   std::shared_ptr<Renderer> renderer;
   std::string renderer_text;  // description and reason, for people
   std::shared_ptr<const SurfacePoints> surface{};

@@ -32,6 +32,16 @@ bool is_scene_folder(const fs::path& path) {
          fs::is_directory(path / "point_cloud", error);
 }
 
+/// Empty if the sidecar is missing. A faulty one is reported when the scene is loaded.
+SceneAbout about_in(const fs::path& sidecar) {
+  std::error_code error;
+  try {
+    if (fs::is_regular_file(sidecar, error)) return read_sidecar(FileSource(sidecar)).about;
+  } catch (const InputError&) {
+  }
+  return {};
+}
+
 /// The newest file counts, because the files of a folder may be replaced one by one or all at once.
 fs::file_time_type time_of(const fs::path& path) {
   std::error_code error;
@@ -82,9 +92,14 @@ std::vector<FoundScene> SceneFolders::scan() {
     } else {
       now.changed = changed;
       try {
-        std::string name = printable(to_utf8(locate_scene(path).name));
+        const SceneLocation location = locate_scene(path);
+        std::string name = printable(to_utf8(location.name));
         std::string id = ids_.id_of(path.string(), name);
-        now.scene = {path, std::move(name), std::move(id), read_scene_size(path, options_),
+        now.scene = {path,
+                     std::move(name),
+                     std::move(id),
+                     read_scene_size(path, options_),
+                     about_in(location.hints.sidecar),
                      changed};
         now.good = true;
       } catch (

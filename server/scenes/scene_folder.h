@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render_core/scene/files/scene_size.h"
+#include "render_core/scene/scene_about.h"
 #include "server/scenes/scene_ids.h"
 
 namespace catgs {
@@ -17,6 +18,7 @@ struct FoundScene {
   std::string name;  // for people
   std::string id;
   SceneSize size;
+  SceneAbout about;  // of its sidecar, when the scene was found
   /// Modification time of the file, or of the newest one directly in its folder. A new value means
   /// a new scene.
   std::filesystem::file_time_type changed;

@@ -100,7 +100,7 @@ void SceneLibrary::pin(std::shared_ptr<const SceneEntry> entry) {
   if (preferred_scene_.empty()) preferred_scene_ = id;
   residency_.pin(id, entry->renderer->scene_bytes());
   Book& book = book_of(id);
-  book.found.name = entry->facts.title;
+  book.found.name = entry->name;
   book.found.size.gaussians = entry->facts.gaussians;
   book.pinned = true;
   book.entry = std::move(entry);
@@ -166,6 +166,14 @@ ErrorMessage SceneLibrary::refusal(SceneResidency::Wish wish, const std::string&
                     name_in(id)),
         false};
   return {ErrorCode::server_full, "other scenes are being loaded: try again in a minute", false};
+}
+
+void SceneLibrary::want_poster(const std::string& id) {
+  boost::asio::post(io_, [this, id] {
+    const auto it = shelf_.find(id);
+    if (it == shelf_.end() || it->second.gone || it->second.poster || residency_.busy()) return;
+    want(id, clock_());
+  });
 }
 
 void SceneLibrary::on_tick(TimePoint now) {
@@ -285,6 +293,7 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
     book.gone = false;
     if (book.found.changed != scene.changed) {
       book.outdated = book.entry != nullptr;
+      book.poster.reset();
       book.retry_at.reset();
     }
     book.found = std::move(scene);
@@ -331,12 +340,19 @@ std::chrono::seconds SceneLibrary::estimate(std::uint64_t bytes) const {
 void SceneLibrary::publish() {
   auto listing = std::make_shared<std::vector<Listing>>();
   for (const std::string& id : scene_ids()) {
-    const Book& book = shelf_.at(id);
-    listing->push_back({id, book.found.name, book.found.size.gaussians});
-    if (!book.entry) continue;
-    listing->back().loaded = true;
-    listing->back().tours = book.entry->tours;
-    listing->back().poster = book.entry->poster;
+    Book& book = shelf_.at(id);
+    if (book.entry) {
+      book.found.about = book.entry->facts.about;
+      book.poster = book.entry->poster;
+    }
+    const FoundScene& found = book.found;
+    listing->push_back({.id = id,
+                        .title = found.about.title.empty() ? found.name : found.about.title,
+                        .gaussians = found.size.gaussians,
+                        .about = found.about,
+                        .loaded = book.entry != nullptr,
+                        .poster = book.poster});
+    if (book.entry) listing->back().tours = book.entry->tours;
   }
   metrics_.scenes_in_memory.Set(static_cast<double>(residency_.count()));
   metrics_.scene_bytes.Set(static_cast<double>(residency_.bytes()));

@@ -33,9 +33,10 @@ class SceneLibrary final : public SceneSource {
     std::string id;
     std::string title;
     std::uint64_t gaussians = 0;
+    SceneAbout about{};
     bool loaded = false;
     std::optional<ToursAnswers> tours{};          // of a loaded one
-    std::shared_ptr<const std::string> poster{};  // of a loaded one; a JPEG file
+    std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
   };
 
   /// Loads the scenes of --scene, or else the first scene of the folders, so that a running server
@@ -64,11 +65,14 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] std::string renderer_text() const;
   /// Any thread.
   [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const;
+  /// Any thread. Loads a scene for its poster, as for a visitor, unless visitors wait for scenes.
+  void want_poster(const std::string& id);
 
  private:
   struct Book {
     FoundScene found;                         // for scenes of --scene, only name and size are set
     std::shared_ptr<const SceneEntry> entry;  // while in memory
+    std::shared_ptr<const std::string> poster{};  // stays when the entry goes
     bool pinned = false;
     bool outdated = false;                // the file has changed since
     bool gone = false;                    // the file is gone: not offered any more

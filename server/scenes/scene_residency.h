@@ -63,6 +63,8 @@ class SceneResidency {
   [[nodiscard]] bool awaited(const std::string& id) const {
     return loading_ == id || (waiting_ && waiting_->id == id);
   }
+  /// True while a scene is being loaded or waits for it.
+  [[nodiscard]] bool busy() const { return !loading_.empty() || waiting_; }
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::size_t count() const { return residents_.size(); }
 

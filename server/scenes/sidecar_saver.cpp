@@ -12,20 +12,11 @@
 #include "render_core/base/error.h"
 #include "server/base/replace_file.h"
 #include "server/scenes/poster.h"
+#include "server/scenes/scene_facts.h"
 #include "server/scenes/tours.h"
 
 namespace catgs {
 namespace {
-
-SceneHints hints_of(const SceneFacts& facts) {
-  SceneHints hints;
-  hints.up = facts.up;
-  hints.start_pose = facts.start_pose;
-  hints.near_z = facts.near_z;
-  hints.limits = {facts.limits_min, facts.limits_max};
-  hints.focus = facts.focus;
-  return hints;
-}
 
 /// The scene's entry with its new sidecar applied.
 std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar& sidecar,
@@ -33,12 +24,7 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   SceneHints hints = hints_of(entry.facts);
   use_sidecar(sidecar, entry.sidecar.filename().string(), hints);
   auto scene = std::make_shared<SceneEntry>(entry);
-  scene->facts.up = hints.up;
-  scene->facts.start_pose = hints.start_pose;
-  scene->facts.near_z = hints.near_z;
-  scene->facts.limits_min = hints.limits.min;
-  scene->facts.limits_max = hints.limits.max;
-  scene->facts.focus = hints.focus;
+  use_hints(hints, entry.name, scene->facts);
   scene->tours = ToursAnswers(tours_of(entry.sidecar, text));
   scene->sidecar_tag = text ? etag_of(*text) : "";
   return scene;

@@ -27,6 +27,8 @@ constexpr std::uint64_t max_bytes = 4 << 20;
 constexpr std::size_t max_tours = 32;
 constexpr std::size_t max_stops = 256;
 constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters
+constexpr float longest_stay_s = 3600;
+constexpr float longest_flight_s = 120;
 
 bool is_file(const std::filesystem::path& file) {
   std::error_code error;
@@ -80,7 +82,7 @@ void check_number(const std::optional<JsonField>& field, float low, float high) 
 
 void check_stop(const JsonField& stop) {
   check_members(stop, {"title", "caption", "position", "look_at", "orientation", "fov_deg",
-                       "marker", "stay_s"});
+                       "marker", "stay_s", "fly_s"});
   check_text(stop.find("title"));
   check_text(stop.find("caption"));
   static_cast<void>(stop.at("position").place());
@@ -90,7 +92,8 @@ void check_stop(const JsonField& stop) {
     static_cast<void>(stop.at("orientation").orientation());
   if (const auto marker = stop.find("marker")) static_cast<void>(marker->place());
   check_number(stop.find("fov_deg"), 5.0f, 160.0f);
-  check_number(stop.find("stay_s"), 0.0f, 3600.0f);
+  check_number(stop.find("stay_s"), 0.0f, longest_stay_s);
+  check_number(stop.find("fly_s"), 0.0f, longest_flight_s);
 }
 
 void check_tour(const JsonField& tour) {

@@ -27,9 +27,10 @@ constexpr double still_bits_per_pixel = 1.5;
 
 }  // namespace
 
-void FrameLoop::enter_scene(float near_z) {
-  near_z_ = near_z;
-  track_ = CameraTrack(near_z);
+void FrameLoop::enter_scene(const SceneFacts& scene) {
+  near_z_ = scene.near_z;
+  background_ = colour_of(scene.about.background_rgb);
+  track_ = CameraTrack(near_z_);
 }
 
 bool FrameLoop::pose_arrived(const PoseSample& sample, TimePoint now) {
@@ -110,6 +111,7 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   ticket.pose_received = *pose_received_;
   order.request.camera = make_camera(aim.world_from_camera, ticket.size_px,
                                      focal_from_fov_y(aim.fov_y_rad, ticket.size_px.y), near_z_);
+  order.request.background = background_;
   if (!ticket.still)
     order.request.forecast = track_.forecast(order.real_fps, SpeculationSettings{}.initial_window);
 }

@@ -30,7 +30,7 @@ class FrameLoop {
       : policy_(policy), flow_(flow), rest_(policy.still_after) {}
 
   /// Forgets the poses of the previous scene.
-  void enter_scene(float near_z);
+  void enter_scene(const SceneFacts& scene);
   /// True: the camera has moved.
   bool pose_arrived(const PoseSample& sample, TimePoint now);
   void follow(const PosePath& path) { track_.follow(path); }
@@ -68,6 +68,7 @@ class FrameLoop {
   const VisitPolicy& policy_;
   FlowControl& flow_;
   float near_z_ = 0.0f;
+  glm::vec3 background_{0.0f};
   CameraTrack track_;
   std::optional<TimePoint> pose_received_;
   FramePace pace_;

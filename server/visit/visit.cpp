@@ -109,7 +109,7 @@ void Visit::ask_again(TimePoint now) {
 
 bool Visit::begin(const Hello& hello, Admission admission, TimePoint now) {
   life_.note_activity(now);
-  if (admission.scene.get() != stream_.scene()) frames_.enter_scene(admission.scene->facts.near_z);
+  if (admission.scene.get() != stream_.scene()) frames_.enter_scene(admission.scene->facts);
   const bool goes_on = stream_.begin(std::move(admission), hello);
   frames_.go_on_from(hello, now);
   if (!goes_on) stream_.open();
@@ -129,7 +129,7 @@ void Visit::select(const std::string& scene_id, TimePoint now) {
     return stream_.opening() ? void() : say(stream_.introduction(), now);
   }
   auto& scene = std::get<std::shared_ptr<const SceneEntry>>(found);
-  frames_.enter_scene(scene->facts.near_z);
+  frames_.enter_scene(scene->facts);
   stream_.enter_scene(std::move(scene));
   stream_.open();
 }

@@ -55,11 +55,14 @@ describe('an author', () => {
     expect(await visitor.page.locator('#tour').isHidden()).toBe(true);
     const { page, errors } = await open_as('author', '?author');
     const start = await make_tour(page);
-    await page.getByRole('button', { name: 'Preview' }).click();
-    await page.getByRole('button', { name: 'Pause the tour' }).waitFor();
-    await page.getByText('1 of 2').waitFor();
-    await page.getByRole('button', { name: 'Pause the tour' }).click();
     await keep_screenshot(page, 'author');
+    await page.getByText('About the scene').click();
+    await page.getByLabel('Title', { exact: true }).fill('The old city');
+    await page.getByLabel('Credits').fill('Ada Lovelace');
+    await page.getByLabel('Licence').fill('CC-BY-4.0');
+    await page.getByLabel('Visitors begin in').selectOption('Walk');
+    await page.getByLabel('Background').fill('#203040');
+    await keep_screenshot(page, 'author-about');
     await page.getByRole('button', { name: 'Save to the server' }).click();
     await page.getByText('Saved. Visitors get it').waitFor();
     expect(errors).toEqual([]);
@@ -67,6 +70,10 @@ describe('an author', () => {
     await visitor.page.reload();
     await settle(visitor.page);
     await visitor.page.getByText('My tour').first().waitFor();
+    await visitor.page.getByText('The old city').waitFor();
+    await visitor.page.getByText('Ada Lovelace · CC-BY-4.0').waitFor();
+    await visitor.page.locator('#mode-label', { hasText: 'Walk' }).waitFor();
+    await keep_screenshot(visitor.page, 'author-visitor');
     expect(distance(start, await pose_of(visitor.page))).toBeGreaterThan(0.1);
     await visitor.page.getByRole('button', { name: 'Play the tour' }).click();
     await visitor.page.getByRole('heading', { name: 'Nearer' }).waitFor();
@@ -86,6 +93,65 @@ describe('an author', () => {
     await page.getByRole('button', { name: 'Save to the server' }).click();
     await page.getByText('Saved. Visitors get it').waitFor();
     expect(readFileSync(sidecar, 'utf8')).toContain('Changed.');
+  });
+
+  it('takes back every edit, and keeps the focus where it works', async () => {
+    const { page } = await open_as('author', '?author');
+    await page.getByText('About the scene').waitFor();
+    const undo = page.getByRole('button', { name: 'Undo' });
+    expect(await undo.isDisabled()).toBe(true);
+    await page.getByRole('button', { name: 'New tour' }).click();
+    await page.keyboard.type('Second');
+    const add = page.getByRole('button', { name: 'Add a stop here' });
+    for (const n of [1, 2, 3]) {
+      await add.click();
+      await page.getByLabel(`Title of stop ${n}`).waitFor();
+    }
+    const focused = (): Promise<string | null> =>
+      page.evaluate(() => document.activeElement!.getAttribute('aria-label') ?? document.activeElement!.textContent);
+    await page.getByRole('button', { name: 'Move stop 3 up' }).press('Enter');
+    expect(await focused()).toBe('Move stop 2 up');
+    await page.keyboard.press('Enter');
+    expect(await focused()).toBe('Title of stop 1'); // there is nothing above it
+    await page.getByLabel('Stay, s (1)').fill('7.5');
+    await page.getByLabel('Flight, s (1)').fill('-1'); // no time
+    await page.getByRole('button', { name: 'No hotspot' }).first().press('Enter');
+    expect(await focused()).toBe('Hotspot here');
+    await page.getByRole('button', { name: 'Delete stop 1' }).press('Enter');
+    expect(await focused()).toBe('Delete stop 1');
+    await undo.click();
+    expect(await page.getByLabel('Stay, s (1)').inputValue()).toBe('7.5');
+    expect(await page.getByLabel('Flight, s (1)').inputValue()).toBe('');
+    for (let i = 0; i < 20 && (await undo.isEnabled()); ++i) await undo.click();
+    expect(await undo.isEnabled()).toBe(false);
+    expect(await page.getByLabel('Title of the tour', { exact: true }).inputValue()).not.toBe('Second');
+  });
+
+  it('is back where a preview began, by Escape and at its end', async () => {
+    const { page } = await open_as('author', '?author', { viewport: { width: 1000, height: 640 } });
+    await page.getByRole('button', { name: 'New tour' }).click();
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByLabel('Stay, s (1)').fill('0.5');
+    await page.getByLabel('Flight, s (1)').fill('0.2');
+    await page.mouse.move(300, 200);
+    await page.mouse.wheel(0, -300);
+    await settle(page);
+    const before = await pose_of(page);
+    const panel = page.locator('#author-panel');
+    const preview = page.getByRole('button', { name: 'Preview' });
+    await preview.click();
+    await page.locator('#tour').waitFor(); // there is no room for it beside the panel
+    expect(await panel.isHidden()).toBe(true);
+    await panel.waitFor();
+    expect(distance(before, await pose_of(page))).toBeLessThan(1e-3);
+    await page.getByLabel('Title of stop 1').focus();
+    await page.getByLabel('Stay, s (1)').fill('3600');
+    await preview.click();
+    await page.getByRole('button', { name: 'Pause the tour' }).waitFor();
+    await page.keyboard.press('Escape');
+    await panel.waitFor();
+    expect(distance(before, await pose_of(page))).toBeLessThan(1e-3);
+    expect(await page.evaluate(() => document.activeElement?.id)).toBe('author-preview');
   });
 
   it('is told when another one saved meanwhile, and replaces theirs on purpose only', async () => {
@@ -130,26 +196,33 @@ describe('an author', () => {
     await page.getByText('link of role author').waitFor();
   });
 
-  it('sees the card of a preview in a window too narrow for it beside the panel', async () => {
-    const { page } = await open_as('author', '?author', { viewport: { width: 1000, height: 640 } });
-    await page.getByRole('button', { name: 'Add a stop here' }).click();
-    expect(await page.locator('#tour').isHidden()).toBe(true);
-    await page.getByRole('button', { name: 'Preview' }).click();
-    await page.locator('#tour').waitFor();
-    expect(await page.locator('#author-panel').isHidden()).toBe(true);
-  });
+  const rooms = {
+    phone: windows.phone,
+    'desktop-dark': windows['desktop-dark'],
+    small: { viewport: { width: 1000, height: 620 } },
+    narrow: { viewport: { width: 320, height: 640 } },
+  };
 
-  it.each(['phone', 'desktop-dark'] as const)('has room to see and to write: %s', async (name) => {
-    const { page } = await open_as('author', '?author', windows[name]);
+  it.each(Object.entries(rooms))('has room to see and to write: %s', async (name, options) => {
+    const { page } = await open_as('author', '?author', options);
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     await settle(page);
     await keep_screenshot(page, `author-${name}`);
-    const { top, bottom } = await page.evaluate(() =>
-      document.getElementById('author-panel')!.getBoundingClientRect().toJSON() as DOMRect,
-    );
-    const { height } = windows[name].viewport;
-    expect(bottom).toBeLessThanOrEqual(height);
-    if (name === 'phone') expect(top).toBeGreaterThan(0.4 * height);
+    const rect = (selector: string): Promise<DOMRect> =>
+      page.evaluate(
+        (found) => document.querySelector(found)!.getBoundingClientRect().toJSON() as DOMRect,
+        selector,
+      );
+    const { width, height } = options.viewport;
+    const panel = await rect('#author-panel');
+    expect(panel.bottom).toBeLessThanOrEqual(height);
+    if (width < 800) expect(panel.top).toBeGreaterThan(0.4 * height);
+    // Everything can be reached, and nothing is cut off at a side.
+    for (const id of ['author-save', 'author-new', 'author-add', 'author-undo']) {
+      await page.locator(`#${id}`).scrollIntoViewIfNeeded();
+      const { left, right, bottom } = await rect(`#${id}`);
+      expect([left >= panel.left, right <= panel.right, bottom <= panel.bottom + 1], id).toEqual([true, true, true]);
+    }
   });
 });

@@ -2,6 +2,7 @@
 // also checks that everything is inside the window and that nothing covers the buttons.
 import { beforeAll, describe, expect, it } from 'vitest';
 import type { Page } from 'playwright-core';
+import type { SceneListing } from '#client/session/scenes';
 import { Error_Code } from '#client/wire/wire';
 import { keep_screenshot, new_page, windows } from './support/browser';
 import { settle } from './support/camera';
@@ -9,14 +10,23 @@ import { at_hello, refuse, start_fake_server, type FakeServer, type Script } fro
 import { painted_jpeg, stream_of } from './support/painted';
 
 let stream: Script;
+let poster: Uint8Array;
 
 beforeAll(async () => {
-  stream = stream_of(await painted_jpeg());
+  poster = await painted_jpeg();
+  stream = stream_of(poster);
 });
+
+const several = [
+  { id: 'city', title: 'Demo city' },
+  { id: 'hall', title: 'The great hall of the old town', credits: 'Ada Lovelace', licence: 'CC-BY-4.0' },
+  { id: 'garden', title: 'garden' },
+];
 
 interface State {
   readonly script?: Script; // undefined: a stream
   readonly query?: string;
+  readonly scenes?: readonly Partial<SceneListing>[]; // of the server, which has one otherwise
   readonly reach: (page: Page, server: FakeServer) => Promise<void>;
 }
 
@@ -46,7 +56,16 @@ const states: Readonly<Record<string, State>> = {
     script: refuse(Error_Code.UNAUTHORIZED, 'this server needs an access token: open the link you were given'),
     reach: title('Access token needed'),
   },
+  scenes: {
+    scenes: several,
+    reach: async (page) => {
+      await page.waitForFunction(() =>
+        [...document.querySelectorAll<HTMLImageElement>('#gallery img')].every((img) => img.naturalWidth > 0),
+      );
+    },
+  },
   'no-scene': {
+    scenes: several,
     script: refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here'),
     query: '?scene=nope',
     reach: async (page) => {
@@ -116,8 +135,8 @@ const misplaced = (page: Page): Promise<string[]> =>
   });
 
 describe.each(Object.entries(windows))('%s', (name, options) => {
-  it.each(Object.entries(states))('shows the state %s whole', async (state, { script = stream, query = '', reach }) => {
-    const server = await start_fake_server(script);
+  it.each(Object.entries(states))('shows the state %s whole', async (state, { script = stream, query = '', scenes = several.slice(0, 1), reach }) => {
+    const server = await start_fake_server(script, { scenes, poster });
     const { page, errors } = await new_page(options);
     await page.goto(server.url + query);
     await reach(page, server);

@@ -9,6 +9,11 @@ import { settle } from './support/camera';
 import { refuse, start_fake_server, web_dist, type Script } from './support/fake_server';
 import { painted_jpeg, stream_of } from './support/painted';
 
+const scenes = [
+  { id: 'city', title: 'Demo city' },
+  { id: 'hall', title: 'The hall', credits: 'Ada', licence: 'MIT' },
+  { id: 'garden', title: 'garden' },
+];
 let stream: Script;
 
 beforeAll(async () => {
@@ -105,7 +110,7 @@ describe('page', () => {
     const server = await start_fake_server((peer, body) => {
       const is_wrong = body.case === 'hello' && body.value.sceneId === 'nope';
       (is_wrong ? refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here') : stream)(peer, body);
-    });
+    }, { scenes });
     const { page } = await new_page();
     await page.goto(`${server.url}?scene=nope`);
     await page.getByText('No such scene').waitFor();
@@ -114,18 +119,35 @@ describe('page', () => {
     await settle(page);
   });
 
-  it('goes to another scene by the keyboard', async () => {
-    const server = await start_fake_server(stream);
-    const { page } = await open(server.url);
-    await page.getByLabel('Choose a scene').focus();
+  it('shows several scenes first, and leads back to them', async () => {
+    const server = await start_fake_server(stream, { scenes });
+    const { page } = await new_page();
+    await page.goto(`${server.url}?author`);
+    await page.getByRole('heading', { name: 'Scenes' }).waitFor();
+    expect(await page.getByRole('link').allInnerTexts()).toEqual([
+      'Demo city',
+      expect.stringMatching(/^The hall\s+Ada · MIT$/),
+      'garden',
+    ]);
+    expect(server.peers).toEqual([]); // no place is taken
+    await page.keyboard.press('Tab');
     await page.keyboard.press('Enter');
-    await page.getByRole('link', { name: 'garden' }).waitFor();
-    await page.keyboard.press('Escape');
-    expect(await page.getByRole('link', { name: 'garden' }).isHidden()).toBe(true);
+    await page.waitForURL(`${server.url}?author=&scene=city`);
+    await settle(page);
+    await page.getByRole('link', { name: 'All scenes' }).focus();
     await page.keyboard.press('Enter');
-    await page.getByRole('link', { name: 'garden' }).focus();
-    await page.keyboard.press('Enter');
-    await page.waitForURL(`${server.url}?scene=garden`);
+    await page.getByRole('heading', { name: 'Scenes' }).waitFor();
+  });
+
+  it('goes to a view, and into a frame, without a choice of scenes', async () => {
+    const server = await start_fake_server(stream, { scenes });
+    for (const way of ['?ui=0', '#stop=1', '#mode=fly&at=0,0,-4,0,0,0,1,60']) {
+      const { page } = await open(server.url + way);
+      await page.close();
+    }
+    expect(server.peers.map((peer) => peer.heard[0]?.value)).toEqual(
+      Array(3).fill(expect.objectContaining({ sceneId: 'city' })),
+    );
   });
 
   it('frames the view for who came by Tab, not for who clicked and flies', async () => {
@@ -152,7 +174,7 @@ describe('page', () => {
     await page.goto(server.url);
     await page.waitForFunction(() => window.catgs !== undefined);
     await page.keyboard.press('KeyM');
-    await page.getByText('Fly', { exact: true }).waitFor();
+    await page.locator('#mode-label', { hasText: 'Fly' }).waitFor();
     await page.keyboard.press('KeyW');
     admit();
     await settle(page);

@@ -1,7 +1,7 @@
 import { afterEach, describe, expect, it, vi } from 'vitest';
 import { identity } from '#client/base/vector';
 import { Picks } from '#client/session/picks';
-import { TourDraft } from '#client/tour/draft';
+import { nothing_said, TourDraft } from '#client/tour/draft';
 import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/save';
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
 import { scene } from './cameras';
@@ -13,6 +13,7 @@ const stop = (title: string): Stop => ({
   eye: { position: [1, 2, 3], orientation: identity, fov_y_rad: 1 },
   marker: [0, 0, 9],
   stay_s: undefined,
+  fly_s: undefined,
 });
 
 const titles = (draft: TourDraft): string[] => draft.stops.map(({ title }) => title);
@@ -20,7 +21,6 @@ const titles = (draft: TourDraft): string[] => draft.stops.map(({ title }) => ti
 describe('a draft of a tour', () => {
   it('grows, is put in order, and shrinks', () => {
     const draft = new TourDraft();
-    draft.load([]);
     for (const name of ['a', 'b', 'c']) draft.add(stop(name));
     draft.move(2, -1);
     expect(titles(draft)).toEqual(['a', 'c', 'b']);
@@ -33,6 +33,55 @@ describe('a draft of a tour', () => {
     expect(draft.stops[0]!.caption).toBe('about c');
   });
 
+  it('is taken back edit by edit, and typing is one edit', () => {
+    const draft = new TourDraft();
+    const first = draft.state;
+    expect(draft.can_undo).toBe(false);
+    draft.add(stop('a'));
+    for (const title of ['H', 'Ha', 'Hall']) draft.change(0, { title }, 'title 0');
+    draft.edit_about({ credits: 'A' }, 'credits');
+    draft.edit_about({ credits: 'Ada' }, 'credits');
+    draft.add_tour();
+    draft.edit({ start: stop('a').eye });
+    draft.remove_tour();
+    expect(draft.tour.title).toBe('');
+    draft.undo(); // the removal
+    expect(draft.state.start).toEqual(stop('a').eye);
+    draft.undo();
+    expect(draft.state.start).toBeUndefined();
+    draft.undo();
+    expect(draft.state.tours).toHaveLength(1);
+    draft.undo();
+    expect(draft.state.about.credits).toBe('');
+    expect(titles(draft)).toEqual(['Hall']);
+    draft.undo();
+    expect(titles(draft)).toEqual(['a']);
+    draft.undo();
+    expect(draft.state).toBe(first);
+    draft.undo();
+    expect(draft.state).toBe(first);
+    for (let i = 0; i < 300; ++i) draft.add_tour();
+    for (let i = 0; i < 300; ++i) draft.undo();
+    expect(draft.state.tours).toHaveLength(101); // the oldest edits are forgotten
+  });
+
+  it('has several tours, one of which is edited', () => {
+    const draft = new TourDraft();
+    draft.add(stop('a'));
+    draft.add_tour();
+    expect(draft.stops).toEqual([]);
+    expect(draft.shown_index).toBe(-1);
+    draft.add(stop('b'));
+    expect(draft.shown_index).toBe(1);
+    draft.edit({ edited: 0 });
+    expect(titles(draft)).toEqual(['a']);
+    draft.remove_tour();
+    expect(titles(draft)).toEqual(['b']);
+    draft.remove_tour();
+    expect(draft.shown).toEqual([]);
+    expect(draft.editable).toEqual([0]);
+  });
+
   it('keeps the other tours, and is none without stops', () => {
     const film: Tour = {
       title: 'film',
@@ -42,26 +91,29 @@ describe('a draft of a tour', () => {
     };
     const second: Tour = { title: 'second', stops: [stop('s')], way: undefined, starts_itself: false };
     const draft = new TourDraft();
-    draft.load([film, { ...second, title: 'first', starts_itself: true }, second]);
-    expect(draft.title).toBe('first');
-    expect(draft.tours[0]!.starts_itself).toBe(true);
-    expect(draft.tours.map(({ title }) => title)).toEqual(['first', 'film', 'second']);
+    draft.load([film, { ...second, title: 'first', starts_itself: true }, second], nothing_said);
+    expect(draft.tour).toMatchObject({ title: 'first', starts_itself: true });
+    expect(draft.editable).toEqual([1, 2]);
+    expect(draft.shown.map(({ title }) => title)).toEqual(['film', 'first', 'second']);
     draft.remove(0);
-    expect(draft.tours.map(({ title }) => title)).toEqual(['film', 'second']);
+    expect(draft.shown.map(({ title }) => title)).toEqual(['film', 'second']);
   });
 
   it('becomes a whole sidecar, which reads back', () => {
     const draft = new TourDraft();
-    draft.load([]);
-    draft.title = 'Mine';
-    draft.add(stop('a'));
+    draft.edit_tour({ title: 'Mine' });
+    draft.add({ ...stop('a'), stay_s: 8, fly_s: 2 });
+    expect(draft.sidecar(scene)).not.toHaveProperty('background');
+    draft.edit_about({ title: 'Hall', credits: 'Ada', mode: 'walk', background: '#ffffff' });
     expect(draft.sidecar(scene)).toMatchObject({
       up: [0, -1, 0],
       start_pose: { position: [0, 0, -5] },
       near: 0.2,
       limits: { min: [-20, -20, -20] },
       focus: [0, 0, 0],
+      ...{ title: 'Hall', credits: 'Ada', mode: 'walk', background: '#ffffff' },
     });
+    expect(draft.sidecar(scene)).not.toHaveProperty('licence');
     const start_pose = { ...scene.start_pose, position: [7, 7, 7] as const };
     const sidecar = draft.sidecar({ ...scene, start_pose, limits_min: [0, 0, 0], limits_max: [0, 0, 0] });
     expect(sidecar).not.toHaveProperty('limits');
@@ -69,7 +121,7 @@ describe('a draft of a tour', () => {
     const { tours } = JSON.parse(JSON.stringify(sidecar)) as { tours: unknown };
     const [tour] = read_tours(tours, [0, -1, 0], 1);
     expect(tour).toMatchObject({ title: 'Mine' });
-    expect(tour!.stops[0]).toMatchObject({ title: 'a', caption: 'about a', marker: [0, 0, 9] });
+    expect(tour!.stops[0]).toMatchObject({ title: 'a', caption: 'about a', marker: [0, 0, 9], stay_s: 8, fly_s: 2 });
   });
 });
 

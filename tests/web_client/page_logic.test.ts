@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import { beforeEach, describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
 import { QualityChoice } from '#client/session/quality';
-import { scene_address, scene_labels, scene_name } from '#client/session/scenes';
+import { leaves_scene_open, scene_address, scene_labels, scene_name, type SceneListing } from '#client/session/scenes';
 import { AccessToken, has_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { Settling } from '#client/ui/automation';
@@ -11,6 +11,8 @@ import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
 import { Error_Code } from '#client/wire/wire';
 import { with_texts } from '../../web_client/page_texts';
 import { FakeTime, fake_storage } from './fakes';
+
+const listing = (id: string, title = id): SceneListing => ({ id, title, credits: '', licence: '' });
 
 describe('access token', () => {
   it('moves from the fragment to the tab, and out of the address', () => {
@@ -75,7 +77,7 @@ describe('scene address', () => {
     const page = 'http://host/tour/?scene=nope&lang=en';
     expect(scene_address(page, 'a b&c')).toBe('http://host/tour/?scene=a+b%26c&lang=en');
     expect(scene_address('http://host/', 'city')).toBe('http://host/?scene=city');
-    expect(scene_address('http://host/?scene=x&ui=0')).toBe('http://host/?ui=0');
+    expect(scene_address('http://host/?scene=x&ui=0#at=1')).toBe('http://host/?ui=0');
   });
 });
 
@@ -88,9 +90,13 @@ describe('names of scenes', () => {
   });
 
   it('say in a list which of several of a name it is', () => {
-    expect(scene_labels(['city', 'hall-kdfmqrtv', 'attic-bbcdnpvv', 'hall-bbcdnpvv'])).toEqual([
-      'city', 'hall-kdfmqrtv', 'attic', 'hall-bbcdnpvv',
-    ]);
+    const listed = [listing('hall-kdfmqrtv', 'hall'), listing('attic-bbcdnpvv', 'attic'), listing('hall-bbcdnpvv', 'hall')];
+    expect(scene_labels(listed)).toEqual(['hall-kdfmqrtv', 'attic', 'hall-bbcdnpvv']);
+  });
+
+  it('are asked for where the address names neither a scene nor a view', () => {
+    for (const rest of ['', '?author', '#token=a', '?scene=', '#mode=fly']) expect(leaves_scene_open(`http://host/${rest}`)).toBe(true);
+    for (const rest of ['?scene=hall', '?ui=0', '#at=1', '#mode=fly&stop=2']) expect(leaves_scene_open(`http://host/${rest}`)).toBe(false);
   });
 });
 
@@ -210,8 +216,9 @@ describe('wording', () => {
 
   it('offers the scenes that there are, and without any says where the name is', () => {
     const state = { phase: 'failed', code: Error_Code.UNKNOWN_SCENE, message: 'no' } as const;
-    expect(card_for(state, false, ['city', 'hall'])?.scene_ids).toEqual(['city', 'hall']);
-    expect(card_for(state, false, ['city'])?.action).toEqual({ label: 'Open city', does: 'open', scene_id: 'city' });
+    const scenes = [listing('city'), listing('hall')];
+    expect(card_for(state, false, scenes)?.scenes).toEqual(scenes);
+    expect(card_for(state, false, [listing('city')])?.action).toEqual({ label: 'Open city', does: 'open', scene_id: 'city' });
     expect(card_for(state, false)?.text).toContain('?scene=');
     expect(card_for(state, false)?.action).toMatchObject({ does: 'open', scene_id: '' });
   });

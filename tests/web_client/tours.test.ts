@@ -9,7 +9,7 @@ import { read_document } from '#client/tour/load';
 import { TourPlayer, type TourState } from '#client/tour/player';
 import { embed_code, frame_sites, read_shared, share_address } from '#client/tour/share';
 import { read_supersplat } from '#client/tour/supersplat';
-import { read_tours, stay_of, write_tours, type Tour } from '#client/tour/tour';
+import { default_stay_s, read_tours, write_tours, type Tour } from '#client/tour/tour';
 import settings from '../support/supersplat_settings.json';
 import { expect_vec } from './cameras';
 import { FakeTime } from './fakes';
@@ -22,7 +22,7 @@ describe('tours of a sidecar', () => {
       title: 'Ground floor',
       autoplay: true,
       stops: [
-        { title: 'Hall', position: [0, 0, 0], look_at: [0, 0, 4], fov_deg: 50, stay_s: 2 },
+        { title: 'Hall', position: [0, 0, 0], look_at: [0, 0, 4], fov_deg: 50, stay_s: 2, fly_s: 3 },
         {
           title: 'Stairs',
           caption: 'Built in 1904.',
@@ -41,10 +41,11 @@ describe('tours of a sidecar', () => {
     expect_vec(rotate(hall!.eye.orientation, [0, 0, 1]), [0, 0, 1]);
     expect(hall!.eye.fov_y_rad).toBeCloseTo((50 * Math.PI) / 180, 6);
     expect(hall!.marker).toBeUndefined();
-    expect(stay_of(hall!)).toBe(2);
+    expect(hall).toMatchObject({ stay_s: 2, fly_s: 3 });
     expect(stairs).toMatchObject({ caption: 'Built in 1904.', marker: [1, 2, 9] });
     expect(stairs!.eye.fov_y_rad).toBe(1.2);
-    expect(stay_of(stairs!)).toBeGreaterThan(3);
+    expect(stairs).toMatchObject({ stay_s: undefined, fly_s: undefined });
+    expect(default_stay_s(stairs!)).toBeGreaterThan(3);
   });
 
   it('have the same limits here and at the server', () => {
@@ -52,11 +53,13 @@ describe('tours of a sidecar', () => {
       .map((name) => readFileSync(new URL(`../../server/scenes/${name}`, import.meta.url), 'utf8'))
       .join('');
     const limit = (name: string): number => {
-      const found = new RegExp(`constexpr std::size_t ${name} = (\\d[\\d']*)(?: << (\\d+))?;`).exec(server);
+      const found = new RegExp(`constexpr (?:std::size_t|float) ${name} = (\\d[\\d']*)(?: << (\\d+))?;`).exec(server);
       if (!found) throw new Error(`server/scenes/tours.* have no ${name}`);
       return Number(found[1]!.replaceAll("'", '')) * 2 ** Number(found[2] ?? 0);
     };
     expect(limits.max_tours).toBe(limit('max_tours'));
+    expect(limits.longest_stay_s).toBe(limit('longest_stay_s'));
+    expect(limits.longest_flight_s).toBe(limit('longest_flight_s'));
     expect(limits.max_stops).toBe(limit('max_stops'));
     expect(limits.max_sidecar_bytes).toBe(limit('max_sent_sidecar_bytes'));
     // The server counts bytes; a character of UTF-8 has at most four.
@@ -209,6 +212,7 @@ describe('the player', () => {
     eye: { position: [x, 0, 0], orientation: identity, fov_y_rad: 1 },
     marker: undefined,
     stay_s: 2,
+    fly_s: undefined,
   });
   const tour: Tour = { title: 'a tour', stops: [1, 2, 3].map((x) => stop(x)), way: undefined, starts_itself: false };
 
@@ -288,6 +292,38 @@ describe('the player', () => {
     time.advance(60_000);
     expect(flying()).toBeUndefined();
     expect(state()).toMatchObject({ stop_index: 1, playing: false });
+  });
+
+  it('flies as long as a stop says', () => {
+    const { player, flying } = guided();
+    player.load([{ ...tour, stops: [{ ...stop(1), fly_s: 7 }] }]);
+    player.next();
+    expect(flying()!.duration_s).toBe(7);
+  });
+
+  it('plays once for a preview, and ends after the last stay', () => {
+    const { player, time, arrive, flying, state } = guided();
+    let ends = 0;
+    player.load([tour]);
+    player.go_to(1);
+    player.play_once(() => (ends += 1));
+    for (const x of [1, 2, 3]) {
+      expect(arrive()).toBe(x);
+      expect(ends).toBe(0);
+      time.advance(2100);
+    }
+    expect(ends).toBe(1);
+    expect(flying()).toBeUndefined();
+    expect(state().playing).toBe(false);
+    player.play_once(() => (ends += 1));
+    arrive();
+    player.pause(); // the author looks around
+    player.play();
+    for (const x of [2, 3, 1]) {
+      expect(arrive()).toBe(x);
+      time.advance(2100);
+    }
+    expect(ends).toBe(1);
   });
 
   it('shows the card of a stop without going there', () => {

@@ -1,13 +1,17 @@
+import { browser_storage } from './base/browser_storage';
+import { leaves_scene_open, list_scenes } from './session/scenes';
+import { AccessToken } from './session/token';
 import { CardView } from './ui/card';
+import { show_gallery } from './ui/gallery';
 import type { SessionStatus } from './ui/session_status';
 import { mount_viewer } from './ui/viewer';
 import { broken_card, unsupported_card } from './ui/wording';
 
-function main(): void {
+async function main(): Promise<void> {
   const card = new CardView();
-  let status: SessionStatus | undefined;
+  const viewer: { status?: SessionStatus } = {};
   const broken = (message: string): void => {
-    if (status) status.break_off(message);
+    if (viewer.status) viewer.status.break_off(message);
     else card.show(broken_card(message));
   };
   window.addEventListener('error', (event) => {
@@ -17,8 +21,12 @@ function main(): void {
   window.addEventListener('unhandledrejection', (event) => broken(String(event.reason)));
 
   const unsupported = unsupported_card(globalThis);
-  if (unsupported) card.show(unsupported);
-  else status = mount_viewer(card);
+  if (unsupported) return card.show(unsupported);
+  const token = new AccessToken(location, history, browser_storage('sessionStorage'));
+  const wish = new URLSearchParams(location.search).get('scene') ?? '';
+  const scenes = wish ? [] : await list_scenes(location.href, token.value);
+  if (scenes.length > 1 && leaves_scene_open(location.href)) return show_gallery(scenes, token.value);
+  viewer.status = mount_viewer(card, token, wish || (scenes[0]?.id ?? ''));
 }
 
-main();
+void main();

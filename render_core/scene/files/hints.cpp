@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include <glm/mat3x3.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/base/printable.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/math/look_at.h"
 #include "render_core/scene/formats/json_field.h"
@@ -21,6 +23,7 @@ namespace catgs {
 namespace {
 
 constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
+constexpr std::size_t max_about_bytes = 800;           // of one text: 200 characters or more
 constexpr std::uint64_t max_cameras_bytes = 16 << 20;  // 10,000 cameras take 5 MiB
 
 glm::vec3 parse_up(const JsonField& field) {
@@ -54,6 +57,41 @@ Bounds parse_limits(const JsonField& field) {
   return limits;
 }
 
+constexpr std::array<std::string_view, 3> mode_names = {"orbit", "fly", "walk"};
+
+std::string parse_line(const std::optional<JsonField>& field) {
+  if (!field) return {};
+  const std::string text = field->text();
+  if (text.size() > max_about_bytes)
+    field->fail(fmt::format("has more than {} bytes", max_about_bytes));
+  return printable(text);
+}
+
+CameraMode parse_mode(const JsonField& field) {
+  const auto found = std::ranges::find(mode_names, field.text());
+  if (found == mode_names.end())
+    field.fail("is no mode", fmt::format("write {}", fmt::join(mode_names, ", ")));
+  return static_cast<CameraMode>(1 + (found - mode_names.begin()));
+}
+
+std::uint32_t parse_colour(const JsonField& field) {
+  const std::string text = field.text();
+  std::uint32_t rgb = 0;
+  const char* end = text.data() + text.size();
+  if (text.size() != 7 || text[0] != '#' ||
+      std::from_chars(text.data() + 1, end, rgb, 16).ptr != end)
+    field.fail("is no colour", "write \"#rrggbb\" in hexadecimal digits");
+  return rgb;
+}
+
+SceneAbout parse_about(const JsonField& root) {
+  SceneAbout about{parse_line(root.find("title")), parse_line(root.find("credits")),
+                   parse_line(root.find("licence"))};
+  if (const auto mode = root.find("mode")) about.mode = parse_mode(*mode);
+  if (const auto colour = root.find("background")) about.background_rgb = parse_colour(*colour);
+  return about;
+}
+
 /// `rows`: 3 x 3 or 4 x 4 numbers; the rotation part must be one.
 glm::mat3 parse_rotation(const JsonField& rows, std::size_t size) {
   if (rows.size() != size) rows.fail(fmt::format("is not a {0}x{0} matrix", size));
@@ -76,7 +114,9 @@ Sidecar read_sidecar(const ByteSource& file) {
   const nlohmann::json document = read_json(file, max_sidecar_bytes);
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
-  static constexpr std::array known = {"up", "start_pose", "near", "limits", "focus", "tours"};
+  static constexpr std::array known = {"up",    "start_pose", "near",    "limits",
+                                       "focus", "title",      "credits", "licence",
+                                       "mode",  "background", "tours"};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())
@@ -92,6 +132,7 @@ Sidecar read_sidecar(const ByteSource& file) {
   }
   if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits);
   if (const auto focus = root.find("focus")) sidecar.focus = focus->place();
+  sidecar.about = parse_about(root);
   return sidecar;
 }
 
@@ -105,6 +146,7 @@ void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hi
                                       : Pose{start->position, start->orientation};
     if (start->look_at && !sidecar.focus) hints.focus = *start->look_at;
   }
+  hints.about = sidecar.about;
   hints.source = fmt::format("sidecar {}", name);
 }
 
@@ -115,13 +157,24 @@ std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
   const auto triple = [](const glm::vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
   const glm::quat& q = hints.start_pose.orientation;
-  const nlohmann::ordered_json document = {
+  nlohmann::ordered_json document = {
       {"up", triple(hints.up)},
       {"start_pose",
        {{"position", triple(hints.start_pose.position)}, {"orientation", {q.x, q.y, q.z, q.w}}}},
       {"near", hints.near_z},
       {"limits", {{"min", triple(hints.limits.min)}, {"max", triple(hints.limits.max)}}},
       {"focus", triple(hints.focus)}};
+  const SceneAbout& about = hints.about;
+  const auto add_said = [&](const char* name, const std::string& text) {
+    if (!text.empty()) document[name] = text;
+  };
+  add_said("title", about.title);
+  add_said("credits", about.credits);
+  add_said("licence", about.licence);
+  if (about.mode != CameraMode::unspecified)
+    document["mode"] = mode_names[static_cast<std::size_t>(about.mode) - 1];
+  if (about.background_rgb != 0)
+    document["background"] = fmt::format("#{:06x}", about.background_rgb);
   std::ofstream file(path);
   file << document.dump(2) << '\n';
   file.close();

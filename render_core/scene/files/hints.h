@@ -22,6 +22,9 @@ namespace catgs {
 ///   "near":       world units
 ///   "limits":     {"min": [x, y, z], "max": [x, y, z]}
 ///   "focus":      [x, y, z]
+///   "title":      text of at most 800 bytes, as "credits" and "licence" are
+///   "mode":       "orbit", "fly" or "walk": how a visitor moves at first
+///   "background": "#rrggbb"
 ///   "tours":      for pages, see web_client/README.md
 struct Sidecar {
   struct StartPose {
@@ -34,6 +37,7 @@ struct Sidecar {
   std::optional<float> near_z;
   std::optional<Bounds> limits;
   std::optional<glm::vec3> focus;
+  SceneAbout about;
   std::optional<std::string> unknown;  // about a field that is none of the above, for people
 };
 
@@ -41,7 +45,8 @@ struct Sidecar {
 /// another program may know it.
 Sidecar read_sidecar(const ByteSource& file);
 
-/// Overwrites hints with the sidecar's fields. `name`: name of the sidecar's file.
+/// Overwrites hints with the sidecar's fields; `about` is the sidecar's as a whole. `name`: name of
+/// the sidecar's file.
 void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hints);
 
 /// The path of a scene file's sidecar: "city.ply" -> "city.json".

@@ -15,6 +15,7 @@ import {
   ServerMessageSchema,
   type ClientMessage,
 } from '#client/wire/wire';
+import type { SceneListing } from '#client/session/scenes';
 import { clean_up } from './clean_up';
 import { build_dir } from './paths';
 
@@ -23,8 +24,6 @@ export const web_dist = path.join(build_dir, 'web_client/dist');
 const policy =
   "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; " +
   "img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-
-const scene_ids = ['city', 'garden'];
 
 const content_types: Readonly<Record<string, string>> = {
   '.html': 'text/html; charset=utf-8',
@@ -50,6 +49,11 @@ export interface FakeServer {
   close(): Promise<void>;
 }
 
+interface Offer {
+  readonly scenes?: readonly Partial<SceneListing>[];
+  readonly poster?: Uint8Array;
+}
+
 /** Called for each message of each client. */
 export type Script = (peer: Peer, body: Body) => void;
 
@@ -62,11 +66,19 @@ export const at_hello =
 export const refuse = (code: Error_Code, message: string): Script =>
   at_hello({ case: 'error', value: { code, message, fatal: true } });
 
-export async function start_fake_server(script: Script): Promise<FakeServer> {
+export async function start_fake_server(
+  script: Script,
+  { scenes = [{ id: 'city', title: 'Demo city' }], poster }: Offer = {},
+): Promise<FakeServer> {
   const http = createServer((request, response) => {
     const name = new URL(request.url ?? '/', 'http://localhost').pathname;
     if (name === '/api/scenes') {
-      response.end(JSON.stringify({ scenes: scene_ids.map((id) => ({ id })) }));
+      response.end(JSON.stringify({ scenes }));
+      return;
+    }
+    if (poster && name.endsWith('/poster.jpg')) {
+      response.writeHead(200, { 'content-type': 'image/jpeg' });
+      response.end(poster);
       return;
     }
     if (name.startsWith('/api/scenes/')) {
@@ -149,7 +161,7 @@ export function welcome(): ServerBody {
       },
       renderer: 'CPU, AVX2, 2 threads (no CUDA device)',
       serverVersion: '0.1.0',
-      sceneIds: scene_ids,
+      sceneIds: ['city', 'garden'],
     },
   };
 }

@@ -178,8 +178,11 @@ void check_precondition(const Precondition& asked) {
 
 /// Elements of a page's head that hold texts of a scene.
 void check_preview(const std::string& title, const std::string& scene_id) {
-  const std::string head = preview_elements(
-      {.site = "https://a.example", .scene_id = scene_id, .title = title, .has_poster = true});
+  const std::string head = preview_elements({.site = "https://a.example",
+                                             .scene_id = scene_id,
+                                             .title = title,
+                                             .about = {.credits = title},
+                                             .has_poster = true});
   const auto count = [&](char c) { return std::ranges::count(head, c); };
   require(count('<') == 7 && count('>') == 7 && count('"') == 28, "texts stay in their attributes");
 }

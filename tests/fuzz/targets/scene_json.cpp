@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "render_core/base/printable.h"
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "server/scenes/tours.h"
@@ -65,6 +66,10 @@ void parse_sidecar(Bytes input) {
   if (sidecar.limits)
     require(is_place(sidecar.limits->min) && is_place(sidecar.limits->max), "limits are places");
   if (sidecar.focus) require(is_place(*sidecar.focus), "the focus is a place");
+  const SceneAbout& about = sidecar.about;
+  for (const std::string& text : {about.title, about.credits, about.licence})
+    require(printable(text) == text, "what visitors are told is printable");
+  require(about.background_rgb <= 0xffffff, "the background is a colour");
   if (sidecar.start_pose)
     require_sound(Pose{sidecar.start_pose->position, sidecar.start_pose->orientation});
 }
@@ -126,7 +131,7 @@ void parse_sent_sidecar(Bytes input) {
 std::map<std::string, std::string> sent_sidecar_seeds() {
   return {{"sent", R"({"up":"-y","near":0.1,"tours":[{"title":"Hall","autoplay":true,"stops":[{
                        "title":"Door","caption":"Oak.","position":[1,2,3],"orientation":[0,0,0,1],
-                       "fov_deg":60,"marker":[1,2,4],"stay_s":8},
+                       "fov_deg":60,"marker":[1,2,4],"stay_s":8,"fly_s":2},
                        {"position":[0,1,2],"look_at":[0,0,0]}]}]})"}};
 }
 
@@ -153,37 +158,39 @@ std::vector<std::string> json_words(std::string_view keys) {
 }  // namespace
 
 std::vector<Target> scene_json_targets() {
-  return {{.name = "lod_tree",
-           .parse = parse_lod_tree,
-           .seeds = lod_tree_seeds,
-           .dictionary = json_words(
-               "lodLevels filenames tree children lods file offset count environment version"),
-           .change = change_json,
-           .max_bytes = 8192},
-          {.name = "sidecar",
-           .parse = parse_sidecar,
-           .seeds = sidecar_seeds,
-           .dictionary = json_words(
-               "up near focus start_pose position look_at orientation limits min max tours -y +z"),
-           .change = change_json},
-          {.name = "cameras",
-           .parse = parse_cameras,
-           .seeds = cameras_seeds,
-           .dictionary = json_words("position rotation frames transform_matrix"),
-           .change = change_json},
-          {.name = "tours",
-           .parse = parse_tours,
-           .seeds = tours_seeds,
-           .dictionary = json_words("tours animTracks annotations cameras"),
-           .change = change_json,
-           .max_bytes = 65536},
-          {.name = "sent_sidecar",
-           .parse = parse_sent_sidecar,
-           .seeds = sent_sidecar_seeds,
-           .dictionary = json_words("tours stops title caption autoplay fov_deg marker stay_s "
-                                    "position look_at orientation up"),
-           .change = change_json,
-           .max_bytes = 65536}};
+  return {
+      {.name = "lod_tree",
+       .parse = parse_lod_tree,
+       .seeds = lod_tree_seeds,
+       .dictionary = json_words(
+           "lodLevels filenames tree children lods file offset count environment version"),
+       .change = change_json,
+       .max_bytes = 8192},
+      {.name = "sidecar",
+       .parse = parse_sidecar,
+       .seeds = sidecar_seeds,
+       .dictionary = json_words(
+           "up near focus start_pose position look_at orientation limits min max tours title "
+           "credits licence mode walk background #0a10ff -y +z"),
+       .change = change_json},
+      {.name = "cameras",
+       .parse = parse_cameras,
+       .seeds = cameras_seeds,
+       .dictionary = json_words("position rotation frames transform_matrix"),
+       .change = change_json},
+      {.name = "tours",
+       .parse = parse_tours,
+       .seeds = tours_seeds,
+       .dictionary = json_words("tours animTracks annotations cameras"),
+       .change = change_json,
+       .max_bytes = 65536},
+      {.name = "sent_sidecar",
+       .parse = parse_sent_sidecar,
+       .seeds = sent_sidecar_seeds,
+       .dictionary = json_words("tours stops title caption autoplay fov_deg marker stay_s fly_s "
+                                "position look_at orientation up"),
+       .change = change_json,
+       .max_bytes = 65536}};
 }
 
 }  // namespace catgs::fuzz

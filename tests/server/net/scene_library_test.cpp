@@ -73,9 +73,12 @@ TEST_F(SceneLibraryTest, LoadsAnExhibitWhenSomebodyAsksForIt) {
   start();
   const auto scenes = listing();
   ASSERT_EQ(scenes.size(), 3u) << scenes;
-  EXPECT_EQ(
-      scenes[0],
-      (nlohmann::json{{"id", "city"}, {"title", "city"}, {"gaussians", 2000}, {"loaded", true}}));
+  EXPECT_EQ(scenes[0], (nlohmann::json{{"id", "city"},
+                                       {"title", "city"},
+                                       {"credits", ""},
+                                       {"licence", ""},
+                                       {"gaussians", 2000},
+                                       {"loaded", true}}));
   EXPECT_EQ(scenes[1].at("gaussians"), 5000) << "from the header alone";
   EXPECT_FALSE(loaded("attic"));
   const auto client = connect();

@@ -155,11 +155,16 @@ TEST(Wire, EveryServerMessageReadsBack) {
   welcome.session_id = "abc";
   welcome.scene.scene_id = "city";
   welcome.scene.focus = {1.0f, 2.0f, 3.0f};
+  welcome.scene.about = {"The city", "Ada", "MIT", CameraMode::walk, 0x0a10ff};
   welcome.scene_ids = {"city", "garden"};
   const auto greeting = reread(welcome).welcome();
   EXPECT_EQ(greeting.version(), 1u);
   EXPECT_EQ(greeting.scene().focus().z(), 3.0f);
   EXPECT_EQ(greeting.scene().start_pose().orientation().w(), 1.0f);
+  EXPECT_EQ(greeting.scene().credits(), "Ada");
+  EXPECT_EQ(greeting.scene().licence(), "MIT");
+  EXPECT_EQ(greeting.scene().mode(), v1::CAMERA_MODE_WALK);
+  EXPECT_EQ(greeting.scene().background_rgb(), 0x0a10ffu);
   EXPECT_EQ(greeting.scene_ids(1), "garden");
   EXPECT_EQ(reread(Stats{12.5f, 800.0f, 3, 0, 1, 4}).stats().sessions(), 4u);
   EXPECT_EQ(reread(Heartbeat{77}).heartbeat().server_time_us(), 77);

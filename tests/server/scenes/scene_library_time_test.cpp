@@ -98,6 +98,43 @@ TEST_F(SceneLibraryTime, ListingsShareWhatPagesGetOfAScene) {
   EXPECT_EQ(tours_of_a()->for_authors, a->tours.for_authors);
 }
 
+TEST_F(SceneLibraryTime, APosterStaysWhenItsSceneGoes) {
+  const auto shown = [&](const std::string& name) {
+    const auto listing = library_->listing();
+    return *std::ranges::find(*listing, id(name), &SceneLibrary::Listing::id);
+  };
+  library_->want_poster(id("a"));
+  run_until([&] { return shown("a").poster != nullptr; });
+  load("b");
+  tick(60s);
+  load("c");
+  EXPECT_FALSE(shown("a").loaded);
+  const auto poster = shown("a").poster;
+  EXPECT_NE(poster, nullptr);
+  library_->want_poster(id("a"));
+  run_until([&] { return true; });
+  EXPECT_FALSE(awaited("a") && in_memory("a")) << "no load for a poster that is there";
+}
+
+TEST_F(SceneLibraryTime, NobodyWaitsForPosters) {
+  EXPECT_TRUE(awaited("a"));
+  library_->want_poster(id("b"));
+  run_until([&] { return in_memory("a"); });
+  EXPECT_TRUE(awaited("c")) << "b does not wait before it";
+  EXPECT_EQ(library_->in_memory(id("b")), nullptr);
+}
+
+TEST_F(SceneLibraryTime, TellsOfScenesBeforeTheyAreLoaded) {
+  folder_.write("d.json", R"({"title": "The hall", "licence": "MIT"})");
+  save_scene(random_cloud(10, 0), folder_ / "d.ply");
+  start();
+  const auto listing = library_->listing();
+  const auto d = std::ranges::find(*listing, id("d"), &SceneLibrary::Listing::id);
+  EXPECT_EQ(d->title, "The hall");
+  EXPECT_EQ(d->about.licence, "MIT");
+  EXPECT_FALSE(d->loaded);
+}
+
 TEST_F(SceneLibraryTime, OneIsLoadedAnotherWaitsAndTheThirdIsRefused) {
   EXPECT_TRUE(awaited("a"));
   EXPECT_TRUE(awaited("b"));

@@ -134,6 +134,19 @@ TEST_F(SidecarSaverTest, ToursAloneNeedNoPoster) {
   EXPECT_EQ(posters_.size(), 1u);
 }
 
+TEST_F(SidecarSaverTest, WhatTheAuthorSaysIsShownAtOnce) {
+  Saved said = save(R"({"title": "The hall", "credits": "Ada", "background": "#ffffff"})");
+  run_until([&] { return library_->in_memory(hall_)->poster != scene_->poster; });
+  EXPECT_EQ(said.get().status, 200);
+  const auto shown = [&] { return library_->listing()->front(); };
+  EXPECT_EQ(shown().title, "The hall");
+  EXPECT_EQ(shown().about.credits, "Ada");
+  EXPECT_EQ(library_->in_memory(hall_)->facts.about.background_rgb, 0xffffffu);
+  Saved nothing = save("{}");
+  run_until([&] { return is_ready(nothing); });
+  EXPECT_EQ(shown().title, "hall") << "its name again";
+}
+
 TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
   Saved begun = save(sidecar_at(1));
   Saved waits = save(sidecar_at(2));

@@ -103,7 +103,7 @@ TEST(SentSidecar, OfAWholeTourIsTaken) {
   const Sidecar sidecar = check_sent_sidecar(
       R"({"up": "-y", "near": 0.1, "tours": [{"title": "Hall", "autoplay": true, "stops": [
           {"title": "Door", "caption": "Oak.", "position": [1, 2, 3], "orientation": [0, 0, 0, 1],
-           "fov_deg": 60, "marker": [1, 2, 4], "stay_s": 8}]}]})");
+           "fov_deg": 60, "marker": [1, 2, 4], "stay_s": 8, "fly_s": 2}]}]})");
   EXPECT_FLOAT_EQ(sidecar.near_z.value(), 0.1f);
   EXPECT_NO_THROW(check_sent_sidecar(with_stop("")));
   EXPECT_NO_THROW(check_sent_sidecar("{}"));
@@ -131,6 +131,7 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
               HasSubstr("tours[0].autoplay"));
   EXPECT_THAT(mistake(with_stop(R"(, "fov_deg": 400)")), HasSubstr("tours[0].stops[0].fov_deg"));
   EXPECT_THAT(mistake(with_stop(R"(, "stay_s": -1)")), HasSubstr("stay_s: is not in 0"));
+  EXPECT_THAT(mistake(with_stop(R"(, "fly_s": 121)")), HasSubstr("fly_s: is not in 0"));
   EXPECT_THAT(mistake(with_stop(R"(, "marker": [0, 0])")), HasSubstr("marker"));
   EXPECT_THAT(mistake(with_stop(R"(, "captoin": "x")")), HasSubstr("unknown field 'captoin'"));
   EXPECT_THAT(mistake(with_stop(R"(, "caption": 7)")), HasSubstr("caption: is not a text"));

@@ -15,7 +15,9 @@ class FrameLoopTest : public testing::Test {
  protected:
   FrameLoopTest() {
     flow.set_wish({{640, 360}, 60, 8000});
-    loop.enter_scene(0.2f);
+    SceneFacts scene;
+    scene.about.background_rgb = 0xff0000;
+    loop.enter_scene(scene);
   }
   static PoseSample sample(std::uint64_t id, float x, bool at_rest = false) {
     PoseSample sample;
@@ -97,6 +99,7 @@ TEST_F(FrameLoopTest, RendersOnDemandAndRefinesAStillPicture) {
   FrameOrder order = run();
   EXPECT_FALSE(order.ticket.refined);
   EXPECT_EQ(order.ticket.pose_id, 1u);
+  EXPECT_EQ(order.request.background, glm::vec3(1.0f, 0.0f, 0.0f)) << "of the scene";
 
   EXPECT_FALSE(pose(2, 0.0f)) << "the same view: nothing to render";
   now += 50ms;
@@ -215,7 +218,7 @@ TEST_F(FrameLoopTest, ForecastsFromPastPosesAlone) {
       static_cast<float>(forecast.frames);
   EXPECT_NEAR(step * static_cast<float>(order.real_fps), 0.1f * 60.0f, 0.1f);
 
-  loop.enter_scene(0.2f);
+  loop.enter_scene(SceneFacts());
   EXPECT_FALSE(has_next()) << "a pose of the old scene shows nothing of the new one";
   EXPECT_FALSE(walk(31).request.forecast) << "elsewhere";
 }

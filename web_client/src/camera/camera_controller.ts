@@ -104,12 +104,18 @@ export class CameraController {
   reset(): void {
     this.end_flight(false);
     if (this.scene_) this.load(this.scene_);
-    this.fov_y_rad = this.scene_?.start_fov_y_rad ?? default_fov_y_rad;
+    this.fov_y_rad = this.start?.fov_y_rad ?? default_fov_y_rad;
+  }
+
+  /** Where reset() leads. */
+  get start(): Eye | undefined {
+    const fov_y_rad = this.scene_?.start_fov_y_rad ?? default_fov_y_rad;
+    return this.scene_ && { ...this.scene_.start_pose, fov_y_rad };
   }
 
   /** Sets another start for reset(). The camera stays where it is. */
-  start_at(eye: Eye): void {
-    if (!this.scene_) return;
+  start_at(eye: Eye | undefined): void {
+    if (!this.scene_ || !eye) return;
     this.scene_ = { ...this.scene_, start_pose: eye, start_fov_y_rad: eye.fov_y_rad };
   }
 

@@ -1,6 +1,7 @@
 // Converts cameras and scenes between the client and the wire.
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { camera_modes, type CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
 import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
 
@@ -47,3 +48,6 @@ export function scene_setup(scene: SceneFacts): SceneSetup {
     scale: scene.scale,
   };
 }
+
+/** How a visitor moves at first; undefined: the scene does not say. The wire counts the modes from 1. */
+export const start_mode = ({ mode }: SceneFacts): CameraMode | undefined => camera_modes[mode - 1];

@@ -1,15 +1,40 @@
-import { ask_server } from '../base/server';
+import { ask_server, scene_path } from '../base/server';
 
-/** Ids of the scenes that this token may see; empty when the server does not answer. */
-export async function list_scenes(page_url: string, token: string): Promise<readonly string[]> {
+/** A scene that this visitor may see, as GET /api/scenes tells of it. */
+export interface SceneListing {
+  readonly id: string;
+  readonly title: string;
+  readonly credits: string;
+  readonly licence: string;
+}
+
+/** The scenes that this token may see; empty when the server does not answer. */
+export async function list_scenes(page_url: string, token: string): Promise<readonly SceneListing[]> {
   try {
     const response = await ask_server(page_url, token, 'scenes');
     if (!response.ok) return [];
-    const { scenes } = (await response.json()) as { scenes: readonly { id: string }[] };
-    return scenes.map(({ id }) => id);
+    const { scenes } = (await response.json()) as { scenes: readonly SceneListing[] };
+    return scenes;
   } catch (error) {
     console.warn('the list of scenes could not be read', error);
     return [];
+  }
+}
+
+/** A still of the scene; 'later': the server has none yet; undefined: there will be none. */
+export async function fetch_poster(
+  page_url: string,
+  token: string,
+  scene_id: string,
+): Promise<Blob | 'later' | undefined> {
+  try {
+    const response = await ask_server(page_url, token, scene_path(scene_id, 'poster.jpg'));
+    if (!response.ok) return response.headers.has('retry-after') ? 'later' : undefined;
+    const blob = await response.blob();
+    return blob.type.startsWith('image/') ? blob : undefined;
+  } catch (error) {
+    console.warn('no poster could be shown', error);
+    return undefined;
   }
 }
 
@@ -18,18 +43,25 @@ export function scene_name(scene_id: string): string {
   return scene_id.replace(/^(.+)-[b-df-hjkmnp-tv]{8}$/, '$1');
 }
 
-/** Names for a list of scenes, and ids where several have the same name. */
-export function scene_labels(scene_ids: readonly string[]): readonly string[] {
-  const names = scene_ids.map(scene_name);
+/** Titles for a list of scenes, and ids where several have the same title. */
+export function scene_labels(scenes: readonly SceneListing[]): readonly string[] {
+  const titles = scenes.map(({ title }) => title);
   const seen = new Set<string>();
-  const shared = new Set(names.filter((name) => seen.size === seen.add(name).size));
-  return names.map((name, i) => (shared.has(name) ? (scene_ids[i] ?? name) : name));
+  const shared = new Set(titles.filter((title) => seen.size === seen.add(title).size));
+  return scenes.map(({ id, title }) => (shared.has(title) ? id : title));
 }
 
-/** The page's address with this scene, or with the server's first one where `scene_id` is empty. */
+/** The page's address with this scene, or with no scene where `scene_id` is empty. The view is left out. */
 export function scene_address(page_url: string, scene_id = ''): string {
   const url = new URL(page_url);
   if (scene_id) url.searchParams.set('scene', scene_id);
   else url.searchParams.delete('scene');
+  url.hash = '';
   return url.href;
+}
+
+/** Whether the address leaves the scene open: it names none, and shows no view of one. Frames get the first scene. */
+export function leaves_scene_open(page_url: string): boolean {
+  const { searchParams, hash } = new URL(page_url);
+  return !searchParams.get('scene') && searchParams.get('ui') !== '0' && !/[#&](at|stop)=/.test(hash);
 }

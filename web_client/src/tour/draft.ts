@@ -1,63 +1,153 @@
-// A tour that an author is editing, and the sidecar made from it. Pure.
+// What an author is editing: the tours and what the scene's sidecar says besides. Pure.
+import type { CameraMode } from '../camera/mode';
+import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
 
-export class TourDraft {
-  private stops_: readonly Stop[] = [];
-  title = '';
-  starts_itself = false;
-  private others_: readonly Tour[] = []; // other tours of the scene, kept as they are
+/** What visitors are told of a scene. Texts are empty where nothing is said. */
+export interface SceneAbout {
+  readonly title: string;
+  readonly credits: string;
+  readonly licence: string;
+  readonly mode: CameraMode | undefined;
+  readonly background: string; // "#rrggbb"
+}
 
-  /** Edits the first tour that has stops. */
-  load(tours: readonly Tour[]): void {
-    const edited = tours.find(({ way }) => way === undefined);
-    this.title = edited?.title ?? '';
-    this.stops_ = edited?.stops ?? [];
-    this.starts_itself = edited?.starts_itself ?? false;
-    this.others_ = tours.filter((tour) => tour !== edited);
+export const nothing_said: SceneAbout = {
+  ...{ title: '', credits: '', licence: '', mode: undefined, background: '#000000' },
+};
+
+interface DraftState {
+  readonly tours: readonly Tour[];
+  /** Index of the tour that is edited. It has stops, or none yet, and is no film. */
+  readonly edited: number;
+  readonly about: SceneAbout;
+  /** Where the author lets visits begin; undefined: where they began before. */
+  readonly start: Eye | undefined;
+}
+
+const empty_tour: Tour = { title: '', stops: [], way: undefined, starts_itself: false };
+const most_undone = 200;
+
+/** Keeps each state of the draft, so that an author can take back every edit. */
+export class TourDraft {
+  private states_: readonly DraftState[] = [{ ...first_of([]), about: nothing_said, start: undefined }];
+  private typed_in_: string | undefined; // the field of the last edit
+
+  load(tours: readonly Tour[], about: SceneAbout): void {
+    this.states_ = [{ ...first_of(tours), about, start: undefined }];
+    this.typed_in_ = undefined;
+  }
+
+  /** Differs after each edit. Undoing an edit brings back the state before. */
+  get state(): DraftState {
+    return this.states_[this.states_.length - 1]!;
+  }
+
+  get tour(): Tour {
+    return this.state.tours[this.state.edited]!;
   }
 
   get stops(): readonly Stop[] {
-    return this.stops_;
+    return this.tour.stops;
   }
 
-  get tours(): readonly Tour[] {
-    const { title, stops, starts_itself } = this;
-    const edited = { title, stops, way: undefined, starts_itself };
-    return stops.length > 0 ? [edited, ...this.others_] : this.others_;
+  /** Tours that can be edited: indices into `state.tours`. */
+  get editable(): readonly number[] {
+    return this.state.tours.flatMap(({ way }, i) => (way ? [] : [i]));
+  }
+
+  /** The tours that visitors get. */
+  get shown(): readonly Tour[] {
+    return this.state.tours.filter(is_shown);
+  }
+
+  /** Index of the edited tour among those shown; -1: it has no stops. */
+  get shown_index(): number {
+    return this.shown.indexOf(this.tour);
+  }
+
+  get can_undo(): boolean {
+    return this.states_.length > 1;
+  }
+
+  undo(): void {
+    this.typed_in_ = undefined;
+    if (this.can_undo) this.states_ = this.states_.slice(0, -1);
+  }
+
+  /** `field`: typing on in one field is one edit. */
+  edit(change: Partial<DraftState>, field?: string): void {
+    const types_on = field !== undefined && field === this.typed_in_;
+    const before = types_on ? this.states_.slice(0, -1) : this.states_.slice(-most_undone);
+    this.states_ = [...before, { ...this.state, ...change }];
+    this.typed_in_ = field;
+  }
+
+  edit_tour(change: Partial<Tour>, field?: string): void {
+    const { tours, edited } = this.state;
+    this.edit({ tours: tours.map((tour, i) => (i === edited ? { ...tour, ...change } : tour)) }, field);
+  }
+
+  edit_about(change: Partial<SceneAbout>, field?: string): void {
+    this.edit({ about: { ...this.state.about, ...change } }, field);
+  }
+
+  add_tour(): void {
+    const { tours } = this.state;
+    this.edit({ tours: [...tours, empty_tour], edited: tours.length });
+  }
+
+  remove_tour(): void {
+    const { tours, edited } = this.state;
+    this.edit(first_of(tours.filter((_, i) => i !== edited)));
   }
 
   add(stop: Stop): void {
-    this.stops_ = [...this.stops_, stop];
+    this.edit_tour({ stops: [...this.stops, stop] });
   }
 
   remove(index: number): void {
-    this.stops_ = this.stops_.filter((_, i) => i !== index);
+    this.edit_tour({ stops: this.stops.filter((_, i) => i !== index) });
   }
 
-  change(index: number, change: Partial<Stop>): void {
-    this.stops_ = this.stops_.map((stop, i) => (i === index ? { ...stop, ...change } : stop));
+  change(index: number, change: Partial<Stop>, field?: string): void {
+    this.edit_tour({ stops: this.stops.map((stop, i) => (i === index ? { ...stop, ...change } : stop)) }, field);
   }
 
   /** Swaps a stop with its neighbour. `by`: 1 or -1. */
   move(index: number, by: number): void {
-    const [stop, neighbour] = [this.stops_[index], this.stops_[index + by]];
+    const [stop, neighbour] = [this.stops[index], this.stops[index + by]];
     if (!stop || !neighbour) return;
-    this.stops_ = this.stops_.map((other, i) =>
-      i === index ? neighbour : i === index + by ? stop : other,
-    );
+    const swapped = this.stops.map((other, i) => (i === index ? neighbour : i === index + by ? stop : other));
+    this.edit_tour({ stops: swapped });
   }
 
   /** The whole of `<scene>.json`: the facts of the scene and the tours. */
   sidecar(scene: SceneSetup): object {
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
+    const { title, credits, licence, mode, background } = this.state.about;
+    const { position, orientation } = scene.start_pose;
     return {
+      ...(title && { title }),
+      ...(credits && { credits }),
+      ...(licence && { licence }),
+      ...(mode && { mode }),
+      ...(background !== nothing_said.background && { background }),
       up: scene.up,
-      start_pose: { position: scene.start_pose.position, orientation: scene.start_pose.orientation },
+      start_pose: { position, orientation },
       near: scene.near_z,
       ...(limited && { limits: { min: scene.limits_min, max: scene.limits_max } }),
       focus: scene.focus,
-      tours: write_tours(this.tours),
+      tours: write_tours(this.shown),
     };
   }
+}
+
+const is_shown = ({ stops, way }: Tour): boolean => stops.length > 0 || way !== undefined;
+
+/** Edits the first tour that is no film, or a new one. */
+function first_of(tours: readonly Tour[]): Pick<DraftState, 'tours' | 'edited'> {
+  const edited = tours.findIndex(({ way }) => way === undefined);
+  return edited >= 0 ? { tours, edited } : { tours: [...tours, empty_tour], edited: tours.length };
 }

@@ -2,7 +2,7 @@
 import type { Timers } from '../base/clock';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight, type PathSample } from '../camera/flight';
-import { stay_of, type Stop, type Tour } from './tour';
+import { default_stay_s, type Stop, type Tour } from './tour';
 
 interface Guided {
   readonly eye: Eye;
@@ -40,6 +40,7 @@ export class TourPlayer {
   private tour_index_ = 0;
   private stop_index_: number | undefined;
   private playing_ = false;
+  private at_end_: (() => void) | undefined; // of the last stop; undefined: the tour begins again
   private cancel_ = (): void => undefined;
   private cancel_announcing_ = (): void => undefined;
   private journey_ = 0; // the end of an older journey does not count for this one
@@ -108,6 +109,13 @@ export class TourPlayer {
     else this.play();
   }
 
+  /** Plays the tour from its first stop to its last one. `ended` is not called where the visitor stops it. */
+  play_once(ended: () => void): void {
+    this.leave();
+    this.at_end_ = ended;
+    this.play();
+  }
+
   play(): void {
     const { tour } = this.state;
     if (!tour) return;
@@ -119,6 +127,7 @@ export class TourPlayer {
   /** Stops playing. The page also calls this when the visitor takes over. */
   pause(): void {
     this.cancel_();
+    this.at_end_ = undefined;
     if (!this.playing_) return;
     this.playing_ = false;
     this.env_.camera.stop_flight();
@@ -145,7 +154,7 @@ export class TourPlayer {
     const { camera } = this.env_;
     const from = camera.eye;
     this.stop_index_ = stop_index;
-    const duration_s = at_once ? 0 : glide_time_s(from, stop.eye, camera.reach);
+    const duration_s = at_once ? 0 : (stop.fly_s ?? glide_time_s(from, stop.eye, camera.reach));
     const way = glide(from, stop.eye, duration_s);
     const journey = this.set_out();
     camera.fly(way, (arrived) => {
@@ -163,7 +172,14 @@ export class TourPlayer {
       return;
     }
     if (!this.playing_) return;
-    this.cancel_ = this.env_.timers.after(stay_of(stop) * 1000, () => this.play());
+    this.cancel_ = this.env_.timers.after((stop.stay_s ?? default_stay_s(stop)) * 1000, () => this.go_on());
+  }
+
+  private go_on(): void {
+    const ended = this.at_end_;
+    if (!ended || this.stop_index_ !== (this.state.tour?.stops.length ?? 0) - 1) return this.play();
+    this.pause();
+    ended();
   }
 
   private run_film(way: Flight, repeats: boolean): void {

@@ -41,6 +41,7 @@ function read_annotation(annotation: JsonPlace, aspect: number): Stop {
     eye: read_camera(annotation.at('camera'), aspect),
     marker: to_scene(annotation.at('position').vec3()),
     stay_s: undefined,
+    fly_s: undefined,
   };
 }
 

@@ -3,7 +3,7 @@ import { look_at, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { JsonPlace } from './json_place';
-import { max_stops, max_tours } from './limits';
+import { longest_flight_s, longest_stay_s, max_stops, max_tours } from './limits';
 
 export interface Stop {
   readonly title: string;
@@ -13,6 +13,8 @@ export interface Stop {
   readonly marker: Vec3 | undefined;
   /** Time that autoplay stays; undefined: as long as the caption takes to read. */
   readonly stay_s: number | undefined;
+  /** Time of the flight to it; undefined: a comfortable one. */
+  readonly fly_s: number | undefined;
 }
 
 export interface Tour {
@@ -25,8 +27,8 @@ export interface Tour {
 }
 
 /** Time that a visitor needs to look around and to read. */
-export function stay_of(stop: Stop): number {
-  return stop.stay_s ?? 3 + 0.06 * (stop.caption.length + stop.title.length);
+export function default_stay_s(stop: Stop): number {
+  return 3 + 0.06 * (stop.caption.length + stop.title.length);
 }
 
 /**
@@ -54,7 +56,8 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
     caption: stop.find('caption')?.text() ?? '',
     eye: { position, orientation, fov_y_rad: stop.find('fov_deg')?.fov_rad() ?? fov_y_rad },
     marker: stop.find('marker')?.vec3(),
-    stay_s: stop.find('stay_s')?.number(0, 3600),
+    stay_s: stop.find('stay_s')?.number(0, longest_stay_s),
+    fly_s: stop.find('fly_s')?.number(0, longest_flight_s),
   };
 }
 
@@ -74,6 +77,7 @@ export function write_tours(tours: readonly Tour[]): unknown[] {
         fov_deg: short((stop.eye.fov_y_rad * 180) / Math.PI),
         ...(stop.marker && { marker: stop.marker.map(short) }),
         ...(stop.stay_s !== undefined && { stay_s: stop.stay_s }),
+        ...(stop.fly_s !== undefined && { fly_s: stop.fly_s }),
       })),
     }));
 }

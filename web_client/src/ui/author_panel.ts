@@ -2,11 +2,13 @@ import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import { text } from '../text';
-import { TourDraft } from '../tour/draft';
-import { max_text_characters } from '../tour/limits';
+import { TourDraft, type SceneAbout } from '../tour/draft';
+import { max_tours } from '../tour/limits';
 import { save_sidecar, type SidecarTag } from '../tour/save';
-import type { Stop, Tour } from '../tour/tour';
-import { by_id, make, on_click, save_file } from './dom';
+import type { Tour } from '../tour/tour';
+import { AuthorAbout } from './author_about';
+import { AuthorStops } from './author_stops';
+import { by_id, on_click, save_file } from './dom';
 
 interface AuthorTools {
   eye(): Eye;
@@ -15,89 +17,150 @@ interface AuthorTools {
   file_name(): string; // of the scene, without extension
   /** The point in the middle of the view; undefined: nothing is there. */
   place_ahead(): Promise<Vec3 | undefined>;
-  /** The tours have changed. */
-  changed(tours: readonly Tour[]): void;
+  /** The tours have changed. `edited`: index of the one that is edited; -1: it has no stops. */
+  changed(tours: readonly Tour[], edited: number): void;
   go_to(stop_index: number): void;
-  /** Plays the tour as it is so far. */
+  /** Plays the edited tour as it is so far. */
   preview(): void;
-  /** Sets where visits begin, for this page. */
-  start_at(eye: Eye): void;
+  /** Sets where visits begin, for this page; undefined: where they began before. */
+  start_at(eye: Eye | undefined): void;
 }
 
 /** The editor of tours: `?author` in the address. */
 export class AuthorPanel {
   private readonly draft_ = new TourDraft();
-  private readonly list_ = by_id('author-stops', HTMLOListElement);
+  private readonly about_: AuthorAbout;
+  private readonly stops_: AuthorStops;
+  private readonly tour_ = by_id('author-tour', HTMLSelectElement);
   private readonly title_ = by_id('author-title', HTMLInputElement);
   private readonly autoplay_ = by_id('author-autoplay', HTMLInputElement);
-  private readonly preview_ = by_id('author-preview', HTMLButtonElement);
   private readonly save_ = by_id('author-save', HTMLButtonElement);
   private readonly replace_ = by_id('author-replace', HTMLButtonElement);
   private readonly done_ = by_id('author-done', HTMLOutputElement);
   private token_: string | undefined;
   private made_from_: SidecarTag;
   private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
-  private open_ = 0; // index of the stop that is shown with all its fields
-  private changes_ = 0;
-  private saved_changes_ = 0;
+  private start_: Eye | undefined; // as the page has heard
+  private saved_: unknown; // the state of the draft that is saved; undefined: the scene has changed besides
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
-    on_click('author-add', () => void this.add());
-    on_click('author-start', () => {
-      tools_.start_at(tools_.eye());
-      this.scene_changed();
-      this.done_.textContent = text.author.start_set;
-    });
-    on_click('author-preview', () => tools_.preview());
-    on_click('author-save', () => void this.save(this.made_from_));
-    on_click('author-replace', () => void this.save(this.theirs_));
-    on_click('author-download', () => this.download());
-    this.title_.addEventListener('input', () => {
-      this.draft_.title = this.title_.value;
+    this.about_ = new AuthorAbout((change, field) => {
+      this.draft_.edit_about(change, field);
       this.told();
     });
-    this.autoplay_.addEventListener('change', () => {
-      this.draft_.starts_itself = this.autoplay_.checked;
-      this.told();
+    this.stops_ = new AuthorStops(by_id('author-stops', HTMLOListElement), {
+      change: (i, change, field) => {
+        this.draft_.change(i, change, field);
+        // Typing does not rebuild the fields.
+        if (field === undefined) this.edited();
+        else this.told();
+      },
+      go_to: (i) => tools_.go_to(i),
+      take_view: (i) => void this.take_view(i),
+      take_marker: (i) => void this.take_marker(i),
+      move: (i, by) => {
+        this.draft_.move(i, by);
+        this.edited(i + by);
+      },
+      remove: (i) => this.remove(i),
     });
-    window.addEventListener('beforeunload', (event) => {
-      if (this.changes_ > this.saved_changes_) event.preventDefault();
-    });
+    this.bind();
   }
 
   /**
    * `token`: lets its holder save the sidecar; undefined: this visitor may not save.
    * `made_from`: the tag of the sidecar with these tours.
    */
-  load(tours: readonly Tour[], token: string | undefined, made_from: SidecarTag): void {
+  load(tours: readonly Tour[], about: SceneAbout, token: string | undefined, made_from: SidecarTag): void {
     this.token_ = token;
     this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
     this.replace_.hidden = true;
-    this.draft_.load(tours);
-    this.title_.value = this.draft_.title;
-    this.autoplay_.checked = this.draft_.starts_itself;
-    this.changes_ = this.saved_changes_ = 0;
-    this.show();
+    this.draft_.load(tours, about);
+    this.saved_ = this.draft_.state;
+    this.start_ = undefined;
+    this.show(0);
   }
 
-  /** Where visits begin, or which way is up, is no longer as it was saved. */
+  /** Which way is up is no longer as it was saved. */
   scene_changed(): void {
-    this.changes_ += 1;
+    this.saved_ = undefined;
     this.done_.textContent = '';
+  }
+
+  private bind(): void {
+    const { draft_: draft, tools_: tools } = this;
+    on_click('author-undo', () => {
+      draft.undo();
+      this.edited();
+    });
+    on_click('author-new', () => {
+      draft.add_tour();
+      this.edited(0);
+      this.title_.focus();
+    });
+    on_click('author-delete', () => {
+      draft.remove_tour();
+      this.edited(0);
+      this.title_.focus();
+    });
+    this.tour_.addEventListener('change', () => {
+      draft.edit({ edited: Number(this.tour_.value) });
+      this.edited(0);
+    });
+    this.title_.addEventListener('input', () => {
+      draft.edit_tour({ title: this.title_.value }, 'tour');
+      this.told();
+    });
+    on_click('author-add', () => void this.add());
+    on_click('author-start', () => {
+      draft.edit({ start: tools.eye() });
+      this.told();
+      this.done_.textContent = text.author.start_set;
+    });
+    on_click('author-preview', () => tools.preview());
+    this.autoplay_.addEventListener('change', () => {
+      draft.edit_tour({ starts_itself: this.autoplay_.checked });
+      this.told();
+    });
+    on_click('author-save', () => void this.save(this.made_from_));
+    on_click('author-replace', () => void this.save(this.theirs_));
+    on_click('author-download', () => this.download());
+    window.addEventListener('beforeunload', (event) => {
+      if (this.saved_ !== draft.state) event.preventDefault();
+    });
   }
 
   private async add(): Promise<void> {
     const eye = this.tools_.eye();
     const marker = await this.tools_.place_ahead();
     const title = text.tour.stop_numbered(this.draft_.stops.length + 1);
-    this.draft_.add({ title, caption: '', eye, marker, stay_s: undefined });
-    this.open_ = this.draft_.stops.length - 1;
-    this.edited();
+    this.draft_.add({ title, caption: '', eye, marker, stay_s: undefined, fly_s: undefined });
+    this.edited(this.draft_.stops.length - 1);
     this.done_.textContent = marker ? '' : text.author.no_marker;
-    this.list_.lastElementChild?.scrollIntoView({ block: 'nearest' });
-    this.list_.lastElementChild?.querySelector('input')?.select();
+    const added = by_id('author-stops', HTMLOListElement).lastElementChild;
+    added?.scrollIntoView({ block: 'nearest' });
+    added?.querySelector('input')?.select();
+  }
+
+  private async take_view(index: number): Promise<void> {
+    const eye = this.tools_.eye();
+    this.draft_.change(index, { eye, marker: await this.tools_.place_ahead() });
+    this.edited();
+  }
+
+  private async take_marker(index: number): Promise<void> {
+    const marker = await this.tools_.place_ahead();
+    if (marker) this.draft_.change(index, { marker });
+    this.edited();
+    if (!marker) this.done_.textContent = text.author.nothing_there;
+  }
+
+  private remove(index: number): void {
+    this.draft_.remove(index);
+    this.edited(index);
+    if (this.draft_.stops.length === 0) by_id('author-add', HTMLButtonElement).focus();
   }
 
   private sidecar(): string | undefined {
@@ -108,7 +171,8 @@ export class AuthorPanel {
   private async save(made_from: SidecarTag): Promise<void> {
     const sidecar = this.sidecar();
     if (sidecar === undefined || this.token_ === undefined) return;
-    const { changes_: changes } = this;
+    const { state } = this.draft_;
+    const focused = document.activeElement;
     this.save_.disabled = this.replace_.disabled = true;
     this.done_.textContent = text.author.saving;
     const result = await save_sidecar(
@@ -121,7 +185,7 @@ export class AuthorPanel {
     );
     this.save_.disabled = this.replace_.disabled = false;
     if (result.kind === 'saved') {
-      this.saved_changes_ = changes;
+      this.saved_ = state;
       this.made_from_ = result.tag;
       this.replace_.hidden = true;
       this.done_.textContent = text.author.saved;
@@ -130,6 +194,8 @@ export class AuthorPanel {
       this.replace_.hidden = false;
       this.done_.textContent = text.author.changed_meanwhile;
     } else this.done_.textContent = text.author.not_saved(result.why);
+    // A button that is disabled loses the focus.
+    if (focused === this.save_ || focused === this.replace_) this.save_.focus();
   }
 
   private download(): void {
@@ -137,82 +203,45 @@ export class AuthorPanel {
     if (sidecar === undefined) return;
     const name = `${this.tools_.file_name()}.json`;
     save_file(new Blob([sidecar], { type: 'application/json' }), name);
-    this.saved_changes_ = this.changes_;
+    this.saved_ = this.draft_.state;
     this.done_.textContent =
       this.token_ === undefined ? text.author.downloaded(name) : text.author.downloaded_too(name);
   }
 
-  private edited(): void {
+  private edited(open_stop?: number): void {
     this.told();
-    this.show();
+    this.show(open_stop);
   }
 
   private told(): void {
-    this.changes_ += 1;
     this.done_.textContent = '';
-    this.tools_.changed(this.draft_.tours);
+    this.show_what_can_be_done();
+    const { shown, shown_index, state } = this.draft_;
+    if (state.start !== this.start_) this.tools_.start_at(state.start);
+    this.start_ = state.start;
+    this.tools_.changed(shown, shown_index);
   }
 
-  private show(): void {
-    const count = this.draft_.stops.length;
-    by_id('author-hint', HTMLElement).hidden = count > 0;
-    this.preview_.disabled = count === 0;
-    this.list_.replaceChildren(...this.draft_.stops.map((stop, i) => this.row_of(stop, i)));
-  }
-
-  /** The fields and buttons of a stop. */
-  private row_of(stop: Stop, i: number): HTMLElement {
-    const words = text.author;
-    const title = make('input', { value: stop.title, maxLength: 200, 'aria-label': words.title(i + 1) });
-    title.addEventListener('input', () => this.change(i, { title: title.value }));
-    const caption = make('textarea', {
-      ...{ value: stop.caption, rows: 2, maxLength: max_text_characters },
-      ...{ placeholder: words.caption_here, 'aria-label': words.caption(i + 1) },
-    });
-    caption.addEventListener('input', () => this.change(i, { caption: caption.value }));
-    const button = (name: string, onclick: () => void, sign = name, disabled = false): HTMLElement => {
-      const said = sign === name ? {} : { 'aria-label': name, title: name };
-      return make('button', { type: 'button', disabled, onclick, ...said }, sign);
-    };
-    const buttons = make(
-      'div',
-      {},
-      button(words.show, () => this.tools_.go_to(i)),
-      button(words.view_here, () => void this.view_here(i)),
-      button(words.up(i + 1), () => this.move(i, -1), '↑', i === 0),
-      button(words.down(i + 1), () => this.move(i, 1), '↓', i === this.draft_.stops.length - 1),
-      button(words.remove(i + 1), () => this.remove(i), '×'),
+  private show(open_stop?: number): void {
+    const { tour, editable, state } = this.draft_;
+    const words = text.tour;
+    this.tour_.replaceChildren(
+      ...editable.map((i, n) => new Option(state.tours[i]!.title || words.numbered(n + 1), String(i))),
     );
-    const item = make('li', {}, title, caption, buttons);
-    item.classList.toggle('open', i === this.open_);
-    item.addEventListener('focusin', () => this.open(i));
-    return item;
+    this.tour_.value = String(state.edited);
+    this.title_.value = tour.title;
+    this.autoplay_.checked = tour.starts_itself;
+    this.about_.show(state.about);
+    this.stops_.show(tour.stops, open_stop);
+    this.show_what_can_be_done();
   }
 
-  private change(index: number, change: { title?: string; caption?: string }): void {
-    this.draft_.change(index, change);
-    this.told(); // does not rebuild the fields, so that they keep their focus
-  }
-
-  private async view_here(index: number): Promise<void> {
-    const eye = this.tools_.eye();
-    this.draft_.change(index, { eye, marker: await this.tools_.place_ahead() });
-    this.edited();
-  }
-
-  private remove(index: number): void {
-    this.draft_.remove(index);
-    this.edited();
-  }
-
-  private open(index: number): void {
-    this.open_ = index;
-    [...this.list_.children].forEach((item, i) => item.classList.toggle('open', i === index));
-  }
-
-  private move(index: number, by: number): void {
-    this.draft_.move(index, by);
-    this.open_ = index + by;
-    this.edited();
+  private show_what_can_be_done(): void {
+    const { stops, editable, state, can_undo } = this.draft_;
+    by_id('author-hint', HTMLElement).hidden = stops.length > 0;
+    by_id('author-preview', HTMLButtonElement).disabled = stops.length === 0;
+    by_id('author-undo', HTMLButtonElement).disabled = !can_undo;
+    this.tour_.hidden = by_id('author-delete', HTMLButtonElement).hidden = editable.length < 2;
+    by_id('author-new', HTMLButtonElement).hidden = stops.length === 0 || state.tours.length >= max_tours;
   }
 }

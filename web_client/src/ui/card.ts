@@ -1,7 +1,6 @@
 import { Signal } from '../base/signal';
-import { scene_address } from '../session/scenes';
-import { by_id } from './dom';
-import { show_scene_links } from './scene_links';
+import { scene_address, scene_labels, type SceneListing } from '../session/scenes';
+import { by_id, make } from './dom';
 import type { Card } from './wording';
 
 /** The card over the picture: what is going on while no picture says it. */
@@ -39,9 +38,17 @@ export class CardView {
     this.title_.textContent = card.title;
     this.text_.textContent = card.text;
     by_id('card-stays', HTMLElement).hidden = true;
-    show_scene_links('card-scenes', card.scene_ids ?? []);
+    show_links(by_id('card-scenes', HTMLUListElement), card.scenes ?? []);
     this.form_.hidden = card.asks_token !== true;
     this.action_.hidden = card.action === undefined;
     this.action_.textContent = card.action?.label ?? '';
   }
+}
+
+function show_links(list: HTMLElement, scenes: readonly SceneListing[]): void {
+  list.hidden = scenes.length === 0;
+  const labels = scene_labels(scenes);
+  list.replaceChildren(
+    ...scenes.map(({ id }, i) => make('li', {}, make('a', { href: scene_address(location.href, id) }, labels[i] ?? id))),
+  );
 }

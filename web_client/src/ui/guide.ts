@@ -1,18 +1,23 @@
 // Leads visitors through a scene: tours, shared views, and the page around this one.
 import { browser_timers, type Clock } from '../base/clock';
 import type { Eye } from '../camera/eye';
+import { start_mode } from '../session/camera_messages';
 import { scene_name } from '../session/scenes';
 import type { AccessToken } from '../session/token';
 import { text } from '../text';
 import { fetch_tours, read_document } from '../tour/load';
+import type { SceneAbout } from '../tour/draft';
 import { TourPlayer, type TourState } from '../tour/player';
 import { read_shared, share_address, type SharedView } from '../tour/share';
+import type { SceneFacts } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import { AuthorPanel } from './author_panel';
 import { EmbedApi } from './embed';
 import { Hotspots } from './hotspots';
 import type { Navigation } from './navigation';
 import type { Notice } from './notice';
+import { Preview } from './preview';
+import { css_colour } from './scene_title';
 import { SharePanel } from './share_panel';
 import type { Toolbar } from './toolbar';
 import { TourView } from './tour_view';
@@ -35,6 +40,7 @@ export class Guide {
   private readonly embed_: EmbedApi;
   private readonly author_: AuthorPanel | undefined;
   private loads_ = 0;
+  private first_start_: Eye | undefined; // of the scene, as visitors get it
 
   constructor(private readonly parts_: GuideParts) {
     const { view, clock, worker, navigation, reduced_motion } = parts_;
@@ -54,7 +60,7 @@ export class Guide {
     const is_author = new URLSearchParams(location.search).has('author');
     this.author_ = is_author ? this.make_author() : undefined;
     this.bind_share();
-    navigation.entered.listen(({ scene }) => void this.enter(scene.sceneId));
+    navigation.entered.listen(({ scene }) => void this.enter(scene));
     navigation.up_changed.listen(() => this.author_?.scene_changed());
     navigation.taken_over.listen(() => this.player_.pause());
     navigation.pad_pressed.listen((action) => {
@@ -86,27 +92,21 @@ export class Guide {
   private make_author(): AuthorPanel {
     const { navigation, toolbar } = this.parts_;
     const { camera } = navigation;
+    const preview = new Preview(this.player_, toolbar, () => navigation.eye, (eye) => this.put(eye));
     return new AuthorPanel({
       eye: () => camera.eye,
       scene: () => camera.scene,
       scene_id: () => navigation.scene_id,
       file_name: () => this.file_name(),
       place_ahead: () => navigation.place_ahead(),
-      changed: (tours) => {
+      changed: (tours, edited) => {
         this.tour_view_.show_tours(tours);
         this.player_.load(tours, true);
+        this.player_.choose(edited);
       },
-      go_to: (stop_index) => {
-        this.player_.choose(0);
-        this.player_.go_to(stop_index);
-      },
-      preview: () => {
-        toolbar.make_room();
-        this.player_.choose(0);
-        this.player_.leave();
-        this.player_.play();
-      },
-      start_at: (eye) => camera.start_at(eye),
+      go_to: (stop_index) => this.player_.go_to(stop_index),
+      preview: () => preview.begin(),
+      start_at: (eye) => camera.start_at(eye ?? this.first_start_),
     });
   }
 
@@ -124,7 +124,8 @@ export class Guide {
   }
 
   /** A scene was entered: takes the shared view of the address and loads the tours. */
-  private async enter(scene_id: string): Promise<void> {
+  private async enter(scene: SceneFacts): Promise<void> {
+    const scene_id = scene.sceneId;
     const { navigation, view, notice, toolbar } = this.parts_;
     const token = this.parts_.token.value;
     const load = ++this.loads_;
@@ -140,8 +141,9 @@ export class Guide {
       camera.start_at(start);
       if (!shared.eye) navigation.reset();
     }
+    this.first_start_ = camera.start;
     this.tour_view_.show_tours(tours);
-    this.author_?.load(tours, may_save ? token : undefined, document.etag);
+    this.author_?.load(tours, about_of(scene), may_save ? token : undefined, document.etag);
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
     this.player_.load(tours, stays);
@@ -188,4 +190,15 @@ export class Guide {
   private file_name(): string {
     return scene_name(this.parts_.navigation.scene_id) || 'scene';
   }
+}
+
+/** What the scene's sidecar says. The name of its file is no title. */
+function about_of(scene: SceneFacts): SceneAbout {
+  return {
+    title: scene.title === scene_name(scene.sceneId) ? '' : scene.title,
+    credits: scene.credits,
+    licence: scene.licence,
+    mode: start_mode(scene),
+    background: css_colour(scene.backgroundRgb),
+  };
 }

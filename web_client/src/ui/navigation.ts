@@ -12,7 +12,7 @@ import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
 import { ray_through, surface_of } from '../camera/ray';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
 import { bind_view_input } from '../input/view_input';
-import { scene_setup } from '../session/camera_messages';
+import { scene_setup, start_mode } from '../session/camera_messages';
 import { Picks } from '../session/picks';
 import type { SceneFacts, Welcome } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
@@ -207,6 +207,8 @@ export class Navigation {
     if (!scene || scene.sceneId === this.scene_id_) return;
     this.scene_id_ = scene.sceneId;
     this.camera.load(scene_setup(scene));
+    const mode = start_mode(scene);
+    if (mode) this.set_mode(mode);
     this.loop.enable();
     this.entered.emit({ scene, scene_ids: sceneIds });
   }

@@ -1,5 +1,4 @@
-import { ask_server, scene_path } from '../base/server';
-import { list_scenes } from '../session/scenes';
+import { fetch_poster } from '../session/scenes';
 import { by_id } from './dom';
 
 /** Shows a still of the scene until the first picture arrives, which takes long in a queue. */
@@ -7,20 +6,11 @@ export class Poster {
   private readonly image_ = by_id('poster', HTMLImageElement);
   private over_ = false;
 
-  /** `scene_id`: empty for the server's first scene. */
   async show(page_url: string, scene_id: string, token: string): Promise<void> {
-    try {
-      const id = scene_id || (await list_scenes(page_url, token))[0];
-      if (!id) return;
-      const response = await ask_server(page_url, token, scene_path(id, 'poster.jpg'));
-      if (!response.ok) return;
-      const blob = await response.blob();
-      if (this.over_ || !blob.type.startsWith('image/')) return;
-      this.image_.src = URL.createObjectURL(blob);
-      this.image_.hidden = false;
-    } catch (error) {
-      console.warn('no poster could be shown', error);
-    }
+    const poster = await fetch_poster(page_url, token, scene_id);
+    if (this.over_ || !(poster instanceof Blob)) return;
+    this.image_.src = URL.createObjectURL(poster);
+    this.image_.hidden = false;
   }
 
   /** The first picture has arrived. */

@@ -1,4 +1,4 @@
-import { list_scenes } from '../session/scenes';
+import { list_scenes, type SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
 import type { AccessToken } from '../session/token';
 import { Error_Code } from '../wire/wire';
@@ -13,7 +13,7 @@ const first_card_after_ms = 300; // a fast connection shows its picture without 
 export class SessionStatus {
   private state_: SessionState = { phase: 'connecting', attempt: 0 };
   private has_picture_ = false;
-  private scene_ids_: readonly string[] = [];
+  private scenes_: readonly SceneListing[] = [];
   private broken_ = false;
 
   constructor(
@@ -53,14 +53,14 @@ export class SessionStatus {
 
   private show(): void {
     if (this.broken_) return;
-    this.card_.show(card_for(this.state_, this.has_picture_, this.scene_ids_));
+    this.card_.show(card_for(this.state_, this.has_picture_, this.scenes_));
     this.toolbar_.set_active(this.state_.phase !== 'failed');
     document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
   }
 
   /** Asks for the list of scenes, because no welcome has brought it. */
   private async offer_scenes(): Promise<void> {
-    this.scene_ids_ = await list_scenes(location.href, this.token_.value);
+    this.scenes_ = await list_scenes(location.href, this.token_.value);
     this.show();
   }
 }

@@ -4,7 +4,7 @@ import { clock_from } from '../base/clock';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import type { PresenterChoice } from '../present/make_presenter';
-import { AccessToken } from '../session/token';
+import type { AccessToken } from '../session/token';
 import { text } from '../text';
 import { WorkerClient } from '../worker/client';
 import { make_automation } from './automation';
@@ -16,19 +16,18 @@ import { Notice } from './notice';
 import { bind_page_events } from './page_events';
 import { Poster } from './poster';
 import { QualityPanel } from './quality_panel';
-import { SceneTitle } from './scene_title';
+import { show_scene_title } from './scene_title';
 import { SessionStatus } from './session_status';
 import { StatsPanel } from './stats_panel';
 import { StreamSize } from './stream_size';
 import { Toolbar } from './toolbar';
 import { jpeg_reason } from './wording';
 
-/** Returns the part that shows fatal errors of the page. */
-export function mount_viewer(card: CardView): SessionStatus {
+/** Returns the part that shows fatal errors of the page. `scene_id`: empty for the server's first scene. */
+export function mount_viewer(card: CardView, token: AccessToken, scene_id: string): SessionStatus {
   const wishes = new URLSearchParams(location.search);
   const view = by_id('view', HTMLElement);
   const clock = clock_from(performance.timeOrigin);
-  const token = new AccessToken(location, history, browser_storage('sessionStorage'));
   const reduced_motion = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const storage = browser_storage('localStorage');
   const rung = remembered_rung(storage, navigator.userAgent, Date.now());
@@ -47,8 +46,7 @@ export function mount_viewer(card: CardView): SessionStatus {
   bind_page_events(worker);
   window.catgs = make_automation(worker, navigation, clock);
 
-  const title = new SceneTitle();
-  navigation.entered.listen(({ scene, scene_ids }) => title.show(scene, scene_ids));
+  navigation.entered.listen(({ scene, scene_ids }) => show_scene_title(scene, scene_ids.length > 1));
   const poster = new Poster();
   worker.on('presented', () => poster.end());
   navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(speed), 2));
@@ -61,8 +59,7 @@ export function mount_viewer(card: CardView): SessionStatus {
   worker.on('fallback', ({ message }) => tell_of_jpeg(text.jpeg.failed_now(message)));
   worker.on('rung', ({ rung: proved }) => remember_rung(proved, storage, navigator.userAgent, Date.now()));
 
-  const scene_id = wishes.get('scene') ?? '';
-  void poster.show(location.href, scene_id, token.value);
+  if (scene_id) void poster.show(location.href, scene_id, token.value);
   const canvas = by_id('picture', HTMLCanvasElement).transferControlToOffscreen();
   worker.post(
     {

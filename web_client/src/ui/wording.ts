@@ -1,6 +1,6 @@
 // Chooses the text for each situation: what happened, and what to do. Pure.
 import type { DecoderRung } from '../decode/ladder';
-import { scene_name } from '../session/scenes';
+import type { SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
 import { text } from '../text';
 import { Error_Code } from '../wire/wire';
@@ -18,17 +18,17 @@ export interface Card {
     readonly scene_id?: string;
   };
   readonly asks_token?: boolean;
-  readonly scene_ids?: readonly string[]; // to choose from
+  readonly scenes?: readonly SceneListing[]; // to choose from
 }
 
 /**
  * The card for a state; undefined when the picture speaks for itself. `has_picture`: whether the canvas
- * shows one. `scene_ids`: the scenes that this visitor may see, as far as known.
+ * shows one. `scenes`: those that this visitor may see, as far as known.
  */
 export function card_for(
   state: SessionState,
   has_picture: boolean,
-  scene_ids: readonly string[] = [],
+  scenes: readonly SceneListing[] = [],
 ): Card | undefined {
   switch (state.phase) {
     case 'live':
@@ -50,11 +50,11 @@ export function card_for(
         action: { label: actions.now, does: 'retry' },
       };
     case 'failed':
-      return failed_card(state.code, state.message, scene_ids);
+      return failed_card(state.code, state.message, scenes);
   }
 }
 
-function failed_card(code: Error_Code, message: string, scene_ids: readonly string[]): Card {
+function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[]): Card {
   const retry = { label: actions.retry, does: 'retry' } as const;
   const said = ({ title, text }: { title: string; text: string }): Card => ({
     title,
@@ -65,7 +65,7 @@ function failed_card(code: Error_Code, message: string, scene_ids: readonly stri
     case Error_Code.UNAUTHORIZED:
       return { title: cards.unauthorized, text: sentence(message).trim(), asks_token: true };
     case Error_Code.UNKNOWN_SCENE:
-      return unknown_scene_card(message, scene_ids);
+      return unknown_scene_card(message, scenes);
     case Error_Code.UNSUPPORTED_VERSION:
       return { ...said(cards.version), action: { label: actions.reload, does: 'reload' } };
     case Error_Code.NO_COMMON_CODEC:
@@ -79,17 +79,17 @@ function failed_card(code: Error_Code, message: string, scene_ids: readonly stri
   }
 }
 
-function unknown_scene_card(message: string, scene_ids: readonly string[]): Card {
+function unknown_scene_card(message: string, scenes: readonly SceneListing[]): Card {
   const { title, others, check } = cards.unknown_scene;
-  const [first] = scene_ids;
-  if (scene_ids.length > 1) return { title, text: sentence(message) + others, scene_ids };
+  const [first] = scenes;
+  if (scenes.length > 1) return { title, text: sentence(message) + others, scenes };
   return {
     title,
     text: sentence(message) + check,
     action: {
-      label: first === undefined ? actions.open_first : actions.open(scene_name(first)),
+      label: first === undefined ? actions.open_first : actions.open(first.title),
       does: 'open',
-      scene_id: first ?? '',
+      scene_id: first?.id ?? '',
     },
   };
 }

@@ -45,8 +45,29 @@ TEST(Sidecar, FieldsAreRead) {
   EXPECT_FALSE(parse_sidecar("{}").up);
 }
 
+TEST(Sidecar, SaysWhatVisitorsAreTold) {
+  const SceneAbout about = parse_sidecar(R"({
+    "title": "The hall", "credits": "Ada\u202e", "licence": "CC-BY-4.0", "mode": "walk",
+    "background": "#0a10FF"})")
+                               .about;
+  EXPECT_EQ(about.title, "The hall");
+  EXPECT_EQ(about.credits, "Ada\\xe2\\x80\\xae") << "its direction does not turn";
+  EXPECT_EQ(about.licence, "CC-BY-4.0");
+  EXPECT_EQ(about.mode, CameraMode::walk);
+  EXPECT_EQ(about.background_rgb, 0x0a10ffu);
+  EXPECT_EQ(colour_of(about.background_rgb), glm::vec3(10, 16, 255) / 255.0f);
+  EXPECT_EQ(parse_sidecar("{}").about, SceneAbout());
+}
+
 TEST(Sidecar, ErrorsNameTheField) {
   const auto error = [](const char* text) { return input_error([&] { parse_sidecar(text); }); };
+  EXPECT_THAT(error(R"({"title": 1})"), HasSubstr("title: is not a text"));
+  EXPECT_THAT(error(fmt::format(R"({{"credits": "{}"}})", std::string(801, 'a')).c_str()),
+              HasSubstr("credits: has more than 800 bytes"));
+  EXPECT_THAT(error(R"({"mode": "swim"})"), AllOf(HasSubstr("mode:"), HasSubstr("orbit, fly")));
+  for (const char* colour : {"red", "#12345", "#12345g", "#-12345", "1234567"})
+    EXPECT_THAT(error(fmt::format(R"({{"background": "{}"}})", colour).c_str()),
+                AllOf(HasSubstr("background:"), HasSubstr("#rrggbb")));
   EXPECT_THAT(error(R"({"up": )"), HasSubstr("city.json: byte"));
   EXPECT_THAT(error("[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
@@ -154,7 +175,8 @@ TEST_F(Hints, UnusableCameraFilesOnlyLeaveANote) {
 
 TEST_F(Hints, WrittenSidecarsReadBackTheSame) {
   write("cameras.json", cameras_json);
-  const SceneHints before = find();
+  SceneHints before = find();
+  before.about = {"Hall", "Ada", "MIT", CameraMode::fly, 0x00ff01};
   write_sidecar(before, folder_ / "s.json");
   std::filesystem::remove(folder_ / "cameras.json");
   const SceneHints after = find();
@@ -164,6 +186,7 @@ TEST_F(Hints, WrittenSidecarsReadBackTheSame) {
   EXPECT_EQ(after.near_z, before.near_z);
   expect_near(after.focus, before.focus);
   expect_near(after.limits.min, before.limits.min);
+  EXPECT_EQ(after.about, before.about);
 }
 
 using JsonFiles = FolderTest;

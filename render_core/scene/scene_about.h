@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <glm/vec3.hpp>
+
+namespace catgs {
+
+/// How a visitor moves at first.
+enum class CameraMode { unspecified, orbit, fly, walk };
+
+/// What a scene's author says about it to visitors. The texts are printable UTF-8; empty: not said.
+struct SceneAbout {
+  std::string title{};
+  std::string credits{};
+  std::string licence{};
+  CameraMode mode = CameraMode::unspecified;
+  std::uint32_t background_rgb = 0;  // 0xRRGGBB, sRGB: shows where no Gaussian is
+
+  bool operator==(const SceneAbout&) const = default;
+};
+
+/// Display-referred colour in [0, 1] of 0xRRGGBB.
+inline glm::vec3 colour_of(std::uint32_t rgb) {
+  return glm::vec3(rgb >> 16 & 0xff, rgb >> 8 & 0xff, rgb & 0xff) / 255.0f;
+}
+
+}  // namespace catgs

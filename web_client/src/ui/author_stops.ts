@@ -1,0 +1,109 @@
+import { text } from '../text';
+import { longest_flight_s, longest_stay_s, max_text_characters } from '../tour/limits';
+import { default_stay_s, type Stop } from '../tour/tour';
+import { make } from './dom';
+
+export interface StopActions {
+  /** `field`: where the author types. */
+  change(index: number, change: Partial<Stop>, field?: string): void;
+  go_to(index: number): void;
+  take_view(index: number): void;
+  /** Puts the marker into the middle of the view. */
+  take_marker(index: number): void;
+  move(index: number, by: number): void;
+  remove(index: number): void;
+}
+
+/** The stops of a tour, with fields and buttons. The open one shows all of them. */
+export class AuthorStops {
+  private open_ = 0;
+
+  constructor(
+    private readonly list_: HTMLElement,
+    private readonly actions_: StopActions,
+  ) {}
+
+  /** Shows the stops. The focus stays on the control where it is, in the row of stop `open`. */
+  show(stops: readonly Stop[], open = this.open_): void {
+    const focused = document.activeElement;
+    const control =
+      focused instanceof HTMLElement && this.list_.contains(focused) ? focused.dataset['control'] : undefined;
+    this.open_ = Math.min(open, Math.max(0, stops.length - 1));
+    this.list_.replaceChildren(...stops.map((stop, i) => this.row_of(stop, i, stops.length)));
+    if (control !== undefined) this.focus(control);
+  }
+
+  /** Focuses a control of the open stop, or its title where the control can do nothing. */
+  focus(control: string): void {
+    const row = this.list_.children[this.open_];
+    const find = (name: string): HTMLElement | null =>
+      row?.querySelector<HTMLElement>(`[data-control="${name}"]:not(:disabled)`) ?? null;
+    (find(control) ?? find('title'))?.focus();
+  }
+
+  private row_of(stop: Stop, i: number, count: number): HTMLElement {
+    const item = make('li', {}, ...this.fields_of(stop, i), this.buttons_of(stop, i, count));
+    item.classList.toggle('open', i === this.open_);
+    item.addEventListener('focusin', () => this.open(i));
+    return item;
+  }
+
+  private fields_of(stop: Stop, i: number): HTMLElement[] {
+    const words = text.author;
+    const title = make('input', { value: stop.title, maxLength: 200, 'aria-label': words.title(i + 1) });
+    const caption = make('textarea', {
+      ...{ value: stop.caption, rows: 2, maxLength: max_text_characters },
+      ...{ placeholder: words.caption_here, 'aria-label': words.caption(i + 1) },
+    });
+    const seconds = (label: string, value: number | undefined, usual: string, most: number): HTMLInputElement =>
+      make('input', {
+        ...{ type: 'number', min: '0', max: String(most), step: 'any', placeholder: usual },
+        ...{ value: value === undefined ? '' : String(value), 'aria-label': `${label} (${i + 1})` },
+      });
+    const stay = seconds(words.stay, stop.stay_s, String(Math.round(default_stay_s(stop))), longest_stay_s);
+    const flight = seconds(words.flight, stop.fly_s, words.automatic, longest_flight_s);
+    const bind = (field: HTMLInputElement | HTMLTextAreaElement, name: string, read: () => Partial<Stop>): void => {
+      field.dataset['control'] = name;
+      field.addEventListener('input', () => {
+        if (field.checkValidity()) this.actions_.change(i, read(), `${name} ${i}`);
+      });
+    };
+    const number_in = ({ value }: HTMLInputElement): number | undefined => (value === '' ? undefined : Number(value));
+    bind(title, 'title', () => ({ title: title.value }));
+    bind(caption, 'caption', () => ({ caption: caption.value }));
+    bind(stay, 'stay', () => ({ stay_s: number_in(stay) }));
+    bind(flight, 'flight', () => ({ fly_s: number_in(flight) }));
+    const times = make('div', {}, make('label', {}, words.flight, flight), make('label', {}, words.stay, stay));
+    times.className = 'times';
+    return [title, caption, times];
+  }
+
+  private buttons_of(stop: Stop, i: number, count: number): HTMLElement {
+    const words = text.author;
+    const { actions_: actions } = this;
+    const button = (control: string, name: string, onclick: () => void, sign = name, disabled = false): HTMLElement => {
+      const said = sign === name ? {} : { 'aria-label': name, title: name };
+      const made = make('button', { type: 'button', disabled, onclick, ...said }, sign);
+      made.dataset['control'] = control;
+      return made;
+    };
+    const marker = stop.marker
+      ? button('marker', words.no_hotspot, () => actions.change(i, { marker: undefined }))
+      : button('marker', words.hotspot_here, () => actions.take_marker(i));
+    return make(
+      'div',
+      {},
+      button('show', words.show, () => actions.go_to(i)),
+      button('view', words.view_here, () => actions.take_view(i)),
+      marker,
+      button('up', words.up(i + 1), () => actions.move(i, -1), '↑', i === 0),
+      button('down', words.down(i + 1), () => actions.move(i, 1), '↓', i === count - 1),
+      button('remove', words.remove(i + 1), () => actions.remove(i), '×'),
+    );
+  }
+
+  private open(index: number): void {
+    this.open_ = index;
+    [...this.list_.children].forEach((item, i) => item.classList.toggle('open', i === index));
+  }
+}

@@ -1,0 +1,50 @@
+// The first page of a server with several scenes: a picture of each.
+import { fetch_poster, scene_address, scene_labels, type SceneListing } from '../session/scenes';
+import { text } from '../text';
+import { by_id, make } from './dom';
+
+const next_try_ms = 5000;
+const tries = 60; // five minutes: a scene that is not loaded by then has more important visitors before it
+
+export function show_gallery(scenes: readonly SceneListing[], token: string): void {
+  const labels = scene_labels(scenes);
+  const list = by_id('gallery-scenes', HTMLUListElement);
+  const pictures = new Map<Element, string>();
+  // Pictures are fetched as they come into view, because there may be thousands.
+  const seen = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      if (!isIntersecting || !(target instanceof HTMLImageElement)) continue;
+      seen.unobserve(target);
+      void show_poster(target, pictures.get(target) ?? '', token);
+    }
+  });
+  list.replaceChildren(
+    ...scenes.map((scene, i) => {
+      const picture = make('img', { alt: '', width: 960, height: 540 });
+      pictures.set(picture, scene.id);
+      seen.observe(picture);
+      const said = [scene.credits, scene.licence].filter((words) => words).join(' · ');
+      const link = make(
+        'a',
+        { href: scene_address(location.href, scene.id) },
+        ...[picture, make('strong', {}, labels[i] ?? scene.id), make('small', {}, said)],
+      );
+      return make('li', {}, link);
+    }),
+  );
+  by_id('gallery', HTMLElement).hidden = false;
+  for (const id of ['view', 'toolbar', 'card']) by_id(id, HTMLElement).hidden = true;
+  document.title = `${text.page.scenes} – CaT-GS`;
+}
+
+async function show_poster(picture: HTMLImageElement, scene_id: string, token: string): Promise<void> {
+  for (let i = 0; i < tries; ++i) {
+    const poster = await fetch_poster(location.href, token, scene_id);
+    if (poster instanceof Blob) {
+      picture.src = URL.createObjectURL(poster);
+      return;
+    }
+    if (poster === undefined) return;
+    await new Promise((resolve) => setTimeout(resolve, next_try_ms));
+  }
+}

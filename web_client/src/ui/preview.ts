@@ -1,0 +1,40 @@
+import type { Eye } from '../camera/eye';
+import type { TourPlayer } from '../tour/player';
+import type { Toolbar } from './toolbar';
+
+/** Plays an author's tour once. At its end, or by Escape, the author is back where the preview began. */
+export class Preview {
+  private from_: Eye | undefined;
+
+  constructor(
+    private readonly player_: TourPlayer,
+    private readonly toolbar_: Toolbar,
+    private readonly eye_: () => Eye,
+    private readonly put_: (eye: Eye) => void,
+  ) {
+    window.addEventListener(
+      'keydown',
+      (event) => {
+        if (event.key !== 'Escape' || !this.from_) return;
+        event.stopImmediatePropagation(); // it would close the panel
+        this.end();
+      },
+      { capture: true },
+    );
+  }
+
+  begin(): void {
+    this.from_ ??= this.eye_();
+    this.toolbar_.make_room();
+    this.player_.play_once(() => this.end());
+  }
+
+  private end(): void {
+    const from = this.from_;
+    this.from_ = undefined;
+    this.player_.leave();
+    if (from) this.put_(from);
+    this.toolbar_.open('author');
+    document.getElementById('author-preview')?.focus();
+  }
+}
