@@ -159,7 +159,7 @@ describe('the mouse', () => {
       await page.keyboard.press('Escape');
     }
     await page.getByRole('button', { name: 'Orbit' }).click();
-    await page.getByText('Fly', { exact: true }).waitFor();
+    await page.locator('#mode-label', { hasText: 'Fly' }).waitFor();
     await page.getByRole('button', { name: 'Back to the start' }).click();
     await page.getByRole('button', { name: 'Full screen' }).click();
     await page.waitForFunction(() => document.fullscreenElement !== null);

@@ -235,7 +235,7 @@ describe('sharing', () => {
     const link = await page.getByLabel('Link to this view').inputValue();
     expect(link).not.toContain('token');
     const { page: friend } = await open(link);
-    await friend.getByText('Fly', { exact: true }).waitFor();
+    await friend.locator('#mode-label', { hasText: 'Fly' }).waitFor();
     const [mine, theirs] = [await pose_of(page), await pose_of(friend)];
     expect(distance(mine, theirs)).toBeLessThan(0.01);
     expect(turned(mine, theirs)).toBeLessThan(0.001);
@@ -245,7 +245,7 @@ describe('sharing', () => {
 
   it('a link may name the mode alone', async () => {
     const { page } = await open(`${server.url}#mode=walk`);
-    await page.getByText('Walk', { exact: true }).waitFor();
+    await page.locator('#mode-label', { hasText: 'Walk' }).waitFor();
   });
 
   it('a link to a place beyond the limits leads to the nearest within, and says so', async () => {
@@ -347,7 +347,7 @@ describe('ways to move', () => {
     const { page } = await open(`${server.url}#stop=1`, windows.desktop);
     await page.keyboard.press('KeyM');
     await page.keyboard.press('KeyM');
-    await page.getByText('Walk', { exact: true }).waitFor();
+    await page.locator('#mode-label', { hasText: 'Walk' }).waitFor();
     const before = await pose_of(page);
     await page.keyboard.down('KeyW');
     await expect.poll(async () => distance(before, await pose_of(page))).toBeGreaterThan(0.5);
