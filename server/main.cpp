@@ -11,13 +11,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <malloc.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "render_core/base/build_info.h"
 #include "render_core/base/command_line.h"
 #include "render_core/base/error.h"
-#include "render_core/base/printable.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/device_error.h"
 #include "server/base/log.h"
@@ -107,10 +105,11 @@ int serve(const CommandLine& line) {
   ConfigSources sources;
   const ServerConfig config = effective_config(line, sources);
   if (line.print_config) std::cout << print_config(config, sources);
-  validate(config, sources);
   set_up_log(config.log_format, config.log_level);
+  validate(config, sources);
   if (const std::string unknown = unknown_variables(variable_names()); !unknown.empty())
-    spdlog::warn("the environment has variables that are no settings: {}", unknown);
+    log_warning({.event = "unknown_setting"},
+                "the environment has variables that are no settings: {}", unknown);
   if (line.print_config) return exit_ok;
   Server server(config);
   server.run();
@@ -144,13 +143,13 @@ int run(int argc, char** argv) {
   } catch (const DevicesUnusable& error) {
     // This is a fault, not a usage error, even if no GPU is found. A lost GPU looks like one that
     // never existed, and a full one may become free. A supervisor loses nothing by trying again.
-    std::cerr << "catgs-server: " << printable(error.what()) << '\n';
+    log_failure("start_failed", error.what());
     return exit_failure;
   } catch (const InputError& error) {
-    std::cerr << "catgs-server: " << printable(error.what()) << '\n';
+    log_failure("start_failed", error.what());
     return exit_usage;
   } catch (const std::exception& error) {
-    std::cerr << "catgs-server: " << printable(error.what()) << '\n';
+    log_failure("failed", error.what());
     return exit_failure;
   }
 }

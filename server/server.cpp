@@ -13,7 +13,6 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "render_core/base/device_set.h"
@@ -160,9 +159,9 @@ NetOptions Server::State::net_options() {
   options.accept = [this](std::shared_ptr<Connection> connection) {
     return places->accept(std::move(connection));
   };
-  options.on_refused = [this](const std::string& line) {
+  options.on_refused = [this](const LogFacts& facts, const std::string& text) {
     metrics.requests_refused.Increment();
-    log_refusal(line);
+    log_refusal(facts, text);
   };
   options.on_failed = [this] {
     boost::asio::post(io, [this] { give_up("the network thread failed"); });
@@ -256,11 +255,12 @@ void Server::run() {
   s.ready = true;
   s.print_banner();
   const Watchdog watchdog(s.liveness, [](const std::string& why) {
-    spdlog::critical("{}; the process ends, so that its supervisor restarts it", why);
+    log_event(spdlog::level::critical, {.event = "stalled"},
+              "{}; the process ends, so that its supervisor restarts it", why);
     ::_exit(1);
   });
   s.io.run();
-  spdlog::info("stopped");
+  log_info({.event = "stopped"}, "stopped");
   if (!s.stop.failure.empty()) throw std::runtime_error(s.stop.failure);
 }
 
@@ -275,20 +275,19 @@ void Server::State::print_banner() const {
   const std::string host = config.bind == "0.0.0.0" || config.bind == "::" ? "localhost"
                            : config.bind.find(':') != std::string::npos    ? "[" + config.bind + "]"
                                                                            : config.bind;
-  spdlog::info("renderer: {}", scenes->renderer_text());
-  spdlog::info("encoder: {}", encoders.front().text);
+  log_info({.event = "renderer"}, "renderer: {}", scenes->renderer_text());
+  log_info({.event = "encoder"}, "encoder: {}", encoders.front().text);
   if (net.admin_port() != 0)
-    spdlog::info("metrics: http://{}/metrics",
-                 fmt::format("{}:{}", parse_endpoint(config.admin_bind).address, net.admin_port()));
-  spdlog::info("open {}://{}:{}/ in a browser; Ctrl-C stops the server",
-               config.tls_cert.empty() ? "http" : "https", host, net.port());
+    log_info({.event = "metrics"}, "metrics: http://{}/metrics",
+             fmt::format("{}:{}", parse_endpoint(config.admin_bind).address, net.admin_port()));
+  log_info({.event = "ready"}, "open {}://{}:{}/ in a browser; Ctrl-C stops the server",
+           config.tls_cert.empty() ? "http" : "https", host, net.port());
   if (config.asks_for_tokens())
-    spdlog::info(
-        "visitors need {}",
-        config.token_key_file.empty()
-            ? fmt::format("a token of {} behind that address: #token=TOKEN", config.token_file)
-            : fmt::format("a link: catgs-server token --token-key-file {} makes one",
-                          config.token_key_file));
+    log_info({.event = "access"}, "visitors need {}",
+             config.token_key_file.empty()
+                 ? fmt::format("a token of {} behind that address: #token=TOKEN", config.token_file)
+                 : fmt::format("a link: catgs-server token --token-key-file {} makes one",
+                               config.token_key_file));
 }
 
 void Server::State::wait_for_signal() {
@@ -308,8 +307,8 @@ void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::mill
   if (std::exchange(stop.begun, true)) return;
   ready = false;
   if (wait == 0ms) return drain(deadline);
-  spdlog::info("stopping: not ready any more, clients are told in {} s",
-               std::chrono::duration_cast<std::chrono::seconds>(wait).count());
+  log_info({.event = "stopping"}, "stopping: not ready any more, clients are told in {} s",
+           std::chrono::duration_cast<std::chrono::seconds>(wait).count());
   stop.timer.expires_after(wait);
   stop.timer.async_wait([this, deadline](const boost::system::error_code&) { drain(deadline); });
 }
@@ -317,12 +316,13 @@ void Server::State::begin_stop(std::chrono::milliseconds wait, std::chrono::mill
 void Server::State::give_up(const std::string& why) {
   if (stop.begun) return;
   stop.failure = why;
-  spdlog::critical("{}; the process ends, so that its supervisor restarts it", stop.failure);
+  log_event(spdlog::level::critical, {.event = "failed"},
+            "{}; the process ends, so that its supervisor restarts it", stop.failure);
   begin_stop(0ms, quick_stop_deadline);
 }
 
 void Server::State::drain(std::chrono::milliseconds deadline) {
-  spdlog::info("stopping: {} connections are told", places->connections());
+  log_info({.event = "drain"}, "stopping: {} connections are told", places->connections());
   places->drain(deadline);
   saver->stop();
   when_empty(Clock::now() + deadline, [this] {

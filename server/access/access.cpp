@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
+#include "server/base/log_event.h"
 #include "server/base/required_file.h"
 #include "server/base/scene_id.h"
 
@@ -163,9 +163,10 @@ void AccessControl::reload_when_changed() {
   token_file_time_ = time;
   try {
     read_token_file();
-    spdlog::info("--token-file was read again: {} tokens", tokens_.size());
+    log_info({.event = "tokens_read"}, "--token-file was read again: {} tokens", tokens_.size());
   } catch (const InputError& bad) {
-    spdlog::error("{}; the tokens read before stay in force", bad.what());
+    log_error({.event = "tokens_unreadable"}, "{}; the tokens read before stay in force",
+              bad.what());
   }
 }
 

@@ -23,7 +23,7 @@
 #include <unistd.h>
 
 #include "render_core/base/printable.h"
-#include "server/base/log_session.h"
+#include "server/base/log_event.h"
 #include "server/base/rate_limit.h"
 
 namespace catgs {
@@ -41,7 +41,12 @@ class JsonFormatter final : public spdlog::formatter {
         {"time", fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:06}Z",
                              fmt::gmtime(system_clock::to_time_t(message.time)), us)},
         {"level", std::string(level.data(), level.size())}};
-    if (!logged_session.empty()) line["session"] = logged_session;
+    constexpr std::pair<const char*, std::string_view LogFacts::*> fields[] = {
+        {"event", &LogFacts::event}, {"session", &LogFacts::session},
+        {"scene", &LogFacts::scene}, {"address", &LogFacts::address},
+        {"link", &LogFacts::link},   {"code", &LogFacts::code}};
+    for (const auto& [name, fact] : fields)
+      if (!(logged_facts.*fact).empty()) line[name] = logged_facts.*fact;
     line["message"] = std::string(message.payload.data(), message.payload.size());
     // Text from clients may be invalid UTF-8 or move the cursor of a reader's terminal.
     constexpr bool ascii = true;
@@ -85,8 +90,8 @@ class LevelFlag final : public spdlog::custom_flag_formatter {
 class SessionFlag final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg&, const std::tm&, spdlog::memory_buf_t& out) override {
-    if (!logged_session.empty())
-      fmt::format_to(std::back_inserter(out), "session {}: ", logged_session);
+    if (!logged_facts.session.empty())
+      fmt::format_to(std::back_inserter(out), "session {}: ", logged_facts.session);
   }
   [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
     return std::make_unique<SessionFlag>();
@@ -107,21 +112,27 @@ class PrintableMessage final : public spdlog::custom_flag_formatter {
 };
 
 std::atomic<std::uint64_t> lines_lost{0};
+std::atomic<bool> in_json{false};
 
 /// True while this thread logs a refusal. Sinks run on the thread that logs.
 thread_local bool logs_refusal = false;
 
-/// A warning of the log itself. It belongs to no session, whatever line it precedes.
+/// A warning of the log itself. It is about nobody, whatever line it precedes.
 class LogsOwnLine {
  public:
-  explicit LogsOwnLine(std::string text) : text_(std::move(text)) {}
+  explicit LogsOwnLine(std::string text) : text_(std::move(text)) {
+    logged_facts = {.event = "log_lines_lost"};
+  }
+  ~LogsOwnLine() { logged_facts = about_; }
+  LogsOwnLine(const LogsOwnLine&) = delete;
+  LogsOwnLine& operator=(const LogsOwnLine&) = delete;
   [[nodiscard]] spdlog::details::log_msg message(spdlog::string_view_t logger) const {
     return {logger, spdlog::level::warn, text_};
   }
 
  private:
   const std::string text_;
-  const LogSession about_nobody_{std::string_view()};
+  const LogFacts about_ = logged_facts;
 };
 
 /// Writes to standard error without blocking. A full disk costs lines only, and a paused reader of
@@ -239,12 +250,20 @@ void set_up_log(std::string_view format, std::string_view level) {
   logger->set_formatter(make_formatter(format));
   logger->set_level(least);
   spdlog::set_default_logger(std::move(logger));
+  in_json = format == "json";
 }
 
-void log_refusal(const std::string& line) {
+void log_refusal(const LogFacts& facts, const std::string& text) {
   logs_refusal = true;
-  spdlog::warn(line);
+  log_warning(facts, "{}", text);
   logs_refusal = false;
+}
+
+void log_failure(std::string_view event, const std::string& text) {
+  if (in_json)
+    log_event(spdlog::level::critical, {.event = event}, "{}", text);
+  else
+    fmt::print(stderr, "catgs-server: {}\n", printable(text));
 }
 
 std::uint64_t log_lines_lost() { return lines_lost; }

@@ -5,8 +5,9 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
+
+#include "server/base/log_event.h"
 
 namespace catgs {
 
@@ -18,7 +19,7 @@ class StopWhileLoading {
   StopWhileLoading() {
     signals_.async_wait([](const boost::system::error_code& error, int) {
       if (error) return;
-      spdlog::info("stopped while scenes were loading");
+      log_info({.event = "stopped"}, "stopped while scenes were loading");
       ::_exit(0);
     });
     listener_ = std::jthread([this] { io_.run(); });  // not before there is something to wait for

@@ -6,7 +6,8 @@
 
 #include <openssl/err.h>
 #include <openssl/ssl.h>
-#include <spdlog/spdlog.h>
+
+#include "server/base/log_event.h"
 
 namespace catgs {
 namespace {
@@ -58,16 +59,16 @@ void CertificateWatch::look() {
   if (now == known_) return;
   known_ = now;
   if (!usable(certificate_, key_)) {
-    spdlog::warn(
-        "--tls-cert and --tls-key have changed and do not fit together: those read before "
-        "stay in force until they do");
+    log_warning({.event = "certificate"},
+                "--tls-cert and --tls-key have changed and do not fit together: those read before "
+                "stay in force until they do");
     return;
   }
   if (lws_tls_cert_updated(context_, certificate_.c_str(), key_.c_str(), nullptr, 0, nullptr, 0) !=
       0)
-    spdlog::error("--tls-cert: the renewed certificate could not be taken");
+    log_error({.event = "certificate"}, "--tls-cert: the renewed certificate could not be taken");
   else
-    spdlog::info("--tls-cert: the renewed certificate is in force");
+    log_info({.event = "certificate"}, "--tls-cert: the renewed certificate is in force");
 }
 
 }  // namespace catgs

@@ -75,7 +75,7 @@ int on_request(lws* wsi, HttpSlot& slot) {
     if (bytes >= 1 && bytes <= max_upload_bytes) return on_upload(wsi, *slot.exchange);
     const int status = bytes < 1 ? 411 : 413;
     const std::string why = fmt::format("{}: {}", status, upload_length_rule);
-    note_refused(wsi, "upload refused: " + why);
+    note_refused(wsi, static_cast<unsigned>(status), "upload refused: " + why);
     if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"),
                                    service_of(wsi).scratch) != 0)
       return close_connection;
@@ -106,7 +106,8 @@ int on_accept(lws* listener, int descriptor) {
   const auto why =
       service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
   if (!why) return keep_reading;
-  site.on_refused(fmt::format("{}: {}", peer.data(), *why));
+  site.on_refused({.event = "connection_refused", .address = peer.data()},
+                  fmt::format("{}: {}", peer.data(), *why));
   return close_connection;
 }
 
@@ -123,7 +124,7 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
       return confirm_upgrade(wsi);
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
-      note_refused(wsi, "request refused: this is no proxy");
+      note_refused(wsi, 0, "request refused: this is no proxy");
       return close_connection;
     case LWS_CALLBACK_HTTP:
       return on_request(wsi, *slot);

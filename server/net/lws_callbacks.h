@@ -5,9 +5,9 @@
 #include <vector>
 
 #include <libwebsockets.h>
-#include <spdlog/spdlog.h>
 
 #include "server/base/clock.h"
+#include "server/base/log_event.h"
 #include "server/base/rate_limit.h"
 #include "server/net/accept_gate.h"
 #include "server/net/answered_connections.h"
@@ -46,7 +46,7 @@ int guarded(Function&& function) {
   try {
     return function();
   } catch (const std::exception& error) {
-    spdlog::error("network: {}", error.what());
+    log_error({.event = "network_failed"}, "network: {}", error.what());
     return -1;
   }
 }

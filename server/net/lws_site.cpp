@@ -63,18 +63,22 @@ bool host_allowed(lws* wsi, const std::string& host) {
 
 bool lacks_tls(lws* wsi) { return site_of(wsi).tls && lws_is_ssl(wsi) == 0; }
 
-void note_refused(lws* wsi, std::string_view why) {
-  site_of(wsi).on_refused(fmt::format("{}: {}", client_address_of(wsi), why));
+void note_refused(lws* wsi, unsigned status, std::string_view why) {
+  const std::string address = client_address_of(wsi);
+  const std::string code = status != 0 ? fmt::format("{}", status) : "";
+  site_of(wsi).on_refused({.event = "request_refused", .address = address, .code = code},
+                          fmt::format("{}: {}", address, why));
 }
 
 void note_refused_origin(lws* wsi, std::string_view what, const std::string& origin,
                          const std::string& host) {
-  note_refused(wsi, fmt::format("{} refused: origin {} is not allowed at {} (--allow-origin)", what,
-                                quoted(origin), quoted(host)));
+  note_refused(wsi, 403,
+               fmt::format("{} refused: origin {} is not allowed at {} (--allow-origin)", what,
+                           quoted(origin), quoted(host)));
 }
 
 int refuse_request(lws* wsi, unsigned status, const char* why) {
-  note_refused(wsi, fmt::format("request refused: {}: {}", status, why));
+  note_refused(wsi, status, fmt::format("request refused: {}: {}", status, why));
   lws_return_http_status(wsi, status, why);
   return -1;
 }
@@ -100,14 +104,15 @@ int confirm_upgrade(lws* wsi) {
   }
   if (::strcasecmp(protocol.c_str(), "h2c") == 0)
     return refuse_request(wsi, 400, "HTTP/1.1 and websockets are spoken here, not h2c");
-  note_refused(wsi, "request refused: it wants another protocol than websocket");
+  note_refused(wsi, 0, "request refused: it wants another protocol than websocket");
   return -1;
 }
 
 HttpResponse refuse_host(lws* wsi, const std::string& host) {
   const std::string name = quoted(host);
   note_refused(
-      wsi, fmt::format("request refused: this server is not known as {} (--allow-origin)", name));
+      wsi, 403,
+      fmt::format("request refused: this server is not known as {} (--allow-origin)", name));
   const bool loopback = site_of(wsi).names == Names::loopback;
   return text_response(
       403,
@@ -122,7 +127,7 @@ HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& reque
   if (!host_allowed(wsi, host)) return refuse_host(wsi, host);
   HttpResponse response = site.http(request);
   if (response.status == 401)
-    note_refused(wsi, fmt::format("request refused: {}", reason(response)));
+    note_refused(wsi, 401, fmt::format("request refused: {}", reason(response)));
   return response;
 }
 
@@ -138,7 +143,9 @@ std::optional<HttpResponse> refuse_upload(lws* wsi) {
   const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   auto refusal = site.uploads.refusal({path, {}, false, authorization});
-  if (refusal) note_refused(wsi, fmt::format("upload refused: {}", reason(*refusal)));
+  if (refusal)
+    note_refused(wsi, static_cast<unsigned>(refusal->status),
+                 fmt::format("upload refused: {}", reason(*refusal)));
   return refusal;
 }
 

@@ -8,6 +8,7 @@
 
 #include <libwebsockets.h>
 
+#include "server/base/log_event.h"
 #include "server/net/connection.h"
 #include "server/net/http.h"
 #include "server/net/trusted_proxies.h"
@@ -24,7 +25,7 @@ struct Site {
   Names names = Names::loopback;
   bool tls = false;
   TrustedProxies proxies;
-  std::function<void(const std::string&)> on_refused;
+  std::function<void(const LogFacts&, const std::string&)> on_refused;
 };
 
 const Site& site_of(lws* wsi);
@@ -42,8 +43,8 @@ bool host_allowed(lws* wsi, const std::string& host);
 /// True for a plain HTTP request to a port that serves https.
 bool lacks_tls(lws* wsi);
 
-/// Reports to Site::on_refused whose request is refused, and why.
-void note_refused(lws* wsi, std::string_view why);
+/// Reports to Site::on_refused whose request is refused, and why. `status`: of the answer; 0: none.
+void note_refused(lws* wsi, unsigned status, std::string_view why);
 
 /// Reports a refused upload or websocket from another site's page.
 void note_refused_origin(lws* wsi, std::string_view what, const std::string& origin,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -157,6 +158,23 @@ enum class ErrorCode {
   internal,
   session_ended,
 };
+
+/// As the log names it.
+constexpr std::string_view name_of(ErrorCode code) {
+  constexpr std::string_view names[] = {"",
+                                        "bad_message",
+                                        "unauthorized",
+                                        "unknown_scene",
+                                        "unsupported_version",
+                                        "no_common_codec",
+                                        "server_full",
+                                        "rate_limited",
+                                        "render_failed",
+                                        "idle_timeout",
+                                        "internal",
+                                        "session_ended"};
+  return names[static_cast<std::size_t>(code)];
+}
 
 struct ErrorMessage {
   ErrorCode code = ErrorCode::internal;

@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 #include <libwebsockets.h>
-#include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
 #include "server/base/prompt_thread.h"
@@ -51,7 +50,7 @@ std::string_view without_line_end(std::string_view line) {
 
 /// While it lives, libwebsockets' errors become an InputError.
 void log_details(int, const char* line) {
-  spdlog::debug("libwebsockets: {}", without_line_end(line));
+  log_debug({.event = "libwebsockets"}, "libwebsockets: {}", without_line_end(line));
 }
 
 /// While it lives, libwebsockets' errors are reported here only. They are not errors of the server,
@@ -60,9 +59,10 @@ void log_details(int, const char* line) {
 void log_errors(int level, const char* line) {
   const bool hangs_up = level == LLL_ERR || std::string_view(line).starts_with("More hdr frags");
   if (!hangs_up) return log_details(level, line);
-  if (!served) return spdlog::warn("libwebsockets: {}", without_line_end(line));
+  const LogFacts facts{.event = "libwebsockets"};
+  if (!served) return log_warning(facts, "libwebsockets: {}", without_line_end(line));
   guarded([&] {
-    served->on_refused(fmt::format("libwebsockets: {}", without_line_end(line)));
+    served->on_refused(facts, fmt::format("libwebsockets: {}", without_line_end(line)));
     return 0;
   });
 }

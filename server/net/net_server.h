@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/log_event.h"
 #include "server/net/connection.h"
 #include "server/net/http.h"
 #include "server/net/trusted_proxies.h"
@@ -29,7 +30,8 @@ struct NetOptions {
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
   /// Reports each request refused before admission: whose it was, and why. Errors that
   /// libwebsockets itself reports name no client. Called on the network thread.
-  std::function<void(const std::string& line)> on_refused = [](const auto&) {};
+  std::function<void(const LogFacts& facts, const std::string& text)> on_refused =
+      [](const auto&, const auto&) {};
   /// The network thread ended unasked. Called on that thread.
   std::function<void()> on_failed = [] {};
   std::string tls_certificate;  // PEM files; both or neither

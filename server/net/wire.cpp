@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <google/protobuf/stubs/logging.h>
-#include <spdlog/spdlog.h>
 
 #include "proto/catgs.pb.h"
+#include "server/base/log_event.h"
 #include "server/base/scene_id.h"
 
 namespace catgs::wire {
@@ -22,8 +22,8 @@ namespace {
 void log_of_protobuf(google::protobuf::LogLevel level, const char* file, int line,
                      const std::string& message) {
   const bool ends_the_process = level == google::protobuf::LOGLEVEL_FATAL;
-  spdlog::log(ends_the_process ? spdlog::level::critical : spdlog::level::debug,
-              "protobuf: {}:{}: {}", file, line, message);
+  log_event(ends_the_process ? spdlog::level::critical : spdlog::level::debug,
+            {.event = "protobuf"}, "protobuf: {}:{}: {}", file, line, message);
 }
 [[maybe_unused]] auto* const former_log_handler = google::protobuf::SetLogHandler(log_of_protobuf);
 

@@ -3,8 +3,7 @@
 #include <exception>
 #include <stdexcept>
 
-#include <spdlog/spdlog.h>
-
+#include "server/base/log_event.h"
 #include "server/encode/encoder.h"
 
 namespace catgs {
@@ -38,7 +37,8 @@ std::shared_ptr<const std::string> make_poster(Renderer& renderer, const SceneFa
   try {
     return std::make_shared<const std::string>(render(renderer, facts));
   } catch (const std::exception& error) {
-    spdlog::warn("scene {}: no poster: {}", facts.scene_id, error.what());
+    log_warning({.event = "no_poster", .scene = facts.scene_id}, "scene {}: no poster: {}",
+                facts.scene_id, error.what());
     return nullptr;
   }
 }

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
@@ -20,6 +19,7 @@
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/synth/synth.h"
+#include "server/base/log_event.h"
 #include "server/net/http.h"
 #include "server/scenes/poster.h"
 #include "server/scenes/scene_facts.h"
@@ -80,18 +80,19 @@ std::shared_ptr<const SceneEntry> load_scene(
     const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
     const ServerConfig& config, const RendererOptions& core, int threads,
     const std::function<void(double)>& progress) {
-  spdlog::info("loading {}", spec);
+  log_info({.event = "scene_loading"}, "loading {}", spec);
   LoadOptions options;
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
   Scene scene = load(spec, config, std::move(options));
-  for (const std::string& note : scene.notes) spdlog::warn("{}: {}", spec, note);
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
   entry->facts.gaussians = scene.cloud.size();
   use_hints(scene.hints, scene.name, entry->facts);
+  for (const std::string& note : scene.notes)
+    log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
   if (!is_synthetic(spec)) {
     entry->sidecar = locate_scene(spec).hints.sidecar;
@@ -103,9 +104,10 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
   entry->poster = make_poster(*entry->renderer, entry->facts);
-  spdlog::info("scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}",
-               entry->facts.scene_id, entry->facts.gaussians, scene.format,
-               static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
+  log_info({.event = "scene_loaded", .scene = entry->facts.scene_id},
+           "scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}", entry->facts.scene_id,
+           entry->facts.gaussians, scene.format,
+           static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
   return entry;
 }
 
@@ -125,7 +127,8 @@ std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& c
     auto entry = load_scene(spec, id_of, config, core, core.pool->threads());
     // The banner shows the first scene's renderer.
     if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)
-      spdlog::info("scene {}: renderer {}", entry->facts.scene_id, entry->renderer_text);
+      log_info({.event = "renderer", .scene = entry->facts.scene_id}, "scene {}: renderer {}",
+               entry->facts.scene_id, entry->renderer_text);
     entries.push_back(std::move(entry));
   }
   return entries;

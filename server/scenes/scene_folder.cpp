@@ -6,12 +6,11 @@
 #include <system_error>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/formats/json_field.h"
+#include "server/base/log_event.h"
 
 namespace catgs {
 namespace {
@@ -76,8 +75,9 @@ std::vector<FoundScene> SceneFolders::scan() {
   std::vector<fs::path> paths = list();
   if (paths.size() > max_scenes) {
     if (!std::exchange(told_of_too_many_, true))
-      spdlog::warn("--scene-folder: {} scenes are too many, the first {} are offered", paths.size(),
-                   max_scenes);
+      log_warning({.event = "too_many_scenes"},
+                  "--scene-folder: {} scenes are too many, the first {} are offered", paths.size(),
+                  max_scenes);
     paths.resize(max_scenes);
   }
   std::map<fs::path, Known> known;
@@ -104,7 +104,7 @@ std::vector<FoundScene> SceneFolders::scan() {
         now.good = true;
       } catch (
           const std::exception& error) {  // it may be half copied: its next change is read again
-        spdlog::warn("not offered: {}", error.what());
+        log_warning({.event = "scene_not_offered"}, "not offered: {}", error.what());
       }
     }
     if (now.good && ids.insert(now.scene.id).second) scenes.push_back(now.scene);

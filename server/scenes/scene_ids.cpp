@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <span>
 
-#include <spdlog/spdlog.h>
-
 #include "server/access/signed_token.h"
+#include "server/base/log_event.h"
 #include "server/base/scene_id.h"
 
 namespace catgs {
@@ -42,7 +41,8 @@ SceneIds::SceneIds(const std::vector<std::string>& scenes,
     const fs::path folder = whole_path(given);
     const auto twin = std::ranges::find(folders_, folder.filename(), &fs::path::filename);
     if (twin != folders_.end() && *twin != folder)
-      spdlog::warn(
+      log_warning(
+          {.event = "scene_folders_alike"},
           "--scene-folder {} and {} have the same name: the ids of their scenes are made of "
           "whole paths, and differ from those that each folder would give alone",
           twin->string(), folder.string());

@@ -6,12 +6,12 @@
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "render_core/base/device_set.h"
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/load_scene.h"
+#include "server/base/log_event.h"
 #include "server/base/scene_id.h"
 #include "server/scenes/scene_catalog.h"
 
@@ -72,7 +72,8 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
 /// A running server can always show a scene: without others, the folders' first one is loaded.
 void SceneLibrary::open_folders() {
   std::vector<FoundScene> found = folders_.scan();
-  spdlog::info("{} scenes in folders, loaded when somebody asks for them", found.size());
+  log_info({.event = "scenes_found"}, "{} scenes in folders, loaded when somebody asks for them",
+           found.size());
   merge(std::move(found));
   next_scan_ = clock_() + scan_interval;
   if (!preferred_scene_.empty()) return;
@@ -205,7 +206,7 @@ void SceneLibrary::start_next(TimePoint now) {
 /// finds the memory free.
 void SceneLibrary::release(const std::string& id) {
   Book& book = shelf_.at(id);
-  spdlog::info("scene {} released", id);
+  log_info({.event = "scene_released", .scene = id}, "scene {} released", id);
   metrics_.scenes_released.Increment();
   residency_.drop(id);
   auto entry = std::exchange(book.entry, nullptr);
@@ -238,7 +239,8 @@ void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint sta
                              TimePoint now) {
   const auto it = shelf_.find(id);
   if (!loaded.entry || it == shelf_.end()) {
-    spdlog::error("scene {} is not loaded: {}", id, loaded.error);
+    log_error({.event = "scene_load_failed", .scene = id}, "scene {} is not loaded: {}", id,
+              loaded.error);
     metrics_.scene_loads_failed.Increment();
     residency_.failed(id);
     if (it != shelf_.end()) it->second.retry_at = now + retry_after_failure;
@@ -276,7 +278,7 @@ void SceneLibrary::start_scan(TimePoint now) {
     try {
       *found = folders_.scan();
     } catch (const std::exception& error) {  // a missing mount: its scenes stay offered
-      spdlog::warn("{}", error.what());
+      log_warning({.event = "scene_folder_unreadable"}, "{}", error.what());
     }
     boost::asio::post(io_, [this, found] {
       scanning_ = false;
@@ -302,8 +304,8 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
     const std::string name(name_in(id));
     if (book.pinned || book.told || !by_name_.at(name).empty()) continue;
     book.told = true;
-    spdlog::info("scene {} is {}, one of several called \"{}\"", id, book.found.path.string(),
-                 name);
+    log_info({.event = "scene_named", .scene = id}, "scene {} is {}, one of several called \"{}\"",
+             id, book.found.path.string(), name);
   }
   // Scenes in memory are released first, once they are unused.
   std::vector<std::string> unused;

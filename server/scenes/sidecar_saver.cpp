@@ -7,9 +7,9 @@
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
+#include "server/base/log_event.h"
 #include "server/base/replace_file.h"
 #include "server/scenes/poster.h"
 #include "server/scenes/scene_facts.h"
@@ -89,7 +89,8 @@ void SidecarSaver::start_save(const SharedRequest& request) {
     try {
       outcome = write(*request);
     } catch (const std::exception& failure) {  // memory, say: it costs this save only
-      spdlog::error("scene {}: a save failed: {}", request->scene_id, failure.what());
+      log_error({.event = "save_failed", .scene = request->scene_id}, "scene {}: a save failed: {}",
+                request->scene_id, failure.what());
       outcome.answer = text_response(500, "500: the server failed to save: try again\n");
     }
     boost::asio::post(io_,
@@ -111,26 +112,30 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) {
     const std::optional<std::string> there = sidecar_text(file);
     const std::string current = there ? etag_of(*there) : "";
     if (!request.precondition.holds(current)) {
-      spdlog::info("scene {}: an author's sidecar was made from an older one than {}",
-                   request.scene_id, file.string());
+      log_info({.event = "save_outdated", .scene = request.scene_id},
+               "scene {}: an author's sidecar was made from an older one than {}", request.scene_id,
+               file.string());
       Outcome refused{
           tagged(412, "412: somebody else saved this scene since you opened it\n", current)};
       try {
         if (current != scene.sidecar_tag)
           refused.revised = revised(scene, there ? sidecar_in(file, *there) : Sidecar(), there);
       } catch (const InputError& broken) {
-        spdlog::warn("scene {}: goes on as it was: {}", request.scene_id, broken.what());
+        log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
+                    "scene {}: goes on as it was: {}", request.scene_id, broken.what());
       }
       return refused;
     }
     auto shown = revised(scene, sidecar, request.json);  // throws before any file is changed
     if (request.place->abandoned()) return {text_response(503, "503: the connection is closed\n")};
     if (there != request.json) replace_file(file, request.json);  // which keeps the one before
-    spdlog::info("scene {}: an author saved {} ({} bytes)", request.scene_id, file.string(),
-                 request.json.size());
+    log_info({.event = "saved", .scene = request.scene_id},
+             "scene {}: an author saved {} ({} bytes)", request.scene_id, file.string(),
+             request.json.size());
     return {tagged(200, "saved\n", etag_of(request.json)), std::move(shown)};
   } catch (const InputError& unwritable) {
-    spdlog::warn("scene {}: an author cannot save: {}", request.scene_id, unwritable.what());
+    log_warning({.event = "save_failed", .scene = request.scene_id},
+                "scene {}: an author cannot save: {}", request.scene_id, unwritable.what());
     std::string why = unwritable.what();
     const std::string path = file.string();  // for the operator's log only
     if (why.starts_with(path)) why.replace(0, path.size(), file.filename().string());

@@ -12,10 +12,10 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/json_field.h"
+#include "server/base/log_event.h"
 #include "server/net/http.h"
 
 namespace catgs {
@@ -54,7 +54,7 @@ nlohmann::json viewer_settings(const std::filesystem::path& sidecar) {
       // Many programs write a settings.json. The viewer's file has animation tracks.
       if (settings.is_object() && settings.contains("animTracks")) return settings;
     } catch (const InputError& error) {
-      spdlog::warn("no tours from it: {}", error.what());
+      log_warning({.event = "tours_unreadable"}, "no tours from it: {}", error.what());
     }
   }
   return nullptr;

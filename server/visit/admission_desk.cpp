@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
-#include "server/base/log_session.h"
+#include "server/base/log_event.h"
 #include "server/base/scene_id.h"
 #include "server/flow/frame_size.h"
 #include "server/net/trusted_proxies.h"
@@ -94,9 +93,10 @@ void AdmissionDesk::set_pixel_share(Place& place, double share) {
   around_.frames.changed(place);
   const glm::ivec2 size_px = plan.moving().size_px;
   place.usage().scale_frame_cost(frame_work(megapixels(size_px)) / work);
-  const LogSession about(place.id());
-  spdlog::debug("its pictures are {}x{} from now on: there is room for {:.0f} % of their pixels",
-                size_px.x, size_px.y, 100.0 * share);
+  const LogScope about(place.facts());
+  log_debug({.event = "picture_size"},
+            "its pictures are {}x{} from now on: there is room for {:.0f} % of their pixels",
+            size_px.x, size_px.y, 100.0 * share);
 }
 
 void AdmissionDesk::grow_pictures() {
@@ -162,9 +162,10 @@ Admission AdmissionDesk::let_in(Place& place, const Hello& hello,
   Visitor& visitor = place.visitor();
   visitor.encoder = best_encoder(around_.encoders, hello.decoders).value();
   visitor.admitted_at = Clock::now();
-  const LogSession about(place.id());
-  spdlog::info("{} looks at {}, {}x{}, {}", place.audience().address(), scene->facts.scene_id,
-               hello.viewport_px.x, hello.viewport_px.y, encoder_name(visitor.encoder.kind));
+  const LogScope about(place.facts());
+  log_info({.event = "session_admitted", .scene = scene->facts.scene_id},
+           "{} looks at {}, {}x{}, {}", place.audience().address(), scene->facts.scene_id,
+           hello.viewport_px.x, hello.viewport_px.y, encoder_name(visitor.encoder.kind));
   return {std::move(scene), visitor.encoder,
           machine_.initial_effort(admitted_, scaled_size(size_px, std::sqrt(offer.pixel_share))),
           offer.pixel_share};

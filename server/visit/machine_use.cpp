@@ -3,9 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
-#include "server/base/log_session.h"
+#include "server/base/log_event.h"
 #include "server/visit/device_loads.h"
 
 namespace catgs {
@@ -64,10 +62,11 @@ void MachineUse::control_effort(const PlaceList& places, int admitted, TimePoint
   }
   for (const auto& [index, effort] : effort_.update(busy_, admitted, encoding, now)) {
     around_.metrics.effort_changes.Increment();
-    const LogSession about(encoders[index]->id());
-    spdlog::debug("libx264 goes on with {}, {} threads: processors {:.0f} % busy",
-                  effort_presets[static_cast<std::size_t>(effort.preset)].name, effort.threads,
-                  100.0 * busy_);
+    const LogScope about(encoders[index]->facts());
+    log_debug({.event = "encoder_effort"},
+              "libx264 goes on with {}, {} threads: processors {:.0f} % busy",
+              effort_presets[static_cast<std::size_t>(effort.preset)].name, effort.threads,
+              100.0 * busy_);
     encoders[index]->visit().stream().plan().use_effort(effort);
   }
 }

@@ -5,25 +5,24 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "server/base/log.h"
-#include "server/base/log_session.h"
+#include "server/base/log_event.h"
 #include "server/net/wire.h"
+#include "server/scenes/scene_entry.h"
 #include "server/schedule/on_session_thread.h"
 
 namespace catgs {
 namespace {
 
 /// Logs an error, and counts it where it closes a connection.
-void note_error(std::string_view session_id, const std::string& address, const ErrorMessage& error,
-                Metrics& metrics) {
-  const LogSession about(session_id);
-  const std::string line = fmt::format("{}: {}", address, error.message);
+void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
+  facts.event = error.fatal ? "session_refused" : "wish_refused";
+  facts.code = name_of(error.code);
   if (error.code == ErrorCode::internal || error.code == ErrorCode::render_failed)
-    spdlog::warn(line);
+    log_warning(facts, "{}: {}", facts.address, error.message);
   else
-    log_refusal(line);
+    log_refusal(facts, fmt::format("{}: {}", facts.address, error.message));
   if (error.code == ErrorCode::bad_message) metrics.bad_messages.Increment();
   if (error.fatal) metrics.sessions_refused.Increment();
 }
@@ -81,7 +80,10 @@ void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why)
   }
   audience_.remove(from);
   const ErrorMessage error{code, std::string(why), true};
-  note_error(id_, from.connection().peer_address(), error, around_.metrics);
+  const std::string address = from.connection().peer_address();
+  LogFacts watching = facts();
+  watching.address = address;
+  note_error(watching, error, around_.metrics);
   from.connection().send(wire::serialize(error));
   from.dismiss(CloseCode::policy_violation, why);
 }
@@ -115,7 +117,7 @@ bool Place::may_be_watched() const {
 
 void Place::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message))
-    note_error(id_, audience_.address(), *error, around_.metrics);
+    note_error(facts(), *error, around_.metrics);
   audience_.send(message, Clock::now());
 }
 
@@ -137,10 +139,18 @@ std::optional<EncoderChoice> Place::other_encoder(Fault why) {
   if (!failed && had.kind == EncoderKind::nvenc) around_.metrics.encoders_refused.Increment();
   auto other = instead_of_nvenc(around_.encoders, had);
   if (!other) return std::nullopt;  // the visit reports why it ends
-  const LogSession about(id_);
-  spdlog::warn("{} {}: {}", had.text, failed ? "failed" : "cannot be opened", other->text);
+  const LogScope about(facts());
+  log_warning({.event = "encoder_replaced"}, "{} {}: {}", had.text,
+              failed ? "failed" : "cannot be opened", other->text);
   visitor_.encoder = *other;
   return other;
+}
+
+LogFacts Place::facts() const {
+  const SceneEntry* const scene = visit_.stream().scene();
+  return {.session = id_,
+          .scene = scene ? std::string_view(scene->facts.scene_id) : std::string_view(),
+          .address = audience_.address()};
 }
 
 void Place::on_tick(TimePoint now) {
@@ -152,8 +162,8 @@ void Place::on_tick(TimePoint now) {
 void Place::account_for(const FrameResult& result, TimePoint now) {
   const FrameTicket& ticket = result.frame.ticket;
   Metrics& metrics = around_.metrics;
-  const LogSession about(id_);
-  if (!result.ok) spdlog::warn("a frame failed: {}", result.message);
+  const LogScope about(facts());
+  if (!result.ok) log_warning({.event = "frame_failed"}, "a frame failed: {}", result.message);
   (!result.ok       ? metrics.frames_failed
    : ticket.refined ? metrics.frames_refined
                     : metrics.frames_rendered)

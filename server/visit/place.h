@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/base/log_event.h"
 #include "server/visit/audience.h"
 #include "server/visit/session_usage.h"
 #include "server/visit/visit.h"
@@ -77,6 +78,8 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   [[nodiscard]] bool may_be_watched() const;
   [[nodiscard]] std::optional<FrameCandidate> next_frame() const { return visit_.next_frame(); }
   [[nodiscard]] const std::string& id() const { return id_; }
+  /// What log lines about it name. Valid until the visit's next event.
+  [[nodiscard]] LogFacts facts() const;
   [[nodiscard]] Visit& visit() { return visit_; }
   [[nodiscard]] Audience& audience() { return audience_; }
   [[nodiscard]] Visitor& visitor() { return visitor_; }

@@ -5,10 +5,9 @@
 
 #include <boost/asio/post.hpp>
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "server/access/signed_token.h"
-#include "server/base/log_session.h"
+#include "server/base/log_event.h"
 #include "server/base/scene_id.h"
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
@@ -105,8 +104,11 @@ bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& 
       best_encoder(around_.encoders, hello.decoders);  // choose() has checked that there is one
   if (visitor.encoder.codec != best->codec) visitor.encoder = *best;
   connection->belong_to(known);
-  const LogSession about(known.id());
-  spdlog::info("{} is back", known.audience().address());
+  {
+    const LogScope about(known.facts());
+    log_info({.event = "session_resumed", .scene = (*scene)->facts.scene_id}, "{} is back",
+             known.audience().address());
+  }
   const PicturePlan& plan = known.visit().stream().plan();
   known.visit().on_resumed(
       hello, {std::move(*scene), visitor.encoder, plan.effort(), plan.pixel_share()}, now);
@@ -145,8 +147,11 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
   leave(newcomer);
   connection->watch(*host);
   audience.add(connection, visit.stream().welcome());
-  const LogSession about(host->id());
-  spdlog::info("{} watches", connection->connection().peer_address());
+  {
+    const std::string address = connection->connection().peer_address();
+    const LogScope about(host->facts());
+    log_info({.event = "spectator_joined", .address = address}, "{} watches", address);
+  }
   if (audience.wants_idr(now)) visit.stream().idr().request();
   around_.frames.changed(*host);
 }
@@ -157,9 +162,9 @@ void Places::leave(Place& place) {
   const TimePoint now = Clock::now();
   if (place.visitor().admitted_at) {
     const VisitStatistics& seen = place.visit().statistics();
-    const LogSession about(place.id());
-    spdlog::info("ended after {} frames, {} bytes, {} dropped", seen.frames_sent(),
-                 seen.bytes_sent(), seen.frames_dropped());
+    const LogScope about(place.facts());
+    log_info({.event = "session_ended"}, "ended after {} frames, {} bytes, {} dropped",
+             seen.frames_sent(), seen.bytes_sent(), seen.frames_dropped());
   }
   desk_.leave(place, now);
   around_.frames.withdraw(place);

@@ -110,6 +110,8 @@ BANNED_CALLS = [
     BannedCall(r"^(server|render_core)/", r"std::regex\b", "its recursion ends the stack"),
     BannedCall(r"\.(h|cpp|cu|cuh)$", r"\busing namespace std;", "names change their meaning"),
     BannedCall(r"^server/", r"\.detach\(\);.*thread|std::thread\([^;]*\)\.detach\(", "nobody waits for its end"),
+    BannedCall(r"^server/(?!base/log).*\.(h|cpp)$", r"\bspdlog::(?!level)",
+               "a line without facts: log_info and its like of log_event.h"),
     BannedCall(r"^web_client/src/.*\.ts$",
                r"\.(inner|outer)HTML\b|insertAdjacentHTML|document\.write|\beval\(|new Function\(",
                "text of scenes and servers would become a page's code: textContent"),

@@ -18,7 +18,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "server/base/log_session.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
@@ -50,7 +49,7 @@ std::vector<std::string> lines(std::string_view format) {
   return lines_of(format, "info", [] {
     spdlog::info("first");
     {
-      const LogSession about("1f2e3d4c5b6a79880f1e2d3c4b5a6978");
+      const LogScope about({.session = "1f2e3d4c5b6a79880f1e2d3c4b5a6978"});
       spdlog::warn("\xff \"quoted\"");
     }
     spdlog::info("last");
@@ -66,6 +65,45 @@ TEST(Log, JsonLinesNameTheirSession) {
   EXPECT_EQ(about.at("level"), "warning");
   EXPECT_EQ(about.at("message"), "\ufffd \"quoted\"");
   EXPECT_FALSE(nlohmann::json::parse(all[2]).contains("session"));
+}
+
+TEST(Log, JsonLinesHaveAFieldForEachFact) {
+  const auto all = lines_of("json", "info", [] {
+    const LogScope about({.session = "1f2e3d4c5b6a", .scene = "hall", .address = "192.0.2.1"});
+    log_info({.event = "session_admitted"}, "{} looks at it", "192.0.2.1");
+    log_refusal({.event = "session_refused", .scene = "attic", .code = "server_full"}, "full {}");
+    spdlog::info("of a library");
+    log_debug({.event = "too_small"}, "not logged");
+  });
+  ASSERT_EQ(all.size(), 3u);
+  const auto facts = [&](std::size_t line) {
+    nlohmann::json said = nlohmann::json::parse(all[line]);
+    said.erase("time");
+    return said;
+  };
+  EXPECT_EQ(facts(0), (nlohmann::json{{"level", "info"},
+                                      {"event", "session_admitted"},
+                                      {"session", "1f2e3d4c"},
+                                      {"scene", "hall"},
+                                      {"address", "192.0.2.1"},
+                                      {"message", "192.0.2.1 looks at it"}}));
+  EXPECT_EQ(facts(1), (nlohmann::json{{"level", "warning"},
+                                      {"event", "session_refused"},
+                                      {"session", "1f2e3d4c"},
+                                      {"scene", "attic"},
+                                      {"address", "192.0.2.1"},
+                                      {"code", "server_full"},
+                                      {"message", "full {}"}}));
+  EXPECT_EQ(facts(2).at("scene"), "hall") << "facts of one line stay with it";
+}
+
+TEST(Log, AFailureIsALineWhereProgramsReadTheLog) {
+  const auto fail = [] { log_failure("start_failed", "no \x1b scene"); };
+  EXPECT_THAT(lines_of("human", "info", fail),
+              testing::ElementsAre("catgs-server: no \\x1b scene"));
+  const auto all = lines_of("json", "info", fail);
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(nlohmann::json::parse(all[0]).at("event"), "start_failed");
 }
 
 TEST(Log, HumanLinesNameTheirSession) {
@@ -130,7 +168,7 @@ TEST(Log, SaysHowManyItLeftOutOnceASecond) {
 TEST(Log, WhoIsRefusedWithoutEndHidesNothingElse) {
   const std::uint64_t lost_before = log_lines_lost();
   const auto all = lines_of("human", "info", [] {
-    for (int i = 0; i < 20'000; ++i) log_refusal("of a stranger");
+    for (int i = 0; i < 20'000; ++i) log_refusal({}, "of a stranger");
     for (int i = 0; i < 300; ++i) spdlog::warn("of somebody else");
   });
   EXPECT_EQ(std::ranges::count_if(all, [](auto& line) { return line.ends_with("else"); }), 300);
@@ -145,14 +183,14 @@ TEST(Log, WhoIsRefusedWithoutEndHidesNothingElse) {
 TEST(Log, NoFloodHidesAnError) {
   const auto all = lines_of("human", "info", [] {
     for (int i = 0; i < 2000; ++i) spdlog::warn("one of many");
-    for (int i = 0; i < 200; ++i) log_refusal("of a stranger");
+    for (int i = 0; i < 200; ++i) log_refusal({}, "of a stranger");
     for (int i = 0; i < 1000; ++i) spdlog::error("grave");
   });
   EXPECT_EQ(std::ranges::count_if(all, [](auto& line) { return line.ends_with("grave"); }), 1000);
 }
 
 TEST(Log, TakesLinesAtTheirRates) {
-  const auto refusal = [] { log_refusal("line"); };
+  const auto refusal = [] { log_refusal({}, "line"); };
   const auto warning = [] { spdlog::warn("line"); };
   const auto check = [](const auto& log, double burst, double per_second) {
     const auto before = std::chrono::steady_clock::now();
@@ -240,7 +278,7 @@ TEST(Log, ADiskThatFillsWithinALineDoesNotSpoilTheNext) {
   const auto former = ::signal(SIGXFSZ, SIG_IGN);
   lines_of("json", "info", [&] {
     with_standard_error(log, [&] {
-      const LogSession about("1f2e3d4c");
+      const LogScope about({.session = "1f2e3d4c"});
       const rlimit small{100, limit.rlim_max};
       ::setrlimit(RLIMIT_FSIZE, &small);
       for (int i = 0; i < 3; ++i) spdlog::info("while the disk fills, and after it");
@@ -258,6 +296,7 @@ TEST(Log, ADiskThatFillsWithinALineDoesNotSpoilTheNext) {
   EXPECT_EQ(nlohmann::json::parse(all[1]).at("message"),
             "3 lines were lost: standard error took none");
   EXPECT_FALSE(nlohmann::json::parse(all[1]).contains("session")) << "they were anybody's";
+  EXPECT_EQ(nlohmann::json::parse(all[1]).at("event"), "log_lines_lost");
   EXPECT_EQ(nlohmann::json::parse(all[2]).at("session"), "1f2e3d4c");
 }
 

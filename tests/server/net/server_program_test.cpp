@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -11,6 +13,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -164,6 +167,69 @@ TEST(ServerProgram, WarningsAboutSettingsAreLinesOfTheLog) {
   EXPECT_THAT(program.log(), AllOf(StartsWith("{\"time\":"), HasSubstr("CATGS_MAX_SESSION")))
       << "standard output is a file of settings";
   EXPECT_EQ(program.exit_status(), 0);
+}
+
+/// The lines of a log in JSON, by event. Throws where one is something else.
+std::multimap<std::string, nlohmann::json> by_event(const std::string& log) {
+  std::multimap<std::string, nlohmann::json> lines;
+  std::istringstream text(log);
+  for (std::string line; std::getline(text, line);) {
+    auto said = nlohmann::json::parse(line);
+    lines.emplace(said.at("event").get<std::string>(), said);
+  }
+  return lines;
+}
+
+TEST(ServerProgram, EveryLineOfAJsonLogSaysWhatHappenedToWhom) {
+  Program program({"--log-format", "json", "--log-level", "debug", "--drain-wait", "0"});
+  {
+    WireClient visitor(program.port());
+    const v1::Welcome welcome = visitor.greet();
+    WireClient spectator(program.port());
+    v1::ClientMessage watching = hello_message(160, 96, v1::CODEC_H264);
+    watching.mutable_hello()->set_watch(welcome.watch_token());
+    spectator.greet(watching);
+    WireClient lost(program.port());
+    v1::ClientMessage elsewhere = hello_message(160, 96, v1::CODEC_H264);
+    elsewhere.mutable_hello()->set_scene_id("attic");
+    lost.send(elsewhere);
+    lost.receive_until_closed();
+    visitor.close(1001);
+  }
+  RawSocket stranger(program.port());
+  stranger.send("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+  std::string answer;
+  stranger.receive_until("\r\n", answer);
+  program.read_log("\"code\":\"405\"");
+  program.read_log("\"event\":\"session_ended\"");
+  program.signal(SIGTERM);
+  program.read_log("never said");
+  EXPECT_EQ(program.exit_status(), 0);
+
+  const auto lines = by_event(program.log());
+  const auto line = [&](const char* event) {
+    const auto found = lines.find(event);
+    return found == lines.end() ? nlohmann::json() : found->second;
+  };
+  for (const char* event : {"scene_loading", "renderer", "encoder", "ready", "stopped"})
+    EXPECT_TRUE(lines.contains(event)) << event;
+  EXPECT_EQ(line("scene_loaded").value("scene", ""), "city");
+  const std::string session = line("session_admitted").value("session", "");
+  EXPECT_EQ(session.size(), 8u);
+  for (const char* event : {"session_admitted", "spectator_joined", "session_ended"}) {
+    EXPECT_EQ(line(event).value("session", ""), session) << event;
+    EXPECT_EQ(line(event).value("scene", ""), "city") << event;
+    EXPECT_EQ(line(event).value("address", ""), "127.0.0.1") << event;
+  }
+  EXPECT_EQ(line("session_refused").value("code", ""), "unknown_scene");
+  EXPECT_EQ(line("request_refused").value("code", ""), "405");
+  EXPECT_EQ(line("request_refused").value("address", ""), "127.0.0.1");
+}
+
+TEST(ServerProgram, AStartThatFailsIsALineOfTheJsonLog) {
+  Program refused({"--log-format", "json", "--scene", "nowhere.ply"}, "never said");
+  EXPECT_EQ(refused.exit_status(), 2);
+  EXPECT_TRUE(by_event(refused.log()).contains("start_failed"));
 }
 
 /// libwebsockets has a line about each head that is too long.
