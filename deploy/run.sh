@@ -211,7 +211,7 @@ wait_until_serving() {
   until [[ -n $(sed -n "$serving_pattern" "$server_log") ]]; do
     if ((ended)); then
       # Its error and not the progress before it; a crash leaves only that.
-      grep '^catgs-server: ' "$server_log" || cat "$server_log"
+      grep -E '^catgs-server: |"event":"start_failed"' "$server_log" || cat "$server_log"
       return 1
     fi
     # Its last words may have come since the log was read: one more look.

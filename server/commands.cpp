@@ -50,10 +50,13 @@ void add_token_command(CLI::App& app, int& exit_code) {
     const auto now = std::chrono::system_clock::now() + parse_duration(options->expires);
     options->grant.expires_unix_s =
         std::chrono::duration_cast<std::chrono::seconds>(now.time_since_epoch()).count();
+    options->grant.id = new_link_id();
     std::cout << make_link_token(options->grant,
                                  read_key_file("--token-key-file", options->key_file))
               << '\n';
-    std::cerr << "append it to the page's address: https://HOST/"
+    std::cerr << "its id is " << options->grant.id
+              << ": a line with it in the file of --revoked-links ends this link\n"
+              << "append it to the page's address: https://HOST/"
               << (scene_id.empty() ? "" : "?scene=" + scene_id)
               << (options->grant.role != "author" ? ""
                   : scene_id.empty()              ? "?author"

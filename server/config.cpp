@@ -259,6 +259,8 @@ std::vector<Setting> access_settings() {
            &C::token_file),
       text("token-key-file", "FILE", "Key of the expiring links that 'catgs-server token' makes",
            &C::token_key_file),
+      text("revoked-links", "FILE", "Ids of links that are refused, one per line; read again",
+           &C::revoked_links),
       text("resume-key-file", "FILE",
            "Key that the servers of a fleet share, so that sessions can move between them "
            "[the key of tokens, or a random one]",

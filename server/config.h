@@ -45,6 +45,7 @@ struct ServerConfig {
   bool admin_open = false;
   std::string token_file;
   std::string token_key_file;
+  std::string revoked_links;
   std::string resume_key_file;  // empty: that of tokens, else a random key
   std::string tls_cert;
   std::string tls_key;

@@ -26,6 +26,9 @@ void validate(const ServerConfig& config, const ConfigSources& sources) {
     throw InputError(fmt::format("--min-fps {}", config.min_fps), {},
                      fmt::format("is above --fps {}, which no session exceeds", config.fps),
                      fmt::format("give at most {}", config.fps));
+  if (!config.revoked_links.empty() && config.token_key_file.empty())
+    throw InputError("--revoked-links", {}, "there are no links without --token-key-file",
+                     "give the key of the links, or leave this out");
   if (config.tls_cert.empty() != config.tls_key.empty())
     throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
                      "--tls-cert and --tls-key belong together");

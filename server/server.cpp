@@ -30,6 +30,7 @@
 #include "server/frame_path.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
+#include "server/net/visitor_address.h"
 #include "server/scenes/scene_api.h"
 #include "server/scenes/scene_library.h"
 #include "server/scenes/sidecar_saver.h"
@@ -93,7 +94,7 @@ struct Server::State {
   State(const ServerConfig& configuration, const ServerParts& parts)
       : config(configuration),
         liveness(parts.liveness_clock),
-        access(config.token_file, config.token_key_file, config.open),
+        access(config.token_file, config.token_key_file, config.open, config.revoked_links),
         client(find_client(config.client_dir)),
         net(net_options()),
         pool(std::make_shared<ThreadPool>(config.threads)),
@@ -234,9 +235,9 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   s.frames = std::make_unique<FramePath>(
       s.io, executor, static_cast<int>(s.devices->views().size()),
       [&s](const auto& why) { s.give_up("no device renders any more: " + why); }, s.metrics);
-  s.places = std::make_unique<Places>(VisitContext{s.io, options, executor, *s.devices, *s.frames,
-                                                   *s.scenes, s.encoders, authorize,
-                                                   session_tokens(s.config), s.metrics});
+  s.places = std::make_unique<Places>(
+      VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
+                   session_tokens(s.config), s.metrics, [&s] { return s.access.revoked_links(); }});
 }
 
 Server::~Server() {
@@ -272,21 +273,24 @@ int Server::port() const { return state_->net.port(); }
 int Server::admin_port() const { return state_->net.admin_port(); }
 
 void Server::State::print_banner() const {
-  const std::string host = config.bind == "0.0.0.0" || config.bind == "::" ? "localhost"
-                           : config.bind.find(':') != std::string::npos    ? "[" + config.bind + "]"
-                                                                           : config.bind;
   log_info({.event = "renderer"}, "renderer: {}", scenes->renderer_text());
   log_info({.event = "encoder"}, "encoder: {}", encoders.front().text);
   if (net.admin_port() != 0)
     log_info({.event = "metrics"}, "metrics: http://{}/metrics",
              fmt::format("{}:{}", parse_endpoint(config.admin_bind).address, net.admin_port()));
-  log_info({.event = "ready"}, "open {}://{}:{}/ in a browser; Ctrl-C stops the server",
-           config.tls_cert.empty() ? "http" : "https", host, net.port());
+  const std::string rest =
+      fmt::format(":{}/{}", net.port(), config.asks_for_tokens() ? "#token=TOKEN" : "");
+  const std::string scheme = config.tls_cert.empty() ? "http://" : "https://";
+  const std::string host = visitor_host(config.bind, config.tls_cert, machine_addresses());
+  const bool all = config.bind == "0.0.0.0" || config.bind == "::";
+  log_info(
+      {.event = "ready"}, "open {} in a browser{}; Ctrl-C stops the server", scheme + host + rest,
+      all && host != "localhost" ? ", on this machine also " + scheme + "localhost" + rest : "");
   if (config.asks_for_tokens())
-    log_info({.event = "access"}, "visitors need {}",
+    log_info({.event = "access"}, "visitors need a TOKEN in that address: {}",
              config.token_key_file.empty()
-                 ? fmt::format("a token of {} behind that address: #token=TOKEN", config.token_file)
-                 : fmt::format("a link: catgs-server token --token-key-file {} makes one",
+                 ? fmt::format("a line of {}", config.token_file)
+                 : fmt::format("catgs-server token --token-key-file {} makes one",
                                config.token_key_file));
 }
 

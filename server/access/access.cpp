@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <fstream>
 #include <iterator>
+#include <span>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -21,6 +23,8 @@ constexpr std::string_view link_purpose = "catgs-link-v1";
 constexpr std::size_t min_key_bytes = 16;
 constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
+constexpr std::size_t max_link_id_bytes = 32;
+constexpr std::size_t max_revoked_links = 100'000;
 constexpr std::chrono::days longest_link{3650};
 
 bool is_role(std::string_view role) {
@@ -43,9 +47,19 @@ std::string other_scene(const LinkGrant& grant, std::string_view scene_id) {
   return fmt::format("this link was made for another scene called \"{}\": ask for a new one", name);
 }
 
-std::string read_text(const std::filesystem::path& path, std::string_view flag) {
-  std::ifstream in = open_required_file(flag, path);
-  return {std::istreambuf_iterator<char>(in), {}};
+bool is_link_id(std::string_view id) {
+  return !id.empty() && id.size() <= max_link_id_bytes &&
+         std::ranges::all_of(id, [](unsigned char c) { return std::isxdigit(c); });
+}
+
+/// Reads a list again that was changed while the server runs.
+void read_again(std::string_view what, const std::function<void()>& read) {
+  try {
+    read();
+    log_info({.event = "list_read"}, "{} were read again", what);
+  } catch (const InputError& bad) {
+    log_error({.event = "list_unreadable"}, "{}; {} read before stay in force", bad.what(), what);
+  }
 }
 
 }  // namespace
@@ -56,8 +70,10 @@ std::string make_link_token(const LinkGrant& grant, std::string_view key) {
                      "use viewer, author, spectator or solo");
   if (!grant.scene_id.empty() && !is_scene_id(grant.scene_id))
     throw InputError("--scene", {}, "is no scene id", "/api/scenes lists them");
-  const std::string payload =
-      fmt::format("{}\n{}\n{}", grant.scene_id, grant.role, grant.expires_unix_s);
+  if (!grant.id.empty() && !is_link_id(grant.id))
+    throw InputError("id " + grant.id, {}, "is no id of a link");
+  std::string payload = fmt::format("{}\n{}\n{}", grant.scene_id, grant.role, grant.expires_unix_s);
+  if (!grant.id.empty()) payload += "\n" + grant.id;
   return sign_token(link_purpose, payload, key);
 }
 
@@ -70,14 +86,22 @@ std::optional<LinkGrant> read_link_token(std::string_view token, std::string_vie
   std::getline(lines, grant.scene_id);
   std::getline(lines, grant.role);
   std::getline(lines, expires);
+  std::getline(lines, grant.id);
   const char* end = expires.data() + expires.size();
   if (!is_role(grant.role)) return std::nullopt;
   if (std::from_chars(expires.data(), end, grant.expires_unix_s).ptr != end) return std::nullopt;
+  if (grant.id.empty()) {
+    const TokenDigest digest = digest_of(token);
+    grant.id = fmt::format("{:02x}", fmt::join(std::span(digest).first<6>(), ""));
+  }
   return grant;
 }
 
+std::string new_link_id() { return random_id().substr(0, 12); }
+
 std::string read_key_file(std::string_view flag, const std::filesystem::path& path) {
-  std::string key = read_text(path, flag);
+  std::ifstream in = open_required_file(flag, path);
+  std::string key{std::istreambuf_iterator<char>(in), {}};
   while (!key.empty() && (key.back() == '\n' || key.back() == '\r')) key.pop_back();
   if (key.size() < min_key_bytes)
     throw InputError(
@@ -105,23 +129,24 @@ std::chrono::seconds parse_duration(std::string_view text) {
 }
 
 AccessControl::AccessControl(std::filesystem::path token_file,
-                             const std::filesystem::path& key_file, bool open)
-    : open_(open), token_file_(std::move(token_file)) {
+                             const std::filesystem::path& key_file, bool open,
+                             std::filesystem::path revoked_links)
+    : open_(open),
+      token_file_("--token-file", std::move(token_file)),
+      revoked_file_("--revoked-links", std::move(revoked_links)) {
   if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
-  if (!token_file_.empty()) {
-    std::error_code missing;  // read_token_file() reports it
-    token_file_time_ = std::filesystem::last_write_time(token_file_, missing);
-    read_token_file();
-  }
+  if (token_file_.given()) read_token_file();
+  if (revoked_file_.given()) read_revoked_links();
 }
 
 Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
                              const ResolveScene& resolve) {
-  auto granted = read(token, now_unix_s);
+  std::string link_id;
+  auto granted = read(token, now_unix_s, link_id);
   if (auto* grant = std::get_if<LinkGrant>(&granted); grant && !grant->scene_id.empty())
     grant->scene_id = resolve(grant->scene_id);
-  return [granted = std::move(granted), has_authors = !key_.empty()](std::string_view scene_id,
-                                                                     Use use) -> Refusal {
+  Permit permit = [granted = std::move(granted), has_authors = !key_.empty()](
+                      std::string_view scene_id, Use use) -> Refusal {
     if (use == Use::save && !has_authors)
       return "nobody can save on this server: it was started without --token-key-file, which "
              "links of role author are made with";
@@ -130,16 +155,21 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
     if (!grant.scene_id.empty() && grant.scene_id != scene_id) return other_scene(grant, scene_id);
     return forbidden(grant.role, use);
   };
+  permit.link_id = std::move(link_id);
+  return permit;
 }
 
 std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
-                                                         std::int64_t now_unix_s) {
+                                                         std::int64_t now_unix_s,
+                                                         std::string& link_id) {
   const LinkGrant everything;  // the default grant: all that viewers may do
-  if (token_file_.empty() && key_.empty()) return everything;
+  if (!token_file_.given() && key_.empty()) return everything;
   if (token.empty() && open_) return everything;
   if (token.empty()) return "this server needs an access token: open the link you were given";
   if (is_static_token(token)) return everything;
   if (const auto grant = key_.empty() ? std::nullopt : read_link_token(token, key_)) {
+    link_id = grant->id;
+    if (revoked_links()->contains(link_id)) return std::string(link_revoked);
     if (now_unix_s < grant->expires_unix_s) return *grant;
     return "this link has expired: ask for a new one";
   }
@@ -147,48 +177,49 @@ std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
 }
 
 bool AccessControl::is_static_token(std::string_view token) {
-  if (token_file_.empty()) return false;
+  if (!token_file_.given()) return false;
   const std::lock_guard lock(mutex_);
-  reload_when_changed();
+  if (token_file_.changed()) read_again("the tokens", [&] { read_token_file(); });
   const TokenDigest digest = digest_of(token);
   bool found = false;
   for (const TokenDigest& known : tokens_) found |= equal_in_constant_time(known, digest);
   return found;
 }
 
-void AccessControl::reload_when_changed() {
-  std::error_code error;
-  const auto time = std::filesystem::last_write_time(token_file_, error);
-  if (error || time == token_file_time_) return;
-  token_file_time_ = time;
-  try {
-    read_token_file();
-    log_info({.event = "tokens_read"}, "--token-file was read again: {} tokens", tokens_.size());
-  } catch (const InputError& bad) {
-    log_error({.event = "tokens_unreadable"}, "{}; the tokens read before stay in force",
-              bad.what());
-  }
+RevokedLinks AccessControl::revoked_links() {
+  const std::lock_guard lock(mutex_);
+  if (revoked_file_.changed()) read_again("the revoked links", [&] { read_revoked_links(); });
+  return revoked_;
 }
 
 void AccessControl::read_token_file() {
-  const std::string source = "--token-file " + token_file_.string();
-  std::istringstream lines(read_text(token_file_, "--token-file"));
   std::vector<TokenDigest> tokens;
-  int number = 0;
-  for (std::string line; std::getline(lines, line);) {
-    ++number;
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-    if (line.empty() || line.front() == '#') continue;
-    if (line.size() < min_token_bytes || line.size() > max_token_bytes)
+  for (const ListFile::Entry& entry : token_file_.read()) {
+    if (entry.text.size() < min_token_bytes || entry.text.size() > max_token_bytes)
       throw InputError(
-          fmt::format("{}:{}", source, number), {},
+          entry.place, {},
           fmt::format("a token has {} to {} characters", min_token_bytes, max_token_bytes),
           "make one: openssl rand -hex 16");
-    tokens.push_back(digest_of(line));
+    tokens.push_back(digest_of(entry.text));
   }
   if (tokens.empty())
-    throw InputError(source, {}, "no token in it", "make one: openssl rand -hex 16");
+    throw InputError(token_file_.source(), {}, "no token in it", "make one: openssl rand -hex 16");
   tokens_ = std::move(tokens);
+}
+
+void AccessControl::read_revoked_links() {
+  auto ids = std::make_shared<LinkIds>();
+  for (const ListFile::Entry& entry : revoked_file_.read()) {
+    const std::string id = entry.text.substr(0, entry.text.find_first_of(" \t#"));
+    if (!is_link_id(id))
+      throw InputError(entry.place, {}, "is no id of a link",
+                       "'catgs-server token' prints it beside the link, and the log names it");
+    if (ids->insert(id).second && ids->size() > max_revoked_links)
+      throw InputError(revoked_file_.source(), {},
+                       fmt::format("more than {} links", max_revoked_links),
+                       "leave out those that have expired, or change the key: that ends all links");
+  }
+  revoked_ = std::move(ids);
 }
 
 }  // namespace catgs

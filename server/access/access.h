@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/access/authorize.h"
+#include "server/access/list_file.h"
 #include "server/access/signed_token.h"
 
 namespace catgs {
@@ -21,12 +22,17 @@ struct LinkGrant {
   /// others' sessions; "solo": neither watch nor be watched.
   std::string role = "viewer";
   std::int64_t expires_unix_s = 0;
+  std::string id = {};  // by which it can be revoked; empty: made when links had none
 };
 
+/// Returns an id for a new link.
+std::string new_link_id();
+
 /// Makes a token `payload.mac`, both base64url: the grant in clear and its HMAC-SHA256 under `key`.
-/// Every server with the key can check it. Throws InputError on a bad role or scene.
+/// Every server with the key can check it. Throws InputError on a bad role, scene or id.
 std::string make_link_token(const LinkGrant& grant, std::string_view key);
-/// Returns the grant if the token was made with `key`. Its expiry is not checked.
+/// Returns the grant if the token was made with `key`. Its expiry is not checked. A link without an
+/// id is known by the beginning of its digest.
 std::optional<LinkGrant> read_link_token(std::string_view token, std::string_view key);
 
 /// Reads a key of at least 16 bytes, without trailing line ends. Throws InputError that names the
@@ -43,24 +49,31 @@ class AccessControl {
  public:
   /// An empty path disables that kind of token. Throws InputError if a file cannot be read.
   AccessControl(std::filesystem::path token_file, const std::filesystem::path& key_file,
-                bool open = false);
+                bool open = false, std::filesystem::path revoked_links = {});
 
-  /// Returns what `token` permits. `resolve` gives the id of the scene that it names. The token
-  /// file is reread after a change; if that fails, its last valid content stays in force.
+  /// Returns what `token` permits. `resolve` gives the id of the scene that it names. The files of
+  /// tokens and of revoked links are reread after a change; if that fails, the last valid content
+  /// stays in force.
   Permit permit(std::string_view token, std::int64_t now_unix_s, const ResolveScene& resolve);
 
+  /// Returns the links that are revoked by now.
+  RevokedLinks revoked_links();
+
  private:
-  /// Returns the grant of a valid token, or why it is invalid.
-  std::variant<LinkGrant, std::string> read(std::string_view token, std::int64_t now_unix_s);
-  void reload_when_changed();
+  /// Returns the grant of a valid token, or why it is invalid. Sets `link_id` to that of a genuine
+  /// link.
+  std::variant<LinkGrant, std::string> read(std::string_view token, std::int64_t now_unix_s,
+                                            std::string& link_id);
   void read_token_file();
+  void read_revoked_links();
   bool is_static_token(std::string_view token);
 
   const bool open_;
   std::mutex mutex_;
-  const std::filesystem::path token_file_;
-  std::filesystem::file_time_type token_file_time_{};
+  ListFile token_file_;
   std::vector<TokenDigest> tokens_;
+  ListFile revoked_file_;
+  RevokedLinks revoked_ = std::make_shared<LinkIds>();
   std::string key_;  // not changed once constructed
 };
 

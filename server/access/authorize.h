@@ -1,7 +1,9 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -20,8 +22,16 @@ using Refusal = std::optional<std::string>;
 
 /// Answers what a token permits, as of when it was read. Checking a token takes time; asking a
 /// Permit about each scene does not.
-using Permit = std::function<Refusal(std::string_view scene_id, Use use)>;
+struct Permit : std::function<Refusal(std::string_view scene_id, Use use)> {
+  using function::function;
+  std::string link_id{};  // of a genuine link, even if it is refused; empty: the token is no link
+};
 using Authorize = std::function<Permit(const std::string& token)>;
+
+using LinkIds = std::set<std::string, std::less<>>;
+/// Those of links that were revoked. Never null.
+using RevokedLinks = std::shared_ptr<const LinkIds>;
+inline constexpr std::string_view link_revoked = "this link was revoked: ask for a new one";
 
 /// Returns the id of a link's scene. The link may contain the scene's name instead.
 using ResolveScene = std::function<std::string(std::string_view wish)>;

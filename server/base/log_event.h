@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -39,6 +40,11 @@ class LogScope {
  private:
   const LogFacts outer_;
 };
+
+/// " by link 3f0c91d27a5e", for people, or nothing.
+inline std::string by_link(const LogFacts& facts) {
+  return facts.link.empty() ? std::string() : fmt::format(" by link {}", facts.link);
+}
 
 /// Logs a line. The text says all to people; the facts say it to programs.
 template <typename... Args>

@@ -55,8 +55,10 @@ fs::file_time_type time_of(const fs::path& path) {
 
 std::vector<fs::path> SceneFolders::list() const {
   std::vector<fs::path> paths;
+  std::set<fs::path> listed;
   for (const fs::path& folder : folders_) {
     std::error_code error;
+    if (!listed.insert(fs::canonical(folder, error)).second && !error) continue;
     fs::directory_iterator entries(folder, error);
     if (error)
       throw InputError("--scene-folder " + folder.string(), {}, error.message(),
@@ -82,7 +84,7 @@ std::vector<FoundScene> SceneFolders::scan() {
   }
   std::map<fs::path, Known> known;
   std::vector<FoundScene> scenes;
-  std::set<std::string> ids;
+  std::set<std::string> keys = elsewhere_;
   for (const fs::path& path : paths) {
     const auto changed = time_of(path);
     const auto before = known_.find(path);
@@ -107,7 +109,7 @@ std::vector<FoundScene> SceneFolders::scan() {
         log_warning({.event = "scene_not_offered"}, "not offered: {}", error.what());
       }
     }
-    if (now.good && ids.insert(now.scene.id).second) scenes.push_back(now.scene);
+    if (now.good && keys.insert(scene_key(path.string())).second) scenes.push_back(now.scene);
   }
   known_ = std::move(known);
   return scenes;

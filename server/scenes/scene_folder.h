@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -28,13 +29,19 @@ struct FoundScene {
 /// folder may be a slow mount of an object store. Not thread-safe.
 class SceneFolders {
  public:
-  SceneFolders(std::vector<std::filesystem::path> folders, SceneIds ids, LoadOptions options)
-      : folders_(std::move(folders)), ids_(std::move(ids)), options_(std::move(options)) {}
+  /// `elsewhere`: scene_key() of scenes that are offered anyway.
+  SceneFolders(std::vector<std::filesystem::path> folders, SceneIds ids, LoadOptions options,
+               std::set<std::string> elsewhere = {})
+      : folders_(std::move(folders)),
+        ids_(std::move(ids)),
+        options_(std::move(options)),
+        elsewhere_(std::move(elsewhere)) {}
 
   /// Lists the present scenes in order of path: scene files, SOG folders and training output
   /// folders directly in the folders. At most max_scenes are listed; a warning names further ones.
-  /// Unreadable scenes are left out and reported once. A path is listed once, even if its folder is
-  /// named twice. Throws InputError if a folder itself cannot be read.
+  /// Unreadable scenes are left out and reported once. A scene is listed once, even if its folder
+  /// is named twice or by a symbolic link, too. Throws InputError if a folder itself cannot be
+  /// read.
   std::vector<FoundScene> scan();
 
   static constexpr std::size_t max_scenes = 10'000;
@@ -50,6 +57,7 @@ class SceneFolders {
   const std::vector<std::filesystem::path> folders_;
   const SceneIds ids_;
   const LoadOptions options_;
+  const std::set<std::string> elsewhere_;
   std::map<std::filesystem::path, Known> known_;
   bool told_of_too_many_ = false;
 };

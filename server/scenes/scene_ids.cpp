@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <system_error>
 
 #include "server/access/signed_token.h"
 #include "server/base/log_event.h"
@@ -32,7 +33,11 @@ std::string with_digest(std::string_view name, std::string_view path) {
 }  // namespace
 
 std::string scene_key(const std::string& spec) {
-  return is_synthetic(spec) ? spec : scene_path(spec).string();
+  if (is_synthetic(spec)) return spec;
+  const fs::path path = scene_path(spec);
+  std::error_code error;
+  const fs::path folder = fs::canonical(path.parent_path(), error);
+  return ((error ? path.parent_path() : folder) / path.filename()).string();
 }
 
 SceneIds::SceneIds(const std::vector<std::string>& scenes,

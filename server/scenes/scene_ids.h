@@ -11,8 +11,9 @@ namespace catgs {
 /// True if --scene names a procedural scene, synth:KIND:COUNT[:SEED].
 inline bool is_synthetic(std::string_view spec) { return spec.starts_with("synth:"); }
 
-/// What two values of --scene have in common if they name the same scene: its path as given, made
-/// absolute, or the words of a procedural scene.
+/// What two values of --scene, or two paths, have in common if they name the same scene: its path,
+/// with symbolic links among its folders resolved, or the words of a procedural scene. A link in
+/// place of the scene itself is a scene of its own, as its sidecar lies beside it.
 std::string scene_key(const std::string& spec);
 
 /// Makes the ids of scenes. An id depends only on the settings and the scene's path. Other files

@@ -1,6 +1,7 @@
 #include "server/scenes/scene_library.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -41,6 +42,12 @@ ResidencyLimits residency_limits(const ServerConfig& config) {
           std::chrono::seconds(config.scene_residency_s)};
 }
 
+std::set<std::string> keys_of(const std::vector<std::string>& scenes) {
+  std::set<std::string> keys;
+  for (const std::string& spec : scenes) keys.insert(scene_key(spec));
+  return keys;
+}
+
 std::string megabytes(std::uint64_t bytes) {
   return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
 }
@@ -56,7 +63,7 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
       metrics_(metrics),
       clock_(std::move(clock)),
       folders_(paths(config.scene_folders), SceneIds(config.scenes, config.scene_folders),
-               size_options(config)),
+               size_options(config), keys_of(config.scenes)),
       residency_(residency_limits(config)) {
   for (auto& entry : load_scenes(config_, core_)) pin(std::move(entry));
   if (!config_.scene_folders.empty()) open_folders();

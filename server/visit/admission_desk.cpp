@@ -106,7 +106,7 @@ void AdmissionDesk::grow_pictures() {
 }
 
 AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
-  place.visitor().token = hello.token;
+  place.visitor().come_by(hello.token, around_.authorize);
   const std::string& id = place.id();
   auto choice = choose(hello);
   if (auto* error = std::get_if<ErrorMessage>(&choice)) {
@@ -162,9 +162,10 @@ Admission AdmissionDesk::let_in(Place& place, const Hello& hello,
   Visitor& visitor = place.visitor();
   visitor.encoder = best_encoder(around_.encoders, hello.decoders).value();
   visitor.admitted_at = Clock::now();
-  const LogScope about(place.facts());
-  log_info({.event = "session_admitted", .scene = scene->facts.scene_id},
-           "{} looks at {}, {}x{}, {}", place.audience().address(), scene->facts.scene_id,
+  LogFacts facts = place.facts();
+  facts.event = "session_admitted";
+  facts.scene = scene->facts.scene_id;
+  log_info(facts, "{}{} looks at {}, {}x{}, {}", facts.address, by_link(facts), facts.scene,
            hello.viewport_px.x, hello.viewport_px.y, encoder_name(visitor.encoder.kind));
   return {std::move(scene), visitor.encoder,
           machine_.initial_effort(admitted_, scaled_size(size_px, std::sqrt(offer.pixel_share))),

@@ -61,9 +61,24 @@ std::vector<std::uint64_t> Audience::send(OutgoingFrame frame, TimePoint now) {
   return visitor_->connection().send(std::move(frame));
 }
 
-void Audience::add(std::shared_ptr<ClientConnection> spectator, Welcome welcome) {
+void Audience::add(std::shared_ptr<ClientConnection> spectator, Welcome welcome,
+                   std::string link_id) {
   spectator->connection().send(wire::serialize(for_spectators(std::move(welcome))));
-  spectators_.push_back({std::move(spectator), true});
+  spectators_.push_back({std::move(spectator), true, std::move(link_id)});
+}
+
+std::string Audience::link_of(const ClientConnection& spectator) const {
+  for (const Spectator& s : spectators_)
+    if (s.connection.get() == &spectator) return s.link_id;
+  return {};
+}
+
+std::vector<std::shared_ptr<ClientConnection>> Audience::spectators_by(
+    const LinkIds& link_ids) const {
+  std::vector<std::shared_ptr<ClientConnection>> found;
+  for (const Spectator& s : spectators_)
+    if (link_ids.contains(s.link_id)) found.push_back(s.connection);
+  return found;
 }
 
 void Audience::remove(const ClientConnection& spectator) {

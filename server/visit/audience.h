@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/access/authorize.h"
 #include "server/visit/client_connection.h"
 
 namespace catgs {
@@ -42,8 +43,13 @@ class Audience {
   [[nodiscard]] std::size_t spectators() const { return spectators_.size(); }
   /// The spectator is sent `welcome` first, without the visitor's secrets. Frames follow from the
   /// next IDR on.
-  void add(std::shared_ptr<ClientConnection> spectator, Welcome welcome);
+  void add(std::shared_ptr<ClientConnection> spectator, Welcome welcome, std::string link_id = {});
   void remove(const ClientConnection& spectator);
+  /// The id of a spectator's link; empty: it came by none.
+  [[nodiscard]] std::string link_of(const ClientConnection& spectator) const;
+  /// The spectators who came by one of these links.
+  [[nodiscard]] std::vector<std::shared_ptr<ClientConnection>> spectators_by(
+      const LinkIds& link_ids) const;
   /// Handles a farewell or a lost decoder. Spectators' other messages are ignored.
   void on_message(ClientConnection& spectator, const ClientMessage& message);
   /// Call it at least four times a second. True: a spectator waits for an IDR and the last one was
@@ -58,6 +64,7 @@ class Audience {
   struct Spectator {
     std::shared_ptr<ClientConnection> connection;
     bool waits_for_idr = true;
+    std::string link_id{};
   };
   void tell_spectators(const ServerMessage& message, TimePoint now);
 

@@ -19,10 +19,11 @@ namespace {
 void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
   facts.event = error.fatal ? "session_refused" : "wish_refused";
   facts.code = name_of(error.code);
+  const std::string text = fmt::format("{}{}: {}", facts.address, by_link(facts), error.message);
   if (error.code == ErrorCode::internal || error.code == ErrorCode::render_failed)
-    log_warning(facts, "{}: {}", facts.address, error.message);
+    log_warning(facts, "{}", text);
   else
-    log_refusal(facts, fmt::format("{}: {}", facts.address, error.message));
+    log_refusal(facts, text);
   if (error.code == ErrorCode::bad_message) metrics.bad_messages.Increment();
   if (error.fatal) metrics.sessions_refused.Increment();
 }
@@ -78,11 +79,13 @@ void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why)
     visit_.fail(code, why);
     return around_.frames.changed(*this);
   }
+  const std::string link_id = audience_.link_of(from);
   audience_.remove(from);
   const ErrorMessage error{code, std::string(why), true};
   const std::string address = from.connection().peer_address();
   LogFacts watching = facts();
   watching.address = address;
+  watching.link = link_id;
   note_error(watching, error, around_.metrics);
   from.connection().send(wire::serialize(error));
   from.dismiss(CloseCode::policy_violation, why);
@@ -150,7 +153,8 @@ LogFacts Place::facts() const {
   const SceneEntry* const scene = visit_.stream().scene();
   return {.session = id_,
           .scene = scene ? std::string_view(scene->facts.scene_id) : std::string_view(),
-          .address = audience_.address()};
+          .address = audience_.address(),
+          .link = visitor_.link_id};
 }
 
 void Place::on_tick(TimePoint now) {

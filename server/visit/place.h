@@ -35,8 +35,17 @@ class Admissions {
 /// The visitor, as of the last hello, and what it was granted.
 struct Visitor {
   std::string token;      // it may be valid for one scene only
+  std::string link_id;    // of the token; empty: it is no link
   EncoderChoice encoder;  // of the streams that are opened from here on
   std::optional<TimePoint> admitted_at;
+
+  /// Notes the token of a hello, and returns what it permits.
+  Permit come_by(const std::string& by, const Authorize& authorize) {
+    Permit permit = authorize(by);
+    token = by;
+    link_id = permit.link_id;
+    return permit;
+  }
 };
 
 /// One visit's place in the server: its Visit, its Audience, its stream on the executor and its

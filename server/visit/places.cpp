@@ -99,7 +99,7 @@ bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& 
   newcomer.audience().detach();
   leave(newcomer);
   Visitor& visitor = known.visitor();
-  visitor.token = hello.token;
+  visitor.come_by(hello.token, around_.authorize);
   const auto best =
       best_encoder(around_.encoders, hello.decoders);  // choose() has checked that there is one
   if (visitor.encoder.codec != best->codec) visitor.encoder = *best;
@@ -129,8 +129,8 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
     return refuse(ErrorCode::session_ended, "the session of this link has ended");
   Visit& visit = host->visit();
   Audience& audience = host->audience();
-  if (const auto why =
-          around_.authorize(hello.token)(visit.stream().scene()->facts.scene_id, Use::watch))
+  const Permit permit = newcomer.visitor().come_by(hello.token, around_.authorize);
+  if (const auto why = permit(visit.stream().scene()->facts.scene_id, Use::watch))
     return refuse(ErrorCode::unauthorized, *why);
   if (!host->may_be_watched())
     return refuse(ErrorCode::unauthorized,
@@ -146,11 +146,14 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
   newcomer.audience().detach();
   leave(newcomer);
   connection->watch(*host);
-  audience.add(connection, visit.stream().welcome());
+  audience.add(connection, visit.stream().welcome(), permit.link_id);
   {
     const std::string address = connection->connection().peer_address();
-    const LogScope about(host->facts());
-    log_info({.event = "spectator_joined", .address = address}, "{} watches", address);
+    LogFacts facts = host->facts();
+    facts.event = "spectator_joined";
+    facts.address = address;
+    facts.link = permit.link_id;
+    log_info(facts, "{}{} watches", address, by_link(facts));
   }
   if (audience.wants_idr(now)) visit.stream().idr().request();
   around_.frames.changed(*host);
@@ -173,13 +176,23 @@ void Places::leave(Place& place) {
   desk_.admit_waiting(now);
 }
 
+void Places::end_revoked(Place& place, const LinkIds& revoked) {
+  for (const auto& spectator : place.audience().spectators_by(revoked))
+    place.refuse(*spectator, ErrorCode::unauthorized, link_revoked);
+  if (!revoked.contains(place.visitor().link_id)) return;
+  place.visit().fail(ErrorCode::unauthorized, link_revoked);
+  around_.frames.changed(place);
+}
+
 void Places::tick() {
   if (stopped_) return;
   around_.options.on_tick();
   const TimePoint now = Clock::now();
   around_.scenes.on_tick(now);
+  const RevokedLinks revoked = around_.revoked_links();
   PlaceList gone;
   for (const auto& place : places_) {
+    if (!revoked->empty()) end_revoked(*place, *revoked);
     place->on_tick(now);
     if (!place->audience().connected() && place->visit().life().state() == VisitState::closed)
       gone.push_back(place);

@@ -56,6 +56,8 @@ class Places final : public Admissions {
   /// Continues the session of a resume token. False: the session cannot continue.
   bool resume(const std::shared_ptr<ClientConnection>& connection, Place& newcomer, Place& known,
               const Hello& hello, TimePoint now);
+  /// Ends a visit whose link was revoked, and dismisses spectators whose links were.
+  void end_revoked(Place& place, const LinkIds& revoked);
   void tick();
 
   const VisitContext around_;

@@ -47,6 +47,7 @@ struct VisitContext {
   Authorize authorize;
   SessionTokens tokens;
   Metrics& metrics;
+  std::function<RevokedLinks()> revoked_links = [] { return std::make_shared<LinkIds>(); };
 };
 
 }  // namespace catgs

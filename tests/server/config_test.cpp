@@ -151,6 +151,14 @@ TEST_F(ConfigTest, RefusesAnOpenDoor) {
   EXPECT_NO_THROW(validate(config));
 }
 
+TEST_F(ConfigTest, RefusesAListOfLinksWithoutTheirKey) {
+  config.scenes = {"synth:city:1000"};
+  config.revoked_links = "revoked";
+  EXPECT_THAT([&] { validate(config); }, ThrowsMessage<InputError>(HasSubstr("--token-key-file")));
+  config.token_key_file = "key";
+  EXPECT_NO_THROW(validate(config));
+}
+
 TEST_F(ConfigTest, RefusesAnOpenAdminDoorEvenWithTokens) {
   config.scenes = {"synth:city:1000"};
   config.bind = "0.0.0.0";

@@ -9,6 +9,7 @@
 #include <openssl/pem.h>
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
+#include <openssl/x509v3.h>
 
 namespace catgs::test {
 namespace {
@@ -32,7 +33,7 @@ File open_for_writing(const std::filesystem::path& path) {
 }  // namespace
 
 void write_self_signed(const std::filesystem::path& certificate, const std::filesystem::path& key,
-                       long serial) {
+                       long serial, const std::string& names) {
   const std::unique_ptr<EVP_PKEY, FreeWith<EVP_PKEY_free>> pair(EVP_EC_gen("P-256"));
   const std::unique_ptr<X509, FreeWith<X509_free>> x509(X509_new());
   ASN1_INTEGER_set(X509_get_serialNumber(x509.get()), serial);
@@ -43,6 +44,12 @@ void write_self_signed(const std::filesystem::path& certificate, const std::file
   X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC,
                              reinterpret_cast<const unsigned char*>("localhost"), -1, -1, 0);
   X509_set_issuer_name(x509.get(), name);
+  if (!names.empty()) {
+    const std::unique_ptr<X509_EXTENSION, FreeWith<X509_EXTENSION_free>> extension(
+        X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, names.c_str()));
+    if (!extension || X509_add_ext(x509.get(), extension.get(), -1) == 0)
+      throw std::runtime_error("cannot name " + names);
+  }
   if (X509_sign(x509.get(), pair.get(), EVP_sha256()) == 0)
     throw std::runtime_error("cannot sign a certificate");
   PEM_write_X509(open_for_writing(certificate).get(), x509.get());

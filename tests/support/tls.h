@@ -5,9 +5,10 @@
 
 namespace catgs::test {
 
-/// Writes a fresh self-signed P-256 certificate for localhost and its key, PEM.
+/// Writes a fresh self-signed P-256 certificate for localhost and its key, PEM. `names` are further
+/// ones: "DNS:a.example,IP:192.0.2.1".
 void write_self_signed(const std::filesystem::path& certificate, const std::filesystem::path& key,
-                       long serial = 1);
+                       long serial = 1, const std::string& names = {});
 
 struct TlsReply {
   std::string protocol;  // negotiated by ALPN

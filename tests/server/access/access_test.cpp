@@ -1,5 +1,6 @@
 #include "server/access/access.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -123,6 +124,67 @@ TEST_F(AccessTest, AnOpenServerShowsItsScenesWithoutATokenAndBelievesTokens) {
   EXPECT_TRUE(refusal(open, author, "garden", 0));
   EXPECT_TRUE(refusal(open, make_link_token({"", "spectator", 1000}, key), "city", 0));
   EXPECT_TRUE(refusal(open, "no-token-of-ours", "city", 0));
+}
+
+TEST_F(AccessTest, LinksAreKnownByTheirIds) {
+  const std::string id = new_link_id();
+  EXPECT_NE(id, new_link_id());
+  const std::string token = make_link_token({"city", "viewer", 1000, id}, key);
+  EXPECT_EQ(read_link_token(token, key)->id, id);
+  EXPECT_THROW(make_link_token({"city", "viewer", 1000, "no id"}, key), InputError);
+
+  const std::string old = make_link_token({"city", "viewer", 1000}, key);
+  const std::string other = make_link_token({"city", "viewer", 1001}, key);
+  EXPECT_EQ(read_link_token(old, key)->id.size(), id.size()) << "made before links had ids";
+  EXPECT_EQ(read_link_token(old, key)->id, read_link_token(old, key)->id);
+  EXPECT_NE(read_link_token(old, key)->id, read_link_token(other, key)->id);
+
+  AccessControl access({}, folder.write("key", std::string(key)));
+  EXPECT_EQ(access.permit(token, 0, one_hall).link_id, id);
+  EXPECT_EQ(access.permit(token, 2000, one_hall).link_id, id) << "the log names who comes too late";
+  EXPECT_EQ(access.permit(token + "x", 0, one_hall).link_id, "");
+  EXPECT_FALSE(refusal(access, old, "city", 0)) << "they stay valid";
+}
+
+TEST_F(AccessTest, LinksEndOneByOneWhenTheirIdsAreRevoked) {
+  const std::string lost = make_link_token({"city", "author", 1000, "0123456789ab"}, key);
+  const std::string kept = make_link_token({"city", "author", 1000, "0123456789ac"}, key);
+  const std::string old = make_link_token({"city", "viewer", 1000}, key);
+  const auto path = folder.write("revoked", "# none yet\n");
+  AccessControl access({}, folder.write("key", std::string(key)), false, path);
+  EXPECT_FALSE(refusal(access, lost, "city", 0));
+
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  folder.write("revoked", "0123456789ab  # class 4b\r\n\n" + read_link_token(old, key)->id);
+  std::filesystem::last_write_time(path, later);
+  EXPECT_THAT(refusal(access, lost, "city", 0), Optional(HasSubstr("revoked")));
+  EXPECT_TRUE(refusal(access, lost, "city", 0, Use::save));
+  EXPECT_TRUE(refusal(access, old, "city", 0)) << "an old one has an id, too";
+  EXPECT_FALSE(refusal(access, kept, "city", 0));
+  EXPECT_EQ(access.revoked_links()->size(), 2u);
+
+  folder.write("revoked", "0123456789ac\nwhich one?\n");
+  std::filesystem::last_write_time(path, later + std::chrono::seconds(2));
+  EXPECT_TRUE(refusal(access, lost, "city", 0)) << "a mistake in the file revives no link";
+  std::filesystem::remove(path);
+  EXPECT_TRUE(refusal(access, lost, "city", 0)) << "nor does its loss";
+}
+
+TEST_F(AccessTest, RevokedLinksHaveANumberAndAForm) {
+  const auto of = [&](const std::string& text) {
+    AccessControl({}, folder.write("key", std::string(key)), false, folder.write("revoked", text));
+  };
+  EXPECT_THAT(
+      [&] {
+        of("0123456789ab\n" + make_link_token({"", "viewer", 1}, key));
+      },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("--revoked-links"), HasSubstr("revoked:2"),
+                                      HasSubstr("is no id of a link"))));
+  std::string many;
+  for (int i = 0; i < 100'000; ++i) many += fmt::format("{:06x}\n", i);
+  EXPECT_NO_THROW(of(many));
+  EXPECT_THAT([&] { of(many + "ffffff\n"); },
+              ThrowsMessage<InputError>(HasSubstr("more than 100000")));
 }
 
 TEST_F(AccessTest, StaticTokensAreReadAgain) {

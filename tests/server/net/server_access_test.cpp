@@ -205,6 +205,55 @@ TEST(ServerAccess, AdmitsByTokenAndNeverSaysIt) {
   EXPECT_THAT(http_get(server.admin_port(), "/api/sessions").body, Not(HasSubstr("sesame")));
 }
 
+TEST(ServerAccess, ARevokedLinkEndsItsSessionsAndNoOthers) {
+  const TemporaryFolder folder;
+  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
+  const std::string key = read_key_file("", key_file);
+  const auto link = [&](const std::string& id) {
+    return make_link_token({"city", "viewer", 1'000'000'000'000, id}, key);
+  };
+  const auto revoked = folder.write("revoked", "");
+  RunningServer server([&](ServerConfig& config) {
+    config.token_key_file = key_file.string();
+    config.revoked_links = revoked.string();
+  });
+  const auto hello_by = [&](const std::string& id) {
+    v1::ClientMessage hello = hello_message(64, 64, v1::CODEC_H264);
+    hello.mutable_hello()->set_token(link(id));
+    return hello;
+  };
+  WireClient kept(server.port()), lost(server.port()), looks_on(server.port());
+  const std::string watch = kept.greet(hello_by("aaaa")).watch_token();
+  v1::ClientMessage resuming = hello_by("bbbb");
+  resuming.mutable_hello()->mutable_resume()->set_token(
+      lost.greet(hello_by("bbbb")).resume_token());
+  v1::ClientMessage watching = hello_by("bbbb");
+  watching.mutable_hello()->set_watch(watch);
+  looks_on.greet(watching);
+
+  folder.write("revoked", "bbbb # found on the net\n");
+  for (WireClient* client : {&lost, &looks_on}) {
+    std::optional<v1::Error> error;
+    client->receive_until_closed(&error);
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code(), v1::Error::UNAUTHORIZED);
+    EXPECT_THAT(error->message(), HasSubstr("revoked"));
+  }
+  for (const v1::ClientMessage& again : {hello_by("bbbb"), resuming, watching}) {
+    WireClient client(server.port());
+    client.send(again);
+    std::optional<v1::Error> error;
+    client.receive_until_closed(&error);
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code(), v1::Error::UNAUTHORIZED);
+  }
+  EXPECT_EQ(
+      http_get(server.port(), "/api/scenes", {{"Authorization", "Bearer " + link("bbbb")}}).status,
+      401);
+  kept.send_pose(1);
+  EXPECT_EQ(kept.receive_frame().header.pose_id(), 1u) << "the other link's session goes on";
+}
+
 TEST(ServerAccess, ARequestHasOneToken) {
   const TemporaryFolder folder;
   const auto token_file = folder.write("tokens", "open-sesame-1\n");

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -20,6 +21,7 @@
 #include <unistd.h>
 
 #include "render_core/scene/files/save_scene.h"
+#include "server/net/visitor_address.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
@@ -226,6 +228,27 @@ TEST(ServerProgram, EveryLineOfAJsonLogSaysWhatHappenedToWhom) {
   EXPECT_EQ(line("request_refused").value("address", ""), "127.0.0.1");
 }
 
+TEST(ServerProgram, TheAddressThatItPrintsOpens) {
+  const TemporaryFolder folder;
+  const std::string tokens = folder.write("tokens", "open-sesame-1\n").string();
+  const auto printed = [](const Program& program) {
+    const std::string log = program.log().substr(program.log().find("open http://") + 5);
+    return log.substr(0, log.find(' '));
+  };
+  Program local({"--token-file", tokens}, "a line of");
+  EXPECT_THAT(printed(local), testing::MatchesRegex("http://127.0.0.1:[0-9]+/#token=TOKEN"));
+  EXPECT_THAT(local.log(), HasSubstr("visitors need a TOKEN in that address: a line of " + tokens));
+  Program open({"--bind", "0.0.0.0", "--open", "--log-format", "json"}, "Ctrl-C");
+  const std::string address = printed(open).substr(std::string("http://").size());
+  const std::string host = address.substr(0, address.find('/'));
+  const int port = std::stoi(host.substr(host.rfind(':') + 1));
+  EXPECT_EQ(http_get(port, "/api/scenes", {{"Host", host}}).status, 200) << address;
+  if (!machine_addresses().empty()) {
+    EXPECT_EQ(host.find("localhost"), std::string::npos) << "other machines have one of their own";
+    EXPECT_THAT(open.log(), HasSubstr(fmt::format("also http://localhost:{}/", port)));
+  }
+}
+
 TEST(ServerProgram, AStartThatFailsIsALineOfTheJsonLog) {
   Program refused({"--log-format", "json", "--scene", "nowhere.ply"}, "never said");
   EXPECT_EQ(refused.exit_status(), 2);
@@ -250,7 +273,7 @@ TEST(ServerProgram, ATokenForANameSaysWhatThatMeans) {
   EXPECT_THAT(saves.log(), AllOf(HasSubstr("--scene hall"), HasSubstr("needs the id")));
   EXPECT_EQ(saves.exit_status(), 2);
   Program exact({"token", "--token-key-file", key, "--scene", "hall-kdfmqrtv"}, "#token=TOKEN\n");
-  EXPECT_THAT(exact.log(), Not(HasSubstr("is a name")));
+  EXPECT_THAT(exact.log(), AllOf(Not(HasSubstr("is a name")), HasSubstr("its id is ")));
   EXPECT_EQ(exact.exit_status(), 0);
 }
 

@@ -51,6 +51,20 @@ TEST(SceneIds, AFolderIsOneSceneByWhateverFileItIsNamed) {
     EXPECT_EQ(SceneIds({file}, {}).id_of(file, "hall"), id) << file;
 }
 
+TEST(SceneKey, IsOneForAllWaysToAFolder) {
+  const TemporaryFolder folder;
+  folder.write("rooms/hall.ply", "");
+  folder.write("rooms/attic/meta.json", "");
+  std::filesystem::create_directory_symlink(folder / "rooms", folder / "current");
+  std::filesystem::create_symlink("hall.ply", folder / "rooms/copy.ply");
+  const auto key = [&](const std::string& path) { return scene_key((folder / path).string()); };
+  EXPECT_EQ(key("current/hall.ply"), key("rooms/hall.ply"));
+  EXPECT_EQ(key("current/../rooms/./hall.ply"), key("rooms/hall.ply"));
+  EXPECT_EQ(key("current/attic/meta.json"), key("rooms/attic"));
+  EXPECT_NE(key("rooms/copy.ply"), key("rooms/hall.ply")) << "it has a sidecar of its own";
+  EXPECT_EQ(key("absent/hall.ply"), (folder / "absent/hall.ply").string());
+}
+
 /// What a link points at may change, as the content of a file may. The sidecar lies beside it.
 TEST(SceneIds, SymbolicLinksArePathsOfTheirOwn) {
   const TemporaryFolder folder;

@@ -344,6 +344,18 @@ TEST_F(SceneLibraryTime, AFileOfBothSettingsIsOneScene) {
   EXPECT_THAT(names(), ElementsAre("b", "a", "c")) << "given twice, and still one";
 }
 
+TEST_F(SceneLibraryTime, AFileBehindALinkedFolderIsOneScene) {
+  const TemporaryFolder elsewhere;
+  const auto link = elsewhere / "exhibition";
+  std::filesystem::create_directory_symlink(folder_.path(), link);
+  config_.scene_folders = {folder_.path(), link};
+  start();
+  EXPECT_THAT(names(), ElementsAre("city", "a", "b", "c"));
+  config_.scenes = {link / "b.ply", folder_ / "b.ply"};
+  start();
+  EXPECT_THAT(names(), ElementsAre("b", "a", "c"));
+}
+
 TEST_F(SceneLibraryTime, AFileThatGoesBeforeItIsLoadedIsForgotten) {
   EXPECT_TRUE(awaited("a"));
   EXPECT_TRUE(awaited("b"));
