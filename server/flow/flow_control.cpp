@@ -21,6 +21,7 @@ constexpr microseconds most_target = 33ms;
 // A decoder is paced no slower than this, because it is only measured by the frames that it gets.
 constexpr double least_paced_fps = 2.0;
 
+constexpr auto rest = 1s;  // without a frame
 constexpr double unused_share = 0.5;
 constexpr auto link_state_holds = 100ms;
 constexpr double most_horizon_us = 100'000.0;
@@ -59,6 +60,8 @@ void FlowControl::set_wish(const FlowWish& wish) {
 }
 
 void FlowControl::sent(const SentFrame& frame, TimePoint now) {
+  if (last_sent_ && now - *last_sent_ > rest) ladder_.rested(now);
+  last_sent_ = now;
   if (!frame.still) frame_size_px_ = frame.size_px;
   const auto pixels = frame.still ? 0 : static_cast<std::size_t>(frame.size_px.x) * frame.size_px.y;
   credit_.sent({frame.frame_id, frame.bytes, pixels, now, frame.still});

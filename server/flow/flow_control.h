@@ -97,6 +97,7 @@ class FlowControl {
   std::chrono::microseconds real_interval_{0};
   LinkState link_;
   std::optional<TimePoint> link_seen_;
+  std::optional<TimePoint> last_sent_;
   std::optional<TimePoint>
       carried_by_;  // when all that was sent will have passed, as a latest bound
   double pose_to_photon_us_ = 0.0;

@@ -18,6 +18,7 @@ constexpr double starving_decoder_share = 0.7;
 constexpr auto want_before_falling = 1s;
 constexpr std::chrono::milliseconds least_patience = 3s;
 constexpr std::chrono::milliseconds most_patience = 60s;
+constexpr auto rest_holds = 2s;
 constexpr auto proof = 10s;  // a rung that held this long counts as proved
 
 constexpr std::array<double, 2> scales = {0.75, 0.5};
@@ -75,7 +76,9 @@ bool QualityLadder::update(const Supply& supply, TimePoint now) {
   rich_since_ = held_since(rich_since_, could_rise(supply), now);
   const bool falls =
       current_ + 1 < rungs_.size() && held_for(starving_since_, want_before_falling, now);
-  const bool rises = held_for(rich_since_, patience_, now);
+  // Not where the better rung has failed lately.
+  const bool at_once = patience_ == least_patience && within(rested_at_, rest_holds, now);
+  const bool rises = held_for(rich_since_, at_once ? 0ms : patience_, now);
   if (!falls && !rises) return false;
   step_to(falls ? current_ + 1 : current_ - 1, now);
   return true;

@@ -25,6 +25,7 @@ struct Rung {
 /// - Down: after one second of shortage.
 /// - Up: after three seconds in which the better rung would have had 0.04 bit a pixel, or the
 ///   encoder left half of its bits unused.
+/// - Up at once for two seconds after a rest, in which the supply may have changed unseen.
 /// - When the better rung does not hold for ten seconds, the next attempt waits twice as long, at
 ///   most a minute.
 /// Pure; not thread-safe.
@@ -41,6 +42,8 @@ class QualityLadder {
   /// The client's wish is the top of the ladder.
   QualityLadder(glm::ivec2 size_px, int fps);
 
+  /// Frames begin again, after a rest.
+  void rested(TimePoint now) { rested_at_ = now; }
   /// True: the rung has changed.
   bool update(const Supply& supply, TimePoint now);
   [[nodiscard]] const Rung& rung() const { return rungs_[current_]; }
@@ -58,6 +61,7 @@ class QualityLadder {
   std::optional<TimePoint> starving_since_;
   std::optional<TimePoint> rich_since_;
   std::optional<TimePoint> risen_at_;
+  std::optional<TimePoint> rested_at_;
   std::chrono::milliseconds patience_;  // before it rises
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace catgs {
 namespace {
@@ -11,6 +12,7 @@ using namespace std::chrono_literals;
 
 constexpr double fast_growth_per_s = 1.5;  // from 5 to 40 Mbit/s in two to three seconds
 constexpr double slow_growth_per_s = 0.15;
+constexpr double regaining_growth_per_s = 4.0;  // tenfold in 0.6 s
 constexpr double near_capacity = 0.85;
 constexpr double beyond_capacity = 1.1;
 constexpr double most_over_delivered = 2.5;
@@ -43,9 +45,11 @@ void RateController::add(const Sample& sample, TimePoint now) {
   if (last_add_ && now - *last_add_ > silence) {
     recent_.clear();
     capacity_.reset();
-    // The sender was not idle: this was in flight all the time.
-    if (sample.round_trip > silence) rate_ = std::min(rate_, restart_share * limits_.start);
+    // If not, this was in flight all the time.
+    const bool idle = sample.round_trip <= silence;
+    if (!idle) rate_ = std::min(rate_, restart_share * limits_.start);
     clamp_rate();
+    regains_ = idle && rate_ < carried_;
   }
   const std::int64_t queue_us = queue_of(sample, now);
   remember(sample, queue_us, now);
@@ -68,6 +72,8 @@ void RateController::forget_path() {
   hold_until_.reset();
   last_back_off_.reset();
   back_offs_in_a_row_ = 0;
+  carried_ = 0.0;
+  regains_ = false;
 }
 
 std::int64_t RateController::queue_of(const Sample& sample, TimePoint now) {
@@ -124,7 +130,10 @@ void RateController::back_off(const Sample& sample, TimePoint now) {
   if (!passed) return;
   capacity_ = passed_when_busy_ = *passed;
   last_back_off_ = now;
+  const double before = rate_;
   rate_ = std::min(rate_, *passed * (queue_ > long_queue ? long_queue_share : back_off_share));
+  if (rate_ < before && std::exchange(regains_, false))
+    carried_ = std::sqrt(carried_ * std::min(carried_, *passed));
   clamp_rate();
   hold_until_ = now + sample.round_trip + memory / 2;
   if (++back_offs_in_a_row_ == 1) queue_at_first_ = queue_;
@@ -137,14 +146,20 @@ void RateController::back_off(const Sample& sample, TimePoint now) {
 
 void RateController::grow(TimePoint now) {
   const auto passed = delivered();
-  if (!passed || rate_ > most_over_delivered * *passed) return;
+  if (!passed) return;
+  carried_ = std::max(carried_, std::min(rate_, *passed));
+  if (rate_ > most_over_delivered * *passed) return;
   if (capacity_ && rate_ > beyond_capacity * *capacity_) capacity_.reset();
   const bool careful = capacity_ && rate_ > near_capacity * *capacity_;
   const std::chrono::duration<double> step =
       last_add_ ? std::min<Clock::duration>(now - *last_add_, longest_step) : longest_step;
   const double room =
       1.0 - static_cast<double>(queue_.count()) / static_cast<double>(target_.count());
-  rate_ *= std::exp((careful ? slow_growth_per_s : fast_growth_per_s) * room * step.count());
+  regains_ = regains_ && rate_ < carried_;
+  const double growth_per_s = regains_  ? regaining_growth_per_s
+                              : careful ? slow_growth_per_s
+                                        : fast_growth_per_s;
+  rate_ *= std::exp(growth_per_s * room * step.count());
   clamp_rate();
 }
 

@@ -24,6 +24,9 @@ namespace catgs {
 ///   passed it by a tenth. The rate stays within 2.5 times the delivered rate.
 /// - Above T the stage is busy, so the delivered rate is its capacity. The rate becomes 0.92 of
 ///   that, or 0.85 if the queue is long. It then stays until the change shows in the samples.
+/// - After a second without samples, the capacity may have changed unseen. If the path has carried
+///   more than the present rate, the rate then grows very fast, up to what it has carried, until
+///   something queues. An attempt that fails makes the next one shorter.
 /// - A stall, such as TCP's after a burst of losses, does not lower the capacity. A gap longer than
 ///   all others together is left out of the delivered rate.
 /// - After five back-offs in a row without a shorter queue, the path has become longer or is filled
@@ -88,6 +91,8 @@ class RateController {
   std::chrono::microseconds queue_{0};
   std::optional<double> capacity_;  // delivered rate when the stage was last busy
   double passed_when_busy_ = 0.0;   // the same, kept however far the rate has grown since
+  double carried_ = 0.0;  // the most that was delivered without a queue; less after attempts failed
+  bool regains_ = false;  // grows towards that
   std::optional<TimePoint> last_back_off_;
   std::optional<TimePoint> last_add_;
   std::optional<TimePoint> hold_until_;  // samples in flight were sent at the previous rate

@@ -47,6 +47,31 @@ TEST_P(OnEveryPath, FollowsALinkThatSlowsDownAndRecovers) {
   EXPECT_EQ(simulation.sizes(), 1) << "a want of quality that the bitrate alone can meet";
 }
 
+TEST_P(OnEveryPath, ALinkThatRecoversDuringARestIsUsedWithinTwoSecondsOfTheNextMotion) {
+  for (const double slow : {4e6, 1e6, 0.5e6}) {
+    FlowScenario rests = scenario({{0us, 50e6}, {5s, slow}, {20s, 50e6}});
+    rests.rests = {{15s, 30s}};
+    FlowSimulation simulation(rests);
+    simulation.run(36s);
+    const double before = simulation.sent_kbps(3s, 5s);
+    EXPECT_LT(simulation.sent_kbps(10s, 15s), 1e-3 * slow) << "the link was slow meanwhile";
+    EXPECT_GE(simulation.sent_kbps(32s, 33s), 0.9 * before) << slow;
+    for (const FrameTrace& frame : simulation.sent(32s, 36s))
+      ASSERT_EQ(frame.ticket.size_px, glm::ivec2(1280, 720)) << slow;
+    EXPECT_LT(simulation.longest_queueing(30s, 36s), 50ms) << slow;
+  }
+}
+
+TEST_P(OnEveryPath, ALinkThatStaysSlowDuringRestsIsNotFilledByTrying) {
+  FlowScenario rests = scenario({{0us, 50e6}, {5s, 4e6}});
+  for (microseconds at = 15s; at < 60s; at += 8s) rests.rests.push_back({at, at + 4s});
+  FlowSimulation simulation(rests);
+  simulation.run(60s);
+  EXPECT_LT(simulation.longest_queueing(10s, 60s), 150ms);
+  EXPECT_GE(simulation.share_queueing_at_most(50ms, 10s, 60s), 0.8);
+  EXPECT_EQ(simulation.sizes(), 1);
+}
+
 TEST_P(OnEveryPath, KeepsItsNominalRateWhereTheLinkIsEnough) {
   FlowSimulation simulation(scenario({{0us, 50e6}}));
   simulation.run(10s);
