@@ -9,6 +9,7 @@
 #include <glm/mat3x3.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/motion/portable.h"
 #include "render_core/motion/script_parts.h"
 
@@ -64,9 +65,10 @@ PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame) {
   if (script.starts_with(tour_prefix)) {
     const std::string_view file = script.substr(tour_prefix.size());
     if (file.empty()) {
-      throw InputError("--script", "", "tour: names no file", "tour:FILE, a TUM file of keyframes");
+      throw InputError("--script", "", "tour: names no file",
+                       "tour:FILE, a camera path of keyframes");
     }
-    return tour_script(frame, read_tum(file));
+    return tour_script(frame, read_camera_path(file).poses);
   }
   throw InputError("--script", "", fmt::format("unknown script \"{}\"", script),
                    "one of orbit, walk, head, drone, still, tour:FILE");

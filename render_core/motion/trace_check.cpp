@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
 namespace catgs {
@@ -28,6 +29,17 @@ std::size_t count_in_view(const Camera& camera, std::span<const glm::vec3> means
 
 }  // namespace
 
+ScenePlace::ScenePlace(const Bounds& robust_bounds, const SceneHints& hints)
+    : bounds(robust_bounds),
+      focus(hints.focus),
+      distance(glm::distance(hints.start_pose.position, hints.focus)) {}
+
+bool ScenePlace::outside(const glm::vec3& position) const {
+  constexpr float rounding = 1.001f;  // an orbit keeps its distance, but for single precision
+  return glm::clamp(position, bounds.min, bounds.max) != position &&
+         glm::distance(position, focus) > rounding * distance;
+}
+
 std::string TraceCheck::complaint() const {
   std::string text;
   if (seeing_frames < wanted_frames) {
@@ -38,14 +50,16 @@ std::string TraceCheck::complaint() const {
         emptiest_frame, 100.0 * emptiest_in_view);
   }
   if (outside_frames > 0) {
-    text += fmt::format("{}{} of {} frames lie outside of the scene's 5-95 % bounds (first: {})",
-                        text.empty() ? "" : "; ", outside_frames, frames, *first_outside);
+    text += fmt::format(
+        "{}{} of {} frames lie outside of the scene's 5-95 % bounds and farther from its "
+        "focus than the first view (first: {})",
+        text.empty() ? "" : "; ", outside_frames, frames, *first_outside);
   }
   return text;
 }
 
 TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,
-                       const Bounds& bounds, const Camera& lens, ThreadPool& pool) {
+                       const ScenePlace& place, const Camera& lens, ThreadPool& pool) {
   constexpr std::size_t max_sample = std::size_t{1} << 17;
   const std::size_t step = std::max<std::size_t>(1, (means.size() + max_sample - 1) / max_sample);
   std::vector<glm::vec3> sample;
@@ -72,7 +86,7 @@ TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> 
   check.seeing_frames = static_cast<double>(seeing) / static_cast<double>(check.frames);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const glm::vec3& position = trajectory[i].world_from_camera.position;
-    if (glm::clamp(position, bounds.min, bounds.max) == position) continue;
+    if (!place.outside(position)) continue;
     if (!check.first_outside) check.first_outside = i;
     ++check.outside_frames;
   }

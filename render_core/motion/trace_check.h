@@ -13,6 +13,19 @@
 
 namespace catgs {
 
+/// The place of a scene, and how far from its focus people look at it. An object is seen from
+/// outside of its bounds.
+struct ScenePlace {
+  ScenePlace(const Bounds& robust_bounds, const SceneHints& hints);
+
+  Bounds bounds;  // robust_bounds() of the scene
+  glm::vec3 focus;
+  float distance;  // of the first view from the focus
+
+  /// Neither in the bounds nor as near to the focus as the first view.
+  [[nodiscard]] bool outside(const glm::vec3& position) const;
+};
+
 /// Whether a trace is fit for measurements. A camera that looks away from the scene, or has left
 /// it, renders fast and well.
 struct TraceCheck {
@@ -23,7 +36,7 @@ struct TraceCheck {
   double seeing_frames = 0.0;  // share of the frames that see enough
   std::size_t emptiest_frame = 0;
   double emptiest_in_view = 0.0;   // of the largest in-view count
-  std::size_t outside_frames = 0;  // camera outside of the bounds
+  std::size_t outside_frames = 0;  // camera outside of the place
   std::optional<std::size_t> first_outside;
 
   [[nodiscard]] bool valid() const { return seeing_frames >= wanted_frames && outside_frames == 0; }
@@ -33,8 +46,8 @@ struct TraceCheck {
 
 /// `means` are the centres of the scene's Gaussians. In view are those deeper than the near plane
 /// that project into the image of `lens` (its pose is not used). Judged by an even sample of at
-/// most 2^17 of them. `bounds`: robust_bounds() of the scene.
+/// most 2^17 of them.
 TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,
-                       const Bounds& bounds, const Camera& lens, ThreadPool& pool);
+                       const ScenePlace& place, const Camera& lens, ThreadPool& pool);
 
 }  // namespace catgs

@@ -12,6 +12,7 @@
 #include "render_core/base/device_set.h"
 #include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/tools/parse_name.h"
 
 namespace catgs {
@@ -23,15 +24,20 @@ bool parse_whole(std::string_view text, T& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-/// The camera's recorded or scripted samples.
-Trajectory make_samples(const RenderOptions& options, const SceneHints& hints) {
+/// The recorded or scripted path. Only a file may name a lens.
+CameraPath make_path(const RenderOptions& options, const SceneHints& hints) {
   if (options.trace.empty() == options.script.empty()) {
     throw InputError("--trace, --script", "", "one of them is needed",
                      "--script orbit is a good start");
   }
-  if (!options.script.empty()) return make_script(script_options(options), hints);
-  const Trajectory trace = read_tum(options.trace);
-  return options.anchor ? anchored(trace, hints) : trace;
+  CameraPath path;
+  if (!options.script.empty()) {
+    path.poses = make_script(script_options(options), hints);
+  } else {
+    path = read_camera_path(options.trace, options.trace_rate_hz);
+    if (options.anchor) path.poses = anchored(path.poses, hints);
+  }
+  return path;
 }
 
 double mean_rate_hz(const Trajectory& path) {
@@ -40,11 +46,26 @@ double mean_rate_hz(const Trajectory& path) {
          static_cast<double>(path.back().time_us - path.front().time_us);
 }
 
+void use_path(RenderSetup& setup, const RenderOptions& options, Trajectory samples) {
+  setup.samples = std::move(samples);
+  const bool resampled = options.fps && !options.trace.empty();
+  const Trajectory path = resampled ? resample(setup.samples, *options.fps) : setup.samples;
+  const FrameRange range = parse_frame_range(options.frames, path.size());
+  setup.first = range.begin;
+  setup.poses.assign(path.begin() + static_cast<std::ptrdiff_t>(range.begin),
+                     path.begin() + static_cast<std::ptrdiff_t>(range.end));
+  setup.fps = options.fps.value_or(mean_rate_hz(path));
+}
+
 }  // namespace
 
 void add_render_options(CLI::App& command, RenderOptions& options) {
   add_scene_options(command, options.scene);
-  auto* trace = command.add_option("--trace", options.trace, "Camera path: a TUM file");
+  auto* trace = command.add_option(
+      "--trace", options.trace,
+      fmt::format("Camera path: {}. Its lens is used unless --size, --fov-deg or "
+                  "--focal-px is given",
+                  camera_path_forms));
   auto* script = command.add_option("--script", options.script,
                                     "Camera path: orbit, walk, head, drone, still or tour:FILE");
   trace->excludes(script);
@@ -54,8 +75,17 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   add_pipeline_options(command, options.pipeline);
 }
 
+void add_trace_rate_option(CLI::App& command, double& rate_hz) {
+  command
+      .add_option("--trace-rate", rate_hz,
+                  "Poses per second of a path whose file has no times, like photographs")
+      ->check(CLI::Range(0.001, 1000.0))
+      ->capture_default_str();
+}
+
 void add_frame_options(CLI::App& command, RenderOptions& options) {
   const ScriptOptions defaults;
+  add_trace_rate_option(command, options.trace_rate_hz);
   command.add_option("--seed", options.seed, fmt::format("Seed of the script ({})", defaults.seed));
   command.add_option("--duration", options.duration_s,
                      fmt::format("Length of the script, seconds ({})", defaults.duration_s));
@@ -82,6 +112,7 @@ FrameRequest RenderSetup::request(std::size_t i) const {
   FrameRequest request;
   request.camera = camera;
   request.camera.world_from_camera = poses[i].world_from_camera;
+  request.background = background;
   return request;
 }
 
@@ -105,7 +136,17 @@ void refuse_script_options(const RenderOptions& options) {
 RenderSetup prepare(const RenderOptions& options, bool quiet) {
   if (!options.trace.empty()) refuse_script_options(options);
   RenderSetup setup = prepare_scene(options, quiet);
-  set_path(setup, options);
+  CameraPath path = make_path(options, setup.scene.hints);
+  if (!options.lens.given()) {
+    if (path.lenses_differ)
+      throw InputError(options.trace, "", "its cameras have several lenses",
+                       "choose one with --size and --fov-deg or --focal-px");
+    if (path.lens) {
+      path.lens->near_z = setup.camera.near_z;
+      setup.camera = *path.lens;
+    }
+  }
+  use_path(setup, options, std::move(path.poses));
   return setup;
 }
 
@@ -126,14 +167,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
 }
 
 void set_path(RenderSetup& setup, const RenderOptions& options) {
-  setup.samples = make_samples(options, setup.scene.hints);
-  const bool resampled = options.fps && !options.trace.empty();
-  const Trajectory path = resampled ? resample(setup.samples, *options.fps) : setup.samples;
-  const FrameRange range = parse_frame_range(options.frames, path.size());
-  setup.first = range.begin;
-  setup.poses.assign(path.begin() + static_cast<std::ptrdiff_t>(range.begin),
-                     path.begin() + static_cast<std::ptrdiff_t>(range.end));
-  setup.fps = options.fps.value_or(mean_rate_hz(path));
+  use_path(setup, options, make_path(options, setup.scene.hints).poses);
 }
 
 RendererOptions renderer_options(const RenderOptions& options) {

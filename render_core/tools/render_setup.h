@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
 #include "render_core/renderer.h"
@@ -22,6 +23,7 @@ namespace catgs {
 struct RenderOptions {
   SceneOptions scene;
   std::string trace;
+  double trace_rate_hz = default_pose_rate_hz;
   bool anchor = false;
   std::string script;
   // For the script. Unset fields keep the default of ScriptOptions.
@@ -55,16 +57,21 @@ struct RenderSetup {
   std::size_t first = 0;        // number of poses[0] in the whole path
   double fps = 0.0;             // of the path
   Camera camera;                // without the pose
+  glm::vec3 background{0.0f};
 
   /// The request for frame i alone, without a forecast; see FrameFeed.
   [[nodiscard]] FrameRequest request(std::size_t i) const;
 };
 
-/// Loads scene and path, makes the renderer. Throws InputError.
+/// Loads scene and path, makes the renderer. Without options of the lens, the lens is that of the
+/// path's file, if it has one. Throws InputError.
 RenderSetup prepare(const RenderOptions& options, bool quiet);
 /// Loads the scene, then set_path() a path; for several paths through one scene.
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet);
 void set_path(RenderSetup& setup, const RenderOptions& options);
+
+/// Adds --trace-rate for `rate_hz`.
+void add_trace_rate_option(CLI::App& command, double& rate_hz);
 
 /// The script that the options describe, as set_path() makes it.
 ScriptOptions script_options(const RenderOptions& options);

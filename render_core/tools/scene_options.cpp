@@ -54,7 +54,9 @@ Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
 }
 
 void add_lens_options(CLI::App& command, LensOptions& options) {
-  command.add_option("--size", options.size, "Width x height, pixels")->capture_default_str();
+  command.add_option("--size", options.size, "Width x height, pixels")
+      ->each([&options](const std::string&) { options.size_given = true; })
+      ->capture_default_str();
   auto* focal = command.add_option("--focal-px", options.focal_px, "Focal length, pixels");
   command
       .add_option("--fov-deg", options.fov_y_deg,

@@ -31,6 +31,10 @@ struct LensOptions {
   std::optional<float> focal_px;
   std::optional<float> fov_y_deg;
   std::optional<float> near_z;
+  bool size_given = false;
+
+  /// Whether the user has said anything about the picture's size or field of view.
+  [[nodiscard]] bool given() const { return size_given || focal_px || fov_y_deg; }
 };
 void add_lens_options(CLI::App& command, LensOptions& options);
 

@@ -17,6 +17,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/tools/scene_options.h"
 #include "tests/load/link_proxy.h"
 #include "tests/load/session.h"
@@ -37,7 +38,7 @@ class TrajectoryMaker {
                        "--script head plays recorded-like head motion");
     }
     for (const std::string& path : options.traces) {
-      traces_.push_back(std::make_shared<const Trajectory>(read_tum(path)));
+      traces_.push_back(std::make_shared<const Trajectory>(read_camera_path(path).poses));
     }
     // A wrong script is told now, not by each session.
     if (traces_.empty()) (void)make(0, SceneHints());

@@ -20,9 +20,10 @@ void add_client_options(CLI::App& app, GroupOptions& group) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   add_duration(app, "--ramp", group.ramp_s, "Spread the starts over this time")->default_str("0s");
-  auto* trace = app.add_option("--trace,--traces", group.traces,
-                               "TUM files, replayed at their own times, forth and back; sessions "
-                               "take turns and begin at different places");
+  auto* trace =
+      app.add_option("--trace,--traces", group.traces,
+                     "Camera paths, replayed at their own times, forth and back; sessions "
+                     "take turns and begin at different places");
   app.add_flag("--anchor", group.anchor, "Move traces to the scene's start pose")->needs(trace);
   app.add_option("--script", group.script.script, "orbit, walk, head, drone, still or tour:FILE")
       ->excludes(trace);

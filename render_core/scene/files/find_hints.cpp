@@ -10,6 +10,7 @@
 #include "render_core/math/look_at.h"
 #include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/files/hints.h"
+#include "render_core/scene/formats/camera_list.h"
 
 namespace catgs {
 
@@ -21,18 +22,21 @@ struct CameraFile {
 };
 
 CameraFile find_cameras(const HintFiles& files, std::vector<std::string>& notes) {
-  const auto try_file = [&](const std::filesystem::path& path, auto read) -> CameraFile {
+  const auto try_file = [&](const std::filesystem::path& path) -> CameraFile {
     std::error_code error;
     if (path.empty() || !std::filesystem::is_regular_file(path, error)) return {};
     try {
-      return {path.filename().string(), read(FileSource(path))};
+      CameraFile found{path.filename().string(), {}};
+      for (const ListedCamera& listed : read_camera_json(FileSource(path)).cameras)
+        found.poses.push_back(listed.camera.world_from_camera);
+      return found;
     } catch (const InputError& e) {
       notes.push_back(fmt::format("not used: {}", e.what()));
       return {};
     }
   };
-  CameraFile cameras = try_file(files.cameras, read_cameras_json);
-  if (cameras.poses.empty()) cameras = try_file(files.transforms, read_transforms_json);
+  CameraFile cameras = try_file(files.cameras);
+  if (cameras.poses.empty()) cameras = try_file(files.transforms);
   return cameras;
 }
 

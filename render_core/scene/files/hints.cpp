@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
@@ -23,8 +22,7 @@ namespace catgs {
 namespace {
 
 constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
-constexpr std::size_t max_about_bytes = 800;           // of one text: 200 characters or more
-constexpr std::uint64_t max_cameras_bytes = 16 << 20;  // 10,000 cameras take 5 MiB
+constexpr std::size_t max_about_bytes = 800;  // of one text: 200 characters or more
 
 glm::vec3 parse_up(const JsonField& field) {
   if (field.value().is_string()) {
@@ -90,22 +88,6 @@ SceneAbout parse_about(const JsonField& root) {
   if (const auto mode = root.find("mode")) about.mode = parse_mode(*mode);
   if (const auto colour = root.find("background")) about.background_rgb = parse_colour(*colour);
   return about;
-}
-
-/// `rows`: 3 x 3 or 4 x 4 numbers; the rotation part must be one.
-glm::mat3 parse_rotation(const JsonField& rows, std::size_t size) {
-  if (rows.size() != size) rows.fail(fmt::format("is not a {0}x{0} matrix", size));
-  glm::mat3 rotation;
-  for (int r = 0; r < 3; ++r) {
-    const auto row = rows[static_cast<std::size_t>(r)].numbers(size);
-    for (int c = 0; c < 3; ++c) rotation[c][r] = row[static_cast<std::size_t>(c)];
-  }
-  // A determinant of 1 alone is not enough: a shear can have it, with numbers of any size.
-  bool is_rotation = std::abs(glm::determinant(rotation) - 1.0f) < 0.05f;
-  for (int c = 0; c < 3; ++c)
-    is_rotation = is_rotation && std::abs(glm::length(rotation[c]) - 1.0f) < 0.05f;
-  if (!is_rotation) rows.fail("is no rotation");
-  return rotation;
 }
 
 }  // namespace
@@ -179,34 +161,6 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
   file << document.dump(2) << '\n';
   file.close();
   if (!file.good()) throw InputError(path.string(), "", "cannot be written");
-}
-
-std::vector<Pose> read_cameras_json(const ByteSource& file) {
-  const nlohmann::json document = read_json(file, max_cameras_bytes);
-  std::vector<Pose> poses;
-  const JsonField cameras(file.name(), document);
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const JsonField camera = cameras[i];
-    poses.push_back({camera.at("position").place(),
-                     glm::normalize(glm::quat_cast(parse_rotation(camera.at("rotation"), 3)))});
-  }
-  return poses;
-}
-
-std::vector<Pose> read_transforms_json(const ByteSource& file) {
-  const nlohmann::json document = read_json(file, max_cameras_bytes);
-  std::vector<Pose> poses;
-  const JsonField frames = JsonField(file.name(), document).at("frames");
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const JsonField matrix = frames[i].at("transform_matrix");
-    glm::mat3 rotation = parse_rotation(matrix, 4);
-    rotation[1] = -rotation[1];  // OpenGL cameras: y up, z back
-    rotation[2] = -rotation[2];
-    glm::vec3 position;
-    for (int r = 0; r < 3; ++r) position[r] = matrix[static_cast<std::size_t>(r)].numbers(4)[3];
-    poses.push_back({matrix.as_place(position), glm::normalize(glm::quat_cast(rotation))});
-  }
-  return poses;
 }
 
 }  // namespace catgs

@@ -55,12 +55,6 @@ std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
 /// Writes all hints as a sidecar. Throws InputError when that fails.
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path);
 
-/// Poses of a training's cameras.json (array of position, 3x3 rotation from camera axes).
-std::vector<Pose> read_cameras_json(const ByteSource& file);
-
-/// Poses of a transforms.json (frames with a 4x4 world-from-camera matrix, OpenGL axes).
-std::vector<Pose> read_transforms_json(const ByteSource& file);
-
 /// Files that may hold hints; empty paths are skipped.
 struct HintFiles {
   std::filesystem::path sidecar;

@@ -22,23 +22,46 @@ constexpr std::size_t max_name_bytes = 4096;
 constexpr int max_side_px = 1 << 20;
 using Cameras = std::map<std::uint32_t, Camera>;
 
-/// COLMAP's camera models without distortion, by its numbers and names.
+constexpr std::size_t max_parameters = 12;
+
+/// COLMAP's camera models by its numbers and names.
 struct Model {
   int id;
   std::string_view name;
-  std::size_t parameters;  // f, cx, cy or fx, fy, cx, cy
+  std::size_t focal_lengths;  // the first parameters: f or fx, fy; then come cx, cy
+  std::size_t parameters;     // more than these: distortion
+  [[nodiscard]] bool pinhole() const { return parameters == focal_lengths + 2; }
 };
-constexpr std::array<Model, 2> models = {{{0, "SIMPLE_PINHOLE", 3}, {1, "PINHOLE", 4}}};
+constexpr std::array<Model, 11> models = {{{0, "SIMPLE_PINHOLE", 1, 3},
+                                           {1, "PINHOLE", 2, 4},
+                                           {2, "SIMPLE_RADIAL", 1, 4},
+                                           {3, "RADIAL", 1, 5},
+                                           {4, "OPENCV", 2, 8},
+                                           {5, "OPENCV_FISHEYE", 2, 8},
+                                           {6, "FULL_OPENCV", 2, 12},
+                                           {7, "FOV", 2, 5},
+                                           {8, "SIMPLE_RADIAL_FISHEYE", 1, 4},
+                                           {9, "RADIAL_FISHEYE", 1, 5},
+                                           {10, "THIN_PRISM_FISHEYE", 2, 12}}};
 
-[[noreturn]] void refuse_model(const std::string& file, const std::string& where,
-                               const std::string& model) {
-  throw InputError(file, where, fmt::format("model {} is not a pinhole camera", model),
-                   "colmap image_undistorter makes pinhole pictures");
+/// The model that is found by `key`. Throws InputError where it is unknown or refused.
+template <class Key>
+const Model& model_of(const std::string& file, const std::string& where, const Key& key,
+                      Key Model::*member, Distortion distortion) {
+  const auto model = std::ranges::find(models, key, member);
+  if (model == models.end())
+    throw InputError(file, where, fmt::format("unknown camera model {}", key),
+                     "the models of COLMAP up to THIN_PRISM_FISHEYE are known");
+  if (distortion == Distortion::refused && !model->pinhole())
+    throw InputError(file, where, fmt::format("model {} is not a pinhole camera", model->name),
+                     "colmap image_undistorter makes pinhole pictures");
+  return *model;
 }
 
 Camera make_camera_of(const std::string& file, const std::string& where, std::uint64_t width,
-                      std::uint64_t height, std::span<const double> parameters) {
-  const bool one_focal = parameters.size() == models[0].parameters;
+                      std::uint64_t height, const Model& model,
+                      std::span<const double> parameters) {
+  const bool one_focal = model.focal_lengths == 1;
   Camera camera;
   camera.size_px = {static_cast<int>(std::min<std::uint64_t>(width, max_side_px + 1)),
                     static_cast<int>(std::min<std::uint64_t>(height, max_side_px + 1))};
@@ -55,9 +78,9 @@ Camera make_camera_of(const std::string& file, const std::string& where, std::ui
 }
 
 /// COLMAP stores camera_from_world: rotation w, x, y, z and translation.
-ColmapImage make_image(const std::string& file, const std::string& where, std::string name,
-                       const std::array<double, 7>& pose, const Cameras& cameras,
-                       std::uint32_t camera_id) {
+ListedCamera make_image(const std::string& file, const std::string& where, std::string name,
+                        const std::array<double, 7>& pose, const Cameras& cameras,
+                        std::uint32_t camera_id) {
   const auto camera = cameras.find(camera_id);
   if (camera == cameras.end()) {
     throw InputError(file, where, fmt::format("there is no camera {}", camera_id));
@@ -70,7 +93,7 @@ ColmapImage make_image(const std::string& file, const std::string& where, std::s
     throw InputError(file, where, "its pose is not a rotation and a translation");
   }
   const glm::dquat world_from_camera = glm::conjugate(rotation / norm);
-  ColmapImage image{std::move(name), camera->second};
+  ListedCamera image{std::move(name), camera->second};
   image.camera.world_from_camera = {
       glm::vec3(-(world_from_camera * glm::dvec3(pose[4], pose[5], pose[6]))),
       glm::quat(world_from_camera)};
@@ -112,7 +135,7 @@ class BinaryReader {
   std::uint64_t offset_ = 0;
 };
 
-Cameras read_binary_cameras(const std::filesystem::path& path) {
+Cameras read_binary_cameras(const std::filesystem::path& path, Distortion distortion) {
   BinaryReader file(path);
   Cameras cameras;
   const auto count = file.next<std::uint64_t>();
@@ -121,21 +144,20 @@ Cameras read_binary_cameras(const std::filesystem::path& path) {
     const auto id = file.next<std::uint32_t>();
     const auto model_id = file.next<std::int32_t>();
     const auto width = file.next<std::uint64_t>(), height = file.next<std::uint64_t>();
-    const auto model = std::ranges::find(models, model_id, &Model::id);
-    if (model == models.end()) refuse_model(file.name(), where, std::to_string(model_id));
-    std::array<double, 4> parameters{};
-    const auto used = std::span(parameters).first(model->parameters);
+    const Model& model = model_of(file.name(), where, model_id, &Model::id, distortion);
+    std::array<double, max_parameters> parameters{};
+    const auto used = std::span(parameters).first(model.parameters);
     for (double& parameter : used) parameter = file.next<double>();
-    cameras[id] = make_camera_of(file.name(), where, width, height, used);
+    cameras[id] = make_camera_of(file.name(), where, width, height, model, used);
   }
   return cameras;
 }
 
-std::vector<ColmapImage> read_binary_images(const std::filesystem::path& path,
-                                            const Cameras& cameras) {
+std::vector<ListedCamera> read_binary_images(const std::filesystem::path& path,
+                                             const Cameras& cameras) {
   constexpr std::uint64_t point_bytes = 24;  // x, y and the number of a 3D point
   BinaryReader file(path);
-  std::vector<ColmapImage> images;
+  std::vector<ListedCamera> images;
   const auto count = file.next<std::uint64_t>();
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string where = file.where();
@@ -169,7 +191,7 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
 
 std::string where_of(const Line& line) { return fmt::format("line {}", line.number); }
 
-Cameras read_text_cameras(const std::filesystem::path& path) {
+Cameras read_text_cameras(const std::filesystem::path& path, Distortion distortion) {
   Cameras cameras;
   for (const Line& line : read_lines(path)) {
     if (line.text.empty()) continue;
@@ -178,24 +200,27 @@ Cameras read_text_cameras(const std::filesystem::path& path) {
     std::string model_name;
     std::uint64_t width = 0, height = 0;
     fields >> id >> model_name >> width >> height;
-    const auto model = std::ranges::find(models, model_name, &Model::name);
-    if (fields && model == models.end()) refuse_model(path.string(), where_of(line), model_name);
-    std::array<double, 4> parameters{};
-    const auto used = std::span(parameters).first(fields ? model->parameters : 0);
+    const auto need = [&] {
+      if (!fields)
+        throw InputError(path.string(), where_of(line), "is not a camera",
+                         "CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
+    };
+    need();
+    const Model& model = model_of(path.string(), where_of(line), std::string_view(model_name),
+                                  &Model::name, distortion);
+    std::array<double, max_parameters> parameters{};
+    const auto used = std::span(parameters).first(model.parameters);
     for (double& parameter : used) fields >> parameter;
-    if (!fields) {
-      throw InputError(path.string(), where_of(line), "is not a camera",
-                       "CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
-    }
-    cameras[id] = make_camera_of(path.string(), where_of(line), width, height, used);
+    need();
+    cameras[id] = make_camera_of(path.string(), where_of(line), width, height, model, used);
   }
   return cameras;
 }
 
-std::vector<ColmapImage> read_text_images(const std::filesystem::path& path,
-                                          const Cameras& cameras) {
+std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
+                                           const Cameras& cameras) {
   const std::vector<Line> lines = read_lines(path);
-  std::vector<ColmapImage> images;
+  std::vector<ListedCamera> images;
   // Every second line lists points, which may be none.
   for (std::size_t i = 0; i < lines.size(); i += 2) {
     if (lines[i].text.empty() && i + 1 >= lines.size()) break;
@@ -218,16 +243,18 @@ std::vector<ColmapImage> read_text_images(const std::filesystem::path& path,
 
 }  // namespace
 
-std::vector<ColmapImage> read_colmap(const std::filesystem::path& folder) {
-  std::vector<ColmapImage> images;
+std::vector<ListedCamera> read_colmap(const std::filesystem::path& folder, Distortion distortion) {
+  std::vector<ListedCamera> images;
   bool found = false;
   for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
     std::error_code error;
     if (std::filesystem::exists(model / "images.bin", error)) {
-      images = read_binary_images(model / "images.bin", read_binary_cameras(model / "cameras.bin"));
+      images = read_binary_images(model / "images.bin",
+                                  read_binary_cameras(model / "cameras.bin", distortion));
       found = true;
     } else if (std::filesystem::exists(model / "images.txt", error)) {
-      images = read_text_images(model / "images.txt", read_text_cameras(model / "cameras.txt"));
+      images = read_text_images(model / "images.txt",
+                                read_text_cameras(model / "cameras.txt", distortion));
       found = true;
     }
     if (found) break;
@@ -237,7 +264,7 @@ std::vector<ColmapImage> read_colmap(const std::filesystem::path& folder) {
                      "sparse/0 with images.bin and cameras.bin, or the same as .txt");
   }
   if (images.empty()) throw InputError(folder.string(), "", "its reconstruction has no images");
-  std::ranges::sort(images, {}, &ColmapImage::name);
+  std::ranges::sort(images, {}, &ListedCamera::name);
   return images;
 }
 

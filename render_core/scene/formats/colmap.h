@@ -1,23 +1,20 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
-#include "render_core/math/camera.h"
+#include "render_core/scene/formats/camera_list.h"
 
 namespace catgs {
 
-/// A photograph whose camera COLMAP found. Its axes are ours; the near plane is the default.
-struct ColmapImage {
-  std::string name;  // of its file, relative to the folder of the images
-  Camera camera;
-};
+/// What to do with lenses that bend straight lines.
+enum class Distortion { refused, ignored };
 
 /// Reads a sparse reconstruction, binary or text, from `folder`/sparse/0, `folder`/sparse or
 /// `folder` itself. The order is that of the file names, which is that of a video's frames.
-/// Pictures with lens distortion cannot be compared with a pinhole camera's: the InputError names
-/// their model. All other mistakes throw InputError too.
-std::vector<ColmapImage> read_colmap(const std::filesystem::path& folder);
+/// Distorted pictures cannot be compared with a pinhole camera's, but their poses are good for a
+/// path. Where distortion is refused, the InputError names the model. All other mistakes throw
+/// InputError too.
+std::vector<ListedCamera> read_colmap(const std::filesystem::path& folder, Distortion distortion);
 
 }  // namespace catgs

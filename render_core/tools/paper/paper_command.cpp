@@ -281,8 +281,8 @@ void add_paper_command(CLI::App& app) {
   paper_app
       ->add_option(
           "--case", options.cases,
-          "A scene, then its traces: TUM files or scripts (orbit, walk, head, drone, still, "
-          "tour:FILE). Repeat it to add a column for another scene")
+          "A scene, then its traces: camera paths (see frames --help) or scripts (orbit, walk, "
+          "head, drone, still, tour:FILE). Repeat it to add a column for another scene")
       ->required()
       ->type_name("SCENE TRACE...");
   auto* images = paper_app->add_option(

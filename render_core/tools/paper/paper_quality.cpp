@@ -55,7 +55,7 @@ class PhotoJudge {
   explicit PhotoJudge(PaperCase& scene)
       : scene_(scene),
         folder_(scene.images()),
-        images_(read_colmap(folder_)),
+        images_(read_colmap(folder_, Distortion::refused)),
         pool_(*scene.setup().pool) {
     for (Row& row : rows_) {
       row.view = scene.setup().made.renderer->make_view(scene.settings(row.variant));
@@ -152,7 +152,7 @@ class PhotoJudge {
 
   PaperCase& scene_;
   std::filesystem::path folder_;
-  std::vector<ColmapImage> images_;
+  std::vector<ListedCamera> images_;
   ThreadPool& pool_;
   std::array<Row, 4> rows_ = {{{"3DGS", variants::vanilla},
                                {"Exact", variants::exact},

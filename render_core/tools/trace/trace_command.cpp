@@ -7,11 +7,13 @@
 
 #include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/motion/plain_motion.h"
 #include "render_core/motion/script.h"
 #include "render_core/motion/trace_check.h"
 #include "render_core/scene/analysis/robust_bounds.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/render_setup.h"
 #include "render_core/tools/scene_options.h"
 
 namespace catgs {
@@ -48,7 +50,7 @@ LoadedScene load_for_trace(const TraceOptions& options, bool quiet) {
 TraceCheck check(const TraceOptions& options, const LoadedScene& loaded,
                  const Trajectory& trajectory) {
   ThreadPool pool;
-  return check_trace(trajectory, loaded.scene.cloud.mean, loaded.bounds,
+  return check_trace(trajectory, loaded.scene.cloud.mean, {loaded.bounds, loaded.scene.hints},
                      make_lens(options.lens, loaded.scene.hints.near_z), pool);
 }
 
@@ -63,8 +65,8 @@ void write_checked(const TraceOptions& options, const LoadedScene& loaded,
   if (!result.valid()) {
     fmt::print(stderr, "catgs-render: {}: {}\n", options.out, result.complaint());
   } else if (!quiet) {
-    fmt::print("{}: {} frames, {:.1f} % of them see enough, all inside of the scene\n", options.out,
-               result.frames, 100.0 * result.seeing_frames);
+    fmt::print("{}: {} frames, {:.1f} % of them see enough, all in or around the scene\n",
+               options.out, result.frames, 100.0 * result.seeing_frames);
   }
 }
 
@@ -79,7 +81,7 @@ void add_script(CLI::App& trace) {
   add_scene_options(*command, options->scene);
   command
       ->add_option("--script", options->script.script,
-                   "orbit, walk, head, drone, still or tour:FILE (a TUM file of keyframes)")
+                   "orbit, walk, head, drone, still or tour:FILE (a camera path of keyframes)")
       ->required();
   command->add_option("--seed", options->script.seed, "The same seed gives the same trace")
       ->capture_default_str();
@@ -95,20 +97,25 @@ void add_script(CLI::App& trace) {
 void add_anchor(CLI::App& trace) {
   struct Options : TraceOptions {
     std::string trace;
+    double trace_rate_hz = default_pose_rate_hz;
     std::optional<double> rate_hz;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = trace.add_subcommand(
       "anchor", "Moves a recorded trace to a scene's start pose, upright and with its heading");
   add_trace_options(*command, *options);
-  command->add_option("--trace", options->trace, "TUM file to read, up is -y")->required();
+  command
+      ->add_option("--trace", options->trace,
+                   fmt::format("Camera path whose up is -y: {}", camera_path_forms))
+      ->required();
+  add_trace_rate_option(*command, options->trace_rate_hz);
   command
       ->add_option("--fps", options->rate_hz,
                    "Resample to this rate (default: keep the recorded samples)")
       ->check(CLI::Range(1.0, 1000.0));
   command->callback([options, command] {
     const bool quiet = is_quiet(*command);
-    const Trajectory recorded = read_tum(options->trace);
+    const Trajectory recorded = read_camera_path(options->trace, options->trace_rate_hz).poses;
     const LoadedScene loaded = load_for_trace(*options, quiet);
     const Trajectory moved = anchored(recorded, loaded.scene.hints);
     write_checked(*options, loaded, options->rate_hz ? resample(moved, *options->rate_hz) : moved,
@@ -163,15 +170,16 @@ void add_check(CLI::App& trace) {
       trace.add_subcommand("check", "Checks whether a trace is fit for measurements");
   add_scene_options(*command, options->scene);
   add_lens_options(*command, options->lens);
-  command->add_option("--trace", options->trace, "TUM file to read")->required();
+  command->add_option("--trace", options->trace, fmt::format("Camera path: {}", camera_path_forms))
+      ->required();
   command->callback([options, command] {
-    const Trajectory trajectory = read_tum(options->trace);
+    const Trajectory trajectory = read_camera_path(options->trace).poses;
     const LoadedScene loaded = load_for_trace(*options, is_quiet(*command));
     const TraceCheck result = check(*options, loaded, trajectory);
     if (!result.valid()) {
       throw CheckFailed(fmt::format("{}: {}", options->trace, result.complaint()));
     }
-    fmt::print("{}: {} frames, {:.1f} % of them see enough, all inside of the scene\n",
+    fmt::print("{}: {} frames, {:.1f} % of them see enough, all in or around the scene\n",
                options->trace, result.frames, 100.0 * result.seeing_frames);
   });
 }

@@ -11,6 +11,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/metrics/summary.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
 #include "render_core/tools/progress.h"
@@ -47,7 +48,7 @@ double parse_input_hz(const std::string& text) {
 std::vector<Trajectory> read_traces(const std::vector<std::string>& files) {
   std::vector<Trajectory> traces;
   for (const std::string& file : files) {
-    traces.push_back(read_tum(file));
+    traces.push_back(read_camera_path(file).poses);
     if (traces.back().back().time_us - traces.back().front().time_us < 1'000'000) {
       throw InputError(file, "", "is shorter than a second", "half of it only shows the motion");
     }
@@ -136,7 +137,7 @@ void add_trace_forecast_command(CLI::App& trace) {
   auto options = std::make_shared<ForecastOptions>();
   CLI::App* command = trace.add_subcommand(
       "forecast", "Compares ways to predict a camera on recorded traces, as Markdown");
-  command->add_option("--trace", options->traces, "TUM files of recorded motion")->required();
+  command->add_option("--trace", options->traces, "Camera paths of recorded motion")->required();
   command
       ->add_option("--input", options->inputs,
                    "Rate at which a client sends its newest sample, Hz, or native")

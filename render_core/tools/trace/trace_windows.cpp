@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/motion/camera_path.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/json_report.h"
@@ -128,7 +129,7 @@ void windows(const WindowsOptions& options, bool quiet) {
   const std::vector<Rule> all_rules = rules(options);
   for (const Rule& rule : all_rules) (void)with_flags(options.pipeline, rule.flags);
   std::vector<Trajectory> traces;
-  for (const std::string& file : options.traces) traces.push_back(read_tum(file));
+  for (const std::string& file : options.traces) traces.push_back(read_camera_path(file).poses);
   check_json(options.json);
   PaperTable table;
   {
@@ -154,7 +155,7 @@ void add_trace_windows_command(CLI::App& trace) {
   auto options = std::make_shared<WindowsOptions>();
   CLI::App* command = trace.add_subcommand(
       "windows", "Prints frames per key frame and lost windows for each rule, as Markdown");
-  command->add_option("--trace", options->traces, "TUM files of recorded motion")->required();
+  command->add_option("--trace", options->traces, "Camera paths of recorded motion")->required();
   command->add_option("--fps", options->rates_hz, "Frames per second; one or more")
       ->delimiter(',')
       ->allow_extra_args(false)

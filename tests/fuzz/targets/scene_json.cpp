@@ -7,6 +7,7 @@
 
 #include "render_core/base/printable.h"
 #include "render_core/scene/files/hints.h"
+#include "render_core/scene/formats/camera_list.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "server/scenes/tours.h"
 #include "tests/fuzz/target.h"
@@ -81,23 +82,26 @@ std::map<std::string, std::string> sidecar_seeds() {
                               [0,0,0,1]},"tours":[]})"}};
 }
 
-/// Both files that trainings leave: whoever reads one looks at the other where it fails.
 void parse_cameras(Bytes input) {
-  const MemorySource file("input", input);
-  std::vector<Pose> poses;
-  try {
-    poses = read_cameras_json(file);
-  } catch (const InputError&) {
-    poses = read_transforms_json(file);
+  const CameraList list = read_camera_json(MemorySource("input", input));
+  require(!list.rate_hz || *list.rate_hz > 0.0, "rates are positive");
+  for (const auto& [name, camera] : list.cameras) {
+    require_sound(camera.world_from_camera);
+    if (camera.size_px.x > 0)
+      require(camera.size_px.y > 0 && camera.focal_px.x > 0.0f && camera.focal_px.y > 0.0f,
+              "lenses are whole");
   }
-  for (const Pose& pose : poses) require_sound(pose);
 }
 
 std::map<std::string, std::string> cameras_seeds() {
   return {{"cameras", R"([{"id":0,"img_name":"a","width":9,"height":9,"position":[-3,0,0],
                           "rotation":[[0,0,1],[0,1,0],[-1,0,0]],"fy":9.5,"fx":9.5}])"},
           {"transforms", R"({"camera_angle_x":0.6,"frames":[{"file_path":"a","transform_matrix":
-                             [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]})"}};
+                             [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]})"},
+          {"path", R"({"camera_type":"perspective","render_width":64,"render_height":48,"fps":24,
+                       "camera_path":[{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,
+                       "aspect":1.3}],"seconds":4,"keyframes":[]})"},
+          {"export", R"([{"file_path":"a.png","transform":[[1,0,0,1],[0,1,0,2],[0,0,1,3]]}])"}};
 }
 
 /// Both names lead to one file in memory: writing files anew would take most of a run's time.
@@ -176,7 +180,9 @@ std::vector<Target> scene_json_targets() {
       {.name = "cameras",
        .parse = parse_cameras,
        .seeds = cameras_seeds,
-       .dictionary = json_words("position rotation frames transform_matrix"),
+       .dictionary =
+           json_words("position rotation frames transform_matrix camera_path camera_to_world fov "
+                      "fl_x camera_angle_x w h cx transform fps seconds"),
        .change = change_json},
       {.name = "tours",
        .parse = parse_tours,

@@ -50,7 +50,7 @@ void parse_colmap(Bytes input) {
   ColmapFolder& folder = text ? text_folder : binary_folder;
   folder.cameras.rewrite(input.subspan(3, length));
   folder.images.rewrite(input.subspan(3 + length));
-  for (const ColmapImage& image : read_colmap(folder.folder.path())) {
+  for (const ListedCamera& image : read_colmap(folder.folder.path(), Distortion::ignored)) {
     const Camera& camera = image.camera;
     const Pose& pose = camera.world_from_camera;
     require(std::isfinite(glm::length(glm::dvec3(pose.position))), "positions are finite");
@@ -133,8 +133,8 @@ std::vector<Target> text_files_targets() {
           {.name = "colmap",
            .parse = parse_colmap,
            .seeds = colmap_seeds,
-           .dictionary = {"PINHOLE", "SIMPLE_PINHOLE", "nan", "inf", "1e308", "1e39", "#", "\r\n",
-                          "18446744073709551615"},
+           .dictionary = {"PINHOLE", "SIMPLE_PINHOLE", "FULL_OPENCV", "nan", "inf", "1e308", "1e39",
+                          "#", "\r\n", "18446744073709551615"},
            .max_bytes = 1024},
           {.name = "config",
            .parse = parse_config,

@@ -35,9 +35,17 @@ Trajectory looking(int count, int away, int out) {
   return path;
 }
 
+/// People look at the wall from z = -0.5.
+SceneHints hints() {
+  SceneHints hints;
+  hints.start_pose.position = {0, 0, -0.5f};
+  hints.focus = {0, 0, 0.5f};
+  return hints;
+}
+
 TraceCheck check(const Trajectory& path) {
   ThreadPool pool(2);
-  return check_trace(path, wall(), bounds, lens, pool);
+  return check_trace(path, wall(), {bounds, hints()}, lens, pool);
 }
 
 TEST(TraceCheck, AcceptsATraceThatSeesTheScene) {
@@ -65,6 +73,18 @@ TEST(TraceCheck, FindsCamerasOutside) {
   EXPECT_THAT(result.complaint(), HasSubstr("first: 17"));
 }
 
+TEST(TraceCheck, AnObjectIsSeenFromAroundIt) {
+  SceneHints object = hints();
+  object.start_pose.position = {0, 0, -1.5f};
+  ThreadPool pool(1);
+  const auto outside = [&](float z) {
+    const Trajectory path = {{0, {{0, 0, z}, {1, 0, 0, 0}}}};
+    return check_trace(path, wall(), {bounds, object}, lens, pool).outside_frames;
+  };
+  EXPECT_EQ(outside(-1.5f), 0u);
+  EXPECT_EQ(outside(-1.6f), 1u) << "farther than the first view";
+}
+
 TEST(TraceCheck, ATenthInViewIsEnough) {
   const TimedPose whole{0, {{0, 0, -0.5f}, {1, 0, 0, 0}}};
   // The view is 1 unit wide to each side at the wall: from x = 1 only points beyond x = 0 …
@@ -81,8 +101,8 @@ TEST(TraceCheck, ATenthInViewIsEnough) {
 
 TEST(TraceCheck, AnEmptySceneOrTraceIsNotFit) {
   ThreadPool pool(1);
-  EXPECT_FALSE(check_trace(looking(3, 3, 9), {}, bounds, lens, pool).valid());
-  EXPECT_FALSE(check_trace({}, wall(), bounds, lens, pool).valid());
+  EXPECT_FALSE(check_trace(looking(3, 3, 9), {}, {bounds, hints()}, lens, pool).valid());
+  EXPECT_FALSE(check_trace({}, wall(), {bounds, hints()}, lens, pool).valid());
 }
 
 }  // namespace

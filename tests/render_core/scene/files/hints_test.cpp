@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "render_core/scene/formats/camera_list.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/streamed_sog.h"
@@ -208,8 +209,7 @@ TEST_F(JsonFiles, LargerThanTheirLimitAreRefused) {
   constexpr std::uint64_t mib = 1 << 20;
   expect_limit(4 * mib, read_meta);
   expect_limit(4 * mib, read_sidecar);
-  expect_limit(16 * mib, read_cameras_json);
-  expect_limit(16 * mib, read_transforms_json);
+  expect_limit(16 * mib, read_camera_json);
   expect_limit(32 * mib, read_lod_tree);
 }
 

@@ -79,7 +79,7 @@ class Colmap : public ::testing::Test {
     write(folder_ / "images.txt", images_txt);
   }
   void expect_both_images() const {
-    const auto images = read_colmap(folder_.path());
+    const auto images = read_colmap(folder_.path(), Distortion::refused);
     ASSERT_EQ(images.size(), 2u);
     EXPECT_EQ(images[0].name, "a.jpg");
     EXPECT_EQ(images[1].name, "b.jpg");
@@ -95,7 +95,7 @@ class Colmap : public ::testing::Test {
     EXPECT_NEAR(right.y, -1.0f, 1e-6f);
   }
   void expect_error(const std::string& message) const {
-    EXPECT_THAT([this] { (void)read_colmap(folder_.path()); },
+    EXPECT_THAT([this] { (void)read_colmap(folder_.path(), Distortion::refused); },
                 ThrowsMessage<InputError>(HasSubstr(message)));
   }
 
@@ -117,7 +117,7 @@ TEST_F(Colmap, ThatEndsEarlyIsAnErrorWhereverItEnds) {
   const std::string whole = images_bin();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     write(folder_ / "images.bin", whole.substr(0, size));
-    EXPECT_THROW((void)read_colmap(folder_.path()), InputError) << size;
+    EXPECT_THROW((void)read_colmap(folder_.path(), Distortion::refused), InputError) << size;
   }
 }
 
@@ -132,12 +132,25 @@ TEST_F(Colmap, CountsAreNotTrusted) {
 TEST_F(Colmap, DistortedPicturesAreRefused) {
   write_binary();
   write(folder_ / "cameras.bin", cameras_bin(4));
-  expect_error("model 4 is not a pinhole camera (colmap image_undistorter");
+  expect_error("model OPENCV is not a pinhole camera (colmap image_undistorter");
   write(folder_ / "cameras.bin", cameras_bin());
   std::filesystem::remove(folder_ / "images.bin");
   write_text();
   write(folder_ / "cameras.txt", "5 OPENCV 640 480 500 510 321 239 0 0 0 0\n");
   expect_error("cameras.txt: line 1: model OPENCV is not a pinhole camera");
+  write(folder_ / "cameras.txt", "5 SPHERE 640 480 500 510\n");
+  expect_error("cameras.txt: line 1: unknown camera model SPHERE");
+}
+
+TEST_F(Colmap, DistortionCanBeIgnored) {
+  write_text();
+  write(folder_ / "cameras.txt", "5 SIMPLE_RADIAL 640 480 500 321 239 0.1\n");
+  const auto images = read_colmap(folder_.path(), Distortion::ignored);
+  ASSERT_EQ(images.size(), 2u);
+  EXPECT_EQ(images[0].camera.focal_px, glm::vec2(500, 500));
+  EXPECT_EQ(images[0].camera.principal_point_px, glm::vec2(321, 239));
+  write(folder_ / "cameras.txt", "5 SIMPLE_RADIAL 640 480 500 321 239\n");
+  EXPECT_THROW((void)read_colmap(folder_.path(), Distortion::ignored), InputError);
 }
 
 TEST_F(Colmap, MistakesNameTheirLine) {

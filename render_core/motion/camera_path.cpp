@@ -1,0 +1,78 @@
+#include "render_core/motion/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/colmap.h"
+
+namespace catgs {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_json(const fs::path& path) {
+  if (path.extension() == ".json") return true;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;  // a pipe can be read only once
+  std::ifstream file(path);
+  char first = '\0';
+  file >> first;
+  return first == '{' || first == '[';
+}
+
+/// The folder of a reconstruction that is named itself or by its images' file.
+std::optional<fs::path> colmap_folder(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return path;
+  const fs::path name = path.filename();
+  if (name == "images.bin" || name == "images.txt") return path.parent_path();
+  return std::nullopt;
+}
+
+bool same_lens(const Camera& a, const Camera& b) {
+  return a.size_px == b.size_px && a.focal_px == b.focal_px &&
+         a.principal_point_px == b.principal_point_px;
+}
+
+CameraPath timed(const fs::path& path, const std::vector<ListedCamera>& cameras, double rate_hz) {
+  constexpr double max_rate_hz = 1000.0;
+  if (cameras.empty()) throw InputError(path.string(), "", "lists no camera");
+  if (!(rate_hz > 0.0 && rate_hz <= max_rate_hz))
+    throw InputError(path.string(), "",
+                     fmt::format("{} poses per second are out of range", rate_hz),
+                     fmt::format("above 0, at most {}", max_rate_hz));
+  CameraPath result;
+  for (const ListedCamera& listed : cameras) {
+    const auto time_us = std::llround(static_cast<double>(result.poses.size()) / rate_hz * 1e6);
+    result.poses.push_back({time_us, listed.camera.world_from_camera});
+  }
+  const Camera& first = cameras.front().camera;
+  result.lenses_differ = !std::ranges::all_of(
+      cameras, [&](const ListedCamera& listed) { return same_lens(listed.camera, first); });
+  if (!result.lenses_differ && first.size_px.x > 0) {
+    result.lens = first;
+    result.lens->world_from_camera = {};
+  }
+  return result;
+}
+
+}  // namespace
+
+CameraPath read_camera_path(const fs::path& path, double rate_hz) {
+  if (const auto folder = colmap_folder(path))
+    return timed(path, read_colmap(*folder, Distortion::ignored), rate_hz);
+  if (is_json(path)) {
+    const CameraList list = read_camera_json(FileSource(path));
+    return timed(path, list.cameras, list.rate_hz.value_or(rate_hz));
+  }
+  CameraPath result;
+  result.poses = read_tum(path);
+  return result;
+}
+
+}  // namespace catgs

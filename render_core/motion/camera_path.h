@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "render_core/math/camera.h"
+#include "render_core/motion/trajectory.h"
+
+namespace catgs {
+
+/// A camera's path as a file describes it.
+struct CameraPath {
+  Trajectory poses;
+  // The lens that the whole path was taken with, without its pose; empty where the file says
+  // nothing of it.
+  std::optional<Camera> lens;
+  bool lenses_differ = false;  // the cameras have several lenses; `lens` is empty
+};
+
+/// Poses per second of a path whose file has no times, unless the caller knows better.
+inline constexpr double default_pose_rate_hz = 30.0;
+
+/// What read_camera_path() takes, for --help.
+inline constexpr const char* camera_path_forms =
+    "a TUM file, cameras.json of a 3DGS training, transforms.json or camera_path.json of "
+    "nerfstudio, or a COLMAP folder";
+
+/// Reads a path in any of these forms; the content tells which. Poses without times follow each
+/// other at `rate_hz`: photographs by name, others as the file lists them. Throws InputError.
+CameraPath read_camera_path(const std::filesystem::path& path,
+                            double rate_hz = default_pose_rate_hz);
+
+}  // namespace catgs

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render_core/math/camera.h"
+#include "render_core/scene/formats/byte_source.h"
+
+namespace catgs {
+
+/// The camera of a photograph or of a keyframe. Its axes are ours; the near plane is the default.
+struct ListedCamera {
+  std::string name;  // of its picture, as the file writes it; may be empty
+  Camera camera;     // size_px is 0 where the file does not describe the whole lens
+};
+
+struct CameraList {
+  std::vector<ListedCamera> cameras;
+  std::optional<double> rate_hz;  // cameras per second, where the file says so
+};
+
+/// Reads cameras that programs of the field write as JSON. The content tells the form:
+///
+///   cameras.json      of a 3DGS training, in the order of the pictures' names
+///   transforms.json   of nerfstudio, instant-ngp and Blender data sets
+///   camera_path.json  of nerfstudio's viewer; perspective cameras only
+///   transforms_*.json that `ns-export cameras` writes
+///
+/// Throws InputError with the field of a mistake.
+CameraList read_camera_json(const ByteSource& file);
+
+}  // namespace catgs

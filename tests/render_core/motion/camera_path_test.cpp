@@ -1,0 +1,164 @@
+// Camera paths in every form that is taken: one camera, written by each program in its own way.
+#include "render_core/motion/camera_path.h"
+
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+/// The test camera stands at (1, 2, 3) and looks along +x; its image's down is the world's +y.
+constexpr const char* our_rows = "[[0, 0, 1], [0, 1, 0], [-1, 0, 0]]";
+constexpr const char* opengl_rows = "[0, 0, -1, 1], [0, -1, 0, 2], [-1, 0, 0, 3]";
+constexpr const char* opengl_flat = "[0, 0, -1, 1, 0, -1, 0, 2, -1, 0, 0, 3, 0, 0, 0, 1]";
+
+class CameraPaths : public ::testing::Test {
+ protected:
+  CameraPath read(const std::string& name, const std::string& text) const {
+    return read_camera_path(folder_.write(name, text));
+  }
+
+  static void expect_camera(const Pose& pose) {
+    EXPECT_LT(glm::distance(pose.position, glm::vec3(1, 2, 3)), 1e-5f);
+    EXPECT_LT(glm::distance(pose.orientation * glm::vec3(0, 0, 1), glm::vec3(1, 0, 0)), 1e-5f);
+    EXPECT_LT(glm::distance(pose.orientation * glm::vec3(0, 1, 0), glm::vec3(0, 1, 0)), 1e-5f);
+  }
+
+  /// `path` has the test camera as its second of two, `step_us` after the first.
+  static void expect_path(const CameraPath& path, std::int64_t step_us) {
+    ASSERT_EQ(path.poses.size(), 2u);
+    EXPECT_EQ(path.poses[0].time_us, 0);
+    EXPECT_EQ(path.poses[1].time_us, step_us);
+    expect_camera(path.poses[1].world_from_camera);
+  }
+
+  static void expect_lens(const CameraPath& path, glm::ivec2 size_px, glm::vec2 focal_px,
+                          glm::vec2 principal_point_px) {
+    ASSERT_TRUE(path.lens.has_value());
+    EXPECT_EQ(path.lens->size_px, size_px);
+    EXPECT_LT(glm::distance(path.lens->focal_px, focal_px), 1e-3f);
+    EXPECT_EQ(path.lens->principal_point_px, principal_point_px);
+  }
+
+  void expect_error(const std::string& name, const std::string& text,
+                    const std::string& message) const {
+    EXPECT_THAT([&] { (void)read(name, text); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr(name), HasSubstr(message))));
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(CameraPaths, Tum) {
+  const CameraPath path = read("a.tum",
+                               "0 0 0 0 0 0 0 1\n"
+                               "0.5 1 2 3 0 0.70710678 0 0.70710678\n");
+  expect_path(path, 500'000);
+  EXPECT_FALSE(path.lens.has_value());
+}
+
+TEST_F(CameraPaths, CamerasOfATrainingInTheOrderOfTheirNames) {
+  const auto camera = [](const char* name, const char* position, const char* rotation, int fx) {
+    return fmt::format(R"({{"id": 0, "img_name": "{}", "width": 64, "height": 48, "position": {},
+                           "rotation": {}, "fx": {}, "fy": 41}})",
+                       name, position, rotation, fx);
+  };
+  const std::string first = camera("a", "[0, 0, 0]", "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]", 40);
+  const CameraPath path =
+      read("cameras.json", fmt::format("[{}, {}]", camera("b", "[1, 2, 3]", our_rows, 40), first));
+  expect_path(path, 33'333);
+  expect_lens(path, {64, 48}, {40, 41}, {32, 24});
+  const CameraPath zoomed =
+      read("cameras.json", fmt::format("[{}, {}]", first, camera("b", "[1, 2, 3]", our_rows, 80)));
+  EXPECT_TRUE(zoomed.lenses_differ);
+  EXPECT_FALSE(zoomed.lens.has_value());
+}
+
+TEST_F(CameraPaths, TransformsOfADataSet) {
+  const std::string frames =
+      fmt::format(R"("frames": [{{"file_path": "b", "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0],
+                     [0, 0, 1, 0], [0, 0, 0, 1]]}}, {{"file_path": "a", "transform_matrix":
+                     [{}, [0, 0, 0, 1]]}}])",
+                  opengl_rows);
+  const CameraPath path =
+      read("transforms.json",
+           R"({"fl_x": 40, "fl_y": 41, "cx": 31, "cy": 23, "w": 64, "h": 48, )" + frames + "}");
+  expect_path(path, 33'333);
+  expect_lens(path, {64, 48}, {40, 41}, {31, 23});
+  const CameraPath blender = read(
+      "transforms_test.json", R"({"camera_angle_x": 1.5707963, "w": 64, "h": 48, )" + frames + "}");
+  expect_lens(blender, {64, 48}, {32, 32}, {32, 24});
+  EXPECT_FALSE(read("no_size.json", R"({"camera_angle_x": 1.57, )" + frames + "}").lens);
+}
+
+TEST_F(CameraPaths, TheViewersPathHasItsOwnTimesAndLens) {
+  const auto path = [&](const std::string& more) {
+    return read("path.json", fmt::format(R"({{"camera_type": "perspective", "render_width": 64,
+                     "render_height": 48, "keyframes": [], {} "camera_path": [{{"camera_to_world":
+                     [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "fov": 90, "aspect": 1.3}},
+                     {{"camera_to_world": {}, "fov": 90}}]}})",
+                                         more, opengl_flat));
+  };
+  expect_path(path(R"("fps": 24,)"), 41'667);
+  expect_path(path(R"("seconds": 4,)"), 2'000'000);
+  expect_path(path(""), 33'333);
+  expect_lens(path(""), {64, 48}, {24, 24}, {32, 24});
+}
+
+TEST_F(CameraPaths, ExportedCameras) {
+  expect_path(read("transforms_train.json",
+                   fmt::format(R"([{{"file_path": "a", "transform": [[1, 0, 0, 0], [0, 1, 0, 0],
+                                   [0, 0, 1, 0]]}}, {{"file_path": "b", "transform": [{}]}}])",
+                               opengl_rows)),
+              33'333);
+}
+
+TEST_F(CameraPaths, ColmapByItsFolderOrFileWhateverTheLens) {
+  folder_.write("sparse/0/cameras.txt", "5 OPENCV 64 48 40 41 31 23 0.1 0 0 0\n");
+  // camera_from_world: turned by -90 degrees about y, and -R (1, 2, 3).
+  const auto file = folder_.write("sparse/0/images.txt",
+                                  "1 0.70710678 0 -0.70710678 0 3 -2 -1 5 b.jpg\n\n"
+                                  "2 1 0 0 0 0 0 0 5 a.jpg\n\n");
+  for (const auto& name : {folder_.path(), file}) {
+    const CameraPath path = read_camera_path(name);
+    expect_path(path, 33'333);
+    expect_lens(path, {64, 48}, {40, 41}, {31, 23});
+  }
+  EXPECT_EQ(read_camera_path(file, 2.0).poses[1].time_us, 500'000);
+}
+
+TEST_F(CameraPaths, TheContentTellsTheForm) {
+  const std::string text = fmt::format(R"( [{{"transform": [{}]}}])", opengl_rows);
+  expect_camera(read("path.txt", text).poses.at(0).world_from_camera);
+}
+
+TEST_F(CameraPaths, MistakesNameTheirField) {
+  expect_error("a.json", "[]", "lists no camera");
+  expect_error("a.json", "{}", "lists no cameras (cameras.json of a 3DGS training");
+  expect_error("a.json", R"({"camera_type": "fisheye", "camera_path": []})",
+               "camera_type: is no perspective camera");
+  expect_error("a.json", R"({"camera_path": [{"camera_to_world": [1, 2]}]})",
+               "camera_path[0].camera_to_world: is not a 4x4 matrix");
+  expect_error("a.json", R"({"frames": [{"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0],
+                             [0, 0, 5, 0], [0, 0, 0, 1]]}]})",
+               "frames[0].transform_matrix: is no rotation");
+  expect_error("a.json", R"([{"position": [0, 0, 0]}])", "[0]: 'rotation' is missing");
+  expect_error("a.json", R"({"fps": 1e6, "camera_path": [{"camera_to_world":
+                             [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}]})",
+               "poses per second are out of range");
+  EXPECT_THAT([&] { (void)read_camera_path(folder_.path()); },
+              ThrowsMessage<InputError>(HasSubstr("has no COLMAP reconstruction")));
+}
+
+}  // namespace
+}  // namespace catgs
