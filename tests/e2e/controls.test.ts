@@ -96,7 +96,7 @@ describe('keys', () => {
     await panel('KeyH', '#help-panel');
     for (const mode of ['Fly', 'Walk', 'Orbit']) {
       await page.keyboard.press('KeyM');
-      await page.getByText(mode, { exact: true }).waitFor();
+      await page.locator('#mode-label', { hasText: mode }).waitFor();
     }
     const start = await pose_of(page);
     const { axis } = await change_by(page, () => page.keyboard.press('KeyU'));
