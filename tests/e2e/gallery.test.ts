@@ -1,9 +1,11 @@
 // Keeps every state of the page as a picture for people to look at: desktop, phone, light and dark. It
-// also checks that everything is inside the window and that nothing covers the buttons.
+// also checks that everything is inside the window, that nothing covers the buttons, and that axe-core finds
+// no barrier.
 import { beforeAll, describe, expect, it } from 'vitest';
 import type { Page } from 'playwright-core';
 import type { SceneListing } from '#client/session/scenes';
 import { Error_Code } from '#client/wire/wire';
+import { barriers } from './support/axe';
 import { keep_screenshot, new_page, windows } from './support/browser';
 import { settle } from './support/camera';
 import { at_hello, refuse, start_fake_server, type FakeServer, type Script } from './support/fake_server';
@@ -27,6 +29,7 @@ interface State {
   readonly script?: Script; // undefined: a stream
   readonly query?: string;
   readonly scenes?: readonly Partial<SceneListing>[]; // of the server, which has one otherwise
+  readonly tours?: readonly object[]; // of the scene
   readonly reach: (page: Page, server: FakeServer) => Promise<void>;
 }
 
@@ -41,6 +44,16 @@ const panel =
     await settle(page);
     await page.locator('#toolbar').getByRole('button', { name: button }).click();
   };
+
+const mode =
+  (presses: number) =>
+  async (page: Page): Promise<void> => {
+    await settle(page);
+    for (let i = 0; i < presses; ++i) await page.keyboard.press('KeyM');
+  };
+
+const stop = (caption: string): object => ({ title: 'Hall', caption, position: [0, 0, -5], look_at: [0, 0, 0], marker: [0, 0, 2] });
+const tours = [{ title: 'Ground floor', stops: [stop('Built in 1904. '.repeat(30)), stop('')] }];
 
 const states: Readonly<Record<string, State>> = {
   connecting: { script: () => undefined, reach: title('Connecting') },
@@ -84,6 +97,23 @@ const states: Readonly<Record<string, State>> = {
       await settle(page);
       await server.close();
       await page.getByRole('button', { name: 'Try now' }).waitFor();
+    },
+  },
+  broken: {
+    reach: async (page) => {
+      await settle(page);
+      await page.evaluate(() => window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' })));
+      await page.getByRole('button', { name: 'Reload' }).waitFor();
+    },
+  },
+  fly: { reach: mode(1) },
+  walk: { reach: mode(2) },
+  tour: {
+    tours,
+    reach: async (page) => {
+      await settle(page);
+      await page.getByRole('button', { name: 'Next stop' }).click();
+      await page.getByText('1 of 2').waitFor();
     },
   },
   quality: { reach: panel('Quality and view') },
@@ -135,13 +165,14 @@ const misplaced = (page: Page): Promise<string[]> =>
   });
 
 describe.each(Object.entries(windows))('%s', (name, options) => {
-  it.each(Object.entries(states))('shows the state %s whole', async (state, { script = stream, query = '', scenes = several.slice(0, 1), reach }) => {
-    const server = await start_fake_server(script, { scenes, poster });
+  it.each(Object.entries(states))('shows the state %s whole', async (state, { reach, query = '', script = stream, ...rest }) => {
+    const server = await start_fake_server(script, { scenes: several.slice(0, 1), poster, ...rest });
     const { page, errors } = await new_page(options);
     await page.goto(server.url + query);
     await reach(page, server);
     await keep_screenshot(page, `state-${state}-${name}`);
     expect(await misplaced(page)).toEqual([]);
+    expect(await barriers(page)).toEqual([]);
     if (state !== 'lost') expect(errors).toEqual([]);
   });
 });

@@ -163,6 +163,59 @@ describe('page', () => {
     expect(await framed()).toBe(true);
   });
 
+  it('has each panel right after its button for the keyboard, and gives the focus back', async () => {
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url);
+    const button = page.getByRole('button', { name: 'Share' });
+    await button.focus();
+    await page.keyboard.press('Enter');
+    await page.keyboard.press('Tab');
+    expect(await page.getByLabel('Link to this view').evaluate((link: Element) => link === document.activeElement)).toBe(true);
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('Escape');
+    expect(await page.locator('#share-panel').isHidden()).toBe(true);
+    expect(await button.evaluate((element) => element === document.activeElement)).toBe(true);
+  });
+
+  it('has the place in the queue in its title, and calls who is not looking', async () => {
+    let admit = (): void => undefined;
+    const server = await start_fake_server((peer, body) => {
+      if (body.case !== 'hello') return stream(peer, body);
+      peer.say({ case: 'queue', value: { position: 2, estimateS: 45 } });
+      admit = () => stream(peer, body);
+    });
+    const { page, errors } = await new_page();
+    await page.addInitScript(() => {
+      const told = { tones: 0 };
+      const nodes = AudioScheduledSourceNode.prototype;
+      const { start } = Object.getOwnPropertyDescriptors(nodes);
+      nodes.start = function (when) {
+        told.tones += 1;
+        start.value!.call(this, when);
+      };
+      Document.prototype.hasFocus = () => !('elsewhere' in told);
+      Object.assign(window, { told });
+    });
+    const told = (): Promise<number> => page.evaluate('window.told.tones') as Promise<number>;
+    await page.goto(server.url);
+    await expect.poll(() => page.title()).toBe('(2) CaT-GS');
+    server.peers[0]!.say({ case: 'queue', value: { position: 1, estimateS: 20 } });
+    await expect.poll(() => page.title()).toBe('(1) CaT-GS');
+    const call_me = page.getByRole('button', { name: 'Call me when it is my turn' });
+    await call_me.click();
+    await page.getByRole('status').getByText('You will hear this').waitFor();
+    expect(await call_me.isHidden()).toBe(true);
+    expect(await told()).toBe(2);
+    await page.evaluate('window.told.elsewhere = true');
+    admit();
+    await page.getByRole('status').getByText('It is your turn').waitFor();
+    expect(await told()).toBe(4);
+    await expect.poll(() => page.title()).toBe('Your turn – Demo city – CaT-GS');
+    await page.evaluate('delete window.told.elsewhere; window.dispatchEvent(new Event("focus"))');
+    expect(await page.title()).toBe('Demo city – CaT-GS');
+    expect(errors).toEqual([]);
+  });
+
   it('loses no key that is pressed before the scene is there', async () => {
     let admit = (): void => undefined;
     const admitted = new Promise<void>((resolve) => (admit = resolve));

@@ -210,7 +210,7 @@ describe('wording', () => {
 
   it('tells what happened and when it tries again', () => {
     const card = card_for({ phase: 'waiting', cause: 'unreachable', retry_in_ms: 3000, message: '' }, true);
-    expect(card).toMatchObject({ text: expect.stringContaining('in 3 s') as unknown, action: { does: 'retry' } });
+    expect(card).toMatchObject({ time: expect.stringContaining('in 3 s') as unknown, action: { does: 'retry' } });
     expect(card?.title).toContain('does not answer');
   });
 

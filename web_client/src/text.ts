@@ -96,12 +96,13 @@ export const text = {
     reconnecting: 'Reconnecting',
     loading_scene: {
       title: 'Loading the scene',
-      text: (time: string): string => `The server is loading it into memory. That takes about ${time}.`,
+      text: 'The server is loading it into memory.',
+      time: (time: string): string => `That takes about ${time}.`,
     },
     queue: {
       title: (position: number): string => `Number ${position} in the queue`,
-      text: (time: string): string =>
-        `The server is full. Your turn comes in about ${time}. Leave this page open.`,
+      text: 'The server is full. Leave this page open.',
+      time: (time: string): string => `Your turn comes in about ${time}.`,
     },
     waiting: {
       unreachable: 'The server does not answer',
@@ -146,8 +147,14 @@ export const text = {
     now: 'Try now',
     reload: 'Reload',
     resume: 'Continue',
+    call: 'Call me when it is my turn',
     open: (scene_id: string): string => `Open ${scene_id}`,
     open_first: 'Open the first scene',
+  },
+  turn: {
+    will_call: 'You will hear this when it is your turn.',
+    now: 'It is your turn.',
+    in_title: 'Your turn – ',
   },
   times: {
     moment: 'a moment',

@@ -13,7 +13,7 @@ export const insecure_host = 'plain.test';
 export const windows = {
   desktop: { viewport: { width: 1280, height: 720 } },
   'desktop-dark': { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' },
-  phone: { viewport: { width: 390, height: 760 }, hasTouch: true, isMobile: true },
+  phone: { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true },
   'phone-dark': { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
 } as const satisfies Record<string, BrowserContextOptions>;
 

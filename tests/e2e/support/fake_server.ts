@@ -52,6 +52,7 @@ export interface FakeServer {
 interface Offer {
   readonly scenes?: readonly Partial<SceneListing>[];
   readonly poster?: Uint8Array;
+  readonly tours?: readonly object[]; // of every scene, as a sidecar has them
 }
 
 /** Called for each message of each client. */
@@ -68,7 +69,7 @@ export const refuse = (code: Error_Code, message: string): Script =>
 
 export async function start_fake_server(
   script: Script,
-  { scenes = [{ id: 'city', title: 'Demo city' }], poster }: Offer = {},
+  { scenes = [{ id: 'city', title: 'Demo city' }], poster, tours = [] }: Offer = {},
 ): Promise<FakeServer> {
   const http = createServer((request, response) => {
     const name = new URL(request.url ?? '/', 'http://localhost').pathname;
@@ -82,7 +83,7 @@ export async function start_fake_server(
       return;
     }
     if (name.startsWith('/api/scenes/')) {
-      response.end('{}');
+      response.end(JSON.stringify({ document: { tours } }));
       return;
     }
     const file = path.join(web_dist, name === '/' ? 'index.html' : name);

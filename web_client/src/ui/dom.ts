@@ -33,13 +33,16 @@ export function save_file(blob: Blob, name: string): void {
 }
 
 /**
- * Lets the style sheets show that an element scrolls further, because phones show no scroll bars. Call the
+ * Lets the style sheets show that an element scrolls further, because phones show no scroll bars. Where it
+ * holds nothing to reach by Tab, Tab reaches the element itself, so that keys can scroll it. Call the
  * returned function when its content has changed.
  */
 export function hint_at_more(element: HTMLElement): () => void {
   const look = (): void => {
-    const below_px = element.scrollHeight - element.clientHeight - element.scrollTop;
-    element.classList.toggle('more-below', below_px > 1);
+    const hidden_px = element.scrollHeight - element.clientHeight;
+    element.classList.toggle('more-below', hidden_px - element.scrollTop > 1);
+    if (hidden_px > 1 && !element.querySelector('button, input, select, textarea, a')) element.tabIndex = 0;
+    else element.removeAttribute('tabindex');
   };
   element.addEventListener('scroll', look, { passive: true });
   new ResizeObserver(look).observe(element);

@@ -131,7 +131,7 @@ export class StatsCharts {
   }
 
   private plot(title: string, series: uPlot.Series[], axes: uPlot.Axis[]): uPlot {
-    this.host_.append(make('h3', {}, title));
+    this.host_.append(make('h2', {}, title));
     const from_zero: uPlot.Scale = { range: (_, _low, high) => [0, Math.max(high * 1.1, 1)] };
     return new uPlot(
       {

@@ -97,8 +97,11 @@ export class Toolbar {
   }
 
   private show(panel: Panel, shown: boolean): void {
-    element_of(panel).hidden = !shown;
-    by_id(`button-${panel}`, HTMLButtonElement).setAttribute('aria-expanded', String(shown));
+    const element = element_of(panel);
+    const button = by_id(`button-${panel}`, HTMLButtonElement);
+    if (!shown && element.contains(document.activeElement)) button.focus(); // not lost with the panel
+    element.hidden = !shown;
+    button.setAttribute('aria-expanded', String(shown));
     this.panel_shown.emit({ panel, shown });
   }
 }

@@ -21,6 +21,7 @@ import { SessionStatus } from './session_status';
 import { StatsPanel } from './stats_panel';
 import { StreamSize } from './stream_size';
 import { Toolbar } from './toolbar';
+import { TurnCall } from './turn_call';
 import { jpeg_reason } from './wording';
 
 /** Returns the part that shows fatal errors of the page. `scene_id`: empty for the server's first scene. */
@@ -40,6 +41,7 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   const navigation = new Navigation(view, worker, clock, reduced_motion);
   const toolbar = new Toolbar(navigation);
   const status = new SessionStatus(card, toolbar, worker, token);
+  new TurnCall(card, notice, worker);
   new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
   new Guide({ view, clock, worker, navigation, toolbar, notice, token, reduced_motion });

@@ -10,10 +10,11 @@ const { cards, actions } = text;
 export interface Card {
   readonly title: string;
   readonly text: string;
+  readonly time?: string; // how long it takes: it changes all the time, so it is not read out
   readonly busy?: boolean; // the page goes on by itself
   readonly action?: {
     readonly label: string;
-    readonly does: 'retry' | 'reload' | 'open';
+    readonly does: 'retry' | 'reload' | 'open' | 'call';
     /** The scene that 'open' opens; empty: the first one. */
     readonly scene_id?: string;
   };
@@ -39,13 +40,20 @@ export function card_for(
       const time = duration(state.estimate_s);
       const { loading_scene, queue } = cards;
       return state.for_scene
-        ? { title: loading_scene.title, text: loading_scene.text(time), busy: true }
-        : { title: queue.title(state.position), text: queue.text(time), busy: true };
+        ? { title: loading_scene.title, text: loading_scene.text, time: loading_scene.time(time), busy: true }
+        : {
+            title: queue.title(state.position),
+            text: queue.text,
+            time: queue.time(time),
+            busy: true,
+            action: { label: actions.call, does: 'call' },
+          };
     }
     case 'waiting':
       return {
         title: cards.waiting[state.cause],
-        text: sentence(state.message) + cards.trying_again(duration(state.retry_in_ms / 1000)),
+        text: sentence(state.message).trim(),
+        time: cards.trying_again(duration(state.retry_in_ms / 1000)),
         busy: true,
         action: { label: actions.now, does: 'retry' },
       };
