@@ -196,7 +196,7 @@ describe('page', () => {
       Document.prototype.hasFocus = () => !('elsewhere' in told);
       Object.assign(window, { told });
     });
-    const told = (): Promise<number> => page.evaluate('window.told.tones') as Promise<number>;
+    const told = (): Promise<number> => page.evaluate('window.told.tones');
     await page.goto(server.url);
     await expect.poll(() => page.title()).toBe('(2) CaT-GS');
     server.peers[0]!.say({ case: 'queue', value: { position: 1, estimateS: 20 } });
