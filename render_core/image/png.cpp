@@ -1,6 +1,7 @@
 #include "render_core/image/png.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -48,15 +49,24 @@ Image read_png(const std::filesystem::path& path) {
   return image;
 }
 
-void write_png(const std::filesystem::path& path, const Image& image) {
-  std::vector<std::uint8_t> bytes(image.rgb.size());
-  std::ranges::transform(image.rgb, bytes.begin(), [](float value) {
+void write_png(const std::filesystem::path& path, const Image& image,
+               std::span<const float> alpha) {
+  assert(alpha.empty() || alpha.size() == image.pixels());
+  const auto byte = [](float value) {
     return static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f)));
-  });
+  };
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(image.pixels() * (alpha.empty() ? 3 : 4));
+  for (std::size_t i = 0; i < image.pixels(); ++i) {
+    // A PNG's colour is what an opaque pixel would have.
+    const float share = alpha.empty() || alpha[i] <= 0.0f ? 1.0f : alpha[i];
+    for (std::size_t c = 0; c < 3; ++c) bytes.push_back(byte(image.rgb[3 * i + c] / share));
+    if (!alpha.empty()) bytes.push_back(byte(alpha[i]));
+  }
   PngImage png;
   png.width = static_cast<png_uint_32>(image.size_px.x);
   png.height = static_cast<png_uint_32>(image.size_px.y);
-  png.format = PNG_FORMAT_RGB;
+  png.format = alpha.empty() ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA;
   if (png_image_write_to_file(&png, path.c_str(), 0, bytes.data(), 0, nullptr) == 0) {
     throw InputError(path.string(), "", png.message, "does the folder exist, is there room?");
   }

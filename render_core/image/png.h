@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 
 #include "render_core/image/image.h"
 #include "render_core/renderer.h"
@@ -11,9 +12,11 @@ namespace catgs {
 /// Throws InputError.
 Image read_png(const std::filesystem::path& path);
 
-/// Writes 8 bits per channel, rounded to nearest. Throws InputError when the file cannot be
-/// written.
-void write_png(const std::filesystem::path& path, const Image& image);
+/// Writes 8 bits per channel, rounded to nearest. `alpha` has one value per pixel of a picture that
+/// was drawn over black; without it the file has no alpha. Throws InputError when the file cannot
+/// be written.
+void write_png(const std::filesystem::path& path, const Image& image,
+               std::span<const float> alpha = {});
 
 /// Copies a finished rgb_f32 frame out of its View.
 Image copy_image(const FrameView& frame);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -58,6 +59,16 @@ std::vector<Variant> ablations(const PaperOptions& options) {
     all.push_back({"Ours " + flags, Pipeline::catgs, flags});
   }
   return all;
+}
+
+std::string sizes_of(const std::vector<JudgedPhoto>& photos) {
+  const auto [low, high] = std::ranges::minmax(photos, {}, [](const JudgedPhoto& photo) {
+    return std::int64_t{photo.size_px.x} * photo.size_px.y;
+  });
+  const auto text = [](glm::ivec2 size) { return fmt::format("{}x{}", size.x, size.y); };
+  return low.size_px == high.size_px
+             ? text(low.size_px) + " px"
+             : fmt::format("{} to {} px", text(low.size_px), text(high.size_px));
 }
 
 PaperCase::PaperCase(const PaperOptions& options, std::size_t index, std::string label, bool quiet)

@@ -18,7 +18,9 @@ struct PaperOptions {
   RenderOptions render;                         // each case sets its scene and path
   std::vector<std::vector<std::string>> cases;  // scene, traces…
   std::vector<std::string> images;              // COLMAP folders, one per case, or none at all
+  std::string image_folder = "images";          // of the photographs, in each COLMAP folder
   double image_rate_hz = 30.0;                  // photographs per second
+  std::size_t llffhold = 8;                     // one photograph in this many is a test view
   std::optional<std::size_t> warmup;            // as warmup_frames() takes it
   std::size_t every = 10;                       // quality and tiles look at one frame in this many
   std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
@@ -43,6 +45,19 @@ inline const Variant without_cache{"Ours-w/o cache", Pipeline::catgs, "--no-cach
 /// Our pipeline with one part at a time left out, and with the flags of `--variant`. A new part is
 /// a line here.
 std::vector<Variant> ablations(const PaperOptions& options);
+
+/// A photograph, and how well each row of the table meets it.
+struct JudgedPhoto {
+  struct Score {
+    double psnr, ssim;
+  };
+  std::string name;
+  glm::ivec2 size_px;
+  std::map<std::string, Score> rows;
+};
+
+/// "96x64 px", or the smallest and the largest size where they differ. Needs a photograph.
+std::string sizes_of(const std::vector<JudgedPhoto>& photos);
 
 /// A scene and its traces, loaded, and the results measured on it so far: several tables use the
 /// same runs.
@@ -81,6 +96,9 @@ class PaperCase {
 
   /// Puts setup() on a path of the caller's.
   void follow(Trajectory samples, Trajectory poses, double fps);
+
+  /// The photographs that tables have compared with, in the order of their names.
+  std::vector<JudgedPhoto> photos;
 
   [[nodiscard]] bool quiet() const { return quiet_; }
 

@@ -108,23 +108,33 @@ void add_lead(PaperTable& fps, const Json& baseline) {
   fps.rows.push_back(std::move(lead));
 }
 
+/// Whether a table follows the photographs' cameras instead of traces.
+bool is_of_photographs(const PaperOptions& options, const PaperTableKind& kind) {
+  return kind.name == "quality" && !options.images.empty();
+}
+
 /// Options that concern some tables only. Without these tables they would be ignored silently.
-void refuse_unused(const CLI::App& app, const std::vector<const PaperTableKind*>& kinds) {
+void refuse_unused(const CLI::App& app, const PaperOptions& options,
+                   const std::vector<const PaperTableKind*>& kinds) {
   struct Use {
     const char* option;
     std::vector<std::string_view> tables;
   };
-  static const std::array<Use, 9> uses = {{{"--baseline", {"fps"}},
-                                           {"--images", {"quality"}},
-                                           {"--image-rate", {"quality"}},
-                                           {"--keep-fraction", {"pruned"}},
-                                           {"--variant", {"ablation"}},
-                                           {"--every", {"quality", "tiles", "traces"}},
-                                           {"--dram-bytes-per-s", {"floor"}},
-                                           {"--warp-instructions-per-s", {"floor"}},
-                                           {"--instructions-per-evaluation", {"floor"}}}};
+  static const std::array<Use, 11> uses = {{{"--baseline", {"fps"}},
+                                            {"--images", {"quality"}},
+                                            {"--image-rate", {"quality"}},
+                                            {"--image-folder", {"quality"}},
+                                            {"--llffhold", {"quality"}},
+                                            {"--keep-fraction", {"pruned"}},
+                                            {"--variant", {"ablation"}},
+                                            {"--every", {"quality", "tiles", "traces"}},
+                                            {"--dram-bytes-per-s", {"floor"}},
+                                            {"--warp-instructions-per-s", {"floor"}},
+                                            {"--instructions-per-evaluation", {"floor"}}}};
   for (const Use& use : uses) {
     const bool used = std::ranges::any_of(kinds, [&](const PaperTableKind* kind) {
+      if (use.option == std::string_view("--every") && is_of_photographs(options, *kind))
+        return false;  // --llffhold chooses
       return std::ranges::find(use.tables, kind->name) != use.tables.end();
     });
     if (used || app.count(use.option) == 0) continue;
@@ -137,7 +147,7 @@ void refuse_unused(const CLI::App& app, const std::vector<const PaperTableKind*>
 void require_traces(const PaperOptions& options, const std::vector<std::string>& labels,
                     const std::vector<const PaperTableKind*>& kinds) {
   for (const PaperTableKind* kind : kinds) {
-    if (kind->name == "quality" && !options.images.empty()) continue;
+    if (is_of_photographs(options, *kind)) continue;
     for (std::size_t i = 0; i < options.cases.size(); ++i) {
       if (options.cases[i].size() > 1) continue;
       throw InputError("--case", labels[i], "has no trace", "name one or more after the scene");
@@ -181,12 +191,30 @@ Json settings_json(const PaperCase& scene) {
           {"every", scene.options().every}};
 }
 
-/// The data that should accompany a table wherever it is copied.
-std::string provenance(const Json& report) {
+/// The scores of each photograph, in the form of the original's per_view.json.
+void add_photos(const std::vector<JudgedPhoto>& photos, Json& scene) {
+  for (const JudgedPhoto& photo : photos) {
+    scene["photographs_px"][photo.name] = {photo.size_px.x, photo.size_px.y};
+    for (const auto& [row, score] : photo.rows) {
+      scene["per_view"][row]["PSNR"][photo.name] = score.psnr;
+      scene["per_view"][row]["SSIM"][photo.name] = score.ssim;
+    }
+  }
+}
+
+/// The data that should accompany a table wherever it is copied. Photographs are compared at their
+/// own sizes.
+std::string provenance(const Json& report, const std::vector<JudgedPhoto>& photos) {
   const Json& settings = report["settings"];
-  return fmt::format("{}x{}, focal length {} px, {}; version {}, commit {}.\n",
-                     settings["size_px"][0].get<int>(), settings["size_px"][1].get<int>(),
-                     settings["focal_px"].get<float>(),
+  std::string sizes;
+  if (!settings["size_px"].is_null()) {
+    sizes = fmt::format("{}x{}, focal length {} px", settings["size_px"][0].get<int>(),
+                        settings["size_px"][1].get<int>(), settings["focal_px"].get<float>());
+  }
+  if (!photos.empty())
+    sizes += fmt::format("{}photographs at {}, focal lengths of COLMAP", sizes.empty() ? "" : "; ",
+                         sizes_of(photos));
+  return fmt::format("{}, {}; version {}, commit {}.\n", sizes,
                      report["cases"][0]["device"].get<std::string>(), build_version, build_commit);
 }
 
@@ -194,7 +222,7 @@ void paper(const PaperCommand& command, const CLI::App& app) {
   const PaperOptions& options = command.options;
   const bool quiet = is_quiet(app);
   const auto kinds = chosen_kinds(command.tables);
-  refuse_unused(app, kinds);
+  refuse_unused(app, options, kinds);
   check(options);
   const std::vector<std::string> labels = case_labels(options.cases);
   require_traces(options, labels, kinds);
@@ -202,6 +230,7 @@ void paper(const PaperCommand& command, const CLI::App& app) {
   const Json baseline = command.baseline.empty() ? Json() : read_baseline(command.baseline, labels);
   Json report = {{"version", build_version}, {"commit", build_commit}, {"cases", Json::array()}};
   std::vector<std::vector<PaperTable>> parts(kinds.size());  // [kind][case]
+  std::vector<JudgedPhoto> all_photos;
   for (std::size_t i = 0; i < options.cases.size(); ++i) {
     PaperCase scene(options, i, labels[i], quiet);
     if (!quiet) {
@@ -213,7 +242,12 @@ void paper(const PaperCommand& command, const CLI::App& app) {
     for (std::size_t k = 0; k < kinds.size(); ++k) {
       parts[k].push_back(kinds[k]->measure(scene));
     }
+    add_photos(scene.photos, report["cases"].back());
+    all_photos.insert(all_photos.end(), scene.photos.begin(), scene.photos.end());
   }
+  const bool photos_only = std::ranges::all_of(
+      kinds, [&](const PaperTableKind* kind) { return is_of_photographs(options, *kind); });
+  if (photos_only) report["settings"]["size_px"] = report["settings"]["focal_px"] = nullptr;
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     const PaperTableKind& kind = *kinds[k];
     std::vector<PaperTable> tables = kind.combine(std::move(parts[k]));
@@ -228,7 +262,7 @@ void paper(const PaperCommand& command, const CLI::App& app) {
       json.push_back(to_json(tables[t]));
     }
   }
-  if (command.json != "-") fmt::print("\n{}", provenance(report));
+  if (command.json != "-") fmt::print("\n{}", provenance(report, all_photos));
   if (!command.json.empty()) write_json(command.json, report);
 }
 
@@ -242,6 +276,31 @@ void add_device_rates(CLI::App& command, DeviceRates& rates) {
       "floor: rate of its processors (default: H200)");
   add("--instructions-per-evaluation", rates.instructions_per_evaluation,
       "floor: instructions for a list entry on a warp's pixels");
+}
+
+void add_photograph_options(CLI::App& command, PaperOptions& options) {
+  auto* images = command.add_option("--images", options.images,
+                                    "quality: compare with the photographs (PNG or JPEG) of a "
+                                    "COLMAP folder, one per case, each at "
+                                    "its own size. --json lists the scores of each");
+  command
+      .add_option("--image-folder", options.image_folder,
+                  "quality: folder of the photographs in the COLMAP folder, like images_4")
+      ->needs(images)
+      ->capture_default_str();
+  command
+      .add_option("--llffhold", options.llffhold,
+                  "quality: one photograph in N, by name, is a test view, as in the original "
+                  "3DGS; 1 compares all")
+      ->needs(images)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      .add_option("--image-rate", options.image_rate_hz,
+                  "quality: photographs per second of the video that they come from")
+      ->needs(images)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -285,15 +344,7 @@ void add_paper_command(CLI::App& app) {
           "head, drone, still, tour:FILE). Repeat it to add a column for another scene")
       ->required()
       ->type_name("SCENE TRACE...");
-  auto* images = paper_app->add_option(
-      "--images", options.images,
-      "quality: compare with the photographs (PNG) of a COLMAP folder, one per case");
-  paper_app
-      ->add_option("--image-rate", options.image_rate_hz,
-                   "quality: photographs per second of the video that they come from")
-      ->needs(images)
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  add_photograph_options(*paper_app, options);
   paper_app->add_option(
       "--baseline", command->baseline,
       "fps: add rows measured elsewhere, JSON {\"FlashGS\": {\"city\": 120.5}}, and the ratio "

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "render_core/scene/formats/colmap.h"
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/paper/paper_tables.h"
+#include "render_core/tools/picture.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
@@ -29,14 +31,15 @@ std::vector<std::string> quality_columns(const std::string& label) {
 }
 
 std::filesystem::path find_photo(const std::filesystem::path& folder, const std::string& name) {
-  std::filesystem::path file = folder / "images" / name;
+  const std::filesystem::path file = folder / name;
   std::error_code error;
-  if (file.extension() == ".png" && std::filesystem::exists(file, error)) return file;
-  const std::filesystem::path png = std::filesystem::path(file).replace_extension(".png");
-  if (std::filesystem::exists(png, error)) return png;
-  throw InputError(
-      png.string(), "", "does not exist",
-      "photographs must be PNG; convert others and keep their names except the extension");
+  if (is_picture(file) && std::filesystem::exists(file, error)) return file;
+  for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"}) {
+    const auto other = std::filesystem::path(file).replace_extension(extension);
+    if (std::filesystem::exists(other, error)) return other;
+  }
+  throw InputError(file.string(), "", "does not exist",
+                   "photographs are PNG or JPEG, of the names that COLMAP knows");
 }
 
 /// The camera for a picture that was scaled after COLMAP had seen it.
@@ -54,8 +57,8 @@ class PhotoJudge {
  public:
   explicit PhotoJudge(PaperCase& scene)
       : scene_(scene),
-        folder_(scene.images()),
-        images_(read_colmap(folder_, Distortion::refused)),
+        folder_(std::filesystem::path(scene.images()) / scene.options().image_folder),
+        images_(read_colmap(scene.images(), Distortion::refused)),
         pool_(*scene.setup().pool) {
     for (Row& row : rows_) {
       row.view = scene.setup().made.renderer->make_view(scene.settings(row.variant));
@@ -86,10 +89,19 @@ class PhotoJudge {
     const int steps = follow_path();
     FrameFeed feed(scene_.setup(), scene_.settings(variants::ours));
     Progress progress(scene_.label() + ": photographs", scene_.quiet());
+    glm::vec2 scale(1.0f);  // from COLMAP's pictures to the photographs
     for (std::size_t k = 0; k < images_.size(); ++k) {
-      const bool judged = k % scene_.options().every == 0;
-      const Image photo = read_png(find_photo(folder_, images_[k].name));
-      const Camera camera = scaled_to(images_[k].camera, photo.size_px);
+      const bool judged = k % scene_.options().llffhold == 0;
+      Image photo;
+      if (judged) {
+        photo = read_picture(find_photo(folder_, images_[k].name));
+        scale = glm::vec2(photo.size_px) / glm::vec2(images_[k].camera.size_px);
+      }
+      // What lies between test views only moves the camera: its size need not be read.
+      const glm::ivec2 size_px =
+          judged ? photo.size_px
+                 : glm::ivec2(glm::round(scale * glm::vec2(images_[k].camera.size_px)));
+      const Camera camera = scaled_to(images_[k].camera, glm::max(size_px, 1));
       FrameView frame;
       for (int step = k == 0 ? steps : 1; step <= steps; ++step) {
         FrameRequest request = feed.next();
@@ -103,14 +115,16 @@ class PhotoJudge {
   }
 
   [[nodiscard]] PaperTable table() const {
-    PaperTable table{.title = {},
-                     .corner = {},
-                     .columns = quality_columns(scene_.label()),
-                     .rows = {},
-                     .notes = {fmt::format("{}: against {} of {} photographs; {} of them were "
-                                           "reached by a sub-frame at {:g} photographs a second.",
-                                           scene_.label(), rows_[0].tally.frames(), images_.size(),
-                                           sub_.tally.frames(), scene_.options().image_rate_hz)}};
+    PaperTable table{
+        .title = {},
+        .corner = {},
+        .columns = quality_columns(scene_.label()),
+        .rows = {},
+        .notes = {fmt::format(
+            "{}: against {} of {} photographs (llffhold {}) of {}; {} of them were reached by a "
+            "sub-frame at {:g} photographs a second.",
+            scene_.label(), scene_.photos.size(), images_.size(), scene_.options().llffhold,
+            sizes_of(scene_.photos), sub_.tally.frames(), scene_.options().image_rate_hz)}};
     for (const Row& row : rows_) table.rows.push_back(quality_row(row.name, row.tally));
     return table;
   }
@@ -144,8 +158,12 @@ class PhotoJudge {
     pool_.parallel_for(rows_.size(), [&](std::size_t i) {
       if (!rows_[i].picture.rgb.empty()) quality[i] = compare_images(rows_[i].picture, photo);
     });
+    JudgedPhoto& judged =
+        scene_.photos.emplace_back(JudgedPhoto{images_[photo_index].name, photo.size_px, {}});
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      if (!rows_[i].picture.rgb.empty()) rows_[i].tally.add(quality[i], photo_index);
+      if (rows_[i].picture.rgb.empty()) continue;
+      rows_[i].tally.add(quality[i], photo_index);
+      judged.rows[rows_[i].name] = {quality[i].psnr(), quality[i].ssim};
       rows_[i].picture = {};
     }
   }

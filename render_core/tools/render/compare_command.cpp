@@ -1,16 +1,22 @@
-// catgs-render compare: the difference of two pictures.
-#include <cmath>
+// catgs-render compare: the difference of two pictures, or of the pictures of two folders.
+#include <algorithm>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
-#include "render_core/image/png.h"
+#include "render_core/base/printable.h"
+#include "render_core/base/thread_pool.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
+#include "render_core/tools/picture.h"
 
 namespace catgs {
 namespace {
@@ -41,22 +47,108 @@ void print_table(const ImageQuality& quality) {
   fmt::print("0.1 % block        {:8.2f} dB\n", quality.block_0_1_percent_psnr());
 }
 
-void compare(const CompareOptions& options) {
-  const Image a = read_png(options.a);
-  const Image b = read_png(options.b);
+ImageQuality compare_pair(const std::filesystem::path& a_path,
+                          const std::filesystem::path& b_path) {
+  const Image a = read_picture(a_path);
+  const Image b = read_picture(b_path);
   if (a.size_px != b.size_px) {
-    throw InputError(options.b, "size",
+    throw InputError(b_path.string(), "size",
                      fmt::format("{}x{} pixels, but {} has {}x{}", b.size_px.x, b.size_px.y,
-                                 options.a, a.size_px.x, a.size_px.y));
+                                 a_path.string(), a.size_px.x, a.size_px.y));
   }
-  const ImageQuality quality = compare_images(a, b);
+  return compare_images(a, b);
+}
+
+/// Pictures of a folder by name, without extension: renderings are PNG, photographs often JPEG.
+std::map<std::string, std::filesystem::path> pictures_in(const std::filesystem::path& folder) {
+  std::map<std::string, std::filesystem::path> pictures;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (!is_picture(entry.path()) || !entry.is_regular_file()) continue;
+    const auto [known, added] = pictures.emplace(entry.path().stem().string(), entry.path());
+    if (!added)
+      throw InputError(folder.string(), known->first, "names two pictures", "keep one of them");
+  }
+  if (pictures.empty())
+    throw InputError(folder.string(), "", "holds no picture", "PNG or JPEG files");
+  return pictures;
+}
+
+struct NamedQuality {
+  std::string name;
+  double psnr = 0.0, ssim = 0.0;
+};
+
+/// Each picture of `a` with that of the same name in `b`; then the means.
+std::vector<NamedQuality> compare_folders(const CompareOptions& options, std::size_t& left_out) {
+  const auto ours = pictures_in(options.a), theirs = pictures_in(options.b);
+  std::vector<NamedQuality> all;
+  for (const auto& [name, path] : ours) {
+    all.push_back({name});
+    if (!theirs.contains(name))
+      throw InputError(options.b, name, "is missing", fmt::format("{} has it", options.a));
+  }
+  left_out = theirs.size() - ours.size();
+  ThreadPool pool;
+  pool.parallel_for(all.size(), [&](std::size_t i) {
+    const ImageQuality quality = compare_pair(ours.at(all[i].name), theirs.at(all[i].name));
+    all[i].psnr = quality.psnr();
+    all[i].ssim = quality.ssim;
+  });
+  NamedQuality mean{"mean"};
+  for (const NamedQuality& one : all) {
+    mean.psnr += one.psnr / static_cast<double>(all.size());
+    mean.ssim += one.ssim / static_cast<double>(all.size());
+  }
+  all.push_back(mean);
+  return all;
+}
+
+/// Returns the mean PSNR.
+double report_folders(const CompareOptions& options) {
+  std::size_t left_out = 0;
+  const std::vector<NamedQuality> all = compare_folders(options, left_out);
+  if (options.json) {
+    nlohmann::ordered_json json;
+    for (const NamedQuality& one : all) {
+      nlohmann::ordered_json& place =
+          &one == &all.back() ? json["mean"] : json["per_view"][one.name];
+      place = {{"psnr_db", one.psnr}, {"ssim", one.ssim}};
+    }
+    json["left_out"] = left_out;
+    write_json("-", json);
+    return all.back().psnr;
+  }
+  std::size_t width = 0;
+  for (const NamedQuality& one : all) width = std::max(width, one.name.size());
+  for (const NamedQuality& one : all)
+    fmt::print("{:<{}}  {:8.2f} dB  SSIM {:8.5f}\n", printable(one.name), width, one.psnr,
+               one.ssim);
+  if (left_out > 0)
+    fmt::print("{} pictures of {} have no partner in {}\n", left_out, printable(options.b),
+               printable(options.a));
+  return all.back().psnr;
+}
+
+/// Returns the PSNR.
+double report_pair(const CompareOptions& options) {
+  const ImageQuality quality = compare_pair(options.a, options.b);
   if (options.json) {
     print_json(quality);
   } else {
     print_table(quality);
   }
-  if (options.required_psnr_db && !(quality.psnr() >= *options.required_psnr_db)) {
-    throw CheckFailed(fmt::format("PSNR is {:.2f} dB, below the required {:.2f} dB", quality.psnr(),
+  return quality.psnr();
+}
+
+void compare(const CompareOptions& options) {
+  std::error_code error;
+  const bool folders = std::filesystem::is_directory(options.a, error);
+  if (folders != std::filesystem::is_directory(options.b, error))
+    throw InputError(options.b, "", "one is a folder and the other is not",
+                     "two pictures or two folders");
+  const double psnr = folders ? report_folders(options) : report_pair(options);
+  if (options.required_psnr_db && !(psnr >= *options.required_psnr_db)) {
+    throw CheckFailed(fmt::format("PSNR is {:.2f} dB, below the required {:.2f} dB", psnr,
                                   *options.required_psnr_db));
   }
 }
@@ -65,12 +157,13 @@ void compare(const CompareOptions& options) {
 
 void add_compare_command(CLI::App& app) {
   auto options = std::make_shared<CompareOptions>();
-  CLI::App* command = app.add_subcommand("compare", "Compares two PNG pictures of one size");
-  command->add_option("a", options->a, "First picture")->required();
-  command->add_option("b", options->b, "Second picture")->required();
+  CLI::App* command = app.add_subcommand(
+      "compare", "Compares two pictures (PNG, JPEG), or those of two folders by name");
+  command->add_option("a", options->a, "Picture or folder")->required();
+  command->add_option("b", options->b, "Picture or folder to compare with")->required();
   command->add_flag("--json", options->json, "Print JSON");
   command->add_option("--require-psnr", options->required_psnr_db,
-                      "Exit with 1 if the PSNR is below this many dB");
+                      "Exit with 1 if the PSNR, of folders its mean, is below this many dB");
   command->callback([options] { compare(*options); });
 }
 

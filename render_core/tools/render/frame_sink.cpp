@@ -1,22 +1,50 @@
 #include "render_core/tools/render/frame_sink.h"
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/base/part_file.h"
 #include "render_core/image/png.h"
 
 namespace catgs {
 namespace {
+
+/// The array as numpy.load() reads it, version 1.0 of the format.
+void write_npy(const std::filesystem::path& path, glm::ivec2 size_px,
+               const std::vector<float>& values) {
+  std::string header = fmt::format(
+      "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", size_px.y, size_px.x);
+  constexpr std::size_t before_header = 10, alignment = 64;
+  while ((before_header + header.size() + 1) % alignment != 0) header += ' ';
+  header += '\n';
+  const auto length = static_cast<std::uint16_t>(header.size());
+  PartFile file(path);
+  file.stream() << "\x93NUMPY" << '\x01' << '\x00';
+  file.stream().write(reinterpret_cast<const char*>(&length), sizeof length) << header;
+  file.stream().write(reinterpret_cast<const char*>(values.data()),
+                      static_cast<std::streamsize>(values.size() * sizeof(float)));
+  file.finish();
+}
+
+void write_picture(const std::filesystem::path& path, const FrameView& frame,
+                   const FrameLayers& layers) {
+  write_png(path, copy_image(frame), layers.alpha);
+  if (!layers.depth.empty())
+    write_npy(std::filesystem::path(path).replace_extension(".npy"), frame.size_px, layers.depth);
+}
 
 class PngSink final : public FrameSink {
  public:
   explicit PngSink(std::filesystem::path path) : path_(std::move(path)) {}
 
   PixelFormat format() const override { return PixelFormat::rgb_f32; }
-  void write(const FrameView& frame) override { write_png(path_, copy_image(frame)); }
+  void write(const FrameView& frame, const FrameLayers& layers) override {
+    write_picture(path_, frame, layers);
+  }
   void finish() override {}
 
  private:
@@ -33,8 +61,8 @@ class PngFolderSink final : public FrameSink {
   }
 
   PixelFormat format() const override { return PixelFormat::rgb_f32; }
-  void write(const FrameView& frame) override {
-    write_png(folder_ / fmt::format("frame_{:06}.png", number_++), copy_image(frame));
+  void write(const FrameView& frame, const FrameLayers& layers) override {
+    write_picture(folder_ / fmt::format("frame_{:06}.png", number_++), frame, layers);
   }
   void finish() override {}
 
@@ -56,7 +84,7 @@ class Y4mSink final : public FrameSink {
   }
 
   PixelFormat format() const override { return PixelFormat::i420; }
-  void write(const FrameView& frame) override {
+  void write(const FrameView& frame, const FrameLayers&) override {
     file_ << "FRAME\n";
     for (int plane = 0; plane < 3; ++plane) {
       const glm::ivec2 size = plane == 0 ? frame.size_px : frame.size_px / 2;
@@ -84,10 +112,18 @@ class Y4mSink final : public FrameSink {
 
 }  // namespace
 
+bool is_video(const std::filesystem::path& path) {
+  return path.extension() == ".y4m" || path.extension() == ".mp4";
+}
+
 std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings) {
   const std::string extension = settings.path.extension().string();
   if (extension == ".png") return std::make_unique<PngSink>(settings.path);
-  if (extension == ".y4m" || extension == ".mp4") {
+  if (is_video(settings.path)) {
+    if (settings.layers) {
+      throw InputError("--alpha, --depth", "", "a video holds colours only",
+                       "give a folder or a .png file");
+    }
     if (settings.size_px.x % 2 != 0 || settings.size_px.y % 2 != 0) {
       throw InputError("--size", "", "a video needs even sides");
     }

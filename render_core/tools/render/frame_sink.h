@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "render_core/renderer.h"
+#include "render_core/tools/render/frame_layers.h"
 
 namespace catgs {
 
@@ -17,7 +18,7 @@ class FrameSink {
 
   /// Format of the frames that write() takes, always in host memory.
   [[nodiscard]] virtual PixelFormat format() const = 0;
-  virtual void write(const FrameView& frame) = 0;
+  virtual void write(const FrameView& frame, const FrameLayers& layers) = 0;
   /// Completes the file. Call it after the last frame; without it the file is unusable.
   virtual void finish() = 0;
 };
@@ -27,10 +28,14 @@ struct FrameSinkSettings {
   glm::ivec2 size_px{0};
   double fps = 60.0;            // of a video
   std::size_t first_frame = 0;  // number of the first picture in a folder
+  bool layers = false;          // frames come with layers, which only pictures can hold
 };
 
+bool is_video(const std::filesystem::path& path);
+
 /// Chooses by the extension of the path: one .png, a .y4m or .mp4 video (both BT.709 limited range
-/// 4:2:0), else a folder of frame_000000.png …, created if missing. Throws InputError.
+/// 4:2:0), else a folder of frame_000000.png …, created if missing. A picture holds its frame's
+/// alpha; its depth goes into a NumPy file beside it: float32, height x width. Throws InputError.
 std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings);
 
 /// H.264 in MP4 through libavformat and libx264; InputError where the build has no libav.

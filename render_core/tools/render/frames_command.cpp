@@ -1,6 +1,8 @@
 // catgs-render frames: a camera path as pictures or video.
-#include <chrono>
+#include <algorithm>
+#include <charconv>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -10,17 +12,58 @@
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/progress.h"
 #include "render_core/tools/reference_check.h"
+#include "render_core/tools/render/frame_layers.h"
 #include "render_core/tools/render/frame_sink.h"
 #include "render_core/tools/render_setup.h"
 
 namespace catgs {
 namespace {
 
+constexpr double default_fps = 30.0;  // of scripts, and of videos at most
+
 struct FramesOptions {
   RenderOptions render;
   std::string out;
+  std::string background = "black";
+  bool alpha = false, depth = false;
   std::size_t checked_pixels = 0;
 };
+
+glm::vec3 parse_colour(std::string_view flag, std::string_view text) {
+  if (text == "black") return glm::vec3(0.0f);
+  if (text == "white") return glm::vec3(1.0f);
+  const std::string_view digits = text.substr(text.starts_with('#') ? 1 : 0);
+  std::uint32_t code = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), code, 16);
+  if (digits.size() != 6 || error != std::errc() || end != digits.data() + digits.size())
+    throw InputError(flag, "", fmt::format("\"{}\" is no colour", text),
+                     "white, black or six hexadecimal digits like ff8000");
+  return glm::vec3(code >> 16, code >> 8 & 0xff, code & 0xff) / 255.0f;
+}
+
+bool is_still(const Trajectory& poses) {
+  const Pose& first = poses.front().world_from_camera;
+  return std::ranges::all_of(poses, [&](const TimedPose& pose) {
+    return pose.world_from_camera.position == first.position &&
+           pose.world_from_camera.orientation == first.orientation;
+  });
+}
+
+/// Scene and path, with the defaults of pictures and videos.
+RenderSetup prepare_frames(const FramesOptions& options, bool quiet) {
+  RenderOptions render = options.render;
+  const glm::vec3 background = parse_colour("--background", options.background);
+  if (!render.fps && !render.script.empty()) render.fps = default_fps;
+  RenderSetup setup = prepare(render, quiet);
+  setup.background = background;
+  if (!render.fps && is_video(options.out) && setup.fps > default_fps) {
+    render.fps = default_fps;
+    set_path(setup, render);
+  }
+  // One picture shows all that a camera at rest sees, unless a length was asked for.
+  if (render.frames.empty() && !render.duration_s && is_still(setup.poses)) setup.poses.resize(1);
+  return setup;
+}
 
 std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderSetup& setup) {
   if (options.out.empty()) {
@@ -30,7 +73,8 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
   auto sink = make_frame_sink({.path = options.out,
                                .size_px = setup.camera.size_px,
                                .fps = setup.fps,
-                               .first_frame = setup.first});
+                               .first_frame = setup.first,
+                               .layers = options.alpha || options.depth});
   if (options.out.ends_with(".png") && setup.poses.size() != 1) {
     throw InputError(options.out, "", fmt::format("one picture for {} frames", setup.poses.size()),
                      "choose one with --frames A:A+1, or give a folder");
@@ -43,12 +87,15 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
 }
 
 void render_frames(const FramesOptions& options, bool quiet) {
-  const RenderSetup setup = prepare(options.render, quiet);
+  const RenderSetup setup = prepare_frames(options, quiet);
   const auto sink = make_sink(options, setup);
   ViewSettings settings = setup.view;
   settings.format = sink ? sink->format() : PixelFormat::rgb_f32;
   const auto view = setup.made.renderer->make_view(settings);
   FrameFeed feed(setup, settings);
+  std::optional<LayerRenderer> layers;
+  if (sink && (options.alpha || options.depth))
+    layers.emplace(*setup.cloud, options.alpha, options.depth, setup.pool);
   if (!quiet) {
     fmt::print(stderr, "{} ({})\n", setup.made.renderer->description(), setup.made.reason);
   }
@@ -57,8 +104,9 @@ void render_frames(const FramesOptions& options, bool quiet) {
     Progress progress("rendering", quiet);
     for (std::size_t i = 0; i < setup.poses.size(); ++i) {
       FrameView frame;
-      render_or_throw(*view, feed.next(), frame);
-      if (sink) sink->write(frame);
+      const FrameRequest request = feed.next();
+      render_or_throw(*view, request, frame);
+      if (sink) sink->write(frame, layers ? layers->render(request.camera) : FrameLayers{});
       if (options.checked_pixels > 0) {
         const double error = reference_error(setup, i, frame, options.checked_pixels);
         fmt::print("frame {:6}  {:7.2f} dB against the reference\n", setup.first + i,
@@ -82,6 +130,21 @@ void add_frames_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("frames", "Renders a camera path to pictures or a video");
   add_render_options(*command, options->render);
   command->add_option("--out", options->out, "A folder of PNG files, or a .png, .y4m or .mp4 file");
+  auto* background =
+      command
+          ->add_option("--background", options->background,
+                       "Colour behind the scene: black, white or six hexadecimal digits (RRGGBB)")
+          ->capture_default_str();
+  command->add_flag("--alpha", options->alpha, "Pictures get an alpha channel")
+      ->excludes(background);
+  command->add_flag("--depth", options->depth,
+                    "Write a NumPy file beside each picture: mean depth along the view axis, world "
+                    "units, 0 where nothing is seen");
+  command->get_option("--fps")->description(
+      "Frames per second (default: 30 for a script, else the rate of the trace, of which a video "
+      "gets 30 at most). The trace is resampled, but forecasts use its recorded samples only, and "
+      "none of the future");
+  command->footer("A path that stands still is one frame, unless --duration or --frames is given.");
   command->add_option("--pixels", options->checked_pixels,
                       "Also print the PSNR against the reference at this many random pixels");
   command->callback([options, command] { render_frames(*options, is_quiet(*command)); });

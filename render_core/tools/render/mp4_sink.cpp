@@ -57,7 +57,7 @@ class Mp4Sink final : public FrameSink {
 
   PixelFormat format() const override { return PixelFormat::i420; }
 
-  void write(const FrameView& frame) override {
+  void write(const FrameView& frame, const FrameLayers&) override {
     frame_->format = encoder_->pix_fmt;
     frame_->width = frame.size_px.x;
     frame_->height = frame.size_px.y;

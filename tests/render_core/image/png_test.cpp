@@ -9,11 +9,13 @@
 
 #include "render_core/base/error.h"
 #include "render_core/image/host_image.h"
+#include "tests/support/read_rgba.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -43,6 +45,12 @@ TEST_F(Png, RoundsAndClamps) {
   write_png(path_, {{2, 1}, {-1.0f, 0.5f, 2.0f, 0.49f / 255.0f, 0.51f / 255.0f, 1.0f}});
   const std::vector<float> expected = {0, 128.0f / 255.0f, 1, 0, 1.0f / 255.0f, 1};
   EXPECT_EQ(read_png(path_).rgb, expected);
+}
+
+TEST_F(Png, AlphaBelongsToColoursOverBlack) {
+  const std::vector<float> alpha = {0.5f, 0.0f, 1.0f};
+  write_png(path_, {{3, 1}, {0.25f, 0.5f, 0, 0, 0, 0, 0.2f, 0.4f, 0.6f}}, alpha);
+  EXPECT_THAT(test::read_rgba(path_), ElementsAre(128, 255, 0, 128, 0, 0, 0, 0, 51, 102, 153, 255));
 }
 
 TEST_F(Png, RefusesWhatIsNoPicture) {

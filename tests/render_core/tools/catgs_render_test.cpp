@@ -202,8 +202,8 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames(still + "--device gpu --out x"), "--device: \"gpu\" is neither all nor a list");
   expect(frames(still + "--renderer cpu --device 1 --out x"),
          "--device: chooses among CUDA devices");
-  expect(frames("--script still --out " + path("a.png")), "one picture for 1200 frames");
-  expect(frames("--script still --frames 2000: --out x"), "the path has 1200 frames");
+  expect(frames("--script orbit --out " + path("a.png")), "one picture for 300 frames");
+  expect(frames("--script still --frames 2000: --out x"), "the path has 300 frames");
   expect(frames(still + "--window 2 --out x"), "--window: has no effect on the exact pipeline");
   expect(frames(still + "--pipeline catgs --window -1 --out x"), "--window: is out of range");
   expect(frames("--trace x --duration 2 --out x"), "--duration: has no effect on a recorded trace");

@@ -11,69 +11,18 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/image/png.h"
-#include "render_core/motion/trajectory.h"
-#include "render_core/scene/files/save_scene.h"
-#include "tests/render_core/tools/run_catgs_render.h"
-#include "tests/support/temporary_folder.h"
-#include "tests/support/test_scenes.h"
+#include "tests/render_core/tools/paper/paper_fixture.h"
 
 namespace catgs {
 namespace {
 
+using test::glide;
 using test::Outcome;
-using test::run;
+using test::Paper;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using Json = nlohmann::ordered_json;
-
-/// A camera that glides sideways past random Gaussians at 120 Hz.
-Trajectory glide(std::size_t frames) {
-  Trajectory path;
-  for (std::size_t i = 0; i < frames; ++i) {
-    const auto time = static_cast<std::int64_t>(i) * 1'000'000 / 120;
-    path.push_back({time, {glm::vec3(0.004f * static_cast<float>(i), 0, 0), {1, 0, 0, 0}}});
-  }
-  return path;
-}
-
-class Paper : public ::testing::Test {
- protected:
-  void SetUp() override {
-    save_scene(test::random_cloud(2000, 1, 7), folder_ / "cloud.ply");
-    save_scene(test::random_cloud(500, 0, 8), folder_ / "mist.ply");
-    write_tum(folder_ / "glide.tum", glide(40));
-  }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-
-  Outcome paper(const std::string& arguments) const {
-    return run(fmt::format("--quiet paper --size 96x64 --near 0.2 --renderer cpu {}", arguments));
-  }
-  std::string cloud_case() const {
-    return fmt::format("--case {} {}", path("cloud.ply"), path("glide.tum"));
-  }
-  std::string both_cases() const {
-    return fmt::format("{} --case {} {}", cloud_case(), path("mist.ply"), path("glide.tum"));
-  }
-
-  /// The tables as JSON; both scenes.
-  Json tables(const std::string& name, const std::string& more = {}) const {
-    const Outcome outcome =
-        paper(fmt::format("--table {} {} {} --json -", name, both_cases(), more));
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
-    return Json::parse(outcome.out).at("tables").at(name);
-  }
-
-  static std::vector<std::string> names(const Json& object) {
-    std::vector<std::string> names;
-    for (const auto& [name, value] : object.items()) names.push_back(name);
-    return names;
-  }
-
-  const test::TemporaryFolder folder_;
-};
 
 TEST_F(Paper, FpsHasAColumnPerScene) {
   std::ofstream(path("flash.json")) << R"({"FlashGS": {"cloud": 123.5}, "Slow": {"cloud": 2}})";
@@ -135,7 +84,7 @@ TEST_F(Paper, OptionsThatWouldChangeNothingAreRefused) {
   };
   for (const char* option :
        {"--baseline x", "--images x", "--keep-fraction 1", "--variant '--window 2'", "--every 2",
-        "--images x --image-rate 5", "--dram-bytes-per-s 1"}) {
+        "--images x --image-rate 5", "--images x --llffhold 2", "--dram-bytes-per-s 1"}) {
     EXPECT_THAT(complaint(fmt::format("--table list {} {}", cloud_case(), option)),
                 HasSubstr("has no effect on the requested tables (it belongs to --table"))
         << option;
@@ -334,56 +283,6 @@ TEST_F(Paper, PrunedKeepsTheShares) {
               ElementsAre("cloud 100 %", "cloud 25 %", "mist 100 %", "mist 25 %"));
   EXPECT_DOUBLE_EQ(rows.at("Size (10³)").at("cloud 100 %").get<double>(), 2.0);
   EXPECT_DOUBLE_EQ(rows.at("Size (10³)").at("cloud 25 %").get<double>(), 0.5);
-}
-
-/// Photographs of the cloud made by the exact pipeline, with a COLMAP reconstruction of their
-/// cameras.
-class PaperPhotographs : public Paper {
- protected:
-  static constexpr std::size_t photos = 6;
-
-  void SetUp() override {
-    Paper::SetUp();
-    std::filesystem::create_directories(folder_ / "photos/images");
-    std::filesystem::create_directories(folder_ / "photos/sparse/0");
-    const Outcome outcome =
-        run(fmt::format("--quiet frames {} --size 96x64 --focal-px 80 --near 0.2 --renderer cpu "
-                        "--trace {} --frames :{} --out {}",
-                        path("cloud.ply"), path("glide.tum"), photos, path("photos/images")));
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
-    std::ofstream(path("photos/sparse/0/cameras.txt"))
-        << "# cameras\n7 PINHOLE 96 64 80 80 48 32\n";
-    std::ofstream images(path("photos/sparse/0/images.txt"));
-    for (std::size_t i = photos; i-- > 0;) {  // in any order
-      images << fmt::format("{} 1 0 0 0 {} 0 0 7 frame_{:06}.jpg\n\n", i + 1,
-                            -0.004 * static_cast<double>(i), i);
-    }
-  }
-
-  std::string arguments() const {
-    return fmt::format("--table quality --case {} --images {} --image-rate 30 --every 1 --json -",
-                       path("cloud.ply"), path("photos"));
-  }
-};
-
-TEST_F(PaperPhotographs, AreMetByKeyFramesAndSubFrames) {
-  const Outcome outcome = paper(arguments());
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
-  const Json table = Json::parse(outcome.out).at("tables").at("quality").at(0);
-  EXPECT_THAT(names(table.at("rows")), ElementsAre("3DGS", "Exact", "Ours-key", "Ours-sub"));
-  // Bound by the 8 bits of the photographs: uniform rounding is 58.9 dB.
-  for (const char* row : {"Exact", "Ours-key", "Ours-sub"}) {
-    EXPECT_GE(table.at("rows").at(row).at("cloud PSNR").get<double>(), 50.0) << row;
-    EXPECT_LE(table.at("rows").at(row).at("cloud PSNR").get<double>(), 65.0) << row;
-  }
-  EXPECT_THAT(table.at("notes").at(0).get<std::string>(), HasSubstr("against 6 of 6 photographs"));
-}
-
-TEST_F(PaperPhotographs, HaveToBePng) {
-  std::filesystem::remove(folder_ / "photos/images/frame_000003.png");
-  const Outcome outcome = paper(arguments());
-  EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.out, HasSubstr("frame_000003.png: does not exist (photographs must be PNG"));
 }
 
 TEST_F(Paper, BadInputExitsWithTwoAndSaysWhatToDo) {

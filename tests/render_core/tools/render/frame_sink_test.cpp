@@ -56,8 +56,8 @@ TEST_F(FrameSinkTest, AFolderGetsNumberedPictures) {
   const auto folder = sink("new/pictures");
   HostImage image;
   const FrameView frame = grey_frame(image, folder->format(), {16, 8});
-  folder->write(frame);
-  folder->write(frame);
+  folder->write(frame, {});
+  folder->write(frame, {});
   folder->finish();
   EXPECT_EQ(read_png(folder_ / "new/pictures/frame_000007.png").size_px, glm::ivec2(16, 8));
   EXPECT_NEAR(read_png(folder_ / "new/pictures/frame_000008.png").rgb[0], 0.5f, 0.003f);
@@ -68,8 +68,8 @@ TEST_F(FrameSinkTest, Y4mIsTaggedAndComplete) {
   ASSERT_EQ(video->format(), PixelFormat::i420);
   HostImage image;
   const FrameView frame = grey_frame(image, PixelFormat::i420, {16, 8});
-  video->write(frame);
-  video->write(frame);
+  video->write(frame, {});
+  video->write(frame, {});
   video->finish();
   const std::string header = "YUV4MPEG2 W16 H8 F29970:1000 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
   const std::string picture =
@@ -85,7 +85,7 @@ TEST_F(FrameSinkTest, Mp4IsCompleteOrRefused) {
     GTEST_SKIP() << error.what();
   }
   HostImage image;
-  for (int i = 0; i < 5; ++i) video->write(grey_frame(image, PixelFormat::i420, {16, 8}));
+  for (int i = 0; i < 5; ++i) video->write(grey_frame(image, PixelFormat::i420, {16, 8}), {});
   video->finish();
   const std::string bytes = bytes_of("a.mp4");
   EXPECT_THAT(bytes.substr(4), StartsWith("ftyp"));

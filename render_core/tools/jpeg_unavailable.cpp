@@ -1,0 +1,11 @@
+#include "render_core/base/error.h"
+#include "render_core/tools/picture.h"
+
+namespace catgs {
+
+Image read_jpeg(const std::filesystem::path& path) {
+  throw InputError(path.string(), "", "this build cannot read JPEG: it was made without libav",
+                   "install libavformat-dev and libavcodec-dev and build again, or use PNG");
+}
+
+}  // namespace catgs

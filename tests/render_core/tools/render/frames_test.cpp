@@ -1,0 +1,195 @@
+// catgs-render frames and compare: what pictures and videos hold, and what two folders of pictures
+// have in common.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/image/png.h"
+#include "render_core/motion/trajectory.h"
+#include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/tools/run_catgs_render.h"
+#include "tests/support/read_rgba.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs {
+namespace {
+
+using test::Outcome;
+using test::run;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// A wall of opaque, flat Gaussians at z = 3 before the right half of a camera at the origin.
+GaussianCloud wall() {
+  GaussianCloud cloud;
+  cloud.resize(21 * 41, 0);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud.mean[i] = {0.5f + 0.1f * static_cast<float>(i % 21),
+                     -2.0f + 0.1f * static_cast<float>(i / 21), 3.0f};
+    cloud.rotation[i] = glm::quat(1, 0, 0, 0);
+    cloud.scale[i] = glm::vec3(0.08f, 0.08f, 0.001f);
+    cloud.opacity[i] = 0.99f;
+    cloud.sh[i] = glm::vec3(1.0f, 0.0f, -1.0f);
+  }
+  return cloud;
+}
+
+class Frames : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    save_scene(wall(), folder_ / "wall.ply");
+    write_tum(path("still.tum"), {{0, {}}, {500'000, {}}, {1'000'000, {}}});
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  Outcome frames(const std::string& arguments) const {
+    return run(
+        fmt::format("--quiet frames {} --size 64x48 --focal-px 40 --near 0.1 --renderer cpu {}",
+                    path("wall.ply"), arguments));
+  }
+  void draw(const std::string& name, const std::string& flags) const {
+    const Outcome outcome =
+        frames(fmt::format("--trace {} --out {} {}", path("still.tum"), path(name), flags));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  }
+  std::size_t files_in(const std::string& name) const {
+    return static_cast<std::size_t>(
+        std::distance(std::filesystem::directory_iterator(path(name)), {}));
+  }
+  std::string bytes_of(const std::string& name) const {
+    std::ifstream file(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+TEST_F(Frames, TheBackgroundIsBehindTheScene) {
+  draw("a.png", "--background ff8000");
+  const Image image = read_png(path("a.png"));
+  EXPECT_EQ(image.row(24)[0], 1.0f);
+  EXPECT_EQ(image.row(24)[1], 128.0f / 255.0f);
+  EXPECT_EQ(image.row(24)[2], 0.0f);
+  draw("b.png", "--background white");
+  EXPECT_EQ(read_png(path("b.png")).row(24)[2], 1.0f);
+  for (const char* wrong : {"grey", "ff80", "-10000", "ff80001"}) {
+    const Outcome outcome =
+        frames(fmt::format("--script still --out {} --background={}", path("c.png"), wrong));
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.out, HasSubstr("is no colour (white, black or six"));
+  }
+}
+
+TEST_F(Frames, AlphaIsWhatHidesTheBackground) {
+  draw("a.png", "--alpha");
+  draw("black.png", "");
+  const std::vector<std::uint8_t> rgba = test::read_rgba(path("a.png"));
+  const Image black = read_png(path("black.png"));
+  ASSERT_EQ(rgba.size(), 4 * black.pixels());
+  const auto alpha = [&](std::size_t x, std::size_t y) { return rgba[4 * (y * 64 + x) + 3]; };
+  EXPECT_EQ(alpha(5, 24), 0);
+  EXPECT_GE(alpha(50, 24), 252);
+  // Over black it is the picture without alpha.
+  for (std::size_t i = 0; i < black.rgb.size(); ++i) {
+    const double over_black = rgba[i / 3 * 4 + i % 3] / 255.0 * rgba[i / 3 * 4 + 3] / 255.0;
+    ASSERT_NEAR(over_black, static_cast<double>(black.rgb[i]), 1.5 / 255.0) << i;
+  }
+  const Outcome both =
+      frames(fmt::format("--script still --out {} --alpha --background white", path("b.png")));
+  EXPECT_EQ(both.exit_code, 2);
+  const Outcome video = frames(fmt::format("--script still --out {} --alpha", path("b.y4m")));
+  EXPECT_EQ(video.exit_code, 2);
+  EXPECT_THAT(video.out, HasSubstr("a video holds colours only"));
+}
+
+TEST_F(Frames, DepthIsANumPyArrayOfDistancesAlongTheAxis) {
+  draw("pictures", "--depth");
+  EXPECT_EQ(files_in("pictures"), 2u);
+  const std::string npy = bytes_of("pictures/frame_000000.npy");
+  EXPECT_EQ(npy.substr(0, 8), std::string("\x93NUMPY\x01\x00", 8));
+  std::uint16_t header = 0;
+  std::memcpy(&header, npy.data() + 8, sizeof header);
+  EXPECT_EQ((10 + header) % 64, 0);
+  EXPECT_THAT(npy.substr(10, header),
+              HasSubstr("{'descr': '<f4', 'fortran_order': False, 'shape': (48, 64), }"));
+  ASSERT_EQ(npy.size(), 10u + header + 64 * 48 * sizeof(float));
+  const auto depth = [&](std::size_t x, std::size_t y) {
+    float value = 0.0f;
+    std::memcpy(&value, npy.data() + 10 + header + (y * 64 + x) * sizeof value, sizeof value);
+    return value;
+  };
+  EXPECT_NEAR(depth(50, 24), 3.0f, 0.01f);
+  EXPECT_NEAR(depth(45, 10), 3.0f, 0.01f);
+  EXPECT_EQ(depth(5, 24), 0.0f);
+}
+
+TEST_F(Frames, ACameraAtRestIsOneFrame) {
+  draw("still", "");
+  EXPECT_EQ(files_in("still"), 1u);
+  draw("all", "--frames 0:3");
+  EXPECT_EQ(files_in("all"), 3u);
+  const Outcome scripted = frames("--script still --out " + path("scripted.png"));
+  EXPECT_EQ(scripted.exit_code, 0) << scripted.out;
+  const Outcome second = frames("--script still --duration 1 --fps 5 --out " + path("a_second"));
+  EXPECT_EQ(second.exit_code, 0) << second.out;
+  EXPECT_EQ(files_in("a_second"), 5u);
+}
+
+TEST_F(Frames, VideosHaveThirtyFramesPerSecond) {
+  const auto header = [&](const std::string& flags) {
+    const Outcome outcome = frames(fmt::format("{} --out {}", flags, path("a.y4m")));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+    return bytes_of("a.y4m").substr(0, 40);
+  };
+  EXPECT_THAT(header("--script orbit --duration 0.2"), HasSubstr(" F30000:1000 "));
+  EXPECT_THAT(header("--script orbit --duration 0.2 --fps 50"), HasSubstr(" F50000:1000 "));
+  Trajectory fast, slow;
+  for (int i = 0; i < 25; ++i) {
+    const Pose pose{{0.01f * static_cast<float>(i), 0, 0}, {1, 0, 0, 0}};
+    fast.push_back({i * 10'000, pose});
+    slow.push_back({i * 40'000, pose});
+  }
+  write_tum(path("fast.tum"), fast);
+  write_tum(path("slow.tum"), slow);
+  EXPECT_THAT(header("--trace " + path("fast.tum")), HasSubstr(" F30000:1000 "));
+  EXPECT_THAT(header("--trace " + path("slow.tum")), HasSubstr(" F25000:1000 "));
+}
+
+TEST_F(Frames, CompareTakesFolders) {
+  for (const char* folder : {"a", "b"}) std::filesystem::create_directory(path(folder));
+  draw("a/one.png", "");
+  draw("b/one.png", "");
+  draw("a/two.png", "");
+  draw("b/two.png", "--background 101010");
+  draw("b/three.png", "");
+  const std::string folders = path("a") + " " + path("b");
+  const Outcome text = run("compare " + folders);
+  ASSERT_EQ(text.exit_code, 0) << text.out;
+  EXPECT_THAT(text.out, AllOf(HasSubstr("one "), HasSubstr("two "), HasSubstr("mean "),
+                              HasSubstr("1 pictures of ")));
+  const auto json = nlohmann::json::parse(run("compare --json " + folders).out);
+  EXPECT_TRUE(json.at("per_view").at("one").at("psnr_db").is_null());
+  EXPECT_EQ(json.at("per_view").at("one").at("ssim"), 1.0);
+  EXPECT_NEAR(json.at("per_view").at("two").at("psnr_db").get<double>(), 26.0, 3.0);
+  EXPECT_NEAR(json.at("mean").at("ssim").get<double>(),
+              0.5 + 0.5 * json.at("per_view").at("two").at("ssim").get<double>(), 1e-9);
+  EXPECT_EQ(json.at("left_out"), 1);
+  EXPECT_EQ(run("compare --require-psnr 60 " + folders).exit_code, 0);  // ∞ among them
+  const Outcome missing = run(fmt::format("compare {} {}", path("b"), path("a")));
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_THAT(missing.out, HasSubstr("three: is missing"));
+  EXPECT_EQ(run(fmt::format("compare {} {}", path("a"), path("b/one.png"))).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace catgs
