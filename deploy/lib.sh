@@ -173,7 +173,7 @@ detect_distribution() {
       command -v kubectl >/dev/null || deploy_test_packages+=(kubernetes-client)  # not in Ubuntu
       # Not the default 1.74, whose Asio coroutines break under clang.
       build_packages+=(libboost1.81-dev)
-      test_packages+=(chromium)
+      test_packages+=(chromium firefox-esr)
       ;;
     "ubuntu 24.04")
       # Ubuntu's chromium package is a snap, which no container can install; a browser that is

@@ -9,6 +9,8 @@ export const build_dir =
 
 export const chromium_path = process.env['CATGS_CHROMIUM'] ?? '/usr/bin/chromium';
 
+export const firefox_path = process.env['CATGS_FIREFOX'] ?? '/usr/bin/firefox-esr';
+
 export const haproxy_path = process.env['CATGS_HAPROXY'] ?? '/usr/sbin/haproxy';
 
 /** Folder for screenshots. */
