@@ -163,9 +163,10 @@ CameraList read_camera_json(const ByteSource& file) {
   const JsonField root(file.name(), document);
   if (document.is_array()) return read_array(root);
   if (root.find("camera_path")) return read_path(root);
-  if (root.find("frames")) return read_transforms(root);
-  root.fail("lists no cameras",
-            "cameras.json of a 3DGS training, transforms.json or camera_path.json of nerfstudio");
+  if (!root.find("frames"))
+    root.fail("lists no cameras",
+              "cameras.json of a 3DGS training, transforms.json or camera_path.json of nerfstudio");
+  return read_transforms(root);
 }
 
 }  // namespace catgs
