@@ -10,7 +10,7 @@ readonly SOURCE_DIR
 build_packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
   libwebsockets-dev libssl-dev libprotobuf-dev protobuf-compiler
-  libavcodec-dev libavformat-dev libavutil-dev
+  libavcodec-dev libavformat-dev libavutil-dev libturbojpeg0-dev
   libglm-dev libhwy-dev libcli11-dev libtomlplusplus-dev libspdlog-dev libfmt-dev
   nlohmann-json3-dev prometheus-cpp-dev
   libwebp-dev libpng-dev zlib1g-dev libzstd-dev libarchive-dev

@@ -4,8 +4,8 @@
 namespace catgs {
 
 Image read_jpeg(const std::filesystem::path& path) {
-  throw InputError(path.string(), "", "this build cannot read JPEG: it was made without libav",
-                   "install libavformat-dev and libavcodec-dev and build again, or use PNG");
+  throw InputError(path.string(), "", "this build cannot read JPEG: it was made without TurboJPEG",
+                   "install libturbojpeg0-dev and build again, or use PNG");
 }
 
 }  // namespace catgs

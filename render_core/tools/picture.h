@@ -13,8 +13,8 @@ bool is_picture(const std::filesystem::path& path);
 /// InputError.
 Image read_picture(const std::filesystem::path& path);
 
-/// Chroma is interpolated between its samples, as libjpeg does. The orientation that a camera notes
-/// is ignored, as by COLMAP. InputError where the build has no libav.
+/// The orientation that a camera notes is ignored, as by COLMAP. Throws InputError, also where the
+/// build has no TurboJPEG.
 Image read_jpeg(const std::filesystem::path& path);
 
 }  // namespace catgs

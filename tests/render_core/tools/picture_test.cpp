@@ -28,7 +28,7 @@ class Jpeg : public ::testing::Test {
     try {
       (void)read_jpeg(photo);
     } catch (const InputError& error) {
-      if (std::string_view(error.what()).find("without libav") != std::string_view::npos)
+      if (std::string_view(error.what()).find("without TurboJPEG") != std::string_view::npos)
         GTEST_SKIP() << error.what();
       throw;
     }
@@ -41,8 +41,7 @@ TEST_F(Jpeg, IsReadAsLibjpegReadsIt) {
   const Image expected = read_png(CATGS_TOOLS_DATA "/photo.png");
   ASSERT_EQ(image.size_px, expected.size_px);
   const ImageQuality quality = compare_images(image, expected);
-  EXPECT_GE(quality.psnr(), 50.0);
-  EXPECT_LE(quality.max_error, 3.0 / 255.0);
+  EXPECT_LE(quality.max_error, 1.0 / 255.0);  // rounding may differ with the processor
 }
 
 TEST_F(Jpeg, TheContentTellsTheKind) {
