@@ -25,22 +25,19 @@ Image read_jpeg(const std::filesystem::path& path) {
   const std::vector<std::byte> file = FileSource(path).read_all(max_file_bytes);
   const auto* data = reinterpret_cast<const unsigned char*>(file.data());
   const std::unique_ptr<void, Destroy> decoder(tjInitDecompress());
-  const auto refuse = [&](std::string_view what) {
-    throw InputError(path.string(), "", what,
-                     fmt::format("a JPEG of at most {0}x{0} pixels, or a PNG", max_image_side_px));
-  };
   Image image;
   int sampling = 0, colours = 0;
   glm::ivec2& size = image.size_px;
-  if (tjDecompressHeader3(decoder.get(), data, file.size(), &size.x, &size.y, &sampling,
-                          &colours) != 0)
-    refuse(tjGetErrorStr2(decoder.get()));
-  if (std::max(size.x, size.y) > max_image_side_px) refuse("is too large");
-  std::vector<unsigned char> rgb(std::size_t{3} * size.x * size.y);
+  bool good = tjDecompressHeader3(decoder.get(), data, file.size(), &size.x, &size.y, &sampling,
+                                  &colours) == 0 &&
+              std::max(size.x, size.y) <= max_image_side_px;
+  std::vector<unsigned char> rgb(good ? std::size_t{3} * size.x * size.y : 0);
   constexpr int flags = TJFLAG_ACCURATEDCT | TJFLAG_STOPONWARNING;  // damage is a warning
-  if (tjDecompress2(decoder.get(), data, file.size(), rgb.data(), size.x, 0, size.y, TJPF_RGB,
-                    flags) != 0)
-    refuse(tjGetErrorStr2(decoder.get()));
+  good = good && tjDecompress2(decoder.get(), data, file.size(), rgb.data(), size.x, 0, size.y,
+                               TJPF_RGB, flags) == 0;
+  if (!good)
+    throw InputError(path.string(), "", "is damaged, too large, or no JPEG of a camera",
+                     fmt::format("grey or colour, at most {0}x{0} pixels", max_image_side_px));
   image.rgb.resize(rgb.size());
   std::ranges::transform(rgb, image.rgb.begin(),
                          [](unsigned char value) { return static_cast<float>(value) / 255.0f; });
