@@ -67,9 +67,14 @@ void set_value(std::string_view source, std::string_view key, std::string_view v
     link.loss = parse_share(source, value);
   } else if (key == "burst") {
     link.burst = parse_burst(source, value);
+  } else if (key == "congestion") {
+    if (value != "cubic" && value != "none")
+      throw InputError(source, "", fmt::format("\"{}\" is no congestion control", value),
+                       "cubic or none");
+    link.cubic = value == "cubic";
   } else {
     throw InputError(source, "", fmt::format("a link has no \"{}\"", key),
-                     "rate, up, delay, jitter, loss, burst or queue");
+                     "rate, up, delay, jitter, loss, burst, queue or congestion");
   }
 }
 
@@ -94,7 +99,10 @@ LinkSettings parse_link(std::string_view source, std::string_view text) {
 }
 
 LinkShaper::LinkShaper(const LinkSettings& link, RateSchedule rate, std::uint64_t seed)
-    : link_(link), rate_(std::move(rate)), random_(static_cast<unsigned>(seed % 0x7ffffffe) + 1) {}
+    : link_(link), rate_(std::move(rate)), random_(static_cast<unsigned>(seed % 0x7ffffffe) + 1) {
+  const bool late = link_.delay_us > 0 || link_.jitter_us > 0 || link_.loss > 0.0;
+  windowed_ = link_.cubic && (late || !rate_.empty());
+}
 
 double LinkShaper::rate_at(std::int64_t time_us) const {
   const auto next = std::ranges::upper_bound(rate_, time_us, {}, &RateStep::from_us);
@@ -125,19 +133,45 @@ void LinkShaper::forget_departed(std::int64_t now_us) {
   }
 }
 
-std::size_t LinkShaper::room_bytes(std::int64_t now_us) {
+void LinkShaper::notice(std::int64_t now_us) {
+  while (!notices_.empty() && notices_.begin()->first <= now_us) {
+    const auto [time_us, known] = *notices_.begin();
+    notices_.erase(notices_.begin());
+    if (known.kind == Notice::Kind::acked) window_.acked(known.sent_us, time_us);
+    if (known.kind == Notice::Kind::lost) window_.lost(known.sent_us, time_us);
+    if (known.kind == Notice::Kind::timed_out) window_.timed_out(time_us);
+  }
+}
+
+std::size_t LinkShaper::buffer_room_bytes(std::int64_t now_us) const {
   if (rate_.empty()) return SIZE_MAX;
-  forget_departed(now_us);
   const double buffered = rate_at(now_us) * 1e-6 * static_cast<double>(link_.queue_us) / 8.0;
   const std::size_t buffer = std::max(min_queue_bytes, static_cast<std::size_t>(buffered));
   return buffer - std::min(buffer, queued_bytes_);
 }
 
+std::size_t LinkShaper::room_bytes(std::int64_t now_us) {
+  forget_departed(now_us);
+  notice(now_us);
+  const std::size_t buffer = buffer_room_bytes(now_us);
+  if (!windowed_) return buffer;
+  const double open = std::floor(window_.segments() - window_.in_flight());
+  const std::size_t window = open < 1.0 ? 0 : static_cast<std::size_t>(open) * segment_bytes;
+  // It would be sent, and there is no room for it.
+  if (window > 0 && buffer < segment_bytes && now_us >= overflow_known_us_) overflows_ = true;
+  return std::min(buffer, window);
+}
+
 std::int64_t LinkShaper::next_room_us() const {
-  return queue_.empty() ? 0 : queue_.front().time_us;
+  std::int64_t next_us = queue_.empty() ? 0 : queue_.front().time_us;
+  if (!notices_.empty() && (queue_.empty() || notices_.begin()->first < next_us))
+    next_us = notices_.begin()->first;
+  return next_us;
 }
 
 std::int64_t LinkShaper::recovery_us(std::int64_t queueing_us) {
+  const std::int64_t round_trip_us = 2 * link_.delay_us + queueing_us;
+  if (std::exchange(overflows_, false)) return std::max<std::int64_t>(1, round_trip_us);
   if (link_.loss <= 0.0) return 0;
   // A two-state chain: losses come with this share and in runs of this mean length.
   const double goes_on = 1.0 - 1.0 / link_.burst;
@@ -147,21 +181,34 @@ std::int64_t LinkShaper::recovery_us(std::int64_t queueing_us) {
     lost_in_a_row_ = 0;
     return 0;
   }
-  const std::int64_t round_trip_us = 2 * link_.delay_us + queueing_us;
   const bool repeats_at_once = ++lost_in_a_row_ < 3;  // by the acks of those behind it
   return round_trip_us + (repeats_at_once ? 0 : min_retransmission_timeout_us);
 }
 
 std::int64_t LinkShaper::send(std::size_t bytes, std::int64_t now_us) {
   forget_departed(now_us);
+  notice(now_us);
   last_departure_us_ = carried_at(std::max(now_us, last_departure_us_), bytes);
   if (!rate_.empty()) {
     queue_.push_back({last_departure_us_, bytes});
     queued_bytes_ += bytes;
   }
+  const std::int64_t queueing_us = last_departure_us_ - now_us;
   std::uniform_int_distribution<std::int64_t> jitter_us(0, link_.jitter_us);
-  const std::int64_t arrival_us = last_departure_us_ + link_.delay_us + jitter_us(random_) +
-                                  recovery_us(last_departure_us_ - now_us);
+  const std::int64_t first_arrival_us = last_departure_us_ + link_.delay_us + jitter_us(random_);
+  const bool overflows = overflows_;
+  const std::int64_t repeated_us = recovery_us(queueing_us);
+  const std::int64_t arrival_us = first_arrival_us + repeated_us;
+  if (windowed_) {
+    window_.sent(now_us);
+    notices_.insert({arrival_us + link_.delay_us, {Notice::Kind::acked, now_us}});
+    const std::int64_t known_us = first_arrival_us + link_.delay_us;  // by acks of the next ones
+    if (repeated_us > 2 * link_.delay_us + queueing_us + 1)
+      notices_.insert({arrival_us - link_.delay_us, {Notice::Kind::timed_out, now_us}});
+    else if (repeated_us > 0)
+      notices_.insert({known_us, {Notice::Kind::lost, now_us}});
+    if (overflows) overflow_known_us_ = known_us;
+  }
   last_arrival_us_ = std::max(last_arrival_us_, arrival_us);  // in order, as TCP gives them
   return last_arrival_us_;
 }

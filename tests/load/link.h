@@ -3,10 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <random>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "tests/load/tcp_window.h"
 
 namespace catgs::load {
 
@@ -28,6 +31,7 @@ struct LinkSettings {
   double loss = 0.0;                // share of segments lost
   double burst = 1.0;               // segments lost in a row, mean
   std::int64_t queue_us = 200'000;  // what the bottleneck buffers, at its rate of the moment
+  bool cubic = true;                // the sender has CUBIC's congestion window; false: none
 
   /// Whether it differs from no link at all.
   [[nodiscard]] bool shapes() const {
@@ -35,8 +39,8 @@ struct LinkSettings {
   }
 };
 
-/// "rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,loss=1%,burst=4,queue=300ms"; `up` is
-/// as `rate` where it is not given. Throws InputError that names `source` and the key.
+/// "rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,loss=1%,burst=4,queue=300ms,congestion=cubic";
+/// `up` is as `rate` where it is not given. Throws InputError that names `source` and the key.
 LinkSettings parse_link(std::string_view source, std::string_view text);
 
 /// One direction of a link. Pure: times are microseconds since the run began, and never decrease
@@ -45,18 +49,20 @@ LinkSettings parse_link(std::string_view source, std::string_view text);
 /// A segment leaves the bottleneck when the rate has carried all bytes before it and its own, and
 /// arrives after delay and jitter, behind its predecessors. A lost one arrives when TCP has
 /// repeated it, and what follows waits for it: a round trip later, or after three lost in a row the
-/// retransmission timeout. The sender's congestion window is not modelled.
+/// retransmission timeout. The sender has no more under way than its congestion window, which it
+/// reduces for a loss. Whatever the window allows beyond the bottleneck's buffer costs a loss, too.
 class LinkShaper {
  public:
   LinkShaper(const LinkSettings& link, RateSchedule rate, std::uint64_t seed);
 
-  /// Bytes that the bottleneck's buffer still takes. Whoever sends more loses nothing here: like a
-  /// TCP sender whose window is closed, it has to wait.
+  /// Bytes that window and buffer still take. Whoever has more has to wait, as before a socket.
   [[nodiscard]] std::size_t room_bytes(std::int64_t now_us);
   /// When there will be room again.
   [[nodiscard]] std::int64_t next_room_us() const;
   /// Takes a segment and returns when it arrives at the far end.
   std::int64_t send(std::size_t bytes, std::int64_t now_us);
+
+  [[nodiscard]] const TcpWindow& window() const { return window_; }
 
   static constexpr std::size_t segment_bytes = 1448;  // Ethernet's, less IP and TCP headers
   static constexpr std::int64_t never_us = std::int64_t{1} << 52;
@@ -66,10 +72,18 @@ class LinkShaper {
     std::int64_t time_us = 0;
     std::size_t bytes = 0;
   };
+  /// What the sender comes to know.
+  struct Notice {
+    enum class Kind { acked, lost, timed_out } kind = Kind::acked;
+    std::int64_t sent_us = 0;
+  };
   [[nodiscard]] double rate_at(std::int64_t time_us) const;
   /// When the bottleneck has carried `bytes` from `begin_us` on.
   [[nodiscard]] std::int64_t carried_at(std::int64_t begin_us, std::size_t bytes) const;
   void forget_departed(std::int64_t now_us);
+  /// Tells the window what the sender knows by now.
+  void notice(std::int64_t now_us);
+  [[nodiscard]] std::size_t buffer_room_bytes(std::int64_t now_us) const;
   /// What the loss of a segment costs it; 0: it is not lost.
   std::int64_t recovery_us(std::int64_t queueing_us);
 
@@ -81,6 +95,11 @@ class LinkShaper {
   std::int64_t last_departure_us_ = 0;
   std::int64_t last_arrival_us_ = 0;
   int lost_in_a_row_ = 0;
+  bool windowed_ = false;
+  TcpWindow window_;
+  std::multimap<std::int64_t, Notice> notices_;  // by time
+  bool overflows_ = false;                       // the buffer loses the next segment
+  std::int64_t overflow_known_us_ = 0;           // the sender knows of the last one from then on
 };
 
 }  // namespace catgs::load

@@ -1,5 +1,8 @@
 #include "tests/load/link.h"
 
+#include <cmath>
+
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,6 +48,8 @@ TEST(Link, ParsesItsParts) {
   EXPECT_EQ(link.loss, 0.01);
   EXPECT_EQ(link.burst, 4.0);
   EXPECT_EQ(link.queue_us, 1'000'000);
+  EXPECT_TRUE(link.cubic);
+  EXPECT_FALSE(parse_link("--link", "delay=1ms,congestion=none").cubic);
   EXPECT_TRUE(link.shapes());
   EXPECT_FALSE(parse_link("--link", "").shapes());
   EXPECT_EQ(parse_link("--link", "rate=5mbit").up.at(0).bits_per_s, 5e6);
@@ -53,15 +58,17 @@ TEST(Link, ParsesItsParts) {
 TEST(Link, RefusesWhatIsNone) {
   for (const char* bad : {"5mbit", "rate", "rate=", "rate=5", "rate=5mbit@3s", "speed=5mbit",
                           "rate=5mbit@0s,1mbit@0s", "delay=20m,jitter=-1ms", "loss=60%", "burst=0",
-                          "rate=5mbit,,", "rate=5mbit,1mbit@2s,1mbit@1s"}) {
+                          "rate=5mbit,,", "congestion=vegas", "rate=5mbit,1mbit@2s,1mbit@1s"}) {
     EXPECT_THROW(parse_link("--link", bad), InputError) << bad;
   }
   EXPECT_THAT([] { parse_link("--link", "speed=1mbit"); },
               ThrowsMessage<InputError>(HasSubstr("speed")));
 }
 
+/// A path whose sender may have any amount under way.
 LinkShaper shaper(std::string_view text) {
-  const LinkSettings link = parse_link("", text);
+  LinkSettings link = parse_link("", text);
+  link.cubic = false;
   return {link, link.down, 7};
 }
 
@@ -138,6 +145,68 @@ TEST(LinkShaper, WhatFollowsALossWaitsForIt) {
     longest = std::max(longest, link.send(segment, now) - now);
   }
   EXPECT_EQ(longest, 10'000 + 20'000 + 200'000) << "delay, round trip, retransmission timeout";
+}
+
+/// What a sender that always has more gets through, and what becomes of its window.
+struct Transfer {
+  explicit Transfer(std::string_view text) : settings(parse_link("", text)) {}
+
+  void run_until(std::int64_t end_us) {
+    while (now_us < end_us) {
+      const std::size_t segments = link.room_bytes(now_us) / segment;
+      for (std::size_t i = 0; i < segments; ++i, ++sent) {
+        const std::int64_t sent_us = now_us;
+        slowest_us = std::max(slowest_us, link.send(segment, now_us) - sent_us);
+      }
+      now_us = std::max(now_us + 100, std::min(link.next_room_us(), end_us));
+    }
+  }
+  [[nodiscard]] double bits_per_s() const {
+    return 8e6 * static_cast<double>(sent * segment) / static_cast<double>(now_us);
+  }
+
+  LinkSettings settings;
+  LinkShaper link{settings, settings.down, 7};
+  std::int64_t now_us = 0;
+  std::int64_t slowest_us = 0;
+  std::size_t sent = 0;
+};
+
+TEST(LinkShaper, ASenderStartsWithTenSegmentsAndDoublesThem) {
+  Transfer transfer("delay=50ms");
+  for (const std::size_t segments : {10u, 30u, 70u, 150u}) {
+    transfer.run_until(transfer.now_us + 100'000 - transfer.now_us % 100'000);
+    EXPECT_EQ(transfer.sent, segments);
+  }
+}
+
+/// RFC 9438, 5.1: at such a loss CUBIC's mean window is Reno's, 1.22 / sqrt(loss). Random losses,
+/// and timeouts after three in a row, cost some of that.
+TEST(LinkShaper, LossCostsTheRateThatItCostsCubic) {
+  for (const double loss : {0.005, 0.01, 0.03}) {
+    Transfer transfer(fmt::format("delay=25ms,loss={}", loss));
+    transfer.run_until(300'000'000);
+    const double expected = 1.22 / std::sqrt(loss) * segment * 8.0 / 0.050;
+    EXPECT_GT(transfer.bits_per_s(), 0.6 * expected) << loss;
+    EXPECT_LT(transfer.bits_per_s(), 1.2 * expected) << loss;
+  }
+}
+
+TEST(LinkShaper, ASenderFillsItsBottleneckAndLosesWhatIsBeyond) {
+  Transfer transfer("rate=20mbit,delay=25ms,queue=100ms");
+  transfer.run_until(60'000'000);
+  EXPECT_GT(transfer.bits_per_s(), 0.9 * 20e6);
+  EXPECT_GT(transfer.slowest_us, 200'000) << "a full buffer, and the round trip of a repetition";
+  EXPECT_LT(transfer.link.window().segments() * segment * 8.0, 20e6 * 0.150 * 1.1);
+}
+
+TEST(LinkShaper, WhoSendsLittleIsNotHeldBack) {
+  Transfer lossy("rate=20mbit,delay=25ms");
+  for (std::int64_t now_us = 0; now_us < 10'000'000; now_us += 33'000) {
+    ASSERT_GE(lossy.link.room_bytes(now_us), 5 * segment);
+    for (int i = 0; i < 5; ++i)
+      EXPECT_LE(lossy.link.send(segment, now_us) - now_us, 25'000 + 5 * 600);
+  }
 }
 
 }  // namespace

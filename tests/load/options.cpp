@@ -51,7 +51,7 @@ void add_client_options(CLI::App& app, GroupOptions& group) {
   app.add_option_function<std::string>(
       "--link", [&group](const std::string& text) { group.link = parse_link("--link", text); },
       "Each session's line: rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,"
-      "loss=1%,burst=4,queue=200ms; each part may be left out");
+      "loss=1%,burst=4,queue=200ms,congestion=cubic; each part may be left out");
   auto* decode = app.add_flag("--decode", manners.decode, "Decode every frame and check its size");
   app.add_flag("--only-pictures", manners.only_pictures,
                "Decode only what is compared with --check-scene, from an IDR of its own on")
