@@ -13,7 +13,7 @@ Installs what the build and the tests need, builds, and runs the tests.
   --quick      unit, integration and lint tests only (minutes, once built)
   (default)    also the load and browser tests
   --full       also the sanitizer builds, clang-tidy over all files, a start from nothing in a fresh
-               Debian, images, and a fleet of containers
+               Debian, images, and a fleet of containers, by podman and by Docker
   --log FILE   the full log (default build/release/test.log)
   -h, --help   this text
 

@@ -127,6 +127,14 @@ set_up_server_image() {
     build_server_image localhost/catgs-server:cpu >"$work/build.log" 2>&1 || die "$(tail -n 20 "$work/build.log")"
 }
 
+# set_up_fleet_images TOOL...: the images of the compose file, but for Grafana's.
+set_up_fleet_images() {
+  set_up_server_image "$@"
+  build_stand_in docker.io/library/haproxy:3.0 haproxy haproxy -W -db -f /usr/local/etc/haproxy/haproxy.cfg
+  build_stand_in docker.io/prom/prometheus:v2.53.3 prometheus \
+    prometheus --config.file=/etc/prometheus/prometheus.yml --storage.tsdb.path=/prometheus
+}
+
 # build_stand_in TAG PACKAGE COMMAND...: Debian's package under the name of an image of a registry.
 build_stand_in() {
   local tag=$1 package=$2

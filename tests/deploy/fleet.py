@@ -1,10 +1,11 @@
 #!/usr/bin/python3
-"""The compose file's system under podman: what visitors notice when servers die, drain and come back.
+"""The compose file's system: what visitors notice when servers die, drain and come back.
 
-  fleet.py --load catgs-load [--keep]
+  fleet.py --load catgs-load [--engine podman | docker]
 
-Runs what docker/compose.yaml says (two servers, HAProxy, Prometheus), without a Docker engine and
-without publishing ports, with eight sessions of catgs-load. Started by fleet.sh, which makes the
+Runs what docker/compose.yaml says, with eight sessions of catgs-load. With docker that is the
+README's command, by docker-compose. With podman it is two servers, HAProxy and Prometheus, without a
+Docker engine and without publishing ports. Started by fleet.sh and docker_engine.sh, which make the
 images. Prints what it measures; exit status 1 where a promise is broken.
 """
 
@@ -47,11 +48,15 @@ def check(holds, text):
         failures.append(text)
 
 
-def podman(*arguments, check_status=True):
-    result = subprocess.run(["podman", *arguments], capture_output=True, text=True, check=False)
-    if check_status and result.returncode != 0:
-        raise RuntimeError(f"podman {' '.join(arguments)}: {result.stderr.strip()}")
+def run_program(*command):
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}: {result.stderr.strip()}")
     return result.stdout.strip()
+
+
+def podman(*arguments):
+    return run_program("podman", *arguments)
 
 
 def wait_until(what, holds, seconds):
@@ -71,7 +76,39 @@ def get(url, timeout=3):
         return answer.read().decode()
 
 
-class Fleet:
+class DockerFleet:
+    """What the README's command starts, by Compose 2 or, where that is missing, by docker-compose 1.29."""
+
+    engine = "docker"
+
+    def __init__(self):
+        file = SOURCE_DIR / "docker/compose.yaml"
+        if subprocess.run(["docker", "compose", "version"], capture_output=True, check=False).returncode == 0:
+            self.command = ("docker", "compose", "-f", str(file), "--profile", "cpu")
+            return
+        # It does not know the key `name`.
+        self.copy = tempfile.NamedTemporaryFile("w", suffix=".yaml")
+        self.copy.write(re.sub(r"^name:.*\n", "", file.read_text(), flags=re.M))
+        self.copy.flush()
+        self.command = ("docker-compose", "-f", self.copy.name, "--project-directory", str(file.parent),
+                        "--project-name", "catgs", "--profile", "cpu")
+
+    def up(self):
+        run_program(*self.command, "up", "--no-build", "--detach")
+
+    def container(self, name):
+        return run_program(*self.command, "ps", "--all", "--quiet", name)
+
+    def address(self, name):
+        networks = json.loads(run_program("docker", "inspect", "--format", "{{json .NetworkSettings.Networks}}", self.container(name)))
+        return next(iter(networks.values()))["IPAddress"]
+
+
+class PodmanFleet:
+    """The same without a Docker engine."""
+
+    engine = "podman"
+
     def __init__(self, compose):
         self.services = compose["services"]
         self.network = compose["networks"]["default"]["ipam"]["config"][0]
@@ -119,6 +156,9 @@ class Fleet:
             if name == "keys":
                 podman("wait", "fleet-keys")
 
+    def container(self, name):
+        return f"fleet-{name}"
+
     def address(self, name):
         return podman("inspect", "--format", f'{{{{(index .NetworkSettings.Networks "{NETWORK}").IPAddress}}}}', f"fleet-{name}")
 
@@ -139,6 +179,11 @@ class Metrics:
 def prometheus(address, query):
     url = f"http://{address}:9090/api/v1/query?" + urllib.parse.urlencode({"query": query})
     return json.loads(get(url))["data"]["result"]
+
+
+def log_of(fleet, name, *options):
+    return subprocess.run([fleet.engine, "logs", *options, fleet.container(name)], stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, check=False).stdout
 
 
 def ids(servers, *names):
@@ -190,8 +235,10 @@ class Load:
         check(metrics["idrs"] <= SESSIONS + moved, f"{metrics['idrs']:.0f} IDRs: one for each session, one more for each that moved")
 
 
-def run(options):
-    fleet = Fleet(yaml.safe_load((SOURCE_DIR / "docker/compose.yaml").read_text()))
+def run(fleet, load_program):
+    def engine(action, *arguments, name):
+        return run_program(fleet.engine, action, *arguments, fleet.container(name))
+
     begin = time.monotonic()
     fleet.up()
     servers = {name: Metrics(fleet.address(name)) for name in ("server-1", "server-2")}
@@ -199,9 +246,11 @@ def run(options):
     wait_until("both servers are ready", lambda: all(get(f"http://{s.address}:9090/readyz") for s in servers.values()), 120)
     wait_until("the page comes through the proxy", lambda: "<!doctype html" in get(f"http://{proxy}:8080/").lower(), 30)
     say(f"up after {time.monotonic() - begin:.1f} s")
+    if fleet.engine == "docker":
+        check("<!doctype html" in get("http://127.0.0.1:8080/").lower(), "the page is where the compose file says")
     time.sleep(3)
 
-    load = Load(options.load, proxy, 75)
+    load = Load(load_program, proxy, 75)
     took = wait_until("all sessions are live", lambda: sum(len(s.live()) for s in servers.values()) == SESSIONS, 30)
     spread = [len(s.live()) for s in servers.values()]
     check(took < 30 and min(spread) >= SESSIONS // 2 - 1, f"{SESSIONS} sessions, spread {spread} by least connections")
@@ -210,37 +259,37 @@ def run(options):
 
     for address, where in ((proxy, "through the proxy"), (servers["server-2"].address, "straight to a server")):
         status = stranger(address, "6.6.6.6")
-        logs = "".join(podman("logs", f"fleet-{name}") + subprocess.run(["podman", "logs", f"fleet-{name}"], capture_output=True, text=True, check=False).stderr for name in servers)
+        logs = "".join(log_of(fleet, name) for name in servers)
         seen = re.findall(r"(\d+\.\d+\.\d+\.\d+): \S", logs)
         check("101" in status and seen and "6.6.6.6" not in logs, f"a forged X-Forwarded-For {where} is ignored (the log says {sorted(set(seen))})")
 
     moved = len(servers["server-1"].live())
     before = ids(servers)
     say(f"kill -9 of server-1 with {moved} sessions")
-    podman("kill", "--signal", "KILL", "fleet-server-1")
+    engine("kill", "--signal", "KILL", name="server-1")
     took = wait_until("all sessions are back", lambda: len(servers["server-2"].live()) == SESSIONS, 20)
     check(took <= 2.0, f"killed: all sessions are live on the other server after {took:.2f} s")
     check(ids(servers, "server-2") == before, "each under its id: its resume token holds on the other server, and brings its pose")
     firing = 'count(ALERTS{alertname="CatgsServerDown", alertstate="firing"})'
     took = wait_until("the alert fires", lambda: prometheus(watcher, firing), 60)
     check(took < 60, f"CatgsServerDown fires {took:.0f} s after that")
-    podman("start", "fleet-server-1")
+    engine("start", name="server-1")
     servers["server-1"] = Metrics(fleet.address("server-1"))
     took = wait_until("the alert clears", lambda: not prometheus(watcher, firing), 60)
     check(took < 60, f"and clears {took:.0f} s after it is started again")
     load.judge(moved, "killed")
 
     wait_until("they have left", lambda: not any(s.live() for s in servers.values()), 30)
-    load = Load(options.load, proxy, 45)
+    load = Load(load_program, proxy, 45)
     wait_until("all sessions are live", lambda: sum(len(s.live()) for s in servers.values()) == SESSIONS, 30)
     moved = len(servers["server-2"].live())
     say(f"drain of server-2 with {moved} sessions")
-    stopper = threading.Thread(target=podman, args=("stop", "--time", "40", "fleet-server-2"))
+    stopper = threading.Thread(target=engine, args=("stop", "--time", "40"), kwargs={"name": "server-2"})
     begin = time.monotonic()
     stopper.start()
     took = wait_until("all sessions are on the other server", lambda: len(servers["server-1"].live()) == SESSIONS, 40)
     stopper.join()
-    status = podman("inspect", "--format", "{{.State.ExitCode}}", "fleet-server-2")
+    status = engine("inspect", "--format", "{{.State.ExitCode}}", name="server-2")
     check(took < 40 and status == "0", f"drained: all sessions on the other server after {took:.1f} s, exit status {status} after {time.monotonic() - begin:.1f} s")
     load.judge(moved, "drained")
 
@@ -248,14 +297,16 @@ def run(options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--load", required=True, help="catgs-load")
+    parser.add_argument("--engine", choices=["podman", "docker"], default="podman")
     options = parser.parse_args()
+    compose = yaml.safe_load((SOURCE_DIR / "docker/compose.yaml").read_text())
+    fleet = DockerFleet() if options.engine == "docker" else PodmanFleet(compose)
     try:
-        run(options)
+        run(fleet, options.load)
     finally:
         if failures or sys.exc_info()[0]:
             for name in SERVICES:
-                print(f"---- {name}", flush=True)
-                subprocess.run(["podman", "logs", "--tail", "20", f"fleet-{name}"], check=False)
+                print(f"---- {name}\n{log_of(fleet, name, '--tail', '20')}", flush=True)
     return 1 if failures else 0
 
 

@@ -7,8 +7,5 @@ set -euo pipefail
 # shellcheck source=tests/deploy/containers.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/containers.sh"
 
-set_up_server_image haproxy
-build_stand_in docker.io/library/haproxy:3.0 haproxy haproxy -W -db -f /usr/local/etc/haproxy/haproxy.cfg
-build_stand_in docker.io/prom/prometheus:v2.53.3 prometheus \
-  prometheus --config.file=/etc/prometheus/prometheus.yml --storage.tsdb.path=/prometheus
+set_up_fleet_images haproxy
 /usr/bin/python3 -B "$source_dir/tests/deploy/fleet.py" --load "$1"
