@@ -19,7 +19,7 @@ namespace catgs {
 struct LinkGrant {
   std::string scene_id;  // or a name, which means the scene that has it alone; empty: every scene
   /// "viewer": may look at everything; "author": may also save tours; "spectator": only watch
-  /// others' sessions; "solo": neither watch nor be watched.
+  /// those who present; "solo": neither watch nor present.
   std::string role = "viewer";
   std::int64_t expires_unix_s = 0;
   std::string id = {};  // by which it can be revoked; empty: made when links had none

@@ -13,7 +13,7 @@ namespace catgs {
 enum class Use {
   list,         // know that it is there
   own_session,  // move through it
-  watch,        // look on at somebody's session, or be looked on at
+  watch,        // look on at who presents, or present
   save,         // write its sidecar
 };
 

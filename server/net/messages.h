@@ -54,6 +54,7 @@ struct Hello {
   std::optional<PoseSample> resume_pose;
   PosePath resume_path;  // empty: no path
   std::string watch_token;
+  bool follow = false;  // rather a session of its own than to watch
   Settings settings;
 };
 
@@ -79,11 +80,18 @@ struct Pick {
   glm::vec3 origin{0.0f};
   glm::vec3 direction{0.0f, 0.0f, 1.0f};  // unit
 };
+struct Present {
+  bool on = false;
+  std::string name;
+};
+struct Follow {
+  std::string watch_token;  // empty: follow nobody
+};
 /// A message of a newer wire version. It is ignored, as the contract demands.
 struct UnknownMessage {};
 
 using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
-                                   SelectScene, RequestIdr, Pause, Bye, Pick>;
+                                   SelectScene, RequestIdr, Pause, Bye, Pick, Present, Follow>;
 
 struct SceneFacts {
   std::string scene_id;
@@ -120,6 +128,7 @@ struct Welcome {
   std::vector<std::string> scene_ids;
   std::string watch_token;
   bool watching = false;
+  bool may_leave = false;
 };
 
 struct Stats {
@@ -157,6 +166,7 @@ enum class ErrorCode {
   idle_timeout,
   internal,
   session_ended,
+  no_leader,
 };
 
 /// As the log names it.
@@ -199,7 +209,16 @@ struct Picked {
   std::optional<float> distance;  // none: nothing was hit
 };
 
-using ServerMessage =
-    std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain, Picked>;
+enum class LeadState { leads, away, ended };
+
+struct Lead {
+  LeadState state = LeadState::leads;
+  std::string name;
+  std::size_t company = 0;           // who watch or follow
+  std::optional<PoseSample> camera;  // to followers
+};
+
+using ServerMessage = std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat,
+                                   ErrorMessage, Drain, Picked, Lead>;
 
 }  // namespace catgs

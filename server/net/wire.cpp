@@ -143,6 +143,7 @@ Hello parse(const v1::Hello& message) {
   if (message.resume().has_pose()) hello.resume_pose = parse(message.resume().pose());
   hello.resume_path = parse(message.resume().path());
   hello.watch_token = checked_length("hello.watch", message.watch(), 512);
+  hello.follow = message.follow();
   hello.settings = parse(message.settings());
   return hello;
 }
@@ -194,6 +195,11 @@ ClientMessage parse(const v1::ClientMessage& message) {
       return Bye{};
     case v1::ClientMessage::kPick:
       return parse(message.pick());
+    case v1::ClientMessage::kPresent:
+      return Present{message.present().on(),
+                     checked_length("present.name", message.present().name(), 64)};
+    case v1::ClientMessage::kFollow:
+      return Follow{checked_length("follow.watch", message.follow().watch(), 512)};
     case v1::ClientMessage::BODY_NOT_SET:
       break;
   }
@@ -256,6 +262,7 @@ void fill(const Welcome& welcome, v1::ServerMessage& out) {
   for (const auto& id : welcome.scene_ids) message.add_scene_ids(id);
   message.set_watch_token(welcome.watch_token);
   message.set_watching(welcome.watching);
+  message.set_may_leave(welcome.may_leave);
 }
 
 void fill(const QueuePlace& place, v1::ServerMessage& out) {
@@ -306,6 +313,20 @@ void fill(const Picked& picked, v1::ServerMessage& out) {
   message.set_distance(picked.distance.value_or(0.0f));
 }
 
+void fill(const Lead& lead, v1::ServerMessage& out) {
+  auto& message = *out.mutable_lead();
+  message.set_state(static_cast<v1::Lead::State>(lead.state));
+  message.set_name(lead.name);
+  message.set_company(static_cast<std::uint32_t>(lead.company));
+  if (!lead.camera) return;
+  auto& camera = *message.mutable_camera();
+  camera.set_pose_id(lead.camera->pose_id);
+  camera.set_client_time_us(lead.camera->client_time_us);
+  fill(lead.camera->world_from_camera, *camera.mutable_world_from_camera());
+  camera.set_fov_y_rad(lead.camera->fov_y_rad);
+  camera.set_at_rest(lead.camera->at_rest);
+}
+
 template <typename Body>
 constexpr Topic topic_of = Topic::event;
 template <>
@@ -318,6 +339,8 @@ template <>
 constexpr Topic topic_of<Stats> = Topic::statistics;
 template <>
 constexpr Topic topic_of<Heartbeat> = Topic::clock;
+template <>
+constexpr Topic topic_of<Lead> = Topic::leader;
 
 std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();

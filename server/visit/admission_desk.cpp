@@ -105,6 +105,13 @@ void AdmissionDesk::grow_pictures() {
     set_pixel_share(*admitted_places()[growth->session], growth->pixel_share);
 }
 
+bool AdmissionDesk::has_spare_place(const Hello& hello) const {
+  if (!queue_.empty()) return false;
+  const auto offer = offer_for(hello, demands());
+  return offer.room == Room::yes && offer.pixel_share >= 0.5 &&
+         std::ranges::all_of(offer.kept, [](double kept) { return kept >= 1.0; });
+}
+
 AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
   place.visitor().come_by(hello.token, around_.authorize);
   const std::string& id = place.id();

@@ -25,6 +25,9 @@ class AdmissionDesk {
   [[nodiscard]] std::variant<std::string, ErrorMessage> choose(const Hello& hello) const;
   [[nodiscard]] SceneAnswer find_scene(const std::string& scene_id, TimePoint now) const;
   AdmissionAnswer admit(Place& place, const Hello& hello);
+  /// True: admit() would grant this hello at least half of the pixels that it wishes, and nobody
+  /// would wait or give up pixels for it.
+  [[nodiscard]] bool has_spare_place(const Hello& hello) const;
   /// A client said hello. It may need less room than the clients that wait already.
   void on_newcomer(TimePoint now);
   /// The place takes no room any more and leaves the queue.

@@ -107,15 +107,20 @@ bool Audience::wants_idr(TimePoint now) const {
 }
 
 void Audience::keep_talking(TimePoint now) {
+  if (const auto lead = presentation_.news(spectators_.size(), !connected(), now)) {
+    if (visitor_) visitor_->connection().send(wire::serialize(*lead));
+    tell_spectators(*lead, now);
+  }
   if (last_said_ && now - *last_said_ < speak_at_least_every) return;
   tell_spectators(heartbeat_at(now), now);
 }
 
-void Audience::dismiss_spectators() {
+void Audience::end_presentation() {
+  presentation_.end();
   for (const Spectator& s : std::exchange(spectators_, {})) {
     s.connection->connection().send(wire::serialize(
-        ErrorMessage{ErrorCode::session_ended, "the session that you watched has ended", true}));
-    s.connection->dismiss(CloseCode::normal, "the session has ended");
+        ErrorMessage{ErrorCode::session_ended, "the presentation has ended", true}));
+    s.connection->dismiss(CloseCode::normal, "the presentation has ended");
   }
 }
 

@@ -9,10 +9,12 @@
 
 #include "server/access/authorize.h"
 #include "server/visit/client_connection.h"
+#include "server/visit/presentation.h"
 
 namespace catgs {
 
-/// The receivers of a visit's frames: its visitor, if connected, and spectators. Spectators get the
+/// The receivers of a visit's frames: its visitor, if connected, and spectators. While the visit
+/// presents, it may also have followers, who get its camera instead. Spectators get the
 /// frames as encoded for the visitor, who never waits for them. A spectator that reads too slowly
 /// misses frames up to the next IDR. Session thread only.
 class Audience {
@@ -39,7 +41,12 @@ class Audience {
   /// dropped.
   std::vector<std::uint64_t> send(OutgoingFrame frame, TimePoint now);
 
-  [[nodiscard]] bool full() const { return spectators_.size() >= max_spectators_; }
+  [[nodiscard]] Presentation& presentation() { return presentation_; }
+  [[nodiscard]] bool full() const { return company() >= max_spectators_; }
+  /// Spectators and followers.
+  [[nodiscard]] std::size_t company() const {
+    return spectators_.size() + presentation_.followers();
+  }
   [[nodiscard]] std::size_t spectators() const { return spectators_.size(); }
   /// The spectator is sent `welcome` first, without the visitor's secrets. Frames follow from the
   /// next IDR on.
@@ -55,10 +62,11 @@ class Audience {
   /// Call it at least four times a second. True: a spectator waits for an IDR and the last one was
   /// sent a second or more ago.
   [[nodiscard]] bool wants_idr(TimePoint now) const;
-  /// Sends spectators a heartbeat after almost a second of silence.
+  /// Sends everybody what is new about the presentation, and spectators a heartbeat after almost a
+  /// second of silence.
   void keep_talking(TimePoint now);
-  /// Closes all spectators' connections: the session has ended or may not be watched any more.
-  void dismiss_spectators();
+  /// Ends the presentation and closes all spectators' connections.
+  void end_presentation();
 
  private:
   struct Spectator {
@@ -72,6 +80,7 @@ class Audience {
   const std::size_t max_spectators_;
   std::string address_;
   std::vector<Spectator> spectators_;
+  Presentation presentation_;
   std::optional<TimePoint> last_idr_;
   std::optional<TimePoint> last_said_;  // to spectators
 };

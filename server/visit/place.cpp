@@ -48,12 +48,31 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   const auto* hello = std::get_if<Hello>(&message);
   if (hello && visit_.life().state() == VisitState::awaiting_hello)
     return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
-  if (const auto* pose = std::get_if<PoseSample>(&message))
+  if (visit_.life().state() == VisitState::live) {
+    if (const auto* wish = std::get_if<Present>(&message)) return present(*wish, received);
+    if (const auto* wish = std::get_if<Follow>(&message))
+      return admissions_.follow(*this, from, *wish, received);
+  }
+  if (const auto* pose = std::get_if<PoseSample>(&message)) {
+    audience_.presentation().moved(*pose, received);
     return around_.frames.pose_arrived(*this, *pose, received);
+  }
   if (const auto* ack = std::get_if<Ack>(&message))
     return around_.frames.seen(*this, *ack, received);
   visit_.on_message(message, received);
   around_.frames.changed(*this);
+}
+
+void Place::present(const Present& wish, TimePoint now) {
+  if (!wish.on) return audience_.end_presentation();
+  if (!may_be_watched())
+    return send(
+        ErrorMessage{ErrorCode::unauthorized, "this link does not let others watch", false});
+  if (!audience_.presentation().since()) {
+    const LogSession about(id_);
+    spdlog::info("{} presents", audience_.address());
+  }
+  audience_.presentation().begin(wish.name, now);
 }
 
 void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::size_t packet_bytes,

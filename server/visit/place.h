@@ -27,6 +27,8 @@ class Admissions {
                         std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) = 0;
   virtual AdmissionAnswer admit(Place& place, const Hello& hello) = 0;
   virtual SceneAnswer find_scene(const std::string& scene_id, TimePoint now) = 0;
+  /// `from`, the place's visitor, follows another session from now on, or none.
+  virtual void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) = 0;
   [[nodiscard]] virtual std::uint32_t admitted() const = 0;
   /// The place's visit has ended.
   virtual void leave(Place& place) = 0;
@@ -96,6 +98,8 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   [[nodiscard]] const std::shared_ptr<Stream>& stream() const { return stream_; }
 
  private:
+  void present(const Present& wish, TimePoint now);
+
   const VisitContext& around_;
   Admissions& admissions_;
   const std::string id_;  // of the session

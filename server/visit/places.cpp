@@ -62,7 +62,14 @@ void Places::forget_connection(const std::string& address) {
 
 void Places::on_hello(const std::shared_ptr<ClientConnection>& from,
                       std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) {
-  if (!hello.watch_token.empty()) return watch(from, *newcomer, hello, now);
+  const auto host = hello.watch_token.empty() ? presenter_for_spectator(hello)
+                                              : presenter(hello.watch_token, hello.token);
+  if (host) {
+    if (const auto* error = std::get_if<ErrorMessage>(&*host))
+      return newcomer->visit().fail(error->code, error->message);
+    if (!has_room_for_follower(hello, *std::get<Place*>(*host)))
+      return watch(from, *newcomer, *std::get<Place*>(*host), hello, now);
+  }
   const auto resumed =
       around_.tokens.read_resume_token(hello.resume_token, around_.options.wall_clock_s());
   if (resumed && hello.version >= wire::version) {
@@ -112,51 +119,118 @@ bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& 
   const PicturePlan& plan = known.visit().stream().plan();
   known.visit().on_resumed(
       hello, {std::move(*scene), visitor.encoder, plan.effort(), plan.pixel_share()}, now);
-  if (!known.may_be_watched()) known.audience().dismiss_spectators();
+  if (!known.may_be_watched()) known.audience().end_presentation();
   around_.frames.changed(known);
   return true;
 }
 
+std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_token,
+                                                     const std::string& access_token) {
+  const auto refused = [](ErrorCode code, std::string_view why) {
+    return ErrorMessage{code, std::string(why), true};
+  };
+  const auto id = around_.tokens.read_watch_token(watch_token);
+  if (!id)
+    return refused(ErrorCode::unauthorized, "this link to watch a session is not valid here");
+  const auto host = find_place(places_, *id);
+  if (!host || !host->visit().life().resumable())
+    return refused(ErrorCode::session_ended, "the session of this link has ended");
+  if (host->visit().life().state() != VisitState::live)
+    return refused(ErrorCode::server_full, "the session of this link is about to start");
+  if (!host->may_be_watched())
+    return refused(ErrorCode::unauthorized,
+                   "the session of this link is not to be watched any more");
+  if (!host->audience().presentation().since())
+    return refused(ErrorCode::session_ended, "the session of this link does not present now");
+  // The leader's link opens the presentation, also to those without an access token. Only links
+  // that let somebody in, but not watch, are taken at their word.
+  const std::string& scene_id = host->visit().stream().scene()->facts.scene_id;
+  const Permit permit = around_.authorize(access_token);
+  if (const auto why = permit(scene_id, Use::watch); why && !permit(scene_id, Use::own_session))
+    return refused(ErrorCode::unauthorized, *why);
+  return host.get();
+}
+
+std::optional<std::variant<Place*, ErrorMessage>> Places::presenter_for_spectator(
+    const Hello& hello) {
+  const Permit permit = around_.authorize(hello.token);
+  const auto only_watches = [&](const std::string& scene_id) {
+    return permit(scene_id, Use::own_session) && !permit(scene_id, Use::watch);
+  };
+  const std::string wanted = around_.scenes.resolve(hello.scene_id);
+  const auto ids = around_.scenes.scene_ids();
+  if (!hello.scene_id.empty() ? !only_watches(wanted) : std::ranges::none_of(ids, only_watches))
+    return std::nullopt;
+  Place* first = nullptr;
+  for (const auto& place : places_) {
+    const auto since = place->audience().presentation().since();
+    if (!since || place->visit().life().state() != VisitState::live || !place->may_be_watched())
+      continue;
+    const std::string& scene_id = place->visit().stream().scene()->facts.scene_id;
+    if (!only_watches(scene_id) || (!hello.scene_id.empty() && scene_id != wanted)) continue;
+    if (!first || *since < *first->audience().presentation().since()) first = place.get();
+  }
+  if (first) return first;
+  return ErrorMessage{ErrorCode::no_leader, "nobody leads through this scene now", true};
+}
+
+bool Places::has_room_for_follower(Hello& hello, Place& host) {
+  const std::string& scene_id = host.visit().stream().scene()->facts.scene_id;
+  if (!hello.follow || around_.authorize(hello.token)(scene_id, Use::own_session)) return false;
+  hello.scene_id = scene_id;
+  return desk_.has_spare_place(hello);
+}
+
 void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
-                   const Hello& hello, TimePoint now) {
+                   Place& host, const Hello& hello, TimePoint now) {
   const auto refuse = [&](ErrorCode code, std::string_view why) {
     newcomer.visit().fail(code, why);
   };
-  const auto id = around_.tokens.read_watch_token(hello.watch_token);
-  if (!id) return refuse(ErrorCode::unauthorized, "this link to watch a session is not valid here");
-  const auto host = find_place(places_, *id);
-  if (!host || !host->visit().life().resumable())
-    return refuse(ErrorCode::session_ended, "the session of this link has ended");
-  Visit& visit = host->visit();
-  Audience& audience = host->audience();
-  const Permit permit = newcomer.visitor().come_by(hello.token, around_.authorize);
-  if (const auto why = permit(visit.stream().scene()->facts.scene_id, Use::watch))
-    return refuse(ErrorCode::unauthorized, *why);
-  if (!host->may_be_watched())
-    return refuse(ErrorCode::unauthorized,
-                  "the session of this link is not to be watched any more");
-  if (visit.life().state() != VisitState::live)
-    return refuse(ErrorCode::server_full, "the session of this link is about to start");
+  Visit& visit = host.visit();
+  Audience& audience = host.audience();
   if (std::ranges::count(hello.decoders, visit.stream().config().codec) == 0)
     return refuse(ErrorCode::no_common_codec,
                   "the client cannot decode what the session of this link is encoded as");
   if (audience.full())
     return refuse(ErrorCode::server_full,
-                  fmt::format("{} people watch this session already", audience.spectators()));
+                  fmt::format("{} people watch this session already", audience.company()));
   newcomer.audience().detach();
   leave(newcomer);
-  connection->watch(*host);
-  audience.add(connection, visit.stream().welcome(), permit.link_id);
+  const Permit permit = around_.authorize(hello.token);
+  connection->watch(host);
+  Welcome welcome = visit.stream().welcome();
+  welcome.may_leave = !permit(welcome.scene.scene_id, Use::own_session).has_value();
+  audience.add(connection, std::move(welcome), permit.link_id);
   {
     const std::string address = connection->connection().peer_address();
-    LogFacts facts = host->facts();
+    LogFacts facts = host.facts();
     facts.event = "spectator_joined";
     facts.address = address;
     facts.link = permit.link_id;
     log_info(facts, "{}{} watches", address, by_link(facts));
   }
   if (audience.wants_idr(now)) visit.stream().idr().request();
-  around_.frames.changed(*host);
+  around_.frames.changed(host);
+}
+
+void Places::follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) {
+  for (const auto& other : places_) other->audience().presentation().remove(from);
+  if (wish.watch_token.empty()) return;
+  const auto refuse = [&](ErrorCode code, std::string why) {
+    place.visit().say(ErrorMessage{code, std::move(why), false}, now);
+    place.visit().say(Lead{LeadState::ended, {}, 0, {}}, now);
+  };
+  const auto found = presenter(wish.watch_token, place.visitor().token);
+  if (const auto* error = std::get_if<ErrorMessage>(&found))
+    return refuse(error->code, error->message);
+  Place& host = *std::get<Place*>(found);
+  const auto scene_of = [](Place& any) { return any.visit().stream().scene()->facts.scene_id; };
+  if (scene_of(host) != scene_of(place))
+    return refuse(ErrorCode::session_ended, "the session of this link is in another scene");
+  if (host.audience().full())
+    return refuse(ErrorCode::server_full,
+                  fmt::format("{} people follow this session already", host.audience().company()));
+  host.audience().presentation().add(from.shared_from_this());
 }
 
 void Places::leave(Place& place) {
@@ -171,7 +245,7 @@ void Places::leave(Place& place) {
   }
   desk_.leave(place, now);
   around_.frames.withdraw(place);
-  place.audience().dismiss_spectators();
+  place.audience().end_presentation();
   places_.erase(it);
   desk_.admit_waiting(now);
 }

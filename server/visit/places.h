@@ -1,8 +1,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
+#include <variant>
 
 #include <boost/asio/steady_timer.hpp>
 
@@ -44,15 +46,25 @@ class Places final : public Admissions {
   [[nodiscard]] std::uint32_t admitted() const override {
     return static_cast<std::uint32_t>(desk_.admitted());
   }
+  void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) override;
   void leave(Place& place) override;
 
  private:
   void add(const std::shared_ptr<ClientConnection>& connection,
            const std::shared_ptr<Place>& place);
   void forget_connection(const std::string& address);
-  /// Makes the newcomer a spectator of the session in its watch token, or refuses it.
-  void watch(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
+  /// Makes the newcomer a spectator of the host, or refuses it.
+  void watch(const std::shared_ptr<ClientConnection>& connection, Place& newcomer, Place& host,
              const Hello& hello, TimePoint now);
+  /// Returns the presenting session of a watch token, or why nobody may watch it by this access
+  /// token.
+  std::variant<Place*, ErrorMessage> presenter(const std::string& watch_token,
+                                               const std::string& access_token);
+  /// Returns the session that a link of role spectator may watch: the one that has presented its
+  /// scene for longest. Nothing: the link lets its client move.
+  std::optional<std::variant<Place*, ErrorMessage>> presenter_for_spectator(const Hello& hello);
+  /// True: a follower gets a visit of its own, and nobody gives up pixels for it.
+  bool has_room_for_follower(Hello& hello, Place& host);
   /// Continues the session of a resume token. False: the session cannot continue.
   bool resume(const std::shared_ptr<ClientConnection>& connection, Place& newcomer, Place& known,
               const Hello& hello, TimePoint now);

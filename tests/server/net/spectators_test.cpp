@@ -1,5 +1,5 @@
-// Integration: clients that look on at a session. Real sockets on loopback, a whole server in this
-// process.
+// Integration: clients that look on at a session, or follow it. Real sockets on loopback, a whole
+// server in this process.
 
 #include <atomic>
 #include <map>
@@ -31,11 +31,42 @@ std::optional<v1::Error> refusal(const RunningServer& server, const v1::ClientMe
   return error;
 }
 
+/// Returns once the server has heard it.
+void present(WireClient& host, const std::string& name = "Ada") {
+  v1::ClientMessage message;
+  message.mutable_present()->set_on(true);
+  message.mutable_present()->set_name(name);
+  host.send(message);
+  host.receive_message(v1::ServerMessage::kLead);
+}
+
+void present_no_more(WireClient& host) {
+  v1::ClientMessage message;
+  message.mutable_present()->set_on(false);
+  host.send(message);
+}
+
+void follow(WireClient& client, const std::string& watch_token) {
+  v1::ClientMessage message;
+  message.mutable_follow()->set_watch(watch_token);
+  client.send(message);
+}
+
+/// Skips to a message about the leader that is as wanted.
+template <typename Wanted>
+v1::Lead lead_of(WireClient& client, Wanted wanted) {
+  for (;;) {
+    const v1::Lead lead = client.receive_message(v1::ServerMessage::kLead).lead();
+    if (wanted(lead)) return lead;
+  }
+}
+
 /// A host that reads, acknowledges and, when asked, moves.
 class BusyHost {
  public:
   explicit BusyHost(const RunningServer& server) : client_(server.port()) {
     welcome = client_.greet(160, 96);
+    present(client_);
     client_.send_pose(1);
   }
   void run(const std::stop_token& stop) {
@@ -105,6 +136,7 @@ TEST(Spectators, HearOfNewSettingsAndMayLeave) {
   RunningServer server;
   WireClient host(server.port());
   const std::string link = host.greet(160, 96).watch_token();
+  present(host);
   WireClient spectator(server.port());
   spectator.greet(watching_hello(link));
   host.send_pose(1);
@@ -130,6 +162,10 @@ TEST(Spectators, AreLimitedAndNeedARealLink) {
   RunningServer server([](ServerConfig& config) { config.max_spectators = 1; });
   WireClient host(server.port());
   const v1::Welcome welcome = host.greet();
+  EXPECT_EQ(refusal(server, watching_hello(welcome.watch_token()))->code(),
+            v1::Error::SESSION_ENDED)
+      << "nobody looks on unasked";
+  present(host);
   EXPECT_EQ(refusal(server, watching_hello("made.up"))->code(), v1::Error::UNAUTHORIZED);
   EXPECT_EQ(refusal(server, watching_hello(welcome.session_id()))->code(), v1::Error::UNAUTHORIZED);
   EXPECT_EQ(refusal(server, watching_hello(welcome.resume_token()))->code(),
@@ -152,13 +188,16 @@ TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
   RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
   WireClient host(server.port());
   const std::string watch = host.greet(64, 64, v1::CODEC_H264, link("viewer")).watch_token();
-  EXPECT_EQ(refusal(server, watching_hello(watch))->code(), v1::Error::UNAUTHORIZED);
+  present(host);
+  WireClient guest(server.port());
+  v1::ClientMessage by_link = watching_hello(watch);
+  by_link.mutable_hello()->set_follow(true);
+  const v1::Welcome shown = guest.greet(by_link);
+  EXPECT_TRUE(shown.watching()) << "the leader's link lets a guest watch";
+  EXPECT_FALSE(shown.may_leave()) << "and no more";
   EXPECT_EQ(refusal(server, watching_hello(watch, link("solo")))->code(), v1::Error::UNAUTHORIZED);
   WireClient spectator(server.port());
   EXPECT_TRUE(spectator.greet(watching_hello(watch, link("spectator"))).watching());
-  v1::ClientMessage own = hello_message(64, 64, v1::CODEC_H264);
-  own.mutable_hello()->set_token(link("spectator"));
-  EXPECT_EQ(refusal(server, own)->code(), v1::Error::UNAUTHORIZED);
   WireClient alone(server.port());
   EXPECT_EQ(alone.greet(64, 64, v1::CODEC_H264, link("solo")).watch_token(), "");
 }
@@ -173,6 +212,7 @@ TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
   RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
   WireClient host(server.port());
   const v1::Welcome welcome = host.greet(64, 64, v1::CODEC_H264, link("viewer"));
+  present(host);
   const v1::ClientMessage watching = watching_hello(welcome.watch_token(), link("spectator"));
   WireClient spectator(server.port());
   spectator.greet(watching);
@@ -184,6 +224,91 @@ TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
   EXPECT_EQ(now.watch_token(), "");
   EXPECT_EQ(spectator.receive_until_closed().close_code, 1000);
   EXPECT_EQ(refusal(server, watching)->code(), v1::Error::UNAUTHORIZED);
+}
+
+TEST(Spectators, OfTheirRoleFindWhoLeadsThroughTheirScene) {
+  const TemporaryFolder folder;
+  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
+  const std::string key = read_key_file("", key_file);
+  const auto link = [&](const std::string& role) {
+    return make_link_token({"city", role, 1'000'000'000'000}, key);
+  };
+  RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
+  WireClient host(server.port());
+  const std::string id = host.greet(64, 64, v1::CODEC_H264, link("viewer")).session_id();
+  const v1::ClientMessage hello = watching_hello("", link("spectator"));
+  EXPECT_EQ(refusal(server, hello)->code(), v1::Error::NO_LEADER);
+  present(host);
+  WireClient spectator(server.port());
+  const v1::Welcome welcome = spectator.greet(hello);
+  EXPECT_TRUE(welcome.watching());
+  EXPECT_FALSE(welcome.may_leave());
+  EXPECT_EQ(welcome.session_id(), id);
+  const auto with_one = [](const v1::Lead& lead) { return lead.company() == 1; };
+  EXPECT_EQ(lead_of(spectator, with_one).name(), "Ada");
+  EXPECT_EQ(lead_of(host, with_one).state(), v1::Lead::LEADS);
+  present_no_more(host);
+  std::optional<v1::Error> error;
+  EXPECT_EQ(spectator.receive_until_closed(&error).close_code, 1000);
+  EXPECT_EQ(error->code(), v1::Error::SESSION_ENDED);
+  EXPECT_EQ(refusal(server, hello)->code(), v1::Error::NO_LEADER);
+}
+
+TEST(Followers, GetTheLeadersCameraAndKeepTheirOwnStream) {
+  RunningServer server([](ServerConfig& config) { config.min_fps = 0; });
+  WireClient host(server.port());
+  const std::string link = host.greet(64, 64, v1::CODEC_H264).watch_token();
+  present(host);
+  host.send_pose(1, 1.5f);
+  WireClient follower(server.port());
+  v1::ClientMessage hello = watching_hello(link);
+  hello.mutable_hello()->set_follow(true);
+  EXPECT_FALSE(follower.greet(hello).watching()) << "a place is free";
+  follow(follower, link);
+  const auto at = [](float x) {
+    return
+        [x](const v1::Lead& lead) { return lead.camera().world_from_camera().position().x() == x; };
+  };
+  EXPECT_EQ(lead_of(follower, at(1.5f)).name(), "Ada");
+  host.send_pose(2, 2.5f);
+  lead_of(follower, at(2.5f));
+  follower.send_pose(7, 9.0f);
+  while (follower.receive_frame().header.pose_id() != 7) {
+  }
+  EXPECT_EQ(lead_of(host, [](const v1::Lead& lead) { return lead.company() == 1; }).company(), 1u);
+  follow(follower, "");
+  lead_of(host, [](const v1::Lead& lead) { return lead.company() == 0; });
+  follow(follower, link);
+  present_no_more(host);
+  EXPECT_EQ(lead_of(follower, [](const v1::Lead& lead) { return lead.state() == v1::Lead::ENDED; })
+                .company(),
+            0u);
+  follow(follower, link);
+  EXPECT_FALSE(follower.receive_message(v1::ServerMessage::kError).error().fatal());
+  EXPECT_EQ(follower.receive_message(v1::ServerMessage::kLead).lead().state(), v1::Lead::ENDED);
+}
+
+TEST(Followers, WatchWhereNoPlaceIsFreeAndHearThatTheLeaderIsAway) {
+  RunningServer server([](ServerConfig& config) {
+    config.min_fps = 0;
+    config.max_sessions = 1;
+    config.max_spectators = 1;
+  });
+  auto host = std::make_unique<WireClient>(server.port());
+  const v1::Welcome lead = host->greet(64, 64, v1::CODEC_H264);
+  present(*host);
+  v1::ClientMessage hello = watching_hello(lead.watch_token());
+  hello.mutable_hello()->set_follow(true);
+  WireClient follower(server.port());
+  const v1::Welcome welcome = follower.greet(hello);
+  EXPECT_TRUE(welcome.watching());
+  EXPECT_TRUE(welcome.may_leave()) << "once a place is free";
+  EXPECT_EQ(refusal(server, hello)->code(), v1::Error::SERVER_FULL);
+  host.reset();
+  lead_of(follower, [](const v1::Lead& now) { return now.state() == v1::Lead::AWAY; });
+  WireClient back(server.port());
+  back.greet(resuming_hello(lead.resume_token()));
+  lead_of(follower, [](const v1::Lead& now) { return now.state() == v1::Lead::LEADS; });
 }
 
 }  // namespace

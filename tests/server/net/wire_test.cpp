@@ -412,6 +412,17 @@ TEST(Wire, SaysWhichMessagesReplaceEachOther) {
   EXPECT_EQ(wire::serialize(ErrorMessage{}).topic, Topic::event);
   EXPECT_EQ(wire::serialize(Drain{}).topic, Topic::event);
   EXPECT_EQ(wire::serialize(Picked{}).topic, Topic::event);
+  EXPECT_EQ(wire::serialize(Lead{}).topic, Topic::leader);
+}
+
+TEST(Wire, BoundsTheNameOfALeaderAndTheTokenOfAFollower) {
+  v1::ClientMessage message;
+  message.mutable_present()->set_name(std::string(65, 'a'));
+  EXPECT_THAT(complaint(message), HasSubstr("present.name"));
+  message.mutable_present()->set_name("a\n");
+  EXPECT_THAT(complaint(message), HasSubstr("present.name"));
+  message.mutable_follow()->set_watch(std::string(513, 'a'));
+  EXPECT_THAT(complaint(message), HasSubstr("follow.watch"));
 }
 
 TEST(Wire, AnswersPicks) {

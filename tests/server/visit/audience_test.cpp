@@ -98,7 +98,7 @@ TEST_F(AudienceTest, EndsWithTheSession) {
   const auto second = join();
   audience.remove(*spectators[0]);
   EXPECT_EQ(audience.spectators(), 1u);
-  audience.dismiss_spectators();
+  audience.end_presentation();
   EXPECT_EQ(second->closed, CloseCode::normal);
   EXPECT_FALSE(first->closed);
   EXPECT_EQ(audience.spectators(), 0u);
