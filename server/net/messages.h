@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -182,7 +183,9 @@ constexpr std::string_view name_of(ErrorCode code) {
                                         "render_failed",
                                         "idle_timeout",
                                         "internal",
-                                        "session_ended"};
+                                        "session_ended",
+                                        "no_leader"};
+  static_assert(std::size(names) == 1 + static_cast<std::size_t>(ErrorCode::no_leader));
   return names[static_cast<std::size_t>(code)];
 }
 

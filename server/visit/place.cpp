@@ -69,8 +69,8 @@ void Place::present(const Present& wish, TimePoint now) {
     return send(
         ErrorMessage{ErrorCode::unauthorized, "this link does not let others watch", false});
   if (!audience_.presentation().since()) {
-    const LogSession about(id_);
-    spdlog::info("{} presents", audience_.address());
+    const LogScope about(facts());
+    log_info({.event = "presents"}, "{} presents", audience_.address());
   }
   audience_.presentation().begin(wish.name, now);
 }

@@ -96,7 +96,7 @@ describe('names of scenes', () => {
 
   it('are asked for where the address names neither a scene nor a view', () => {
     for (const rest of ['', '?author', '#token=a', '?scene=', '#mode=fly']) expect(leaves_scene_open(`http://host/${rest}`)).toBe(true);
-    for (const rest of ['?scene=hall', '?ui=0', '#at=1', '#mode=fly&stop=2']) expect(leaves_scene_open(`http://host/${rest}`)).toBe(false);
+    for (const rest of ['?scene=hall', '?ui=0', '#at=1', '#mode=fly&stop=2', '#watch=abc']) expect(leaves_scene_open(`http://host/${rest}`)).toBe(false);
   });
 });
 

@@ -20,17 +20,31 @@ function eased(share: number): number {
   return s * s * s * (s * (6 * s - 15) + 10);
 }
 
+/** The camera at a share of the straight way. */
+export const between = (from: Eye, to: Eye, share: number): Eye => ({
+  position: add(from.position, scale(sub(to.position, from.position), share)),
+  orientation: slerp(from.orientation, to.orientation, share),
+  fov_y_rad: from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share,
+});
+
 export function glide(from: Eye, to: Eye, duration_s: number): Flight {
   return {
     duration_s,
-    at: (time_s) => {
-      const share = duration_s > 0 ? eased(time_s / duration_s) : 1;
-      return {
-        position: add(from.position, scale(sub(to.position, from.position), share)),
-        orientation: slerp(from.orientation, to.orientation, share),
-        fov_y_rad: from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share,
-      };
-    },
+    at: (time_s) => between(from, to, duration_s > 0 ? eased(time_s / duration_s) : 1),
+  };
+}
+
+const catch_up_s = 0.08; // smooths the steps between two messages, and is hardly seen as a delay
+const pursuit_s = 5 * catch_up_s;
+
+/**
+ * After a camera that somebody else moves and that is heard of a few times a second: quick at first, then
+ * slower and slower. The next message replaces it before its end.
+ */
+export function pursuit(from: Eye, to: Eye): Flight {
+  return {
+    duration_s: pursuit_s,
+    at: (time_s) => (time_s >= pursuit_s ? to : between(from, to, 1 - Math.exp(-time_s / catch_up_s))),
   };
 }
 

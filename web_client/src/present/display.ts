@@ -52,6 +52,12 @@ export class Display {
     this.redraw_soon();
   }
 
+  /** Whether pictures may be larger than the view. */
+  set may_overscan(may: boolean) {
+    this.policy_.may_overscan = may;
+    this.env_.overscan_changed();
+  }
+
   get warps(): boolean {
     return this.policy_.active;
   }

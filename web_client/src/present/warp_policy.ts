@@ -23,6 +23,7 @@ export class WarpPolicy {
   private readonly widths_ = new TimeWindow(span_us);
   private readonly heights_ = new TimeWindow(span_us);
   private readonly draw_us_ = new TimeWindow(span_us);
+  may_overscan = true;
   private overscan_ = none;
   private needed_us_ = -Infinity; // when the present overscan was last needed
   private too_slow_ = false;
@@ -41,7 +42,7 @@ export class WarpPolicy {
   }
 
   get overscan(): Sides {
-    return this.active ? this.overscan_ : none;
+    return this.active && this.may_overscan ? this.overscan_ : none;
   }
 
   /** Text for people. */

@@ -63,5 +63,5 @@ export function scene_address(page_url: string, scene_id = ''): string {
 /** Whether the address leaves the scene open: it names none, and shows no view of one. Frames get the first scene. */
 export function leaves_scene_open(page_url: string): boolean {
   const { searchParams, hash } = new URL(page_url);
-  return !searchParams.get('scene') && searchParams.get('ui') !== '0' && !/[#&](at|stop)=/.test(hash);
+  return !searchParams.get('scene') && searchParams.get('ui') !== '0' && !/[#&](at|stop|watch)=/.test(hash);
 }

@@ -8,6 +8,7 @@ import {
   type ClientBody,
   type FrameHeader,
   type HelloInit,
+  type Lead,
   type Picked,
   type PoseInit,
   type ServerBody,
@@ -35,6 +36,8 @@ interface SessionListener {
   stream_ended(): void;
   stats(stats: Stats): void;
   picked(picked: Picked): void;
+  /** Of the session that this one leads, watches or follows. */
+  lead(lead: Lead): void;
   /** The server sent a message for people. The session goes on. */
   notice(message: string): void;
 }
@@ -65,6 +68,7 @@ export class Session {
   private last_pose_: PoseInit | undefined;
   private path_: readonly PoseInit[] = [];
   private paused_ = false;
+  private readonly kept_ = new Map<ClientBody['case'], ClientBody>();
 
   constructor(
     private readonly env_: SessionEnvironment,
@@ -91,6 +95,12 @@ export class Session {
   /** Sends to a server that has welcomed this session. Nothing is kept for later. */
   send(body: ClientBody): void {
     if (this.link_?.welcome) this.link_.send(body);
+  }
+
+  /** Sends it, and again at each welcome. A newer message of its kind takes its place. */
+  keep(body: ClientBody): void {
+    this.kept_.set(body.case, body);
+    if (this.link_?.welcome?.watching === false) this.send(body);
   }
 
   /** The newest pose wins. A congested connection skips older ones. */
@@ -220,6 +230,9 @@ export class Session {
       case 'picked':
         if (link === this.link_) this.listener_.picked(body.value);
         break;
+      case 'lead':
+        if (link === this.link_) this.listener_.lead(body.value);
+        break;
       case 'error':
         this.refused(link, body.value);
         break;
@@ -236,6 +249,8 @@ export class Session {
     link.welcomed_us = this.env_.clock.now_us();
     if (welcome.config) link.config = welcome.config;
     if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
+    // A session of its own stays one.
+    if (!welcome.watching) this.greeting_ = { ...this.greeting_, watch: '', follow: false };
     if (link === this.link_) this.go_live(link);
     else if (this.last_pose_) link.send({ case: 'pose', value: this.last_pose_ });
   }
@@ -259,6 +274,7 @@ export class Session {
     if (link.config) this.listener_.config(link.config);
     this.listener_.state({ phase: 'live' });
     if (this.paused_) this.send({ case: 'pause', value: { paused: true } });
+    if (!link.welcome?.watching) for (const body of this.kept_.values()) this.send(body);
     this.flush_pose();
     this.keep_alive();
   }
@@ -268,6 +284,8 @@ export class Session {
       this.listener_.notice(error.message);
     } else if (link === this.successor_) {
       this.lost(link, 'refused', error.message);
+    } else if (error.code === Error_Code.SESSION_ENDED || error.code === Error_Code.NO_LEADER) {
+      this.wait('no_leader', error.message);
     } else if (is_temporary(error.code)) {
       this.wait('refused', error.message);
     } else {
@@ -288,7 +306,7 @@ export class Session {
 
   private flush_pose(): void {
     this.cancel_pose_();
-    if (!this.last_pose_ || !this.link_?.welcome) return;
+    if (!this.last_pose_ || this.link_?.welcome?.watching !== false) return;
     if (this.link_.buffered_bytes() > congested_bytes) {
       this.cancel_pose_ = this.env_.timers.after(congestion_poll_ms, () => this.flush_pose());
       return;

@@ -14,4 +14,5 @@ export type WaitCause =
   | 'unreachable' // no connection could be opened
   | 'lost' // an open connection was closed
   | 'silent' // an open connection said nothing for too long
+  | 'no_leader' // this page looks on, and nobody leads now
   | 'refused'; // the server said why, and trying again makes sense

@@ -11,6 +11,12 @@ const fragment_of = (href: string): URLSearchParams => new URLSearchParams(new U
 
 export const has_token = (href: string): boolean => fragment_of(href).has('token');
 
+/** The watch token of a link to a presentation; '' for none. It stays in the address, for reloads. */
+export function watch_token(href: string): string {
+  const token = fragment_of(href).get('watch') ?? '';
+  return can_be_token(token) ? token : '';
+}
+
 /** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
   private value_: string;

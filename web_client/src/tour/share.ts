@@ -29,6 +29,14 @@ export function share_address(page_url: string, scene_id: string, view: SharedVi
   return url.href;
 }
 
+/** The page's address for those who follow the session of this watch token. */
+export function presentation_address(page_url: string, scene_id: string, watch_token: string): string {
+  const nowhere = { eye: undefined, mode: undefined, tour_index: undefined, stop_index: undefined };
+  const url = new URL(share_address(page_url, scene_id, nowhere));
+  url.hash = new URLSearchParams({ watch: watch_token }).toString();
+  return url.href;
+}
+
 /** Reads an address of share_address(). Members are undefined where it has nothing or nonsense. */
 export function read_shared(page_url: string): SharedView {
   const fragment = new URLSearchParams(new URL(page_url).hash.slice(1));

@@ -139,13 +139,13 @@ export class Guide {
     for (const problem of problems) notice.show(text.tour.unreadable(problem));
     if (start) {
       camera.start_at(start);
-      if (!shared.eye) navigation.reset();
+      if (!shared.eye && !navigation.led) navigation.reset();
     }
     this.first_start_ = camera.start;
     this.tour_view_.show_tours(tours);
     this.author_?.load(tours, about_of(scene), may_save ? token : undefined, document.etag);
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
-    const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined;
+    const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined || navigation.led;
     this.player_.load(tours, stays);
     if (load === 1 && this.author_) toolbar.open('author');
     this.show_stop(shared, true);

@@ -34,6 +34,8 @@ export class Navigation {
   readonly speed_chosen = new Signal<number>();
   readonly sampled = new Signal<CameraSample>();
   readonly pad_pressed = new Signal<GamepadAction>();
+  /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
+  led = false;
   private readonly inertia_ = new Inertia();
   private readonly picks_: Picks;
   private scene_id_: string | undefined;
@@ -202,7 +204,8 @@ export class Navigation {
     this.loop.changed();
   }
 
-  private welcomed({ scene, sceneIds }: Welcome): void {
+  private welcomed({ scene, sceneIds, watching }: Welcome): void {
+    if (watching) return; // another visitor moves the camera
     // After a reconnect the visitor stays where they were.
     if (!scene || scene.sceneId === this.scene_id_) return;
     this.scene_id_ = scene.sceneId;

@@ -1,4 +1,4 @@
-import { has_token } from '../session/token';
+import { has_token, watch_token } from '../session/token';
 import type { WorkerClient } from '../worker/client';
 
 /**
@@ -16,8 +16,10 @@ export function bind_page_events(worker: WorkerClient): void {
   window.addEventListener('online', () => {
     if (waits) worker.post({ kind: 'retry' });
   });
+  const watched = watch_token(location.href);
   window.addEventListener('hashchange', () => {
-    if (has_token(location.href)) location.reload();
+    const other = watch_token(location.href);
+    if (has_token(location.href) || (other && other !== watched)) location.reload();
   });
   window.addEventListener('pagehide', (event) => {
     if (!event.persisted) worker.post({ kind: 'stop' });

@@ -17,6 +17,8 @@ const no_room_for_card = '(max-width: 1100px), (max-height: 500px)';
 export class Toolbar {
   readonly panel_shown = new Signal<{ panel: Panel; shown: boolean }>();
   private readonly bar_ = by_id('toolbar', HTMLElement);
+  /** Whether another visitor moves the camera: then there is less to control. */
+  watching = false;
   private readonly small_screen_ = matchMedia(small_screen);
 
   constructor(private readonly navigation_: Navigation) {
@@ -65,6 +67,7 @@ export class Toolbar {
     const faster: Readonly<Record<string, number>> = { '+': 2, '=': 2, '-': -2, '_': -2 };
     window.addEventListener('keydown', (event) => {
       if (this.bar_.inert || event.repeat || !is_for_page(event)) return;
+      if (this.watching && !(event.code in { KeyF: 1, KeyI: 1, Escape: 1 })) return;
       actions[event.code]?.();
       // By its sign, because its place differs from layout to layout.
       const steps = faster[event.key];

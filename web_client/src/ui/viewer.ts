@@ -4,7 +4,7 @@ import { clock_from } from '../base/clock';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import type { PresenterChoice } from '../present/make_presenter';
-import type { AccessToken } from '../session/token';
+import { watch_token, type AccessToken } from '../session/token';
 import { text } from '../text';
 import { WorkerClient } from '../worker/client';
 import { make_automation } from './automation';
@@ -21,6 +21,7 @@ import { SessionStatus } from './session_status';
 import { StatsPanel } from './stats_panel';
 import { StreamSize } from './stream_size';
 import { Toolbar } from './toolbar';
+import { Together } from './together';
 import { TurnCall } from './turn_call';
 import { jpeg_reason } from './wording';
 
@@ -45,10 +46,13 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
   new Guide({ view, clock, worker, navigation, toolbar, notice, token, reduced_motion });
+  new Together(worker, navigation, toolbar, notice, reduced_motion);
   bind_page_events(worker);
   window.catgs = make_automation(worker, navigation, clock);
 
-  navigation.entered.listen(({ scene, scene_ids }) => show_scene_title(scene, scene_ids.length > 1));
+  worker.on('welcome', ({ welcome: { scene, sceneIds } }) => {
+    if (scene) show_scene_title(scene, sceneIds.length > 1);
+  });
   const poster = new Poster();
   worker.on('presented', () => poster.end());
   navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(speed), 2));
@@ -71,6 +75,7 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
       page_origin_ms: performance.timeOrigin,
       token: token.value,
       scene_id,
+      watch: watch_token(location.href),
       view: stream_size.view,
       quality: stream_size.quality,
       rung,

@@ -50,6 +50,9 @@ export function card_for(
           };
     }
     case 'waiting':
+      if (state.cause === 'no_leader') {
+        return { title: cards.waiting.no_leader, text: text.together.comes_by_itself, busy: true };
+      }
       return {
         title: cards.waiting[state.cause],
         text: sentence(state.message).trim(),

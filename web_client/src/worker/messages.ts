@@ -1,5 +1,5 @@
 // Messages between page and worker. They are structured clones, so they hold plain data only.
-import type { Pose, CameraSample } from '../camera/eye';
+import type { Pose, CameraSample, Eye } from '../camera/eye';
 import type { PathSample } from '../camera/flight';
 import type { Ray } from '../camera/ray';
 import type { DecoderRung } from '../decode/ladder';
@@ -10,7 +10,7 @@ import type { WarpMode } from '../present/warp_policy';
 import type { Quality, View } from '../session/quality';
 import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
-import type { FrameHeader, StreamConfig, Welcome } from '../wire/wire';
+import type { FrameHeader, Lead, StreamConfig, Welcome } from '../wire/wire';
 
 export interface Snapshot {
   /** Header of the newest picture. */
@@ -30,6 +30,8 @@ export type ToWorker =
       page_origin_ms: number;
       token: string;
       scene_id: string;
+      /** Watch token of a session to follow; '': none. */
+      watch: string;
       view: View;
       quality: Quality;
       rung: DecoderRung;
@@ -43,6 +45,11 @@ export type ToWorker =
   | { kind: 'hidden'; hidden: boolean }
   | { kind: 'retry' }
   | { kind: 'token'; token: string }
+  /** Begins anew: follows the session of this watch token; '': a visit of one's own. */
+  | { kind: 'watch'; watch: string }
+  /** Of a visit of one's own: wants the camera of that session; '': no more. */
+  | { kind: 'follow'; watch: string }
+  | { kind: 'present'; on: boolean; name: string }
   | { kind: 'stop' }
   | { kind: 'get_stats'; request: number }
   | { kind: 'get_snapshot'; request: number };
@@ -56,6 +63,8 @@ export type FromWorker =
   | { kind: 'rung'; rung: DecoderRung }
   /** Answers a pick. `distance`: undefined where nothing is there. */
   | { kind: 'picked'; id: number; distance: number | undefined }
+  /** `eye`: where the leader's camera is, for those who follow. */
+  | { kind: 'lead'; lead: Lead; eye: Eye | undefined }
   | { kind: 'notice'; message: string }
   /** No video decoder is left. The worker asks for JPEG pictures instead. */
   | { kind: 'fallback'; message: string }

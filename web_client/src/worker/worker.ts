@@ -76,6 +76,7 @@ class Client {
     this.tell_presenter();
     this.pipeline_ = this.make_pipeline();
     this.session_ = this.make_session(start);
+    if (start.watch) this.session_.keep({ case: 'follow', value: { watch: start.watch } });
     this.session_.start();
   }
 
@@ -115,6 +116,18 @@ class Client {
         break;
       case 'token':
         this.session_.greet_anew({ token: message.token });
+        break;
+      case 'watch':
+        this.session_.keep({ case: 'follow', value: { watch: message.watch } });
+        this.session_.greet_anew({ watch: message.watch, follow: true });
+        break;
+      case 'follow':
+        this.session_.keep({ case: 'follow', value: { watch: message.watch } });
+        break;
+      case 'present':
+        // The leader's pictures and field of view are also those of others, who see no warped view.
+        this.display_.may_overscan = !message.on;
+        this.session_.keep({ case: 'present', value: { on: message.on, name: message.name } });
         break;
       case 'stop':
         this.session_.stop();
@@ -185,6 +198,10 @@ class Client {
         stream_ended: () => this.pipeline_.end_stream(),
         stats: (stats) => this.metrics_.server_said(stats),
         picked: ({ id, hit, distance }) => say({ kind: 'picked', id, distance: hit ? distance : undefined }),
+        lead: (lead) => {
+          const { camera } = lead;
+          say({ kind: 'lead', lead, eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad) });
+        },
         notice: (message) => say({ kind: 'notice', message }),
       },
       {
@@ -193,6 +210,8 @@ class Client {
         viewportHeightPx: start.view.height_px,
         decoders: available_codecs(start.rung),
         token: start.token,
+        watch: start.watch,
+        follow: start.watch !== '',
         settings: settings(start.view, start.quality, this.display_.overscan),
       },
     );

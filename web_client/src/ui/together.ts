@@ -1,0 +1,206 @@
+// Watching together: one visitor leads, and others see what the leader sees. They watch the leader's own
+// pictures, or follow the leader's camera on a stream of their own where the server has a place for them.
+import type { Eye } from '../camera/eye';
+import { glide, glide_time_s, pursuit } from '../camera/flight';
+import { watch_token } from '../session/token';
+import { text } from '../text';
+import { presentation_address } from '../tour/share';
+import { Lead_State, type Lead, type Welcome } from '../wire/wire';
+import type { WorkerClient } from '../worker/client';
+import { by_id, on_click } from './dom';
+import type { Navigation } from './navigation';
+import type { Notice } from './notice';
+import type { Toolbar } from './toolbar';
+
+const { together: words } = text;
+const most_name_bytes = 64; // that the wire takes
+
+/**
+ * alone: nobody is led, or the presentation is over. watching: the pictures are the leader's. following:
+ * the camera is. left: the visitor looks around and may follow again. leading: others are led from here.
+ */
+type Role = 'alone' | 'watching' | 'following' | 'left' | 'leading';
+
+export class Together {
+  private role_: Role = 'alone';
+  private lead_: Lead | undefined;
+  private leader_eye_: Eye | undefined;
+  private may_leave_ = false;
+  private leader_gone_ = false; // a card says so
+  private joining_ = false; // on the way from the visitor's own view to the leader's
+  private chasing_ = false; // this part replaces its own flight by the next
+  private readonly token_ = watch_token(location.href);
+  private readonly bar_ = by_id('company', HTMLElement);
+  private readonly action_ = by_id('company-action', HTMLButtonElement);
+  private readonly view_ = by_id('view', HTMLElement);
+  private readonly own_label_ = this.view_.getAttribute('aria-label') ?? '';
+  private readonly name_ = by_id('present-name', HTMLInputElement);
+  private readonly link_ = by_id('present-link', HTMLInputElement);
+
+  constructor(
+    private readonly worker_: WorkerClient,
+    private readonly navigation_: Navigation,
+    private readonly toolbar_: Toolbar,
+    private readonly notice_: Notice,
+    private readonly reduced_motion_: boolean,
+  ) {
+    navigation_.led = this.token_ !== '';
+    worker_.on('welcome', ({ welcome }) => this.welcomed(welcome));
+    worker_.on('state', ({ state }) => {
+      this.leader_gone_ = state.phase === 'waiting' && state.cause === 'no_leader';
+      this.show();
+    });
+    worker_.on('lead', ({ lead, eye }) => this.heard(lead, eye));
+    worker_.on('presented', ({ pose, fov_y_rad }) => {
+      if (this.role_ === 'watching') this.leader_eye_ = { ...pose, fov_y_rad };
+    });
+    navigation_.entered.listen(() => {
+      if (this.leader_eye_) navigation_.put(this.leader_eye_);
+    });
+    navigation_.taken_over.listen(() => {
+      if (this.role_ === 'following') this.leave();
+    });
+    this.action_.addEventListener('click', () => this.act());
+    on_click('present-start', () => this.present());
+    on_click('present-stop', () => this.stop());
+    on_click('present-copy', () => void this.copy());
+    this.link_.addEventListener('focus', () => this.link_.select());
+  }
+
+  private welcomed({ watching, mayLeave, watchToken, scene }: Welcome): void {
+    this.may_leave_ = mayLeave;
+    by_id('present', HTMLElement).hidden = watchToken === '' || this.token_ !== '';
+    this.link_.value = presentation_address(location.href, scene?.sceneId ?? '', watchToken);
+    if (watching) this.become('watching');
+    else if (this.role_ === 'watching') this.become('left'); // it comes to follow by the next message
+  }
+
+  private heard(lead: Lead, eye: Eye | undefined): void {
+    this.lead_ = lead;
+    if (eye) this.leader_eye_ = eye;
+    if (this.role_ === 'leading' || this.role_ === 'watching') this.show();
+    else if (lead.state === Lead_State.ENDED) this.ended();
+    else if (eye) this.follow(eye);
+  }
+
+  private ended(): void {
+    if (this.role_ === 'following') this.notice_.show(words.over, 10);
+    this.navigation_.stop_flight();
+    this.become('alone');
+  }
+
+  private follow(eye: Eye): void {
+    if (this.role_ !== 'following') {
+      this.become('following');
+      this.joining_ = true;
+      const from = this.navigation_.eye;
+      const time_s = this.reduced_motion_ ? 0 : glide_time_s(from, eye, this.navigation_.reach);
+      this.fly(glide(from, eye, time_s));
+    } else if (!this.joining_) {
+      this.chase();
+    }
+  }
+
+  private chase(): void {
+    const { leader_eye_: to, navigation_: navigation } = this;
+    if (to) this.fly(this.reduced_motion_ ? glide(to, to, 0) : pursuit(navigation.eye, to));
+  }
+
+  private fly(way: ReturnType<typeof glide>): void {
+    this.chasing_ = true;
+    this.navigation_.fly(way, (arrived) => {
+      if (arrived && this.joining_) {
+        this.joining_ = false;
+        this.chase();
+      } else if (!arrived && !this.chasing_ && this.role_ === 'following') {
+        this.leave(); // a tour or a gesture has taken the camera
+      }
+    });
+    this.chasing_ = false;
+  }
+
+  private act(): void {
+    if (this.role_ === 'leading') this.stop();
+    else if (this.role_ === 'left') this.worker_.post({ kind: 'follow', watch: this.token_ });
+    else if (this.role_ === 'watching') this.worker_.post({ kind: 'watch', watch: '' });
+    else this.leave();
+  }
+
+  private leave(): void {
+    this.worker_.post({ kind: 'follow', watch: '' });
+    this.become('left');
+    this.navigation_.stop_flight();
+  }
+
+  private present(): void {
+    this.worker_.post({ kind: 'present', on: true, name: within_bytes(this.name_.value.trim()) });
+    this.lead_ = undefined;
+    this.become('leading');
+    by_id('present-copy', HTMLButtonElement).focus();
+  }
+
+  private stop(): void {
+    this.worker_.post({ kind: 'present', on: false, name: '' });
+    this.become('alone');
+  }
+
+  private async copy(): Promise<void> {
+    const clipboard = navigator.clipboard as Clipboard | undefined;
+    let said: string = text.share.copy_yourself;
+    try {
+      if (clipboard) {
+        await clipboard.writeText(this.link_.value);
+        said = words.copied;
+      }
+    } catch {
+      this.link_.select();
+    }
+    by_id('present-done', HTMLOutputElement).textContent = said;
+  }
+
+  private become(role: Role): void {
+    this.role_ = role;
+    const watching = role === 'watching';
+    document.body.classList.toggle('watching', watching);
+    this.toolbar_.watching = watching;
+    this.view_.setAttribute('role', watching ? 'img' : 'application');
+    const leading = role === 'leading';
+    for (const id of ['present-link', 'present-copy', 'present-stop']) by_id(id, HTMLElement).hidden = !leading;
+    for (const id of ['present-name', 'present-start']) by_id(id, HTMLElement).hidden = leading;
+    by_id('present-done', HTMLOutputElement).textContent = '';
+    this.show();
+  }
+
+  private show(): void {
+    const name = this.lead_?.name || words.somebody;
+    const count = this.lead_?.company ?? 0;
+    const away = this.lead_?.state === Lead_State.AWAY;
+    const said: Readonly<Record<Role, string>> = {
+      alone: '',
+      watching: this.leader_gone_ ? '' : away ? words.away(name) : words.leads(name, count),
+      following: away ? words.away(name) : words.leads(name, count),
+      left: words.leads(name, 0),
+      leading: words.you_lead(count),
+    };
+    const action: Readonly<Record<Role, string>> = {
+      alone: '',
+      watching: this.may_leave_ ? words.leave : '',
+      following: words.leave,
+      left: words.follow(name),
+      leading: words.stop,
+    };
+    const line = by_id('company-text', HTMLElement);
+    if (line.textContent !== said[this.role_]) line.textContent = said[this.role_];
+    this.bar_.hidden = said[this.role_] === '' && action[this.role_] === '';
+    this.action_.textContent = action[this.role_];
+    this.action_.hidden = action[this.role_] === '';
+    this.view_.setAttribute('aria-label', this.role_ === 'watching' ? words.view(name) : this.own_label_);
+  }
+}
+
+/** As much of the name as the wire takes. */
+function within_bytes(name: string): string {
+  let short = Array.from(name);
+  while (new TextEncoder().encode(short.join('')).length > most_name_bytes) short = short.slice(0, -1);
+  return short.join('');
+}
