@@ -28,6 +28,19 @@ void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
   if (error.fatal) metrics.sessions_refused.Increment();
 }
 
+void present(Place& place, const Present& wish, TimePoint now) {
+  Audience& audience = place.audience();
+  if (!wish.on) return audience.end_presentation();
+  if (!place.may_be_watched())
+    return place.send(
+        ErrorMessage{ErrorCode::unauthorized, "this link does not let others watch", false});
+  if (!audience.presentation().since()) {
+    const LogScope about(place.facts());
+    log_info({.event = "presents"}, "{} presents", audience.address());
+  }
+  audience.presentation().begin(wish.name, now);
+}
+
 }  // namespace
 
 Place::Place(const VisitContext& around, Admissions& admissions, std::string session_id,
@@ -49,7 +62,7 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   if (hello && visit_.life().state() == VisitState::awaiting_hello)
     return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
   if (visit_.life().state() == VisitState::live) {
-    if (const auto* wish = std::get_if<Present>(&message)) return present(*wish, received);
+    if (const auto* wish = std::get_if<Present>(&message)) return present(*this, *wish, received);
     if (const auto* wish = std::get_if<Follow>(&message))
       return admissions_.follow(*this, from, *wish, received);
   }
@@ -61,18 +74,6 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
     return around_.frames.seen(*this, *ack, received);
   visit_.on_message(message, received);
   around_.frames.changed(*this);
-}
-
-void Place::present(const Present& wish, TimePoint now) {
-  if (!wish.on) return audience_.end_presentation();
-  if (!may_be_watched())
-    return send(
-        ErrorMessage{ErrorCode::unauthorized, "this link does not let others watch", false});
-  if (!audience_.presentation().since()) {
-    const LogScope about(facts());
-    log_info({.event = "presents"}, "{} presents", audience_.address());
-  }
-  audience_.presentation().begin(wish.name, now);
 }
 
 void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::size_t packet_bytes,

@@ -98,8 +98,6 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   [[nodiscard]] const std::shared_ptr<Stream>& stream() const { return stream_; }
 
  private:
-  void present(const Present& wish, TimePoint now);
-
   const VisitContext& around_;
   Admissions& admissions_;
   const std::string id_;  // of the session

@@ -146,6 +146,8 @@ std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_to
   // that let somebody in, but not watch, are taken at their word.
   const std::string& scene_id = host->visit().stream().scene()->facts.scene_id;
   const Permit permit = around_.authorize(access_token);
+  if (around_.revoked_links()->contains(permit.link_id))
+    return refused(ErrorCode::unauthorized, link_revoked);
   if (const auto why = permit(scene_id, Use::watch); why && !permit(scene_id, Use::own_session))
     return refused(ErrorCode::unauthorized, *why);
   return host.get();

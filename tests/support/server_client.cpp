@@ -220,6 +220,14 @@ v1::Welcome WireClient::greet(const v1::ClientMessage& hello) {
   return receive_message(v1::ServerMessage::kWelcome).welcome();
 }
 
+void WireClient::present(const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_present()->set_on(true);
+  message.mutable_present()->set_name(name);
+  send(message);
+  receive_message(v1::ServerMessage::kLead);
+}
+
 void WireClient::close(int code) {
   require(state_->run([&](auto done) {
     state_->socket.async_close(websocket::close_code(static_cast<std::uint16_t>(code)), done);

@@ -102,6 +102,8 @@ class WireClient {
                     const std::string& token = {});
   /// The same with a hello of the caller's making.
   v1::Welcome greet(const v1::ClientMessage& hello);
+  /// Leads others. Returns once the server has heard it.
+  void present(const std::string& name = "Ada");
   /// Closes as a peer of RFC 6455 does, and waits for the answer.
   void close(int code);
   void send_pose(std::uint64_t pose_id, float x = 0.0f);

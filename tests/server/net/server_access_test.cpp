@@ -224,6 +224,7 @@ TEST(ServerAccess, ARevokedLinkEndsItsSessionsAndNoOthers) {
   };
   WireClient kept(server.port()), lost(server.port()), looks_on(server.port());
   const std::string watch = kept.greet(hello_by("aaaa")).watch_token();
+  kept.present();
   v1::ClientMessage resuming = hello_by("bbbb");
   resuming.mutable_hello()->mutable_resume()->set_token(
       lost.greet(hello_by("bbbb")).resume_token());

@@ -187,6 +187,7 @@ TEST(ServerProgram, EveryLineOfAJsonLogSaysWhatHappenedToWhom) {
   {
     WireClient visitor(program.port());
     const v1::Welcome welcome = visitor.greet();
+    visitor.present();
     WireClient spectator(program.port());
     v1::ClientMessage watching = hello_message(160, 96, v1::CODEC_H264);
     watching.mutable_hello()->set_watch(welcome.watch_token());

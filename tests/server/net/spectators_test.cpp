@@ -31,15 +31,6 @@ std::optional<v1::Error> refusal(const RunningServer& server, const v1::ClientMe
   return error;
 }
 
-/// Returns once the server has heard it.
-void present(WireClient& host, const std::string& name = "Ada") {
-  v1::ClientMessage message;
-  message.mutable_present()->set_on(true);
-  message.mutable_present()->set_name(name);
-  host.send(message);
-  host.receive_message(v1::ServerMessage::kLead);
-}
-
 void present_no_more(WireClient& host) {
   v1::ClientMessage message;
   message.mutable_present()->set_on(false);
@@ -66,7 +57,7 @@ class BusyHost {
  public:
   explicit BusyHost(const RunningServer& server) : client_(server.port()) {
     welcome = client_.greet(160, 96);
-    present(client_);
+    client_.present();
     client_.send_pose(1);
   }
   void run(const std::stop_token& stop) {
@@ -136,7 +127,7 @@ TEST(Spectators, HearOfNewSettingsAndMayLeave) {
   RunningServer server;
   WireClient host(server.port());
   const std::string link = host.greet(160, 96).watch_token();
-  present(host);
+  host.present();
   WireClient spectator(server.port());
   spectator.greet(watching_hello(link));
   host.send_pose(1);
@@ -165,7 +156,7 @@ TEST(Spectators, AreLimitedAndNeedARealLink) {
   EXPECT_EQ(refusal(server, watching_hello(welcome.watch_token()))->code(),
             v1::Error::SESSION_ENDED)
       << "nobody looks on unasked";
-  present(host);
+  host.present();
   EXPECT_EQ(refusal(server, watching_hello("made.up"))->code(), v1::Error::UNAUTHORIZED);
   EXPECT_EQ(refusal(server, watching_hello(welcome.session_id()))->code(), v1::Error::UNAUTHORIZED);
   EXPECT_EQ(refusal(server, watching_hello(welcome.resume_token()))->code(),
@@ -188,7 +179,7 @@ TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
   RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
   WireClient host(server.port());
   const std::string watch = host.greet(64, 64, v1::CODEC_H264, link("viewer")).watch_token();
-  present(host);
+  host.present();
   WireClient guest(server.port());
   v1::ClientMessage by_link = watching_hello(watch);
   by_link.mutable_hello()->set_follow(true);
@@ -212,7 +203,7 @@ TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
   RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
   WireClient host(server.port());
   const v1::Welcome welcome = host.greet(64, 64, v1::CODEC_H264, link("viewer"));
-  present(host);
+  host.present();
   const v1::ClientMessage watching = watching_hello(welcome.watch_token(), link("spectator"));
   WireClient spectator(server.port());
   spectator.greet(watching);
@@ -238,7 +229,7 @@ TEST(Spectators, OfTheirRoleFindWhoLeadsThroughTheirScene) {
   const std::string id = host.greet(64, 64, v1::CODEC_H264, link("viewer")).session_id();
   const v1::ClientMessage hello = watching_hello("", link("spectator"));
   EXPECT_EQ(refusal(server, hello)->code(), v1::Error::NO_LEADER);
-  present(host);
+  host.present();
   WireClient spectator(server.port());
   const v1::Welcome welcome = spectator.greet(hello);
   EXPECT_TRUE(welcome.watching());
@@ -258,7 +249,7 @@ TEST(Followers, GetTheLeadersCameraAndKeepTheirOwnStream) {
   RunningServer server([](ServerConfig& config) { config.min_fps = 0; });
   WireClient host(server.port());
   const std::string link = host.greet(64, 64, v1::CODEC_H264).watch_token();
-  present(host);
+  host.present();
   host.send_pose(1, 1.5f);
   WireClient follower(server.port());
   v1::ClientMessage hello = watching_hello(link);
@@ -296,7 +287,7 @@ TEST(Followers, WatchWhereNoPlaceIsFreeAndHearThatTheLeaderIsAway) {
   });
   auto host = std::make_unique<WireClient>(server.port());
   const v1::Welcome lead = host->greet(64, 64, v1::CODEC_H264);
-  present(*host);
+  host->present();
   v1::ClientMessage hello = watching_hello(lead.watch_token());
   hello.mutable_hello()->set_follow(true);
   WireClient follower(server.port());
