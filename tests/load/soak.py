@@ -188,6 +188,7 @@ def bad_lines(text: str, caused: collections.Counter[str]) -> list[str]:
             level, message = said["level"], said["message"]
         elif match := re.match(r"[\d:.]+ (?:\x1b\[\S*?m)?(\w+)(?:\x1b\[m)? (?:session \w+: )?(.*)", line):
             level, message = match.groups()
+        message = re.sub(r" by link \w+(?=: )", "", message)  # whoever causes a warning does not know the id
         if level == "warning" and left[message] > 0:
             left[message] -= 1
         elif level not in ("debug", "info"):

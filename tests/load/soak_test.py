@@ -95,7 +95,7 @@ class Findings(unittest.TestCase):
     def test_warnings_that_strangers_caused_are_as_many_as_they_caused(self):
         lines = ['{"time":"t","level":"warning","session":"1f2e3d4c","message":"127.0.0.1: refused"}',
                  "12:00:00.000 warning session 1f2e3d4c: 127.0.0.1: refused",
-                 "12:00:00.000 \x1b[1;33mwarning\x1b[m 127.0.0.1: refused"]
+                 "12:00:00.000 \x1b[1;33mwarning\x1b[m 127.0.0.1 by link abe6d002dd8b: refused"]
         caused = lambda times: collections.Counter({"127.0.0.1: refused": times})
         of = lambda times, text=lines: soak.bad_lines("\n".join(text), caused(times))
         self.assertEqual(of(3), [])
