@@ -13,7 +13,7 @@ namespace catgs {
 enum class Use {
   list,         // know that it is there
   own_session,  // move through it
-  watch,        // look on at who presents, or present
+  watch,        // watch a presenting session, or present
   save,         // write its sidecar
 };
 
@@ -29,7 +29,7 @@ struct Permit : std::function<Refusal(std::string_view scene_id, Use use)> {
 using Authorize = std::function<Permit(const std::string& token)>;
 
 using LinkIds = std::set<std::string, std::less<>>;
-/// Those of links that were revoked. Never null.
+/// Ids of revoked links. Never null.
 using RevokedLinks = std::shared_ptr<const LinkIds>;
 inline constexpr std::string_view link_revoked = "this link was revoked: ask for a new one";
 

@@ -20,7 +20,7 @@ struct LogFacts {
   std::string_view code{};     // why it failed: an ErrorCode's name or an HTTP status
 };
 
-/// Those of the line that this thread logs.
+/// Facts of the line that this thread is logging.
 inline thread_local LogFacts logged_facts;
 
 /// Adds facts to all lines of this thread for a scope. The texts outlive it.

@@ -45,7 +45,7 @@ void RateController::add(const Sample& sample, TimePoint now) {
   if (last_add_ && now - *last_add_ > silence) {
     recent_.clear();
     capacity_.reset();
-    // If not, this was in flight all the time.
+    // After a long round trip the sender was not idle: the sample was in flight.
     const bool idle = sample.round_trip <= silence;
     if (!idle) rate_ = std::min(rate_, restart_share * limits_.start);
     clamp_rate();

@@ -179,8 +179,24 @@ ErrorMessage SceneLibrary::refusal(SceneResidency::Wish wish, const std::string&
 void SceneLibrary::want_poster(const std::string& id) {
   boost::asio::post(io_, [this, id] {
     const auto it = shelf_.find(id);
-    if (it == shelf_.end() || it->second.gone || it->second.poster || residency_.busy()) return;
-    want(id, clock_());
+    if (it == shelf_.end() || making_poster_ || residency_.busy()) return;
+    Book& book = it->second;
+    if (book.gone || book.entry || book.poster || book.poster_tried ||
+        !residency_.has_room(book.found.size.bytes()))
+      return;
+    making_poster_ = book.poster_tried = true;
+    boost::asio::post(loader_, [this, id, found = book.found] {
+      // The scene goes here, on the loader's thread: that may wait for the device.
+      std::shared_ptr<const std::string> poster;
+      if (const Loaded loaded = load(id, found); loaded.entry) poster = loaded.entry->poster;
+      boost::asio::post(io_, [this, id, poster, changed = found.changed] {
+        making_poster_ = false;
+        const auto made_for = shelf_.find(id);
+        if (made_for == shelf_.end() || made_for->second.found.changed != changed) return;
+        if (!made_for->second.poster) made_for->second.poster = poster;
+        publish();
+      });
+    });
   });
 }
 
@@ -303,6 +319,7 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
     if (book.found.changed != scene.changed) {
       book.outdated = book.entry != nullptr;
       book.poster.reset();
+      book.poster_tried = false;
       book.retry_at.reset();
     }
     book.found = std::move(scene);
@@ -350,7 +367,7 @@ void SceneLibrary::publish() {
   auto listing = std::make_shared<std::vector<Listing>>();
   for (const std::string& id : scene_ids()) {
     Book& book = shelf_.at(id);
-    if (book.entry) {
+    if (book.entry && !book.outdated) {
       book.found.about = book.entry->facts.about;
       book.poster = book.entry->poster;
     }

@@ -65,7 +65,9 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] std::string renderer_text() const;
   /// Any thread.
   [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const;
-  /// Any thread. Loads a scene for its poster, as for a visitor, unless visitors wait for scenes.
+  /// Any thread. Loads a scene for a moment to make its poster, once and one at a time. Does
+  /// nothing while a visitor waits for a scene, or where it would not fit beside the scenes in
+  /// memory.
   void want_poster(const std::string& id);
 
  private:
@@ -73,6 +75,7 @@ class SceneLibrary final : public SceneSource {
     FoundScene found;                         // for scenes of --scene, only name and size are set
     std::shared_ptr<const SceneEntry> entry;  // while in memory
     std::shared_ptr<const std::string> poster{};  // stays when the entry goes
+    bool poster_tried = false;                    // for this content of the file
     bool pinned = false;
     bool outdated = false;                // the file has changed since
     bool gone = false;                    // the file is gone: not offered any more
@@ -119,6 +122,7 @@ class SceneLibrary final : public SceneSource {
   double bytes_per_second_ = 100e6;     // of the last load
   std::optional<TimePoint> next_scan_;  // nothing without folders
   bool scanning_ = false;
+  bool making_poster_ = false;
 
   mutable std::mutex published_mutex_;  // guards the next two
   std::shared_ptr<const std::vector<Listing>> published_;

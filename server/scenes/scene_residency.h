@@ -65,6 +65,10 @@ class SceneResidency {
   }
   /// True while a scene is being loaded or waits for it.
   [[nodiscard]] bool busy() const { return !loading_.empty() || waiting_; }
+  /// True if so many bytes fit without releasing a scene.
+  [[nodiscard]] bool has_room(std::uint64_t bytes) const {
+    return limits_.budget_bytes == 0 || this->bytes() + bytes <= limits_.budget_bytes;
+  }
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::size_t count() const { return residents_.size(); }
 

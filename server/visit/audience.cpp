@@ -43,9 +43,13 @@ void Audience::close(CloseCode code, std::string_view reason) {
 
 void Audience::send(const ServerMessage& message, TimePoint now) {
   if (visitor_) visitor_->connection().send(wire::serialize(message));
-  if (const auto* welcome = std::get_if<Welcome>(&message))
+  if (const auto* welcome = std::get_if<Welcome>(&message)) {
+    // Its company may not be allowed to see another scene.
+    if (std::exchange(scene_id_, welcome->scene.scene_id) != welcome->scene.scene_id)
+      end_presentation();
     tell_spectators(for_spectators(*welcome), now);
-  else if (std::holds_alternative<StreamConfig>(message) || std::holds_alternative<Drain>(message))
+  } else if (std::holds_alternative<StreamConfig>(message) ||
+             std::holds_alternative<Drain>(message))
     tell_spectators(message, now);
 }
 

@@ -81,6 +81,7 @@ class Audience {
   std::string address_;
   std::vector<Spectator> spectators_;
   Presentation presentation_;
+  std::string scene_id_;  // as of the last welcome
   std::optional<TimePoint> last_idr_;
   std::optional<TimePoint> last_said_;  // to spectators
 };

@@ -20,6 +20,8 @@ void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
   facts.event = error.fatal ? "session_refused" : "wish_refused";
   facts.code = name_of(error.code);
   const std::string text = fmt::format("{}{}: {}", facts.address, by_link(facts), error.message);
+  // Pages that wait for somebody to lead ask again and again.
+  if (error.code == ErrorCode::no_leader) return log_debug(facts, "{}", text);
   if (error.code == ErrorCode::internal || error.code == ErrorCode::render_failed)
     log_warning(facts, "{}", text);
   else

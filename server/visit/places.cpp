@@ -142,8 +142,8 @@ std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_to
                    "the session of this link is not to be watched any more");
   if (!host->audience().presentation().since())
     return refused(ErrorCode::session_ended, "the session of this link does not present now");
-  // The leader's link opens the presentation, also to those without an access token. Only links
-  // that let somebody in, but not watch, are taken at their word.
+  // The leader's link opens the presentation, also to those without an access token. Only a link
+  // of role solo is refused: its holder chose not to watch.
   const std::string& scene_id = host->visit().stream().scene()->facts.scene_id;
   const Permit permit = around_.authorize(access_token);
   if (around_.revoked_links()->contains(permit.link_id))
@@ -226,6 +226,7 @@ void Places::follow(Place& place, ClientConnection& from, const Follow& wish, Ti
   if (const auto* error = std::get_if<ErrorMessage>(&found))
     return refuse(error->code, error->message);
   Place& host = *std::get<Place*>(found);
+  if (&host == &place) return refuse(ErrorCode::bad_message, "a session cannot follow itself");
   const auto scene_of = [](Place& any) { return any.visit().stream().scene()->facts.scene_id; };
   if (scene_of(host) != scene_of(place))
     return refuse(ErrorCode::session_ended, "the session of this link is in another scene");

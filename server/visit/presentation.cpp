@@ -28,6 +28,7 @@ void Presentation::end() {
   tell({LeadState::ended, name_, 0, {}});
   followers_.clear();
   told_.reset();
+  camera_.reset();
 }
 
 void Presentation::add(const std::shared_ptr<ClientConnection>& follower) {
@@ -51,9 +52,10 @@ std::size_t Presentation::followers() const {
 }
 
 void Presentation::moved(const PoseSample& camera, TimePoint now) {
+  const bool stops = camera.at_rest && !(camera_ && camera_->at_rest);
   camera_ = camera;
   camera_is_new_ = true;
-  if (!camera_told_ || camera.at_rest || now - *camera_told_ >= between_cameras) tell_camera(now);
+  if (!camera_told_ || stops || now - *camera_told_ >= between_cameras) tell_camera(now);
 }
 
 std::optional<Lead> Presentation::news(std::size_t spectators, bool away, TimePoint now) {

@@ -203,7 +203,7 @@ describe('page', () => {
     await expect.poll(() => page.title()).toBe('(1) CaT-GS');
     const call_me = page.getByRole('button', { name: 'Call me when it is my turn' });
     await call_me.click();
-    await page.getByRole('status').getByText('You will hear this').waitFor();
+    await page.getByRole('status').getByText('This sound tells you').waitFor();
     expect(await call_me.isHidden()).toBe(true);
     expect(await told()).toBe(2);
     await page.evaluate('window.told.elsewhere = true');

@@ -47,7 +47,7 @@ describe('a presentation', () => {
     expect(await barriers(leader)).toEqual([]);
     const { page: follower, errors: more } = await open(link, windows.phone);
     await follower.getByText('Ada leads').waitFor();
-    await leader.getByText('You lead, 1 follow').waitFor();
+    await leader.getByText('You lead. One person follows.').waitFor();
     await move(leader);
     await expect.poll(() => apart(leader, follower)).toBeLessThan(1e-3);
     await keep_screenshot(follower, 'together-follow');

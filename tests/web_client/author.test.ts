@@ -73,7 +73,7 @@ describe('a draft of a tour', () => {
     expect(draft.shown_index).toBe(-1);
     draft.add(stop('b'));
     expect(draft.shown_index).toBe(1);
-    draft.edit({ edited: 0 });
+    draft.choose(0);
     expect(titles(draft)).toEqual(['a']);
     draft.remove_tour();
     expect(titles(draft)).toEqual(['b']);

@@ -162,7 +162,7 @@ export const text = {
     stop: 'Stop presenting',
     copied: 'The link is in the clipboard.',
     somebody: 'Your guide',
-    you_lead: (count: number): string => (count === 0 ? 'You lead. Nobody follows yet.' : `You lead, ${count} follow`),
+    you_lead: (count: number): string => (count === 0 ? 'You lead. Nobody follows yet.' : `You lead. ${count === 1 ? 'One person follows' : `${count} people follow`}.`),
     leads: (name: string, count: number): string => (count > 1 ? `${name} leads, ${count} follow` : `${name} leads`),
     away: (name: string): string => `${name} has lost the connection`,
     leave: 'Look around myself',
@@ -172,7 +172,7 @@ export const text = {
     view: (name: string): string => `3D view. ${name} moves the camera.`,
   },
   turn: {
-    will_call: 'You will hear this when it is your turn.',
+    will_call: 'This sound tells you when it is your turn.',
     now: 'It is your turn.',
     in_title: 'Your turn – ',
   },

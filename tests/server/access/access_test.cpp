@@ -180,6 +180,8 @@ TEST_F(AccessTest, RevokedLinksHaveANumberAndAForm) {
       },
       ThrowsMessage<InputError>(AllOf(HasSubstr("--revoked-links"), HasSubstr("revoked:2"),
                                       HasSubstr("is no id of a link"))));
+  EXPECT_THROW(of("3F0C91D27A5E\n"), InputError)
+      << "ids are in small letters: it would end nothing";
   std::string many;
   for (int i = 0; i < 100'000; ++i) many += fmt::format("{:06x}\n", i);
   EXPECT_NO_THROW(of(many));

@@ -270,6 +270,9 @@ TEST(Followers, GetTheLeadersCameraAndKeepTheirOwnStream) {
   follow(follower, "");
   lead_of(host, [](const v1::Lead& lead) { return lead.company() == 0; });
   follow(follower, link);
+  follow(host, link);
+  EXPECT_EQ(host.receive_message(v1::ServerMessage::kError).error().code(), v1::Error::BAD_MESSAGE)
+      << "nobody follows themselves";
   present_no_more(host);
   EXPECT_EQ(lead_of(follower, [](const v1::Lead& lead) { return lead.state() == v1::Lead::ENDED; })
                 .company(),

@@ -105,23 +105,38 @@ TEST_F(SceneLibraryTime, APosterStaysWhenItsSceneGoes) {
   };
   library_->want_poster(id("a"));
   run_until([&] { return shown("a").poster != nullptr; });
+  EXPECT_FALSE(shown("a").loaded) << "it was there for a moment";
   load("b");
+  EXPECT_NE(shown("b").poster, nullptr);
+  tick(60s);
+  load("a");
   tick(60s);
   load("c");
-  EXPECT_FALSE(shown("a").loaded);
-  const auto poster = shown("a").poster;
-  EXPECT_NE(poster, nullptr);
-  library_->want_poster(id("a"));
-  run_until([&] { return true; });
-  EXPECT_FALSE(awaited("a") && in_memory("a")) << "no load for a poster that is there";
+  EXPECT_FALSE(shown("b").loaded);
+  EXPECT_NE(shown("b").poster, nullptr);
+  const auto before = std::filesystem::last_write_time(folder_ / "b.ply");
+  std::filesystem::last_write_time(folder_ / "b.ply", before + 2s);
+  tick(31s);
+  run_until([&] { return shown("b").poster == nullptr; });
 }
 
-TEST_F(SceneLibraryTime, NobodyWaitsForPosters) {
+TEST_F(SceneLibraryTime, NobodyWaitsForAPoster) {
+  const auto has_poster = [&](const std::string& name) {
+    const auto listing = library_->listing();
+    return std::ranges::find(*listing, id(name), &SceneLibrary::Listing::id)->poster != nullptr;
+  };
   EXPECT_TRUE(awaited("a"));
-  library_->want_poster(id("b"));
+  library_->want_poster(id("b"));  // while a visitor waits
   run_until([&] { return in_memory("a"); });
-  EXPECT_TRUE(awaited("c")) << "b does not wait before it";
-  EXPECT_EQ(library_->in_memory(id("b")), nullptr);
+  EXPECT_FALSE(has_poster("b"));
+  library_->want_poster(id("b"));
+  library_->want_poster(id("c"));  // one at a time
+  run_until([&] { return has_poster("b"); });
+  EXPECT_FALSE(has_poster("c"));
+  load("b");
+  library_->want_poster(id("c"));  // there is no room for it
+  EXPECT_TRUE(awaited("c")) << "a visitor may still ask";
+  EXPECT_TRUE(in_memory("a") && in_memory("b"));
 }
 
 TEST_F(SceneLibraryTime, TellsOfScenesBeforeTheyAreLoaded) {

@@ -58,6 +58,41 @@ TEST_F(AudienceTest, FramesBeginWithAnIdr) {
   EXPECT_FALSE(audience.wants_idr(now + 1h));
 }
 
+TEST_F(AudienceTest, APresentationEndsWithItsScene) {
+  const auto enter = [&](const std::string& scene_id) {
+    Welcome welcome;
+    welcome.scene.scene_id = scene_id;
+    audience.send(welcome, now);
+  };
+  enter("hall");
+  audience.presentation().begin("Ada", now);
+  const auto spectator = join();
+  enter("hall");  // the leader comes back
+  EXPECT_TRUE(audience.presentation().since());
+  EXPECT_FALSE(spectator->closed);
+  enter("attic");
+  EXPECT_FALSE(audience.presentation().since());
+  EXPECT_TRUE(spectator->closed) << "it may not be allowed to see that";
+}
+
+TEST_F(AudienceTest, FollowersHearOfACameraThirtyTimesASecondAtMost) {
+  const auto connection = std::make_shared<FakeConnection>();
+  const auto follower = std::make_shared<ClientConnection>(io, metrics, connection, [] {});
+  audience.presentation().begin("Ada", now);
+  audience.presentation().add(follower);
+  const auto told = [&](bool at_rest) {
+    const int before = connection->messages;
+    PoseSample camera;
+    camera.at_rest = at_rest;
+    for (int i = 0; i < 100; ++i) audience.presentation().moved(camera, now += 10us);
+    return connection->messages - before;
+  };
+  EXPECT_EQ(told(false), 1);
+  EXPECT_EQ(told(true), 1) << "that it stops";
+  now += 1s;
+  EXPECT_EQ(told(true), 1);
+}
+
 TEST_F(AudienceTest, ASlowOneDropsToTheNextIdrAndDisturbsNobody) {
   const auto good = join();
   const auto slow = join();

@@ -11,7 +11,7 @@ export interface SceneListing {
 /** The scenes that this token may see; empty when the server does not answer. */
 export async function list_scenes(page_url: string, token: string): Promise<readonly SceneListing[]> {
   try {
-    const response = await ask_server(page_url, token, 'scenes');
+    const response = await ask_server(page_url, token, 'scenes', { signal: AbortSignal.timeout(5000) });
     if (!response.ok) return [];
     const { scenes } = (await response.json()) as { scenes: readonly SceneListing[] };
     return scenes;

@@ -67,6 +67,12 @@ export class TourDraft {
     return this.shown.indexOf(this.tour);
   }
 
+  /** Edits another tour from here on. That changes nothing, so there is nothing to undo. */
+  choose(edited: number): void {
+    this.typed_in_ = undefined;
+    this.states_ = [...this.states_.slice(0, -1), { ...this.state, edited }];
+  }
+
   get can_undo(): boolean {
     return this.states_.length > 1;
   }

@@ -106,7 +106,9 @@ export class AuthorPanel {
       this.title_.focus();
     });
     this.tour_.addEventListener('change', () => {
-      draft.edit({ edited: Number(this.tour_.value) });
+      const is_saved = this.saved_ === draft.state;
+      draft.choose(Number(this.tour_.value));
+      if (is_saved) this.saved_ = draft.state;
       this.edited(0);
     });
     this.title_.addEventListener('input', () => {
@@ -134,7 +136,9 @@ export class AuthorPanel {
 
   private async add(): Promise<void> {
     const eye = this.tools_.eye();
+    const { edited } = this.draft_.state;
     const marker = await this.tools_.place_ahead();
+    if (edited !== this.draft_.state.edited) return; // the author went on to another tour
     const title = text.tour.stop_numbered(this.draft_.stops.length + 1);
     this.draft_.add({ title, caption: '', eye, marker, stay_s: undefined, fly_s: undefined });
     this.edited(this.draft_.stops.length - 1);
@@ -146,13 +150,20 @@ export class AuthorPanel {
 
   private async take_view(index: number): Promise<void> {
     const eye = this.tools_.eye();
-    this.draft_.change(index, { eye, marker: await this.tools_.place_ahead() });
+    const stop = this.draft_.stops[index];
+    const marker = await this.tools_.place_ahead();
+    const at = this.draft_.stops.findIndex((other) => other === stop); // it may have moved meanwhile
+    if (at < 0) return;
+    this.draft_.change(at, { eye, marker });
     this.edited();
   }
 
   private async take_marker(index: number): Promise<void> {
+    const stop = this.draft_.stops[index];
     const marker = await this.tools_.place_ahead();
-    if (marker) this.draft_.change(index, { marker });
+    const at = this.draft_.stops.findIndex((other) => other === stop);
+    if (at < 0) return;
+    if (marker) this.draft_.change(at, { marker });
     this.edited();
     if (!marker) this.done_.textContent = text.author.nothing_there;
   }

@@ -93,6 +93,7 @@ export class Guide {
     const { navigation, toolbar } = this.parts_;
     const { camera } = navigation;
     const preview = new Preview(this.player_, toolbar, () => navigation.eye, (eye) => this.put(eye));
+    navigation.taken_over.listen(() => preview.forget());
     return new AuthorPanel({
       eye: () => camera.eye,
       scene: () => camera.scene,
@@ -100,6 +101,7 @@ export class Guide {
       file_name: () => this.file_name(),
       place_ahead: () => navigation.place_ahead(),
       changed: (tours, edited) => {
+        preview.forget();
         this.tour_view_.show_tours(tours);
         this.player_.load(tours, true);
         this.player_.choose(edited);

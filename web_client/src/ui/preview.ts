@@ -24,9 +24,14 @@ export class Preview {
   }
 
   begin(): void {
-    this.from_ ??= this.eye_();
+    this.from_ = this.eye_();
     this.toolbar_.make_room();
     this.player_.play_once(() => this.end());
+  }
+
+  /** The author goes on from here, so that Escape leads nowhere. */
+  forget(): void {
+    this.from_ = undefined;
   }
 
   private end(): void {

@@ -30,6 +30,7 @@ export class Together {
   private joining_ = false; // on the way from the visitor's own view to the leader's
   private chasing_ = false; // this part replaces its own flight by the next
   private readonly token_ = watch_token(location.href);
+  private wants_ = this.token_ !== ''; // to follow; cameras that were sent before the visitor left still arrive
   private readonly bar_ = by_id('company', HTMLElement);
   private readonly action_ = by_id('company-action', HTMLButtonElement);
   private readonly view_ = by_id('view', HTMLElement);
@@ -80,7 +81,7 @@ export class Together {
     if (eye) this.leader_eye_ = eye;
     if (this.role_ === 'leading' || this.role_ === 'watching') this.show();
     else if (lead.state === Lead_State.ENDED) this.ended();
-    else if (eye) this.follow(eye);
+    else if (eye && this.wants_) this.follow(eye);
   }
 
   private ended(): void {
@@ -121,12 +122,18 @@ export class Together {
 
   private act(): void {
     if (this.role_ === 'leading') this.stop();
-    else if (this.role_ === 'left') this.worker_.post({ kind: 'follow', watch: this.token_ });
+    else if (this.role_ === 'left') this.come_back();
     else if (this.role_ === 'watching') this.worker_.post({ kind: 'watch', watch: '' });
     else this.leave();
   }
 
+  private come_back(): void {
+    this.wants_ = true;
+    this.worker_.post({ kind: 'follow', watch: this.token_ });
+  }
+
   private leave(): void {
+    this.wants_ = false;
     this.worker_.post({ kind: 'follow', watch: '' });
     this.become('left');
     this.navigation_.stop_flight();
