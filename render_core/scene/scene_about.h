@@ -1,7 +1,10 @@
 #pragma once
 
+#include <charconv>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include <glm/vec3.hpp>
 
@@ -20,6 +23,15 @@ struct SceneAbout {
 
   bool operator==(const SceneAbout&) const = default;
 };
+
+/// 0xRRGGBB of six hexadecimal digits; nothing for other texts.
+inline std::optional<std::uint32_t> parse_rgb(std::string_view digits) {
+  std::uint32_t rgb = 0;
+  const char* end = digits.data() + digits.size();
+  if (digits.size() != 6 || std::from_chars(digits.data(), end, rgb, 16).ptr != end)
+    return std::nullopt;
+  return rgb;
+}
 
 /// Display-referred colour in [0, 1] of 0xRRGGBB.
 inline glm::vec3 colour_of(std::uint32_t rgb) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <string_view>
@@ -74,12 +73,10 @@ CameraMode parse_mode(const JsonField& field) {
 
 std::uint32_t parse_colour(const JsonField& field) {
   const std::string text = field.text();
-  std::uint32_t rgb = 0;
-  const char* end = text.data() + text.size();
-  if (text.size() != 7 || text[0] != '#' ||
-      std::from_chars(text.data() + 1, end, rgb, 16).ptr != end)
-    field.fail("is no colour", "write \"#rrggbb\" in hexadecimal digits");
-  return rgb;
+  const auto rgb =
+      text.starts_with('#') ? parse_rgb(std::string_view(text).substr(1)) : std::nullopt;
+  if (!rgb) field.fail("is no colour", "write \"#rrggbb\" in hexadecimal digits");
+  return *rgb;
 }
 
 SceneAbout parse_about(const JsonField& root) {

@@ -1,6 +1,5 @@
 // catgs-render frames: a camera path as pictures or video.
 #include <algorithm>
-#include <charconv>
 #include <memory>
 #include <optional>
 
@@ -32,13 +31,11 @@ struct FramesOptions {
 glm::vec3 parse_colour(std::string_view flag, std::string_view text) {
   if (text == "black") return glm::vec3(0.0f);
   if (text == "white") return glm::vec3(1.0f);
-  const std::string_view digits = text.substr(text.starts_with('#') ? 1 : 0);
-  std::uint32_t code = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), code, 16);
-  if (digits.size() != 6 || error != std::errc() || end != digits.data() + digits.size())
+  const auto rgb = parse_rgb(text.substr(text.starts_with('#') ? 1 : 0));
+  if (!rgb)
     throw InputError(flag, "", fmt::format("\"{}\" is no colour", text),
                      "white, black or six hexadecimal digits like ff8000");
-  return glm::vec3(code >> 16, code >> 8 & 0xff, code & 0xff) / 255.0f;
+  return colour_of(*rgb);
 }
 
 bool is_still(const Trajectory& poses) {

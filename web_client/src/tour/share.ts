@@ -96,5 +96,5 @@ export function embed_code(address: string): string {
   const url = new URL(address);
   url.searchParams.set('ui', '0');
   const source = url.href.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
-  return `<iframe src="${source}" width="960" height="540" style="border:0" allow="fullscreen; gamepad" title="3D tour"></iframe>`;
+  return `<iframe src="${source}" style="width:100%;aspect-ratio:16/9;border:0" allow="fullscreen; gamepad" title="3D tour"></iframe>`;
 }

@@ -63,6 +63,7 @@ export class Guide {
     navigation.entered.listen(({ scene }) => void this.enter(scene));
     navigation.up_changed.listen(() => this.author_?.scene_changed());
     navigation.taken_over.listen(() => this.player_.pause());
+    navigation.went_back.listen(() => this.player_.leave()); // what is shown is no stop any more
     navigation.pad_pressed.listen((action) => {
       if (action === 'next') this.player_.next();
       else if (action === 'previous') this.player_.previous();

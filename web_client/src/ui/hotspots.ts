@@ -71,6 +71,11 @@ export class Hotspots {
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, number);
       button.append(label_of(stop, i, button));
       button.addEventListener('click', () => this.go_to_(i));
+      // Whoever zooms where a hotspot is means the view.
+      button.addEventListener('wheel', (event) => {
+        event.preventDefault();
+        this.view_.dispatchEvent(new WheelEvent(event.type, event));
+      });
       for (const arrival of ['pointerenter', 'focus']) {
         button.addEventListener(arrival, () => this.host_.classList.remove('labels-dismissed'));
       }

@@ -28,6 +28,8 @@ export class Navigation {
   readonly taken_over = new Signal();
   /** The mode or the field of view may have changed. */
   readonly changed = new Signal();
+  /** The camera went back to where visits begin. */
+  readonly went_back = new Signal();
   /** The visitor has said which way is up. */
   readonly up_changed = new Signal();
   /** The visitor has chosen another speed by wheel or key. */
@@ -102,10 +104,11 @@ export class Navigation {
   reset(): void {
     this.taken_over.emit();
     this.camera.reset();
+    this.went_back.emit();
     this.moved();
   }
 
-  /** Turns the scene about the view axis. Angles > 0 turn it clockwise. */
+  /** Turns the scene about the view axis. Angles > 0 turn it to the left. */
   turn_up(angle_rad: number): void {
     this.camera.turn_up(angle_rad);
     this.up_changed.emit();

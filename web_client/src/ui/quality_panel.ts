@@ -34,7 +34,7 @@ export class QualityPanel {
     this.speed_.addEventListener('input', () => navigation_.set_speed(2 ** this.speed_.valueAsNumber));
     const kept = Number(storage_?.getItem(speed_key));
     if (kept > 0) navigation_.set_speed(kept);
-    for (const [id, turns] of [['up-left', -0.25], ['up-right', 0.25], ['up-flip', 0.5]] as const) {
+    for (const [id, turns] of [['up-left', 0.25], ['up-right', -0.25], ['up-flip', 0.5]] as const) {
       on_click(id, () => navigation_.turn_up(turns * 2 * Math.PI));
     }
     on_click('up-surface', () => void this.stand_here());

@@ -193,7 +193,7 @@ export class Together {
       alone: '',
       watching: this.may_leave_ ? words.leave : '',
       following: words.leave,
-      left: words.follow(name),
+      left: words.follow(this.lead_?.name ?? ''),
       leading: words.stop,
     };
     const line = by_id('company-text', HTMLElement);

@@ -41,6 +41,7 @@ export class TurnCall {
       this.call();
     } else if (state.phase === 'failed') {
       this.waits_ = false;
+      this.hang_up();
       this.lead('');
     }
   }
@@ -62,8 +63,14 @@ export class TurnCall {
     if (!this.sound_) return;
     this.sound();
     this.card_.call_over();
-    this.sound_ = undefined;
+    setTimeout(() => this.hang_up(), 2000); // the tones are over by then
     if (document.hidden) this.notify();
+  }
+
+  /** Browsers limit how many sounds a page may hold. */
+  private hang_up(): void {
+    void this.sound_?.close();
+    this.sound_ = undefined;
   }
 
   private notify(): void {
