@@ -208,7 +208,7 @@ describe('page', () => {
     expect(await told()).toBe(2);
     await page.evaluate('window.told.elsewhere = true');
     admit();
-    await page.getByRole('status').getByText('It is your turn').waitFor();
+    await page.getByRole('status').getByText('It is your turn.', { exact: true }).waitFor();
     expect(await told()).toBe(4);
     await expect.poll(() => page.title()).toBe('Your turn – Demo city – CaT-GS');
     await page.evaluate('delete window.told.elsewhere; window.dispatchEvent(new Event("focus"))');
