@@ -20,7 +20,7 @@ struct CameraPath {
 /// Poses per second of a path whose file has no times, unless the caller knows better.
 inline constexpr double default_pose_rate_hz = 30.0;
 
-/// What read_camera_path() takes, for --help.
+/// The help texts name the forms that read_camera_path() takes.
 inline constexpr const char* camera_path_forms =
     "a TUM file, cameras.json of a 3DGS training, transforms.json or camera_path.json of "
     "nerfstudio, or a COLMAP folder";

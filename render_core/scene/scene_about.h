@@ -13,7 +13,7 @@ namespace catgs {
 /// How a visitor moves at first.
 enum class CameraMode { unspecified, orbit, fly, walk };
 
-/// What a scene's author says about it to visitors. The texts are printable UTF-8; empty: not said.
+/// A scene's author says this about it to visitors. The texts are printable UTF-8; empty: not said.
 struct SceneAbout {
   std::string title{};
   std::string credits{};

@@ -9,7 +9,7 @@
 
 namespace catgs {
 
-/// What a log line is about, for programs that read it. JSON has a field for each one that is not
+/// Programs learn from these what a log line is about. JSON has a field for each one that is not
 /// empty (server/base/log.cpp).
 struct LogFacts {
   std::string_view event{};    // what happened: one name for each kind of line

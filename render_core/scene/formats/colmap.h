@@ -7,7 +7,7 @@
 
 namespace catgs {
 
-/// What to do with lenses that bend straight lines.
+/// Lenses that bend straight lines are refused, or taken as if they were straight.
 enum class Distortion { refused, ignored };
 
 /// Reads a sparse reconstruction, binary or text, from `folder`/sparse/0, `folder`/sparse or

@@ -97,7 +97,7 @@ class PhotoJudge {
         photo = read_picture(find_photo(folder_, images_[k].name));
         scale = glm::vec2(photo.size_px) / glm::vec2(images_[k].camera.size_px);
       }
-      // What lies between test views only moves the camera: its size need not be read.
+      // A photograph between test views only moves the camera. Its size need not be read.
       const glm::ivec2 size_px =
           judged ? photo.size_px
                  : glm::ivec2(glm::round(scale * glm::vec2(images_[k].camera.size_px)));

@@ -8,7 +8,7 @@
 
 namespace catgs {
 
-/// What a picture's pixels hold besides their colour, row by row; empty where not asked for.
+/// Pixels have these values besides their colour, row by row; empty where not asked for.
 struct FrameLayers {
   std::vector<float> alpha;  // 1 - the transmittance left for the background
   std::vector<float> depth;  // mean view depth, world units; 0 where nothing is seen

@@ -23,7 +23,24 @@ v1::ClientMessage watching_hello(const std::string& watch_token, const std::stri
   return message;
 }
 
-std::optional<v1::Error> refusal(const RunningServer& server, const v1::ClientMessage& hello) {
+/// A server that visitors enter by links.
+class ServerOfLinks {
+ public:
+  [[nodiscard]] std::string link(const std::string& role) const {
+    return make_link_token({"city", role, 1'000'000'000'000}, read_key_file("", key_file_));
+  }
+  [[nodiscard]] int port() const { return server_.port(); }
+
+ private:
+  const TemporaryFolder folder_;
+  const std::filesystem::path key_file_ =
+      folder_.write("key", "0123456789abcdef0123456789abcdef\n");
+  const RunningServer server_{
+      [this](ServerConfig& config) { config.token_key_file = key_file_.string(); }};
+};
+
+template <typename AnyServer>
+std::optional<v1::Error> refusal(const AnyServer& server, const v1::ClientMessage& hello) {
   WireClient client(server.port());
   client.send(hello);
   std::optional<v1::Error> error;
@@ -170,15 +187,9 @@ TEST(Spectators, AreLimitedAndNeedARealLink) {
 }
 
 TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
-  const TemporaryFolder folder;
-  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
-  const std::string key = read_key_file("", key_file);
-  const auto link = [&](const std::string& role) {
-    return make_link_token({"city", role, 1'000'000'000'000}, key);
-  };
-  RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
+  const ServerOfLinks server;
   WireClient host(server.port());
-  const std::string watch = host.greet(64, 64, v1::CODEC_H264, link("viewer")).watch_token();
+  const std::string watch = host.greet(64, 64, v1::CODEC_H264, server.link("viewer")).watch_token();
   host.present();
   WireClient guest(server.port());
   v1::ClientMessage by_link = watching_hello(watch);
@@ -186,30 +197,26 @@ TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
   const v1::Welcome shown = guest.greet(by_link);
   EXPECT_TRUE(shown.watching()) << "the leader's link lets a guest watch";
   EXPECT_FALSE(shown.may_leave()) << "and no more";
-  EXPECT_EQ(refusal(server, watching_hello(watch, link("solo")))->code(), v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server, watching_hello(watch, server.link("solo")))->code(),
+            v1::Error::UNAUTHORIZED);
   WireClient spectator(server.port());
-  EXPECT_TRUE(spectator.greet(watching_hello(watch, link("spectator"))).watching());
+  EXPECT_TRUE(spectator.greet(watching_hello(watch, server.link("spectator"))).watching());
   WireClient alone(server.port());
-  EXPECT_EQ(alone.greet(64, 64, v1::CODEC_H264, link("solo")).watch_token(), "");
+  EXPECT_EQ(alone.greet(64, 64, v1::CODEC_H264, server.link("solo")).watch_token(), "");
 }
 
 TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
-  const TemporaryFolder folder;
-  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
-  const std::string key = read_key_file("", key_file);
-  const auto link = [&](const std::string& role) {
-    return make_link_token({"city", role, 1'000'000'000'000}, key);
-  };
-  RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
+  const ServerOfLinks server;
   WireClient host(server.port());
-  const v1::Welcome welcome = host.greet(64, 64, v1::CODEC_H264, link("viewer"));
+  const v1::Welcome welcome = host.greet(64, 64, v1::CODEC_H264, server.link("viewer"));
   host.present();
-  const v1::ClientMessage watching = watching_hello(welcome.watch_token(), link("spectator"));
+  const v1::ClientMessage watching =
+      watching_hello(welcome.watch_token(), server.link("spectator"));
   WireClient spectator(server.port());
   spectator.greet(watching);
   WireClient alone(server.port());
   v1::ClientMessage back = resuming_hello(welcome.resume_token());
-  back.mutable_hello()->set_token(link("solo"));
+  back.mutable_hello()->set_token(server.link("solo"));
   const v1::Welcome now = alone.greet(back);
   EXPECT_EQ(now.session_id(), welcome.session_id());
   EXPECT_EQ(now.watch_token(), "");
@@ -218,16 +225,10 @@ TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
 }
 
 TEST(Spectators, OfTheirRoleFindWhoLeadsThroughTheirScene) {
-  const TemporaryFolder folder;
-  const auto key_file = folder.write("key", "0123456789abcdef0123456789abcdef\n");
-  const std::string key = read_key_file("", key_file);
-  const auto link = [&](const std::string& role) {
-    return make_link_token({"city", role, 1'000'000'000'000}, key);
-  };
-  RunningServer server([&](ServerConfig& config) { config.token_key_file = key_file.string(); });
+  const ServerOfLinks server;
   WireClient host(server.port());
-  const std::string id = host.greet(64, 64, v1::CODEC_H264, link("viewer")).session_id();
-  const v1::ClientMessage hello = watching_hello("", link("spectator"));
+  const std::string id = host.greet(64, 64, v1::CODEC_H264, server.link("viewer")).session_id();
+  const v1::ClientMessage hello = watching_hello("", server.link("spectator"));
   EXPECT_EQ(refusal(server, hello)->code(), v1::Error::NO_LEADER);
   host.present();
   WireClient spectator(server.port());

@@ -43,6 +43,10 @@ export function scene_name(scene_id: string): string {
   return scene_id.replace(/^(.+)-[b-df-hjkmnp-tv]{8}$/, '$1');
 }
 
+/** Whom a scene is from, and under which licence; '' where nothing is said. */
+export const credit_line = ({ credits, licence }: Pick<SceneListing, 'credits' | 'licence'>): string =>
+  [credits, licence].filter((words) => words).join(' · ');
+
 /** Titles for a list of scenes, and ids where several have the same title. */
 export function scene_labels(scenes: readonly SceneListing[]): readonly string[] {
   const titles = scenes.map(({ title }) => title);

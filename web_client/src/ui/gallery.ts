@@ -1,5 +1,5 @@
 // The first page of a server with several scenes: a picture of each.
-import { fetch_poster, scene_address, scene_labels, type SceneListing } from '../session/scenes';
+import { credit_line, fetch_poster, scene_address, scene_labels, type SceneListing } from '../session/scenes';
 import { text } from '../text';
 import { by_id, make } from './dom';
 
@@ -23,11 +23,10 @@ export function show_gallery(scenes: readonly SceneListing[], token: string): vo
       const picture = make('img', { alt: '', width: 960, height: 540 });
       pictures.set(picture, scene.id);
       seen.observe(picture);
-      const said = [scene.credits, scene.licence].filter((words) => words).join(' · ');
       const link = make(
         'a',
         { href: scene_address(location.href, scene.id) },
-        ...[picture, make('strong', {}, labels[i] ?? scene.id), make('small', {}, said)],
+        ...[picture, make('strong', {}, labels[i] ?? scene.id), make('small', {}, credit_line(scene))],
       );
       return make('li', {}, link);
     }),

@@ -1,4 +1,4 @@
-import { scene_address } from '../session/scenes';
+import { credit_line, scene_address } from '../session/scenes';
 import type { SceneFacts } from '../wire/wire';
 import { by_id, make } from './dom';
 
@@ -7,8 +7,7 @@ export function show_scene_title(scene: SceneFacts, several: boolean): void {
   const name = scene.title || scene.sceneId;
   const count = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
   by_id('scene-name', HTMLElement).replaceChildren(name, make('small', {}, count));
-  const said = [scene.credits, scene.licence].filter((words) => words).join(' · ');
-  by_id('scene-credits', HTMLElement).textContent = said;
+  by_id('scene-credits', HTMLElement).textContent = credit_line(scene);
   const all = by_id('all-scenes', HTMLAnchorElement);
   all.href = scene_address(location.href);
   all.hidden = !several;
