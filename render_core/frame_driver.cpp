@@ -43,7 +43,7 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
 /// Pipelines other than catgs list for the picture of the frame alone.
 FramePlan FrameDriver::plan(const FrameRequest& request) {
   const Camera& camera = request.camera;
-  if (settings_.pipeline == Pipeline::catgs)
+  if (keeps_caches(settings_.pipeline))
     return groups_.plan(camera, costs_.pays() ? request.forecast : std::nullopt, depths_);
   FramePlan plan;
   plan.window_end = camera;

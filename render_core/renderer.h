@@ -29,8 +29,14 @@ class ThreadPool;
 enum class Pipeline {
   vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
   exact,    // exact ellipse/tile culling; the same image as the reference
-  catgs,    // the paper's: key frames (same image as `exact`), then sub-frames from their caches
+  paper,    // CaT-GS as published: key frames (same image as `exact`), then sub-frames
+  catgs,    // the server's: `exact` without what the last frame shows to be hidden
 };
+
+/// Whether a pipeline uses what earlier frames of its View left.
+constexpr bool keeps_caches(Pipeline pipeline) {
+  return pipeline == Pipeline::paper || pipeline == Pipeline::catgs;
+}
 
 enum class PixelFormat {
   rgb_f32,  // one plane, 3 floats a pixel, display-referred, clamped to [0, 1]
@@ -62,8 +68,6 @@ struct FrameStats {
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::uint64_t tasks = 0;               // parts into which the tiles were cut for the blend
-  std::uint32_t giants = 0;  // CUDA core: Gaussians of the group that turns move far in lists
-  std::uint32_t uncarried_lists = 0;  // CUDA core: lists with more giants than could be moved
   // Pipeline::catgs
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()

@@ -37,7 +37,7 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
     : scene_(std::move(scene)), settings_(settings), driver_(settings) {
-  if (settings.pipeline == Pipeline::catgs && settings.colour_cache)
+  if (keeps_caches(settings.pipeline) && settings.colour_cache)
     colours_.emplace(scene_->store.clusters().size());
 }
 
@@ -49,12 +49,12 @@ RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noex
 
 FrameView CpuView::draw(const FrameRequest& request, FramePlan plan) {
   const Camera& camera = request.camera;
-  if (settings_.pipeline == Pipeline::catgs) widen_for_blocks(plan, settings_.speculation.grid);
+  if (keeps_caches(settings_.pipeline)) widen_for_blocks(plan, settings_.speculation.grid);
   image_.resize(settings_.format, camera.size_px);
   FrameStats stats;
   grid_ = plan.grid;
   blocks_.place(camera.size_px, plan);
-  if (settings_.pipeline == Pipeline::catgs) reach_.begin(plan);
+  if (keeps_caches(settings_.pipeline)) reach_.begin(plan);
   if (settings_.pipeline == Pipeline::vanilla) {
     draw_boxes(camera, plan, stats);
   } else if (plan.kind == FrameKind::key) {
@@ -109,7 +109,7 @@ void CpuView::draw_key_lists(const Camera& camera, const FramePlan& plan, FrameS
   clock.end(Stage::project);
   lists_.finish(table(plan), scene_->kernels, *scene_->pool);
   clock.end(Stage::bin);
-  if (settings_.pipeline == Pipeline::catgs) {
+  if (keeps_caches(settings_.pipeline)) {
     sort_seen_lists(
         [&](std::size_t tile) { lists_.sort_front(tile, reach_.of_tile(tile), splats_); });
   } else {
@@ -222,7 +222,7 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
       lists_.sort_rest(tile, splats_);
       result = blend_tile(request, tile);
     }
-    if (settings_.pipeline == Pipeline::catgs)
+    if (keeps_caches(settings_.pipeline))
       reach_.set(
           tile, result.finished ? lists_.list(tile)[result.looked_at - 1].key : TileReach::unknown);
     if (settings_.count_pairs) pairs += result.pairs;

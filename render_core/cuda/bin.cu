@@ -1,4 +1,5 @@
 #include "render_core/cuda/bin.cuh"
+#include "render_core/cuda/blend.cuh"
 #include "render_core/cuda/cuda_check.h"
 #include "render_core/cuda/tiles.cuh"
 #include "render_core/cuda/warp_sums.cuh"
@@ -100,6 +101,36 @@ __device__ void emit_large(const EmitParams<Tile>& p, Window<Tile>& window, std:
   }
 }
 
+/// The blocks of parts that end before `depth`.
+__device__ std::uint32_t hidden_blocks(const float* part_limit, float depth) {
+  std::uint32_t hidden = 0;
+#pragma unroll
+  for (int part = 0; part < parts_per_tile; part += 4) {
+    const float4 limit = __ldg(reinterpret_cast<const float4*>(&part_limit[part]));
+    if (depth > limit.x) hidden |= blocks_of(part);
+    if (depth > limit.y) hidden |= blocks_of(part + 1);
+    if (depth > limit.z) hidden |= blocks_of(part + 2);
+    if (depth > limit.w) hidden |= blocks_of(part + 3);
+  }
+  return hidden;
+}
+
+/// TileEntry::blocks of a splat in a tile, without blocks where it is hidden.
+template <class Tile>
+__device__ std::uint32_t blocks_of_entry(const EmitParams<Tile>& p, std::uint32_t tile,
+                                         std::uint32_t slot) {
+  const int column = static_cast<int>(tile) % p.shape.tiles_x;
+  const int row = static_cast<int>(tile) / p.shape.tiles_x;
+  const SplatRecord& r = p.records[slot];
+  const std::uint32_t blocks =
+      p.path != nullptr
+          ? make_footprint(r.centre_px, p.path[slot], p.shape).blocks(column, row)
+          : make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape).blocks(column, row);
+  if (p.part_limit == nullptr) return blocks;
+  return blocks &
+         ~hidden_blocks(&p.part_limit[std::size_t{tile} * parts_per_tile], p.splat_depth[slot]);
+}
+
 template <class Tile>
 __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile> p) {
   __shared__ Window<Tile> window;
@@ -152,8 +183,12 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
   }
   __syncthreads();
   for (std::uint32_t at = begin + thread; at < end; at += block_size) {
-    p.tile[at] = window.tile[at - begin];
-    p.slot[at] = window.slot[at - begin];
+    Tile tile = window.tile[at - begin];
+    const std::uint32_t slot = window.slot[at - begin];
+    const std::uint32_t blocks = tile < p.shape.tiles() ? blocks_of_entry(p, tile, slot) : 0;
+    if (blocks == 0) tile = static_cast<Tile>(p.shape.tiles());
+    p.tile[at] = tile;
+    p.entry[at] = {slot, blocks};
   }
 }
 

@@ -19,8 +19,10 @@ struct EmitParams {
   const std::uint32_t* tile_count;  // [visible_bound], by slot
   const TileSpans* spans;           // [visible_bound], by slot
   const SplatPath* path;            // [visible_bound], by slot; null: splats do not move
+  const float* part_limit;          // Occlusion::part; null: nothing is hidden
+  const float* splat_depth;         // [visible_bound], by slot; for part_limit
   Tile* tile;                       // [list_bound], tile index; shape.tiles() means no tile
-  std::uint32_t* slot;              // [list_bound]
+  TileEntry* entry;                 // [list_bound]
 };
 template <class Tile>
 void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream);

@@ -19,38 +19,113 @@ constexpr int blocks_per_processor = 8;
 constexpr unsigned lane_splats = 2;
 constexpr unsigned group_splats = lane_splats * warp_size;
 
+/// Entries of a list that a warp scans at a time. Their loads hide each other's latency.
+constexpr unsigned scan_steps = 4;
+constexpr unsigned scan_entries = scan_steps * warp_size;
+
+/// Room for hits: fewer than a group, and those of a scan.
+constexpr unsigned hit_room = 256;
+static_assert(hit_room >= group_splats + scan_entries);
+
 /// Shared by the lanes of a warp.
 struct __align__(16) WarpScratch {
   StagedHalf staged[halves];  // splats that wait for the halves of its part
-  Box box[halves];            // of parts that are not squares
   // A column for each lane.
   PixelPlaces places[halves][warp_size];
   float4 fetched[2][lane_splats][2][warp_size];  // records of this group and the next
+  std::uint32_t hits[hit_room];  // list entries that reach live halves and wait to be fetched
 };
 
-/// Splats of a list, in groups. Two loads are in flight while a group is blended: the next group's
-/// records, and the slots of the one after it.
-class Groups {
+/// Finds the entries of a list that reach a part. The masks of the next entries are being loaded
+/// meanwhile.
+class HitScan {
  public:
-  __device__ Groups(const BlendParams& p, const BlendTask& task, WarpScratch& scratch)
-      : records_(p.records),
-        slots_(p.slot),
-        next_(task.first),
-        last_(task.last),
-        mine_(&scratch.fetched[0][0][0][threadIdx.x % warp_size]) {
-    load_slots(next_);
-    fetch();
+  /// A group of list entries, front to back: the lane's share, and what all lanes know.
+  struct Group {
+    TileEntry entry[lane_splats] = {};  // all with index 0 come before those with index 1
+    unsigned count = 0;                 // of all lanes
+    std::uint32_t end = 0;              // one past the last list entry of the group
+  };
+
+  __device__ HitScan(const BlendParams& p, const BlendTask& task, std::uint32_t* hits)
+      : entries_(p.entries), hits_(hits), at_(task.first), last_(task.last) {
+    load_blocks();
   }
 
-  __device__ bool more() const { return next_ < last_; }
-  /// One past the last entry taken.
-  __device__ std::uint32_t taken() const { return min(next_, last_); }
+  /// The next group of entries that reach any of `blocks`; their loads have begun.
+  __device__ Group next(std::uint32_t blocks) {
+    const unsigned lane = threadIdx.x % warp_size, lanes_before = (1u << lane) - 1u;
+    while (waiting_ < group_splats && at_ < last_) {
+#pragma unroll
+      for (unsigned j = 0; j < scan_steps; ++j) {
+        const bool hit = (blocks_[j] & blocks) != 0;
+        const unsigned lanes = __ballot_sync(~0u, hit);
+        if (hit)
+          hits_[(first_ + waiting_ + __popc(lanes & lanes_before)) % hit_room] =
+              at_ + j * warp_size + lane;
+        waiting_ += __popc(lanes);
+      }
+      at_ += scan_entries;
+      load_blocks();
+    }
+    __syncwarp();
+    Group group;
+    group.count = min(waiting_, group_splats);
+    if (group.count > 0) group.end = hits_[(first_ + group.count - 1) % hit_room] + 1;
+#pragma unroll
+    for (unsigned i = 0; i < lane_splats; ++i) {
+      const unsigned k = i * warp_size + lane;
+      if (k >= group.count) continue;
+      const uint2 words =
+          __ldg(reinterpret_cast<const uint2*>(&entries_[hits_[(first_ + k) % hit_room]]));
+      group.entry[i] = {words.x, words.y};
+    }
+    first_ = (first_ + group.count) % hit_room;
+    waiting_ -= group.count;
+    return group;
+  }
 
-  /// Makes the next group available.
-  __device__ void take() {
-    next_ += group_splats;
+ private:
+  __device__ void load_blocks() {
+#pragma unroll
+    for (unsigned j = 0; j < scan_steps; ++j) {
+      const std::uint32_t at = at_ + j * warp_size + threadIdx.x % warp_size;
+      blocks_[j] = at < last_ ? __ldg(&entries_[at].blocks) : 0;
+    }
+  }
+
+  const TileEntry* entries_;
+  std::uint32_t* hits_;               // a ring
+  unsigned first_ = 0, waiting_ = 0;  // in it
+  std::uint32_t at_, last_;           // list entries
+  std::uint32_t blocks_[scan_steps];  // of the entries from at_ on
+};
+
+/// Splats of a list that reach a part, in groups. Two loads are in flight while a group is blended:
+/// the next group's records, and the entries of the one after it.
+class Groups {
+ public:
+  /// `blocks`: those of the part's halves, a bit each.
+  __device__ Groups(const BlendParams& p, const BlendTask& task, std::uint32_t blocks,
+                    WarpScratch& scratch)
+      : records_(p.records),
+        scan_(p, task, scratch.hits),
+        mine_(&scratch.fetched[0][0][0][threadIdx.x % warp_size]) {
+    current_.end = task.first;
+    next_ = scan_.next(blocks);
+    fetch(blocks);
+  }
+
+  /// Whether take() will find a splat.
+  __device__ bool more() const { return fetched_.count > 0; }
+  /// One past the last entry taken.
+  __device__ std::uint32_t taken() const { return current_.end; }
+
+  /// Makes the next group available. `blocks`: of the halves that still need splats.
+  __device__ void take(std::uint32_t blocks) {
+    current_ = fetched_;
     buffer_ ^= 1u;
-    fetch();
+    fetch(blocks);
     asm volatile("cp.async.wait_group 1;" ::: "memory");
   }
   /// The lane's i-th splat of the group. All splats with i = 0 come before those with i = 1.
@@ -59,76 +134,38 @@ class Groups {
     const float4 a = words[0], b = words[warp_size];
     return {{a.x, a.y}, {a.z, a.w, b.x}, b.y, reinterpret_cast<const PackedColour&>(b.z)};
   }
+  /// The blocks that this splat reaches.
+  __device__ std::uint32_t blocks(unsigned i) const { return current_.entry[i].blocks; }
 
  private:
-  static constexpr std::uint32_t no_slot = ~0u;
-
-  __device__ void load_slots(std::uint32_t first) {
-#pragma unroll
-    for (unsigned i = 0; i < lane_splats; ++i) {
-      const std::uint32_t at = first + i * warp_size + threadIdx.x % warp_size;
-      slot_[i] = at < last_ ? __ldg(&slots_[at]) : no_slot;
-    }
-  }
-
-  /// Starts loading the records of the group at next_, and loads the slots of the group after it.
-  __device__ void fetch() {
+  /// Starts loading the records of the next group, and the entries of the group after it.
+  __device__ void fetch(std::uint32_t blocks) {
 #pragma unroll
     for (unsigned i = 0; i < lane_splats; ++i) {
       float4* to = &mine_[buffer_ * buffer_words + i * splat_words];
-      if (slot_[i] != no_slot) {
+      if (next_.entry[i].blocks != 0) {
         asm volatile(
             "cp.async.ca.shared.global [%0], [%1], 16;"
             "cp.async.ca.shared.global [%0 + %2], [%1 + 16], 16;" ::"r"(
                 static_cast<std::uint32_t>(__cvta_generic_to_shared(to))),
-            "l"(&records_[slot_[i]]), "n"(warp_size * sizeof(float4))
+            "l"(&records_[next_.entry[i].slot]), "n"(warp_size * sizeof(float4))
             : "memory");
-      } else {
-        to[0] = make_float4(0.0f, 0.0f, 1.0f, 0.0f);
-        to[warp_size] = make_float4(1.0f, never, 0.0f, 0.0f);
       }
     }
     asm volatile("cp.async.commit_group;" ::: "memory");
-    load_slots(next_ + group_splats);
+    fetched_ = next_;
+    if (fetched_.count > 0) next_ = scan_.next(blocks);
   }
 
   // In elements of `fetched`.
   static constexpr unsigned splat_words = 2 * warp_size, buffer_words = lane_splats * splat_words;
 
   const SplatRecord* records_;
-  const std::uint32_t* slots_;
-  std::uint32_t next_, last_;        // list entries
-  std::uint32_t slot_[lane_splats];  // of the group to fetch next
-  unsigned buffer_ = 0;              // the buffer that it goes to
-  float4* mine_;                     // the lane's column of fetched
+  HitScan scan_;
+  HitScan::Group current_, fetched_, next_;
+  unsigned buffer_ = 0;  // the buffer that the next group goes to
+  float4* mine_;         // the lane's column of fetched
 };
-
-/// Whether a splat centred at `centre` reaches the box with alpha_min. The minimum of a convex
-/// quadratic over a box is at the centre, or on a line through the nearest point of the box in x or
-/// in y.
-struct BoxTest {
-  math::Whitening<float> w;
-  float2 centre;
-  float reach, y_per_x, x_per_y;
-
-  __device__ bool reaches(const Box& box) const {
-    const float low_x = box.low_x - centre.x, high_x = box.high_x - centre.x;
-    const float low_y = box.low_y - centre.y, high_y = box.high_y - centre.y;
-    const float x = math::clamp(0.0f, low_x, high_x);
-    const float y = math::clamp(0.0f, low_y, high_y);
-    const float y_for_x = math::clamp(y_per_x * x, low_y, high_y);
-    const float x_for_y = math::clamp(x_per_y * y, low_x, high_x);
-    return fminf(math::whitened_square<float>(w, {x, y_for_x}),
-                 math::whitened_square<float>(w, {x_for_y, y})) <= reach;
-  }
-};
-
-/// `centre` is relative to the origin of the boxes.
-__device__ BoxTest make_box_test(const SplatRecord& splat, float2 centre) {
-  const math::Whitening<float>& w = splat.whitening;
-  return {w, centre, math::reach_of(splat.log2_opacity) + 1e-3f,
-          __fdividef(-w.xx * w.xy, w.xy * w.xy + w.yy * w.yy), __fdividef(-w.xy, w.xx)};
-}
 
 /// Splats that wait in the ring of a half part.
 struct Waiting {
@@ -136,26 +173,32 @@ struct Waiting {
   unsigned count = 0;
 };
 
-/// Stages the splats of a group for each unfinished half that they reach.
-template <class Pixels>
-__device__ void stage(WarpScratch& scratch, const Pixels& pixels, const Groups& groups,
-                      const bool (&live)[halves], Waiting (&waiting)[halves]) {
+/// No splat that reaches a pixel of a part has more than this as its whitened square at the part's
+/// origin. A splat is at least as wide as its low-pass filter, so the square's root grows by 1.56 a
+/// pixel at most. Pixels lie within 5 px, and there it is 2.83 at most. Halves hold the
+/// coefficients of such splats, but not of those far away.
+constexpr float most_at_origin = 128.0f;
+
+/// Stages the splats of a group for each unfinished half that they reach. `live`: those halves'
+/// blocks.
+__device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Groups& groups,
+                      const std::uint32_t (&live)[halves], Waiting (&waiting)[halves]) {
   const unsigned lanes_before = (1u << threadIdx.x % warp_size) - 1u;
   StagedSplat splat[lane_splats];
   unsigned hits[lane_splats][halves];  // lanes
 #pragma unroll
   for (unsigned i = 0; i < lane_splats; ++i) {
     const SplatRecord record = groups.splat(i);
-    const float2 centre =
-        make_float2(record.centre_px.x - pixels.origin_x(), record.centre_px.y - pixels.origin_y());
-    const BoxTest test = make_box_test(record, centre);
-    splat[i] = staged_splat(
-        math::exponent_field<float>(record.whitening, {centre.x, centre.y}, record.log2_opacity),
-        reinterpret_cast<const uint2&>(record.colour));
+    const auto field = math::exponent_field<float>(
+        record.whitening,
+        {record.centre_px.x - pixels.origin_x(), record.centre_px.y - pixels.origin_y()},
+        record.log2_opacity);
+    splat[i] = staged_splat(field, reinterpret_cast<const uint2&>(record.colour));
+    // In sub-frames, a splat may be far from where its key frame had it.
+    const bool near = field.u * field.u + field.v * field.v <= most_at_origin;
 #pragma unroll
     for (int half = 0; half < halves; ++half)
-      hits[i][half] =
-          __ballot_sync(~0u, test.reaches(Pixels::box(scratch.box, half)) && live[half]);
+      hits[i][half] = __ballot_sync(~0u, near && (groups.blocks(i) & live[half]) != 0);
   }
   __syncwarp();  // all lanes have read the last round
 #pragma unroll
@@ -193,7 +236,7 @@ __device__ float transmittance_before(const BlendParams& p, std::uint32_t slice,
   float product = 1.0f;
   for (int back = 1 + lane; back <= place; back += warp_size) {
     const volatile float* known = p.slice_transmittance;
-    product *= known[slice_part(p.shape, slice - back, part)];
+    product *= known[slice_part(slice - back, part)];
   }
 #pragma unroll
   for (int step = warp_size / 2; step > 0; step /= 2)
@@ -209,31 +252,29 @@ __device__ BlendTask load_task(const BlendParams& p, std::uint32_t task) {
 
 using States = math::PixelState<float>[pixels_per_lane];
 
-template <class Pixels>
 __device__ void store(const BlendParams& p, const BlendTask& task, std::uint32_t slice,
-                      const Pixels& pixels, const States& states) {
+                      const PartPixels& pixels, const States& states) {
 #pragma unroll
   for (int i = 0; i < pixels_per_lane; ++i) {
-    if (Pixels::most_parts == most_run_parts && !pixels.inside(p.shape, i)) continue;
     if (task.slices > 1) {
       const math::Vec3<float>& c = states[i].colour;
-      p.slice_pixels[slice_pixel(p.shape, slice, pixels.in_tile(i))] =
+      p.slice_pixels[slice_pixel(slice, pixels.in_tile(i))] =
           make_float4(c.x, c.y, c.z, states[i].transmittance);
     } else {
       const int2 place = pixels.place(i);
-      show_pixel(p.rgb, p.shape, place.x, place.y, states[i], p.background);
+      show_pixel(p.rgb, p.shape, place.x, place.y, states[i], p.background, p.finish);
     }
   }
 }
 
 /// Marks finished pixels by the sign, as in math::PixelState.
-__device__ float finished_by_sign(float transmittance) {
-  return is_live(transmittance) ? transmittance : -transmittance;
+__device__ float finished_by_sign(float transmittance, float least) {
+  return transmittance >= least ? transmittance : -transmittance;
 }
 
 /// Moves the pixels of the halves to the lanes that store them.
 __device__ void gather_states(WarpScratch& scratch, const HalfPixels (&half_pixels_of)[halves],
-                              States& states) {
+                              float least, States& states) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   __syncwarp();
   const int holds = lane % round_lanes - 2;       // red and green, or blue
@@ -249,8 +290,8 @@ __device__ void gather_states(WarpScratch& scratch, const HalfPixels (&half_pixe
           const int pixel =
               half * half_pixels + b * block_pixels + row * (block_pixels / 2) + lane / round_lanes;
           reinterpret_cast<float2*>(&pixels[pixel])[holds] = make_float2(
-              from.colour[2 * row],
-              holds == 0 ? from.colour[2 * row + 1] : finished_by_sign(from.transmittance[row]));
+              from.colour[2 * row], holds == 0 ? from.colour[2 * row + 1]
+                                               : finished_by_sign(from.transmittance[row], least));
         }
       }
     }
@@ -264,32 +305,36 @@ __device__ void gather_states(WarpScratch& scratch, const HalfPixels (&half_pixe
   }
 }
 
-template <bool count_pairs, class Pixels>
+template <bool count_pairs>
 __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint32_t task_index,
                            int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const BlendTask task = load_task(p, task_index);
   const std::uint32_t slice = task_index - p.shape.tiles();  // its index if it is a slice
-  const Pixels pixels(p, scratch.box, task.tile, part);
-  if (pixels.empty()) return;
+  const PartPixels pixels(p.shape, task.tile, part);
+  if (!pixels.shows(p.shape)) return;
+  const float least = p.finish.transmittance;
   unsigned long long pairs = 0;
   const auto behind_finished = [&] {
     // The limit is halved, so that rounding cannot make the composite use a slice that was not
     // blended.
-    return task.slice > 0 && transmittance_before(p, slice, task.slice, part) <
-                                 0.5f * static_cast<float>(transmittance_min);
+    return task.slice > 0 && transmittance_before(p, slice, task.slice, part) < 0.5f * least;
   };
   if (behind_finished()) return;  // the composite will not use this part of the slice
-  Groups groups(p, task, scratch);
+  const std::uint32_t first_block = first_block_of(part);
+  std::uint32_t live[halves] = {first_block, first_block << blocks_across};
+  Groups groups(p, task, live[0] | live[1], scratch);
   PixelPlaces(&places)[halves][warp_size] = scratch.places;
   HalfPixels half[halves] = {take_half(pixels, p.shape, 0, places[0][lane]),
                              take_half(pixels, p.shape, 1, places[1][lane])};
-  bool live[halves] = {half[0].live(), half[1].live()};
+#pragma unroll
+  for (int h = 0; h < halves; ++h)
+    if (!half[h].live(least)) live[h] = 0;
   Waiting waiting[halves];
-  for (int group = 0; live[0] || live[1]; ++group) {
+  for (int group = 0; (live[0] | live[1]) != 0; ++group) {
     const bool more = groups.more();
     if (more) {
-      groups.take();
+      groups.take(live[0] | live[1]);
       stage(scratch, pixels, groups, live, waiting);
     } else {
       fill_up(scratch, waiting);
@@ -297,12 +342,12 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
     const unsigned enough = more ? round_splats : 1;
 #pragma unroll
     for (int h = 0; h < halves; ++h) {
-      while (live[h] && waiting[h].count >= enough) {
-        pairs +=
-            blend_round<count_pairs>(half[h], places[h][lane], scratch.staged[h], waiting[h].first);
+      while (live[h] != 0 && waiting[h].count >= enough) {
+        pairs += blend_round<count_pairs>(half[h], places[h][lane], scratch.staged[h],
+                                          waiting[h].first, least);
         waiting[h].first = StagedHalf::wrapped(waiting[h].first + round_splats);
         waiting[h].count -= min(waiting[h].count, unsigned{round_splats});
-        live[h] = half[h].live();
+        if (!half[h].live(least)) live[h] = 0;
       }
     }
     if (!more || (group % 2 == 1 && behind_finished())) break;
@@ -310,27 +355,29 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
   asm volatile("cp.async.wait_all;" ::: "memory");
   if (count_pairs) atomicAdd(&p.counts->blended_pairs, pairs);
   States states;
-  gather_states(scratch, half, states);
+  gather_states(scratch, half, least, states);
   store(p, task, slice, pixels, states);
 
-  const std::uint32_t consumed = groups.taken();
   float largest = 0.0f;  // of unfinished pixels: nothing behind shows in the finished ones
 #pragma unroll
   for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, states[i].transmittance);
   largest = __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(largest)));
   if (lane != 0) return;
+  const std::uint32_t looked_at = groups.taken();
   if (task.slices > 1) {
-    const std::uint32_t at = slice_part(p.shape, slice, part);
-    p.consumed[at] = consumed;
+    const std::uint32_t at = slice_part(slice, part);
+    p.consumed[at] = looked_at;
     volatile float* known = p.slice_transmittance;
     known[at] = largest;
-  } else {
-    atomicMax(&p.reach[task.tile], consumed - task.first);
+    return;
   }
+  atomicMax(&p.reach[task.tile], looked_at - task.first);
+  const bool finished = largest <= 0.0f && looked_at > task.first;
+  p.ends.note(task.tile, part, finished, finished ? p.entries[looked_at - 1].slot : 0);
 }
 
 /// Warps take parts from a queue, so that none waits for the longest part of its tile or block.
-template <bool count_pairs, class Pixels>
+template <bool count_pairs>
 __global__ void __launch_bounds__(block_size, blocks_per_processor)
     blend_kernel(const BlendParams p) {
   let_next_kernel_begin();
@@ -346,7 +393,7 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
     std::uint32_t work = 0;
     if (lane == 0) work = atomicAdd(&p.counts->next_part, 1u);
     work = __shfl_sync(~0u, work, 0);
-    std::uint32_t place = work / Pixels::most_parts;
+    std::uint32_t place = work / parts_per_tile;
     int queue_class = 0;
     for (; queue_class < queue_classes; ++queue_class) {
       const std::uint32_t queued = p.counts->queued[queue_class];
@@ -355,8 +402,7 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
     }
     if (queue_class == queue_classes) return;
     const std::uint32_t task = p.queue[queue_class * p.shape.tiles() + place];
-    blend_part<count_pairs, Pixels>(p, scratch[warp], task,
-                                    static_cast<int>(work % Pixels::most_parts));
+    blend_part<count_pairs>(p, scratch[warp], task, static_cast<int>(work % parts_per_tile));
     __syncwarp();
   }
 }
@@ -365,18 +411,13 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
 
 int blend_warps(int processors) {
   int blocks = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, blend_kernel<false, SquarePixels>,
-                                                      block_size, 0),
+  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, blend_kernel<false>, block_size, 0),
         "occupancy");
   return processors * blocks * warps_per_block;
 }
 
 void launch_blend(const BlendParams& params, cudaStream_t stream) {
-  const bool runs = params.pixels != nullptr;
-  const auto kernel =
-      params.count_pairs
-          ? (runs ? blend_kernel<true, RunPixels> : blend_kernel<true, SquarePixels>)
-          : (runs ? blend_kernel<false, RunPixels> : blend_kernel<false, SquarePixels>);
+  const auto kernel = params.count_pairs ? blend_kernel<true> : blend_kernel<false>;
   kernel<<<params.warps / warps_per_block, block_size, 0, stream>>>(params);
   check_launch("blend");
 }

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cmath>
+
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/pixel.cuh"
 
 namespace catgs::cuda {
 
@@ -14,61 +17,72 @@ struct BlendTask {
 };
 static_assert(sizeof(BlendTask) == 16);
 
-/// A warp blends one of the 8x8 px parts of a tile. Parts are small enough that most splats of a
-/// tile miss most of them, and large enough that loading and testing a splat serves many pixels.
-constexpr int part_size_px = 8;
-constexpr int parts_per_tile = (tile_size_px / part_size_px) * (tile_size_px / part_size_px);
+/// A warp blends one of the 8x8 px parts of a tile, in two halves that are blocks. Parts are small
+/// enough that most splats of a tile miss most of them, and large enough that loading a splat
+/// serves many pixels.
+constexpr int part_side_px = 8;
+constexpr int halves = part_side_px / block_height_px;
+constexpr int parts_across = tile_side_px / part_side_px;
+constexpr int parts_per_tile = parts_across * parts_across;
+constexpr int part_pixels = part_side_px * part_side_px;
+static_assert(block_width_px == part_side_px && halves == 2);
 
-/// A pixel of the picture.
-struct PixelPlace {
-  std::uint16_t x, y;
-};
-
-/// When the grid is turned against the picture, a tile's pixels are a run. It is blended in parts
-/// of part_pixels; the last part takes the rest. Turned tiles have more pixels at the sides that
-/// the camera turns to.
-constexpr int part_pixels = part_size_px * part_size_px;
-constexpr int most_run_parts = 6;
-
-/// Room for the pixels of a tile.
-__host__ __device__ inline std::uint32_t run_bound_px(const FrameShape& shape) {
-  return static_cast<std::uint32_t>(shape.tile_parts * part_pixels);
+/// TileEntry::blocks of half 0 of a part; those of half 1 follow in the next row of blocks.
+__host__ __device__ constexpr std::uint32_t first_block_of(int part) {
+  return 1u << (part / parts_across * halves * blocks_across + part % parts_across);
 }
+__host__ __device__ constexpr std::uint32_t blocks_of(int part) {
+  return first_block_of(part) * (1u + (1u << blocks_across));
+}
+
+/// Numbers of a tile's pixels: part by part, and row by row in a part.
+constexpr int tile_pixels = tile_side_px * tile_side_px;
 
 /// The places where a slice stores a pixel of its tile, and the state of a part.
-__device__ inline std::size_t slice_pixel(const FrameShape& shape, std::uint32_t slice,
-                                          int in_tile) {
-  return static_cast<std::size_t>(slice) * run_bound_px(shape) + static_cast<unsigned>(in_tile);
+__device__ inline std::size_t slice_pixel(std::uint32_t slice, int in_tile) {
+  return static_cast<std::size_t>(slice) * tile_pixels + static_cast<unsigned>(in_tile);
 }
-__device__ inline std::uint32_t slice_part(const FrameShape& shape, std::uint32_t slice, int part) {
-  return slice * static_cast<unsigned>(shape.tile_parts) + static_cast<unsigned>(part);
+__device__ inline std::uint32_t slice_part(std::uint32_t slice, int part) {
+  return slice * static_cast<unsigned>(parts_per_tile) + static_cast<unsigned>(part);
 }
+
+/// Where parts end: the view depth of the last splat that a part looked at until all its pixels
+/// were finished; infinity where some are not. No splat behind it shows.
+struct PartEnds {
+  const float* splat_depth;  // [visible_bound]
+  float* depth;              // [tiles][parts_per_tile]; null: not wanted
+
+  __device__ void note(std::uint32_t tile, int part, bool finished, std::uint32_t slot) const {
+    if (depth == nullptr) return;
+    depth[tile * parts_per_tile + static_cast<unsigned>(part)] =
+        finished ? splat_depth[slot] : INFINITY;
+  }
+};
 
 /// Blends all tasks front to back. Whole tiles go straight to the image, slices to slice_pixels.
 struct BlendParams {
   FrameShape shape;
   const SplatRecord* records;
-  const std::uint32_t* slot;   // [list_bound], sorted by tile, front to back within one
+  const TileEntry* entries;    // [list_bound], sorted by tile, front to back within one
   const BlendTask* tasks;      // [task_bound(shape)]
   const std::uint32_t* queue;  // [queue_bound(shape)], tasks by class
   float3 background;
   float* rgb;  // [height][width][3], display-referred, in [0, 1]
-  // Runs of the tiles' pixels, [tiles][run_bound_px(shape)] and [tiles]; null: tiles are squares.
-  const PixelPlace* pixels;
-  const std::uint32_t* pixel_count;
-  // Results of slices. Their pixels, [slice_bound][run_bound_px(shape)]: colour and transmittance
-  // as in math::PixelState. Then, both [slice_bound][tile_parts]: one past the last entry looked
-  // at, and the largest transmittance that a slice leaves to what lies behind it (1 at first).
+  // Results of slices. Their pixels, [slice_bound][tile_pixels]: colour and transmittance as in
+  // math::PixelState. Then, both [slice_bound][parts_per_tile]: one past the last entry looked at,
+  // and the largest transmittance that a slice leaves to what lies behind it (1 at first).
   float4* slice_pixels;
   std::uint32_t* consumed;
   float* slice_transmittance;
+  PartEnds ends;
+  Finish finish;
   std::uint32_t* reach;  // [tiles], zeroed; number of entries that a whole tile looked at
   FrameCounts* counts;   // next_part is consumed; blended_pairs is set when counted
   bool count_pairs;      // slower
   int warps;             // that the device runs at a time, by blend_warps()
 };
 
-/// Number of warps of the blend kernel for square tiles that `processors` of the current device run
+/// Number of warps of the blend kernel that `processors` of the current device run
 /// at a time.
 int blend_warps(int processors);
 void launch_blend(const BlendParams& params, cudaStream_t stream);

@@ -140,15 +140,11 @@ __device__ inline std::uint32_t bits_of(__half2 halves) {
   return reinterpret_cast<const std::uint32_t&>(halves);
 }
 
-__device__ inline bool is_live(float transmittance) {
-  return transmittance >= static_cast<float>(transmittance_min);
-}
-
 /// A block of pixels, distributed over the lanes of a warp. Lane l has pixels l / 4 and l / 4 + 8:
 /// their transmittances; red and green if it is the third lane of the four, blue if it is the last.
 struct BlockPixels {
   float colour[4];
-  float transmittance[2];  // any value below transmittance_min means finished
+  float transmittance[2];
 };
 
 /// The first factors of the first product: the lane's pair out of (1, x), (y, x^2), (xy, y^2), 0,
@@ -160,20 +156,19 @@ struct PixelPlaces {
 struct HalfPixels {
   BlockPixels block[half_blocks];
 
-  /// Whether any pixel of the half part is not finished. Called by the whole warp.
-  __device__ bool live() const {
+  /// Whether any pixel has a transmittance of `least` or more. Called by the whole warp.
+  __device__ bool live(float least) const {
     float most = 0.0f;
 #pragma unroll
     for (const BlockPixels& b : block)
       most = fmaxf(most, fmaxf(b.transmittance[0], b.transmittance[1]));
-    return __any_sync(~0u, is_live(most));
+    return __any_sync(~0u, most >= least);
   }
 };
 
 /// Initialises half part `half` from the warp's pixels, and sets the places of the lane's pixels.
-template <class Pixels>
-__device__ HalfPixels take_half(const Pixels& pixels, const FrameShape& shape, int half,
-                                PixelPlaces& places) {
+__device__ inline HalfPixels take_half(const PartPixels& pixels, const FrameShape& shape, int half,
+                                       PixelPlaces& places) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size, pair = lane % round_lanes;
   HalfPixels taken;
 #pragma unroll
@@ -205,7 +200,7 @@ struct QuarterBlend {
 /// product.
 template <bool count_pairs>
 __device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint32_t (&places)[2],
-                                      const uint2* in_column, unsigned& pairs) {
+                                      const uint2* in_column, float least, unsigned& pairs) {
   QuarterBlend blend{{alpha_scale, alpha_scale}, {}};
 #pragma unroll
   for (int j = 0; j < columns; ++j) {
@@ -221,7 +216,7 @@ __device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint
         const float alpha = fminf(exp2_flushing(exponent[2 * row + k]), most_scaled_alpha);
         weight[k] = alpha * blend.scaled[row];
         blend.scaled[row] = fmaf(weight[k], -alpha_scale, blend.scaled[row]);
-        if (count_pairs) pairs += alpha > 0.0f && is_live(pixels.transmittance[row]);
+        if (count_pairs) pairs += alpha > 0.0f && pixels.transmittance[row] >= least;
       }
       blend.weight[j][row] = __floats2half2_rn(weight[0], weight[1]);
     }
@@ -229,11 +224,12 @@ __device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint
   return blend;
 }
 
-/// Blends the staged splats at first, first + 1, … first + 31 into a half part. Returns the number
-/// of pairs that the lane blended if `count_pairs`.
+/// Blends the staged splats at first, first + 1, … first + 31 into the pixels of a half part whose
+/// transmittance is `least` or more. Returns the number of pairs that the lane blended if
+/// `count_pairs`.
 template <bool count_pairs>
 __device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
-                                const StagedHalf& staged, unsigned first) {
+                                const StagedHalf& staged, unsigned first, float least) {
   const unsigned lane = threadIdx.x % warp_size;
   // Columns 2 l and 2 l + 1 of the first product are two neighbours in the quarter of lane l.
   const unsigned column = lane / round_lanes;
@@ -244,7 +240,7 @@ __device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
   QuarterBlend mine[half_blocks];
 #pragma unroll
   for (int b = 0; b < half_blocks; ++b)
-    mine[b] = blend_quarter<count_pairs>(pixels.block[b], places.of[b], in_column, pairs);
+    mine[b] = blend_quarter<count_pairs>(pixels.block[b], places.of[b], in_column, least, pairs);
   // Row r of a matrix of colours belongs to the splat in column r of the first product.
   const unsigned row_of_matrix = lane % column_splats, matrix = lane / column_splats;
   uint2 colours[chunks];
@@ -273,7 +269,7 @@ __device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
     __half2 factor[2];
 #pragma unroll
     for (int row = 0; row < 2; ++row) {
-      float before = is_live(block.transmittance[row]) ? block.transmittance[row] : 0.0f;
+      float before = block.transmittance[row] >= least ? block.transmittance[row] : 0.0f;
       if (lane % 2 != 0) before *= neighbour[b][row];
       if (lane / 2 % 2 != 0) before *= other_pair[b][row];
       factor[row] = __float2half2_rn(before);

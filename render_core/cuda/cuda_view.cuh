@@ -5,9 +5,7 @@
 
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_room.h"
-#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/list_builder.cuh"
-#include "render_core/cuda/reach_history.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/stage_times.h"
@@ -30,22 +28,19 @@ class CudaView final : public View {
   [[nodiscard]] std::size_t memory_bytes() const override;
 
  private:
-  void set_shape(glm::ivec2 size_px, const TileGrid& grid);
-  void make_room(glm::ivec2 size_px, const TileGrid& grid);
+  void set_shape(glm::ivec2 size_px, int tile_side);
+  void make_room(glm::ivec2 size_px);
   enum class Headroom { none, some };
   void reserve(Headroom headroom);
   bool needs_more_room();
   void forget_frames();
   [[nodiscard]] std::optional<FrameView> draw(const FrameRequest& request, const FramePlan& plan);
   void draw_key(const FrameRequest& request, const FramePlan& plan);
-  [[nodiscard]] bool draw_sub(const FrameRequest& request, const FramePlan& plan);
+  void draw_sub(const FrameRequest& request);
   void draw_vanilla(const FrameRequest& request);
+  [[nodiscard]] Occlusion want_occlusion(const Camera& camera);
   void list_tiles(const ListRequest& request);
-  ColourArrays want_colours(const math::CameraModel<float>& camera);
-  [[nodiscard]] GiantSet want_giants(const FramePlan& plan);
-  void reorder(const GiantSet& giants);
-  void split(ReorderRun* runs, const LastReach& last);
-  void place_tiles(const FramePlan& plan);
+  void split();
   void blend(const FrameRequest& request);
   void deliver();
   [[nodiscard]] FrameView finished(FrameKind kind, float near_z);
@@ -65,11 +60,10 @@ class CudaView final : public View {
   VanillaPipeline vanilla_;
   int blend_warps_;
 
-  // State of sub-frames beside memory_.
-  ReachHistory reach_;
-  bool turned_ = false;         // the frame's tiles are runs of pixels
-  bool seeks_giants_ = false;   // since a turn in this group
-  bool colours_known_ = false;  // memory_ says which ones
+  // What memory_ holds of the last frame.
+  bool reach_known_ = false;
+  std::optional<Camera> ends_of_;  // the camera whose part_ends are known
+  float mean_inverse_depth_ = 0.0f;
 };
 
 }  // namespace catgs::cuda

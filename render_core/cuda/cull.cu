@@ -32,7 +32,13 @@ __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
     if (i < p.scene.count) {
       const Splat splat =
           make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i));
-      visible = splat.in_view || splat.watched;
+      visible =
+          splat.in_view &&
+          !p.occlusion.hides(
+              p.shape,
+              make_float2(splat.centre_px.x - splat.half_px.x, splat.centre_px.y - splat.half_px.y),
+              make_float2(splat.centre_px.x + splat.half_px.x, splat.centre_px.y + splat.half_px.y),
+              splat.depth);
     }
     const unsigned word = __ballot_sync(~0u, visible);
     if (threadIdx.x % warp_size == 0) p.mask[rank * warps + threadIdx.x / warp_size] = word;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/occlusion.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/motion/list_culler.h"
@@ -8,14 +9,15 @@
 namespace catgs::cuda {
 
 /// Finds the Gaussians in view, in the order of the scene's clusters: the frustum cache of a key
-/// frame. In view means now, or with `sweeps` at some time of the window; watched Gaussians count
-/// too. Clusters are tested first, so that the cost of the rest depends on what is in sight, not on
-/// the size of the scene.
+/// frame. In view means now, or with `sweeps` at some time of the window; and not hidden by
+/// what is in front. Clusters are tested first, so that the cost of the rest depends on what is in
+/// sight, not on the size of the scene.
 struct CullParams {
   SceneArrays scene;
   ListCuller culler;
   FrameCameras camera;
   bool sweeps;
+  Occlusion occlusion;
   FrameShape shape;
   std::uint32_t* clusters;  // [scene.cluster_count], those in sight; a cluster's position here is
                             // its rank

@@ -36,16 +36,12 @@ struct FrameCounts {
   std::uint32_t visible = 0;       // Gaussians in view
   std::uint32_t list_entries = 0;  // sum of all tile lists, before any bound was applied
   std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float
-  std::uint32_t giants = 0;        // in the GiantSet; sub-frames add to it
   // Counts of each frame.
   std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
   std::uint32_t sampled = 0;   // counted Gaussians; inverse_depths is their sum
   unsigned long long inverse_depths = 0;     // in units of 1 / (near_z * inverse_depth_scale)
-  std::uint32_t unlisted = 0;                // 1: a watched Gaussian came into view
   std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
-  std::uint32_t runs = 0;                    // of the reorder stage
-  std::uint32_t uncarried_lists = 0;         // lists with too many giants for launch_giants()
   std::uint32_t wanted_slices = 0;           // of long tiles; allocated_slices found room
   std::uint32_t allocated_slices = 0;
   std::uint32_t next_part = 0;              // of a task; next one for a warp of the blend
@@ -60,24 +56,31 @@ struct HostCounts {
   std::uint32_t list_entries = 0;
 };
 
-// In an array of visible Gaussians: this one is in no list. A turn may bring it into view, but
-// seldom does. Giants far to the side may come before the near plane with footprints all over the
-// picture. A sub-frame that finds one in view is drawn again as a key frame.
-constexpr std::uint32_t watched_bit = std::uint32_t{1} << 31;
-static_assert(max_gaussians <= watched_bit);
+/// Side of the tiles that have lists. A list entry says which of the tile's 8x4 px blocks its splat
+/// reaches, so a tile may be large: lists then have few entries to sort.
+constexpr int tile_side_px = 32;
 
-/// The picture, the grid of tile lists (see TileGrid) and the bounds of the frame's buffers.
+/// Width and height of a tile's blocks: a bit each in TileEntry::blocks, row by row.
+constexpr int block_width_px = 8;
+constexpr int block_height_px = 4;
+constexpr int blocks_across = tile_side_px / block_width_px;
+constexpr int blocks_down = tile_side_px / block_height_px;
+static_assert(blocks_across * blocks_down == 32);
+
+/// An entry of a tile's list.
+struct __align__(8) TileEntry {
+  std::uint32_t slot;    // of the splat
+  std::uint32_t blocks;  // that the splat reaches
+};
+
+/// The picture, its tiles, and the bounds of the frame's buffers.
 struct FrameShape {
   int width_px = 0, height_px = 0;
   int tiles_x = 0, tiles_y = 0;
-  int first_x_px = 0, first_y_px = 0;         // where tile (0, 0) begins in the lists' image plane
-  int list_width_px = 0, list_height_px = 0;  // extent of the lists, from there
-  int shown_x_px = 0, shown_y_px = 0;         // where tile (0, 0) begins in the picture
-  int tile_parts = 0;                         // parts per tile for which slices have room
-  std::uint32_t tile_bound = 0;               // room for tiles
-  std::uint32_t visible_bound = 0;            // room for visible Gaussians
-  std::uint32_t list_bound = 0;               // room for list entries
-  std::uint32_t slice_bound = 0;              // room for slices of long tiles
+  std::uint32_t tile_bound = 0;     // room for tiles
+  std::uint32_t visible_bound = 0;  // room for visible Gaussians
+  std::uint32_t list_bound = 0;     // room for list entries
+  std::uint32_t slice_bound = 0;    // room for slices of long tiles
 
   __host__ __device__ std::uint32_t tiles() const {
     return static_cast<std::uint32_t>(tiles_x) * static_cast<std::uint32_t>(tiles_y);

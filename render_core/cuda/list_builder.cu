@@ -26,9 +26,6 @@ ListRequest::ListRequest(const Camera& camera, const FramePlan& plan,
       min_depth(speculation_min_depth(settings, camera.near_z)) {
   cameras.now.single.near_z = plan.list_near_z;
   cameras.end = sweeps ? make_camera_pair(plan.window_end).single : cameras.now.single;
-  cameras.growth = math::convert<float>(plan.growth);
-  cameras.trail_shift_px = make_float2(static_cast<float>(plan.trail_shift_px.x),
-                                       static_cast<float>(plan.trail_shift_px.y));
 }
 
 SortScratch ListBuilder::scratch() const {
@@ -43,6 +40,7 @@ void ListBuilder::cull(const ListRequest& request, const FrameShape& shape, cuda
                .culler = request.culler,
                .camera = request.cameras,
                .sweeps = request.sweeps,
+               .occlusion = request.occlusion,
                .shape = shape,
                .clusters = m.clusters.get(),
                .mask = m.cull_mask.get(),
@@ -58,7 +56,7 @@ void ListBuilder::cull(const ListRequest& request, const FrameShape& shape, cuda
 }
 
 void ListBuilder::project(const ListRequest& request, const FrameShape& shape,
-                          const ColourArrays& colours, cudaStream_t stream) {
+                          cudaStream_t stream) {
   const ViewMemory& m = memory_;
   launch_project({.scene = scene_,
                   .camera = request.cameras,
@@ -66,9 +64,9 @@ void ListBuilder::project(const ListRequest& request, const FrameShape& shape,
                   .min_depth = request.min_depth,
                   .counts = m.counts.get(),
                   .visible = m.visible.get(),
-                  .colours = colours,
                   .records = m.records.get(),
                   .depth_key = m.depth.get(),
+                  .splat_depth = m.splat_depth.get(),
                   .tile_count = m.tile_count.get(),
                   .spans = m.spans.get(),
                   .path = request.sweeps ? m.path.get() : nullptr,
@@ -109,8 +107,10 @@ void ListBuilder::emit_as(const ListRequest& request, const FrameShape& shape,
                      .tile_count = m.tile_count.get(),
                      .spans = m.spans.get(),
                      .path = request.sweeps ? m.path.get() : nullptr,
+                     .part_limit = request.occlusion.part,
+                     .splat_depth = m.splat_depth.get(),
                      .tile = reinterpret_cast<Tile*>(m.tile.get()),
-                     .slot = m.other_slot.get()},
+                     .entry = m.other_entries.get()},
                     stream);
 }
 
@@ -127,13 +127,13 @@ void ListBuilder::sort_as(const FrameShape& shape, cudaStream_t stream) {
   ViewMemory& m = memory_;
   PingPong<Tile> tile{.current = reinterpret_cast<Tile*>(m.tile.get()),
                       .other = reinterpret_cast<Tile*>(m.other_tile.get())};
-  PingPong<std::uint32_t> slot{.current = m.other_slot.get(), .other = m.slot.get()};
+  PingPong<TileEntry> entry{.current = m.other_entries.get(), .other = m.entries.get()};
   check(cudaEventSynchronize(counted_.get()), "list entries");
   const std::uint32_t entries = std::min(m.list_counts.get()->list_entries, shape.list_bound);
-  cuda::sort_by_tile(shape, entries, tile, slot, scratch(), stream);
+  cuda::sort_by_tile(shape, entries, tile, entry, scratch(), stream);
   launch_ranges<Tile>(
       {.shape = shape, .entries = entries, .tile = tile.current, .range = m.range.get()}, stream);
-  if (slot.current == m.other_slot.get()) m.slot.swap(m.other_slot);
+  if (entry.current == m.other_entries.get()) m.entries.swap(m.other_entries);
 }
 
 }  // namespace catgs::cuda

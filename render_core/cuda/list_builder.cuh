@@ -1,5 +1,6 @@
 #pragma once
 
+#include "render_core/cuda/occlusion.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/stream.h"
@@ -8,7 +9,7 @@
 
 namespace catgs::cuda {
 
-/// The region that lists have to cover.
+/// What the lists have to cover.
 struct ListRequest {
   ListRequest(const Camera& camera, const FramePlan& plan, const SpeculationSettings& settings);
 
@@ -16,6 +17,7 @@ struct ListRequest {
   ListCuller culler;
   bool sweeps;      // trails are listed, not ellipses
   float min_depth;  // as in ProjectParams
+  Occlusion occlusion{};
 };
 
 /// The stages that make the lists of Gaussians per tile, in order, in the memory of a View. All
@@ -29,9 +31,8 @@ class ListBuilder {
 
   /// Finds the Gaussians in view. Sets the frame's counts to zero first.
   void cull(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
-  /// Projects them, and shades those whose colours `colours` does not have.
-  void project(const ListRequest& request, const FrameShape& shape, const ColourArrays& colours,
-               cudaStream_t stream);
+  /// Projects and shades them.
+  void project(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   void sort_by_depth(const FrameShape& shape, cudaStream_t stream);
   void emit(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   /// Completes the lists.

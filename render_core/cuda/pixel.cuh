@@ -10,11 +10,24 @@ __device__ inline bool in_picture(const FrameShape& shape, int x_px, int y_px) {
   return x_px >= 0 && y_px >= 0 && x_px < shape.width_px && y_px < shape.height_px;
 }
 
+/// When a pixel is finished.
+struct Finish {
+  float transmittance;  // below this one
+  // A finished pixel's colour is taken for that of what lies behind it. Otherwise that is black.
+  bool fills;
+};
+
 /// Writes a blended pixel over its background. `rgb`: [height][width][3], display-referred, in [0,
 /// 1]. Pixels outside the picture are dropped.
 __device__ inline void show_pixel(float* rgb, const FrameShape& shape, int x_px, int y_px,
-                                  const math::PixelState<float>& pixel, float3 background) {
+                                  math::PixelState<float> pixel, float3 background,
+                                  const Finish& finish) {
   if (!in_picture(shape, x_px, y_px)) return;
+  if (finish.fills && fabsf(pixel.transmittance) < finish.transmittance) {
+    const float scale = __fdividef(1.0f, 1.0f - fabsf(pixel.transmittance));
+    pixel.colour = {scale * pixel.colour.x, scale * pixel.colour.y, scale * pixel.colour.z};
+    pixel.transmittance = 0.0f;
+  }
   const auto shown = math::resolve<float>(pixel, {background.x, background.y, background.z});
   float* out = rgb + 3 * (static_cast<std::size_t>(y_px) * shape.width_px + x_px);
   out[0] = shown.x;

@@ -1,8 +1,6 @@
 #pragma once
 
-#include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
-#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/splat.cuh"
 
 namespace catgs::cuda {
@@ -13,17 +11,16 @@ struct ProjectParams {
   SceneArrays scene;
   FrameCameras camera;
   FrameShape shape;
-  float min_depth;            // nearer splats do not count in displacement and nearness
-  FrameCounts* counts;        // displacement, nearness, giants, unlisted, depths
-  std::uint32_t* visible;     // [visible_bound], scene indices; key frames set watched_bit
-  ColourArrays colours;       // colours from earlier frames; all null: none
-  SplatRecord* records;       // [visible_bound]
-  std::uint32_t* depth_key;   // [visible_bound], depth_key() of the view depth
-  std::uint32_t* tile_count;  // key frames: [visible_bound], number of its list entries
-  TileSpans* spans;           // key frames: [visible_bound]
-  SplatPath* path;            // key frames with a window: [visible_bound]
-  std::uint32_t* order;       // key frames: [visible_bound], input of sort_by_depth()
-  GiantSet giants{};          // sub-frames only
+  float min_depth;               // nearer splats do not count in displacement and nearness
+  FrameCounts* counts;           // displacement, nearness, depths
+  const std::uint32_t* visible;  // [visible_bound], scene indices
+  SplatRecord* records;          // [visible_bound]
+  std::uint32_t* depth_key;      // [visible_bound], depth_key() of the view depth
+  float* splat_depth;            // [visible_bound], the depth itself; null: not wanted
+  std::uint32_t* tile_count;     // key frames: [visible_bound], number of its list entries
+  TileSpans* spans;              // key frames: [visible_bound]
+  SplatPath* path;               // key frames with a window: [visible_bound]
+  std::uint32_t* order;          // key frames: [visible_bound], input of sort_by_depth()
 };
 
 enum class Listing {

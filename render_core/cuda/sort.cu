@@ -47,6 +47,7 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   std::size_t depth = 0, scan = 0, narrow = 0, wide = 0;
   cub::DoubleBuffer<std::uint32_t> keys, values;
   cub::DoubleBuffer<std::uint16_t> narrow_keys;
+  cub::DoubleBuffer<TileEntry> entries;
   check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound,
                                         depth_bits_below, depth_end_bit),
         "depth sort size");
@@ -54,10 +55,10 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
                                        static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
                                        shape.visible_bound),
         "tile count scan size");
-  check(cub::DeviceRadixSort::SortPairs(nullptr, wide, keys, values, shape.list_bound, 0,
+  check(cub::DeviceRadixSort::SortPairs(nullptr, wide, keys, entries, shape.list_bound, 0,
                                         tile_bits(shape)),
         "tile sort size");
-  check(cub::DeviceRadixSort::SortPairs(nullptr, narrow, narrow_keys, values, shape.list_bound, 0,
+  check(cub::DeviceRadixSort::SortPairs(nullptr, narrow, narrow_keys, entries, shape.list_bound, 0,
                                         std::min(tile_bits(shape), 16)),
         "tile sort size");
   return std::max({depth, scan, narrow, wide});
@@ -88,20 +89,20 @@ void scan_tile_counts(std::uint32_t visible, FrameCounts* counts, HostCounts* ho
 
 template <class Tile>
 void sort_by_tile(const FrameShape& shape, std::uint32_t entries, PingPong<Tile>& tile,
-                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream) {
+                  PingPong<TileEntry>& entry, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<Tile> keys(tile.current, tile.other);
-  cub::DoubleBuffer<std::uint32_t> values(slot.current, slot.other);
+  cub::DoubleBuffer<TileEntry> values(entry.current, entry.other);
   check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, entries, 0,
                                         tile_bits(shape), stream),
         "tile sort");
   tile = {keys.Current(), keys.Alternate()};
-  slot = {values.Current(), values.Alternate()};
+  entry = {values.Current(), values.Alternate()};
 }
 
 template void sort_by_tile(const FrameShape&, std::uint32_t, PingPong<std::uint16_t>&,
-                           PingPong<std::uint32_t>&, SortScratch, cudaStream_t);
+                           PingPong<TileEntry>&, SortScratch, cudaStream_t);
 template void sort_by_tile(const FrameShape&, std::uint32_t, PingPong<std::uint32_t>&,
-                           PingPong<std::uint32_t>&, SortScratch, cudaStream_t);
+                           PingPong<TileEntry>&, SortScratch, cudaStream_t);
 
 std::size_t sum_scratch_bytes(std::uint32_t count) {
   std::size_t bytes = 0;

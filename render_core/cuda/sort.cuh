@@ -53,7 +53,7 @@ void scan_tile_counts(std::uint32_t visible, FrameCounts* counts, HostCounts* ho
 /// Keys are at most shape.tiles(). Tile: std::uint16_t or std::uint32_t.
 template <class Tile>
 void sort_by_tile(const FrameShape& shape, std::uint32_t entries, PingPong<Tile>& tile,
-                  PingPong<std::uint32_t>& slot, SortScratch scratch, cudaStream_t stream);
+                  PingPong<TileEntry>& entry, SortScratch scratch, cudaStream_t stream);
 
 /// For the vanilla pipeline: sums[i] = tile_count[0] + … + tile_count[i], and a sort of list
 /// entries by 64-bit (tile | depth) keys.

@@ -2,7 +2,6 @@
 
 #include "render_core/cuda/gaussian.cuh"
 #include "render_core/cuda/tiles.cuh"
-#include "render_core/math/growth-inl.h"
 #include "render_core/math/sweep-inl.h"
 
 namespace catgs::cuda {
@@ -19,13 +18,11 @@ inline CameraPair make_camera_pair(const Camera& camera) {
 }
 
 /// The camera of a frame. For listing also the camera at the end of its window (the same if it has
-/// none) and the other bounds of the lists.
+/// none).
 struct FrameCameras {
   CameraPair now;  // its near_z is the near plane of the lists
   math::CameraModel<float> end;
   float near_z;  // near plane of the picture
-  ListGrowth<float> growth{};
-  float2 trail_shift_px{};  // added to trails
 };
 
 /// Base-2 logarithm of an opacity that reaches nothing.
@@ -38,21 +35,9 @@ struct Splat {
   math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
   float log2_opacity = never;
   float depth = 0.0f;
-  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, 0.0f, {}};
-  bool in_view = false;  // its box, or that of its path, meets the region of the lists
-  bool watched = false;  // a turn may bring it into view
+  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, {}};
+  bool in_view = false;  // its box, or that of its path, meets the picture
 };
-
-/// Whether a turn may bring a Gaussian into the picture that is behind the near plane at both ends
-/// of the window. `reach`: of its ellipse.
-__device__ inline bool turns_in(const SceneArrays& scene, const FrameCameras& camera,
-                                std::uint32_t i, const math::Vec3<float>& mean, float reach) {
-  const math::CameraModel<float>& now = camera.now.single;
-  const float extent = math::extent_bound(load_factor(scene, i), reach);
-  return math::may_turn_in(camera.growth, math::camera_from_world(now, mean), extent, now.near_z) ||
-         math::may_turn_in(camera.growth, math::camera_from_world(camera.end, mean), extent,
-                           now.near_z);
-}
 
 /// With `sweeps`, finds splats that are in view at some time of the window; otherwise those in view
 /// now.
@@ -66,36 +51,23 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const float reach = math::reach_of(centre.log2_opacity);
   const bool in_front = out.depth > camera.near_z;
   const float end_depth = sweeps ? math::view_depth(camera.end, mean) : out.depth;
-  if (reach < 0.0f) return out;
-  if (fmaxf(out.depth, end_depth) <= now.near_z) {
-    out.watched = sweeps && turns_in(scene, camera, i, mean, reach);
-    return out;
-  }
+  if (reach < 0.0f || fmaxf(out.depth, end_depth) <= now.near_z) return out;
 
   const math::CovarianceFactor<float> factor = load_factor(scene, i);
   math::Sweep<float> s{};
   math::Vec2<float> half;
-  float grow = 0.0f;
   if (sweeps) {
     s = math::sweep(now, camera.end, mean, factor, out.depth);
-    s.displacement.x += camera.trail_shift_px.x;
-    s.displacement.y += camera.trail_shift_px.y;
     half = math::half_extent(s.outline, reach);
-    const math::Vec2<float> slope{
-        (s.shape.centre_px.x - now.principal_point_px.x) / now.focal_px.x,
-        (s.shape.centre_px.y - now.principal_point_px.y) / now.focal_px.y};
-    grow = math::growth_px(camera.growth, slope, fmaxf(fminf(out.depth, end_depth), now.near_z),
-                           hypotf(half.x, half.y));
   } else {
     s.shape = math::project(now, mean, factor, out.depth);
     half = math::half_extent(s.shape, reach);
   }
   const float step_x = 0.5f * s.displacement.x, step_y = 0.5f * s.displacement.y;
-  const float x = s.shape.centre_px.x + step_x - static_cast<float>(shape.first_x_px);
-  const float y = s.shape.centre_px.y + step_y - static_cast<float>(shape.first_y_px);
-  const float wide = half.x + fabsf(step_x) + grow, high = half.y + fabsf(step_y) + grow;
-  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.list_width_px) ||
-      y - high > static_cast<float>(shape.list_height_px)) {
+  const float x = s.shape.centre_px.x + step_x, y = s.shape.centre_px.y + step_y;
+  const float wide = half.x + fabsf(step_x), high = half.y + fabsf(step_y);
+  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.width_px) ||
+      y - high > static_cast<float>(shape.height_px)) {
     return out;
   }
   out.in_view = true;
@@ -103,7 +75,7 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   out.half_px = make_float2(half.x, half.y);
   out.whitening = math::whitening(s.shape);
   if (in_front) out.log2_opacity = centre.log2_opacity;
-  out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, grow, {}};
+  out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, {}};
   return out;
 }
 

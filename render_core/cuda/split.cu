@@ -15,7 +15,6 @@ constexpr std::uint32_t most_slices_per_tile = 1024;
 /// How a tile is cut.
 struct Cut {
   uint2 range;
-  bool seen;               // it has pixels in the picture
   std::uint32_t reach;     // last frame's reach
   std::uint32_t expected;  // list entries that it is expected to look at
   std::uint32_t slices;    // of the expected entries
@@ -24,43 +23,14 @@ struct Cut {
   __device__ std::uint32_t listed() const { return range.y - range.x; }
   /// Number of slices that need room: a whole tile needs none.
   __device__ std::uint32_t stored() const { return slices + reserve > 1 ? slices + reserve : 0; }
-  __device__ Cut without_reserve() const { return {range, seen, reach, expected, slices, 0}; }
-  __device__ Cut whole() const {
-    return {range, seen, reach, seen ? listed() : 0, seen ? 1u : 0u, 0};
-  }
+  __device__ Cut without_reserve() const { return {range, reach, expected, slices, 0}; }
+  __device__ Cut whole() const { return {range, reach, listed(), 1, 0}; }
 };
 
-/// The reach in the last frame of this tile, or of the one that showed its middle; all ones:
-/// unknown.
-__device__ std::uint32_t last_reach(const SplitParams& p, std::uint32_t t) {
-  const LastReach& last = p.last;
-  if (last.reach == nullptr) return ~0u;
-  if (last.same_grid) return last.reach[t];
-  constexpr float middle = 0.5f * tile_size_px;
-  const int x = static_cast<int>(t) % p.shape.tiles_x, y = static_cast<int>(t) / p.shape.tiles_x;
-  const auto at = math::apply<float>(
-      last.list_from_frame, {static_cast<float>(p.shape.shown_x_px + x * tile_size_px) + middle,
-                             static_cast<float>(p.shape.shown_y_px + y * tile_size_px) + middle});
-  constexpr float tile = tile_size_px;
-  const int last_x = static_cast<int>((at.x - static_cast<float>(last.first_x_px)) / tile);
-  const int last_y = static_cast<int>((at.y - static_cast<float>(last.first_y_px)) / tile);
-  // A turn shows places that the last frame did not list.
-  const bool listed = at.x >= static_cast<float>(last.first_x_px) && last_x < last.tiles_x &&
-                      at.y >= static_cast<float>(last.first_y_px) && last_y < last.tiles_y;
-  return listed ? last.reach[last_y * last.tiles_x + last_x] : ~0u;
-}
-
-__device__ bool is_seen(const SplitParams& p, std::uint32_t t) {
-  if (p.pixel_count != nullptr) return p.pixel_count[t] > 0;
-  const int x = p.shape.shown_x_px + static_cast<int>(t) % p.shape.tiles_x * tile_size_px;
-  const int y = p.shape.shown_y_px + static_cast<int>(t) / p.shape.tiles_x * tile_size_px;
-  return x > -tile_size_px && y > -tile_size_px && x < p.shape.width_px && y < p.shape.height_px;
-}
-
 __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
-  Cut cut{p.range[t], is_seen(p, t), last_reach(p, t), 0, 0, 0};
-  cut = cut.whole();
-  if (!p.split || !cut.seen) return cut;
+  const Cut cut_nowhere{p.range[t], p.reach_known ? p.reach[t] : ~0u, 0, 0, 0};
+  Cut cut = cut_nowhere.whole();
+  if (!p.split) return cut;
   const std::uint32_t length = slice_length(
       p.mean_list > 0 ? p.mean_list
                       : min(p.counts->list_entries, p.shape.list_bound) / p.shape.tiles());
@@ -76,13 +46,12 @@ __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
 
 /// Places taken by the block's earlier threads, or by all of them.
 struct Places {
-  std::uint32_t slices, slices_without_reserve, runs;
+  std::uint32_t slices, slices_without_reserve;
 };
 
 struct AddPlaces {
   __device__ Places operator()(const Places& a, const Places& b) const {
-    return {a.slices + b.slices, a.slices_without_reserve + b.slices_without_reserve,
-            a.runs + b.runs};
+    return {a.slices + b.slices, a.slices_without_reserve + b.slices_without_reserve};
   }
 };
 
@@ -105,27 +74,6 @@ __device__ std::uint32_t queued_in(int queue_class, const Cut& cut) {
   return cut.reserve + (cut.slices > c ? cut.slices - c : 0);
 }
 
-/// Entries that the reorder stage sorts: somewhat more than will be looked at, because entries from
-/// behind may belong in front.
-__device__ std::uint32_t ordered_of(const SplitParams& p, const Cut& cut) {
-  if (p.runs == nullptr || cut.expected == 0) return 0;
-  constexpr std::uint32_t step = 128;
-  return min(cut.listed(), (cut.expected + cut.expected / 8 + step - 1) / step * step);
-}
-
-__device__ std::uint32_t runs_of(const SplitParams& p, const Cut& cut) {
-  return (ordered_of(p, cut) + reorder_run - 1) / reorder_run;
-}
-
-__device__ void write_runs(const SplitParams& p, const Cut& cut, std::uint32_t at) {
-  const std::uint32_t ordered = ordered_of(p, cut);
-  for (std::uint32_t begin = 0; begin < ordered; begin += reorder_run, ++at) {
-    const std::uint32_t end = begin + reorder_run;
-    p.runs[at] = {cut.range.x + begin, cut.range.x + min(end, ordered), begin > 0, end < ordered,
-                  0};
-  }
-}
-
 /// `first`: the tile's first slice, if any; `place`: its first place in each class of the queue.
 __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cut,
                             std::uint32_t first, const std::uint32_t (&place)[queue_classes]) {
@@ -143,8 +91,8 @@ __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cu
   for (std::uint32_t s = 0; s < slices; ++s) {
     p.tasks[first_task + s] = {t, begin_of(s), s + 1 == slices ? cut.range.y : begin_of(s + 1),
                                static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(slices)};
-    for (int part = 0; part < p.shape.tile_parts && slices > 1; ++part)
-      p.slice_transmittance[slice_part(p.shape, first + s, part)] = 1.0f;
+    for (int part = 0; part < parts_per_tile && slices > 1; ++part)
+      p.slice_transmittance[slice_part(first + s, part)] = 1.0f;
     const bool in_last = s >= cut.slices || s + 1 >= queue_classes;
     const std::uint32_t c = in_last ? queue_classes - 1 : s;
     const std::uint32_t earlier = in_last ? s - min(cut.slices, queue_classes - 1u) : 0;
@@ -173,20 +121,17 @@ __device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places&
 
 __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p) {
   let_next_kernel_begin();
-  if (p.counts->unlisted != 0) return;  // no tasks, no runs: the frame will be drawn again
   using Scan = cub::BlockScan<Places, split_block>;
   __shared__ Scan::TempStorage scratch;
   __shared__ std::uint32_t queued[queue_classes];  // by the block; then before the block
-  __shared__ std::uint32_t first_run;
   const std::uint32_t tiles = p.shape.tiles();
   const std::uint32_t t = blockIdx.x * split_block + threadIdx.x;
   const bool present = t < tiles;
   Cut cut = present ? cut_of(p, t) : Cut{};
   Places before{}, all{};
-  Scan(scratch).ExclusiveScan({cut.stored(), cut.without_reserve().stored(), runs_of(p, cut)},
-                              before, Places{}, AddPlaces{}, all);
+  Scan(scratch).ExclusiveScan({cut.stored(), cut.without_reserve().stored()}, before, Places{},
+                              AddPlaces{}, all);
   if (threadIdx.x < queue_classes) queued[threadIdx.x] = 0;
-  if (threadIdx.x == 0) first_run = atomicAdd(&p.counts->runs, all.runs);
   const unsigned long long expected = __reduce_add_sync(~0u, cut.expected);
   const std::uint32_t longest = __reduce_max_sync(~0u, cut.listed());
   if (threadIdx.x % warp_size == 0) {
@@ -194,10 +139,6 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
     atomicMax(&p.counts->list_max, longest);
   }
   __syncthreads();
-  if (present && p.runs != nullptr) {
-    write_runs(p, cut, first_run + before.runs);
-    p.ordered[t] = ordered_of(p, cut);
-  }
   const std::uint32_t first = make_room(p, cut, before, all);
   std::uint32_t place[queue_classes];
 #pragma unroll
@@ -212,70 +153,72 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
   if (!present) return;
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) place[c] += queued[c];
-  p.reach[t] = cut.seen ? 0 : cut.reach;
+  p.reach[t] = 0;
   p.tile_slices[t] = make_uint2(first, cut.stored());
   write_tasks(p, t, cut, first, place);
 }
 
-constexpr int composite_block = tile_size_px * tile_size_px;
+constexpr int composite_block = 256;
+constexpr int parts_per_block = composite_block / part_pixels;
+static_assert(composite_block % part_pixels == 0 && part_pixels == 2 * warp_size);
 
-/// A pixel of a tile: its place in the picture, and the part that it was blended in.
-struct TilePixel {
-  int x_px, y_px, part;
+/// What a pixel looked at.
+struct Look {
+  std::uint32_t end;  // one past its last list entry
+  bool finished;
 };
 
-__device__ TilePixel square_pixel(const CompositeParams& p, int tile, int in_tile) {
-  const int x = in_tile % tile_size_px, y = in_tile / tile_size_px;
-  return {p.shape.shown_x_px + tile % p.shape.tiles_x * tile_size_px + x,
-          p.shape.shown_y_px + tile / p.shape.tiles_x * tile_size_px + y,
-          y / part_size_px * (tile_size_px / part_size_px) + x / part_size_px};
-}
-
-__device__ TilePixel run_pixel(const CompositeParams& p, int tile, int in_tile) {
-  const PixelPlace place =
-      p.pixels[static_cast<std::size_t>(tile) * run_bound_px(p.shape) + in_tile];
-  return {place.x, place.y, in_tile / part_pixels};
-}
-
-/// Blends one pixel's slices and writes it. Returns one past the last entry that it looked at.
-__device__ std::uint32_t fold(const CompositeParams& p, uint2 slices, int in_tile,
-                              const TilePixel& at) {
+/// Blends the slices of pixel `in_tile` and writes it.
+__device__ Look fold(const CompositeParams& p, std::uint32_t tile, uint2 slices, int in_tile) {
+  const int part = in_tile / part_pixels, in_part = in_tile % part_pixels;
+  const int x_px = static_cast<int>(tile) % p.shape.tiles_x * tile_side_px +
+                   part % parts_across * part_side_px + in_part % part_side_px;
+  const int y_px = static_cast<int>(tile) / p.shape.tiles_x * tile_side_px +
+                   part / parts_across * part_side_px + in_part / part_side_px;
+  if (!in_picture(p.shape, x_px, y_px)) return {0, true};
   math::PixelState<float> pixel = math::empty_pixel<float>();
-  std::uint32_t looked_at = 0;
-  for (std::uint32_t s = slices.x; s < slices.x + slices.y; ++s) {
-    const float4 slice = p.slice_pixels[slice_pixel(p.shape, s, in_tile)];
+  Look look{0, false};
+  for (std::uint32_t s = slices.x; s < slices.x + slices.y && !look.finished; ++s) {
+    const float4 slice = p.slice_pixels[slice_pixel(s, in_tile)];
     pixel.colour.x += pixel.transmittance * slice.x;
     pixel.colour.y += pixel.transmittance * slice.y;
     pixel.colour.z += pixel.transmittance * slice.z;
     pixel.transmittance *= fabsf(slice.w);
-    looked_at = p.consumed[slice_part(p.shape, s, at.part)];
-    const bool finished = signbit(slice.w);
-    if (finished || pixel.transmittance < static_cast<float>(transmittance_min)) break;
+    look.end = p.consumed[slice_part(s, part)];
+    look.finished = signbit(slice.w) || pixel.transmittance < p.finish.transmittance;
   }
-  show_pixel(p.rgb, p.shape, at.x_px, at.y_px, pixel, p.background);
-  return looked_at;
+  show_pixel(p.rgb, p.shape, x_px, y_px, pixel, p.background, p.finish);
+  return look;
 }
 
+/// A block takes the tiles in turn, some parts at a time.
 __global__ void __launch_bounds__(composite_block) composite_kernel(const CompositeParams p) {
   wait_for_earlier_work();
-  if (p.counts->unlisted != 0) return;
-  using Reduce = cub::BlockReduce<std::uint32_t, composite_block>;
-  __shared__ Reduce::TempStorage scratch;
-  const std::uint32_t tile = blockIdx.x;
+  const std::uint32_t tile = blockIdx.x / (parts_per_tile / parts_per_block);
   const uint2 slices = p.tile_slices[tile];
   if (slices.y == 0) return;
-  const int index = static_cast<int>(tile), thread = static_cast<int>(threadIdx.x);
-  std::uint32_t looked_at = 0;
-  if (p.pixels == nullptr) {
-    looked_at = fold(p, slices, thread, square_pixel(p, index, thread));
-  } else {
-    const int count = static_cast<int>(p.pixel_count[tile]);
-    for (int k = thread; k < count; k += composite_block)
-      looked_at = max(looked_at, fold(p, slices, k, run_pixel(p, index, k)));
+  const int thread = static_cast<int>(threadIdx.x);
+  const int first_part =
+      static_cast<int>(blockIdx.x % (parts_per_tile / parts_per_block)) * parts_per_block;
+  const Look look = fold(p, tile, slices, first_part * part_pixels + thread);
+  __shared__ std::uint32_t ends[composite_block / warp_size];
+  __shared__ bool finished[composite_block / warp_size];
+  const std::uint32_t end = __reduce_max_sync(~0u, look.end);
+  const bool all_finished = __all_sync(~0u, look.finished);
+  if (thread % warp_size == 0) {
+    ends[thread / warp_size] = end;
+    finished[thread / warp_size] = all_finished;
   }
-  looked_at =
-      Reduce(scratch).Reduce(looked_at, [](std::uint32_t a, std::uint32_t b) { return max(a, b); });
-  if (thread == 0) p.reach[tile] = looked_at - p.tasks[p.shape.tiles() + slices.x].first;
+  __syncthreads();
+  if (thread >= parts_per_block) return;
+  const std::uint32_t part_end = max(ends[2 * thread], ends[2 * thread + 1]);
+  const bool part_finished = finished[2 * thread] && finished[2 * thread + 1];
+  const std::uint32_t first = p.tasks[p.shape.tiles() + slices.x].first;
+  if (part_end > first) atomicMax(&p.reach[tile], part_end - first);
+  // A part beyond the picture's edge counts as finished, and has looked at nothing.
+  if (part_finished && part_end == 0) return;
+  p.ends.note(tile, first_part + thread, part_finished,
+              part_finished ? p.entries[part_end - 1].slot : 0);
 }
 
 }  // namespace
@@ -286,7 +229,8 @@ void launch_split(const SplitParams& params, cudaStream_t stream) {
 }
 
 void launch_composite(const CompositeParams& params, cudaStream_t stream) {
-  launch_early("composite", composite_kernel, params.shape.tiles(), composite_block, stream,
+  launch_early("composite", composite_kernel,
+               params.shape.tiles() * (parts_per_tile / parts_per_block), composite_block, stream,
                params);
 }
 

@@ -1,20 +1,8 @@
 #pragma once
 
 #include "render_core/cuda/blend.cuh"
-#include "render_core/cuda/reorder.cuh"
-#include "render_core/math/homography-inl.h"
 
 namespace catgs::cuda {
-
-/// The reach of tiles in the View's last frame, and the grid that they belonged to.
-struct LastReach {
-  const std::uint32_t* reach = nullptr;  // [tiles]; null: not known
-  bool same_grid = false;
-  // For another grid: from this picture's pixels to the plane of the last lists.
-  Homography<float> list_from_frame{};
-  int first_x_px = 0, first_y_px = 0;
-  int tiles_x = 0, tiles_y = 0;
-};
 
 /// Cuts long tile lists into slices of about twice the mean length (paper 3.4, Algorithm 1). With l
 /// the length of a slice, a tile longer than 2 l becomes ceil(length / l) tasks of equal length.
@@ -25,22 +13,17 @@ struct LastReach {
 /// that are drawn last. Most of them then find that nothing shines through what lies before them.
 /// For the same reason all first slices are queued before all second ones, and so on. The mean is
 /// also the last frame's, so that nothing waits for that of this frame. Blocks of tiles whose
-/// slices find no room go without: first without slices of the rest, then without any. Tiles
-/// without a pixel in the picture have no task.
+/// slices find no room go without: first without slices of the rest, then without any.
 struct SplitParams {
   FrameShape shape;
-  const uint2* range;  // [tiles]
-  LastReach last;
-  std::uint32_t* reach;              // [tiles], zeroed here; kept for tiles that are not seen
-  const std::uint32_t* pixel_count;  // [tiles]; null: tiles are squares in the picture
-  BlendTask* tasks;                  // [task_bound(shape)]
-  uint2* tile_slices;                // [tiles], first slice and number of slices; 0: one task
-  std::uint32_t* queue;              // [queue_bound(shape)], see FrameCounts
-  // For the reorder stage; null: it does not follow.
-  ReorderRun* runs;            // [run_bound]
-  std::uint32_t* ordered;      // [tiles], number of entries in runs
-  float* slice_transmittance;  // [slice_bound][tile_parts], set to 1
-  FrameCounts* counts;         // sets the counts of tasks and runs, and list_max
+  const uint2* range;          // [tiles]
+  bool reach_known;            // `reach` is that of the View's last frame
+  std::uint32_t* reach;        // [tiles], zeroed here
+  BlendTask* tasks;            // [task_bound(shape)]
+  uint2* tile_slices;          // [tiles], first slice and number of slices; 0: one task
+  std::uint32_t* queue;        // [queue_bound(shape)], see FrameCounts
+  float* slice_transmittance;  // [slice_bound][parts_per_tile], set to 1
+  FrameCounts* counts;         // sets the counts of tasks, and list_max
   std::uint32_t mean_list;     // of a tile, for slice_length(); 0: unknown, take this frame's
   bool split;                  // false: every tile is one task
 };
@@ -67,11 +50,6 @@ inline std::uint32_t queue_bound(const FrameShape& shape) {
 /// Number of slices that are worth their pixels: twice what the paper's rule can ask for.
 inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tile_bound; }
 
-/// Room for the runs of the reorder stage.
-inline std::uint32_t run_bound(const FrameShape& shape) {
-  return shape.tile_bound + shape.list_bound / reorder_run;
-}
-
 /// Blends the slices of split tiles front to back: C = sum_i C_i prod_{m < i} T_m. Slices behind a
 /// finished pixel are not looked at.
 struct CompositeParams {
@@ -80,9 +58,9 @@ struct CompositeParams {
   const uint2* tile_slices;
   const float4* slice_pixels;
   const std::uint32_t* consumed;
-  const PixelPlace* pixels;  // as in BlendParams
-  const std::uint32_t* pixel_count;
-  const FrameCounts* counts;
+  const TileEntry* entries;  // as in BlendParams
+  PartEnds ends;
+  Finish finish;
   float3 background;
   float* rgb;
   std::uint32_t* reach;  // set for split tiles

@@ -12,8 +12,7 @@ struct __align__(16) SplatPath {
   float dx, dy;                      // px, from the record's centre
   math::Whitening<float> whitening;  // of the outline
   float log2_opacity;                // the record has none while the splat is behind the near plane
-  float grow_px;                     // px that the outline is widened by
-  float unused;
+  float unused[2];
 };
 static_assert(sizeof(SplatPath) == 32);
 
@@ -22,49 +21,79 @@ static_assert(sizeof(SplatPath) == 32);
 template <class Outline>
 struct TileFootprint {
   Outline outline;
-  float2 centre_px;  // from the grid's corner
-  float grow_px;     // px that the outline is widened by
-  float slack_px;    // px that rows and columns are widened by, against rounding
+  float2 centre_px;
+  float slack_px;  // px that rows and columns are widened by, against rounding
+  float top_px, bottom_px;
   int first_row, last_row;
   FrameShape shape;
 
-  /// First and last column of one tile row; empty when first > last. A tile counts when the
-  /// rectangle of its pixel centres, within the lists, meets the outline.
-  __device__ int2 columns(int row) const {
-    constexpr float tile = tile_size_px;
-    const float top = static_cast<float>(row) * tile + 0.5f;
-    const float bottom =
-        fminf(top + (tile - 1.0f), static_cast<float>(shape.list_height_px) - 0.5f);
-    const auto cut =
-        math::columns_in_band(outline, top - grow_px - centre_px.y, bottom + grow_px - centre_px.y);
-    const float low = cut.low + centre_px.x - grow_px - slack_px;
-    const float high = cut.high + centre_px.x + grow_px + slack_px;
-    if (cut.low > cut.high || high < 0.5f || low > static_cast<float>(shape.list_width_px) - 0.5f) {
-      return make_int2(0, -1);
-    }
-    const float first = ceilf((low - (tile - 0.5f)) * (1.0f / tile));
-    const float last = floorf((high - 0.5f) * (1.0f / tile));
+  /// The columns that the outline reaches among the pixel centres of rows first_px…last_px, in px;
+  /// empty when low > high.
+  __device__ math::Interval<float> cut(float first_px, float last_px) const {
+    const auto columns = math::columns_in_band(outline, first_px - slack_px - centre_px.y,
+                                               last_px + slack_px - centre_px.y);
+    if (columns.low > columns.high) return columns;
+    return {columns.low + centre_px.x - slack_px, columns.high + centre_px.x + slack_px};
+  }
+
+  /// First and last of the columns of `width_px` px whose pixel centres meet `cut`, from px `from`
+  /// on and among `count`; empty when first > last.
+  __device__ static int2 reached(const math::Interval<float>& cut, float from_px, float width_px,
+                                 int count) {
+    if (cut.low > cut.high) return make_int2(0, -1);
+    const float first = ceilf((cut.low - from_px - (width_px - 0.5f)) / width_px);
+    const float last = floorf((cut.high - from_px - 0.5f) / width_px);
     return make_int2(static_cast<int>(fmaxf(first, 0.0f)),
-                     static_cast<int>(fminf(last, static_cast<float>(shape.tiles_x - 1))));
+                     static_cast<int>(fminf(last, static_cast<float>(count - 1))));
+  }
+
+  /// First and last column of one tile row; empty when first > last. A tile counts when the
+  /// rectangle of its pixel centres, within the picture, meets the outline.
+  __device__ int2 columns(int row) const {
+    constexpr float tile = tile_side_px;
+    const float top = static_cast<float>(row) * tile + 0.5f;
+    const float bottom = fminf(top + (tile - 1.0f), static_cast<float>(shape.height_px) - 0.5f);
+    const auto columns = cut(top, bottom);
+    if (columns.low > static_cast<float>(shape.width_px) - 0.5f) return make_int2(0, -1);
+    return reached(columns, 0.0f, tile, shape.tiles_x);
+  }
+
+  /// The blocks of a tile that the outline reaches: TileEntry::blocks.
+  __device__ std::uint32_t blocks(int column, int row) const {
+    constexpr float width = block_width_px, height = block_height_px;
+    const float left = static_cast<float>(column * tile_side_px) - centre_px.x;
+    const float top = static_cast<float>(row * tile_side_px) - centre_px.y;
+    const int first = max(__float2int_rd((top_px - centre_px.y - top) * (1.0f / height)), 0);
+    const int last =
+        min(__float2int_rd((bottom_px - centre_px.y - top) * (1.0f / height)), blocks_down - 1);
+    // Column k is reached if its last pixel centre is not left of the cut, and its first one not
+    // right of it.
+    const float from = (-left - slack_px - (width - 0.5f)) * (1.0f / width);
+    const float to = (-left + slack_px - 0.5f) * (1.0f / width);
+    std::uint32_t blocks = 0;
+    for (int k = first; k <= last; ++k) {
+      const float y = top + static_cast<float>(k) * height + 0.5f;
+      const auto cut = math::columns_in_band(outline, y - slack_px, y + (height - 1.0f) + slack_px);
+      const int low = max(__float2int_ru(fmaf(cut.low, 1.0f / width, from)), 0);
+      const int high = min(__float2int_rd(fmaf(cut.high, 1.0f / width, to)), blocks_across - 1);
+      if (cut.low <= cut.high && low <= high)
+        blocks |= ((2u << high) - (1u << low)) << (k * blocks_across);
+    }
+    return blocks;
   }
 
   /// Sets the rows for an outline that covers `top`…`bottom` (px, from its centre).
   __device__ void set_rows(float top, float bottom) {
-    constexpr float tile = tile_size_px;
-    const float slack = grow_px + slack_px;
-    const float first = ceilf((top + centre_px.y - slack - (tile - 0.5f)) * (1.0f / tile));
-    const float last = floorf((bottom + centre_px.y + slack - 0.5f) * (1.0f / tile));
+    constexpr float tile = tile_side_px;
+    top_px = top + centre_px.y - slack_px;
+    bottom_px = bottom + centre_px.y + slack_px;
+    const float first = ceilf((top_px - (tile - 0.5f)) * (1.0f / tile));
+    const float last = floorf((bottom_px - 0.5f) * (1.0f / tile));
     first_row = static_cast<int>(fmaxf(first, 0.0f));
     last_row = static_cast<int>(fminf(last, static_cast<float>(shape.tiles_y - 1)));
     if (!(first <= last)) last_row = first_row - 1;
   }
 };
-
-/// Position relative to the grid's corner.
-__device__ inline float2 in_grid(float2 centre_px, const FrameShape& shape) {
-  return make_float2(centre_px.x - static_cast<float>(shape.first_x_px),
-                     centre_px.y - static_cast<float>(shape.first_y_px));
-}
 
 /// Footprint of a splat in its present place. It reaches nothing when `log2_opacity` is too low.
 __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
@@ -74,8 +103,7 @@ __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
   const math::Vec2<float> half = math::half_extent(w, fmaxf(reach, 0.0f));
   TileFootprint<math::Ellipse<float>> f;
   f.outline = math::make_ellipse(w, reach, half.x, math::rightmost_y(w, fmaxf(reach, 0.0f)));
-  f.centre_px = in_grid(centre_px, shape);
-  f.grow_px = 0.0f;
+  f.centre_px = centre_px;
   f.slack_px = slack_px;
   f.shape = shape;
   f.set_rows(-half.y, half.y);
@@ -93,8 +121,7 @@ __device__ inline TileFootprint<math::Trail<float>> make_footprint(
   TileFootprint<math::Trail<float>> f;
   f.outline = math::make_trail(math::make_ellipse(w, reach, half_x, math::rightmost_y(w, reach)),
                                {path.dx, path.dy});
-  f.centre_px = in_grid(centre_px, shape);
-  f.grow_px = path.grow_px;
+  f.centre_px = centre_px;
   f.slack_px = slack_px;
   f.shape = shape;
   f.set_rows(f.outline.top_y, f.outline.bottom_y);

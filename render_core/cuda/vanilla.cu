@@ -142,7 +142,7 @@ __global__ void __launch_bounds__(block_size) blend_kernel(const BlendParams p) 
     }
   }
   if (p.count_pairs) atomicAdd(&p.counts->blended_pairs, pairs);
-  show_pixel(p.rgb, p.shape, px, py, pixel, p.background);
+  show_pixel(p.rgb, p.shape, px, py, pixel, p.background, {.transmittance = 0.0f, .fills = false});
 }
 
 }  // namespace

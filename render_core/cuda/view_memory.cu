@@ -6,11 +6,7 @@
 namespace catgs::cuda {
 
 bool speculates(const ViewSettings& settings) {
-  return settings.pipeline == Pipeline::catgs && settings.speculation.initial_window > 0;
-}
-
-bool turns_tiles(const ViewSettings& settings) {
-  return speculates(settings) && settings.speculation.grid == GridKind::warp;
+  return settings.pipeline == Pipeline::paper && settings.speculation.initial_window > 0;
 }
 
 std::size_t ViewSizes::scratch_bytes() const {

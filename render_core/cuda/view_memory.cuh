@@ -1,22 +1,18 @@
 #pragma once
 
 #include "render_core/cuda/blend.cuh"
-#include "render_core/cuda/colour_cache.cuh"
 #include "render_core/cuda/cull.cuh"
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/frame_arrays.cuh"
-#include "render_core/cuda/giants.cuh"
 #include "render_core/cuda/memory_table.h"
-#include "render_core/cuda/reorder.cuh"
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/tiles.cuh"
 #include "render_core/renderer.h"
 
 namespace catgs::cuda {
 
-/// Whether a View has sub-frames; whether these find their tiles by launch_pixel_runs().
+/// Whether a View has sub-frames.
 bool speculates(const ViewSettings& settings);
-bool turns_tiles(const ViewSettings& settings);
 
 /// The sizes that the rows of ViewMemory depend on.
 struct ViewSizes {
@@ -29,17 +25,16 @@ struct ViewSizes {
   }
   /// Number of parts of slices.
   [[nodiscard]] std::size_t slice_parts() const {
-    return std::size_t{shape.slice_bound} * static_cast<unsigned>(shape.tile_parts);
+    return std::size_t{shape.slice_bound} * parts_per_tile;
   }
   [[nodiscard]] std::size_t slice_pixels() const {
-    return std::size_t{shape.slice_bound} * run_bound_px(shape);
+    return std::size_t{shape.slice_bound} * tile_pixels;
   }
-  [[nodiscard]] bool keeps_colours() const {
-    return settings.pipeline == Pipeline::catgs && settings.colour_cache;
+  [[nodiscard]] std::size_t part_limits() const {
+    return occludes() ? std::size_t{shape.tile_bound} * parts_per_tile : 0;
   }
-  [[nodiscard]] bool reorders() const {
-    return settings.pipeline == Pipeline::catgs && settings.order == BlendOrder::fresh;
-  }
+  /// Whether frames hide what their predecessors did not show.
+  [[nodiscard]] bool occludes() const { return settings.pipeline == Pipeline::catgs; }
   [[nodiscard]] bool makes_video() const { return settings.format == PixelFormat::i420; }
   [[nodiscard]] std::size_t scratch_bytes() const;
   /// Size of the picture in host memory.
@@ -57,13 +52,14 @@ struct ViewMemory : MemoryTable<ViewSizes> {
                            [](S s) { return cull_words(s.scene.cluster_count); }};
   DeviceRow<U32> visible{this, Life::group, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<uint2> range{this, Life::group, [](S s) { return s.shape.tile_bound; }};
-  DeviceRow<U32> slot{this, Life::group, [](S s) { return s.shape.list_bound; }};
+  DeviceRow<TileEntry> entries{this, Life::group, [](S s) { return s.shape.list_bound; }};
   DeviceRow<FrameCounts> counts{this, Life::group, [](S) { return 1; }};
-  DeviceRow<U32> giants{this, Life::group, [](S s) { return s.reorders() ? giant_words : 0; }};
 
   // For the Gaussians in view.
   DeviceRow<SplatRecord> records{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> depth{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
+  DeviceRow<float> splat_depth{this, Life::frame,
+                               [](S s) { return s.occludes() ? s.shape.visible_bound : 0; }};
 
   // Used to make the lists. A sort may leave its result in a row or in its `other` one.
   DeviceRow<U32> cull_seen{this, Life::frame, [](S s) { return s.scene.cluster_count; }};
@@ -78,39 +74,21 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<U32> other_order{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> tile{this, Life::frame, [](S s) { return s.shape.list_bound; }};
   DeviceRow<U32> other_tile{this, Life::frame, [](S s) { return s.shape.list_bound; }};
-  DeviceRow<U32> other_slot{this, Life::frame, [](S s) { return s.shape.list_bound; }};
+  DeviceRow<TileEntry> other_entries{this, Life::frame, [](S s) { return s.shape.list_bound; }};
   DeviceRow<std::byte> scratch{this, Life::frame, [](S s) { return s.scratch_bytes(); }};
   PinnedRow<HostCounts> list_counts{this, Life::frame, [](S) { return 1; }};
 
-  // ColourArrays.
-  DeviceRow<glm::vec3> shaded_from{
-      this, Life::view, [](S s) { return s.keeps_colours() ? s.scene.cluster_count : 0; }};
-  DeviceRow<U32> colours_known{this, Life::view, [](S s) {
-                                 return s.keeps_colours() ? cull_words(s.scene.cluster_count) : 0;
-                               }};
-  DeviceRow<U32> colours_wanted{this, Life::frame, [](S s) {
-                                  return s.keeps_colours() ? cull_words(s.scene.cluster_count) : 0;
-                                }};
-  DeviceRow<PackedColour> colours{this, Life::view,
-                                  [](S s) { return s.keeps_colours() ? s.scene.count : 0; }};
+  // Where the parts of the last frame ended, and what follows from that: see Occlusion.
+  DeviceRow<float> part_ends{this, Life::view, [](S s) { return s.part_limits(); }};
+  DeviceRow<float> part_limit{this, Life::frame, [](S s) { return s.part_limits(); }};
+  DeviceRow<float> tile_limit{this, Life::frame,
+                              [](S s) { return s.occludes() ? s.shape.tile_bound : 0; }};
 
-  // Tasks of the blend, and runs of the reorder stage.
+  // Tasks of the blend.
   DeviceRow<U32> reach{this, Life::view, [](S s) { return s.shape.tile_bound; }};
-  DeviceRow<U32> other_reach{this, Life::view, [](S s) { return s.shape.tile_bound; }};
   DeviceRow<BlendTask> tasks{this, Life::frame, [](S s) { return task_bound(s.shape); }};
   DeviceRow<U32> queue{this, Life::frame, [](S s) { return queue_bound(s.shape); }};
   DeviceRow<uint2> tile_slices{this, Life::frame, [](S s) { return s.shape.tile_bound; }};
-  DeviceRow<ReorderRun> runs{this, Life::frame,
-                             [](S s) { return s.reorders() ? run_bound(s.shape) : 0; }};
-  DeviceRow<U32> ordered{this, Life::frame,
-                         [](S s) { return s.reorders() ? s.shape.tile_bound : 0; }};
-  DeviceRow<PixelPlace> pixels{this, Life::frame, [](S s) {
-                                 return turns_tiles(s.settings) ? std::size_t{s.shape.tile_bound} *
-                                                                      run_bound_px(s.shape)
-                                                                : 0;
-                               }};
-  DeviceRow<U32> pixel_count{this, Life::frame,
-                             [](S s) { return turns_tiles(s.settings) ? s.shape.tile_bound : 0; }};
   DeviceRow<U32> consumed{this, Life::frame, [](S s) { return s.slice_parts(); }};
   DeviceRow<float> slice_transmittance{this, Life::frame, [](S s) { return s.slice_parts(); }};
   DeviceRow<float4> slice_pixels{this, Life::frame, [](S s) { return s.slice_pixels(); }};
@@ -122,16 +100,10 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   PinnedRow<std::byte> host_image{this, Life::frame, [](S s) { return s.host_image_bytes(); }};
   PinnedRow<FrameCounts> host_counts{this, Life::view, [](S) { return 1; }};
 
-  [[nodiscard]] ColourArrays colour_arrays() const {
-    return {.shaded_from = shaded_from.get(),
-            .known = colours_known.get(),
-            .wanted = colours_wanted.get(),
-            .colour = colours.get()};
-  }
   /// Whether lists of this shape fit in the present memory.
   [[nodiscard]] bool holds_lists(const FrameShape& shape) const {
     return shape.visible_bound <= visible.size() && shape.tile_bound <= range.size() &&
-           shape.list_bound <= slot.size();
+           shape.list_bound <= entries.size();
   }
 };
 

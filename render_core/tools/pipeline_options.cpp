@@ -9,9 +9,11 @@ namespace catgs {
 namespace {
 
 Pipeline parse_pipeline(std::string_view name) {
-  return parse_name<Pipeline>(
-      "--pipeline", name,
-      {{"exact", Pipeline::exact}, {"vanilla", Pipeline::vanilla}, {"catgs", Pipeline::catgs}});
+  return parse_name<Pipeline>("--pipeline", name,
+                              {{"exact", Pipeline::exact},
+                               {"vanilla", Pipeline::vanilla},
+                               {"paper", Pipeline::paper},
+                               {"catgs", Pipeline::catgs}});
 }
 
 BlendOrder parse_order(std::string_view name) {
@@ -50,7 +52,7 @@ void refuse_without_caches(const PipelineOptions& options) {
 void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
   command
       .add_option("--pipeline", options.pipeline,
-                  "exact, vanilla (the original 3DGS) or catgs (key frames and sub-frames)")
+                  "exact, vanilla (the original 3DGS), paper (CaT-GS as published) or catgs (ours)")
       ->capture_default_str();
   add_speculation_options(command, options);
   command
@@ -102,7 +104,11 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
 ViewSettings view_settings(const PipelineOptions& options) {
   ViewSettings settings;
   settings.pipeline = parse_pipeline(options.pipeline);
-  if (settings.pipeline != Pipeline::catgs) refuse_without_caches(options);
+  if (!keeps_caches(settings.pipeline)) refuse_without_caches(options);
+  if (settings.pipeline == Pipeline::paper) {
+    settings.speculation.grid = GridKind::fixed;
+    settings.order = BlendOrder::key;
+  }
   SpeculationSettings& speculation = settings.speculation;
   speculation.initial_window =
       options.no_cache ? 0 : options.window.value_or(speculation.initial_window);
@@ -157,6 +163,8 @@ std::string_view pipeline_name(Pipeline pipeline) {
       return "vanilla";
     case Pipeline::exact:
       return "exact";
+    case Pipeline::paper:
+      return "paper";
     case Pipeline::catgs:
       break;
   }

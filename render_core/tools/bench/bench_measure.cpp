@@ -87,8 +87,6 @@ ListLength Measurement::list_length(Kind kind) const {
     length.max = std::max(length.max, frame.stats.list_entries);
     length.tile_max = std::max(length.tile_max, frame.stats.list_max);
     length.overflowed += frame.stats.overflowed_entries;
-    length.giants_max = std::max(length.giants_max, frame.stats.giants);
-    length.uncarried += frame.stats.uncarried_lists;
     ++count;
   });
   length.mean /= static_cast<double>(std::max<std::size_t>(count, 1));

@@ -17,8 +17,6 @@ struct ListLength {
   std::uint64_t max = 0;         // of a frame
   std::uint32_t tile_max = 0;    // longest list of a tile
   std::uint64_t overflowed = 0;  // entries that found no memory, all frames
-  std::uint32_t giants_max = 0;  // see FrameStats
-  std::uint64_t uncarried = 0;   // lists with too many giants, all frames
   double visible_mean = 0.0;
 };
 

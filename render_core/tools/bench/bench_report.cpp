@@ -98,7 +98,7 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
   json["near"] = setup.camera.near_z;
   const ViewSettings& settings = result.settings;
   json["pipeline"] = pipeline_name(settings.pipeline);
-  if (settings.pipeline == Pipeline::catgs) {
+  if (keeps_caches(settings.pipeline)) {
     const SpeculationSettings& speculation = settings.speculation;
     json["window"] = speculation.initial_window;
     json["max_trail_px"] = speculation.max_trail_px;
@@ -207,8 +207,6 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
   add_times(json, measurement, FrameKind::sub, "_sub");
   json["visible_mean"] = lists.visible_mean;
   json["overflowed_entries"] = lists.overflowed;
-  json["giants_max"] = lists.giants_max;
-  json["uncarried_lists"] = lists.uncarried;
   json["key_frames"] = measurement.frame_ms(FrameKind::key).size();
   json["sub_frames"] = measurement.frame_ms(FrameKind::sub).size();
   json["frames_per_key"] = measurement.frames_per_key();
@@ -228,7 +226,7 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
 void print_report(const RenderSetup& setup, const BenchResult& result) {
   const Measurement& measurement = result.measurement;
   const ListLength lists = measurement.list_length();
-  const bool groups = result.settings.pipeline == Pipeline::catgs;
+  const bool groups = keeps_caches(result.settings.pipeline);
   fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.cloud->size(),
              setup.cloud->sh_degree, setup.camera.size_px.x, setup.camera.size_px.y,
              pipeline_name(result.settings.pipeline));
@@ -253,10 +251,6 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
   if (lists.overflowed > 0) {
     fmt::print("{:<14}{} list entries found no memory and were not drawn\n", "OVERFLOW",
                lists.overflowed);
-  }
-  if (lists.uncarried > 0) {
-    fmt::print("{:<14}{} lists had more giants than can be sorted (up to {} in view)\n", "ORDER",
-               lists.uncarried, lists.giants_max);
   }
   if (result.quality) print_quality(*result.quality);
 }

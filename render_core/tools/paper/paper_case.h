@@ -38,6 +38,8 @@ struct Variant {
 namespace variants {
 inline const Variant vanilla{"3DGS", Pipeline::vanilla};
 inline const Variant exact{"Exact", Pipeline::exact};  // precise culling alone
+// The published method: lists on a fixed grid, blended in the key frame's order.
+inline const Variant paper{"Paper", Pipeline::paper, "--grid fixed --order key"};
 inline const Variant ours{"Ours"};
 inline const Variant without_cache{"Ours-w/o cache", Pipeline::catgs, "--no-cache"};
 }  // namespace variants

@@ -38,10 +38,19 @@ TEST_P(CudaSmallScenes, MatchesReferenceWithListsAsShortAsTheCpuCores) {
             2.0 + 1.05 * static_cast<double>(cpu.stats.list_entries));
 }
 
-// Nothing may be missing as long as the camera keeps to the forecast, Gaussians that come through
-// the near plane or into the image among it. Order is another matter where hundreds of splats lie
-// in one plane, as in `coincident`: all change places at once, and the lists take some frames to
-// follow.
+/// The paper's pipeline, with groups of a known length.
+ViewSettings paper_settings() {
+  ViewSettings settings = test::patient_settings();
+  settings.pipeline = Pipeline::paper;
+  settings.speculation.grid = GridKind::fixed;
+  settings.order = BlendOrder::key;
+  return settings;
+}
+
+// Nothing may be missing as long as the camera keeps to the forecast, Gaussians that come into the
+// image among it. Order is another matter: sub-frames blend in the order of their key frame. A turn
+// makes it wrong, and so do the near plane, behind which the key frame knows no order, and depths
+// that were equal in the 24 bits of a key.
 TEST_P(CudaSmallScenes, SubFramesOnTheForecastPathMissNothing) {
   REQUIRE_DEVICE();
   const TestScene& scene = GetParam();
@@ -49,13 +58,14 @@ TEST_P(CudaSmallScenes, SubFramesOnTheForecastPathMissNothing) {
   const auto exact = renderer->make_view({});
   for (const test::Move& move : test::moves()) {
     SCOPED_TRACE(move.name);
-    const auto view = renderer->make_view(test::patient_settings());
+    const auto view = renderer->make_view(paper_settings());
     for (int k = 0; k <= test::window; ++k) {
       const FrameRequest request = test::request_on_path(scene, move, k);
       const Rendered drawn = render_in(*view, request);
       EXPECT_EQ(drawn.stats.kind, k == 0 ? FrameKind::key : FrameKind::sub) << k;
       EXPECT_EQ(drawn.stats.window, test::window);
-      const double bound = k > 0 && scene.name == "coincident" ? 30.0 : 60.0;
+      const bool ordered = move.turn_rad == glm::vec3(0.0f) && scene.name != "near_plane";
+      const double bound = k == 0 ? 60.0 : ordered ? 27.0 : 8.0;
       EXPECT_GE(test::psnr_db(drawn.rgb, render_in(*exact, request).rgb), bound) << "frame " << k;
     }
     EXPECT_EQ(render_in(*view, test::request_on_path(scene, move, test::window)).stats.kind,
@@ -68,14 +78,35 @@ TEST_P(CudaSmallScenes, KeyFramesListNoMoreThanTheCpuCores) {
   const TestScene& scene = GetParam();
   for (const test::Move& move : test::moves()) {
     const FrameRequest request = test::request_on_path(scene, move, 0);
-    const auto cuda = renderer_of(scene, RendererKind::cuda)->make_view(test::patient_settings());
-    const auto cpu = renderer_of(scene, RendererKind::cpu)->make_view(test::patient_settings());
+    const auto cuda = renderer_of(scene, RendererKind::cuda)->make_view(paper_settings());
+    const auto cpu = renderer_of(scene, RendererKind::cpu)->make_view(paper_settings());
     const FrameStats a = render_in(*cuda, request).stats, b = render_in(*cpu, request).stats;
     EXPECT_LE(static_cast<double>(a.list_entries),
               2.0 + 1.05 * static_cast<double>(b.list_entries));
     // Each core has its own slack at the edge of the image, and the longest path may be there.
     EXPECT_NEAR(a.displacement_px, b.displacement_px, 0.01f + 0.2f * b.displacement_px);
     EXPECT_NEAR(1.0f / a.nearest_depth, 1.0f / b.nearest_depth, 0.02f / b.nearest_depth);
+  }
+}
+
+// The camera leaps once.
+TEST_P(CudaSmallScenes, CatgsStaysCloseToExactWhereverTheCameraGoes) {
+  REQUIRE_DEVICE();
+  const TestScene& scene = GetParam();
+  const auto renderer = renderer_of(scene, RendererKind::cuda);
+  const auto exact = renderer->make_view({});
+  for (const test::Move& move : test::moves()) {
+    SCOPED_TRACE(move.name);
+    const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
+    FrameRequest request = scene.request;
+    for (int k = 0; k < 8; ++k) {
+      Pose& pose = request.camera.world_from_camera;
+      pose = test::moved(pose, move);
+      if (k == 5) pose.position += glm::vec3(1.0f, -0.5f, 0.7f);
+      const Rendered drawn = render_in(*view, request);
+      EXPECT_EQ(drawn.stats.kind, FrameKind::key);
+      EXPECT_GE(test::psnr_db(drawn.rgb, render_in(*exact, request).rgb), 45.0) << k;
+    }
   }
 }
 
@@ -214,10 +245,11 @@ TEST(CudaRenderer, TileLoadsAddUpToTheLists) {
     EXPECT_TRUE(view->tile_loads().empty());
     const FrameStats stats = render_in(*view, scene.request).stats;
     const std::vector<std::uint32_t> loads = view->tile_loads();
-    EXPECT_EQ(loads.size(), 40u * 23u);
+    const bool vanilla = pipeline == Pipeline::vanilla;  // its tiles have 16 px
+    EXPECT_EQ(loads.size(), vanilla ? 40u * 23u : 20u * 12u);
     const std::uint64_t sum = std::accumulate(loads.begin(), loads.end(), std::uint64_t{0});
     EXPECT_LE(sum, stats.list_entries);
-    EXPECT_GE(sum + stats.list_entries / 1000, stats.list_entries);  // some counted by a hair
+    EXPECT_GE(sum + stats.list_entries / 50, stats.list_entries);  // some reach no block
     EXPECT_EQ(*std::max_element(loads.begin(), loads.end()), stats.list_max);
   }
 }
@@ -230,7 +262,7 @@ TEST(CudaRenderer, LongTilesAreSplit) {
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto split = renderer->make_view({}), whole = renderer->make_view({.split_tasks = false});
   const Rendered b = render_in(*whole, scene.request);
-  EXPECT_EQ(b.stats.tasks, 1024u);  // one a tile
+  EXPECT_EQ(b.stats.tasks, 256u);  // one a tile
   for (int frame = 0; frame < 4; ++frame) {
     const Rendered a = render_in(*split, scene.request);
     EXPECT_GT(a.stats.tasks, b.stats.tasks);

@@ -71,11 +71,29 @@ TEST(PipelineOptions, BecomeViewSettings) {
   EXPECT_EQ(predictor_settings({.constant_velocity = true}).min_confidence, 1.0);
 }
 
+TEST(PipelineOptions, ThePapersPipelineIsTheFixedGridInKeyOrderUnlessToldOtherwise) {
+  const ViewSettings settings = view_settings({.pipeline = "paper"});
+  EXPECT_EQ(settings.pipeline, Pipeline::paper);
+  EXPECT_EQ(settings.speculation.grid, GridKind::fixed);
+  EXPECT_EQ(settings.order, BlendOrder::key);
+  PipelineOptions options;
+  options.pipeline = "paper";
+  options.grid = "shift";
+  EXPECT_EQ(view_settings(options).speculation.grid, GridKind::shift);
+  EXPECT_EQ(view_settings(options).order, BlendOrder::key);
+  options.order = "fresh";
+  EXPECT_EQ(view_settings(options).order, BlendOrder::fresh);
+  // The other pipelines keep their own.
+  EXPECT_EQ(view_settings({.pipeline = "catgs"}).speculation.grid, SpeculationSettings{}.grid);
+  EXPECT_EQ(view_settings({.pipeline = "catgs"}).order, ViewSettings{}.order);
+}
+
 TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
   const auto refused = [](const PipelineOptions& options, const std::string& message) {
     EXPECT_THAT([&] { view_settings(options); }, ThrowsMessage<InputError>(HasSubstr(message)));
   };
-  refused({.pipeline = "fast"}, "--pipeline: unknown \"fast\" (one of exact, vanilla, catgs)");
+  refused({.pipeline = "fast"},
+          "--pipeline: unknown \"fast\" (one of exact, vanilla, paper, catgs)");
   refused({.pipeline = "catgs", .order = "old"}, "--order: unknown \"old\"");
   refused({.pipeline = "catgs", .window = 65}, "--window: is out of range");
   refused({.window = 4}, "--window: has no effect on the exact pipeline");

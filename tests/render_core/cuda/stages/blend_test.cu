@@ -4,7 +4,6 @@
 #include <random>
 
 #include "render_core/cuda/convert.cuh"
-#include "render_core/cuda/pixel_runs.cuh"
 #include "render_core/cuda/split.cuh"
 #include "render_core/math/colour-inl.h"
 #include "render_core/math/ellipse-inl.h"
@@ -20,7 +19,7 @@ constexpr glm::vec3 background(0.2f, 0.5f, 0.1f);
 /// pixels.
 class BlendStage : public StageTest {
  protected:
-  BlendStage() : grid_(image_grid(size_px)), shape_(picture_shape(size_px, grid_)) {
+  BlendStage() : shape_(picture_shape(size_px)) {
     std::mt19937_64 random(31);
     const auto uniform = [&](double low, double high) {
       return static_cast<float>(low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53);
@@ -48,29 +47,52 @@ class BlendStage : public StageTest {
       records_.push_back(record);
     }
     for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
-      const auto first = static_cast<std::uint32_t>(slots_.size());
+      const auto first = static_cast<std::uint32_t>(entries_.size());
       for (std::uint32_t i = 0; i < splats_.size(); ++i)
-        if (reaches(splats_[i], t)) slots_.push_back(i);
-      ranges_.push_back(make_uint2(first, static_cast<std::uint32_t>(slots_.size())));
+        if (const std::uint32_t blocks = reached(splats_[i], t); blocks != 0)
+          entries_.push_back({i, blocks});
+      ranges_.push_back(make_uint2(first, static_cast<std::uint32_t>(entries_.size())));
     }
-    shape_.list_bound = static_cast<std::uint32_t>(slots_.size());
+    shape_.list_bound = static_cast<std::uint32_t>(entries_.size());
   }
 
   [[nodiscard]] glm::ivec2 corner_of(std::uint32_t tile) const {
-    return tile_size_px * glm::ivec2(static_cast<int>(tile) % grid_.tiles.x,
-                                     static_cast<int>(tile) / grid_.tiles.x);
+    return tile_side_px * glm::ivec2(static_cast<int>(tile) % shape_.tiles_x,
+                                     static_cast<int>(tile) / shape_.tiles_x);
   }
 
-  [[nodiscard]] bool reaches(const catgs::Splat& s, std::uint32_t tile) const {
+  /// The blocks of a tile that a splat reaches.
+  [[nodiscard]] std::uint32_t reached(const catgs::Splat& s, std::uint32_t tile) const {
     const math::Whitening<double> w{s.whitening_xx, s.whitening_xy, s.whitening_yy};
     const glm::ivec2 corner = corner_of(tile);
-    for (int y = corner.y; y < corner.y + tile_size_px; ++y)
-      for (int x = corner.x; x < corner.x + tile_size_px; ++x)
-        if (s.log2_opacity -
-                math::whitened_square<double>(w, {x + 0.5 - s.centre_x, y + 0.5 - s.centre_y}) >=
+    std::uint32_t blocks = 0;
+    for (int y = 0; y < tile_side_px; ++y)
+      for (int x = 0; x < tile_side_px; ++x)
+        if (s.log2_opacity - math::whitened_square<double>(w, {corner.x + x + 0.5 - s.centre_x,
+                                                               corner.y + y + 0.5 - s.centre_y}) >=
             log2_alpha_min)
-          return true;
-    return false;
+          blocks |= 1u << (y / block_height_px * blocks_across + x / block_width_px);
+    return blocks;
+  }
+
+  /// Blends the pixels of the CPU core's tile at `corner`. Returns how many entries it looked at.
+  std::size_t blend_on_cpu(const std::vector<DepthSlot>& list, glm::ivec2 corner,
+                           HostImage& image) const {
+    const glm::ivec2 end = glm::min(corner + tile_size_px, size_px);
+    std::vector<PixelBlock> blocks;
+    for (int y = corner.y; y < end.y; y += block_side_px)
+      for (int x = corner.x; x < end.x; x += block_side_px)
+        blocks.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)});
+    return simd_kernels()
+        .front()
+        .blend_blocks({.splats = splats_.data(),
+                       .list = list,
+                       .blocks = blocks,
+                       .background = background,
+                       .cull_blocks = true,
+                       .count_pairs = false,
+                       .image = &image})
+        .looked_at;
   }
 
   /// The CPU core's picture; `looked_at`: entries of each tile's list.
@@ -79,20 +101,15 @@ class BlendStage : public StageTest {
     image.resize(PixelFormat::rgb_f32, size_px);
     for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
       std::vector<DepthSlot> list;
-      for (std::uint32_t k = ranges_[t].x; k < ranges_[t].y; ++k) list.push_back({k, slots_[k]});
-      const glm::ivec2 corner = corner_of(t), end = glm::min(corner + tile_size_px, size_px);
-      std::vector<PixelBlock> blocks;
-      for (int y = corner.y; y < end.y; y += block_side_px)
-        for (int x = corner.x; x < end.x; x += block_side_px)
-          blocks.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)});
-      const BlendResult result = simd_kernels().front().blend_blocks({.splats = splats_.data(),
-                                                                      .list = list,
-                                                                      .blocks = blocks,
-                                                                      .background = background,
-                                                                      .cull_blocks = true,
-                                                                      .count_pairs = false,
-                                                                      .image = &image});
-      looked_at.push_back(result.looked_at);
+      for (std::uint32_t k = ranges_[t].x; k < ranges_[t].y; ++k)
+        list.push_back({k, entries_[k].slot});
+      const glm::ivec2 corner = corner_of(t), end = glm::min(corner + tile_side_px, size_px);
+      std::size_t most = 0;
+      // The CPU core's tiles are smaller.
+      for (int y = corner.y; y < end.y; y += tile_size_px)
+        for (int x = corner.x; x < end.x; x += tile_size_px)
+          most = std::max(most, blend_on_cpu(list, {x, y}, image));
+      looked_at.push_back(most);
     }
     std::vector<float> rgb;
     for (int y = 0; y < size_px.y; ++y)
@@ -100,9 +117,9 @@ class BlendStage : public StageTest {
     return rgb;
   }
 
-  /// The device's picture, of tiles in one task each; by runs of their pixels when `turned`.
-  std::vector<float> on_device(bool turned, std::vector<std::uint32_t>& reached) {
-    shape_.tile_parts = turned ? most_run_parts : parts_per_tile;
+  /// The device's picture, of tiles in one task each, and where its parts end.
+  std::vector<float> on_device(const Finish& finish, std::vector<std::uint32_t>& reached,
+                               std::vector<float>& ends) {
     const std::uint32_t tiles = shape_.tiles();
     std::vector<BlendTask> whole;
     std::vector<std::uint32_t> numbers;
@@ -114,76 +131,109 @@ class BlendStage : public StageTest {
     FrameCounts counts;
     counts.queued[0] = tiles;
     const auto record = upload(records_);
-    const auto slot = upload(slots_), queue = upload(numbers);
+    const auto entry = upload(entries_);
+    const auto queue = upload(numbers);
     const auto reach = upload(std::vector<std::uint32_t>(tiles));
     const auto task = upload(whole);
     const auto on_device = upload(std::vector{counts});
     const auto rgb =
         upload(std::vector<float>(3 * static_cast<std::size_t>(size_px.x * size_px.y), -1.0f));
-    const auto pixels = upload(std::vector<PixelPlace>(std::size_t{tiles} * run_bound_px(shape_)));
-    const auto pixel_count = upload(std::vector<std::uint32_t>(tiles));
+    std::vector<float> depths;  // a splat's depth is its number
+    for (std::size_t i = 0; i < splats_.size(); ++i) depths.push_back(static_cast<float>(i));
+    const auto depth = upload(depths);
+    const auto end = upload(std::vector<float>(std::size_t{tiles} * parts_per_tile, -1.0f));
     const Stream stream;
-    if (turned)
-      launch_pixel_runs({.shape = shape_,
-                         .list_from_frame = {},
-                         .frame_from_list = {},
-                         .pixels = pixels.get(),
-                         .pixel_count = pixel_count.get()},
-                        stream.get());
     launch_blend({.shape = shape_,
                   .records = record.get(),
-                  .slot = slot.get(),
+                  .entries = entry.get(),
                   .tasks = task.get(),
                   .queue = queue.get(),
                   .background = make_float3(background.x, background.y, background.z),
                   .rgb = rgb.get(),
-                  .pixels = turned ? pixels.get() : nullptr,
-                  .pixel_count = turned ? pixel_count.get() : nullptr,
                   .slice_pixels = nullptr,
                   .consumed = nullptr,
                   .slice_transmittance = nullptr,
+                  .ends = {.splat_depth = depth.get(), .depth = end.get()},
+                  .finish = finish,
                   .reach = reach.get(),
                   .counts = on_device.get(),
                   .count_pairs = false,
                   .warps = blend_warps(processors())},
                  stream.get());
     reached = fetch(reach.get(), tiles);
+    ends = fetch(end.get(), std::size_t{tiles} * parts_per_tile);
     return fetch(rgb.get(), rgb.size());
   }
 
-  TileGrid grid_;
   FrameShape shape_;
   std::vector<catgs::Splat> splats_;
   std::vector<SplatRecord> records_;
-  std::vector<std::uint32_t> slots_;
+  std::vector<TileEntry> entries_;
   std::vector<uint2> ranges_;
 };
+
+constexpr Finish exact_finish{.transmittance = static_cast<float>(transmittance_min),
+                              .fills = false};
 
 TEST_F(BlendStage, IsTheCpuCoresButForTheRestOfARound) {
   std::vector<std::size_t> looked_at;
   const std::vector<float> expected = on_cpu(looked_at);
-  for (const bool turned : {false, true}) {
-    SCOPED_TRACE(turned ? "runs of pixels" : "squares");
-    std::vector<std::uint32_t> reached;
-    const std::vector<float> drawn = on_device(turned, reached);
-    // A finished pixel sees at most transmittance_min / (1 - alpha_max) of what lies behind it.
-    Difference colour("blend: colour", 0.0101);
-    for (std::size_t i = 0; i < drawn.size(); ++i) colour.add(drawn[i] - expected[i]);
-    Difference quality("blend: dB below 60", 0.0);
-    quality.add(std::max(0.0, 60.0 - catgs::test::psnr_db(drawn, expected)));
-    // Entries come in groups of 64, of which the last two are on their way when the tile is
-    // finished.
-    Mismatches reach("blend: tiles that looked at less of their list", 0.05);
-    for (std::size_t t = 0; t < looked_at.size(); ++t) {
-      EXPECT_LE(reached[t], ranges_[t].y - ranges_[t].x);
-      reach.add(reached[t] + 64 < looked_at[t]);
+  std::vector<std::uint32_t> reached;
+  std::vector<float> ends;
+  const std::vector<float> drawn = on_device(exact_finish, reached, ends);
+  // A finished pixel sees at most transmittance_min / (1 - alpha_max) of what lies behind it.
+  Difference colour("blend: colour", 0.0101);
+  for (std::size_t i = 0; i < drawn.size(); ++i) colour.add(drawn[i] - expected[i]);
+  Difference quality("blend: dB below 60", 0.0);
+  quality.add(std::max(0.0, 60.0 - catgs::test::psnr_db(drawn, expected)));
+  Mismatches reach("blend: tiles that looked at less of their list", 0.05);
+  for (std::size_t t = 0; t < looked_at.size(); ++t) {
+    EXPECT_LE(reached[t], ranges_[t].y - ranges_[t].x);
+    reach.add(reached[t] + 64 < looked_at[t]);
+  }
+}
+
+// What lies behind the end of a part shows nowhere in it.
+TEST_F(BlendStage, PartsEndBehindWhatShows) {
+  const Finish early{.transmittance = 0.05f, .fills = false};
+  std::vector<std::uint32_t> reached;
+  std::vector<float> ends;
+  const std::vector<float> drawn = on_device(early, reached, ends);
+  std::size_t finished = 0, open = 0;
+  std::vector<TileEntry> kept = entries_;
+  for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
+    for (int part = 0; part < parts_per_tile; ++part) {
+      const glm::ivec2 at =
+          corner_of(t) + part_side_px * glm::ivec2(part % parts_across, part / parts_across);
+      if (at.x >= size_px.x || at.y >= size_px.y) continue;
+      const float end = ends[t * parts_per_tile + static_cast<unsigned>(part)];
+      (std::isinf(end) ? open : finished) += 1;
+      for (std::uint32_t k = ranges_[t].x; k < ranges_[t].y; ++k)
+        if (static_cast<float>(entries_[k].slot) > end) kept[k].blocks &= ~blocks_of(part);
     }
   }
+  EXPECT_GT(finished, 10u);
+  entries_ = kept;
+  const std::vector<float> without = on_device(early, reached, ends);
+  Difference colour("blend: colour without what is behind the ends", 1e-6);
+  for (std::size_t i = 0; i < drawn.size(); ++i) colour.add(drawn[i] - without[i]);
+}
+
+TEST_F(BlendStage, FinishedPixelsFillTheRestWithTheirColour) {
+  std::vector<std::uint32_t> reached;
+  std::vector<float> ends;
+  const Finish dark{.transmittance = 0.05f, .fills = false};
+  const Finish filled{.transmittance = 0.05f, .fills = true};
+  const std::vector<float> exact = on_device(exact_finish, reached, ends);
+  const std::vector<float> a = on_device(dark, reached, ends);
+  const std::vector<float> b = on_device(filled, reached, ends);
+  // What shows behind is as bright as what stands before, on average.
+  EXPECT_GT(catgs::test::psnr_db(b, exact), catgs::test::psnr_db(a, exact));
+  EXPECT_GT(catgs::test::psnr_db(b, exact), 35.0);
 }
 
 class CompositeStage : public StageTest {
  protected:
-  static constexpr std::size_t tile_pixels = tile_size_px * tile_size_px;
   /// What the blend leaves behind: slices of tiles, and how far each part of one looked.
   struct Slices {
     std::vector<uint2> of_tile;    // first slice, count
@@ -206,7 +256,7 @@ class CompositeStage : public StageTest {
       slices += count;
     }
     for (std::uint32_t s = 0; s < slices; ++s) {
-      for (std::size_t k = 0; k < tile_pixels; ++k) {
+      for (int k = 0; k < tile_pixels; ++k) {
         const bool finished = random() % 4 == 0;
         const float transmittance = finished ? -0.001f : 0.05f + 0.9f * uniform();
         made.pixels.push_back(make_float4(uniform(), uniform(), uniform(), transmittance));
@@ -220,7 +270,7 @@ class CompositeStage : public StageTest {
 };
 
 TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
-  FrameShape shape = picture_shape(size_px, image_grid(size_px));
+  FrameShape shape = picture_shape(size_px);
   const std::uint32_t tiles = shape.tiles();
   const auto [of_tile, tasks, of_slice, looked_at] = random_slices(tiles);
   shape.slice_bound = static_cast<std::uint32_t>(tasks.size()) - tiles;
@@ -228,8 +278,7 @@ TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
   const auto task = upload(tasks);
   const auto pixels = upload(of_slice);
   const auto consumed = upload(looked_at);
-  const auto counts = upload(std::vector<FrameCounts>(1));
-  const auto reach = upload(std::vector<std::uint32_t>(tiles, 12345));
+  const auto reach = upload(std::vector<std::uint32_t>(tiles));
   const auto rgb =
       upload(std::vector<float>(3 * static_cast<std::size_t>(size_px.x * size_px.y), -1.0f));
   const Stream stream;
@@ -238,9 +287,9 @@ TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
                     .tile_slices = slice.get(),
                     .slice_pixels = pixels.get(),
                     .consumed = consumed.get(),
-                    .pixels = nullptr,
-                    .pixel_count = nullptr,
-                    .counts = counts.get(),
+                    .entries = nullptr,
+                    .ends = {.splat_depth = nullptr, .depth = nullptr},
+                    .finish = exact_finish,
                     .background = make_float3(background.x, background.y, background.z),
                     .rgb = rgb.get(),
                     .reach = reach.get()},
@@ -252,21 +301,22 @@ TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
   Mismatches reaches("composite: reach of tiles", 0.0);
   for (std::uint32_t t = 0; t < tiles; ++t) {
     std::uint32_t farthest = 0;
-    for (int k = 0; k < static_cast<int>(tile_pixels); ++k) {
-      const int in_x = k % tile_size_px, in_y = k / tile_size_px;
-      const int x = static_cast<int>(t) % shape.tiles_x * tile_size_px + in_x;
-      const int y = static_cast<int>(t) / shape.tiles_x * tile_size_px + in_y;
-      const int part = in_y / part_size_px * 2 + in_x / part_size_px;
+    for (int k = 0; k < tile_pixels; ++k) {
+      const int part = k / part_pixels, in_part = k % part_pixels;
+      const int x = static_cast<int>(t) % shape.tiles_x * tile_side_px +
+                    part % parts_across * part_side_px + in_part % part_side_px;
+      const int y = static_cast<int>(t) / shape.tiles_x * tile_side_px +
+                    part / parts_across * part_side_px + in_part / part_side_px;
+      if (x >= size_px.x || y >= size_px.y) continue;
       glm::dvec3 sum(0.0);
       double transmittance = 1.0;
       for (std::uint32_t s = of_tile[t].x; s < of_tile[t].x + of_tile[t].y; ++s) {
-        const float4& p = of_slice[s * tile_pixels + static_cast<std::size_t>(k)];
+        const float4& p = of_slice[std::size_t{s} * tile_pixels + static_cast<unsigned>(k)];
         sum += transmittance * glm::dvec3(p.x, p.y, p.z);
         transmittance *= std::abs(p.w);
         farthest = std::max(farthest, looked_at[s * parts_per_tile + static_cast<unsigned>(part)]);
         if (std::signbit(p.w) || transmittance < transmittance_min) break;
       }
-      if (x >= size_px.x || y >= size_px.y) continue;
       const float* pixel = &drawn[3 * static_cast<std::size_t>(y * size_px.x + x)];
       for (int c = 0; c < 3; ++c)
         colour.add(of_tile[t].y == 0
@@ -274,7 +324,7 @@ TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
                        : pixel[c] - std::clamp(sum[c] + transmittance * background[c], 0.0, 1.0));
     }
     reaches.add(reached[t] !=
-                (of_tile[t].y == 0 ? 12345u : farthest - tasks[tiles + of_tile[t].x].first));
+                (of_tile[t].y == 0 ? 0u : farthest - tasks[tiles + of_tile[t].x].first));
   }
 }
 

@@ -1,6 +1,7 @@
 // The stages that make lists: the two sorts and the scan against the standard library's, entries
 // against the CPU core's lists and against every pixel.
 
+#include <map>
 #include <numeric>
 #include <random>
 #include <set>
@@ -96,20 +97,23 @@ void expect_sorted_by_tile(glm::ivec2 tiles, cudaStream_t stream) {
   const Numbers numbers = random_numbers(count, shape.tiles() + 1, 4);  // the last: padding
   const std::vector<Tile> tile_of(numbers.begin(), numbers.end());
   const auto key = upload(tile_of), other_key = upload(tile_of);
-  const auto slot = upload(counting(count)), other_slot = upload(Numbers(count));
+  std::vector<TileEntry> entries;
+  for (std::uint32_t i = 0; i < count; ++i) entries.push_back({i, ~i});
+  const auto entry = upload(entries), other_entry = upload(entries);
   const auto range = upload(std::vector<uint2>(shape.tiles(), make_uint2(1, 2)));
   const auto scratch = scratch_for(shape);
   PingPong<Tile> tile{.current = key.get(), .other = other_key.get()};
-  PingPong<std::uint32_t> slots{.current = slot.get(), .other = other_slot.get()};
-  sort_by_tile(shape, count, tile, slots, {.memory = scratch.get(), .bytes = scratch.bytes()},
+  PingPong<TileEntry> sorted{.current = entry.get(), .other = other_entry.get()};
+  sort_by_tile(shape, count, tile, sorted, {.memory = scratch.get(), .bytes = scratch.bytes()},
                stream);
   launch_ranges<Tile>(
       {.shape = shape, .entries = count, .tile = tile.current, .range = range.get()}, stream);
   Numbers expected = counting(count);
   std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return numbers[i]; });
-  const Numbers drawn = fetch(slots.current, count);
+  const std::vector<TileEntry> drawn = fetch(sorted.current, count);
   Mismatches places("sort: places in order of tiles", 0.0);
-  for (std::uint32_t k = 0; k < count; ++k) places.add(drawn[k] != expected[k]);
+  for (std::uint32_t k = 0; k < count; ++k)
+    places.add(drawn[k].slot != expected[k] || drawn[k].blocks != ~expected[k]);
 
   const std::vector<uint2> ranges = fetch(range.get(), shape.tiles());
   Mismatches found("ranges: of tiles", 0.0);
@@ -132,40 +136,43 @@ TEST_F(SortStage, OrdersEntriesByTileAsAStableSortAndFindsTheirRanges) {
 
 using Entry = std::pair<std::uint32_t, std::uint32_t>;  // tile, index in the cloud
 
-/// The CPU core's lists of the splats that it has in view, but for those in `left_out`.
-std::set<Entry> cpu_entries(const StagedLists& lists, const TileGrid& grid,
-                            const std::vector<bool>& left_out) {
+/// The CPU core's lists of the splats that it has in view, by tiles of this core.
+std::set<Entry> cpu_entries(const StagedLists& lists) {
+  constexpr std::uint32_t ratio = tile_side_px / tile_size_px;
   std::set<Entry> entries;
   for (const auto& found : lists.on_cpu()) {
-    if (!found || left_out[found->splat.original_index]) continue;
-    if (found->splat.growth_px > max_image_side_px) continue;  // it is in all lists here
+    if (!found) continue;
     std::vector<TileRun> runs;
     const catgs::SplatPath path = found->path.value_or(catgs::SplatPath{});
     simd_kernels().front().list_tiles({.splats = std::span(&found->splat, 1),
                                        .paths = found->path ? &path : nullptr,
                                        .first_slot = 0,
-                                       .first_px = grid.first_px},
+                                       .first_px = glm::ivec2(0)},
                                       runs);
     for (const TileRun& run : runs)
       for (std::uint32_t column = run.begin; column < run.end; ++column)
-        entries.emplace(run.row * static_cast<std::uint32_t>(grid.tiles.x) + column,
-                        found->splat.original_index);
+        entries.emplace(
+            run.row / ratio * static_cast<std::uint32_t>(lists.shape().tiles_x) + column / ratio,
+            found->splat.original_index);
   }
   return entries;
 }
 
-/// Whether a splat as it is now reaches a pixel of the tile, in double precision.
-bool reaches(const SplatRecord& splat, const FrameShape& shape, std::uint32_t tile) {
+/// The blocks of a tile that a splat as it is now reaches in a pixel of the picture, in double
+/// precision.
+std::uint32_t reached_blocks(const SplatRecord& splat, const FrameShape& shape,
+                             std::uint32_t tile) {
   const math::Whitening<double> w{splat.whitening.xx, splat.whitening.xy, splat.whitening.yy};
-  const int left = shape.first_x_px + static_cast<int>(tile) % shape.tiles_x * tile_size_px;
-  const int top = shape.first_y_px + static_cast<int>(tile) / shape.tiles_x * tile_size_px;
-  for (int y = std::max(top, 0); y < std::min(top + tile_size_px, shape.height_px); ++y)
-    for (int x = std::max(left, 0); x < std::min(left + tile_size_px, shape.width_px); ++x)
+  const int left = static_cast<int>(tile) % shape.tiles_x * tile_side_px;
+  const int top = static_cast<int>(tile) / shape.tiles_x * tile_side_px;
+  std::uint32_t blocks = 0;
+  for (int y = top; y < std::min(top + tile_side_px, shape.height_px); ++y)
+    for (int x = left; x < std::min(left + tile_side_px, shape.width_px); ++x)
       if (splat.log2_opacity - math::whitened_square<double>(
                                    w, {x + 0.5 - splat.centre_px.x, y + 0.5 - splat.centre_px.y}) >=
           log2_alpha_min + 1e-4)
-        return true;
-  return false;
+        blocks |= 1u << ((y - top) / block_height_px * blocks_across + (x - left) / block_width_px);
+  return blocks;
 }
 
 class EmitStage : public ListStage {};
@@ -186,33 +193,44 @@ TEST_P(EmitStage, ListsWhatTheCpuCoreListsAndMissesNoPixel) {
   ASSERT_LE(counts.list_entries, lists.shape().list_bound);
   const auto tiles =
       fetch(reinterpret_cast<const std::uint16_t*>(m.tile.get()), counts.list_entries);
-  const auto slots = fetch(m.other_slot.get(), counts.list_entries);
+  const auto entries = fetch(m.other_entries.get(), counts.list_entries);
 
-  std::vector<bool> watched(scene.cloud.size());
-  for (const std::uint32_t v : visible)
-    if ((v & watched_bit) != 0) watched[scene.order[v & ~watched_bit]] = true;
-  std::set<Entry> listed, of_slots;
+  std::set<Entry> listed;
+  std::map<Entry, std::uint32_t> blocks;  // by tile and slot
   std::uint32_t depth = 0;
-  for (std::size_t k = 0; k < slots.size(); ++k) {
-    EXPECT_GE(keys[slots[k]] >> depth_bits_below, depth);  // in depth order
-    depth = keys[slots[k]] >> depth_bits_below;
-    if (tiles[k] == lists.shape().tiles()) continue;  // counted by a hair
-    const std::uint32_t index = scene.order[visible[slots[k]] & ~watched_bit];
-    EXPECT_TRUE(listed.emplace(tiles[k], index).second) << "listed twice";
-    of_slots.emplace(tiles[k], slots[k]);
+  for (std::size_t k = 0; k < entries.size(); ++k) {
+    const std::uint32_t slot = entries[k].slot;
+    if (tiles[k] == lists.shape().tiles()) continue;   // it reaches no block
+    EXPECT_GE(keys[slot] >> depth_bits_below, depth);  // in depth order
+    depth = keys[slot] >> depth_bits_below;
+    EXPECT_TRUE(listed.emplace(tiles[k], scene.order[visible[slot]]).second) << "listed twice";
+    blocks[{tiles[k], slot}] = entries[k].blocks;
   }
-  const std::set<Entry> expected = cpu_entries(lists, staged.plan.grid, watched);
+  const std::set<Entry> expected = cpu_entries(lists);
   {
-    // Each core widens outlines by its own allowance for rounding.
-    Mismatches missing("emit: entries of the CPU core that are missing", 0.01);
+    // Each core widens outlines by its own allowance for rounding. Here, an entry must reach a
+    // block; there, the tile.
+    Mismatches missing("emit: entries of the CPU core that are missing", 0.02);
     for (const Entry& entry : expected) missing.add(!listed.contains(entry));
     Mismatches added("emit: entries that the CPU core does not have", 0.05);
     for (const Entry& entry : listed) added.add(!expected.contains(entry));
   }
-  Mismatches missed("emit: tiles with a pixel that a splat reaches and no entry of it", 0.0);
-  for (std::uint32_t slot = 0; slot < seen; ++slot)
-    for (std::uint32_t t = 0; t < lists.shape().tiles(); ++t)
-      if (reaches(records[slot], lists.shape(), t)) missed.add(!of_slots.contains({t, slot}));
+  // An outline may meet the rectangle of a block's pixel centres between them.
+  Mismatches more("emit: blocks of entries that the splat reaches in no pixel",
+                  GetParam() == Listed::now ? 0.15 : 0.6);
+  Mismatches missed("emit: blocks that a splat reaches and that are in no entry", 0.0);
+  for (std::uint32_t slot = 0; slot < seen; ++slot) {
+    for (std::uint32_t t = 0; t < lists.shape().tiles(); ++t) {
+      const std::uint32_t reached = reached_blocks(records[slot], lists.shape(), t);
+      const auto entry = blocks.find({t, slot});
+      const std::uint32_t found = entry == blocks.end() ? 0 : entry->second;
+      for (int block = 0; block < 32; ++block) {
+        const bool reaches = (reached >> block & 1u) != 0, has = (found >> block & 1u) != 0;
+        if (reaches) missed.add(!has);
+        if (has) more.add(!reaches);
+      }
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(, EmitStage, testing::Values(Listed::now, Listed::window), name_of);

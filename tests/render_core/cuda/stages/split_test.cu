@@ -1,8 +1,8 @@
-// Splitting tiles into tasks, queueing them and cutting runs for the reorder stage, against the
-// rule of split.cuh on the host.
+// Splitting tiles into tasks and queueing them, against the rule of split.cuh on the host.
 
 #include <map>
 #include <random>
+#include <span>
 
 #include "render_core/cuda/split.cuh"
 #include "tests/render_core/cuda/stages/stage.h"
@@ -40,8 +40,7 @@ struct Drawn {
   FrameCounts counts;
   std::vector<BlendTask> tasks;
   std::vector<uint2> tile_slices;
-  std::vector<std::uint32_t> queue, ordered, reach;
-  std::vector<ReorderRun> runs;
+  std::vector<std::uint32_t> queue, reach;
   std::vector<float> transmittance;
 };
 
@@ -59,8 +58,7 @@ class SplitStage : public StageTest {
       tiles_.push_back({begin, listed, reach});
       begin += listed;
     }
-    shape_ = picture_shape({40 * tile_size_px, 25 * tile_size_px},
-                           image_grid({40 * tile_size_px, 25 * tile_size_px}));
+    shape_ = picture_shape({40 * tile_side_px, 25 * tile_side_px});
     shape_.list_bound = begin;
   }
 
@@ -73,40 +71,29 @@ class SplitStage : public StageTest {
       last_reach.push_back(tile.reach);
     }
     const auto range = upload(ranges);
-    const auto last = upload(last_reach);
-    const auto reach = upload(std::vector<std::uint32_t>(tiles_.size(), 7));
+    const auto reach = upload(last_reach);
     const auto tasks = upload(std::vector<BlendTask>(task_bound(shape_)));
     const auto slices = upload(std::vector<uint2>(tiles_.size()));
     const auto queue = upload(std::vector<std::uint32_t>(queue_bound(shape_)));
-    const auto runs = upload(std::vector<ReorderRun>(run_bound(shape_)));
-    const auto ordered = upload(std::vector<std::uint32_t>(tiles_.size()));
-    const auto transmittance = upload(std::vector<float>(
-        std::size_t{slice_bound} * static_cast<unsigned>(shape_.tile_parts) + 1));
+    const auto transmittance =
+        upload(std::vector<float>(std::size_t{slice_bound} * parts_per_tile + 1));
     const auto counts = upload(std::vector<FrameCounts>(1));
     const Stream stream;
     launch_split({.shape = shape_,
                   .range = range.get(),
-                  .last = {.reach = last.get(), .same_grid = true},
+                  .reach_known = true,
                   .reach = reach.get(),
-                  .pixel_count = nullptr,
                   .tasks = tasks.get(),
                   .tile_slices = slices.get(),
                   .queue = queue.get(),
-                  .runs = runs.get(),
-                  .ordered = ordered.get(),
                   .slice_transmittance = transmittance.get(),
                   .counts = counts.get(),
                   .mean_list = mean,
                   .split = true},
                  stream.get());
-    return {fetch(counts.get(), 1)[0],
-            fetch(tasks.get(), task_bound(shape_)),
-            fetch(slices.get(), tiles_.size()),
-            fetch(queue.get(), queue_bound(shape_)),
-            fetch(ordered.get(), tiles_.size()),
-            fetch(reach.get(), tiles_.size()),
-            fetch(runs.get(), run_bound(shape_)),
-            fetch(transmittance.get(), transmittance.size())};
+    return {fetch(counts.get(), 1)[0],          fetch(tasks.get(), task_bound(shape_)),
+            fetch(slices.get(), tiles_.size()), fetch(queue.get(), queue_bound(shape_)),
+            fetch(reach.get(), tiles_.size()),  fetch(transmittance.get(), transmittance.size())};
   }
 
   std::vector<Tile> tiles_;
@@ -188,7 +175,7 @@ TEST_F(SplitStage, CutsTilesByTheRule) {
   EXPECT_EQ(drawn.counts.list_max, longest);
   EXPECT_GT(wanted, 100u);  // the case is the one meant
   Mismatches clear("split: parts of slices that begin without their transmittance", 0.0);
-  for (std::size_t i = 0; i < wanted * static_cast<unsigned>(shape_.tile_parts); ++i)
+  for (std::size_t i = 0; i < wanted * parts_per_tile; ++i)
     clear.add(drawn.transmittance[i] != 1.0f);
 }
 
@@ -199,31 +186,6 @@ TEST_F(SplitStage, LosesNothingWhereSlicesFindNoRoom) {
     EXPECT_LE(drawn.counts.allocated_slices, room);
     EXPECT_GT(drawn.counts.wanted_slices, room);
   }
-}
-
-TEST_F(SplitStage, CutsRunsThatCoverWhatWillBeLookedAt) {
-  const Drawn drawn = split(100'000, 300);
-  std::map<std::uint32_t, ReorderRun> runs;  // by their first entry
-  for (std::uint32_t r = 0; r < drawn.counts.runs; ++r)
-    EXPECT_TRUE(runs.emplace(drawn.runs[r].first, drawn.runs[r]).second);
-  Mismatches covered("split: tiles whose runs are not what will be looked at", 0.0);
-  std::size_t used = 0;
-  for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
-    const Tile& tile = tiles_[t];
-    const std::uint32_t expected = cut_of(tile, slice_length(300)).expected;
-    const std::uint32_t ordered =
-        expected == 0 ? 0 : std::min(tile.listed, (expected + expected / 8 + 127) / 128 * 128);
-    bool same = drawn.ordered[t] == ordered;
-    for (std::uint32_t at = 0; same && at < ordered; at += reorder_run, ++used) {
-      const auto run = runs.find(tile.begin + at);
-      const std::uint32_t end = std::min(at + reorder_run, ordered);
-      same = run != runs.end() && run->second.last == tile.begin + end &&
-             (run->second.continues != 0) == (at > 0) &&
-             (run->second.follows != 0) == (at + reorder_run < ordered) && run->second.met == 0;
-    }
-    covered.add(!same);
-  }
-  EXPECT_EQ(used, runs.size());
 }
 
 }  // namespace

@@ -110,18 +110,13 @@ inline int processors() {
   return count;
 }
 
-/// The picture in a grid of its own, with room for everything.
-inline FrameShape picture_shape(glm::ivec2 size_px, const TileGrid& grid) {
+/// The picture and its tiles, without room for anything else.
+inline FrameShape picture_shape(glm::ivec2 size_px) {
   FrameShape shape;
   shape.width_px = size_px.x;
   shape.height_px = size_px.y;
-  shape.tiles_x = grid.tiles.x;
-  shape.tiles_y = grid.tiles.y;
-  shape.first_x_px = shape.shown_x_px = grid.first_px.x;
-  shape.first_y_px = shape.shown_y_px = grid.first_px.y;
-  shape.list_width_px = grid.size_px.x;
-  shape.list_height_px = grid.size_px.y;
-  shape.tile_parts = parts_per_tile;
+  shape.tiles_x = (size_px.x + tile_side_px - 1) / tile_side_px;
+  shape.tiles_y = (size_px.y + tile_side_px - 1) / tile_side_px;
   shape.tile_bound = shape.tiles();
   return shape;
 }
@@ -157,7 +152,7 @@ class StagedLists {
         plan_(plan),
         builder_(scene.device.arrays(), memory_, processors()),
         request_(camera, plan, settings.speculation),
-        shape_(picture_shape(camera.size_px, plan.grid)) {
+        shape_(picture_shape(camera.size_px)) {
     shape_.visible_bound = std::max(scene.device.arrays().count, 1u);
     shape_.list_bound = 64 * shape_.visible_bound + 4096;
     (void)memory_.reserve({.shape = shape_, .scene = scene.device.arrays(), .settings = settings});
@@ -169,7 +164,7 @@ class StagedLists {
   [[nodiscard]] FrameCounts counts() const { return fetch(memory_.counts.get(), 1)[0]; }
 
   void cull() { builder_.cull(request_, shape_, stream_.get()); }
-  void project() { builder_.project(request_, shape_, {}, stream_.get()); }
+  void project() { builder_.project(request_, shape_, stream_.get()); }
   void sort_by_depth() { builder_.sort_by_depth(shape_, stream_.get()); }
   void emit() { builder_.emit(request_, shape_, stream_.get()); }
 
@@ -185,7 +180,7 @@ class StagedLists {
           {.scene = &scene_.store,
            .camera = &camera_,
            .plan = &plan_,
-           .pipeline = sweeps ? Pipeline::catgs : Pipeline::exact,
+           .pipeline = sweeps ? Pipeline::paper : Pipeline::exact,
            .cluster = c,
            .splats = splats.data(),
            .min_depth = request_.min_depth,
@@ -220,6 +215,8 @@ struct StagedCase {
     camera = make_camera(catgs::test::look_at({1, 0, 1}, {-0.5f, 0.5f, 6}), size_px,
                          static_cast<float>(size_px.x));
     settings = catgs::test::patient_settings();
+    settings.pipeline = Pipeline::paper;
+    settings.speculation.grid = GridKind::fixed;
     if (listed == Listed::now) settings.pipeline = Pipeline::exact;
     FrameGroups groups(settings.speculation);
     const Pose end = catgs::test::moved(camera.world_from_camera, catgs::test::moves().back());

@@ -1,0 +1,102 @@
+#include "render_core/cuda/cuda_check.h"
+#include "render_core/cuda/occlusion.cuh"
+
+namespace catgs::cuda {
+namespace {
+
+/// Limits are moved back by this share of their depth: a surface's depth varies within a part.
+constexpr float margin = 0.02f;
+
+constexpr int block_size = 128;
+
+/// A ray of the present picture in the last camera's space: offset + depth * direction.
+struct LastRay {
+  math::Vec3<float> offset, direction;
+
+  __device__ math::Vec3<float> at(float depth) const {
+    return {offset.x + depth * direction.x, offset.y + depth * direction.y,
+            offset.z + depth * direction.z};
+  }
+};
+
+__device__ LastRay last_ray(const OcclusionParams& p, float x_px, float y_px) {
+  const math::CameraModel<float>& now = p.now;
+  const float x = (x_px - now.principal_point_px.x) / now.focal_px.x;
+  const float y = (y_px - now.principal_point_px.y) / now.focal_px.y;
+  const auto seen = [&](const math::Vec3<float>& v) {
+    return math::Vec3<float>{math::dot<float>(p.last.right, v), math::dot<float>(p.last.down, v),
+                             math::dot<float>(p.last.forward, v)};
+  };
+  return {seen({now.position.x - p.last.position.x, now.position.y - p.last.position.y,
+                now.position.z - p.last.position.z}),
+          seen({x * now.right.x + y * now.down.x + now.forward.x,
+                x * now.right.y + y * now.down.y + now.forward.y,
+                x * now.right.z + y * now.down.z + now.forward.z})};
+}
+
+/// The deepest end of the parts around the image of a point; infinity beyond the picture's edge.
+__device__ float deepest_end(const OcclusionParams& p, const math::Vec3<float>& point) {
+  if (!(point.z > 0.0f)) return INFINITY;
+  const float x_px = p.last.focal_px.x * point.x / point.z + p.last.principal_point_px.x;
+  const float y_px = p.last.focal_px.y * point.y / point.z + p.last.principal_point_px.y;
+  const int parts_x = (p.shape.width_px + part_side_px - 1) / part_side_px;
+  const int parts_y = (p.shape.height_px + part_side_px - 1) / part_side_px;
+  const float x = floorf(x_px / part_side_px), y = floorf(y_px / part_side_px);
+  if (!(x >= 0.0f && y >= 0.0f && x < static_cast<float>(parts_x) &&
+        y < static_cast<float>(parts_y)))
+    return INFINITY;
+  float deepest = 0.0f;
+  for (int dy = -p.radius; dy <= p.radius; ++dy) {
+    for (int dx = -p.radius; dx <= p.radius; ++dx) {
+      const int at_x = static_cast<int>(x) + dx, at_y = static_cast<int>(y) + dy;
+      if (at_x < 0 || at_y < 0 || at_x >= parts_x || at_y >= parts_y) continue;
+      const int tile = at_y / parts_across * p.shape.tiles_x + at_x / parts_across;
+      const int part = at_y % parts_across * parts_across + at_x % parts_across;
+      deepest = fmaxf(deepest, p.last_ends[tile * parts_per_tile + part]);
+    }
+  }
+  return deepest;
+}
+
+__device__ float limit_of(const OcclusionParams& p, float x_px, float y_px) {
+  const LastRay ray = last_ray(p, x_px, y_px);
+  if (!(ray.direction.z > 0.0f)) return INFINITY;
+  float end = deepest_end(p, ray.direction);  // where the ray's far end was
+  constexpr int steps = 2;
+  for (int step = 0; step < steps && end < INFINITY; ++step)
+    end = fmaxf(end, deepest_end(p, ray.at((end - ray.offset.z) / ray.direction.z)));
+  // The camera may have moved past the place where the last picture ended.
+  if (!(end > ray.offset.z)) return INFINITY;
+  return (1.0f + margin) * (end - ray.offset.z) / ray.direction.z;
+}
+
+__global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionParams p) {
+  const std::uint32_t at = blockIdx.x * block_size + threadIdx.x;
+  const std::uint32_t tile = at / parts_per_tile;
+  if (tile >= p.shape.tiles()) return;
+  const int part = static_cast<int>(at % parts_per_tile);
+  const int x_px =
+      static_cast<int>(tile) % p.shape.tiles_x * tile_side_px + part % parts_across * part_side_px;
+  const int y_px =
+      static_cast<int>(tile) / p.shape.tiles_x * tile_side_px + part / parts_across * part_side_px;
+  float limit = 0.0f;  // nothing is seen beyond the picture
+  if (x_px < p.shape.width_px && y_px < p.shape.height_px)
+    limit = limit_of(p, static_cast<float>(x_px) + 0.5f * part_side_px,
+                     static_cast<float>(y_px) + 0.5f * part_side_px);
+  p.part[at] = limit;
+  static_assert(warp_size % parts_per_tile == 0);
+#pragma unroll
+  for (int step = parts_per_tile / 2; step > 0; step /= 2)
+    limit = fmaxf(limit, __shfl_xor_sync(__activemask(), limit, step));
+  if (part == 0) p.tile[tile] = limit;
+}
+
+}  // namespace
+
+void launch_occlusion(const OcclusionParams& params, cudaStream_t stream) {
+  occlusion_kernel<<<blocks_for(params.shape.tiles() * parts_per_tile, block_size), block_size, 0,
+                     stream>>>(params);
+  check_launch("occlusion");
+}
+
+}  // namespace catgs::cuda
