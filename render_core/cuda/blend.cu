@@ -194,8 +194,9 @@ __device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Grou
         {record.centre_px.x - pixels.origin_x(), record.centre_px.y - pixels.origin_y()},
         record.log2_opacity);
     splat[i] = staged_splat(field, reinterpret_cast<const uint2&>(record.colour));
-    // In sub-frames, a splat may be far from where its key frame had it.
-    const bool near = field.u * field.u + field.v * field.v <= most_at_origin;
+    // With a window, a list has splats that reach nothing now, or are far from here.
+    const bool near = math::reach_of(record.log2_opacity) >= 0.0f &&
+                      field.u * field.u + field.v * field.v <= most_at_origin;
 #pragma unroll
     for (int half = 0; half < halves; ++half)
       hits[i][half] = __ballot_sync(~0u, near && (groups.blocks(i) & live[half]) != 0);
