@@ -40,7 +40,7 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
   }
 }
 
-/// Pipelines other than catgs list for the picture of the frame alone.
+/// Pipelines without caches list for the picture of the frame alone.
 FramePlan FrameDriver::plan(const FrameRequest& request) {
   const Camera& camera = request.camera;
   if (keeps_caches(settings_.pipeline))

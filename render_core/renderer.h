@@ -30,7 +30,9 @@ enum class Pipeline {
   vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
   exact,    // exact ellipse/tile culling; the same image as the reference
   paper,    // CaT-GS as published: key frames (same image as `exact`), then sub-frames
-  catgs,    // the server's: `exact` without what the last frame shows to be hidden
+  // The server's. CUDA core: `exact` without what the last frame shows to be hidden. CPU core: key
+  // frames and sub-frames whose tiles turn with the camera.
+  catgs,
 };
 
 /// Whether a pipeline uses what earlier frames of its View left.

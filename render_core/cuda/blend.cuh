@@ -38,6 +38,20 @@ __host__ __device__ constexpr std::uint32_t blocks_of(int part) {
 /// Numbers of a tile's pixels: part by part, and row by row in a part.
 constexpr int tile_pixels = tile_side_px * tile_side_px;
 
+/// The top left pixel of a part, px in the picture.
+__device__ inline int2 part_corner_px(const FrameShape& shape, std::uint32_t tile, int part) {
+  const int index = static_cast<int>(tile);
+  return make_int2(index % shape.tiles_x * tile_side_px + part % parts_across * part_side_px,
+                   index / shape.tiles_x * tile_side_px + part / parts_across * part_side_px);
+}
+
+/// The place in an array [tiles][parts_per_tile] of the part in this column and row of all parts.
+__device__ inline std::uint32_t part_place(const FrameShape& shape, int column, int row) {
+  const int tile = row / parts_across * shape.tiles_x + column / parts_across;
+  const int in_tile = row % parts_across * parts_across + column % parts_across;
+  return static_cast<std::uint32_t>(tile * parts_per_tile + in_tile);
+}
+
 /// The places where a slice stores a pixel of its tile, and the state of a part.
 __device__ inline std::size_t slice_pixel(std::uint32_t slice, int in_tile) {
   return static_cast<std::size_t>(slice) * tile_pixels + static_cast<unsigned>(in_tile);

@@ -60,7 +60,7 @@ class CudaView final : public View {
   VanillaPipeline vanilla_;
   int blend_warps_;
 
-  // What memory_ holds of the last frame.
+  // These say what memory_ holds of the last frame.
   bool reach_known_ = false;
   std::optional<Camera> ends_of_;  // the camera whose part_ends are known
   float mean_inverse_depth_ = 0.0f;

@@ -9,7 +9,7 @@
 
 namespace catgs::cuda {
 
-/// What the lists have to cover.
+/// A frame as the stages that make lists see it.
 struct ListRequest {
   ListRequest(const Camera& camera, const FramePlan& plan, const SpeculationSettings& settings);
 

@@ -50,9 +50,7 @@ __device__ float deepest_end(const OcclusionParams& p, const math::Vec3<float>& 
     for (int dx = -p.radius; dx <= p.radius; ++dx) {
       const int at_x = static_cast<int>(x) + dx, at_y = static_cast<int>(y) + dy;
       if (at_x < 0 || at_y < 0 || at_x >= parts_x || at_y >= parts_y) continue;
-      const int tile = at_y / parts_across * p.shape.tiles_x + at_x / parts_across;
-      const int part = at_y % parts_across * parts_across + at_x % parts_across;
-      deepest = fmaxf(deepest, p.last_ends[tile * parts_per_tile + part]);
+      deepest = fmaxf(deepest, p.last_ends[part_place(p.shape, at_x, at_y)]);
     }
   }
   return deepest;
@@ -75,14 +73,11 @@ __global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionPa
   const std::uint32_t tile = at / parts_per_tile;
   if (tile >= p.shape.tiles()) return;
   const int part = static_cast<int>(at % parts_per_tile);
-  const int x_px =
-      static_cast<int>(tile) % p.shape.tiles_x * tile_side_px + part % parts_across * part_side_px;
-  const int y_px =
-      static_cast<int>(tile) / p.shape.tiles_x * tile_side_px + part / parts_across * part_side_px;
+  const int2 corner = part_corner_px(p.shape, tile, part);
   float limit = 0.0f;  // nothing is seen beyond the picture
-  if (x_px < p.shape.width_px && y_px < p.shape.height_px)
-    limit = limit_of(p, static_cast<float>(x_px) + 0.5f * part_side_px,
-                     static_cast<float>(y_px) + 0.5f * part_side_px);
+  if (in_picture(p.shape, corner.x, corner.y))
+    limit = limit_of(p, static_cast<float>(corner.x) + 0.5f * part_side_px,
+                     static_cast<float>(corner.y) + 0.5f * part_side_px);
   p.part[at] = limit;
   static_assert(warp_size % parts_per_tile == 0);
 #pragma unroll

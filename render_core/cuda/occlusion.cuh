@@ -44,9 +44,7 @@ __device__ inline bool Occlusion::hides(const FrameShape& shape, float2 low_px, 
   if (parts_x <= most_parts && parts_y <= most_parts) {
     for (int y = top / part_side_px; y <= bottom / part_side_px; ++y) {
       for (int x = left / part_side_px; x <= right / part_side_px; ++x) {
-        const int tile_index = y / parts_across * shape.tiles_x + x / parts_across;
-        const int in_tile = y % parts_across * parts_across + x % parts_across;
-        if (!(depth > part[tile_index * parts_per_tile + in_tile])) return false;
+        if (!(depth > part[part_place(shape, x, y)])) return false;
       }
     }
     return true;

@@ -27,11 +27,9 @@ class PartPixels {
     column_ = lane % part_side_px;
     row_ = lane / half_lanes * block_height_px + lane % half_lanes / part_side_px;
     in_tile_ = part * part_pixels + row_ * part_side_px + column_;
-    const int tiles_x = shape.tiles_x;
-    x_px_ = static_cast<int>(tile) % tiles_x * tile_side_px + part % parts_across * part_side_px +
-            column_;
-    y_px_ =
-        static_cast<int>(tile) / tiles_x * tile_side_px + part / parts_across * part_side_px + row_;
+    const int2 corner = part_corner_px(shape, tile, part);
+    x_px_ = corner.x + column_;
+    y_px_ = corner.y + row_;
   }
 
   /// Origin of the part: the pixel corner in its middle, px in the picture.

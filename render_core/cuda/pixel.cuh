@@ -13,7 +13,7 @@ __device__ inline bool in_picture(const FrameShape& shape, int x_px, int y_px) {
 /// When a pixel is finished.
 struct Finish {
   float transmittance;  // below this one
-  // A finished pixel's colour is taken for that of what lies behind it. Otherwise that is black.
+  // A finished pixel's colour stands for what lies behind it. Otherwise the background does.
   bool fills;
 };
 

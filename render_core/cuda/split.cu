@@ -162,7 +162,7 @@ constexpr int composite_block = 256;
 constexpr int parts_per_block = composite_block / part_pixels;
 static_assert(composite_block % part_pixels == 0 && part_pixels == 2 * warp_size);
 
-/// What a pixel looked at.
+/// A pixel looked at entries up to this one.
 struct Look {
   std::uint32_t end;  // one past its last list entry
   bool finished;
@@ -171,10 +171,8 @@ struct Look {
 /// Blends the slices of pixel `in_tile` and writes it.
 __device__ Look fold(const CompositeParams& p, std::uint32_t tile, uint2 slices, int in_tile) {
   const int part = in_tile / part_pixels, in_part = in_tile % part_pixels;
-  const int x_px = static_cast<int>(tile) % p.shape.tiles_x * tile_side_px +
-                   part % parts_across * part_side_px + in_part % part_side_px;
-  const int y_px = static_cast<int>(tile) / p.shape.tiles_x * tile_side_px +
-                   part / parts_across * part_side_px + in_part / part_side_px;
+  const int2 corner = part_corner_px(p.shape, tile, part);
+  const int x_px = corner.x + in_part % part_side_px, y_px = corner.y + in_part / part_side_px;
   if (!in_picture(p.shape, x_px, y_px)) return {0, true};
   math::PixelState<float> pixel = math::empty_pixel<float>();
   Look look{0, false};

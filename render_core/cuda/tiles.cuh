@@ -27,35 +27,22 @@ struct TileFootprint {
   int first_row, last_row;
   FrameShape shape;
 
-  /// The columns that the outline reaches among the pixel centres of rows first_px…last_px, in px;
-  /// empty when low > high.
-  __device__ math::Interval<float> cut(float first_px, float last_px) const {
-    const auto columns = math::columns_in_band(outline, first_px - slack_px - centre_px.y,
-                                               last_px + slack_px - centre_px.y);
-    if (columns.low > columns.high) return columns;
-    return {columns.low + centre_px.x - slack_px, columns.high + centre_px.x + slack_px};
-  }
-
-  /// First and last of the columns of `width_px` px whose pixel centres meet `cut`, from px `from`
-  /// on and among `count`; empty when first > last.
-  __device__ static int2 reached(const math::Interval<float>& cut, float from_px, float width_px,
-                                 int count) {
-    if (cut.low > cut.high) return make_int2(0, -1);
-    const float first = ceilf((cut.low - from_px - (width_px - 0.5f)) / width_px);
-    const float last = floorf((cut.high - from_px - 0.5f) / width_px);
-    return make_int2(static_cast<int>(fmaxf(first, 0.0f)),
-                     static_cast<int>(fminf(last, static_cast<float>(count - 1))));
-  }
-
   /// First and last column of one tile row; empty when first > last. A tile counts when the
   /// rectangle of its pixel centres, within the picture, meets the outline.
   __device__ int2 columns(int row) const {
     constexpr float tile = tile_side_px;
     const float top = static_cast<float>(row) * tile + 0.5f;
     const float bottom = fminf(top + (tile - 1.0f), static_cast<float>(shape.height_px) - 0.5f);
-    const auto columns = cut(top, bottom);
-    if (columns.low > static_cast<float>(shape.width_px) - 0.5f) return make_int2(0, -1);
-    return reached(columns, 0.0f, tile, shape.tiles_x);
+    const auto cut = math::columns_in_band(outline, top - slack_px - centre_px.y,
+                                           bottom + slack_px - centre_px.y);
+    const float low = cut.low + centre_px.x - slack_px;
+    const float high = cut.high + centre_px.x + slack_px;
+    if (cut.low > cut.high || low > static_cast<float>(shape.width_px) - 0.5f)
+      return make_int2(0, -1);
+    const float first = ceilf((low - (tile - 0.5f)) * (1.0f / tile));
+    const float last = floorf((high - 0.5f) * (1.0f / tile));
+    return make_int2(static_cast<int>(fmaxf(first, 0.0f)),
+                     static_cast<int>(fminf(last, static_cast<float>(shape.tiles_x - 1))));
   }
 
   /// The blocks of a tile that the outline reaches: TileEntry::blocks.

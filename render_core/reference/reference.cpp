@@ -189,8 +189,7 @@ class ReferenceRenderer final : public Renderer {
   std::size_t scene_bytes() const override { return cloud_->bytes(); }
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     if (keeps_caches(settings.pipeline)) {
-      throw InputError("--pipeline catgs", "", "the reference keeps no caches",
-                       "use --pipeline exact");
+      throw InputError("--pipeline", "", "the reference keeps no caches", "use --pipeline exact");
     }
     return std::make_unique<ReferenceView>(cloud_, pool_, settings);
   }

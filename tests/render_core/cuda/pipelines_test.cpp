@@ -1,4 +1,4 @@
-// What the CUDA core's catgs leaves out; needs a device.
+// The CUDA core's catgs leaves out what is hidden, and nothing else; needs a device.
 
 #include "tests/render_core/cuda/device.h"
 

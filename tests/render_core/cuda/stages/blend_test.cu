@@ -193,7 +193,7 @@ TEST_F(BlendStage, IsTheCpuCoresButForTheRestOfARound) {
   }
 }
 
-// What lies behind the end of a part shows nowhere in it.
+// Splats behind the end of a part show nowhere in it.
 TEST_F(BlendStage, PartsEndBehindWhatShows) {
   const Finish early{.transmittance = 0.05f, .fills = false};
   std::vector<std::uint32_t> reached;
