@@ -7,35 +7,34 @@
 namespace catgs::cuda {
 namespace {
 
-constexpr int block_size = 256;
+constexpr int block_size = 512;
 constexpr int warps = block_size / warp_size;
 
-/// List entries that a block of the emit kernel writes. Blocks share the lists evenly, whatever a
-/// splat's size, and write them in order.
-constexpr std::uint32_t window_size = 2048;
-
 // Every splat of a window has its first entry in it, except one that began before.
-constexpr std::uint32_t most_splats = window_size + 1;
+constexpr std::uint32_t most_splats = list_window + 1;
 
-template <class Tile>
+/// List entries while they are made: their tile's row << 16 | column, and their splat's slot.
 struct Window {
   std::uint32_t begin, end;  // list entries
-  Tile tile[window_size];
-  std::uint32_t slot[window_size];
+  std::uint32_t place[list_window];
+  std::uint32_t slot[list_window];
 
   /// Writes a row's entries from `at` on, as far as they are before `last` and in the window.
   /// Returns the first entry of the next row.
-  __device__ std::uint32_t put_row(std::uint32_t first_tile, int2 columns, std::uint32_t splat,
-                                   std::uint32_t at, std::uint32_t last) {
+  __device__ std::uint32_t put_row(int row, int2 columns, std::uint32_t splat, std::uint32_t at,
+                                   std::uint32_t last) {
     const std::uint32_t stop = min(last, end);
     for (int column = columns.x; column <= columns.y; ++column, ++at) {
       if (at < begin || at >= stop) continue;
-      tile[at - begin] = static_cast<Tile>(first_tile + static_cast<std::uint32_t>(column));
+      place[at - begin] = static_cast<std::uint32_t>(row << 16 | column);
       slot[at - begin] = splat;
     }
     return at;
   }
 };
+
+/// In place of an entry that no splat wrote.
+constexpr std::uint32_t nowhere = ~0u;
 
 /// The first k in [0, count) whose entries begin after `at`. Found by one warp with 32 probes at a
 /// time.
@@ -71,7 +70,7 @@ __device__ std::uint32_t entries_end(const EmitParams<Tile>& p, std::uint32_t sl
 /// All lanes write one splat. Rows stay in order, so that the list is the same as if a single lane
 /// wrote it.
 template <class Tile, class Outline>
-__device__ void emit_together(const EmitParams<Tile>& p, Window<Tile>& window,
+__device__ void emit_together(const EmitParams<Tile>& p, Window& window,
                               const TileFootprint<Outline>& f, std::uint32_t slot,
                               std::uint32_t at) {
   const std::uint32_t last = entries_end(p, slot, at);
@@ -81,14 +80,13 @@ __device__ void emit_together(const EmitParams<Tile>& p, Window<Tile>& window,
     const int2 columns = row <= f.last_row ? f.columns(row) : make_int2(0, -1);
     const std::uint32_t count = static_cast<std::uint32_t>(max(0, columns.y - columns.x + 1));
     const WarpSums<std::uint32_t> counts = warp_sums(count);
-    window.put_row(static_cast<std::uint32_t>(row * p.shape.tiles_x), columns, slot,
-                   at + counts.before, last);
+    window.put_row(row, columns, slot, at + counts.before, last);
     at += counts.all;
   }
 }
 
 template <class Tile>
-__device__ void emit_large(const EmitParams<Tile>& p, Window<Tile>& window, std::uint32_t slot,
+__device__ void emit_large(const EmitParams<Tile>& p, Window& window, std::uint32_t slot,
                            std::uint32_t at) {
   const SplatRecord& r = p.records[slot];
   if (p.path != nullptr) {
@@ -117,29 +115,29 @@ __device__ std::uint32_t hidden_blocks(const float* part_limit, float depth) {
 
 /// TileEntry::blocks of a splat in a tile, without blocks where it is hidden.
 template <class Tile>
-__device__ std::uint32_t blocks_of_entry(const EmitParams<Tile>& p, std::uint32_t tile,
-                                         std::uint32_t slot) {
-  const int column = static_cast<int>(tile) % p.shape.tiles_x;
-  const int row = static_cast<int>(tile) / p.shape.tiles_x;
+__device__ std::uint32_t blocks_of_entry(const EmitParams<Tile>& p, int column, int row,
+                                         std::uint32_t tile, std::uint32_t slot) {
   const SplatRecord& r = p.records[slot];
   const std::uint32_t blocks =
-      p.path != nullptr
-          ? make_footprint(r.centre_px, p.path[slot], p.shape).blocks(column, row)
-          : make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape).blocks(column, row);
-  if (p.part_limit == nullptr) return blocks;
-  return blocks &
-         ~hidden_blocks(&p.part_limit[std::size_t{tile} * parts_per_tile], p.splat_depth[slot]);
+      p.path != nullptr ? make_footprint(r.centre_px, p.path[slot], p.shape).blocks(column, row)
+                        : blocks_of(r.centre_px, r.whitening, r.log2_opacity, column, row);
+  if (p.occlusion.part == nullptr) return blocks;
+  const float depth = p.splat_depth[slot];
+  if (!(depth > p.occlusion.tile[tile].x)) return blocks;
+  return blocks & ~hidden_blocks(&p.occlusion.part[std::size_t{tile} * parts_per_tile], depth);
 }
 
 template <class Tile>
 __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile> p) {
-  __shared__ Window<Tile> window;
+  extern __shared__ std::uint32_t dynamic[];
+  std::uint32_t* large = dynamic;                  // [most_splats], places in the order
+  std::uint32_t* in_tile = dynamic + most_splats;  // [counted], the window's entries in each tile
+  __shared__ Window window;
   __shared__ std::uint32_t splats[2];  // in depth order: range of splats in the window
-  __shared__ std::uint32_t large[most_splats];
   __shared__ std::uint32_t large_count;
   const std::uint32_t thread = threadIdx.x;
-  const std::uint32_t begin = blockIdx.x * window_size;
-  const std::uint32_t end = min(begin + window_size, p.shape.list_bound);
+  const std::uint32_t begin = blockIdx.x * list_window;
+  const std::uint32_t end = min(begin + list_window, p.shape.list_bound);
   const std::uint32_t visible = min(p.counts->visible, p.shape.visible_bound);
   if (begin >= p.counts->list_entries) return;
   if (thread / warp_size < 2) {
@@ -149,10 +147,9 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
     if (thread % warp_size == 0)
       splats[thread / warp_size] = thread < warp_size ? max(beyond, 1u) - 1 : beyond;
   }
-  for (std::uint32_t j = thread; j < window_size; j += block_size) {
-    window.tile[j] = static_cast<Tile>(p.shape.tiles());  // padding, if no splat writes it
-    window.slot[j] = 0;
-  }
+  for (std::uint32_t j = thread; j < list_window; j += block_size) window.place[j] = nowhere;
+  const std::uint32_t counted = p.in_window != nullptr ? p.shape.tiles() : 0;
+  for (std::uint32_t t = thread; t < counted; t += block_size) in_tile[t] = 0;
   if (thread == 0) {
     window.begin = begin;
     window.end = end;
@@ -167,13 +164,12 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
       if (p.tile_count[slot] > 0) large[atomicAdd(&large_count, 1u)] = k;
       continue;
     }
-    std::uint32_t first_tile =
-        spans.row() * static_cast<std::uint32_t>(p.shape.tiles_x) + spans.column();
 #pragma unroll
-    for (int j = 0; j < TileSpans::most_rows; ++j, first_tile += p.shape.tiles_x) {
+    for (int j = 0; j < TileSpans::most_rows; ++j) {
       if (j >= static_cast<int>(spans.rows())) break;
-      const int first = spans.first(j);
-      at = window.put_row(first_tile, make_int2(first, first + spans.count(j) - 1), slot, at, end);
+      const int first = static_cast<int>(spans.column()) + spans.first(j);
+      at = window.put_row(static_cast<int>(spans.row()) + j,
+                          make_int2(first, first + spans.count(j) - 1), slot, at, end);
     }
   }
   __syncthreads();
@@ -183,13 +179,22 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
   }
   __syncthreads();
   for (std::uint32_t at = begin + thread; at < end; at += block_size) {
-    Tile tile = window.tile[at - begin];
-    const std::uint32_t slot = window.slot[at - begin];
-    const std::uint32_t blocks = tile < p.shape.tiles() ? blocks_of_entry(p, tile, slot) : 0;
-    if (blocks == 0) tile = static_cast<Tile>(p.shape.tiles());
-    p.tile[at] = tile;
-    p.entry[at] = {slot, blocks};
+    const std::uint32_t place = window.place[at - begin], slot = window.slot[at - begin];
+    std::uint32_t tile = p.shape.tiles(), blocks = 0;
+    if (place != nowhere) {
+      const int column = static_cast<int>(place & 0xffffu), row = static_cast<int>(place >> 16);
+      tile = static_cast<std::uint32_t>(row * p.shape.tiles_x + column);
+      blocks = blocks_of_entry(p, column, row, tile, slot);
+    }
+    if (blocks == 0) tile = p.shape.tiles();  // padding
+    p.tile[at] = static_cast<Tile>(tile);
+    p.entry[at] = {blocks == 0 ? 0 : slot, blocks};
+    if (tile < counted) atomicAdd(&in_tile[tile], 1u);
   }
+  if (counted == 0) return;
+  __syncthreads();
+  for (std::uint32_t t = thread; t < counted; t += block_size)
+    p.in_window[std::size_t{blockIdx.x} * counted + t] = in_tile[t];
 }
 
 /// Four entries a thread.
@@ -218,7 +223,13 @@ __global__ void __launch_bounds__(block_size) ranges_kernel(const RangesParams<T
 
 template <class Tile>
 void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream) {
-  emit_kernel<<<blocks_for(params.shape.list_bound, window_size), block_size, 0, stream>>>(params);
+  const std::uint32_t counted = params.in_window != nullptr ? params.shape.tiles() : 0;
+  const std::size_t shared_bytes = (most_splats + counted) * sizeof(std::uint32_t);
+  check(cudaFuncSetAttribute(emit_kernel<Tile>, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                             static_cast<int>(shared_bytes)),
+        "emit");
+  emit_kernel<<<blocks_for(params.shape.list_bound, list_window), block_size, shared_bytes,
+                stream>>>(params);
   check_launch("emit");
 }
 

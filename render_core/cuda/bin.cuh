@@ -1,6 +1,8 @@
 #pragma once
 
 #include "render_core/cuda/frame_arrays.cuh"
+#include "render_core/cuda/occlusion.cuh"
+#include "render_core/cuda/tile_sort.cuh"
 #include "render_core/cuda/tiles.cuh"
 
 namespace catgs::cuda {
@@ -19,10 +21,11 @@ struct EmitParams {
   const std::uint32_t* tile_count;  // [visible_bound], by slot
   const TileSpans* spans;           // [visible_bound], by slot
   const SplatPath* path;            // [visible_bound], by slot; null: splats do not move
-  const float* part_limit;          // Occlusion::part; null: nothing is hidden
-  const float* splat_depth;         // [visible_bound], by slot; for part_limit
-  Tile* tile;                       // [list_bound], tile index; shape.tiles() means no tile
-  TileEntry* entry;                 // [list_bound]
+  Occlusion occlusion;
+  const float* splat_depth;  // [visible_bound], by slot; for occlusion
+  std::uint32_t* in_window;  // TileSortParams::in_window; null: not wanted
+  Tile* tile;                // [list_bound], tile index; shape.tiles() means no tile
+  TileEntry* entry;          // [list_bound]
 };
 template <class Tile>
 void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream);

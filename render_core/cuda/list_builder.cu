@@ -7,6 +7,7 @@
 #include "render_core/cuda/cull.cuh"
 #include "render_core/cuda/list_builder.cuh"
 #include "render_core/cuda/project.cuh"
+#include "render_core/cuda/tile_sort.cuh"
 
 namespace catgs::cuda {
 namespace {
@@ -107,15 +108,26 @@ void ListBuilder::emit_as(const ListRequest& request, const FrameShape& shape,
                      .tile_count = m.tile_count.get(),
                      .spans = m.spans.get(),
                      .path = request.sweeps ? m.path.get() : nullptr,
-                     .part_limit = request.occlusion.part,
+                     .occlusion = request.occlusion,
                      .splat_depth = m.splat_depth.get(),
+                     .in_window = sorts_in_one_pass(shape) ? m.in_window.get() : nullptr,
                      .tile = reinterpret_cast<Tile*>(m.tile.get()),
                      .entry = m.other_entries.get()},
                     stream);
 }
 
 void ListBuilder::sort_by_tile(const FrameShape& shape, cudaStream_t stream) {
-  if (is_narrow(shape)) {
+  const ViewMemory& m = memory_;
+  if (sorts_in_one_pass(shape)) {
+    launch_tile_sort({.shape = shape,
+                      .counts = m.counts.get(),
+                      .tile = reinterpret_cast<const std::uint16_t*>(m.tile.get()),
+                      .unsorted = m.other_entries.get(),
+                      .in_window = m.in_window.get(),
+                      .entry = m.entries.get(),
+                      .range = m.range.get()},
+                     stream);
+  } else if (is_narrow(shape)) {
     sort_as<std::uint16_t>(shape, stream);
   } else {
     sort_as<std::uint32_t>(shape, stream);

@@ -21,9 +21,9 @@ struct ListRequest {
 };
 
 /// The stages that make the lists of Gaussians per tile, in order, in the memory of a View. All
-/// throw CudaError. They only launch work, except that each of the two sorts first waits for a
-/// count of an earlier stage. Meanwhile the device works on the stage after that one. `shape` is
-/// the same in all stages of a frame.
+/// throw CudaError. They only launch work, except that CUB's sorts first wait for a count of an
+/// earlier stage. Meanwhile the device works on the stage after that one. `shape` is the same in
+/// all stages of a frame.
 class ListBuilder {
  public:
   ListBuilder(const SceneArrays& scene, ViewMemory& memory, int processors)

@@ -80,10 +80,13 @@ __global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionPa
                      static_cast<float>(corner.y) + 0.5f * part_side_px);
   p.part[at] = limit;
   static_assert(warp_size % parts_per_tile == 0);
+  float2 of_tile = make_float2(limit, limit);
 #pragma unroll
-  for (int step = parts_per_tile / 2; step > 0; step /= 2)
-    limit = fmaxf(limit, __shfl_xor_sync(__activemask(), limit, step));
-  if (part == 0) p.tile[tile] = limit;
+  for (int step = parts_per_tile / 2; step > 0; step /= 2) {
+    of_tile.x = fminf(of_tile.x, __shfl_xor_sync(__activemask(), of_tile.x, step));
+    of_tile.y = fmaxf(of_tile.y, __shfl_xor_sync(__activemask(), of_tile.y, step));
+  }
+  if (part == 0) p.tile[tile] = of_tile;
 }
 
 }  // namespace

@@ -8,8 +8,8 @@ namespace catgs::cuda {
 /// The depths behind which nothing shows, expected from the View's last frame. Splats behind them
 /// are not drawn.
 struct Occlusion {
-  const float* part = nullptr;  // [tiles][parts_per_tile], view depth; null: nothing is hidden
-  const float* tile = nullptr;  // [tiles], the largest of a tile
+  const float* part = nullptr;   // [tiles][parts_per_tile], view depth; null: nothing is hidden
+  const float2* tile = nullptr;  // [tiles], the smallest and the largest of a tile
 
   /// Whether a splat with this box, px in the picture, is behind the limits of all parts it meets.
   __device__ bool hides(const FrameShape& shape, float2 low_px, float2 high_px, float depth) const;
@@ -25,7 +25,7 @@ struct OcclusionParams {
   int radius;              // parts around the place
   const float* last_ends;  // [tiles][parts_per_tile]
   float* part;             // likewise, Occlusion::part
-  float* tile;             // [tiles], Occlusion::tile
+  float2* tile;            // [tiles], Occlusion::tile
 };
 void launch_occlusion(const OcclusionParams& params, cudaStream_t stream);
 
@@ -52,7 +52,7 @@ __device__ inline bool Occlusion::hides(const FrameShape& shape, float2 low_px, 
   if (parts_x > most_tiles * parts_across || parts_y > most_tiles * parts_across) return false;
   for (int y = top / tile_side_px; y <= bottom / tile_side_px; ++y)
     for (int x = left / tile_side_px; x <= right / tile_side_px; ++x)
-      if (!(depth > tile[y * shape.tiles_x + x])) return false;
+      if (!(depth > tile[y * shape.tiles_x + x].y)) return false;
   return true;
 }
 

@@ -115,6 +115,38 @@ __device__ inline TileFootprint<math::Trail<float>> make_footprint(
   return f;
 }
 
+/// TileEntry::blocks of a splat in its present place. Cuts it into columns of blocks, which a tile
+/// has fewer of than rows.
+__device__ inline std::uint32_t blocks_of(float2 centre_px, const math::Whitening<float>& w,
+                                          float log2_opacity, int column, int row) {
+  constexpr float width = block_width_px, height = block_height_px, slack = listing_slack_px;
+  const float reach = math::reach_of(log2_opacity);
+  if (reach < 0.0f) return 0;
+  const math::Ellipse<float> turned = math::make_transposed_ellipse(w, reach);
+  const float half_width = math::half_extent(w, reach).x + slack;
+  const float left = static_cast<float>(column * tile_side_px) - centre_px.x;
+  const float top = static_cast<float>(row * tile_side_px) - centre_px.y;
+  const int first = max(__float2int_rd((-half_width - left) * (1.0f / width)), 0);
+  const int last = min(__float2int_rd((half_width - left) * (1.0f / width)), blocks_across - 1);
+  std::uint32_t blocks = 0;
+  for (int k = first; k <= last; ++k) {
+    const float x = left + static_cast<float>(k) * width + 0.5f;
+    const auto cut = math::columns_in_band(turned, x - slack, x + (width - 1.0f) + slack);
+    // Row j is reached if its last pixel centre is not above the cut, and its first one not below.
+    const int low =
+        max(__float2int_ru((cut.low - top - slack - (height - 0.5f)) * (1.0f / height)), 0);
+    const int high =
+        min(__float2int_rd((cut.high - top + slack - 0.5f) * (1.0f / height)), blocks_down - 1);
+    if (cut.low > cut.high || low > high) continue;
+    constexpr std::uint32_t every_row = 0x11111111u;
+    static_assert(blocks_across == 4 && blocks_down == 8);
+    const std::uint32_t rows = (every_row << (blocks_across * low)) &
+                               (every_row >> (blocks_across * (blocks_down - 1 - high)));
+    blocks |= rows << k;
+  }
+  return blocks;
+}
+
 /// The tiles of a small splat, row by row. Most splats are small, so their tiles are kept between
 /// counting and listing.
 struct TileSpans {

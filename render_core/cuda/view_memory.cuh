@@ -6,6 +6,7 @@
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/memory_table.h"
 #include "render_core/cuda/split.cuh"
+#include "render_core/cuda/tile_sort.cuh"
 #include "render_core/cuda/tiles.cuh"
 #include "render_core/renderer.h"
 
@@ -73,16 +74,18 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<U32> order{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> other_order{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> tile{this, Life::frame, [](S s) { return s.shape.list_bound; }};
-  DeviceRow<U32> other_tile{this, Life::frame, [](S s) { return s.shape.list_bound; }};
+  DeviceRow<U32> other_tile{
+      this, Life::frame, [](S s) { return sorts_in_one_pass(s.shape) ? 0 : s.shape.list_bound; }};
   DeviceRow<TileEntry> other_entries{this, Life::frame, [](S s) { return s.shape.list_bound; }};
+  DeviceRow<U32> in_window{this, Life::frame, [](S s) { return window_tiles(s.shape); }};
   DeviceRow<std::byte> scratch{this, Life::frame, [](S s) { return s.scratch_bytes(); }};
   PinnedRow<HostCounts> list_counts{this, Life::frame, [](S) { return 1; }};
 
   // Where the parts of the last frame ended, and what follows from that: see Occlusion.
   DeviceRow<float> part_ends{this, Life::view, [](S s) { return s.part_limits(); }};
   DeviceRow<float> part_limit{this, Life::frame, [](S s) { return s.part_limits(); }};
-  DeviceRow<float> tile_limit{this, Life::frame,
-                              [](S s) { return s.occludes() ? s.shape.tile_bound : 0; }};
+  DeviceRow<float2> tile_limit{this, Life::frame,
+                               [](S s) { return s.occludes() ? s.shape.tile_bound : 0; }};
 
   // Tasks of the blend.
   DeviceRow<U32> reach{this, Life::view, [](S s) { return s.shape.tile_bound; }};

@@ -112,6 +112,18 @@ CATGS_HD_INLINE Ellipse<T> make_ellipse(const Whitening<T>& w, T reach, T half_e
   return {w, reach + T(1e-4) + T(3e-6) * w.xx * half_extent_x, T(1.0) / w.xx, rightmost};
 }
 
+/// The ellipse with its axes exchanged, for cuts into bands of columns: columns_in_band() of the
+/// result gives rows. `reach` as in make_ellipse().
+template <class T>
+CATGS_HD_INLINE Ellipse<T> make_transposed_ellipse(const Whitening<T>& w, T reach) {
+  const T root = sqrt(reach);
+  const T xx = sqrt(mul_add(w.xy, w.xy, w.yy * w.yy));
+  const T scale = w.xx / xx;
+  const T half_height = root / w.yy;
+  return make_ellipse<T>({xx, w.xy * scale, w.yy * scale}, reach, half_height,
+                         -w.xy * half_height / w.xx);
+}
+
 template <class T, class S>
 CATGS_HD_INLINE Ellipse<T> convert(const Ellipse<S>& e) {
   return {{T(e.w.xx), T(e.w.xy), T(e.w.yy)}, T(e.reach), T(e.inverse_xx), T(e.rightmost_y)};

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "render_core/cuda/bin.cuh"
+#include "render_core/cuda/tile_sort.cuh"
 #include "render_core/math/ellipse-inl.h"
 #include "tests/render_core/cuda/stages/stage.h"
 
@@ -42,7 +43,7 @@ TEST_F(SortStage, OrdersSplatsByDepthAsAStableSort) {
   const FrameShape shape{.tiles_x = 4, .tiles_y = 4, .visible_bound = count, .list_bound = 1};
   // Few depths, so that many are equal; their lowest bits say nothing.
   Numbers keys = random_numbers(count, 5000, 1);
-  for (std::uint32_t& key : keys) key = key << depth_bits_below | key % 16;
+  for (std::uint32_t& key : keys) key = key << depth_bits_below | key % (1u << depth_bits_below);
   keys[7] = most_depth_key;
   const auto key = upload(keys), other_key = upload(keys);
   const auto slot = upload(counting(count)), other_slot = upload(Numbers(count));
@@ -89,35 +90,19 @@ TEST_F(SortStage, SumsTileCountsInDepthOrder) {
   }
 }
 
-template <class Tile>
-void expect_sorted_by_tile(glm::ivec2 tiles, cudaStream_t stream) {
-  constexpr std::uint32_t count = 50'000;
-  const FrameShape shape{
-      .tiles_x = tiles.x, .tiles_y = tiles.y, .visible_bound = 1, .list_bound = count};
-  const Numbers numbers = random_numbers(count, shape.tiles() + 1, 4);  // the last: padding
-  const std::vector<Tile> tile_of(numbers.begin(), numbers.end());
-  const auto key = upload(tile_of), other_key = upload(tile_of);
-  std::vector<TileEntry> entries;
-  for (std::uint32_t i = 0; i < count; ++i) entries.push_back({i, ~i});
-  const auto entry = upload(entries), other_entry = upload(entries);
-  const auto range = upload(std::vector<uint2>(shape.tiles(), make_uint2(1, 2)));
-  const auto scratch = scratch_for(shape);
-  PingPong<Tile> tile{.current = key.get(), .other = other_key.get()};
-  PingPong<TileEntry> sorted{.current = entry.get(), .other = other_entry.get()};
-  sort_by_tile(shape, count, tile, sorted, {.memory = scratch.get(), .bytes = scratch.bytes()},
-               stream);
-  launch_ranges<Tile>(
-      {.shape = shape, .entries = count, .tile = tile.current, .range = range.get()}, stream);
-  Numbers expected = counting(count);
+/// Compares the lists of `tiles` tiles with a stable sort of random entries: entry i has tile
+/// numbers[i], slot i and blocks ~i, and numbers of `tiles` mean no tile.
+void expect_lists(const Numbers& numbers, std::uint32_t tiles, const std::vector<TileEntry>& drawn,
+                  const std::vector<uint2>& ranges) {
+  Numbers expected = counting(numbers.size());
+  std::erase_if(expected, [&](std::uint32_t i) { return numbers[i] >= tiles; });
   std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return numbers[i]; });
-  const std::vector<TileEntry> drawn = fetch(sorted.current, count);
   Mismatches places("sort: places in order of tiles", 0.0);
-  for (std::uint32_t k = 0; k < count; ++k)
+  for (std::size_t k = 0; k < expected.size(); ++k)
     places.add(drawn[k].slot != expected[k] || drawn[k].blocks != ~expected[k]);
 
-  const std::vector<uint2> ranges = fetch(range.get(), shape.tiles());
   Mismatches found("ranges: of tiles", 0.0);
-  for (std::uint32_t t = 0; t < shape.tiles(); ++t) {
+  for (std::uint32_t t = 0; t < tiles; ++t) {
     const auto same = [&](std::uint32_t i) { return numbers[i]; };
     const auto of_tile = std::ranges::equal_range(expected, t, {}, same);
     const auto first = static_cast<std::uint32_t>(of_tile.begin() - expected.begin());
@@ -127,11 +112,83 @@ void expect_sorted_by_tile(glm::ivec2 tiles, cudaStream_t stream) {
   }
 }
 
+std::vector<TileEntry> numbered_entries(std::uint32_t count) {
+  std::vector<TileEntry> entries;
+  for (std::uint32_t i = 0; i < count; ++i) entries.push_back({i, ~i});
+  return entries;
+}
+
+template <class Tile>
+void expect_sorted_by_tile(glm::ivec2 tiles, cudaStream_t stream) {
+  constexpr std::uint32_t count = 50'000;
+  const FrameShape shape{
+      .tiles_x = tiles.x, .tiles_y = tiles.y, .visible_bound = 1, .list_bound = count};
+  const Numbers numbers = random_numbers(count, shape.tiles() + 1, 4);  // the last: padding
+  const std::vector<Tile> tile_of(numbers.begin(), numbers.end());
+  const auto key = upload(tile_of), other_key = upload(tile_of);
+  const auto entry = upload(numbered_entries(count)), other_entry = upload(numbered_entries(count));
+  const auto range = upload(std::vector<uint2>(shape.tiles(), make_uint2(1, 2)));
+  const auto scratch = scratch_for(shape);
+  PingPong<Tile> tile{.current = key.get(), .other = other_key.get()};
+  PingPong<TileEntry> sorted{.current = entry.get(), .other = other_entry.get()};
+  sort_by_tile(shape, count, tile, sorted, {.memory = scratch.get(), .bytes = scratch.bytes()},
+               stream);
+  launch_ranges<Tile>(
+      {.shape = shape, .entries = count, .tile = tile.current, .range = range.get()}, stream);
+  expect_lists(numbers, shape.tiles(), fetch(sorted.current, count),
+               fetch(range.get(), shape.tiles()));
+}
+
 TEST_F(SortStage, OrdersEntriesByTileAsAStableSortAndFindsTheirRanges) {
   const Stream stream;
   expect_sorted_by_tile<std::uint16_t>({40, 25}, stream.get());
   expect_sorted_by_tile<std::uint16_t>({255, 257}, stream.get());  // 65,535: all bits
   expect_sorted_by_tile<std::uint32_t>({300, 250}, stream.get());
+}
+
+/// The number of entries of each window in each tile.
+Numbers count_windows(const std::vector<std::uint16_t>& tile_of, std::uint32_t tiles) {
+  Numbers in_window((tile_of.size() + list_window - 1) / list_window * tiles);
+  for (std::size_t i = 0; i < tile_of.size(); ++i)
+    if (tile_of[i] < tiles) ++in_window[i / list_window * tiles + tile_of[i]];
+  return in_window;
+}
+
+TEST_F(SortStage, OrdersEntriesByTileInOnePass) {
+  constexpr std::uint32_t count = 300'000, room = count + 2 * list_window;
+  const Stream stream;
+  for (const glm::ivec2 tiles : {glm::ivec2(60, 34), glm::ivec2(64, 64), glm::ivec2(1, 1)}) {
+    const FrameShape shape{.tiles_x = tiles.x,
+                           .tiles_y = tiles.y,
+                           .tile_bound = static_cast<std::uint32_t>(tiles.x * tiles.y),
+                           .visible_bound = 1,
+                           .list_bound = room};
+    ASSERT_TRUE(sorts_in_one_pass(shape));
+    // Half of the entries crowd in few tiles; the largest number means no tile.
+    Numbers numbers = random_numbers(count, shape.tiles() + 1, 5);
+    for (std::uint32_t i = 0; i < count; i += 2) numbers[i] %= 7;
+    const std::vector<std::uint16_t> tile_of(numbers.begin(), numbers.end());
+    Numbers in_window = count_windows(tile_of, shape.tiles());
+    in_window.resize(window_tiles(shape));
+    const auto counted = upload(in_window);
+    FrameCounts counts;
+    counts.list_entries = count;
+    const auto frame = upload(std::vector<FrameCounts>{counts});
+    const auto tile = upload(tile_of);
+    const auto unsorted = upload(numbered_entries(count));
+    const auto sorted = upload(std::vector<TileEntry>(count));
+    const auto range = upload(std::vector<uint2>(shape.tiles(), make_uint2(1, 2)));
+    launch_tile_sort({.shape = shape,
+                      .counts = frame.get(),
+                      .tile = tile.get(),
+                      .unsorted = unsorted.get(),
+                      .in_window = counted.get(),
+                      .entry = sorted.get(),
+                      .range = range.get()},
+                     stream.get());
+    expect_lists(numbers, shape.tiles(), fetch(sorted.get(), count),
+                 fetch(range.get(), shape.tiles()));
+  }
 }
 
 using Entry = std::pair<std::uint32_t, std::uint32_t>;  // tile, index in the cloud
@@ -194,6 +251,8 @@ TEST_P(EmitStage, ListsWhatTheCpuCoreListsAndMissesNoPixel) {
   const auto tiles =
       fetch(reinterpret_cast<const std::uint16_t*>(m.tile.get()), counts.list_entries);
   const auto entries = fetch(m.other_entries.get(), counts.list_entries);
+  const Numbers in_window = count_windows(tiles, lists.shape().tiles());
+  EXPECT_EQ(fetch(m.in_window.get(), in_window.size()), in_window);
 
   std::set<Entry> listed;
   std::map<Entry, std::uint32_t> blocks;  // by tile and slot

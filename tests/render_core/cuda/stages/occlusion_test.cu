@@ -1,6 +1,7 @@
 // Limits of depth from the last frame's ends, against what they mean.
 
 #include <cmath>
+#include <span>
 
 #include "render_core/cuda/occlusion.cuh"
 #include "tests/render_core/cuda/stages/stage.h"
@@ -25,16 +26,16 @@ class OcclusionStage : public StageTest {
                                     y % parts_across * parts_across + x % parts_across);
   }
 
-  /// The limits by parts, and the largest of each tile.
+  /// The limits by parts, and the smallest and the largest of each tile.
   std::vector<float> limits(const std::vector<float>& ends, const Pose& now, const Pose& last,
-                            int radius, std::vector<float>& of_tiles) const {
+                            int radius, std::vector<float2>& of_tiles) const {
     const std::size_t parts = std::size_t{shape_.tiles()} * parts_per_tile;
     const auto camera = [](const Pose& pose) {
       return make_camera_pair(make_camera(pose, size_px, 150.0f)).single;
     };
     const auto last_ends = upload(ends);
     const auto part = upload(std::vector<float>(parts, -1.0f));
-    const auto tile = upload(std::vector<float>(shape_.tiles(), -1.0f));
+    const auto tile = upload(std::vector<float2>(shape_.tiles(), make_float2(-1.0f, -1.0f)));
     const Stream stream;
     launch_occlusion({.shape = shape_,
                       .now = camera(now),
@@ -57,7 +58,8 @@ class OcclusionStage : public StageTest {
 };
 
 TEST_F(OcclusionStage, AStillCameraKeepsTheDeepestEndAround) {
-  std::vector<float> ends = even(4.0f), of_tiles;
+  std::vector<float> ends = even(4.0f);
+  std::vector<float2> of_tiles;
   ends[place(7, 5)] = 9.0f;
   ends[place(20, 12)] = unknown;
   const std::vector<float> found = limits(ends, Pose{}, Pose{}, 1, of_tiles);
@@ -76,10 +78,9 @@ TEST_F(OcclusionStage, AStillCameraKeepsTheDeepestEndAround) {
     }
   }
   for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
-    float most = 0.0f;
-    for (unsigned part = 0; part < parts_per_tile; ++part)
-      most = std::max(most, found[t * parts_per_tile + part]);
-    EXPECT_EQ(of_tiles[t], most) << t;
+    const auto of_tile = std::span(found).subspan(t * parts_per_tile, parts_per_tile);
+    EXPECT_EQ(of_tiles[t].x, std::ranges::min(of_tile)) << t;
+    EXPECT_EQ(of_tiles[t].y, std::ranges::max(of_tile)) << t;
   }
 }
 
@@ -89,7 +90,7 @@ TEST_F(OcclusionStage, LimitsAreNeverBeforeTheSurfaceTheyComeFrom) {
   for (const catgs::test::Move& move : catgs::test::moves()) {
     SCOPED_TRACE(move.name);
     const Pose last{}, now = catgs::test::moved(last, move);
-    std::vector<float> of_tiles;
+    std::vector<float2> of_tiles;
     const std::vector<float> found =
         limits(even(static_cast<float>(depth)), now, last, 1, of_tiles);
     std::size_t known = 0;
@@ -114,7 +115,7 @@ TEST_F(OcclusionStage, LimitsAreNeverBeforeTheSurfaceTheyComeFrom) {
 TEST_F(OcclusionStage, WhatTheLastPictureDidNotShowIsNotLimited) {
   const Pose last{};
   const Pose now = catgs::test::moved(last, {"yaw", {0, 0, 0}, {0, 0.4f, 0}});
-  std::vector<float> of_tiles;
+  std::vector<float2> of_tiles;
   const std::vector<float> found = limits(even(5.0f), now, last, 1, of_tiles);
   for (int y = 0; y < parts_y; ++y) {
     EXPECT_EQ(found[place(parts_x - 1, y)], unknown);  // at the side that the camera turns to
