@@ -47,11 +47,4 @@ std::optional<Pose> CameraForecast::at(std::int64_t time_us) const {
   return predictor_.at(time_us);
 }
 
-std::optional<Forecast> CameraForecast::forecast(std::int64_t now_us, double rate_hz,
-                                                 int frames) const {
-  const auto end_us = now_us + std::llround(frames * 1e6 / rate_hz);
-  if (on_path(now_us) && on_path(end_us)) return Forecast{interpolate(path_, end_us), frames};
-  return predictor_.forecast(now_us, rate_hz, frames);
-}
-
 }  // namespace catgs

@@ -22,8 +22,8 @@ class CameraTrack {
     newest_ = sample;
     forecast_.add({sample.client_time_us, sample.world_from_camera});
     aim_ = sample;
-    aim_time_us_ = sample.client_time_us + ahead.count();
-    if (const auto then = forecast_.at(aim_time_us_)) aim_.world_from_camera = *then;
+    if (const auto then = forecast_.at(sample.client_time_us + ahead.count()))
+      aim_.world_from_camera = *then;
     return true;
   }
   void follow(const PosePath& path) { forecast_.follow(path); }
@@ -38,16 +38,11 @@ class CameraTrack {
   [[nodiscard]] const PoseSample& aim() const { return aim_; }
   /// Aims at the newest pose itself, because the camera stands still.
   void aim_at_newest() { aim_ = *newest_; }
-  /// The forecast from the aim on; see MotionPredictor.
-  [[nodiscard]] std::optional<Forecast> forecast(double rate_hz, int frames) const {
-    return forecast_.forecast(aim_time_us_, rate_hz, frames);
-  }
 
  private:
   CameraForecast forecast_;
   std::optional<PoseSample> newest_;
   PoseSample aim_;
-  std::int64_t aim_time_us_ = 0;
 };
 
 }  // namespace catgs

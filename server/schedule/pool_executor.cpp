@@ -8,13 +8,6 @@
 namespace catgs {
 namespace {
 
-/// Requests pictures in the encoder's format, with lists shared across frames where that pays.
-ViewSettings view_settings() {
-  ViewSettings settings{Pipeline::catgs, PixelFormat::i420};
-  settings.speculation.cost_aware = true;
-  return settings;
-}
-
 bool lost(RenderStatus::Code code) { return code == RenderStatus::Code::device_failed; }
 
 StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFactory& encoders) {
@@ -22,7 +15,7 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
   try {
     if (!stream.view || stream.settings.renderer != settings.renderer) {
       stream.view.reset();  // its memory first: two views of a large scene may not fit
-      stream.view = settings.renderer->make_view(view_settings());
+      stream.view = settings.renderer->make_view({Pipeline::catgs, PixelFormat::i420});
     }
   } catch (const DeviceError& error) {
     opened.message = error.what();

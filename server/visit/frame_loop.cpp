@@ -93,8 +93,7 @@ std::optional<FrameCandidate> FrameLoop::next(const IdrPolicy& idr, bool still_s
 void FrameLoop::start(FrameOrder& order, TimePoint now) {
   assert(track_.newest());
   FrameTicket& ticket = order.ticket;
-  // A still is a key frame of the pose itself. A sub-frame may lack a little at tile edges, and a
-  // forecast overshoots a camera that stops.
+  // A still shows the pose itself. A forecast overshoots a camera that stops.
   ticket.refined = ticket.still && !order.force_idr && !view_has_changed() && !shown_is_passing_;
   if (ticket.still) track_.aim_at_newest();
   const PoseSample& aim = track_.aim();
@@ -112,8 +111,6 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   order.request.camera = make_camera(aim.world_from_camera, ticket.size_px,
                                      focal_from_fov_y(aim.fov_y_rad, ticket.size_px.y), near_z_);
   order.request.background = background_;
-  if (!ticket.still)
-    order.request.forecast = track_.forecast(order.real_fps, SpeculationSettings{}.initial_window);
 }
 
 void FrameLoop::limit(FrameOrder& order, TimePoint now) {

@@ -195,34 +195,6 @@ TEST_F(FrameLoopTest, AFrameThatFailedIsDrawnAgain) {
   EXPECT_TRUE(is_due());
 }
 
-// Samples of the client's clock, 1/60 s apart, 0.1 further along x each.
-TEST_F(FrameLoopTest, ForecastsFromPastPosesAlone) {
-  const auto walk = [&](std::uint64_t id) {
-    PoseSample walked = sample(id, 0.1f * static_cast<float>(id));
-    walked.client_time_us = static_cast<std::int64_t>(id) * 16'667;
-    loop.pose_arrived(walked, now);
-    return run();
-  };
-  EXPECT_FALSE(walk(1).request.forecast) << "nothing is known of the motion";
-  FrameOrder order;
-  for (std::uint64_t id = 2; id <= 30; ++id) {
-    now += 17ms;
-    order = walk(id);
-  }
-  ASSERT_TRUE(order.request.forecast);
-  const Forecast& forecast = *order.request.forecast;
-  EXPECT_EQ(forecast.frames, SpeculationSettings{}.initial_window);
-  // As far in so many frames of the rate that is reached as it came in as many samples.
-  const float step =
-      (forecast.world_from_camera.position.x - order.request.camera.world_from_camera.position.x) /
-      static_cast<float>(forecast.frames);
-  EXPECT_NEAR(step * static_cast<float>(order.real_fps), 0.1f * 60.0f, 0.1f);
-
-  loop.enter_scene(SceneFacts());
-  EXPECT_FALSE(has_next()) << "a pose of the old scene shows nothing of the new one";
-  EXPECT_FALSE(walk(31).request.forecast) << "elsewhere";
-}
-
 TEST_F(FrameLoopTest, TheClientsClockMayJump) {
   constexpr std::int64_t hour_us = 3'600'000'000;
   for (const std::int64_t jump_us : {std::int64_t{0}, -hour_us, 2 * hour_us, -100 * hour_us}) {
