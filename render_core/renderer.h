@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,13 +29,13 @@ enum class Pipeline {
   vanilla,  // the original 3DGS: 3-sigma boxes, 64-bit (tile | depth) key sort, nothing kept
   exact,    // exact ellipse/tile culling; the same image as the reference
   paper,    // CaT-GS as published: key frames (same image as `exact`), then sub-frames
-  // The server's. CUDA core: `exact` without what the last frame shows to be hidden. CPU core: key
-  // frames and sub-frames whose tiles turn with the camera.
+  // The server's: `exact` without what the last frame shows to be hidden. A pixel is finished at
+  // least_shown.
   catgs,
 };
 
-/// Whether a pipeline uses what earlier frames of its View left.
-constexpr bool keeps_caches(Pipeline pipeline) {
+/// Whether a pipeline may show colours of an earlier frame.
+constexpr bool keeps_colours(Pipeline pipeline) {
   return pipeline == Pipeline::paper || pipeline == Pipeline::catgs;
 }
 
@@ -55,13 +54,6 @@ inline constexpr std::size_t stage_count = 5;
 inline constexpr std::array<std::string_view, stage_count> stage_names = {"project", "bin", "sort",
                                                                           "blend", "convert"};
 
-/// The depths by which sub-frames blend. The caches fix which Gaussians a tile blends, not their
-/// order.
-enum class BlendOrder {
-  fresh,  // those of the frame itself
-  key,    // those of the key frame, as in the paper: cheaper, but wrong once the view has turned
-};
-
 struct FrameStats {
   FrameKind kind = FrameKind::key;
   std::uint32_t visible = 0;             // Gaussians that passed culling
@@ -70,25 +62,20 @@ struct FrameStats {
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::uint64_t tasks = 0;               // parts into which the tiles were cut for the blend
-  // Pipeline::catgs
+  // Pipeline::paper
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
-  // Over visible Gaussians deeper than speculation_min_depth(): see SceneDepths.
+  // Over visible Gaussians deeper than speculation_min_depth().
   float nearest_depth = 0;       // world units
   float mean_inverse_depth = 0;  // 1 / world units
-  // Times of the drawing that succeeded. A drawing repeated for lack of room, or because a watched
-  // Gaussian came into view, is not counted.
+  // Times of the drawing that succeeded. A drawing repeated for lack of room is not counted.
   std::array<float, stage_count> stage_ms{};
-
-  [[nodiscard]] float total_ms() const {
-    return std::accumulate(stage_ms.begin(), stage_ms.end(), 0.0f);
-  }
 };
 
 struct FrameRequest {
   Camera camera;
   glm::vec3 background{0.0f};
-  std::optional<Forecast> forecast{};  // Pipeline::catgs; without it no sub-frame follows
+  std::optional<Forecast> forecast{};  // Pipeline::paper; without it no sub-frame follows
 };
 
 struct Plane {
@@ -118,11 +105,10 @@ struct ViewSettings {
   PixelFormat format = PixelFormat::rgb_f32;
   MemorySpace space = MemorySpace::host;  // of rgb_f32; device: it stays on the device
   std::uint64_t max_list_entries = std::uint64_t{64} << 20;  // bounds the memory of tile lists
-  bool count_pairs = false;              // fill FrameStats::blended_pairs; slower
-  SpeculationSettings speculation{};     // Pipeline::catgs
-  BlendOrder order = BlendOrder::fresh;  // Pipeline::catgs
-  bool colour_cache = true;              // Pipeline::catgs: reuse colours while accurate
-  bool split_tasks = true;               // CUDA core: long tiles are blended in several parts
+  bool count_pairs = false;           // fill FrameStats::blended_pairs; slower
+  SpeculationSettings speculation{};  // Pipeline::paper
+  bool colour_cache = true;           // CPU core, catgs and paper: reuse colours while accurate
+  bool split_tasks = true;            // CUDA core: long tiles are blended in several parts
 };
 
 /// The check that every core makes first: sizes, focal length, near plane and pose must be in

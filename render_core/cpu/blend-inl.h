@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
+#include <type_traits>
 
 #include <hwy/cache_control.h>
 
@@ -99,85 +101,147 @@ HWY_INLINE void find_hits(const Batch& batch, Vec2<float> offset, Hits& hits) {
   hits.splats = cull ? hits.splats & all : all;
 }
 
-/// Blends the hits over a block. Returns the number of pairs if `count_pairs`. `finished` tells
-/// whether all pixels are finished.
-template <bool count_pairs>
-HWY_INLINE std::uint64_t blend_hits(const Batch& batch, const Hits& hits, BlockPixels& pixels,
-                                    bool& finished) {
-  constexpr int registers = block_px / lanes;
-  RunningPixel<Floats> pixel[registers];
-  for (int k = 0; k < registers; ++k) pixel[k] = begin_run(pixels.load(k * lanes));
-  std::uint64_t pairs = 0;
-  finished = false;
-  for (std::uint64_t left = hits.splats; left != 0 && !finished; left &= left - 1) {
+/// A block's pixels in registers, for as long as a batch is blended.
+template <bool fills>
+struct BlockRun {
+  static constexpr int registers = block_px / lanes;
+  std::conditional_t<fills, PixelState<Floats>, RunningPixel<Floats>> pixel[registers];
+
+  HWY_INLINE explicit BlockRun(const BlockPixels& pixels) {
+    for (int k = 0; k < registers; ++k) {
+      if constexpr (fills) {
+        pixel[k] = pixels.load(k * lanes);
+      } else {
+        pixel[k] = begin_run(pixels.load(k * lanes));
+      }
+    }
+  }
+  /// Returns which pixels of a register are not finished.
+  HWY_INLINE FloatMask add(int k, const Floats& exponent, const Vec3<Floats>& colour) {
+    if constexpr (fills) {
+      return blend_on(pixel[k], exponent, colour);
+    } else {
+      return blend(pixel[k], exponent, colour);
+    }
+  }
+  HWY_INLINE void store(BlockPixels& pixels) const {
+    for (int k = 0; k < registers; ++k) {
+      if constexpr (fills) {
+        pixels.store(k * lanes, pixel[k]);
+      } else {
+        pixels.store(k * lanes, end_run(pixel[k]));
+      }
+    }
+  }
+};
+
+/// Blends the hits over a block until all its pixels are finished. Returns the splat that finished
+/// them, or null. Adds the pairs to `pairs` if they are counted.
+template <bool fills, bool count_pairs>
+HWY_INLINE const Splat* blend_hits(const Batch& batch, const Hits& hits, BlockPixels& pixels,
+                                   std::uint64_t& pairs) {
+  BlockRun<fills> run(pixels);
+  const Splat* last = nullptr;
+  for (std::uint64_t left = hits.splats; left != 0 && last == nullptr; left &= left - 1) {
     const int i = std::countr_zero(left);
     const Splat& s = *batch.splats[i];
     const Floats start_u(hits.u[i]), start_v(hits.v[i]), log2_opacity(s.log2_opacity);
     const Floats xx(s.whitening_xx), xy(s.whitening_xy), yy(s.whitening_yy);
     const Vec3<Floats> colour{Floats(s.red), Floats(s.green), Floats(s.blue)};
-    finished = true;
-    for (int k = 0; k < registers; ++k) {
+    bool finished = true;
+    for (int k = 0; k < block_px / lanes; ++k) {
       const Floats x = Floats::load(columns_in_block + k * lanes);
       const Floats y = Floats::load(rows_in_block + k * lanes);
       const Floats u = mul_add(xx, x, mul_add(xy, y, start_u)), v = mul_add(yy, y, start_v);
       const Floats exponent = neg_mul_add(u, u, neg_mul_add(v, v, log2_opacity));
-      const auto live = blend(pixel[k], exponent, colour);
+      const FloatMask live = run.add(k, exponent, colour);
       finished &= none(live);
       if constexpr (count_pairs) pairs += std::popcount(bits(live & contributes(exponent)));
     }
+    if (finished) last = &s;
   }
-  for (int k = 0; k < registers; ++k) pixels.store(k * lanes, end_run(pixel[k]));
+  run.store(pixels);
+  return last;
+}
+
+/// First pixel of block `b` in its tile, row by row.
+constexpr glm::ivec2 block_corner_px(int b) {
+  return block_side_px * glm::ivec2(b % parts_across, b / parts_across);
+}
+static_assert(part_side_px == block_side_px, "a part is a block");
+
+/// The pixels of a tile.
+struct TilePixels {
+  BlockPixels blocks[blocks_per_tile];
+  float ends[blocks_per_tile];  // depth of the splat that finished a block; infinity: none did
+  std::uint32_t inside;         // blocks that meet the image, a bit each
+};
+
+/// Blends the list over the blocks inside the image. Returns the pairs if they are counted.
+template <bool cull, bool fills, bool count_pairs>
+std::uint64_t blend_list(const BlendTask& task, TilePixels& pixels) {
+  const Vec2<float> first{static_cast<float>(task.first_px.x) + 0.5f,
+                          static_cast<float>(task.first_px.y) + 0.5f};
+  std::uint32_t live_blocks = pixels.inside;
+  std::uint64_t pairs = 0;
+  Batch batch;
+  Hits hits;
+  for (std::size_t at = 0; at < task.list.size() && live_blocks != 0; at += batch.count) {
+    load(task, task.list.subspan(at), first, batch);
+    for (std::uint32_t left = live_blocks; left != 0; left &= left - 1) {
+      const int block = std::countr_zero(left);
+      const glm::ivec2 corner = block_corner_px(block);
+      find_hits<cull>(batch, {static_cast<float>(corner.x), static_cast<float>(corner.y)}, hits);
+      const Splat* last = blend_hits<fills, count_pairs>(batch, hits, pixels.blocks[block], pairs);
+      if (last == nullptr) continue;
+      pixels.ends[block] = last->depth;
+      live_blocks &= ~(1u << block);
+    }
+  }
   return pairs;
 }
 
-template <bool cull, bool count_pairs>
-BlendResult blend_list(const BlendTask& task, BlockPixels* pixels) {
-  const PixelBlock origin = task.blocks[0];
-  const Vec2<float> first{static_cast<float>(origin.x) + 0.5f, static_cast<float>(origin.y) + 0.5f};
-  std::uint32_t live_blocks =
-      static_cast<std::uint32_t>((std::uint64_t{1} << task.blocks.size()) - 1);
-  BlendResult result;
-  Batch batch;
-  Hits hits;
-  while (result.looked_at < task.list.size() && live_blocks != 0) {
-    load(task, task.list.subspan(result.looked_at), first, batch);
-    result.looked_at += batch.count;
-    for (std::uint32_t left = live_blocks; left != 0; left &= left - 1) {
-      const int block = std::countr_zero(left);
-      find_hits<cull>(batch,
-                      {static_cast<float>(task.blocks[block].x - origin.x),
-                       static_cast<float>(task.blocks[block].y - origin.y)},
-                      hits);
-      bool finished = false;
-      result.pairs += blend_hits<count_pairs>(batch, hits, pixels[block], finished);
-      if (finished) live_blocks &= ~(1u << block);
-    }
+inline void note_ends(const TilePixels& pixels, const PartEnds& ends) {
+  for (std::uint32_t left = pixels.inside; left != 0; left &= left - 1) {
+    const int b = std::countr_zero(left);
+    ends.first[b / parts_across * ends.stride + b % parts_across] = pixels.ends[b];
   }
-  result.finished = live_blocks == 0;
-  return result;
 }
 
-inline BlendResult blend_blocks(const BlendTask& task) {
-  BlockPixels pixels[max_task_blocks];
-  for (std::size_t i = 0; i < task.blocks.size(); ++i)
-    clear(pixels[i], task.blocks[i], task.image->size_px());
-  BlendResult result;
-  if (task.count_pairs) {
-    result = task.cull_blocks ? blend_list<true, true>(task, pixels)
-                              : blend_list<false, true>(task, pixels);
-  } else {
-    result = task.cull_blocks ? blend_list<true, false>(task, pixels)
-                              : blend_list<false, false>(task, pixels);
+inline std::uint64_t blend_tile(const BlendTask& task) {
+  TilePixels pixels;
+  const glm::ivec2 size_px = task.image->size_px();
+  pixels.inside = 0;
+  for (int b = 0; b < blocks_per_tile; ++b) {
+    const glm::ivec2 first = task.first_px + block_corner_px(b);
+    pixels.ends[b] = std::numeric_limits<float>::infinity();
+    if (first.x >= size_px.x || first.y >= size_px.y) continue;
+    pixels.inside |= 1u << b;
+    clear(pixels.blocks[b], size_px - first);
   }
-  for (std::size_t i = 0; i < task.blocks.size(); ++i) {
-    resolve_block(pixels[i], task.background);
+  std::uint64_t pairs = 0;
+  if (task.fills) {
+    pairs = task.count_pairs ? blend_list<true, true, true>(task, pixels)
+                             : blend_list<true, true, false>(task, pixels);
+  } else if (task.cull_blocks) {
+    pairs = task.count_pairs ? blend_list<true, false, true>(task, pixels)
+                             : blend_list<true, false, false>(task, pixels);
+  } else {
+    pairs = task.count_pairs ? blend_list<false, false, true>(task, pixels)
+                             : blend_list<false, false, false>(task, pixels);
+  }
+  for (std::uint32_t left = pixels.inside; left != 0; left &= left - 1) {
+    const int b = std::countr_zero(left);
+    const glm::ivec2 first = task.first_px + block_corner_px(b);
+    resolve_block(pixels.blocks[b], task.background, task.fills);
     if (task.image->format() == PixelFormat::rgb_f32) {
-      write_rgb(pixels[i], task.blocks[i], *task.image);
+      write_rgb(pixels.blocks[b], first, *task.image);
     } else {
-      write_i420(pixels[i], task.blocks[i], *task.image);
+      write_i420(pixels.blocks[b], first, *task.image);
     }
   }
-  return result;
+  if (task.ends.first != nullptr) note_ends(pixels, task.ends);
+  return pairs;
 }
 
 }  // namespace HWY_NAMESPACE

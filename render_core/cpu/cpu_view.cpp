@@ -22,6 +22,7 @@ class StageClock {
         std::chrono::duration<float, std::milli>(now - last_).count();
     last_ = now;
   }
+  void restart() { last_ = std::chrono::steady_clock::now(); }
 
  private:
   FrameStats& stats_;
@@ -37,35 +38,38 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
     : scene_(std::move(scene)), settings_(settings), driver_(settings) {
-  if (keeps_caches(settings.pipeline) && settings.colour_cache)
+  if (keeps_colours(settings.pipeline) && settings.colour_cache)
     colours_.emplace(scene_->store.clusters().size());
 }
 
 RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noexcept {
   return driver_.render(
       request, frame, [&](const FramePlan& plan) { return draw(request, plan); },
-      [&] { reach_.forget(); });
+      [&] { occlusion_.forget(); });
 }
 
-FrameView CpuView::draw(const FrameRequest& request, FramePlan plan) {
+FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
   const Camera& camera = request.camera;
-  if (keeps_caches(settings_.pipeline)) widen_for_blocks(plan, settings_.speculation.grid);
-  image_.resize(settings_.format, camera.size_px);
+  const bool occludes = settings_.pipeline == Pipeline::catgs;
   FrameStats stats;
-  grid_ = plan.grid;
-  blocks_.place(camera.size_px, plan);
-  if (keeps_caches(settings_.pipeline)) reach_.begin(plan);
-  if (settings_.pipeline == Pipeline::vanilla) {
-    draw_boxes(camera, plan, stats);
-  } else if (plan.kind == FrameKind::key) {
-    draw_key_lists(camera, plan, stats);
-  } else {
-    draw_sub_lists(camera, stats);
-  }
   StageClock clock(stats);
+  image_.resize(settings_.format, camera.size_px);
+  tiles_ = (camera.size_px + (tile_size_px - 1)) / tile_size_px;
+  if (occludes) occlusion_.begin(camera, mean_inverse_depth_, scene_->kernels, *scene_->pool);
+  clock.end(Stage::project);
+  if (settings_.pipeline == Pipeline::vanilla) {
+    draw_boxes(camera, stats);
+  } else if (plan.kind == FrameKind::key) {
+    draw_lists(camera, plan, stats);
+  } else {
+    draw_cached_lists(camera, stats);
+  }
+  clock.restart();
   stats.blended_pairs = blend(request);
   clock.end(Stage::blend);
+  if (occludes) occlusion_.finish();
   summarise(stats);
+  mean_inverse_depth_ = stats.mean_inverse_depth;
   return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats};
 }
 
@@ -88,20 +92,21 @@ void CpuView::summarise(FrameStats& stats) const {
   stats.overflowed_entries = lists_.overflowed_entries();
 }
 
-void CpuView::draw_boxes(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
+void CpuView::draw_boxes(const Camera& camera, FrameStats& stats) {
   StageClock clock(stats);
+  const FramePlan plan{.window_end = camera};
   cull_clusters(camera, plan);
   project(camera, plan, [](std::size_t, std::size_t) {});
   clock.end(Stage::project);
-  lists_.build_by_keys(table(plan), grid_.tiles, settings_.max_list_entries, *scene_->pool);
+  lists_.build_by_keys(table(plan), tiles_, settings_.max_list_entries, *scene_->pool);
   clock.end(Stage::sort);
 }
 
 /// Makes the lists for `camera`, and with a window for all cameras on the way to its end.
-void CpuView::draw_key_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
+void CpuView::draw_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
   StageClock clock(stats);
   cull_clusters(camera, plan);
-  lists_.begin(grid_.tiles, segments(), settings_.max_list_entries);
+  lists_.begin(tiles_, segments(), settings_.max_list_entries);
   // Listed while the splats are in cache. Reading them again would cost as much as the listing.
   project(camera, plan, [&](std::size_t segment, std::size_t rank) {
     lists_.add(segment, table(plan).of_cluster(rank), scene_->kernels);
@@ -109,50 +114,24 @@ void CpuView::draw_key_lists(const Camera& camera, const FramePlan& plan, FrameS
   clock.end(Stage::project);
   lists_.finish(table(plan), scene_->kernels, *scene_->pool);
   clock.end(Stage::bin);
-  if (keeps_caches(settings_.pipeline)) {
-    sort_seen_lists(
-        [&](std::size_t tile) { lists_.sort_front(tile, reach_.of_tile(tile), splats_); });
-  } else {
-    lists_.sort(splats_, *scene_->pool);
-  }
+  lists_.sort(splats_, *scene_->pool);
   clock.end(Stage::sort);
 }
 
-/// Calls sort(tile) for all tiles that have pixels in the image.
-template <class Sort>
-void CpuView::sort_seen_lists(const Sort& sort) {
-  constexpr std::size_t tiles_per_task = 16;
-  const std::size_t tiles = lists_.tiles();
-  scene_->pool->parallel_for((tiles + tiles_per_task - 1) / tiles_per_task, [&](std::size_t task) {
-    const std::size_t end = std::min(tiles, (task + 1) * tiles_per_task);
-    for (std::size_t tile = task * tiles_per_task; tile < end; ++tile)
-      if (!blocks_.of_tile(tile).empty()) sort(tile);
-  });
-}
-
-void CpuView::draw_sub_lists(const Camera& camera, FrameStats& stats) {
+/// Refreshes the splats of the key frame's lists, which keep their order.
+void CpuView::draw_cached_lists(const Camera& camera, FrameStats& stats) {
   StageClock clock(stats);
-  grow(depths_, splats_.size());
   const std::size_t ranks = clusters_.size(), shares = segments();
   const float min_depth = speculation_min_depth(settings_.speculation, camera.near_z);
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
-      const std::size_t first = rank * cluster_size;
       if (counts_[rank] == 0) continue;
       summaries_[rank] = scene_->kernels.refresh_cluster(
-          {&scene_->store, &camera, clusters_[rank], &members_[rank], splats_.data() + first,
-           depths_.data() + first, min_depth, colours_of(clusters_[rank], camera)});
+          {&scene_->store, &camera, clusters_[rank], &members_[rank],
+           splats_.data() + rank * cluster_size, min_depth, colours_of(clusters_[rank], camera)});
     }
   });
   clock.end(Stage::project);
-  sort_seen_lists([&](std::size_t tile) {
-    if (settings_.order == BlendOrder::key) {
-      lists_.sort_front(tile, reach_.of_tile(tile), splats_);
-    } else {
-      lists_.sort_front_again(tile, reach_.of_tile(tile), splats_, depths_);
-    }
-  });
-  clock.end(Stage::sort);
 }
 
 void CpuView::cull_clusters(const Camera& camera, const FramePlan& plan) {
@@ -161,7 +140,8 @@ void CpuView::cull_clusters(const Camera& camera, const FramePlan& plan) {
   const bool cull = settings_.pipeline != Pipeline::vanilla;
   clusters_.clear();
   for (std::size_t c = 0; c < clusters.size(); ++c) {
-    if (!cull || !culler.outside(clusters[c])) clusters_.push_back(static_cast<std::uint32_t>(c));
+    if (cull && (culler.outside(clusters[c]) || occlusion_.hides(clusters[c]))) continue;
+    clusters_.push_back(static_cast<std::uint32_t>(c));
   }
 }
 
@@ -174,7 +154,7 @@ std::size_t CpuView::segments() const {
 }
 
 SplatTable CpuView::table(const FramePlan& plan) const {
-  return {splats_, plan.window > 0 ? paths_.data() : nullptr, counts_, plan.grid.first_px};
+  return {splats_, plan.window > 0 ? paths_.data() : nullptr, counts_, occlusion_.limits()};
 }
 
 ClusterColours CpuView::colours_of(std::uint32_t cluster, const Camera& camera) {
@@ -193,18 +173,25 @@ void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& d
   if (sweeps) grow(members_, ranks);
   summaries_.resize(ranks);
   counts_.resize(ranks);
-  const Pipeline culling = sweeps                                    ? Pipeline::catgs
-                           : settings_.pipeline == Pipeline::vanilla ? Pipeline::vanilla
-                                                                     : Pipeline::exact;
+  // A key frame of the paper without a window is an exact frame.
+  const bool is_exact = settings_.pipeline == Pipeline::paper && !sweeps;
   const float min_depth = speculation_min_depth(settings_.speculation, camera.near_z);
   const std::size_t shares = segments();
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;
       summaries_[rank] = scene_->kernels.project_cluster(
-          {&scene_->store, &camera, &plan, culling, clusters_[rank], splats_.data() + first,
-           min_depth, colours_of(clusters_[rank], camera), sweeps ? paths_.data() + first : nullptr,
-           sweeps ? &members_[rank] : nullptr});
+          {.scene = &scene_->store,
+           .camera = &camera,
+           .pipeline = is_exact ? Pipeline::exact : settings_.pipeline,
+           .cluster = clusters_[rank],
+           .splats = splats_.data() + first,
+           .min_depth = min_depth,
+           .limits = occlusion_.limits(),
+           .colours = colours_of(clusters_[rank], camera),
+           .window_end = &plan.window_end,
+           .paths = sweeps ? paths_.data() + first : nullptr,
+           .members = sweeps ? &members_[rank] : nullptr});
       counts_[rank] = summaries_[rank].visible;
       done(share, rank);
     }
@@ -212,58 +199,39 @@ void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& d
 }
 
 std::uint64_t CpuView::blend(const FrameRequest& request) {
+  const bool fills = settings_.pipeline == Pipeline::catgs;
   std::atomic<std::uint64_t> pairs{0};
   const std::span<const std::uint32_t> tiles = lists_.tiles_by_length();
   scene_->pool->parallel_for(tiles.size(), [&](std::size_t i) {
-    const std::uint32_t tile = tiles[i];
-    if (blocks_.of_tile(tile).empty()) return;
-    BlendResult result = blend_tile(request, tile);
-    if (!result.finished && lists_.front(tile).size() < lists_.list(tile).size()) {
-      lists_.sort_rest(tile, splats_);
-      result = blend_tile(request, tile);
-    }
-    if (keeps_caches(settings_.pipeline))
-      reach_.set(
-          tile, result.finished ? lists_.list(tile)[result.looked_at - 1].key : TileReach::unknown);
-    if (settings_.count_pairs) pairs += result.pairs;
+    const auto index = static_cast<int>(tiles[i]);
+    const glm::ivec2 tile(index % tiles_.x, index / tiles_.x);
+    const std::uint64_t blended =
+        scene_->kernels.blend_tile({.splats = splats_.data(),
+                                    .list = lists_.list(tiles[i]),
+                                    .first_px = tile * tile_size_px,
+                                    .background = request.background,
+                                    .cull_blocks = settings_.pipeline != Pipeline::vanilla,
+                                    .fills = fills,
+                                    .count_pairs = settings_.count_pairs,
+                                    .image = &image_,
+                                    .ends = fills ? occlusion_.ends_of_tile(tile) : PartEnds{}});
+    if (settings_.count_pairs) pairs += blended;
   });
   return pairs;
 }
 
-/// Blends the ordered part of a tile's list.
-BlendResult CpuView::blend_tile(const FrameRequest& request, std::size_t tile) {
-  BlendResult sum{.finished = true};
-  for (std::span<const PixelBlock> blocks = blocks_.of_tile(tile); !blocks.empty();) {
-    const auto part = blocks.first(std::min<std::size_t>(blocks.size(), max_task_blocks));
-    const BlendResult result = scene_->kernels.blend_blocks(
-        {splats_.data(), lists_.front(tile), part, request.background,
-         settings_.pipeline != Pipeline::vanilla, settings_.count_pairs, &image_});
-    sum.pairs += result.pairs;
-    sum.looked_at = std::max(sum.looked_at, result.looked_at);
-    sum.finished = sum.finished && result.finished;
-    blocks = blocks.subspan(part.size());
-  }
-  return sum;
-}
-
 std::vector<std::uint32_t> CpuView::tile_loads() const {
   std::vector<std::uint32_t> loads;
-  const glm::ivec2 first = -grid_.first_px / tile_size_px;  // tile of the image's first pixel
-  const glm::ivec2 tiles = image_grid(image_.size_px()).tiles;
-  for (int y = first.y; y < first.y + tiles.y; ++y) {
-    for (int x = first.x; x < first.x + tiles.x; ++x) {
-      const auto tile = static_cast<std::size_t>(y * grid_.tiles.x + x);
-      loads.push_back(static_cast<std::uint32_t>(lists_.list(tile).size()));
-    }
-  }
+  for (std::size_t tile = 0; tile < lists_.tiles(); ++tile)
+    loads.push_back(static_cast<std::uint32_t>(lists_.list(tile).size()));
   return loads;
 }
 
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         blocks_.memory_bytes() + reach_.memory_bytes() + bytes(clusters_) + bytes(members_) +
-         bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_) + bytes(depths_);
+         occlusion_.memory_bytes() + bytes(clusters_) + bytes(members_) + bytes(summaries_) +
+         bytes(counts_) + bytes(splats_) + bytes(paths_);
 }
 
 }  // namespace catgs

@@ -8,10 +8,9 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/cpu/colour_cache.h"
 #include "render_core/cpu/kernels.h"
-#include "render_core/cpu/pixel_blocks.h"
+#include "render_core/cpu/occlusion.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
-#include "render_core/cpu/tile_reach.h"
 #include "render_core/frame_driver.h"
 #include "render_core/image/host_image.h"
 #include "render_core/motion/frame_groups.h"
@@ -26,9 +25,9 @@ struct CpuScene {
   SimdKernels kernels;
 };
 
-/// Buffers of a frame, kept for the next one. Those of a key frame are the caches of its
-/// sub-frames: the visible Gaussians (the frustum cache) and the list of each tile (the sort
-/// cache).
+/// Buffers of a frame, kept for the next one. In Pipeline::paper, those of a key frame are the
+/// caches of its sub-frames: the visible Gaussians (the frustum cache) and the list of each tile
+/// (the sort cache).
 class CpuView final : public View {
  public:
   CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings);
@@ -38,17 +37,14 @@ class CpuView final : public View {
   std::size_t memory_bytes() const override;
 
  private:
-  FrameView draw(const FrameRequest& request, FramePlan plan);
-  void draw_boxes(const Camera& camera, const FramePlan& plan, FrameStats& stats);
-  void draw_key_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats);
-  void draw_sub_lists(const Camera& camera, FrameStats& stats);
+  FrameView draw(const FrameRequest& request, const FramePlan& plan);
+  void draw_boxes(const Camera& camera, FrameStats& stats);
+  void draw_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats);
+  void draw_cached_lists(const Camera& camera, FrameStats& stats);
   void cull_clusters(const Camera& camera, const FramePlan& plan);
   template <class Done>
   void project(const Camera& camera, const FramePlan& plan, const Done& done);
-  template <class Sort>
-  void sort_seen_lists(const Sort& sort);
   std::uint64_t blend(const FrameRequest& request);
-  BlendResult blend_tile(const FrameRequest& request, std::size_t tile);
   void summarise(FrameStats& stats) const;
   [[nodiscard]] std::size_t segments() const;
   [[nodiscard]] SplatTable table(const FramePlan& plan) const;
@@ -57,7 +53,7 @@ class CpuView final : public View {
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
   FrameDriver driver_;
-  TileGrid grid_;  // of the lists
+  glm::ivec2 tiles_{0};  // of the picture
   HostImage image_;
   std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
   std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians
@@ -65,11 +61,10 @@ class CpuView final : public View {
   std::vector<std::uint32_t> counts_;      // [rank]: visible Gaussians
   std::vector<Splat> splats_;              // [slot], see SplatTable
   std::vector<SplatPath> paths_;           // [slot]
-  std::vector<std::uint32_t> depths_;      // [slot]: bits of a sub-frame's depths
   std::optional<ColourCache> colours_;
   TileLists lists_;
-  PixelBlocks blocks_;
-  TileReach reach_;
+  Occlusion occlusion_;              // Pipeline::catgs
+  float mean_inverse_depth_ = 0.0f;  // of the last frame
 };
 
 }  // namespace catgs

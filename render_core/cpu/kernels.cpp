@@ -32,6 +32,7 @@
 
 #include "render_core/cpu/bin-inl.h"
 #include "render_core/cpu/blend-inl.h"
+#include "render_core/cpu/limits-inl.h"
 #include "render_core/cpu/project-inl.h"
 
 #if HWY_ONCE
@@ -44,12 +45,12 @@ struct Target {
   SimdKernels kernels;
 };
 
-#define CATGS_TARGET(name)                                                               \
-  {                                                                                      \
-    HWY_##name, {                                                                        \
-#name, N_##name::project_cluster, N_##name::refresh_cluster, N_##name::list_tiles, \
-          N_##name::blend_blocks                                                         \
-    }                                                                                    \
+#define CATGS_TARGET(name)                                                                \
+  {                                                                                       \
+    HWY_##name, {                                                                         \
+#name, N_##name::find_limits, N_##name::project_cluster, N_##name::refresh_cluster, \
+          N_##name::list_tiles, N_##name::blend_tile                                      \
+    }                                                                                     \
   }
 
 const Target compiled_targets[] = {

@@ -10,6 +10,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "render_core/cpu/depth_limits.h"
 #include "render_core/cpu/list_sort.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/image/host_image.h"
@@ -26,7 +27,7 @@ struct alignas(64) Splat {
   float whitening_xx, whitening_xy;  // math::Whitening
   float whitening_yy, log2_opacity;
   float half_extent_x;  // px, of the ellipse alpha >= alpha_min
-  float growth_px;      // px that its outline is widened by for listing
+  float unused;
   float red, green, blue;
   float depth;  // world units along the view axis
   std::uint32_t original_index;
@@ -61,15 +62,17 @@ struct ClusterColours {
 struct ProjectTask {
   const SceneStore* scene;
   const Camera* camera;
-  const FramePlan* plan;  // what the lists have to cover
   // Defines which Gaussians are visible, and the tiles of a splat's box. vanilla: as in the
-  // original; exact: where the ellipse is; catgs: where the trail is until the window's end.
+  // original; exact and catgs: where the ellipse is; paper: where the trail is until the window's
+  // end.
   Pipeline pipeline;
   std::size_t cluster;
   Splat* splats;
-  float min_depth;  // world units; nearer Gaussians do not count in ClusterSummary
+  float min_depth;       // world units; nearer Gaussians do not count in ClusterSummary
+  DepthLimits limits{};  // Gaussians behind them are not visible
   ClusterColours colours{nullptr, nullptr};
-  // For catgs only.
+  // For paper only.
+  const Camera* window_end = nullptr;
   SplatPath* paths = nullptr;         // as splats
   ClusterMembers* members = nullptr;  // the visible ones
 };
@@ -81,8 +84,7 @@ struct RefreshTask {
   const Camera* camera;
   std::size_t cluster;
   const ClusterMembers* members;
-  Splat* splats;          // without the fields that only listing needs
-  std::uint32_t* depths;  // as splats: bits of depth
+  Splat* splats;  // without the fields that only listing needs
   float min_depth;
   ClusterColours colours;
 };
@@ -107,7 +109,7 @@ struct ListTask {
   std::span<const Splat> splats;
   const SplatPath* paths;  // as splats; null: ellipses are listed, not trails
   std::uint32_t first_slot;
-  glm::ivec2 first_px;  // of the grid
+  DepthLimits limits;  // tiles that a splat is behind do not list it
 };
 
 /// Pixels are blended in blocks of 4x4, which are culled as one: a register where that is wide
@@ -115,38 +117,43 @@ struct ListTask {
 inline constexpr int block_side_px = 4;
 inline constexpr int block_px = block_side_px * block_side_px;
 
-/// First pixel of a block, inside of the image; the others may lie outside.
-struct PixelBlock {
-  std::uint16_t x, y;
-};
+inline constexpr int blocks_per_tile = tile_size_px * tile_size_px / block_px;
 
-/// The largest number of blocks that one task blends; a tile has half as many.
-inline constexpr int max_task_blocks = 32;
-
-struct BlendResult {
-  std::uint64_t pairs = 0;    // (Gaussian, pixel) pairs blended, when counted
-  std::size_t looked_at = 0;  // leading entries of the list that were looked at
-  bool finished = false;      // no pixel would look at more entries
-};
-
-/// Blends a tile's list in some blocks and writes them to the image.
+/// Blends a tile's list and writes the tile's pixels to the image.
 struct BlendTask {
   const Splat* splats;
   std::span<const DepthSlot> list;  // front to back
-  std::span<const PixelBlock> blocks;
+  glm::ivec2 first_px;              // of the tile, in the image
   glm::vec3 background;
   bool cull_blocks;  // skip blocks that a splat's ellipse misses; same image
+  // A block is finished where all its pixels are below least_shown, and is then filled. Else each
+  // pixel is finished before transmittance_min.
+  bool fills;
   bool count_pairs;
   const HostImage* image;
+  PartEnds ends;  // of the tile, to be noted where it fills
+};
+
+/// Finds the limits of a row of parts: math::occlusion_limit().
+struct LimitTask {
+  const Camera* now;
+  const Camera* last;
+  const float* deepest;  // the deepest end around each part of the last picture, by rows
+  int stride;            // of these rows
+  glm::ivec2 parts;      // of both pictures: columns and rows
+  int row;
+  float* limits;  // [column]
 };
 
 /// The stages that are compiled once per instruction set.
 struct SimdKernels {
   std::string_view name;
+  void (*find_limits)(const LimitTask& task);
   ClusterSummary (*project_cluster)(const ProjectTask& task);
   ClusterSummary (*refresh_cluster)(const RefreshTask& task);
   void (*list_tiles)(const ListTask& task, std::vector<TileRun>& runs);  // appends
-  BlendResult (*blend_blocks)(const BlendTask& task);
+  /// Returns the (Gaussian, pixel) pairs blended, when counted.
+  std::uint64_t (*blend_tile)(const BlendTask& task);
 };
 
 /// Kernels for instruction sets that this processor has, best first; the last is "SCALAR".

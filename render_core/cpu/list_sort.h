@@ -66,24 +66,4 @@ void sort_list(std::span<DepthSlot> data, std::span<DepthSlot> scratch, const Be
   }
 }
 
-/// sort_list() for lists that are nearly in order: by insertion as long as that is cheaper.
-template <class Before>
-void sort_list_again(std::span<DepthSlot> data, std::span<DepthSlot> scratch,
-                     const Before& before) {
-  // In moves, measured. An element out of place costs a mispredicted branch; sorting anew costs as
-  // much as 8 moves per element. The head start keeps the first few elements from deciding.
-  constexpr std::size_t misprediction = 24, sorting_anew = 8, head_start = 512;
-  const auto in_order = in_order_of(before);
-  std::size_t spent = 0;
-  for (std::size_t i = 1; i < data.size(); ++i) {
-    const DepthSlot e = data[i];
-    if (!in_order(e, data[i - 1])) continue;
-    std::size_t at = i;
-    for (; at > 0 && in_order(e, data[at - 1]); --at) data[at] = data[at - 1];
-    data[at] = e;
-    spent += misprediction + (i - at);
-    if (spent > sorting_anew * i + head_start) return sort_list(data, scratch, before);
-  }
-}
-
 }  // namespace catgs

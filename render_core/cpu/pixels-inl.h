@@ -44,24 +44,24 @@ struct alignas(64) BlockPixels {
   }
 };
 
-/// Empty pixels; those outside of an image of this size are finished from the start.
-inline void clear(BlockPixels& pixels, const PixelBlock& block, glm::ivec2 size_px) {
-  const Floats width(static_cast<float>(size_px.x - block.x));
-  const Floats height(static_cast<float>(size_px.y - block.y));
+/// Empty pixels; those beyond the first `inside_px` columns and rows are finished from the start.
+inline void clear(BlockPixels& pixels, glm::ivec2 inside_px) {
+  const Floats width(static_cast<float>(inside_px.x)), height(static_cast<float>(inside_px.y));
   for (int at = 0; at < block_px; at += lanes) {
     PixelState<Floats> pixel = empty_pixel<Floats>();
     const auto inside =
         (Floats::load(columns_in_block + at) < width) & (Floats::load(rows_in_block + at) < height);
-    pixel.transmittance = select(inside, pixel.transmittance, -pixel.transmittance);
+    pixel.transmittance = select(inside, pixel.transmittance, Floats(0.0));
     pixels.store(at, pixel);
   }
 }
 
 /// Resolves a block over the background in place.
-inline void resolve_block(BlockPixels& pixels, const glm::vec3& background) {
+inline void resolve_block(BlockPixels& pixels, const glm::vec3& background, bool fills) {
   const Vec3<Floats> behind{Floats(background.x), Floats(background.y), Floats(background.z)};
   for (int at = 0; at < block_px; at += lanes) {
     PixelState<Floats> pixel = pixels.load(at);
+    if (fills) pixel = filled(pixel);
     pixel.colour = resolve(pixel, behind);
     pixels.store(at, pixel);
   }
@@ -82,13 +82,12 @@ HWY_INLINE void copy_rows(const T* rows, glm::ivec2 inside_px, std::size_t per_p
   }
 }
 
-inline void write_rgb(const BlockPixels& pixels, const PixelBlock& block, const HostImage& image) {
+inline void write_rgb(const BlockPixels& pixels, glm::ivec2 origin_px, const HostImage& image) {
   const hn::ScalableTag<float> d;
   alignas(64) float rgb[3 * block_px];
   for (int at = 0; at < block_px; at += lanes)
     hn::StoreInterleaved3(hn::Load(d, pixels.red + at), hn::Load(d, pixels.green + at),
                           hn::Load(d, pixels.blue + at), d, rgb + 3 * at);
-  const glm::ivec2 origin_px(block.x, block.y);
   const glm::ivec2 inside_px = glm::min(image.size_px() - origin_px, block_side_px);
   copy_rows<3 * block_side_px>(
       rgb, inside_px, 3, [&](int y) { return image.rgb_row(origin_px.y + y) + 3 * origin_px.x; });
@@ -111,7 +110,7 @@ HWY_INLINE void average_2x2(const float* block, float* out) {
   }
 }
 
-inline void write_i420(const BlockPixels& pixels, const PixelBlock& block, const HostImage& image) {
+inline void write_i420(const BlockPixels& pixels, glm::ivec2 origin_px, const HostImage& image) {
   constexpr int samples = block_px / 4, samples_across = block_side_px / 2;
   using L = Lanes<hn::CappedTag<float, samples>>;
   std::uint8_t luma[block_px], chroma[2][samples];
@@ -127,7 +126,6 @@ inline void write_i420(const BlockPixels& pixels, const PixelBlock& block, const
     store_codes(codes.x, chroma[0] + at);
     store_codes(codes.y, chroma[1] + at);
   }
-  const glm::ivec2 origin_px(block.x, block.y);
   const glm::ivec2 inside_px = glm::min(image.size_px() - origin_px, block_side_px);
   copy_rows<block_side_px>(luma, inside_px, 1,
                            [&](int y) { return image.byte_row(0, origin_px.y + y) + origin_px.x; });

@@ -183,7 +183,7 @@ struct SplatLook {
 
 /// The fields that listing needs in addition.
 struct SplatBox {
-  Floats half_extent_x, growth_px;
+  Floats half_extent_x;
   TileRange columns, rows;
   Floats rightmost_y;
 };
@@ -192,7 +192,7 @@ struct SplatBox {
 HWY_INLINE SplatBox no_box() {
   const Floats zero(0.0);
   const FloatMask nowhere = zero < zero;
-  return {zero, zero, {zero, zero, nowhere}, {zero, zero, nowhere}, zero};
+  return {zero, {zero, zero, nowhere}, {zero, zero, nowhere}, zero};
 }
 
 /// Makes splats that are not in front of the near plane draw nothing, at a depth that can be
@@ -207,7 +207,7 @@ HWY_INLINE void write_splats(const SplatLook& s, const SplatBox& box, std::uint3
                              Splat* out) {
   alignas(64) float splats[16 * Floats::count];
   interleave({s.centre_px.x, s.centre_px.y, s.w.xx, s.w.xy, s.w.yy, s.log2_opacity,
-              box.half_extent_x, box.growth_px, s.colour.x, s.colour.y, s.colour.z, s.depth,
+              box.half_extent_x, Floats(0.0), s.colour.x, s.colour.y, s.colour.z, s.depth,
               s.original_index, pack_pair(box.columns.low, box.rows.low),
               pack_pair(box.columns.end, box.rows.end), box.rightmost_y},
              splats);

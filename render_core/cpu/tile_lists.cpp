@@ -28,22 +28,6 @@ std::span<DepthSlot> scratch_of(std::size_t size) {
   return std::span(scratch).first(size);
 }
 
-/// Moves the entries up to a depth (bits) before the others; both keep their order. Returns the
-/// moved entries.
-std::span<DepthSlot> bring_to_front(std::span<DepthSlot> list, std::uint32_t reach) {
-  const std::span<DepthSlot> behind = scratch_of(list.size());
-  std::size_t front = 0, rest = 0;
-  for (const DepthSlot& entry : list) {  // no branch that could be mispredicted
-    const bool is_front = entry.key <= reach;
-    behind[rest] = entry;
-    list[front] = entry;
-    front += is_front ? 1 : 0;
-    rest += is_front ? 0 : 1;
-  }
-  std::copy_n(behind.begin(), rest, list.begin() + static_cast<std::ptrdiff_t>(front));
-  return list.first(front);
-}
-
 /// Orders splats of equal depth.
 struct SceneOrder {
   std::span<const Splat> splats;
@@ -54,13 +38,12 @@ struct SceneOrder {
 
 }  // namespace
 
-void TileLists::begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries) {
-  assert(grid.x > 0 && grid.y > 0);
-  grid_ = grid;
+void TileLists::begin(glm::ivec2 tiles, std::size_t segments, std::uint64_t max_entries) {
+  assert(tiles.x > 0 && tiles.y > 0);
+  tiles_across_ = tiles.x;
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
-  starts_.resize(static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y) + 1);
-  sorted_.assign(tiles(), 0);
+  starts_.resize(static_cast<std::size_t>(tiles.x) * static_cast<std::size_t>(tiles.y) + 1);
   segments_.resize(segments);
   clear_segments();
 }
@@ -89,7 +72,7 @@ void TileLists::add(std::size_t segment_index, const ListTask& task, const SimdK
   }
   const std::span added = std::span(segment.runs).subspan(known);
   for (const TileRun& run : added) {
-    std::uint32_t* const row = segment.positions.data() + run.row * grid_.x;
+    std::uint32_t* const row = segment.positions.data() + run.row * tiles_across_;
     for (int column = run.begin; column < run.end; ++column) ++row[column];
     segment.entries += run.end - run.begin;
   }
@@ -109,7 +92,8 @@ void TileLists::finish(const SplatTable& table, const SimdKernels& kernels, Thre
   pool.parallel_for(segments_.size(), [&](std::size_t k) {
     Segment& segment = segments_[k];
     for (const TileRun& run : segment.runs) {
-      const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(grid_.x);
+      const std::size_t row =
+          static_cast<std::size_t>(run.row) * static_cast<std::size_t>(tiles_across_);
       for (std::size_t tile = row + run.begin; tile < row + run.end; ++tile)
         entries_[starts_[tile] + segment.positions[tile]++] = run.entry;
     }
@@ -140,7 +124,7 @@ void TileLists::list_nearest(const SplatTable& table, const SimdKernels& kernels
 /// The nearest splat to be left out, together with all behind it, so that the entries of the nearer
 /// splats (entries_of_slot_) stay within the bound.
 TileLists::DepthOrder TileLists::find_first_left_out(const SplatTable& table, ThreadPool& pool) {
-  const auto& [splats, paths, counts, first_px] = table;
+  const auto& [splats, paths, counts, limits] = table;
   by_depth_.clear();
   for (std::size_t rank = 0; rank < counts.size(); ++rank)
     for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank]; ++slot)
@@ -172,41 +156,18 @@ void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
   pool.parallel_for((tiles() + tiles_per_task - 1) / tiles_per_task, [&](std::size_t task) {
     const std::size_t end = std::min(tiles(), (task + 1) * tiles_per_task);
     for (std::size_t tile = task * tiles_per_task; tile < end; ++tile) {
-      sorted_[tile] = 0;
-      sort_rest(tile, splats);
+      const std::span<DepthSlot> list{entries_.data() + starts_[tile],
+                                      entries_.data() + starts_[tile + 1]};
+      sort_list(list, scratch_of(list.size()), SceneOrder{splats});
     }
   });
 }
 
-void TileLists::sort_front(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats) {
-  const std::span<DepthSlot> list = mutable_list(tile);
-  const std::span<DepthSlot> front = bring_to_front(list, reach);
-  sort_list(front, scratch_of(front.size()), SceneOrder{splats});
-  sorted_[tile] = static_cast<std::uint32_t>(front.size());
-}
-
-void TileLists::sort_front_again(std::size_t tile, std::uint32_t reach,
-                                 std::span<const Splat> splats,
-                                 std::span<const std::uint32_t> depths) {
-  assert(depths.size() == splats.size());
-  const std::span<DepthSlot> list = mutable_list(tile);
-  for (DepthSlot& entry : list) entry.key = depths[entry.value];
-  const std::span<DepthSlot> front = bring_to_front(list, reach);
-  sort_list_again(front, scratch_of(front.size()), SceneOrder{splats});
-  sorted_[tile] = static_cast<std::uint32_t>(front.size());
-}
-
-void TileLists::sort_rest(std::size_t tile, std::span<const Splat> splats) {
-  const std::span<DepthSlot> rest = mutable_list(tile).subspan(sorted_[tile]);
-  sort_list(rest, scratch_of(rest.size()), SceneOrder{splats});
-  sorted_[tile] += static_cast<std::uint32_t>(rest.size());
-}
-
-void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
+void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 tiles, std::uint64_t max_entries,
                               ThreadPool& pool) {
-  assert(grid.x > 0 && grid.y > 0);
-  const auto& [splats, paths, counts, first_px] = table;
-  const auto tile_count = static_cast<std::size_t>(grid.x) * static_cast<std::size_t>(grid.y);
+  assert(tiles.x > 0 && tiles.y > 0);
+  const auto& [splats, paths, counts, limits] = table;
+  const auto tile_count = static_cast<std::size_t>(tiles.x) * static_cast<std::size_t>(tiles.y);
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
   const std::uint64_t wanted = count_keys(table, pool);
@@ -228,7 +189,7 @@ void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uin
       const std::uint64_t depth = std::bit_cast<std::uint32_t>(s.depth);
       for (int y = s.tile_y; y < s.tile_end_y; ++y)
         for (int x = s.tile_x; x < s.tile_end_x; ++x)
-          *key++ = {static_cast<std::uint64_t>(y * grid.x + x) << 32 | depth,
+          *key++ = {static_cast<std::uint64_t>(y * tiles.x + x) << 32 | depth,
                     static_cast<std::uint32_t>(slot)};
     }
   });
@@ -242,15 +203,12 @@ void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uin
     ++starts_[(keys_[i].key >> 32) + 1];
   }
   std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
-  sorted_.resize(tile_count);
-  for (std::size_t tile = 0; tile < tile_count; ++tile)
-    sorted_[tile] = static_cast<std::uint32_t>(list(tile).size());
 }
 
 /// Counts the keys of each splat that is not left out (entries_of_slot_) and finds the first key of
 /// each cluster (key_offsets_). Returns the sum of the counts.
 std::uint64_t TileLists::count_keys(const SplatTable& table, ThreadPool& pool) {
-  const auto& [splats, paths, counts, first_px] = table;
+  const auto& [splats, paths, counts, limits] = table;
   entries_of_slot_.resize(splats.size());
   key_offsets_.resize(counts.size());
   pool.parallel_for(counts.size(), [&](std::size_t rank) {
@@ -294,7 +252,7 @@ std::uint32_t TileLists::longest() const {
 
 std::size_t TileLists::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
-  std::size_t sum = bytes(starts_) + bytes(entries_) + bytes(sorted_) + bytes(tiles_by_length_) +
+  std::size_t sum = bytes(starts_) + bytes(entries_) + bytes(tiles_by_length_) +
                     bytes(key_offsets_) + bytes(keys_) + bytes(key_scratch_);
   for (const Segment& segment : segments_) sum += bytes(segment.runs) + bytes(segment.positions);
   return sum;

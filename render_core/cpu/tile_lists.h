@@ -21,12 +21,12 @@ struct SplatTable {
   std::span<const Splat> splats;
   const SplatPath* paths;  // [slot]; null: ellipses are listed, not trails
   std::span<const std::uint32_t> counts;
-  glm::ivec2 first_px;  // of the grid
+  DepthLimits limits;
 
   [[nodiscard]] ListTask of_cluster(std::size_t rank) const {
     const std::size_t first = rank * cluster_size;
     return {splats.subspan(first, counts[rank]), paths == nullptr ? nullptr : paths + first,
-            static_cast<std::uint32_t>(first), first_px};
+            static_cast<std::uint32_t>(first), limits};
   }
 };
 
@@ -36,9 +36,9 @@ struct SplatTable {
 /// entries are counted.
 class TileLists {
  public:
-  /// Starts lists for a grid of tiles. Splats are added in `segments` shares, in parallel; each
-  /// share belongs to one thread at a time.
-  void begin(glm::ivec2 grid, std::size_t segments, std::uint64_t max_entries);
+  /// Starts lists for columns x rows of tiles. Splats are added in `segments` shares, in parallel;
+  /// each share belongs to one thread at a time.
+  void begin(glm::ivec2 tiles, std::size_t segments, std::uint64_t max_entries);
 
   /// Lists splats for the tiles whose rectangle of pixel centres meets their ellipse alpha >=
   /// alpha_min, or their trail.
@@ -50,28 +50,12 @@ class TileLists {
   /// Brings each list into depth order; equal depths keep the order of the scene.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
 
-  /// Brings entries up to the depth `reach` (bits) to the front of a tile's list, sorted. Lists of
-  /// several tiles may be sorted in parallel.
-  void sort_front(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats);
-
-  /// The same for a list whose front was sorted before its splats moved a little. `depths` [slot]
-  /// are the bits of the current depths.
-  void sort_front_again(std::size_t tile, std::uint32_t reach, std::span<const Splat> splats,
-                        std::span<const std::uint32_t> depths);
-
-  /// Sorts the rest of a list, behind its front.
-  void sort_rest(std::size_t tile, std::span<const Splat> splats);
-
   /// Lists and sorts in the original's way: a (tile | depth) key per splat and tile of its box, one
   /// sort of all keys.
-  void build_by_keys(const SplatTable& table, glm::ivec2 grid, std::uint64_t max_entries,
+  void build_by_keys(const SplatTable& table, glm::ivec2 tiles, std::uint64_t max_entries,
                      ThreadPool& pool);
 
   [[nodiscard]] std::size_t tiles() const { return starts_.size() - 1; }
-  /// The sorted part of a tile's list.
-  [[nodiscard]] std::span<const DepthSlot> front(std::size_t tile) const {
-    return list(tile).first(sorted_[tile]);
-  }
   /// The splats of a tile (row-major index): depth bits and slot.
   [[nodiscard]] std::span<const DepthSlot> list(std::size_t tile) const {
     assert(tile < tiles());
@@ -103,20 +87,15 @@ class TileLists {
   void list_nearest(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool);
   DepthOrder find_first_left_out(const SplatTable& table, ThreadPool& pool);
   void place_lists();
-  std::span<DepthSlot> mutable_list(std::size_t tile) {
-    assert(tile < tiles());
-    return {entries_.data() + starts_[tile], entries_.data() + starts_[tile + 1]};
-  }
   std::uint64_t count_keys(const SplatTable& table, ThreadPool& pool);
 
-  glm::ivec2 grid_{0};
+  int tiles_across_ = 0;
   std::uint64_t max_entries_ = 0;
   std::vector<Segment> segments_;
   std::atomic<std::uint64_t> runs_{0};
   DepthOrder first_left_out_ = nothing_left_out;
   std::vector<std::uint64_t> starts_ = {0};  // tiles + 1
   std::vector<DepthSlot> entries_;
-  std::vector<std::uint32_t> sorted_;  // [tile]: sorted entries at the front of its list
   std::uint64_t overflowed_ = 0;
   std::vector<std::uint32_t> tiles_by_length_;
   // Used when memory is short.

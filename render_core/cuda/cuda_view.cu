@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -31,22 +30,9 @@ void set_tiles(FrameShape& shape, glm::ivec2 size_px, int tile_side) {
   shape.tile_bound = shape.tiles();
 }
 
-/// Only the paper's pipeline has sub-frames here. Its lists belong to the pixels of its key frames.
-/// Without any cache, catgs is exact.
-ViewSettings settled(ViewSettings settings) {
-  if (settings.pipeline == Pipeline::catgs && settings.speculation.initial_window == 0)
-    settings.pipeline = Pipeline::exact;
-  settings.speculation.grid = GridKind::fixed;
-  if (settings.pipeline != Pipeline::paper) settings.speculation.initial_window = 0;
-  return settings;
-}
-
-/// The other pipelines draw what the reference draws. In a picture of catgs, less than this shows
-/// of what is left out. Measured on one H100, hon_sui_sen head2 and fungi_room head1: 1/512 gives
-/// 75 and 74 dB against exact, 1/255 gives 69 and 67, 1/128 gives 62 and 61, 1/100 gives 61 and 58.
 Finish finish_of(Pipeline pipeline) {
-  constexpr float least_shown = 1.0f / 128.0f;
-  if (pipeline == Pipeline::catgs) return {.transmittance = least_shown, .fills = true};
+  if (pipeline == Pipeline::catgs)
+    return {.transmittance = static_cast<float>(least_shown), .fills = true};
   return {.transmittance = static_cast<float>(transmittance_min), .fills = false};
 }
 
@@ -57,7 +43,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
     : scene_(std::move(scene)),
       device_(device),
       processors_(processors_of(device)),
-      settings_(settled(settings)),
+      settings_(settings),
       driver_(settings_),
       room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
       builder_(scene_->arrays(), memory_, processors_),
@@ -77,7 +63,7 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
       [&] { forget_frames(); });
 }
 
-std::optional<FrameView> CudaView::draw(const FrameRequest& request, const FramePlan& plan) {
+FrameView CudaView::draw(const FrameRequest& request, const FramePlan& plan) {
   check(cudaSetDevice(device_), "device");
   if (settings_.pipeline == Pipeline::vanilla) {
     draw_vanilla(request);
@@ -174,19 +160,12 @@ Occlusion CudaView::want_occlusion(const Camera& camera) {
   const ViewMemory& m = memory_;
   if (!ends_of_) return {};
   const auto now = make_camera_pair(camera).single, last = make_camera_pair(*ends_of_).single;
-  const math::Vec3<float> step{now.position.x - last.position.x, now.position.y - last.position.y,
-                               now.position.z - last.position.z};
-  // How far near surfaces move against those behind them. With parts of the place alone (radius 0),
-  // blocks fell to 13 dB where surfaces came out behind others. After a larger step, nothing is
-  // hidden.
-  const float parallax_px =
-      2.0f * camera.focal_px.x * mean_inverse_depth_ * std::sqrt(math::dot<float>(step, step));
-  constexpr int most_radius = 4;
-  if (!(parallax_px < most_radius * part_side_px)) return {};
+  const int radius = math::occlusion_radius<float>(now, last, mean_inverse_depth_, part_side_px);
+  if (radius < 0) return {};
   launch_occlusion({.shape = shape_,
                     .now = now,
                     .last = last,
-                    .radius = 1 + static_cast<int>(parallax_px / part_side_px),
+                    .radius = radius,
                     .last_ends = m.part_ends.get(),
                     .part = m.part_limit.get(),
                     .tile = m.tile_limit.get()},

@@ -34,7 +34,7 @@ class CudaView final : public View {
   void reserve(Headroom headroom);
   bool needs_more_room();
   void forget_frames();
-  [[nodiscard]] std::optional<FrameView> draw(const FrameRequest& request, const FramePlan& plan);
+  [[nodiscard]] FrameView draw(const FrameRequest& request, const FramePlan& plan);
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   void draw_sub(const FrameRequest& request);
   void draw_vanilla(const FrameRequest& request);

@@ -25,7 +25,6 @@ ListRequest::ListRequest(const Camera& camera, const FramePlan& plan,
       culler(camera, plan),
       sweeps(plan.window > 0),
       min_depth(speculation_min_depth(settings, camera.near_z)) {
-  cameras.now.single.near_z = plan.list_near_z;
   cameras.end = sweeps ? make_camera_pair(plan.window_end).single : cameras.now.single;
 }
 

@@ -4,41 +4,10 @@
 namespace catgs::cuda {
 namespace {
 
-/// Limits are moved back by this share of their depth: a surface's depth varies within a part.
-constexpr float margin = 0.02f;
-
 constexpr int block_size = 128;
 
-/// A ray of the present picture in the last camera's space: offset + depth * direction.
-struct LastRay {
-  math::Vec3<float> offset, direction;
-
-  __device__ math::Vec3<float> at(float depth) const {
-    return {offset.x + depth * direction.x, offset.y + depth * direction.y,
-            offset.z + depth * direction.z};
-  }
-};
-
-__device__ LastRay last_ray(const OcclusionParams& p, float x_px, float y_px) {
-  const math::CameraModel<float>& now = p.now;
-  const float x = (x_px - now.principal_point_px.x) / now.focal_px.x;
-  const float y = (y_px - now.principal_point_px.y) / now.focal_px.y;
-  const auto seen = [&](const math::Vec3<float>& v) {
-    return math::Vec3<float>{math::dot<float>(p.last.right, v), math::dot<float>(p.last.down, v),
-                             math::dot<float>(p.last.forward, v)};
-  };
-  return {seen({now.position.x - p.last.position.x, now.position.y - p.last.position.y,
-                now.position.z - p.last.position.z}),
-          seen({x * now.right.x + y * now.down.x + now.forward.x,
-                x * now.right.y + y * now.down.y + now.forward.y,
-                x * now.right.z + y * now.down.z + now.forward.z})};
-}
-
-/// The deepest end of the parts around the image of a point; infinity beyond the picture's edge.
-__device__ float deepest_end(const OcclusionParams& p, const math::Vec3<float>& point) {
-  if (!(point.z > 0.0f)) return INFINITY;
-  const float x_px = p.last.focal_px.x * point.x / point.z + p.last.principal_point_px.x;
-  const float y_px = p.last.focal_px.y * point.y / point.z + p.last.principal_point_px.y;
+/// The deepest end of the parts around a place in the last picture; infinity beyond its edge.
+__device__ float deepest_end(const OcclusionParams& p, float x_px, float y_px) {
   const int parts_x = (p.shape.width_px + part_side_px - 1) / part_side_px;
   const int parts_y = (p.shape.height_px + part_side_px - 1) / part_side_px;
   const float x = floorf(x_px / part_side_px), y = floorf(y_px / part_side_px);
@@ -57,15 +26,8 @@ __device__ float deepest_end(const OcclusionParams& p, const math::Vec3<float>& 
 }
 
 __device__ float limit_of(const OcclusionParams& p, float x_px, float y_px) {
-  const LastRay ray = last_ray(p, x_px, y_px);
-  if (!(ray.direction.z > 0.0f)) return INFINITY;
-  float end = deepest_end(p, ray.direction);  // where the ray's far end was
-  constexpr int steps = 2;
-  for (int step = 0; step < steps && end < INFINITY; ++step)
-    end = fmaxf(end, deepest_end(p, ray.at((end - ray.offset.z) / ray.direction.z)));
-  // The camera may have moved past the place where the last picture ended.
-  if (!(end > ray.offset.z)) return INFINITY;
-  return (1.0f + margin) * (end - ray.offset.z) / ray.direction.z;
+  return math::occlusion_limit<float>(p.now, p.last, {x_px, y_px},
+                                      [&p](float x, float y) { return deepest_end(p, x, y); });
 }
 
 __global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionParams p) {

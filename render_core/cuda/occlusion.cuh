@@ -1,7 +1,7 @@
 #pragma once
 
 #include "render_core/cuda/blend.cuh"
-#include "render_core/math/camera-inl.h"
+#include "render_core/math/occlusion-inl.h"
 
 namespace catgs::cuda {
 
@@ -15,14 +15,11 @@ struct Occlusion {
   __device__ bool hides(const FrameShape& shape, float2 low_px, float2 high_px, float depth) const;
 };
 
-/// Carries the ends of parts (see PartEnds) over to the next frame. A part's middle is followed
-/// into the last picture, along its ray, to the depth at which that picture ends. The deepest end
-/// of the parts around that place counts, so that surfaces which come out behind others are drawn.
-/// Parts that the last picture did not show hide nothing.
+/// Carries the ends of parts (see PartEnds) over to the next frame: math::occlusion_limit().
 struct OcclusionParams {
   FrameShape shape;  // of both frames
   math::CameraModel<float> now, last;
-  int radius;              // parts around the place
+  int radius;              // math::occlusion_radius(), not negative
   const float* last_ends;  // [tiles][parts_per_tile]
   float* part;             // likewise, Occlusion::part
   float2* tile;            // [tiles], Occlusion::tile

@@ -89,6 +89,27 @@ CATGS_HD_INLINE auto blend(RunningPixel<T>& pixel, T exponent, const Vec3<T>& co
   return live;
 }
 
+/// Blends one Gaussian over what lies behind, for pixels that stop together: those below
+/// least_shown go on until all are. Returns which pixels are not below it.
+template <class T>
+CATGS_HD_INLINE auto blend_on(PixelState<T>& pixel, T exponent, const Vec3<T>& colour) {
+  const T weight = alpha_of(exponent) * pixel.transmittance;
+  pixel.colour.x = mul_add(weight, colour.x, pixel.colour.x);
+  pixel.colour.y = mul_add(weight, colour.y, pixel.colour.y);
+  pixel.colour.z = mul_add(weight, colour.z, pixel.colour.z);
+  pixel.transmittance = pixel.transmittance - weight;
+  return pixel.transmittance >= T(least_shown);
+}
+
+/// A pixel below least_shown shows what lies behind it in its own colour.
+template <class T>
+CATGS_HD_INLINE PixelState<T> filled(const PixelState<T>& pixel) {
+  const T rest = abs(pixel.transmittance);
+  const auto fills = rest < T(least_shown);
+  const T scale = select(fills, T(1.0) / (T(1.0) - rest), T(1.0));
+  return {pixel.colour * scale, select(fills, T(0.0), pixel.transmittance)};
+}
+
 /// The pixel over its background, clamped to what a display can show.
 template <class T>
 CATGS_HD_INLINE Vec3<T> resolve(const PixelState<T>& pixel, const Vec3<T>& background) {

@@ -53,15 +53,6 @@ CATGS_HD_INLINE Vec3<T> operator*(const Vec3<T>& row, const CovarianceFactor<T>&
           mul_add(row.y, l.yy, row.z * l.zy), row.z * l.zz};
 }
 
-/// Largest distance from a Gaussian's centre at which it reaches alpha_min, world units, by the
-/// trace of its covariance; `reach` as in reach_of().
-template <class T>
-CATGS_HD_INLINE T extent_bound(const CovarianceFactor<T>& l, T reach) {
-  const T variance =
-      l.xx * l.xx + l.yx * l.yx + l.yy * l.yy + l.zx * l.zx + l.zy * l.zy + l.zz * l.zz;
-  return sqrt(reach * variance) * T(1.0 / exponent_scale);
-}
-
 /// A Gaussian in the image plane, before opacity and colour.
 template <class T>
 struct ProjectedGaussian {

@@ -188,8 +188,9 @@ class ReferenceRenderer final : public Renderer {
   }
   std::size_t scene_bytes() const override { return cloud_->bytes(); }
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
-    if (keeps_caches(settings.pipeline)) {
-      throw InputError("--pipeline", "", "the reference keeps no caches", "use --pipeline exact");
+    if (keeps_colours(settings.pipeline)) {
+      throw InputError("--pipeline", "", "the reference keeps nothing from frame to frame",
+                       "use --pipeline exact");
     }
     return std::make_unique<ReferenceView>(cloud_, pool_, settings);
   }

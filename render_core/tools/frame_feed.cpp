@@ -6,7 +6,8 @@ namespace catgs {
 
 FrameFeed::FrameFeed(const RenderSetup& setup, const ViewSettings& settings)
     : setup_(setup),
-      forecast_frames_(keeps_caches(settings.pipeline) ? settings.speculation.initial_window : 0),
+      forecast_frames_(settings.pipeline == Pipeline::paper ? settings.speculation.initial_window
+                                                            : 0),
       predictor_(setup.predictor) {}
 
 FrameRequest FrameFeed::next() {

@@ -18,10 +18,9 @@ class Core {
   RenderStatus render(const FrameRequest& request) {
     return driver_.render(
         request, frame,
-        [&](const FramePlan& plan) -> std::optional<FrameView> {
+        [&](const FramePlan& plan) {
           asked.push_back(plan);
           if (fails) fails();
-          if (lists_lack_something && plan.kind == FrameKind::sub) return std::nullopt;
           FrameView drawn;
           drawn.stats = stats;
           return drawn;
@@ -33,7 +32,6 @@ class Core {
   int forgotten = 0;
   FrameView frame;
   FrameStats stats;
-  bool lists_lack_something = false;
   std::function<void()> fails;
 
  private:
@@ -48,24 +46,23 @@ FrameRequest resting() {
   return request;
 }
 
-constexpr ViewSettings catgs{.pipeline = Pipeline::catgs};
+constexpr ViewSettings paper{.pipeline = Pipeline::paper};
 
-TEST(FrameDriver, DrawsEveryFrameAsAKeyFrameWithoutCaches) {
-  for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla}) {
+TEST(FrameDriver, OnlyThePaperHasGroups) {
+  for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla, Pipeline::catgs}) {
     Core core({.pipeline = pipeline});
     for (int i = 0; i < 3; ++i) ASSERT_TRUE(core.render(resting()).ok());
     ASSERT_EQ(core.asked.size(), 3u);
     for (const FramePlan& plan : core.asked) {
       EXPECT_EQ(plan.kind, FrameKind::key);
       EXPECT_EQ(plan.window, 0);
-      EXPECT_EQ(plan.grid.tiles, glm::ivec2(4, 3));
-      EXPECT_EQ(plan.list_near_z, resting().camera.near_z);
+      EXPECT_EQ(plan.window_end.size_px, resting().camera.size_px);
     }
   }
 }
 
 TEST(FrameDriver, SubFramesFollowAKeyFrameAndTheStatisticsSayWhatWasDrawn) {
-  Core core(catgs);
+  Core core(paper);
   const int window = SpeculationSettings{}.initial_window;
   for (int i = 0; i <= window + 1; ++i) {
     ASSERT_TRUE(core.render(resting()).ok());
@@ -76,27 +73,13 @@ TEST(FrameDriver, SubFramesFollowAKeyFrameAndTheStatisticsSayWhatWasDrawn) {
   }
 }
 
-TEST(FrameDriver, DrawsASubFrameAgainWhoseListsAreNotEnough) {
-  Core core(catgs);
-  ASSERT_TRUE(core.render(resting()).ok());
-  core.lists_lack_something = true;
-  ASSERT_TRUE(core.render(resting()).ok());
-  ASSERT_EQ(core.asked.size(), 3u);
-  EXPECT_EQ(core.asked[1].kind, FrameKind::sub);
-  EXPECT_EQ(core.asked[2].kind, FrameKind::key);
-  EXPECT_EQ(core.asked[2].window, 0);
-  EXPECT_EQ(core.frame.stats.kind, FrameKind::key);
-  EXPECT_EQ(core.forgotten, 0);
-}
-
 // The nearest Gaussian decides how far a group may reach, and only a drawn frame tells it.
-TEST(FrameDriver, PlansByTheDepthsOfTheLastFrame) {
+TEST(FrameDriver, PlansByTheNearestDepthOfTheLastFrame) {
   FrameRequest moving = resting();
   moving.forecast->world_from_camera.position = {0.5f, 0.0f, 0.0f};
-  Core near_by(catgs), far_away(catgs);
+  Core near_by(paper), far_away(paper);
   near_by.stats.nearest_depth = 0.5f;
   far_away.stats.nearest_depth = 1000.0f;
-  near_by.stats.mean_inverse_depth = far_away.stats.mean_inverse_depth = 1e-3f;
   for (Core* core : {&near_by, &far_away}) {
     FrameRequest first = resting();
     first.forecast.reset();
@@ -113,7 +96,7 @@ TEST(FrameDriver, AFailureIsToldAndEndsTheGroup) {
       {[] { throw DeviceError(RenderStatus::Code::device_failed, "lost"); },
        RenderStatus::Code::device_failed}};
   for (const auto& [fails, code] : failures) {
-    Core core(catgs);
+    Core core(paper);
     ASSERT_TRUE(core.render(resting()).ok());
     core.frame.size_px = {1, 2};
     core.fails = fails;
@@ -127,7 +110,7 @@ TEST(FrameDriver, AFailureIsToldAndEndsTheGroup) {
 }
 
 TEST(FrameDriver, DrawsNothingForABadRequest) {
-  Core core(catgs);
+  Core core(paper);
   FrameRequest request = resting();
   request.camera.near_z = 0.0f;
   EXPECT_EQ(core.render(request).code, RenderStatus::Code::invalid_request);

@@ -41,7 +41,7 @@ inline constexpr int window = 4;
 
 /// Groups of `window` sub-frames whatever the motion, so that long trails are tested too.
 inline ViewSettings patient_settings() {
-  ViewSettings settings{.pipeline = Pipeline::catgs};
+  ViewSettings settings{.pipeline = Pipeline::paper};
   settings.speculation = {
       .initial_window = window, .max_trail_px = 1e6f, .min_depth = 2.0f, .max_deviation_px = 0.5f};
   return settings;

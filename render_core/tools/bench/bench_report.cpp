@@ -98,19 +98,15 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
   json["near"] = setup.camera.near_z;
   const ViewSettings& settings = result.settings;
   json["pipeline"] = pipeline_name(settings.pipeline);
-  if (keeps_caches(settings.pipeline)) {
+  if (settings.pipeline == Pipeline::paper) {
     const SpeculationSettings& speculation = settings.speculation;
     json["window"] = speculation.initial_window;
     json["max_trail_px"] = speculation.max_trail_px;
     json["min_depth"] = speculation_min_depth(speculation, setup.camera.near_z);
     json["max_deviation_px"] = speculation.max_deviation_px;
-    json["grid"] = grid_name(speculation.grid);
-    json["guard_px"] = speculation.guard_px;
-    json["cost_aware"] = speculation.cost_aware;
-    json["order"] = settings.order == BlendOrder::fresh ? "fresh" : "key";
-    json["colour_cache"] = settings.colour_cache;
     json["constant_velocity"] = options.pipeline.constant_velocity;
   }
+  if (keeps_colours(settings.pipeline)) json["colour_cache"] = settings.colour_cache;
   json["split_tasks"] = settings.split_tasks;
   json["simd"] = options.simd;
   json["threads"] = setup.pool->threads();
@@ -226,7 +222,7 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
 void print_report(const RenderSetup& setup, const BenchResult& result) {
   const Measurement& measurement = result.measurement;
   const ListLength lists = measurement.list_length();
-  const bool groups = keeps_caches(result.settings.pipeline);
+  const bool groups = result.settings.pipeline == Pipeline::paper;
   fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.cloud->size(),
              setup.cloud->sh_degree, setup.camera.size_px.x, setup.camera.size_px.y,
              pipeline_name(result.settings.pipeline));

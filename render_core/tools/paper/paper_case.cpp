@@ -39,7 +39,7 @@ std::string stem(const std::string& file) {
 RenderSetup load_case(const PaperOptions& options, std::size_t index, bool quiet) {
   RenderOptions render = options.render;
   render.scene.path = options.cases[index].front();
-  render.pipeline.pipeline = pipeline_name(Pipeline::catgs);
+  render.pipeline.pipeline = pipeline_name(Pipeline::paper);
   return prepare_scene(render, quiet);
 }
 
@@ -47,16 +47,14 @@ RenderSetup load_case(const PaperOptions& options, std::size_t index, bool quiet
 
 std::vector<Variant> ablations(const PaperOptions& options) {
   std::vector<Variant> all = {
-      variants::without_cache,
-      {"Ours-w/o split", Pipeline::catgs, "--no-split"},
-      {"Ours-w/o grid that turns", Pipeline::catgs, "--grid shift"},
-      {"Ours-w/o grid that moves", Pipeline::catgs, "--grid fixed"},
       {"Ours-w/o colour cache", Pipeline::catgs, "--no-colour-cache"},
-      {"Ours-w/o fresh order", Pipeline::catgs, "--order key"},
-      {"Ours-w/o doubt", Pipeline::catgs, "--constant-velocity"},
+      {"Ours-w/o split", Pipeline::catgs, "--no-split"},
+      variants::paper,
+      variants::without_cache,
+      {"Paper-w/o doubt", Pipeline::paper, "--constant-velocity"},
   };
   for (const std::string& flags : options.variants) {
-    all.push_back({"Ours " + flags, Pipeline::catgs, flags});
+    all.push_back({"Paper " + flags, Pipeline::paper, flags});
   }
   return all;
 }
@@ -111,14 +109,16 @@ std::string PaperCase::images() const {
   return options_->images.empty() ? std::string() : options_->images[index_];
 }
 
+/// The command's options of the paper's pipeline are for its rows alone.
 PipelineOptions PaperCase::pipeline_options(const Variant& variant) const {
-  return with_flags(options_->render.pipeline, variant.flags);
+  PipelineOptions options;
+  if (variant.pipeline == Pipeline::paper) options = options_->render.pipeline;
+  options.pipeline = pipeline_name(variant.pipeline);
+  return with_flags(options, variant.flags);
 }
 
 ViewSettings PaperCase::settings(const Variant& variant) const {
-  ViewSettings settings = view_settings(pipeline_options(variant));
-  settings.pipeline = variant.pipeline;
-  return settings;
+  return view_settings(pipeline_options(variant));
 }
 
 const std::vector<Measurement>& PaperCase::runs(const Variant& variant) {
@@ -221,7 +221,9 @@ void check(const PaperOptions& options) {
   }
   if (!has_script(options)) refuse_script_options(options.render);
   for (const std::string& flags : options.variants) {
-    (void)with_flags(options.render.pipeline, flags);
+    PipelineOptions pipeline = options.render.pipeline;
+    pipeline.pipeline = pipeline_name(Pipeline::paper);
+    (void)with_flags(pipeline, flags);
   }
   for (const double fraction : options.keep_fractions) {
     if (!(fraction > 0.0 && fraction <= 1.0)) {

@@ -38,14 +38,13 @@ struct Variant {
 namespace variants {
 inline const Variant vanilla{"3DGS", Pipeline::vanilla};
 inline const Variant exact{"Exact", Pipeline::exact};  // precise culling alone
-// The published method: lists on a fixed grid, blended in the key frame's order.
-inline const Variant paper{"Paper", Pipeline::paper, "--grid fixed --order key"};
+inline const Variant paper{"Paper", Pipeline::paper};  // the published method
 inline const Variant ours{"Ours"};
-inline const Variant without_cache{"Ours-w/o cache", Pipeline::catgs, "--no-cache"};
+inline const Variant without_cache{"Paper-w/o cache", Pipeline::paper, "--no-cache"};
 }  // namespace variants
 
-/// Our pipeline with one part at a time left out, and with the flags of `--variant`. A new part is
-/// a line here.
+/// Our pipeline and the paper's with one part at a time left out, and the paper's with the flags of
+/// `--variant`. A new part is a line here.
 std::vector<Variant> ablations(const PaperOptions& options);
 
 /// A photograph, and how well each row of the table meets it.

@@ -183,10 +183,6 @@ Json settings_json(const PaperCase& scene) {
           {"max_trail_px", speculation.max_trail_px},
           {"min_depth", speculation.min_depth},
           {"max_deviation_px", speculation.max_deviation_px},
-          {"grid", grid_name(speculation.grid)},
-          {"guard_px", speculation.guard_px},
-          {"cost_aware", speculation.cost_aware},
-          {"order", setup.view.order == BlendOrder::fresh ? "fresh" : "key"},
           {"warmup", scene.options().warmup.value_or(default_warmup)},
           {"every", scene.options().every}};
 }
@@ -356,7 +352,8 @@ void add_paper_command(CLI::App& app) {
       ->allow_extra_args(false);
   paper_app
       ->add_option("--variant", options.variants,
-                   "ablation: add a row for ours with these flags of bench, like \"--window 8\"")
+                   "ablation: add a row for the paper's pipeline with these flags of bench, like "
+                   "\"--window 8\"")
       ->allow_extra_args(false);
   add_device_rates(*paper_app, options.rates);
   paper_app->add_flag("--anchor", options.render.anchor,

@@ -94,7 +94,7 @@ void add_rows(PaperTable& table, const std::string& name, const Measurement& run
 
 PaperTable floor_table(PaperCase& scene) {
   const Measurement exact = pooled(scene.runs(variants::exact));
-  const Measurement ours = pooled(scene.runs(variants::ours));
+  const Measurement paper = pooled(scene.runs(variants::paper));
   const MeanWork work = count_work(scene);
   const FrameWork frame = frame_work(scene, work);
   const DeviceRates& rates = scene.options().rates;
@@ -116,8 +116,8 @@ PaperTable floor_table(PaperCase& scene) {
                       scene.label(), 1e-6 * work.reached_entries, 1e-6 * work.warp_evaluations,
                       1e-6 * work.blended_pairs, work.frames)}};
   add_rows(table, "Exact", exact, FrameKind::key, frame, rates);
-  add_rows(table, "Key frame", ours, FrameKind::key, frame, rates);
-  add_rows(table, "Sub-frame", ours, FrameKind::sub, frame, rates);
+  add_rows(table, "Key frame", paper, FrameKind::key, frame, rates);
+  add_rows(table, "Sub-frame", paper, FrameKind::sub, frame, rates);
   return table;
 }
 

@@ -79,7 +79,7 @@ WindowColumn without_window(const std::vector<Measurement>& runs,
 }
 
 WindowColumn with_window(PaperCase& scene, int window, const std::vector<Measurement>& exact) {
-  ViewSettings settings = scene.settings(variants::ours);
+  ViewSettings settings = scene.settings(variants::paper);
   settings.speculation.initial_window = window;
   settings.speculation.max_trail_px = any_trail_px;
   const std::vector<Measurement> runs = scene.runs(settings, fmt::format("W-{}", window));

@@ -1,6 +1,5 @@
 // catgs-render trace windows: the length of key frames' windows on recorded motion, by the rules of
 // motion/frame_groups.h alone. Needs no scene and draws nothing.
-#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,9 +22,9 @@ namespace {
 struct WindowsOptions {
   std::vector<std::string> traces;
   std::vector<double> rates_hz{120.0, 60.0, 30.0};
-  std::vector<float> depths{1.0f, 20.0f};  // nearest and farthest
+  float nearest_depth = 1.0f;  // in every frame, world units
   LensOptions lens{.size = "1920x1080", .focal_px = 1100.0f, .fov_y_deg = {}, .near_z = 0.2f};
-  PipelineOptions pipeline;
+  PipelineOptions pipeline{.pipeline = "paper"};
   std::vector<std::string> variants;
   std::string json;
 };
@@ -37,11 +36,9 @@ struct Rule {
 
 std::vector<Rule> rules(const WindowsOptions& options) {
   std::vector<Rule> all = {
-      {"The paper's rule", "--grid fixed --max-deviation-px 1e9"},  // right or wrong
-      {"Ended off the forecast", "--grid fixed"},
-      {"Grid shifted with the camera", "--grid shift"},
-      {"Grid turned with the camera", "--grid warp"},
-      {"The same, W0 = 8", "--grid warp --window 8"},
+      {"The paper's rule", "--max-deviation-px 1e9"},  // right or wrong
+      {"Ended off the forecast", ""},
+      {"The same, W0 = 8", "--window 8"},
   };
   for (const std::string& flags : options.variants) all.push_back({flags, flags});
   return all;
@@ -52,17 +49,11 @@ struct Groups {
   std::size_t frames = 0, keys = 0, keys_without_window = 0;
 };
 
-/// A trace at a frame rate, without a scene. `setup` serves FrameFeed: forecasts know the recorded
-/// samples up to each frame.
-struct Journey {
+/// A trace at a frame rate, without a scene, for FrameFeed: forecasts know the recorded samples up
+/// to each frame.
+RenderSetup make_journey(const Trajectory& trace, double rate_hz, const WindowsOptions& options,
+                         const PipelineOptions& pipeline) {
   RenderSetup setup;
-  SceneDepths depths;  // of every frame
-};
-
-Journey make_journey(const Trajectory& trace, double rate_hz, const WindowsOptions& options,
-                     const PipelineOptions& pipeline) {
-  Journey journey;
-  RenderSetup& setup = journey.setup;
   setup.samples = trace;
   setup.poses = resample(trace, rate_hz);
   setup.fps = rate_hz;
@@ -70,18 +61,16 @@ Journey make_journey(const Trajectory& trace, double rate_hz, const WindowsOptio
   setup.predictor = predictor_settings(pipeline);
   setup.predictor.lever = forecast_lever(setup.camera.near_z);
   setup.view = view_settings(pipeline);
-  const float nearest = options.depths[0], farthest = options.depths[1];
-  journey.depths = {nearest, std::log(farthest / nearest) / (farthest - nearest)};
-  return journey;
+  return setup;
 }
 
 /// Counts groups as a View makes them: a key frame is made and shown where a group has ended.
-void add_groups(const Journey& journey, Groups& sum) {
-  FrameFeed feed(journey.setup, journey.setup.view);
-  FrameGroups groups(journey.setup.view.speculation);
-  for (std::size_t i = 0; i < journey.setup.poses.size(); ++i) {
+void add_groups(const RenderSetup& setup, float nearest_depth, Groups& sum) {
+  FrameFeed feed(setup, setup.view);
+  FrameGroups groups(setup.view.speculation);
+  for (std::size_t i = 0; i < setup.poses.size(); ++i) {
     const FrameRequest request = feed.next();
-    const FramePlan plan = groups.plan(request.camera, request.forecast, journey.depths);
+    const FramePlan plan = groups.plan(request.camera, request.forecast, nearest_depth);
     ++sum.frames;
     if (plan.kind == FrameKind::sub) continue;
     ++sum.keys;
@@ -96,10 +85,10 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
       .corner = "Frames per key frame",
       .columns = {},
       .rows = {},
-      .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, depths "
-                            "from {:g} to {:g}.",
+      .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, nearest "
+                            "depth {:g}.",
                             traces.size(), options.lens.size, *options.lens.focal_px,
-                            options.depths[0], options.depths[1])}};
+                            options.nearest_depth)}};
   for (const double rate_hz : options.rates_hz) {
     table.columns.push_back(fmt::format("{:g} Hz", rate_hz));
     table.columns.push_back(fmt::format("no window, {:g} Hz", rate_hz));
@@ -110,7 +99,7 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
     for (const double rate_hz : options.rates_hz) {
       Groups sum;
       for (const Trajectory& trace : traces) {
-        add_groups(make_journey(trace, rate_hz, options, pipeline), sum);
+        add_groups(make_journey(trace, rate_hz, options, pipeline), options.nearest_depth, sum);
       }
       const auto keys = static_cast<double>(sum.keys);
       row.numbers.push_back({static_cast<double>(sum.frames) / keys, 2});
@@ -123,9 +112,6 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
 
 void windows(const WindowsOptions& options, bool quiet) {
   (void)make_lens(options.lens, 0.0f);
-  if (!(options.depths[0] < options.depths[1])) {
-    throw InputError("--depths", "", "the nearest depth must come first", "like --depths 1 20");
-  }
   const std::vector<Rule> all_rules = rules(options);
   for (const Rule& rule : all_rules) (void)with_flags(options.pipeline, rule.flags);
   std::vector<Trajectory> traces;
@@ -144,7 +130,7 @@ void windows(const WindowsOptions& options, bool quiet) {
                             {"size", options.lens.size},
                             {"focal_px", *options.lens.focal_px},
                             {"near", *options.lens.near_z},
-                            {"depths", options.depths},
+                            {"nearest_depth", options.nearest_depth},
                             {"flags", flags},
                             {"table", to_json(table)}});
 }
@@ -162,9 +148,8 @@ void add_trace_windows_command(CLI::App& trace) {
       ->check(CLI::Range(1.0, 1000.0))
       ->capture_default_str();
   command
-      ->add_option("--depths", options->depths,
-                   "Depths of the nearest and the farthest Gaussian in every frame, world units")
-      ->expected(2)
+      ->add_option("--nearest-depth", options->nearest_depth,
+                   "Depth of the nearest Gaussian in every frame, world units")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--size", options->lens.size, "Size of the picture, pixels")

@@ -28,7 +28,7 @@ using test::TestScene;
 struct Projected {
   std::vector<Splat> splats;
   std::vector<std::uint32_t> counts;
-  [[nodiscard]] SplatTable table() const { return {splats, nullptr, counts, glm::ivec2(0)}; }
+  [[nodiscard]] SplatTable table() const { return {splats, nullptr, counts, {}}; }
   template <class Visit>
   void for_each(const Visit& visit) const {
     for (std::size_t rank = 0; rank < counts.size(); ++rank)
@@ -40,14 +40,10 @@ struct Projected {
 Projected project_all(const SceneStore& store, const Camera& camera, const SimdKernels& kernels,
                       Pipeline pipeline = Pipeline::exact) {
   Projected out;
-  FramePlan plan;
-  plan.window_end = camera;
-  plan.grid = image_grid(camera.size_px);
-  plan.list_near_z = camera.near_z;
   out.splats.resize(store.clusters().size() * cluster_size);
   for (std::size_t c = 0; c < store.clusters().size(); ++c)
     out.counts.push_back(kernels
-                             .project_cluster({&store, &camera, &plan, pipeline, c,
+                             .project_cluster({&store, &camera, pipeline, c,
                                                out.splats.data() + c * cluster_size, 0.0f})
                              .visible);
   return out;
@@ -175,9 +171,9 @@ TEST_P(Kernels, ListsMissNoTileAndAddFew) {
         idle += is_listed && !reaches;
       }
     });
-    // Exact for rectangles of pixel centres: a sliver may slip between centres. Boxes inside one
-    // tile are listed untested: with the box cut by the image edge, the ellipse may stay outside.
-    EXPECT_LE(static_cast<double>(idle), 0.06 * static_cast<double>(lists.entries()) + 8.0);
+    // Exact for rectangles of pixel centres: a sliver may slip between centres. Boxes in one row or
+    // column of tiles are listed untested: their corners may stay empty.
+    EXPECT_LE(static_cast<double>(idle), 0.09 * static_cast<double>(lists.entries()) + 8.0);
   }
 }
 
@@ -265,28 +261,6 @@ TEST(SortList, EqualsStableSortOnAnyDistribution) {
       std::ranges::stable_sort(expected, {}, &DepthSlot::key);
       sort_list(std::span(list), std::span(scratch),
                 [](const DepthSlot& a, const DepthSlot& b) { return a.value < b.value; });
-      for (std::size_t i = 0; i < size; ++i) {
-        ASSERT_EQ(list[i].key, expected[i].key);
-        ASSERT_EQ(list[i].value, expected[i].value);
-      }
-    }
-  }
-}
-
-TEST(SortListAgain, EqualsStableSortHoweverFarElementsMoved) {
-  std::uint64_t state = 3;
-  const auto random = [&state] {
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return static_cast<std::uint32_t>(state >> 33);
-  };
-  for (const std::size_t size : {0u, 1u, 2u, 25u, 300u, 5000u}) {
-    for (const std::uint32_t noise : {1u, 3u, 30u, 1000u, 0x3fffffffu}) {
-      std::vector<DepthSlot> list(size), scratch(size);
-      for (std::uint32_t i = 0; i < size; ++i) list[i] = {8 * i + random() % noise, i};
-      std::vector<DepthSlot> expected = list;
-      std::ranges::stable_sort(expected, {}, &DepthSlot::key);
-      sort_list_again(std::span(list), std::span(scratch),
-                      [](const DepthSlot& a, const DepthSlot& b) { return a.value < b.value; });
       for (std::size_t i = 0; i < size; ++i) {
         ASSERT_EQ(list[i].key, expected[i].key);
         ASSERT_EQ(list[i].value, expected[i].value);

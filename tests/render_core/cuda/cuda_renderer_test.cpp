@@ -38,15 +38,6 @@ TEST_P(CudaSmallScenes, MatchesReferenceWithListsAsShortAsTheCpuCores) {
             2.0 + 1.05 * static_cast<double>(cpu.stats.list_entries));
 }
 
-/// The paper's pipeline, with groups of a known length.
-ViewSettings paper_settings() {
-  ViewSettings settings = test::patient_settings();
-  settings.pipeline = Pipeline::paper;
-  settings.speculation.grid = GridKind::fixed;
-  settings.order = BlendOrder::key;
-  return settings;
-}
-
 // Nothing may be missing as long as the camera keeps to the forecast, Gaussians that come through
 // the near plane or into the image among it. Order is another matter: sub-frames blend in the order
 // of their key frame, which a turn makes wrong.
@@ -57,7 +48,7 @@ TEST_P(CudaSmallScenes, SubFramesOnTheForecastPathMissNothing) {
   const auto exact = renderer->make_view({});
   for (const test::Move& move : test::moves()) {
     SCOPED_TRACE(move.name);
-    const auto view = renderer->make_view(paper_settings());
+    const auto view = renderer->make_view(test::patient_settings());
     for (int k = 0; k <= test::window; ++k) {
       const FrameRequest request = test::request_on_path(scene, move, k);
       const Rendered drawn = render_in(*view, request);
@@ -77,8 +68,8 @@ TEST_P(CudaSmallScenes, KeyFramesListNoMoreThanTheCpuCores) {
   const TestScene& scene = GetParam();
   for (const test::Move& move : test::moves()) {
     const FrameRequest request = test::request_on_path(scene, move, 0);
-    const auto cuda = renderer_of(scene, RendererKind::cuda)->make_view(paper_settings());
-    const auto cpu = renderer_of(scene, RendererKind::cpu)->make_view(paper_settings());
+    const auto cuda = renderer_of(scene, RendererKind::cuda)->make_view(test::patient_settings());
+    const auto cpu = renderer_of(scene, RendererKind::cpu)->make_view(test::patient_settings());
     const FrameStats a = render_in(*cuda, request).stats, b = render_in(*cpu, request).stats;
     EXPECT_LE(static_cast<double>(a.list_entries),
               2.0 + 1.05 * static_cast<double>(b.list_entries));

@@ -55,21 +55,5 @@ TEST(CudaFrames, CatgsDoesNotDrawWhatAWallHides) {
   EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 45.0);
 }
 
-// Without any cache, a frame is that of exact to the last bit of its lists.
-TEST(CudaFrames, WithoutCachesCatgsIsExact) {
-  REQUIRE_DEVICE();
-  const TestScene scene = wall_before_many();
-  const auto renderer = renderer_of(scene, RendererKind::cuda);
-  ViewSettings settings{.pipeline = Pipeline::catgs};
-  settings.speculation.initial_window = 0;
-  const auto view = renderer->make_view(settings);
-  const Rendered exact = render(*renderer, scene.request);
-  for (int frame = 0; frame < 2; ++frame) {
-    const Rendered drawn = render_in(*view, scene.request);
-    EXPECT_EQ(drawn.stats.list_entries, exact.stats.list_entries);
-    EXPECT_GE(psnr_db(drawn.rgb, exact.rgb), 60.0);
-  }
-}
-
 }  // namespace
 }  // namespace catgs

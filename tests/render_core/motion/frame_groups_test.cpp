@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
-#include "render_core/math/homography-inl.h"
 
 namespace catgs {
 namespace {
@@ -22,12 +21,6 @@ Pose moved(glm::vec3 position) { return {position, {1, 0, 0, 0}}; }
 
 Pose turned(float degrees, glm::vec3 axis, glm::vec3 position = glm::vec3(0)) {
   return {position, glm::angleAxis(glm::radians(degrees), axis)};
-}
-
-/// The paper's groups: lists cover rotation too.
-SpeculationSettings on_fixed_grid(SpeculationSettings settings = {}) {
-  settings.grid = GridKind::fixed;
-  return settings;
 }
 
 TEST(UniformMotion, IsLinearInPositionAndAngle) {
@@ -131,7 +124,6 @@ TEST(Speculation, SettingsAreChecked) {
   EXPECT_THAT(error_of({.max_trail_px = 0}), ::testing::HasSubstr("--max-trail-px"));
   EXPECT_THAT(error_of({.min_depth = std::nanf("")}), ::testing::HasSubstr("--min-depth"));
   EXPECT_THAT(error_of({.max_deviation_px = infinity}), ::testing::HasSubstr("--max-deviation-px"));
-  EXPECT_THAT(error_of({.guard_px = -1.0f}), ::testing::HasSubstr("--guard-px"));
   EXPECT_FLOAT_EQ(speculation_min_depth({}, 0.3f), 0.6f);
   EXPECT_FLOAT_EQ(speculation_min_depth({.min_depth = 0.4f}, 0.3f), 0.4f);
 }
@@ -142,90 +134,90 @@ std::string kinds(FrameGroups& groups, int frames, float step, float depth, int 
   for (int i = 0; i < frames; ++i) {
     const float x = static_cast<float>(i) * step;
     const Forecast forecast{moved({x + step * static_cast<float>(horizon), 0, 0}), horizon};
-    const FramePlan plan = groups.plan(camera_at(moved({x, 0, 0})), forecast, {depth});
+    const FramePlan plan = groups.plan(camera_at(moved({x, 0, 0})), forecast, depth);
     kinds += plan.kind == FrameKind::key ? 'k' : 's';
   }
   return kinds;
 }
 
 TEST(FrameGroups, AKeyFrameAndWSubFrames) {
-  FrameGroups still{on_fixed_grid()};
+  FrameGroups still{SpeculationSettings{}};
   EXPECT_EQ(kinds(still, 11, 0.0f, 1.0f), "ksssskssssk");
-  FrameGroups off{on_fixed_grid({.initial_window = 0})};
+  FrameGroups off{{.initial_window = 0}};
   EXPECT_EQ(kinds(off, 4, 0.0f, 1.0f), "kkkk");
 }
 
 TEST(FrameGroups, FastMotionShrinksTheWindow) {
   // 1100 px * 0.01 / 1 = 11 px a frame, 44 px in four: W = floor(4 * 16 / 44) = 1.
-  FrameGroups fast{on_fixed_grid()};
+  FrameGroups fast{SpeculationSettings{}};
   EXPECT_EQ(kinds(fast, 6, 0.01f, 1.0f), "ksksks");
-  FrameGroups farther{on_fixed_grid()};
+  FrameGroups farther{SpeculationSettings{}};
   EXPECT_EQ(kinds(farther, 6, 0.01f, 3.0f), "kssssk");
-  FrameGroups nothing_near{on_fixed_grid()};
+  FrameGroups nothing_near{SpeculationSettings{}};
   EXPECT_EQ(kinds(nothing_near, 6, 0.01f, infinity), "kssssk");
-  FrameGroups faster{on_fixed_grid()};
+  FrameGroups faster{SpeculationSettings{}};
   EXPECT_EQ(kinds(faster, 4, 0.02f, 1.0f), "kkkk");
-  FrameGroups longer_trails{on_fixed_grid({.max_trail_px = 32.0f})};
+  FrameGroups longer_trails{{.max_trail_px = 32.0f}};
   EXPECT_EQ(kinds(longer_trails, 6, 0.01f, 1.0f), "ksskss");
 }
 
 TEST(FrameGroups, UnknownOrTooSmallDepthsMeanTheDepthThreshold) {
   // d = 2 x 0.2: 4 frames of 0.001 are 1100 * 0.004 / 0.4 = 11 px; of 0.002 22 px, so W = 2.
   for (const float depth : {0.0f, 0.1f, std::nanf("")}) {
-    FrameGroups slow{on_fixed_grid()};
+    FrameGroups slow{SpeculationSettings{}};
     EXPECT_EQ(kinds(slow, 6, 0.001f, depth), "kssssk");
-    FrameGroups quicker{on_fixed_grid()};
+    FrameGroups quicker{SpeculationSettings{}};
     EXPECT_EQ(kinds(quicker, 6, 0.002f, depth), "ksskss");
   }
 }
 
 TEST(FrameGroups, PlansTheCameraAtTheEndOfTheWindow) {
-  FrameGroups groups{on_fixed_grid()};
+  FrameGroups groups{SpeculationSettings{}};
   const Forecast forecast{turned(4, {0, 0, 1}, {0.08f, 0, 0}), 8};
   const Camera now = camera_at({});
-  const FramePlan plan = groups.plan(now, forecast, {10.0f});  // 38 px by roll, 4.4 px by the step
+  const FramePlan plan = groups.plan(now, forecast, 10.0f);  // 38 px by roll, 4.4 px by the step
   EXPECT_EQ(plan.kind, FrameKind::key);
   EXPECT_EQ(plan.window, 1);
   EXPECT_NEAR(plan.window_end.world_from_camera.position.x, 0.01f, 1e-6f);
   EXPECT_NEAR(glm::degrees(glm::angle(plan.window_end.world_from_camera.orientation)), 0.5f, 1e-3f);
   EXPECT_EQ(plan.window_end.size_px, now.size_px);
-  const FramePlan sub = groups.plan(plan.window_end, forecast, {10.0f});
+  const FramePlan sub = groups.plan(plan.window_end, forecast, 10.0f);
   EXPECT_EQ(sub.kind, FrameKind::sub);
   EXPECT_EQ(sub.window, 1);
 }
 
 TEST(FrameGroups, WithoutForecastEveryFrameIsAKeyFrame) {
-  FrameGroups groups{on_fixed_grid()};
+  FrameGroups groups{SpeculationSettings{}};
   for (int i = 0; i < 3; ++i) {
-    const FramePlan plan = groups.plan(camera_at({}), std::nullopt, {1.0f});
+    const FramePlan plan = groups.plan(camera_at({}), std::nullopt, 1.0f);
     EXPECT_EQ(plan.kind, FrameKind::key);
     EXPECT_EQ(plan.window, 0);
   }
 }
 
 TEST(FrameGroups, AFrameWithoutForecastEndsTheWindow) {
-  FrameGroups groups{on_fixed_grid()};
+  FrameGroups groups{SpeculationSettings{}};
   const Forecast still{camera_at({}).world_from_camera, 4};
-  EXPECT_EQ(groups.plan(camera_at({}), still, {1.0f}).window, 4);
-  EXPECT_EQ(groups.plan(camera_at({}), still, {1.0f}).kind, FrameKind::sub);
-  EXPECT_EQ(groups.plan(camera_at({}), std::nullopt, {1.0f}).kind, FrameKind::key);
-  EXPECT_EQ(groups.plan(camera_at({}), still, {1.0f}).kind, FrameKind::key);
+  EXPECT_EQ(groups.plan(camera_at({}), still, 1.0f).window, 4);
+  EXPECT_EQ(groups.plan(camera_at({}), still, 1.0f).kind, FrameKind::sub);
+  EXPECT_EQ(groups.plan(camera_at({}), std::nullopt, 1.0f).kind, FrameKind::key);
+  EXPECT_EQ(groups.plan(camera_at({}), still, 1.0f).kind, FrameKind::key);
 }
 
 TEST(FrameGroups, NeverGoBeyondTheForecast) {
-  FrameGroups groups{on_fixed_grid({.initial_window = 8})};
+  FrameGroups groups{{.initial_window = 8}};
   EXPECT_EQ(kinds(groups, 6, 0.0f, 1.0f, 2), "ksskss");
 }
 
 /// A group whose forecast is 4 frames of 0.01 units to the right, at depth 20: 0.55 px a frame.
 class OpenGroup : public ::testing::Test {
  protected:
-  OpenGroup() { groups_.plan(camera_at({}), Forecast{moved({0.04f, 0, 0}), 4}, {depth}); }
+  OpenGroup() { groups_.plan(camera_at({}), Forecast{moved({0.04f, 0, 0}), 4}, depth); }
   FrameKind next(const Camera& camera, float nearest = depth) {
-    return groups_.plan(camera, Forecast{camera.world_from_camera, 4}, {nearest}).kind;
+    return groups_.plan(camera, Forecast{camera.world_from_camera, 4}, nearest).kind;
   }
   static constexpr float depth = 20.0f;
-  FrameGroups groups_{on_fixed_grid()};
+  FrameGroups groups_{SpeculationSettings{}};
 };
 
 TEST_F(OpenGroup, GoesOnWhereItWasForecast) {
@@ -262,9 +254,9 @@ TEST_F(OpenGroup, EndsWithAnotherLens) {
   others[2].principal_point_px.x += 1.0f;
   others[3].near_z = 0.1f;
   for (const Camera& other : others) {
-    FrameGroups groups{on_fixed_grid()};
-    groups.plan(camera_at({}), Forecast{moved({0.04f, 0, 0}), 4}, {depth});
-    EXPECT_EQ(groups.plan(other, std::nullopt, {depth}).kind, FrameKind::key);
+    FrameGroups groups{SpeculationSettings{}};
+    groups.plan(camera_at({}), Forecast{moved({0.04f, 0, 0}), 4}, depth);
+    EXPECT_EQ(groups.plan(other, std::nullopt, depth).kind, FrameKind::key);
   }
 }
 
@@ -272,72 +264,6 @@ TEST_F(OpenGroup, EndsWhenTheCachesAreGone) {
   groups_.forget();
   EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::key);
   EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::sub);
-}
-
-/// A group on a grid that follows the camera: 1.2 degrees and 0.04 units in four frames, Gaussians
-/// at depth 20 and beyond, 40 in the mean.
-class TurningGroup : public ::testing::TestWithParam<GridKind> {
- protected:
-  TurningGroup() { key_ = groups_.plan(camera_at({}), Forecast{at(1.0f), 4}, depths); }
-  static Pose at(float share, glm::vec3 off_path = glm::vec3(0)) {
-    return turned(1.2f * share, {0, 1, 0}, glm::vec3(0.04f * share, 0, 0) + off_path);
-  }
-  FramePlan next(const Pose& pose) {
-    return groups_.plan(camera_at(pose), Forecast{pose, 4}, depths);
-  }
-  static constexpr SceneDepths depths{20.0f, 1.0f / 40.0f};
-  SpeculationSettings settings_{.grid = GetParam()};
-  FrameGroups groups_{settings_};
-  FramePlan key_;
-};
-
-TEST_P(TurningGroup, HasAWindowThatAFixedGridHasNot) {
-  FrameGroups fixed{on_fixed_grid()};
-  EXPECT_LT(fixed.plan(camera_at({}), Forecast{at(1.0f), 4}, depths).window, 2);
-  EXPECT_GE(key_.window, 2);
-  EXPECT_EQ(next(at(0.25f)).kind, FrameKind::sub);
-  EXPECT_EQ(next(at(0.5f)).kind, FrameKind::sub);
-}
-
-TEST_P(TurningGroup, HoldsEveryPixelOfItsPicturesInItsGrid) {
-  const FramePlan plan = next(at(0.5f));
-  ASSERT_EQ(plan.kind, FrameKind::sub);
-  for (const double x : {0.5, 960.0, 1919.5}) {
-    for (const double y : {0.5, 540.0, 1079.5}) {
-      const auto in_list = math::apply<double>(plan.list_from_frame, {x, y});
-      EXPECT_GE(in_list.x, plan.grid.first_px.x);
-      EXPECT_LE(in_list.x, plan.grid.first_px.x + plan.grid.size_px.x);
-      EXPECT_GE(in_list.y, plan.grid.first_px.y);
-      EXPECT_LE(in_list.y, plan.grid.first_px.y + plan.grid.size_px.y);
-    }
-  }
-}
-
-TEST_P(TurningGroup, EndsWhereTheViewTurnsFarther) {
-  EXPECT_EQ(next(turned(6.0f, {0, 1, 0})).kind, FrameKind::key);
-}
-
-TEST_P(TurningGroup, EndsWhereTheCameraLeavesThePath) {
-  EXPECT_EQ(next(at(0.5f, {0, 0.01f, 0})).kind, FrameKind::sub);
-  EXPECT_EQ(next(at(0.5f, {0, 1.0f, 0})).kind, FrameKind::key);
-}
-
-INSTANTIATE_TEST_SUITE_P(Grids, TurningGroup, ::testing::Values(GridKind::shift, GridKind::warp),
-                         [](const auto& grid) {
-                           return grid.param == GridKind::warp ? "Warp" : "Shift";
-                         });
-
-TEST(WarpGrid, AllowsAnUnexpectedTurn) {
-  // 0.3 degrees away, where the fixed grid ends its group.
-  for (const GridKind grid : {GridKind::fixed, GridKind::warp}) {
-    SpeculationSettings settings;
-    settings.grid = grid;
-    FrameGroups groups{settings};
-    groups.plan(camera_at({}), Forecast{Pose{}, 4}, {20.0f, 0.05f});
-    const FramePlan plan =
-        groups.plan(camera_at(turned(0.3f, {0, 1, 0})), Forecast{Pose{}, 4}, {20.0f, 0.05f});
-    EXPECT_EQ(plan.kind, grid == GridKind::warp ? FrameKind::sub : FrameKind::key);
-  }
 }
 
 }  // namespace

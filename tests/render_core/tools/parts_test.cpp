@@ -50,42 +50,23 @@ TEST(PipelineOptions, BecomeViewSettings) {
   EXPECT_EQ(view_settings(options).pipeline, Pipeline::exact);
   EXPECT_TRUE(view_settings(options).split_tasks);
   EXPECT_TRUE(view_settings(options).colour_cache);
-  options.pipeline = "catgs";
+  options.pipeline = "paper";
   options.window = 8;
   options.max_trail_px = 20.0f;
   options.min_depth = 0.4f;
-  options.order = "key";
   options.no_split = true;
   options.no_colour_cache = true;
   const ViewSettings settings = view_settings(options);
-  EXPECT_EQ(settings.pipeline, Pipeline::catgs);
+  EXPECT_EQ(settings.pipeline, Pipeline::paper);
   EXPECT_EQ(settings.speculation.initial_window, 8);
   EXPECT_EQ(settings.speculation.max_trail_px, 20.0f);
   EXPECT_EQ(settings.speculation.min_depth, 0.4f);
   EXPECT_EQ(settings.speculation.max_deviation_px, SpeculationSettings{}.max_deviation_px);
-  EXPECT_EQ(settings.order, BlendOrder::key);
   EXPECT_FALSE(settings.split_tasks);
   EXPECT_FALSE(settings.colour_cache);
-  EXPECT_EQ(view_settings({.pipeline = "catgs", .no_cache = true}).speculation.initial_window, 0);
+  EXPECT_EQ(view_settings({.pipeline = "paper", .no_cache = true}).speculation.initial_window, 0);
   EXPECT_EQ(predictor_settings({}).min_confidence, 0.0);
   EXPECT_EQ(predictor_settings({.constant_velocity = true}).min_confidence, 1.0);
-}
-
-TEST(PipelineOptions, ThePapersPipelineIsTheFixedGridInKeyOrderUnlessToldOtherwise) {
-  const ViewSettings settings = view_settings({.pipeline = "paper"});
-  EXPECT_EQ(settings.pipeline, Pipeline::paper);
-  EXPECT_EQ(settings.speculation.grid, GridKind::fixed);
-  EXPECT_EQ(settings.order, BlendOrder::key);
-  PipelineOptions options;
-  options.pipeline = "paper";
-  options.grid = "shift";
-  EXPECT_EQ(view_settings(options).speculation.grid, GridKind::shift);
-  EXPECT_EQ(view_settings(options).order, BlendOrder::key);
-  options.order = "fresh";
-  EXPECT_EQ(view_settings(options).order, BlendOrder::fresh);
-  // The other pipelines keep their own.
-  EXPECT_EQ(view_settings({.pipeline = "catgs"}).speculation.grid, SpeculationSettings{}.grid);
-  EXPECT_EQ(view_settings({.pipeline = "catgs"}).order, ViewSettings{}.order);
 }
 
 TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
@@ -94,10 +75,11 @@ TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
   };
   refused({.pipeline = "fast"},
           "--pipeline: unknown \"fast\" (one of exact, vanilla, paper, catgs)");
-  refused({.pipeline = "catgs", .order = "old"}, "--order: unknown \"old\"");
-  refused({.pipeline = "catgs", .window = 65}, "--window: is out of range");
+  refused({.pipeline = "paper", .window = 65}, "--window: is out of range");
+  refused({.pipeline = "catgs", .window = 0}, "--window: has no effect on the catgs pipeline");
   refused({.window = 4}, "--window: has no effect on the exact pipeline");
-  refused({.pipeline = "vanilla", .order = "key"}, "--order: has no effect on the vanilla");
+  refused({.pipeline = "catgs", .min_depth = 1.0f}, "--min-depth: has no effect on the catgs");
+  refused({.no_colour_cache = true}, "--no-colour-cache: has no effect on the exact pipeline");
   refused({.no_cache = true}, "--no-cache: has no effect");
   refused({.constant_velocity = true}, "--constant-velocity: has no effect");
 }

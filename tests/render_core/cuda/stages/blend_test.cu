@@ -1,6 +1,9 @@
 // Blending, against the CPU core's kernel on the same splats and lists; folding slices and
 // conversion to video, against the formulas on the host.
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <random>
 
 #include "render_core/cuda/convert.cuh"
@@ -37,6 +40,7 @@ class BlendStage : public StageTest {
       s.green = static_cast<float>(random() % 129) / 128.0f;
       s.blue = static_cast<float>(random() % 129) / 128.0f;
       s.original_index = i;
+      s.depth = static_cast<float>(i);
       splats_.push_back(s);
       SplatRecord record{};
       record.centre_px = make_float2(s.centre_x, s.centre_y);
@@ -78,21 +82,21 @@ class BlendStage : public StageTest {
   /// Blends the pixels of the CPU core's tile at `corner`. Returns how many entries it looked at.
   std::size_t blend_on_cpu(const std::vector<DepthSlot>& list, glm::ivec2 corner,
                            HostImage& image) const {
-    const glm::ivec2 end = glm::min(corner + tile_size_px, size_px);
-    std::vector<PixelBlock> blocks;
-    for (int y = corner.y; y < end.y; y += block_side_px)
-      for (int x = corner.x; x < end.x; x += block_side_px)
-        blocks.push_back({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)});
-    return simd_kernels()
-        .front()
-        .blend_blocks({.splats = splats_.data(),
-                       .list = list,
-                       .blocks = blocks,
-                       .background = background,
-                       .cull_blocks = true,
-                       .count_pairs = false,
-                       .image = &image})
-        .looked_at;
+    std::array<float, blocks_per_tile> ends{};
+    (void)simd_kernels().front().blend_tile({.splats = splats_.data(),
+                                             .list = list,
+                                             .first_px = corner,
+                                             .background = background,
+                                             .cull_blocks = true,
+                                             .fills = false,
+                                             .count_pairs = false,
+                                             .image = &image,
+                                             .ends = {ends.data(), catgs::parts_across}});
+    const float end = *std::ranges::max_element(ends);
+    if (std::isinf(end)) return list.size();
+    const auto behind = std::ranges::find_if(
+        list, [&](const DepthSlot& entry) { return splats_[entry.value].depth > end; });
+    return static_cast<std::size_t>(behind - list.begin());
   }
 
   /// The CPU core's picture; `looked_at`: entries of each tile's list.

@@ -204,7 +204,7 @@ std::set<Entry> cpu_entries(const StagedLists& lists) {
     simd_kernels().front().list_tiles({.splats = std::span(&found->splat, 1),
                                        .paths = found->path ? &path : nullptr,
                                        .first_slot = 0,
-                                       .first_px = glm::ivec2(0)},
+                                       .limits = {}},
                                       runs);
     for (const TileRun& run : runs)
       for (std::uint32_t column = run.begin; column < run.end; ++column)

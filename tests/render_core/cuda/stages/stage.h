@@ -179,11 +179,11 @@ class StagedLists {
       const ClusterSummary summary = simd_kernels().front().project_cluster(
           {.scene = &scene_.store,
            .camera = &camera_,
-           .plan = &plan_,
            .pipeline = sweeps ? Pipeline::paper : Pipeline::exact,
            .cluster = c,
            .splats = splats.data(),
            .min_depth = request_.min_depth,
+           .window_end = &plan_.window_end,
            .paths = sweeps ? paths.data() : nullptr,
            .members = sweeps ? &members : nullptr});
       for (std::uint32_t i = 0; i < summary.visible; ++i)
@@ -215,15 +215,13 @@ struct StagedCase {
     camera = make_camera(catgs::test::look_at({1, 0, 1}, {-0.5f, 0.5f, 6}), size_px,
                          static_cast<float>(size_px.x));
     settings = catgs::test::patient_settings();
-    settings.pipeline = Pipeline::paper;
-    settings.speculation.grid = GridKind::fixed;
     if (listed == Listed::now) settings.pipeline = Pipeline::exact;
     FrameGroups groups(settings.speculation);
     const Pose end = catgs::test::moved(camera.world_from_camera, catgs::test::moves().back());
     plan = groups.plan(
         camera,
         listed == Listed::now ? std::nullopt : std::optional(Forecast{end, catgs::test::window}),
-        {});
+        0.0f);
     EXPECT_EQ(plan.window > 0, listed == Listed::window);
   }
 

@@ -21,7 +21,7 @@ constexpr float key_error = 0.001f;
 constexpr float sub_error = 0.01f;
 
 /// Grey that follows the camera; half of the background shows through. Key and sub-frames of the
-/// catgs pipeline are off by known errors.
+/// paper pipeline are off by known errors.
 class GreyView final : public View {
  public:
   GreyView(const ViewSettings& settings, std::vector<FrameRequest>* requests)
@@ -30,8 +30,8 @@ class GreyView final : public View {
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
     FrameStats stats;
     float grey = 0.3f + request.camera.world_from_camera.position.x;
-    if (settings_.pipeline == Pipeline::catgs) {
-      const FramePlan plan = groups_.plan(request.camera, request.forecast, {100.0f, 0.01f});
+    if (settings_.pipeline == Pipeline::paper) {
+      const FramePlan plan = groups_.plan(request.camera, request.forecast, 100.0f);
       stats.kind = plan.kind;
       stats.window = plan.window;
       grey += plan.kind == FrameKind::key ? key_error : sub_error;
@@ -64,7 +64,7 @@ class GreyRenderer final : public Renderer {
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     return std::make_unique<GreyView>(settings, &requests);
   }
-  std::vector<FrameRequest> requests;  // of the catgs pipeline
+  std::vector<FrameRequest> requests;  // of the paper pipeline
 };
 
 TimedPose at_x(std::int64_t time_us, float x) { return {time_us, {{x, 0, 0}, {1, 0, 0, 0}}}; }
@@ -83,18 +83,18 @@ class BenchParts : public ::testing::Test {
     for (int i = 0; i < 23; ++i)
       setup_.poses.push_back(at_x(i * 10'000, 0.001f * static_cast<float>(i)));
     setup_.samples = setup_.poses;
-    catgs_.pipeline = Pipeline::catgs;
+    paper_.pipeline = Pipeline::paper;
   }
 
   RenderSetup setup_;
   GreyRenderer* grey_ = nullptr;
-  ViewSettings catgs_;
+  ViewSettings paper_;
 };
 
 const ProgressReport no_report = [](double) {};
 
 TEST_F(BenchParts, MeasureTellsKeyAndSubFramesApart) {
-  const Measurement measurement = measure(setup_, catgs_, 1, no_report);
+  const Measurement measurement = measure(setup_, paper_, 1, no_report);
   ASSERT_EQ(measurement.frames.size(), 23u);
   // The first two frames know no motion yet: groups of one; then 4 groups of 5, and the last one is
   // cut by the end of the path, not by the camera.
@@ -114,14 +114,14 @@ TEST_F(BenchParts, MeasureTellsKeyAndSubFramesApart) {
 
 TEST_F(BenchParts, WindowsThatTheCameraLeavesAreCounted) {
   setup_.poses[9].world_from_camera.position.y = 50.0f;  // in the middle of a group
-  const Measurement measurement = measure(setup_, catgs_, 0, no_report);
+  const Measurement measurement = measure(setup_, paper_, 0, no_report);
   EXPECT_EQ(measurement.frames[8].stats.kind, FrameKind::sub);
   EXPECT_EQ(measurement.frames[9].stats.kind, FrameKind::key);
   EXPECT_GE(measurement.windows_cut(), 1u);
 }
 
 TEST_F(BenchParts, JudgeFindsTheKnownErrors) {
-  const QualityReport quality = judge(setup_, catgs_, 1, no_report);
+  const QualityReport quality = judge(setup_, paper_, 1, no_report);
   EXPECT_EQ(quality.key.frames(), 7u);
   EXPECT_EQ(quality.sub.frames(), 16u);
   EXPECT_NEAR(quality.key.mean_psnr(), -20.0 * std::log10(key_error), 0.01);
@@ -137,8 +137,8 @@ TEST_F(BenchParts, JudgeFindsTheKnownErrors) {
 }
 
 TEST_F(BenchParts, TheWorstFramesAreKeptAndWritten) {
-  catgs_.speculation.initial_window = 2;
-  const QualityReport quality = judge(setup_, catgs_, 1, no_report);
+  paper_.speculation.initial_window = 2;
+  const QualityReport quality = judge(setup_, paper_, 1, no_report);
   EXPECT_EQ(quality.worst_sub.frame.number, quality.sub.worst_frame());
   EXPECT_EQ(quality.worst_sub.block.number, quality.sub.worst_block_frame());
   EXPECT_NEAR(quality.worst_sub.frame.judged.rgb[5] - quality.worst_sub.frame.truth.rgb[5],
@@ -158,7 +158,7 @@ TEST_F(BenchParts, TheWorstFramesAreKeptAndWritten) {
 }
 
 TEST_F(BenchParts, JudgeTakesEveryNthFrameAndSwitch) {
-  const QualityReport quality = judge(setup_, catgs_, 3, no_report);
+  const QualityReport quality = judge(setup_, paper_, 3, no_report);
   EXPECT_EQ(quality.key.frames() + quality.sub.frames(), 8u);
   EXPECT_EQ(quality.pop.count, 2u);
 }
@@ -172,7 +172,7 @@ TEST_F(BenchParts, ForecastsKnowOnlyThePast) {
       setup_.samples.push_back(at_x(i * 40'000, i < 15 ? x : x + turning_point));
     }
     setup_.poses = resample(setup_.samples, 100.0);
-    FrameFeed feed(setup_, catgs_);
+    FrameFeed feed(setup_, paper_);
     std::vector<std::optional<Forecast>> all;
     for (std::size_t i = 0; i < setup_.poses.size(); ++i) all.push_back(feed.next().forecast);
     return all;
@@ -196,9 +196,9 @@ TEST_F(BenchParts, ForecastsAreMadeAsTheSetupSays) {
   for (std::size_t i = 0; i < setup_.samples.size(); ++i) {
     setup_.samples[i].world_from_camera.position.x = i % 2 == 0 ? 0.01f : 0.0f;
   }
-  catgs_.speculation.initial_window = 16;
+  paper_.speculation.initial_window = 16;
   const auto last_frames = [&] {
-    FrameFeed feed(setup_, catgs_);
+    FrameFeed feed(setup_, paper_);
     std::optional<Forecast> last;
     for (std::size_t i = 0; i < setup_.poses.size(); ++i) last = feed.next().forecast;
     return last ? last->frames : -1;

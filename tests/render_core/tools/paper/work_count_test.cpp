@@ -63,8 +63,9 @@ TEST(WorkCount, AgreesWithTheCpuCore) {
       const double slack = 5.0 + share * static_cast<double>(core);
       EXPECT_NEAR(static_cast<double>(counted), static_cast<double>(core), slack) << scene.name;
     };
-    // The core's slack adds under 0.2 %, and more where everything is smaller than a pixel.
-    near(count.list_entries, frame.stats.list_entries, scene.name == "many" ? 0.002 : 0.05);
+    // The core lists boxes in one row or column of tiles untested, which adds under 0.4 %, and more
+    // for needles. Its slack adds more where everything is smaller than a pixel.
+    near(count.list_entries, frame.stats.list_entries, scene.name == "many" ? 0.004 : 0.1);
     near(count.blended_pairs, frame.stats.blended_pairs, 0.001);
     EXPECT_LE(count.reached_entries, count.list_entries) << scene.name;
     EXPECT_GE(32 * count.warp_evaluations, count.blended_pairs) << scene.name;

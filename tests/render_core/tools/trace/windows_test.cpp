@@ -59,7 +59,7 @@ TEST_F(TraceWindows, FollowThePapersRule) {
 
 TEST_F(TraceWindows, AreLongerForWhatIsFarAway) {
   const auto outcome = test::run("--quiet trace windows --trace " + path("glide.tum") +
-                                 " --fps 60 --depths 10 20 --json -");
+                                 " --fps 60 --nearest-depth 10 --json -");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
   const auto rows = nlohmann::json::parse(outcome.out).at("table").at("rows");
   EXPECT_NEAR(rows.at("The paper's rule").at("60 Hz").get<double>(), 5.0, 0.05);
@@ -75,7 +75,7 @@ TEST_F(TraceWindows, NameMistakes) {
   expect(path("glide.tum") + " --variant '--pipeline exact'", "selects another pipeline");
   expect(path("glide.tum") + " --window 99", "--window: is out of range");
   expect(path("glide.tum") + " --fps 0", "--fps");
-  expect(path("glide.tum") + " --depths 2 1", "--depths: the nearest");
+  expect(path("glide.tum") + " --nearest-depth 0", "--nearest-depth");
   expect(path("glide.tum") + " --size 12", "--size: \"12\" is not a picture size");
 }
 
