@@ -5,8 +5,8 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/cuda/device_buffer.h"
-#include "render_core/cuda/packed_gaussian.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/packed_gaussian.h"
 
 namespace catgs::cuda {
 

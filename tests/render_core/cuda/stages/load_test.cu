@@ -3,7 +3,7 @@
 #include "render_core/cuda/shade.cuh"
 #include "render_core/math/camera-inl.h"
 #include "tests/render_core/cuda/stages/stage.h"
-#include "tests/render_core/cuda/unpack.h"
+#include "tests/render_core/scene/unpack.h"
 
 namespace catgs::cuda::stages {
 namespace {
@@ -24,7 +24,7 @@ __global__ void load_all(SceneArrays scene, math::Vec3<float> from, Loaded* out)
 }
 
 /// The colour seen from `from`, in double precision from the packed harmonics.
-glm::dvec3 colour_of(const test::Unpacked& gaussian, int sh_degree, const glm::dvec3& from) {
+glm::dvec3 colour_of(const catgs::test::Unpacked& gaussian, int sh_degree, const glm::dvec3& from) {
   const PackedGeometry& g = gaussian.geometry;
   double basis[16] = {};
   math::sh_basis(
@@ -58,10 +58,10 @@ TEST_F(LoadStage, KernelsReadWhatWasPacked) {
     const auto units = fetch(arrays.units, arrays.cluster_count);
     for (std::uint32_t i = 0; i < arrays.count; ++i) {
       const std::size_t cluster = i / cluster_size;
-      const test::Unpacked expected =
-          test::unpack(std::span(blocks).subspan(cluster * packed_block_bytes(degree),
-                                                 packed_block_bytes(degree)),
-                       units[cluster], degree, static_cast<std::uint32_t>(i % cluster_size));
+      const catgs::test::Unpacked expected =
+          catgs::test::unpack(std::span(blocks).subspan(cluster * packed_block_bytes(degree),
+                                                        packed_block_bytes(degree)),
+                              units[cluster], degree, static_cast<std::uint32_t>(i % cluster_size));
       const math::Vec3<float>& at = loaded[i].centre.mean;
       const glm::vec3& original = cloud.mean[scene.order[i]];
       for (const float d : {at.x - original.x, at.y - original.y, at.z - original.z}) mean.add(d);

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "render_core/cuda/packed_gaussian.h"
+#include "render_core/scene/packed_gaussian.h"
 
-namespace catgs::cuda::test {
+namespace catgs::test {
 
 struct Unpacked {
   PackedGeometry geometry;
@@ -39,4 +39,4 @@ inline Unpacked unpack(std::span<const std::byte> block, const PackedUnits& unit
   return out;
 }
 
-}  // namespace catgs::cuda::test
+}  // namespace catgs::test

@@ -16,10 +16,10 @@
 #include "render_core/scene/clusters.h"
 #include "render_core/scene/gaussian_cloud.h"
 
-namespace catgs::cuda {
+namespace catgs {
 
-// How the CUDA core stores Gaussians: 77 bytes each with harmonics of degree 3, where plain floats
-// take 236.
+// How the CUDA core and the pages of a tree store Gaussians: 77 bytes each with harmonics of degree
+// 3, where plain floats take 236.
 //
 // A Gaussian is a record: geometry and base colour, then a byte for every higher harmonic. A block
 // holds the records of a cluster plane by plane: the first 16 bytes of all records, the next 16 of
@@ -125,4 +125,25 @@ struct PackedCluster {
 PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
                            std::span<std::byte> block);
 
-}  // namespace catgs::cuda
+/// The same with the covariance factor of each member. The cloud's rotations and scales are not
+/// read.
+PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
+                           std::span<const math::CovarianceFactor<double>> factors,
+                           std::span<std::byte> block);
+
+/// Writes the first `count` Gaussians of a block to the cloud, from index `first` on, and their
+/// factors to `factors`, which has `count` entries. The cloud has room for them and the block's
+/// degree. Its rotations and scales stay as they are; see axes_of().
+void unpack_cluster(std::span<const std::byte> block, const PackedUnits& units, std::size_t count,
+                    GaussianCloud& cloud, std::size_t first,
+                    std::span<math::CovarianceFactor<double>> factors);
+
+/// Rotation and scale with R diag(scale^2) R^T = L L^T, by one-sided Jacobi rotations of L's
+/// columns (Demmel, Veselic 1992).
+struct GaussianAxes {
+  glm::quat rotation;
+  glm::vec3 scale;
+};
+GaussianAxes axes_of(const math::CovarianceFactor<double>& factor);
+
+}  // namespace catgs

@@ -1,6 +1,6 @@
 // What the CUDA core's layout keeps of a scene, on the CPU.
 
-#include "render_core/cuda/packed_gaussian.h"
+#include "render_core/scene/packed_gaussian.h"
 
 #include <algorithm>
 #include <array>
@@ -9,13 +9,15 @@
 #include <numeric>
 #include <vector>
 
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
 #include <gtest/gtest.h>
 
 #include "render_core/math/ellipse-inl.h"
-#include "tests/render_core/cuda/unpack.h"
+#include "tests/render_core/scene/unpack.h"
 #include "tests/support/test_scenes.h"
 
-namespace catgs::cuda {
+namespace catgs {
 namespace {
 
 class PackedScene {
@@ -207,5 +209,60 @@ TEST(PackedGaussian, BoundsHoldForWhatIsPacked) {
   }
 }
 
+// Needles, flakes and balls. The factor of a flake that a world axis crosses at right angles is not
+// unique within rounding, its covariance is.
+TEST(PackedGaussian, UnpacksToTheGaussiansOfTheRecords) {
+  for (const int degree : {0, 3}) {
+    SCOPED_TRACE(degree);
+    GaussianCloud cloud = catgs::test::random_cloud(200, degree, 12);
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      cloud.scale[i] *= glm::vec3(1.0f, i % 2 ? 1e-4f : 1.0f, i % 3 ? 1e-3f : 1.0f);
+    std::vector<std::uint32_t> all(cloud.size());
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<std::byte> block(packed_block_bytes(degree));
+    const PackedCluster packed = pack_cluster(cloud, all, block);
+
+    GaussianCloud read;
+    read.resize(cloud.size(), degree);
+    std::vector<math::CovarianceFactor<double>> factors(cloud.size());
+    unpack_cluster(block, packed.units, cloud.size(), read, 0, factors);
+    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+      const test::Unpacked u = test::unpack(block, packed.units, degree, i);
+      EXPECT_EQ(read.mean[i], cloud.mean[i]);
+      EXPECT_EQ(read.opacity[i], std::exp2(unpack_log2_opacity(u.geometry.log2_opacity)));
+      EXPECT_EQ(read.sh_of(i)->g, from_half(u.geometry.base_green));
+      for (int k = 3; k < 3 * read.sh_count(); ++k)
+        EXPECT_EQ(read.sh_of(i)[k / 3][k % 3], u.sh[static_cast<std::size_t>(k - 3)]);
+      EXPECT_EQ(factors[i].zx, u.factor.zx);
+
+      const auto [rotation, scale] = axes_of(factors[i]);
+      EXPECT_NEAR(glm::length(rotation), 1.0f, 1e-6f);
+      const auto& l = factors[i];
+      const glm::dmat3 root(l.xx, l.yx, l.zx, 0, l.yy, l.zy, 0, 0, l.zz);
+      const glm::dmat3 axes(glm::mat3_cast(rotation));
+      const glm::dmat3 scaled(axes[0] * double{scale.x}, axes[1] * double{scale.y},
+                              axes[2] * double{scale.z});
+      const glm::dmat3 difference = scaled * glm::transpose(scaled) - root * glm::transpose(root);
+      const double largest = std::pow(std::max({scale.x, scale.y, scale.z}), 2.0);
+      for (int c = 0; c < 3; ++c)
+        EXPECT_LT(glm::length(difference[c]), 2e-6 * largest) << "Gaussian " << i;
+    }
+  }
+}
+
+TEST(PackedGaussian, AxesOfFlatFactorsAreAxes) {
+  for (const math::CovarianceFactor<double>& l : {math::CovarianceFactor<double>{0, 0, 0, 0, 0, 0},
+                                                  {2, 0, 0, 0, 0, 0},
+                                                  {0, 0, 3, 0, 0, 0},
+                                                  {1, 1, 0, 1, 0, 0},
+                                                  {0, 0, 0, 0, 0, 1e-12}}) {
+    const auto [rotation, scale] = axes_of(l);
+    EXPECT_NEAR(glm::length(rotation), 1.0f, 1e-6f);
+    EXPECT_NEAR(glm::length(glm::dvec3(scale)),
+                std::sqrt(l.xx * l.xx + l.yx * l.yx + l.yy * l.yy + l.zx * l.zx + l.zz * l.zz),
+                1e-6);
+  }
+}
+
 }  // namespace
-}  // namespace catgs::cuda
+}  // namespace catgs

@@ -1,4 +1,4 @@
-#include "render_core/cuda/packed_gaussian.h"
+#include "render_core/scene/packed_gaussian.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,14 @@
 #include <cstring>
 #include <limits>
 
-namespace catgs::cuda {
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+
+#include "render_core/math/constants.h"
+#include "render_core/scene/activations.h"
+
+namespace catgs {
 namespace {
 
 constexpr float sh_levels = 127.0f;  // on either side of zero
@@ -102,11 +109,17 @@ void add_to(ClusterBounds& bounds, const PackedGeometry& g, float unit) {
 
 PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
                            std::span<std::byte> block) {
-  assert(!members.empty() && members.size() <= cluster_size);
-  assert(block.size() == packed_block_bytes(cloud.sh_degree));
+  assert(members.size() <= cluster_size);
   std::array<Factor, cluster_size> factors;
   for (std::size_t j = 0; j < members.size(); ++j) factors[j] = factor_of(cloud, members[j]);
-  const PackedUnits units = units_for(cloud, members, std::span(factors).first(members.size()));
+  return pack_cluster(cloud, members, std::span(factors).first(members.size()), block);
+}
+
+PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
+                           std::span<const Factor> factors, std::span<std::byte> block) {
+  assert(!members.empty() && members.size() <= cluster_size && factors.size() == members.size());
+  assert(block.size() == packed_block_bytes(cloud.sh_degree));
+  const PackedUnits units = units_for(cloud, members, factors);
 
   const int degree = cloud.sh_degree, record_bytes = packed_record_bytes(degree);
   std::array<std::byte, packed_record_bytes(max_sh_degree)> record;
@@ -131,4 +144,74 @@ PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint
   return {units, bounds.cluster()};
 }
 
-}  // namespace catgs::cuda
+void unpack_cluster(std::span<const std::byte> block, const PackedUnits& units, std::size_t count,
+                    GaussianCloud& cloud, std::size_t first, std::span<Factor> factors) {
+  assert(count <= cluster_size && factors.size() == count && first + count <= cloud.size());
+  const int degree = cloud.sh_degree, record_bytes = packed_record_bytes(degree);
+  assert(block.size() == packed_block_bytes(degree));
+  std::array<std::byte, packed_record_bytes(max_sh_degree)> record;
+  for (std::size_t j = 0; j < count; ++j) {
+    for (int at = 0; at < record_bytes;) {
+      const int width = packed_plane_width(degree, at);
+      std::memcpy(&record[at], &block[packed_offset(at, width, static_cast<std::uint32_t>(j))],
+                  static_cast<std::size_t>(width));
+      at += width;
+    }
+    PackedGeometry g;
+    std::memcpy(&g, record.data(), sizeof(g));
+    const auto l = unpack_factor(g.factor, units.factor);
+    factors[j] = {l.xx, l.yx, l.yy, l.zx, l.zy, l.zz};
+    cloud.mean[first + j] = {g.mean[0], g.mean[1], g.mean[2]};
+    // Rounding may have left the ends of the range that sanitize() allows.
+    cloud.opacity[first + j] = std::clamp(std::exp2(unpack_log2_opacity(g.log2_opacity)),
+                                          static_cast<float>(alpha_min), max_opacity);
+    glm::vec3* sh = cloud.sh.data() + (first + j) * cloud.sh_count();
+    sh[0] = {from_half(g.base_red), from_half(g.base_green), from_half(g.base_blue)};
+    for (int b = 0; b < packed_sh_bytes(degree); ++b) {
+      const int k = 1 + b / 3;
+      sh[k][b % 3] = packed_sh(std::to_integer<std::uint32_t>(record[sizeof(g) + b]), 0) *
+                     units.sh[sh_degree_of(k) - 1];
+    }
+  }
+}
+
+GaussianAxes axes_of(const Factor& l) {
+  glm::dmat3 columns(l.xx, l.yx, l.zx, 0.0, l.yy, l.zy, 0.0, 0.0, l.zz);
+  constexpr int most_sweeps = 12;  // convergence is quadratic
+  for (int sweep = 0, turned = 1; turned > 0 && sweep < most_sweeps; ++sweep) {
+    turned = 0;
+    for (int p = 0; p < 2; ++p)
+      for (int q = p + 1; q < 3; ++q) {
+        const glm::dvec3 a = columns[p], b = columns[q];
+        const double aa = glm::dot(a, a), bb = glm::dot(b, b), ab = glm::dot(a, b);
+        if (std::abs(ab) <= 1e-15 * std::sqrt(aa * bb)) continue;
+        ++turned;
+        const double cotangent = (bb - aa) / (2.0 * ab);  // of twice the angle
+        const double t = std::copysign(1.0, cotangent) /
+                         (std::abs(cotangent) + std::sqrt(1.0 + cotangent * cotangent));
+        const double c = 1.0 / std::sqrt(1.0 + t * t);
+        columns[p] = c * (a - t * b);
+        columns[q] = c * (b + t * a);
+      }
+  }
+  const glm::dvec3 scale(glm::length(columns[0]), glm::length(columns[1]), glm::length(columns[2]));
+  // A column without length gets the direction that the longer ones leave.
+  int order[3] = {0, 1, 2};
+  std::sort(order, order + 3, [&](int a, int b) { return scale[a] > scale[b]; });
+  glm::dmat3 axes(1.0);
+  if (scale[order[0]] > 0.0) {
+    const glm::dvec3 first = columns[order[0]] / scale[order[0]];
+    glm::dvec3 second = columns[order[1]] - first * glm::dot(first, columns[order[1]]);
+    if (glm::dot(second, second) == 0.0) {
+      const glm::dvec3 off = std::abs(first.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+      second = glm::cross(first, off);
+    }
+    axes[order[0]] = first;
+    axes[order[1]] = glm::normalize(second);
+    axes[order[2]] = glm::cross(axes[order[0]], axes[order[1]]);
+    if (glm::determinant(axes) < 0.0) axes[order[2]] = -axes[order[2]];
+  }
+  return {glm::normalize(glm::quat(glm::quat_cast(axes))), glm::vec3(scale)};
+}
+
+}  // namespace catgs
