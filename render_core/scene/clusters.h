@@ -24,8 +24,20 @@ constexpr std::size_t clusters_of(std::size_t gaussians) {
   return (gaussians + cluster_size - 1) / cluster_size;
 }
 
-/// Indices of places along a Morton curve; equal codes keep their order. Applied to a cloud's
-/// means, cluster c is the run of indices that starts at c * cluster_size.
+/// A Morton curve through a box of 2^21 cells on each axis.
+class MortonCurve {
+ public:
+  /// `low` and `high`: the ends of the box.
+  MortonCurve(const glm::vec3& low, const glm::vec3& high);
+  /// Place along the curve, 63 bits, of a place in the box.
+  [[nodiscard]] std::uint64_t code(const glm::vec3& place) const;
+
+ private:
+  glm::dvec3 low_, cells_per_unit_;
+};
+
+/// Indices of places along the Morton curve of their box; equal codes keep their order. Applied to
+/// a cloud's means, cluster c is the run of indices that starts at c * cluster_size.
 std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> places, ThreadPool& pool);
 
 /// Bounds of a cluster for culling.

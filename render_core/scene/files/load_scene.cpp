@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -22,6 +23,7 @@
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/tree/read_tree.h"
 
 namespace catgs {
 
@@ -30,6 +32,7 @@ namespace {
 struct Decoded {
   std::string format;
   GaussianCloud cloud;
+  std::vector<std::string> notes{};
 };
 
 Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
@@ -50,6 +53,10 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
   if (begins == "PK\x03\x04") {
     SogFile sog = read_sog(ZipFiles(file), "meta.json", context);
     return {fmt::format("sog v{} (zip)", sog.version), std::move(sog.cloud)};
+  }
+  if (is_tree(file)) {
+    TreeScene tree = read_tree(std::make_unique<FileSource>(path), context);
+    return {"tree", std::move(tree.cloud), std::move(tree.notes)};
   }
   if (is_spz(file)) {
     SpzFile spz = read_spz(file, context);
@@ -87,6 +94,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   Decoded decoded = read_location(location, options, context.part(0.0, 0.9));
   scene.format = std::move(decoded.format);
   scene.cloud = std::move(decoded.cloud);
+  scene.notes = std::move(decoded.notes);
   scene.report = sanitize(scene.cloud, context.part(0.9, 1.0));
   if (scene.cloud.empty())
     throw InputError(path.string(), "",

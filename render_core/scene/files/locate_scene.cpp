@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view iteration_prefix = "iteration_";
-constexpr std::array scene_extensions = {".ply", ".splat", ".spz", ".sog"};
+constexpr std::array scene_extensions = {".ply", ".splat", ".spz", ".sog", ".tree"};
 
 std::optional<std::uint64_t> iteration_number(const fs::path& folder) {
   const std::string name = folder.filename().string();

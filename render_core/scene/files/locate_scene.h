@@ -10,9 +10,8 @@ namespace catgs {
 
 /// For error messages.
 inline constexpr std::string_view supported_scenes =
-    "supported: .ply (3DGS or compressed), .splat, .spz, .sog, a folder with lod-meta.json "
-    "(streamed "
-    "SOG) or meta.json (SOG), a training output folder";
+    "supported: .ply (3DGS or compressed), .splat, .spz, .sog, .tree, a folder with lod-meta.json "
+    "(streamed SOG) or meta.json (SOG), a training output folder";
 
 /// The scene that a path given by a user names.
 struct SceneLocation {

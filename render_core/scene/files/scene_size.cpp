@@ -14,6 +14,7 @@
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/streamed_sog.h"
+#include "render_core/scene/tree/tree_file.h"
 
 namespace catgs {
 
@@ -49,6 +50,10 @@ SceneSize size_of_file(const std::filesystem::path& path) {
   const std::string_view begins(start.data(), start.size());
   if (begins.starts_with("ply")) return size_of_ply(file);
   if (begins == "PK\x03\x04") return size_of_sog(ZipFiles(file, "meta.json"));
+  if (is_tree(file)) {
+    const TreeHeader header = read_tree_header(file);
+    return {header.gaussians, static_cast<int>(header.sh_degree)};
+  }
   if (is_spz(file)) {
     const SpzSize size = read_spz_size(file);
     return {size.count, size.sh_degree};

@@ -5,6 +5,7 @@
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/render_core/scene/tree/tree_test_support.h"
 
 namespace catgs::test {
 namespace {
@@ -25,12 +26,14 @@ class SceneSizeTest : public FolderTest {
 };
 
 TEST_F(SceneSizeTest, IsThatOfTheLoadedScene) {
+  ThreadPool pool(1);
   for (const int degree : {0, 3}) {
     const GaussianCloud cloud = random_cloud(300, degree);
     expect_as_loaded("a.ply", ply_bytes(cloud));
     expect_as_loaded("b.ply", encode_compressed_ply(cloud, true));
     for (const int version : {1, 2, 3, 4})
       expect_as_loaded("c.spz", encode_spz(cloud, {.version = version}));
+    expect_as_loaded("g.tree", tree_bytes(cloud, pool));
     expect_as_loaded("d.sog", zip(encode_sog(cloud, 2), true));
   }
   expect_as_loaded("e.splat", std::string(32 * 7, '\x40'));

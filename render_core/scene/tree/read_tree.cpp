@@ -1,0 +1,88 @@
+#include "render_core/scene/tree/read_tree.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/format_limits.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::size_t nodes_at_a_time = 8;
+constexpr float least_scale = 1e-10f;  // as in sanitize()
+
+void read_node(const TreePage& page, std::size_t slot, GaussianCloud& cloud, std::size_t first) {
+  const NodeFacts& facts = page.facts(slot);
+  std::vector<math::CovarianceFactor<double>> factors(facts.count);
+  unpack_cluster(page.block(slot), facts.units, facts.count, cloud, first, factors);
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    const GaussianAxes axes = axes_of(factors[i]);
+    cloud.rotation[first + i] = axes.rotation;
+    cloud.scale[first + i] = glm::max(axes.scale, least_scale);
+  }
+}
+
+std::shared_ptr<const TreePage> page_of(TreeFile& tree, NodeId node) {
+  const auto page = tree.page(tree.shape().page_of(node));
+  if (!page) throw InputError("", "", tree.damage().first);
+  return page;
+}
+
+}  // namespace
+
+GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes,
+                         const LoadContext& context) {
+  const TreeShape& shape = tree.shape();
+  std::vector<std::size_t> first(nodes.size() + 1, 0);
+  context.part(0.0, 0.5).for_blocks(nodes.size(), nodes_at_a_time, [&](auto begin, auto end) {
+    for (std::size_t n = begin; n < end; ++n)
+      first[n + 1] = page_of(tree, nodes[n])->facts(shape.slot_of(nodes[n])).count;
+  });
+  for (std::size_t n = 0; n < nodes.size(); ++n) first[n + 1] += first[n];
+  GaussianCloud cloud;
+  cloud.resize(first.back(), shape.sh_degree());
+  context.part(0.5, 1.0).for_blocks(nodes.size(), nodes_at_a_time, [&](auto begin, auto end) {
+    for (std::size_t n = begin; n < end; ++n)
+      read_node(*page_of(tree, nodes[n]), shape.slot_of(nodes[n]), cloud, first[n]);
+  });
+  return cloud;
+}
+
+TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context) {
+  constexpr std::size_t memory_bytes = std::size_t{64} << 20;
+  const std::string name = file->name();
+  TreeFile tree(std::move(file), memory_bytes);
+  const TreeShape& shape = tree.shape();
+  if (shape.gaussians() > max_gaussians)
+    throw InputError(name, "",
+                     fmt::format("has {} Gaussians, at most {} are loaded at once",
+                                 shape.gaussians(), max_gaussians),
+                     "split the scene before it is converted");
+
+  // Without cameras no facts are looked at, only whether a page is there.
+  std::vector<char> sound(shape.pages());
+  context.part(0.0, 0.4).for_blocks(
+      tree.pages_in_file(), 1, [&](auto page, auto) { sound[page] = tree.page(page) != nullptr; });
+  const std::vector<NodeFacts> unseen(shape.slots());
+  const Cut all = choose_cut(
+      shape, {}, 0.0f, [&](std::uint64_t page) { return sound[page] ? unseen.data() : nullptr; });
+  const std::string first = tree.damage().first;
+  if (all.drawn.empty())
+    throw InputError(name, "page 0", "is damaged or missing, and nothing can be seen without it",
+                     "convert the scene again");
+  TreeScene scene;
+  scene.cloud = read_nodes(tree, all.drawn, context.part(0.4, 1.0));
+  if (const auto lost = std::ranges::count(sound, 0); lost > 0)
+    scene.notes.push_back(
+        fmt::format("{} of {} pages are damaged or missing and show less detail{}{}", lost,
+                    shape.pages(), first.empty() ? "" : "; the first: ", first));
+  return scene;
+}
+
+}  // namespace catgs

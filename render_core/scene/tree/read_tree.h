@@ -1,0 +1,28 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/tree/cut.h"
+#include "render_core/scene/tree/tree_file.h"
+
+namespace catgs {
+
+/// The Gaussians of nodes, in their order, as packed. Rotations and scales are the axes of the
+/// packed covariances. Throws InputError if a page is damaged.
+GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes, const LoadContext& context);
+
+/// A tree as a scene: all its leaves. Where pages are damaged or missing, the finest nodes that
+/// stand for their leaves are taken, and a note says so. Throws InputError when the header is
+/// wrong, no page is left, or there are more than max_gaussians.
+struct TreeScene {
+  GaussianCloud cloud;
+  std::vector<std::string> notes;  // for people
+};
+TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context);
+
+}  // namespace catgs

@@ -1,0 +1,127 @@
+#include "render_core/scene/tree/tree_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include "render_core/base/error.h"
+
+namespace catgs {
+namespace {
+
+void check_levels(const ByteSource& file, const TreeHeader& header) {
+  const TreeShape shape(header.gaussians, static_cast<int>(header.sh_degree));
+  for (int l = 0; l < shape.levels(); ++l) {
+    const TreeLevel& level = header.levels[static_cast<std::size_t>(l)];
+    const std::uint64_t nodes = shape.nodes_on(l);
+    if (level.gaussians < nodes || level.gaussians > nodes * cluster_size ||
+        !(level.mean_error >= 0.0f && level.mean_error <= level.max_error) ||
+        !std::isfinite(level.max_error))
+      throw InputError(file.name(), fmt::format("level {}", l), "is out of range");
+  }
+  if (header.levels[0].gaussians != header.gaussians)
+    throw InputError(file.name(), "level 0", "has another number of Gaussians than the tree");
+}
+
+}  // namespace
+
+std::uint32_t TreeHeader::right_checksum() const {
+  return static_cast<std::uint32_t>(
+      crc32(0, reinterpret_cast<const Bytef*>(this), offsetof(TreeHeader, checksum)));
+}
+
+bool is_tree(const ByteSource& file) {
+  std::array<char, 8> magic{};
+  if (file.size() < magic.size()) return false;
+  file.read(0, std::as_writable_bytes(std::span(magic)));
+  return magic == TreeHeader::right_magic;
+}
+
+TreeHeader read_tree_header(const ByteSource& file) {
+  TreeHeader header;
+  file.read(0, std::as_writable_bytes(std::span(&header, 1)));
+  const auto refuse = [&](std::string_view field, const std::string& what,
+                          std::string_view remedy) {
+    throw InputError(file.name(), field, what, remedy);
+  };
+  constexpr std::string_view damaged = "the file is damaged: convert the scene again";
+  if (header.magic != TreeHeader::right_magic) refuse("magic", "is not that of a tree", "");
+  if (header.version != TreeHeader::right_version)
+    refuse("version",
+           fmt::format("{} where {} is known", header.version, TreeHeader::right_version),
+           "convert the scene again with this program");
+  if (header.checksum != header.right_checksum())
+    refuse("header", "its checksum is wrong", damaged);
+  if (header.sh_degree > static_cast<std::uint32_t>(max_sh_degree))
+    refuse("SH degree", fmt::format("{} is not in 0 to 3", header.sh_degree), damaged);
+  if (header.gaussians == 0 || header.gaussians > TreeShape::max_gaussians)
+    refuse("Gaussians",
+           fmt::format("{} is not in 1 to {}", header.gaussians, TreeShape::max_gaussians),
+           damaged);
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(header.low[axis] >= -max_coordinate && header.low[axis] <= header.high[axis] &&
+          header.high[axis] <= max_coordinate))
+      refuse("bounds", "are out of range", damaged);
+  if (header.dropped > header.read || header.read - header.dropped != header.gaussians)
+    refuse("Gaussians read and dropped", "do not make the number of Gaussians", damaged);
+  if (header.source.back() != '\0') refuse("source", "has no end", damaged);
+  check_levels(file, header);
+  return header;
+}
+
+TreeFile::TreeFile(std::unique_ptr<const ByteSource> file, std::size_t memory_bytes)
+    : file_(std::move(file)),
+      header_(read_tree_header(*file_)),
+      shape_(header_.gaussians, static_cast<int>(header_.sh_degree)),
+      most_pages_(std::max<std::size_t>(1, memory_bytes / shape_.page_bytes())) {}
+
+std::uint64_t TreeFile::pages_in_file() const {
+  const std::uint64_t size = std::max<std::uint64_t>(file_->size(), TreeShape::header_bytes);
+  return std::min(shape_.pages(), (size - TreeShape::header_bytes) / shape_.page_bytes());
+}
+
+std::shared_ptr<const TreePage> TreeFile::page(std::uint64_t number) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = by_number_.find(number); found != by_number_.end()) {
+      held_.splice(held_.begin(), held_, found->second);
+      return found->second->page;
+    }
+  }
+  // Two threads may read the same page; the second one's copy is dropped.
+  std::shared_ptr<const TreePage> page = read(number);
+  const std::lock_guard lock(mutex_);
+  if (const auto found = by_number_.find(number); found != by_number_.end())
+    return found->second->page;
+  held_.push_front({number, page});
+  by_number_[number] = held_.begin();
+  if (held_.size() > most_pages_) {
+    by_number_.erase(held_.back().number);
+    held_.pop_back();
+  }
+  return page;
+}
+
+std::shared_ptr<const TreePage> TreeFile::read(std::uint64_t number) {
+  try {
+    auto page = std::make_shared<TreePage>(shape_);
+    file_->read(shape_.page_offset(number), page->bytes());
+    page->check(number, file_->name());
+    return page;
+  } catch (const InputError& e) {
+    const std::lock_guard lock(mutex_);
+    if (damage_.pages++ == 0) damage_.first = e.what();
+    return nullptr;
+  }
+}
+
+TreeFile::Damage TreeFile::damage() const {
+  const std::lock_guard lock(mutex_);
+  return damage_;
+}
+
+}  // namespace catgs

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/scene.h"
+#include "render_core/scene/tree/tree_page.h"
+
+namespace catgs {
+
+/// What a tree knows of one of its levels.
+struct TreeLevel {
+  std::uint64_t gaussians = 0;
+  float mean_error = 0.0f, max_error = 0.0f;  // of its nodes, world units
+};
+
+/// The first bytes of a .tree file, little-endian; pages follow at byte 4096 (TreeShape).
+struct TreeHeader {
+  static constexpr std::array<char, 8> right_magic = {'c', 'a', 't', 'g', 's', 't', 'r', 'e'};
+  static constexpr std::uint32_t right_version = 1;
+  static constexpr std::size_t most_levels = 27;
+
+  std::array<char, 8> magic = right_magic;
+  std::uint32_t version = right_version;
+  std::uint32_t sh_degree = 0;
+  std::uint64_t gaussians = 0;                  // of the leaves
+  glm::vec3 low{0.0f}, high{0.0f};              // ends of the box of their means
+  std::uint64_t read = 0, dropped = 0;          // SanitizeReport of the scene it was made from
+  std::array<char, 64> source{};                // format of that scene, UTF-8, ends with a zero
+  std::array<TreeLevel, most_levels> levels{};  // leaves first
+  std::uint64_t checksum = 0;                   // CRC-32 of the bytes before it
+
+  [[nodiscard]] std::uint32_t right_checksum() const;
+};
+static_assert(sizeof(TreeHeader) == 568 && sizeof(TreeHeader) <= TreeShape::header_bytes);
+
+/// Whether a file begins like a tree.
+bool is_tree(const ByteSource& file);
+
+/// Reads the header. Throws InputError naming the field that is wrong. Pages may be missing.
+TreeHeader read_tree_header(const ByteSource& file);
+
+/// The pages of a tree in host memory: read when they are asked for, checked as they are read, and
+/// let go in the order of their last use. Thread-safe. Pages are read, not mapped, for the reasons
+/// that ByteSource gives; the system's cache holds what was read lately anyway.
+class TreeFile {
+ public:
+  /// `memory_bytes` bounds the pages held here; those that callers hold count no more. Throws
+  /// InputError as read_tree_header() does.
+  TreeFile(std::unique_ptr<const ByteSource> file, std::size_t memory_bytes);
+
+  [[nodiscard]] const TreeHeader& header() const { return header_; }
+  [[nodiscard]] const TreeShape& shape() const { return shape_; }
+  /// Less than shape().pages() where the file is cut off.
+  [[nodiscard]] std::uint64_t pages_in_file() const;
+
+  /// A page of [0, shape().pages()); null if it is damaged or missing.
+  std::shared_ptr<const TreePage> page(std::uint64_t number);
+
+  struct Damage {
+    std::uint64_t pages = 0;  // that were asked for and could not be used
+    std::string first;        // what was wrong with the first of them
+  };
+  [[nodiscard]] Damage damage() const;
+
+ private:
+  struct Held {
+    std::uint64_t number;
+    std::shared_ptr<const TreePage> page;  // null: damaged
+  };
+  std::shared_ptr<const TreePage> read(std::uint64_t number);
+
+  std::unique_ptr<const ByteSource> file_;
+  TreeHeader header_;
+  TreeShape shape_;
+  std::size_t most_pages_;
+  mutable std::mutex mutex_;
+  std::list<Held> held_;  // latest use first
+  std::unordered_map<std::uint64_t, std::list<Held>::iterator> by_number_;
+  Damage damage_;
+};
+
+}  // namespace catgs

@@ -1,0 +1,180 @@
+#include "render_core/scene/tree/cut.h"
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "render_core/scene/tree/tree_file.h"
+#include "tests/render_core/scene/tree/tree_test_support.h"
+#include "tests/support/test_scenes.h"
+
+namespace catgs::test {
+namespace {
+
+/// A tree in memory of which some pages are resident.
+class SomePages {
+ public:
+  SomePages(std::size_t gaussians, int degree, std::uint64_t seed)
+      : file_(source_of(tree_bytes(random_cloud(gaussians, degree, seed), pool_)),
+              std::size_t{1} << 28),
+        resident_(file_.shape().pages(), true) {
+    for (std::uint64_t p = 0; p < file_.shape().pages(); ++p) pages_.push_back(file_.page(p));
+  }
+
+  [[nodiscard]] const TreeShape& shape() const { return file_.shape(); }
+  [[nodiscard]] const NodeFacts& facts(NodeId node) const {
+    return pages_[shape().page_of(node)]->facts(shape().slot_of(node));
+  }
+  [[nodiscard]] bool resident(NodeId node) const { return resident_[shape().page_of(node)]; }
+  void keep_some(std::uint64_t seed, double share) {
+    std::mt19937_64 random(seed);
+    for (std::size_t p = 1; p < resident_.size(); ++p)
+      resident_[p] = std::bernoulli_distribution(share)(random);
+  }
+  [[nodiscard]] Cut cut(std::span<const Camera> cameras, float detail_px) const {
+    return choose_cut(shape(), cameras, detail_px, [&](std::uint64_t page) {
+      return resident_[page] ? &pages_[page]->facts(0) : nullptr;
+    });
+  }
+  void drop(std::uint64_t page) { resident_[page] = false; }
+
+ private:
+  ThreadPool pool_{2};
+  TreeFile file_;
+  std::vector<std::shared_ptr<const TreePage>> pages_;
+  std::vector<bool> resident_;
+};
+
+/// The largest error in px over the cameras that may see a node, from the eight corners of its box;
+/// negative: it is outside.
+float brute_error_px(const NodeFacts& facts, std::span<const Camera> cameras) {
+  float largest = -1.0f;
+  for (const Camera& camera : cameras) {
+    if (ClusterCuller(camera).outside(facts.bounds)) continue;
+    const glm::mat3 rotation = camera_from_world_rotation(camera.world_from_camera);
+    float nearest = std::numeric_limits<float>::infinity();
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::vec3 sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+      const glm::vec3 at = facts.bounds.centre + sign * facts.bounds.half_extent;
+      nearest = std::min(nearest, (rotation * (at - camera.world_from_camera.position)).z);
+    }
+    largest = std::max(largest, nearest > camera.near_z ? facts.error * camera.focal_px.x / nearest
+                                                        : std::numeric_limits<float>::infinity());
+  }
+  return largest;
+}
+
+std::vector<NodeId> children_of(const TreeShape& shape, NodeId node) {
+  std::vector<NodeId> children;
+  const auto below = static_cast<std::uint8_t>(node.level - 1);
+  for (const std::uint32_t i : {2 * node.index, 2 * node.index + 1})
+    if (i < shape.nodes_on(below)) children.push_back({below, i});
+  return children;
+}
+
+/// What choose_cut() promises, looked at from each leaf and each drawn node.
+void expect_sound(const SomePages& tree, std::span<const Camera> cameras, float detail_px) {
+  const TreeShape& shape = tree.shape();
+  const Cut cut = tree.cut(cameras, detail_px);
+  std::vector<int> covers(shape.leaves(), 0);
+  std::map<std::uint64_t, float> missing;
+  for (std::size_t i = 0; i < cut.missing.size(); ++i) {
+    ASSERT_TRUE(missing.emplace(cut.missing[i].page, cut.missing[i].error_px).second);
+    if (i > 0) {
+      ASSERT_GE(cut.missing[i - 1].error_px, cut.missing[i].error_px);
+    }
+  }
+  std::size_t expected_missing = 0;
+  std::uint64_t last = 0;
+  for (const NodeId node : cut.drawn) {
+    ASSERT_TRUE(tree.resident(node));
+    const std::uint64_t first = std::uint64_t{node.index} << node.level;
+    ASSERT_GE(first, last) << "not in the order of the leaves";
+    last = first;
+    for (std::uint64_t l = first; l < first + (1ull << node.level) && l < shape.leaves(); ++l)
+      ++covers[l];
+    const float error = brute_error_px(tree.facts(node), cameras);
+    ASSERT_GE(error, 0.0f) << "is outside";
+    if (node.level == 0 || error < 0.999f * detail_px) continue;
+    if (error < 1.001f * detail_px) continue;  // within rounding of the bound
+    std::size_t absent = 0;
+    for (const NodeId child : children_of(shape, node)) {
+      if (tree.resident(child)) continue;
+      ++absent;
+      ASSERT_TRUE(missing.contains(shape.page_of(child)));
+      if (std::isfinite(error)) {
+        ASSERT_NEAR(missing[shape.page_of(child)], error, 1e-3f * error);
+      }
+    }
+    ASSERT_GT(absent, 0u) << "node " << int{node.level} << "." << node.index << " is too coarse";
+    expected_missing += absent;
+  }
+  ASSERT_EQ(missing.size(), expected_missing);
+  for (std::uint32_t l = 0; l < shape.leaves(); ++l) {
+    ASSERT_LE(covers[l], 1);
+    if (covers[l] == 0) {
+      ASSERT_LT(brute_error_px(tree.facts({0, l}), cameras), 0.0f) << "a hole at leaf " << l;
+    }
+  }
+}
+
+std::vector<Camera> cameras_around() {
+  std::vector<Camera> cameras;
+  for (const glm::vec3 from :
+       {glm::vec3(0, 0, -6), glm::vec3(3, 1, 4), glm::vec3(-20, 5, 5), glm::vec3(0, 0, -300)})
+    cameras.push_back(make_camera(look_at(from, {0, 0, 5}), {320, 240}, 200.0f));
+  cameras.push_back(make_camera(look_at({0.5f, 0, 4}, {2, 0, 9}), {320, 240}, 500.0f));
+  return cameras;
+}
+
+TEST(Cut, HasNoHolesAndDrawsNothingTwice) {
+  for (const int degree : {0, 3}) {
+    SomePages tree(60'001, degree, 8 + static_cast<std::uint64_t>(degree));
+    const std::vector<Camera> cameras = cameras_around();
+    for (const double share : {1.0, 0.8, 0.3, 0.0}) {
+      tree.keep_some(static_cast<std::uint64_t>(100.0 * share), share);
+      for (const float detail_px : {0.0f, 0.5f, 2.0f, 30.0f}) {
+        SCOPED_TRACE(testing::Message() << share << " of the pages, " << detail_px << " px");
+        for (std::size_t c = 0; c < cameras.size(); ++c)
+          expect_sound(tree, std::span(cameras).subspan(c, 1), detail_px);
+        expect_sound(tree, cameras, detail_px);  // all at once
+      }
+    }
+  }
+}
+
+TEST(Cut, ZeroDetailIsAllLeaves) {
+  const SomePages tree(20'000, 0, 3);
+  const Camera far = make_camera(look_at({0, 0, -5000}, {0, 0, 5}), {320, 240}, 200.0f);
+  const Cut everything = tree.cut({}, 0.0f), seen = tree.cut(std::span(&far, 1), 0.0f);
+  EXPECT_EQ(everything.drawn.size(), tree.shape().leaves());
+  EXPECT_EQ(seen.drawn, everything.drawn);
+  EXPECT_TRUE(seen.missing.empty());
+}
+
+TEST(Cut, FartherIsCoarser) {
+  const SomePages tree(60'000, 0, 4);
+  std::size_t before = tree.shape().leaves() + 1;
+  for (const float distance : {20.0f, 100.0f, 500.0f, 3000.0f}) {
+    const Camera camera = make_camera(look_at({0, 0, -distance}, {0, 0, 5}), {640, 480}, 400.0f);
+    const std::size_t drawn = tree.cut(std::span(&camera, 1), 1.0f).drawn.size();
+    EXPECT_LT(drawn, before);
+    before = drawn;
+  }
+}
+
+TEST(Cut, WithoutTheRootsPageItIsAskedFor) {
+  SomePages tree(1000, 0, 5);
+  tree.drop(0);
+  const Cut cut = tree.cut({}, 0.0f);
+  EXPECT_TRUE(cut.drawn.empty());
+  ASSERT_EQ(cut.missing.size(), 1u);
+  EXPECT_EQ(cut.missing[0].page, 0u);
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,171 @@
+#include "render_core/scene/tree/tree_file.h"
+
+#include <functional>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/tree/read_tree.h"
+#include "tests/render_core/scene/scene_test_support.h"
+#include "tests/render_core/scene/tree/tree_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// A tree of 40 leaves: the root's page and 3 pages of leaves.
+class TreeFileTest : public ::testing::Test {
+ protected:
+  static constexpr std::size_t gaussians = 40 * cluster_size - 10;
+  TreeFileTest() : bytes_(tree_bytes(random_cloud(gaussians, 0), pool_)), shape_(gaussians, 0) {}
+
+  /// The tree with another header, whose checksum is right.
+  [[nodiscard]] std::string with_header(const std::function<void(TreeHeader&)>& change) const {
+    std::string bytes = bytes_;
+    TreeHeader header;
+    std::memcpy(&header, bytes.data(), sizeof header);
+    change(header);
+    header.checksum = header.right_checksum();
+    std::memcpy(bytes.data(), &header, sizeof header);
+    return bytes;
+  }
+  /// The tree with another page, whose checksum is right.
+  [[nodiscard]] std::string with_page(std::uint64_t number,
+                                      const std::function<void(TreePage&)>& change) const {
+    std::string bytes = bytes_;
+    TreePage page(shape_);
+    char* at = bytes.data() + shape_.page_offset(number);
+    std::memcpy(page.bytes().data(), at, page.bytes().size());
+    change(page);
+    page.seal(number);
+    std::memcpy(at, page.bytes().data(), page.bytes().size());
+    return bytes;
+  }
+  static TreeScene read(std::string bytes) {
+    return read_tree(source_of(std::move(bytes)), two_threads());
+  }
+  /// What is said about the page.
+  [[nodiscard]] static std::string fault(std::string bytes, std::uint64_t page) {
+    TreeFile tree(source_of(std::move(bytes)), 1 << 20);
+    EXPECT_EQ(tree.page(page), nullptr);
+    EXPECT_EQ(tree.damage().pages, 1u);
+    return tree.damage().first;
+  }
+
+  ThreadPool pool_{2};
+  std::string bytes_;
+  TreeShape shape_;
+};
+
+TEST_F(TreeFileTest, HeaderFieldsAreChecked) {
+  const auto error = [&](const std::function<void(TreeHeader&)>& change) {
+    return input_error([&] { read_tree_header(*source_of(with_header(change))); });
+  };
+  EXPECT_THAT(error([](auto& h) { h.magic[0] = 'x'; }), HasSubstr("magic"));
+  EXPECT_THAT(error([](auto& h) { h.version = 2; }), AllOf(HasSubstr("version"), HasSubstr("2")));
+  EXPECT_THAT(error([](auto& h) { h.sh_degree = 4; }), AllOf(HasSubstr("degree"), HasSubstr("4")));
+  EXPECT_THAT(error([](auto& h) { h.gaussians = 0; }), HasSubstr("Gaussians"));
+  EXPECT_THAT(error([](auto& h) { h.gaussians = (std::uint64_t{1} << 34) + 1; }),
+              AllOf(HasSubstr("Gaussians"), HasSubstr("17179869184")));
+  EXPECT_THAT(error([](auto& h) { h.low.x = NAN; }), HasSubstr("bounds"));
+  EXPECT_THAT(error([](auto& h) { h.dropped = 1; }), HasSubstr("dropped"));
+  EXPECT_THAT(error([](auto& h) { h.source.fill('x'); }), HasSubstr("source"));
+  EXPECT_THAT(error([](auto& h) { h.levels[1].gaussians = 0; }), HasSubstr("level 1"));
+  EXPECT_THAT(error([](auto& h) { h.levels[2].mean_error = -1.0f; }), HasSubstr("level 2"));
+  EXPECT_THAT(error([](auto& h) { --h.levels[0].gaussians; }), HasSubstr("level 0"));
+
+  std::string flipped = bytes_;
+  flipped[20] ^= 1;
+  EXPECT_THAT(input_error([&] { read_tree_header(*source_of(flipped)); }), HasSubstr("checksum"));
+  EXPECT_THAT(input_error([&] { read_tree_header(*source_of(bytes_.substr(0, 100))); }),
+              HasSubstr("cut off"));
+}
+
+TEST_F(TreeFileTest, ValuesOfPagesAreCheckedThoughTheirChecksumIsRight) {
+  const std::uint64_t leaves = shape_.page_of({0, 0});
+  const std::size_t slot = shape_.slot_of({0, 0});
+  const auto error = [&](const std::function<void(NodeFacts&)>& change) {
+    return fault(with_page(leaves, [&](TreePage& page) { change(page.facts(slot)); }), leaves);
+  };
+  EXPECT_THAT(error([](auto& f) { f.count = 0; }), AllOf(HasSubstr("count"), HasSubstr("0.0")));
+  EXPECT_THAT(error([](auto& f) { f.count = 257; }), HasSubstr("count"));
+  EXPECT_THAT(error([](auto& f) { f.error = NAN; }), HasSubstr("error"));
+  EXPECT_THAT(error([](auto& f) { f.error = 1.0f; }), HasSubstr("error"));
+  EXPECT_THAT(error([](auto& f) { f.bounds.centre.y = INFINITY; }), HasSubstr("bounds"));
+  EXPECT_THAT(error([](auto& f) { f.bounds.half_extent.z *= 0.5f; }), HasSubstr("mean"));
+  EXPECT_THAT(error([](auto& f) { f.bounds.reach = -1.0f; }), HasSubstr("reach"));
+  EXPECT_THAT(error([](auto& f) { f.reserved[2] = 7; }), HasSubstr("reserved"));
+  EXPECT_THAT(error([](auto& f) { f.units.factor *= 1.5f; }), HasSubstr("unit"));
+  EXPECT_THAT(error([](auto& f) { f.units.factor = 0x1p-100f; }), HasSubstr("unit"));
+  EXPECT_THAT(error([](auto& f) { f.units.sh[2] = 1e30f; }), HasSubstr("harmonics"));
+  const auto record = [&](std::uint32_t offset, std::uint16_t bits) {
+    return fault(with_page(leaves,
+                           [&](TreePage& page) {
+                             std::memcpy(&page.block(slot)[offset], &bits, sizeof bits);
+                           }),
+                 leaves);
+  };
+  EXPECT_THAT(record(packed_offset(0, 16, 3) + 2, 0x7fc0), HasSubstr("mean"));  // NaN
+  EXPECT_THAT(record(packed_offset(0, 16, 3) + 14, 0x7c00), HasSubstr("colour"));
+  EXPECT_THAT(record(packed_offset(16, 16, 3) + 14, 0xfc01), HasSubstr("colour"));
+}
+
+TEST_F(TreeFileTest, PagesOfOtherPlacesAreNotTaken) {
+  std::string bytes = bytes_;
+  const auto at = [&](NodeId node) { return shape_.page_offset(shape_.page_of(node)); };
+  bytes.replace(at({0, 0}), shape_.page_bytes(), bytes_, at({0, 16}), shape_.page_bytes());
+  EXPECT_THAT(fault(bytes, shape_.page_of({0, 0})), HasSubstr("checksum"));
+}
+
+TEST_F(TreeFileTest, ADamagedPageCostsDetailAndNoRegion) {
+  std::string bytes = bytes_;
+  const std::uint64_t page = shape_.page_of({0, 20});
+  bytes[shape_.page_offset(page) + 5000] ^= 0x10;
+  const TreeScene scene = read(bytes), whole = read(bytes_);
+  EXPECT_TRUE(whole.notes.empty());
+  ASSERT_EQ(scene.notes.size(), 1u);
+  EXPECT_THAT(scene.notes[0],
+              AllOf(HasSubstr("1 of 4 pages"), HasSubstr("page " + std::to_string(page))));
+  // A node of the root's page stands for the 32 leaves of the page and its neighbour.
+  EXPECT_EQ(whole.cloud.size(), gaussians);
+  EXPECT_EQ(scene.cloud.size(), gaussians - 31 * cluster_size);
+}
+
+TEST_F(TreeFileTest, ACutFileShowsWhatIsLeft) {
+  for (std::uint64_t pages = 1; pages <= shape_.pages(); ++pages) {
+    const TreeScene scene = read(bytes_.substr(0, shape_.page_offset(pages)));
+    EXPECT_EQ(scene.notes.empty(), pages == shape_.pages());
+    EXPECT_FALSE(scene.cloud.empty());
+    EXPECT_EQ(scene.cloud.size() == gaussians, pages == shape_.pages());
+  }
+  EXPECT_THAT(input_error([&] { read(bytes_.substr(0, shape_.page_offset(1) - 1)); }),
+              HasSubstr("page 0"));
+}
+
+TEST_F(TreeFileTest, MoreThanFitIntoASceneAreRefusedBeforeAnythingIsRead) {
+  const std::string bytes = with_header([](TreeHeader& h) {
+    h.gaussians = h.read = std::uint64_t{1} << 33;
+    const TreeShape shape(h.gaussians, 0);
+    for (int l = 0; l < shape.levels(); ++l)
+      h.levels[static_cast<std::size_t>(l)] = {shape.nodes_on(l) * cluster_size, 0.0f, 0.0f};
+  });
+  EXPECT_THAT(input_error([&] { read(bytes); }),
+              AllOf(HasSubstr("8589934592"), HasSubstr("268435456")));
+}
+
+TEST_F(TreeFileTest, MemoryIsBoundedByTheLatestPages) {
+  TreeFile tree(source_of(bytes_), 2 * shape_.page_bytes());
+  const std::weak_ptr<const TreePage> first = tree.page(0), second = tree.page(1);
+  tree.page(0);
+  tree.page(2);
+  EXPECT_FALSE(first.expired());
+  EXPECT_TRUE(second.expired());
+  EXPECT_EQ(tree.damage().pages, 0u);
+}
+
+}  // namespace
+}  // namespace catgs::test

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+
+#include "render_core/scene/tree/build_tree.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+
+/// The bytes of the cloud's tree. `part`: Gaussians of a part.
+inline std::string tree_bytes(const GaussianCloud& cloud, ThreadPool& pool,
+                              std::size_t memory_bytes = std::size_t{1} << 30,
+                              std::size_t part = 1'000'000) {
+  const auto count = static_cast<std::size_t>(cloud.sh_count());
+  const auto each = [&](const std::function<void(const GaussianCloud&)>& take) {
+    for (std::size_t first = 0; first < cloud.size(); first += part) {
+      GaussianCloud some;
+      some.resize(std::min(part, cloud.size() - first), cloud.sh_degree);
+      std::copy_n(&cloud.mean[first], some.size(), some.mean.begin());
+      std::copy_n(&cloud.rotation[first], some.size(), some.rotation.begin());
+      std::copy_n(&cloud.scale[first], some.size(), some.scale.begin());
+      std::copy_n(&cloud.opacity[first], some.size(), some.opacity.begin());
+      std::copy_n(&cloud.sh[first * count], some.sh.size(), some.sh.begin());
+      take(some);
+    }
+  };
+  const TemporaryFolder folder;
+  build_tree({each, "test", {}}, folder / "a.tree", memory_bytes, pool, LoadContext(pool));
+  std::ifstream file(folder / "a.tree", std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// A file in memory that owns its bytes.
+class OwnedSource final : public ByteSource {
+ public:
+  explicit OwnedSource(std::string bytes)
+      : ByteSource("a.tree", bytes.size()), bytes_(std::move(bytes)) {}
+
+ private:
+  void read_in_range(std::uint64_t offset, std::span<std::byte> to) const override {
+    if (!to.empty()) std::memcpy(to.data(), bytes_.data() + offset, to.size());
+  }
+  std::string bytes_;
+};
+
+inline std::unique_ptr<const ByteSource> source_of(std::string bytes) {
+  return std::make_unique<OwnedSource>(std::move(bytes));
+}
+
+}  // namespace catgs::test
