@@ -100,73 +100,133 @@ std::vector<Cell> choose_cells(std::uint64_t seed, const Light& light, double ta
   return chosen;
 }
 
-}  // namespace
+/// A city as parts that can be painted one by one: its cells from the middle outwards, then the
+/// backdrop.
+class City {
+ public:
+  City(std::size_t count, std::uint64_t seed, ThreadPool& pool);
 
-Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
-  const Light light(glm::normalize(glm::vec3(-0.88f, -0.41f, -0.20f)), child(seed, 1));
+  [[nodiscard]] std::size_t parts() const { return cells_.size() + 1; }
+  /// Gaussians of the parts before this one.
+  [[nodiscard]] std::size_t first(std::size_t part) const {
+    return part < parts() ? first_[part] : count_;
+  }
+  /// The Gaussians of the parts [begin, end), in parallel.
+  [[nodiscard]] GaussianCloud paint(std::size_t begin, std::size_t end, ThreadPool& pool) const;
+  [[nodiscard]] SceneHints hints() const;
+
+ private:
+  void paint_cell_at(std::size_t cell, GaussianCloud& cloud, std::size_t to) const;
+  void paint_backdrop(GaussianCloud& cloud, std::size_t to) const;
+
+  std::size_t count_;
+  std::uint64_t seed_;
+  Light light_;
+  std::vector<Cell> cells_;
+  std::vector<std::size_t> first_;  // by part
+  float radius_;
+};
+
+City::City(std::size_t count, std::uint64_t seed, ThreadPool& pool)
+    : count_(count),
+      seed_(seed),
+      light_(glm::normalize(glm::vec3(-0.88f, -0.41f, -0.20f)), child(seed, 1)) {
   const std::size_t reference = std::min(count, full_density_count);
-  const std::size_t backdrop = backdrop_count(count);
-  const std::size_t in_cells = count - backdrop;
+  const std::size_t in_cells = count - backdrop_count(count);
   // Below full density, the area shrinks with the count to the power 3/4, the density by the rest.
   const double fill = std::sqrt(std::sqrt(static_cast<double>(reference) / full_density_count));
   const double target = static_cast<double>(in_cells) / fill;
-  const std::vector<Cell> cells = choose_cells(seed, light, target, pool);
+  cells_ = choose_cells(seed, light_, target, pool);
   double total = 0.0;
-  for (const Cell& cell : cells) total += cell.weight;
+  for (const Cell& cell : cells_) total += cell.weight;
   const double density = count < full_density_count ? static_cast<double>(in_cells) / total : 1.0;
-
-  Scene scene;
-  scene.cloud.resize(count, max_sh_degree);
-  std::vector<std::size_t> first(cells.size() + 1, 0);
+  first_.assign(parts(), 0);
   double sum = 0.0;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    sum += cells[i].weight;
-    first[i + 1] = std::min(in_cells, static_cast<std::size_t>(sum * density));
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    sum += cells_[i].weight;
+    first_[i + 1] = std::min(in_cells, static_cast<std::size_t>(sum * density));
   }
-  first.back() = in_cells;
-  const float radius = cells.back().distance + 0.5f * block_pitch_m;
-  pool.parallel_for(cells.size() + 1, [&](std::size_t i) {
-    Shadows shadows(light.to_sun());
-    if (i == cells.size()) {
-      const auto paint = [&](Painter& p) {
-        const glm::vec2 centre = city_centre;
-        const float sky = std::max(900.0f, 4.0f * radius);
-        paint_sky(p, centre, sky, 0.55, child(seed, 2));
-        // Begins within the outermost cells, whose ring has gaps.
-        paint_horizon(p, centre, std::max(0.55f * radius, radius - 1.2f * block_pitch_m), sky,
-                      {0.22f, 0.21f, 0.17f}, 0.18, child(seed, 3));
-        paint_skyline(p, centre, radius + 40.0f, 2.2f * radius + 150.0f, 0.27, child(seed, 4));
-      };
-      Painter painter(light, shadows, scene.cloud, in_cells, backdrop, 1.0);
-      const std::size_t n = painter.take(1.0);
-      painter.divide(n, paint);
-      return;
-    }
-    const Cell& cell = cells[i];
-    for (int dc = -2; dc <= 1; ++dc) {  // the sun stands to the west and south
-      for (int dr = -2; dr <= 1; ++dr)
-        add_shadows(plan_block(seed, cell.column + dc, cell.row + dr), shadows);
-    }
-    const glm::vec2 corner = glm::vec2(cell.column, cell.row) * block_pitch_m;
-    shadows.keep({at(corner.x - 15.0f, 100.0f, corner.y - 15.0f),
-                  at(corner.x + block_pitch_m, 0.0f, corner.y + block_pitch_m)});
-    const float haze = 0.30f * smooth_step(0.4f, 1.0f, cell.distance / std::max(radius, 220.0f));
-    Painter painter(light, shadows, scene.cloud, first[i], first[i + 1] - first[i], cell.weight);
-    paint_cell(painter, plan_block(seed, cell.column, cell.row), haze);
-  });
+  first_.back() = in_cells;
+  radius_ = cells_.back().distance + 0.5f * block_pitch_m;
+}
 
+GaussianCloud City::paint(std::size_t begin, std::size_t end, ThreadPool& pool) const {
+  GaussianCloud cloud;
+  cloud.resize(first(end) - first(begin), max_sh_degree);
+  pool.parallel_for(end - begin, [&](std::size_t i) {
+    const std::size_t part = begin + i, to = first(part) - first(begin);
+    if (part < cells_.size())
+      paint_cell_at(part, cloud, to);
+    else
+      paint_backdrop(cloud, to);
+  });
+  return cloud;
+}
+
+void City::paint_cell_at(std::size_t i, GaussianCloud& cloud, std::size_t to) const {
+  Shadows shadows(light_.to_sun());
+  const Cell& cell = cells_[i];
+  for (int dc = -2; dc <= 1; ++dc) {  // the sun stands to the west and south
+    for (int dr = -2; dr <= 1; ++dr)
+      add_shadows(plan_block(seed_, cell.column + dc, cell.row + dr), shadows);
+  }
+  const glm::vec2 corner = glm::vec2(cell.column, cell.row) * block_pitch_m;
+  shadows.keep({at(corner.x - 15.0f, 100.0f, corner.y - 15.0f),
+                at(corner.x + block_pitch_m, 0.0f, corner.y + block_pitch_m)});
+  const float haze = 0.30f * smooth_step(0.4f, 1.0f, cell.distance / std::max(radius_, 220.0f));
+  Painter painter(light_, shadows, cloud, to, first(i + 1) - first(i), cell.weight);
+  paint_cell(painter, plan_block(seed_, cell.column, cell.row), haze);
+}
+
+void City::paint_backdrop(GaussianCloud& cloud, std::size_t to) const {
+  Shadows shadows(light_.to_sun());
+  Painter painter(light_, shadows, cloud, to, count_ - first_.back(), 1.0);
+  const std::size_t n = painter.take(1.0);
+  painter.divide(n, [&](Painter& p) {
+    const glm::vec2 centre = city_centre;
+    const float sky = std::max(900.0f, 4.0f * radius_);
+    paint_sky(p, centre, sky, 0.55, child(seed_, 2));
+    // Begins within the outermost cells, whose ring has gaps.
+    paint_horizon(p, centre, std::max(0.55f * radius_, radius_ - 1.2f * block_pitch_m), sky,
+                  {0.22f, 0.21f, 0.17f}, 0.18, child(seed_, 3));
+    paint_skyline(p, centre, radius_ + 40.0f, 2.2f * radius_ + 150.0f, 0.27, child(seed_, 4));
+  });
+}
+
+SceneHints City::hints() const {
+  SceneHints hints;
+  hints.start_pose = look_at(at(start_place.x, 11.0f, start_place.y), at(-8.0f, 4.0f, 40.0f), up);
+  hints.near_z = 0.2f;
+  hints.scale = 14.0f;
+  hints.limits = {at(city_centre.x - radius_, 90.0f, city_centre.y - radius_),
+                  at(city_centre.x + radius_, 0.5f, city_centre.y + radius_)};
+  // On the view axis, over the middle of the crossing: an orbit stays between the houses.
+  hints.focus = at(-0.4f, 7.0f, -2.7f);
+  hints.source = "procedural";
+  return hints;
+}
+
+}  // namespace
+
+Scene make_city(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
+  const City city(count, seed, pool);
+  Scene scene;
   scene.name = "city";
   scene.format = "procedural";
-  scene.hints.start_pose =
-      look_at(at(start_place.x, 11.0f, start_place.y), at(-8.0f, 4.0f, 40.0f), up);
-  scene.hints.near_z = 0.2f;
-  scene.hints.scale = 14.0f;
-  scene.hints.limits = {at(city_centre.x - radius, 90.0f, city_centre.y - radius),
-                        at(city_centre.x + radius, 0.5f, city_centre.y + radius)};
-  // On the view axis, over the middle of the crossing: an orbit stays between the houses.
-  scene.hints.focus = at(-0.4f, 7.0f, -2.7f);
-  scene.hints.source = "procedural";
+  scene.cloud = city.paint(0, city.parts(), pool);
+  scene.hints = city.hints();
   return scene;
+}
+
+SceneHints stream_city(std::size_t count, std::uint64_t seed, ThreadPool& pool,
+                       const std::function<void(const GaussianCloud&)>& take) {
+  constexpr std::size_t at_a_time = 1'000'000;
+  const City city(count, seed, pool);
+  for (std::size_t begin = 0, end = 0; begin < city.parts(); begin = end) {
+    while (end < city.parts() && city.first(end) - city.first(begin) < at_a_time) ++end;
+    take(city.paint(begin, end, pool));
+  }
+  return city.hints();
 }
 
 }  // namespace catgs::synth

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string_view>
 
 #include "render_core/scene/scene.h"
@@ -25,5 +26,11 @@ SynthKind parse_synth_kind(std::string_view name);  // throws InputError
 Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed);
 /// The same on a given pool, whose size changes only the time.
 Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed, ThreadPool& pool);
+
+/// The same Gaussians in their order, in parts that are let go once `take` returns. A city may have
+/// up to 2^34 of them and takes a few hundred MB; the others are made whole. Returns the hints.
+SceneHints synthesize_parts(SynthKind kind, std::size_t gaussians, std::uint64_t seed,
+                            ThreadPool& pool,
+                            const std::function<void(const GaussianCloud&)>& take);
 
 }  // namespace catgs

@@ -9,6 +9,14 @@ namespace {
 
 constexpr std::size_t fewest_gaussians = 1'000;
 constexpr std::size_t most_gaussians = 64'000'000;
+constexpr std::size_t most_streamed = std::size_t{1} << 34;
+
+void check_count(std::size_t gaussians, std::size_t most) {
+  if (gaussians < fewest_gaussians || gaussians > most)
+    throw InputError("procedural scene", "gaussians",
+                     std::to_string(gaussians) + " is out of range",
+                     std::to_string(fewest_gaussians) + " to " + std::to_string(most));
+}
 
 }  // namespace
 
@@ -25,10 +33,7 @@ Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed) {
 }
 
 Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed, ThreadPool& pool) {
-  if (gaussians < fewest_gaussians || gaussians > most_gaussians) {
-    throw InputError("procedural scene", "gaussians",
-                     std::to_string(gaussians) + " is out of range", "1000 to 64000000");
-  }
+  check_count(gaussians, most_gaussians);
   switch (kind) {
     case SynthKind::garden:
       return synth::make_garden(gaussians, seed, pool);
@@ -38,6 +43,18 @@ Scene synthesize(SynthKind kind, std::size_t gaussians, std::uint64_t seed, Thre
       break;
   }
   return synth::make_city(gaussians, seed, pool);
+}
+
+SceneHints synthesize_parts(SynthKind kind, std::size_t gaussians, std::uint64_t seed,
+                            ThreadPool& pool,
+                            const std::function<void(const GaussianCloud&)>& take) {
+  if (kind == SynthKind::city) {
+    check_count(gaussians, most_streamed);
+    return synth::stream_city(gaussians, seed, pool, take);
+  }
+  const Scene scene = synthesize(kind, gaussians, seed, pool);
+  take(scene.cloud);
+  return scene.hints;
 }
 
 }  // namespace catgs

@@ -150,10 +150,33 @@ TEST(Synth, ALargerCityKeepsItsMiddle) {
   EXPECT_EQ(in_the_middle(small), in_the_middle(large));
 }
 
+TEST(Synth, PartsMakeTheWholeScene) {
+  ThreadPool pool(2);
+  const GaussianCloud whole = synthesize(SynthKind::city, 2'300'000, 1, pool).cloud;
+  std::size_t taken = 0, parts = 0;
+  const SceneHints hints =
+      synthesize_parts(SynthKind::city, 2'300'000, 1, pool, [&](const GaussianCloud& part) {
+        ASSERT_LE(taken + part.size(), whole.size());
+        EXPECT_TRUE(std::equal(part.mean.begin(), part.mean.end(), whole.mean.begin() + taken));
+        EXPECT_TRUE(std::equal(part.sh.begin(), part.sh.end(), whole.sh.begin() + 16 * taken));
+        taken += part.size();
+        ++parts;
+      });
+  EXPECT_EQ(taken, whole.size());
+  EXPECT_GT(parts, 1u);
+  EXPECT_EQ(hints.source, "procedural");
+}
+
 TEST(Synth, RefusesWhatItCannotMake) {
   EXPECT_THROW(synthesize(SynthKind::city, 999, 1), InputError);
   EXPECT_THROW(synthesize(SynthKind::city, 64'000'001, 1), InputError);
   EXPECT_THROW(parse_synth_kind("castle"), InputError);
+  ThreadPool pool(1);
+  const auto parts = [&](std::size_t count) {
+    synthesize_parts(SynthKind::city, count, 1, pool, [](const GaussianCloud&) {});
+  };
+  EXPECT_THROW(parts(999), InputError);
+  EXPECT_THROW(parts((std::size_t{1} << 34) + 1), InputError);
   EXPECT_EQ(parse_synth_kind("garden"), SynthKind::garden);
 }
 
