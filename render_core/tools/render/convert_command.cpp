@@ -11,6 +11,7 @@
 #include "render_core/scene/prune.h"
 #include "render_core/scene/scene.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/render/tree_output.h"
 #include "render_core/tools/scene_options.h"
 
 namespace catgs {
@@ -21,6 +22,7 @@ struct ConvertOptions {
   std::string out;
   double keep_fraction = 1.0;
   int threads = 0;
+  TreeOptions tree;
 };
 
 /// Estimated hints can be estimated again. Others would be lost with the files that they came from.
@@ -37,9 +39,15 @@ void write_hints_beside(const SceneHints& hints, const std::filesystem::path& ou
 
 /// Before the scene is loaded, which may take minutes.
 void check_output(const ConvertOptions& options) {
-  check_can_be_saved(options.out);
+  if (!is_tree_name(options.out)) check_can_be_saved(options.out);
   if (std::error_code error; std::filesystem::equivalent(options.in.path, options.out, error))
     throw InputError(options.out, "", "is the scene that is read", "give the output another name");
+}
+
+void save_tree(const Scene& scene, const ConvertOptions& options, bool quiet) {
+  ThreadPool pool(options.threads);
+  const SceneParts whole{[&](const auto& take) { take(scene.cloud); }, scene.format, scene.report};
+  write_tree(whole, options.tree, options.out, pool, quiet);
 }
 
 void convert(const ConvertOptions& options, bool quiet) {
@@ -50,7 +58,10 @@ void convert(const ConvertOptions& options, bool quiet) {
   Scene scene = load_scene(options.in, options.threads, quiet);
   const std::size_t loaded = scene.cloud.size();
   keep_most_important(scene.cloud, options.keep_fraction);
-  save_scene(scene.cloud, options.out);
+  if (is_tree_name(options.out))
+    save_tree(scene, options, quiet);
+  else
+    save_scene(scene.cloud, options.out);
   fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
              scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),
              scene.format);
@@ -67,9 +78,11 @@ void convert(const ConvertOptions& options, bool quiet) {
 
 void add_convert_command(CLI::App& app) {
   auto options = std::make_shared<ConvertOptions>();
-  CLI::App* command = app.add_subcommand("convert", "Converts a scene to .ply, .splat or .spz");
+  CLI::App* command =
+      app.add_subcommand("convert", "Converts a scene to .ply, .splat, .spz or .tree");
   add_scene_options(*command, options->in, "in");
-  command->add_option("out", options->out, "File to write: .ply, .splat or .spz")->required();
+  command->add_option("out", options->out, "File to write: .ply, .splat, .spz or .tree")
+      ->required();
   command
       ->add_option(
           "--keep-fraction", options->keep_fraction,
@@ -77,6 +90,7 @@ void add_convert_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--threads", options->threads, "Number of threads; 0: one per processor")
       ->capture_default_str();
+  add_tree_options(*command, options->tree);
   command->callback([options, command] { convert(*options, is_quiet(*command)); });
 }
 

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -10,9 +12,12 @@
 #include <sys/resource.h>
 
 #include "render_core/scene/analysis/robust_bounds.h"
+#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/tree/tree_file.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
+#include "render_core/tools/render/tree_output.h"
 #include "render_core/tools/scene_options.h"
 
 namespace catgs {
@@ -135,7 +140,20 @@ void print_text(const Json& info) {
                                 info["load_ms"].get<double>(), 1e-6 * peak, peak / bytes));
 }
 
+/// The header of the tree that a path names, if it names one.
+std::optional<TreeHeader> tree_at(const std::filesystem::path& path) {
+  const SceneLocation location = locate_scene(path);
+  if (location.kind != SceneLocation::Kind::file) return std::nullopt;
+  const FileSource file(location.path);
+  if (!is_tree(file)) return std::nullopt;
+  return read_tree_header(file);
+}
+
 void info(const InfoOptions& options, bool quiet) {
+  if (const auto tree = tree_at(options.scene.path)) {
+    const Json description = describe_tree(locate_scene(options.scene.path).path, *tree);
+    return options.json ? write_json("-", description) : print_tree(description);
+  }
   const auto start = std::chrono::steady_clock::now();
   const Scene scene = load_scene(options.scene, options.threads, quiet);
   const std::chrono::duration<double, std::milli> load_ms =

@@ -306,6 +306,34 @@ TEST_F(CatgsRender, SynthesizedScenesKeepTheirStartPose) {
   EXPECT_EQ(json.at("hints").at("source"), "sidecar city.json");
 }
 
+TEST_F(CatgsRender, ConvertsToATreeAndBack) {
+  const Outcome there = run(fmt::format("convert {} {}", scene(), path("ball.tree")));
+  ASSERT_EQ(there.exit_code, 0) << there.out;
+  const auto tree = nlohmann::json::parse(run("info --json " + path("ball.tree")).out);
+  EXPECT_EQ(tree.at("format"), "tree");
+  EXPECT_EQ(tree.at("gaussians"), 400);
+  EXPECT_EQ(tree.at("missing_bytes"), 0);
+  ASSERT_EQ(tree.at("levels").size(), 2u);
+  EXPECT_EQ(tree.at("levels")[0].at("gaussians"), 256);
+  EXPECT_GT(tree.at("levels")[0].at("mean_error"), 0.0);
+  EXPECT_THAT(run("info " + path("ball.tree")).out,
+              AllOf(HasSubstr("bytes per Gaussian"), HasSubstr("3DGS ply")));
+
+  ASSERT_EQ(run(fmt::format("convert {} {}", path("ball.tree"), path("back.ply"))).exit_code, 0);
+  const auto back = nlohmann::json::parse(run("info --json " + path("back.ply")).out);
+  EXPECT_EQ(back.at("gaussians"), 400);
+  const Outcome memory = run(fmt::format("convert {} {} --memory -1", scene(), path("other.tree")));
+  EXPECT_EQ(memory.exit_code, 2);
+  EXPECT_THAT(memory.out, HasSubstr("--memory"));
+}
+
+TEST_F(CatgsRender, SynthesizedTreesAreThoseOfTheWholeScene) {
+  ASSERT_EQ(run("synth city --gaussians 5000 " + path("a.tree")).exit_code, 0);
+  ASSERT_EQ(run("synth city --gaussians 5000 --memory 0 " + path("b.tree")).exit_code, 0);
+  EXPECT_EQ(run_command(fmt::format("cmp {} {}", path("a.tree"), path("b.tree"))).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(path("a.json")));
+}
+
 TEST_F(CatgsRender, SynthRefusesWhatItCannotMake) {
   const Outcome unknown = run(fmt::format("synth castle {}", path("castle.ply")));
   EXPECT_EQ(unknown.exit_code, 2);
