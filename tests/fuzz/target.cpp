@@ -22,7 +22,7 @@ const std::vector<Target>& targets() {
     std::vector<Target> joined;
     for (const auto& of_file :
          {ply_targets(), splat_spz_targets(), sog_targets(), scene_json_targets(),
-          text_files_targets(), scene_size_targets(), network_targets()})
+          text_files_targets(), scene_size_targets(), tree_targets(), network_targets()})
       joined.insert(joined.end(), of_file.begin(), of_file.end());
     return joined;
   }();

@@ -42,6 +42,7 @@ std::vector<Target> scene_size_targets();
 std::vector<Target> sog_targets();
 std::vector<Target> splat_spz_targets();
 std::vector<Target> text_files_targets();
+std::vector<Target> tree_targets();
 
 /// All of them.
 const std::vector<Target>& targets();
