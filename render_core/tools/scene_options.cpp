@@ -37,17 +37,21 @@ void add_scene_options(CLI::App& command, SceneOptions& options, const std::stri
                      "Axis that points up, like +z, where no sidecar says so [estimated]");
 }
 
+std::optional<glm::vec3> up_of(const SceneOptions& options) {
+  if (!options.up) return std::nullopt;
+  const std::optional<glm::vec3> up = axis_named(*options.up);
+  if (!up)
+    throw InputError("--up", "", fmt::format("\"{}\" is no axis", *options.up),
+                     "one of +x, -x, +y, -y, +z and -z; a sidecar takes any direction");
+  return up;
+}
+
 Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
   Progress progress("loading", quiet);
   LoadOptions load;
   load.lod = options.lod;
   load.gaussian_budget = options.budget;
-  if (options.up) {
-    load.up = axis_named(*options.up);
-    if (!load.up)
-      throw InputError("--up", "", fmt::format("\"{}\" is no axis", *options.up),
-                       "one of +x, -x, +y, -y, +z and -z; a sidecar takes any direction");
-  }
+  load.up = up_of(options);
   load.threads = threads;
   load.progress = [&](double fraction) { progress.update(fraction); };
   return load_scene(options.path, load);

@@ -22,6 +22,9 @@ struct SceneOptions {
 /// The path is the command's next positional argument.
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name = "scene");
 
+/// The direction that --up names. Throws InputError.
+std::optional<glm::vec3> up_of(const SceneOptions& options);
+
 /// Shows its progress on a terminal. Throws InputError.
 Scene load_scene(const SceneOptions& options, int threads, bool quiet);
 

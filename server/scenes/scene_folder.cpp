@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool has_scene_extension(const fs::path& path) {
-  constexpr std::array extensions = {".ply", ".splat", ".spz", ".sog"};
+  constexpr std::array extensions = {".ply", ".splat", ".spz", ".sog", ".tree"};
   return std::ranges::count(extensions, path.extension().string()) > 0;
 }
 

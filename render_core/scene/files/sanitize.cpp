@@ -32,17 +32,12 @@ bool finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// A Gaussian outside of this is absurd. Unlimited while `radius` is 0, as for a single Gaussian.
-struct Reach {
-  glm::vec3 centre{0.0f};
-  float radius = 0.0f;
-
-  [[nodiscard]] bool contains(const glm::vec3& mean, float largest_scale) const {
-    const glm::vec3 m = glm::abs(mean);
-    if (std::max({m.x, m.y, m.z, largest_scale}) > absurd_value) return false;
-    return radius == 0.0f || (glm::distance(mean, centre) <= radius && largest_scale <= radius);
-  }
-};
+bool contains(const SaneReach& reach, const glm::vec3& mean, float largest_scale) {
+  const glm::vec3 m = glm::abs(mean);
+  if (std::max({m.x, m.y, m.z, largest_scale}) > absurd_value) return false;
+  return reach.radius == 0.0f ||
+         (glm::distance(mean, reach.centre) <= reach.radius && largest_scale <= reach.radius);
+}
 
 struct Repairs {
   std::size_t zero_rotations = 0, clamped = 0, zeroed_sh = 0;
@@ -80,7 +75,7 @@ bool repair_sh(GaussianCloud& cloud, std::size_t i, Repairs& repairs) {
   return bad;
 }
 
-Verdict judge(GaussianCloud& cloud, std::size_t i, const Reach& reach, Repairs& repairs) {
+Verdict judge(GaussianCloud& cloud, std::size_t i, const SaneReach& reach, Repairs& repairs) {
   glm::quat& q = cloud.rotation[i];
   glm::vec3& scale = cloud.scale[i];
   float& opacity = cloud.opacity[i];
@@ -89,7 +84,8 @@ Verdict judge(GaussianCloud& cloud, std::size_t i, const Reach& reach, Repairs& 
     return Verdict::not_finite;
   if (opacity < invisible_opacity) return Verdict::invisible;
   opacity = std::max(opacity, least_opacity);
-  if (!reach.contains(cloud.mean[i], std::max({scale.x, scale.y, scale.z}))) return Verdict::absurd;
+  if (!contains(reach, cloud.mean[i], std::max({scale.x, scale.y, scale.z})))
+    return Verdict::absurd;
 
   bool repaired = repair_rotation(q, repairs);
   const glm::vec3 old_scale = scale;
@@ -106,14 +102,21 @@ Verdict judge(GaussianCloud& cloud, std::size_t i, const Reach& reach, Repairs& 
 
 }  // namespace
 
-SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context) {
-  Reach reach;
+SaneReach sane_reach(const GaussianCloud& cloud) {
+  SaneReach reach;
   if (const auto bounds = robust_bounds(cloud, 0.01f)) {
     reach.centre = 0.5f * (bounds->min + bounds->max);
     reach.radius = absurd_diagonals * glm::distance(bounds->min, bounds->max);
     if (!std::isfinite(reach.radius)) reach.radius = 0.0f;
   }
+  return reach;
+}
 
+SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context) {
+  return sanitize(cloud, sane_reach(cloud), context);
+}
+
+SanitizeReport sanitize(GaussianCloud& cloud, const SaneReach& reach, const LoadContext& context) {
   std::vector<Verdict> verdicts(cloud.size());
   std::array<std::atomic<std::size_t>, 5> counts{};
   std::atomic<std::size_t> zero_rotations{0}, clamped{0}, zeroed_sh{0};

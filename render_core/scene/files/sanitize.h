@@ -28,4 +28,15 @@ namespace catgs {
 /// The kept Gaussians stay in order, and the vectors keep their allocations.
 SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context);
 
+/// What is not absurd by rule 3: unlimited while `radius` is 0.
+struct SaneReach {
+  glm::vec3 centre{0.0f};
+  float radius = 0.0f;
+};
+/// Of a scene, or of an even sample of it.
+SaneReach sane_reach(const GaussianCloud& cloud);
+
+/// Judges a part of a scene by the reach of the whole.
+SanitizeReport sanitize(GaussianCloud& part, const SaneReach& reach, const LoadContext& context);
+
 }  // namespace catgs

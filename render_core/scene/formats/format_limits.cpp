@@ -6,13 +6,13 @@
 
 namespace catgs {
 
-void require_count(const ByteSource& file, std::string_view where, std::uint64_t count) {
+void require_count(const ByteSource& file, std::string_view where, std::uint64_t count,
+                   std::uint64_t most) {
   if (count == 0) throw InputError(file.name(), where, "there are no Gaussians");
-  if (count > max_gaussians)
-    throw InputError(
-        file.name(), where,
-        fmt::format("{} Gaussians announced, at most {} are supported", count, max_gaussians),
-        "the header is wrong, or split the scene");
+  if (count > most)
+    throw InputError(file.name(), where,
+                     fmt::format("{} Gaussians announced, at most {} are supported", count, most),
+                     "the header is wrong, or split the scene");
 }
 
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,

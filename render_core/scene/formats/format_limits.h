@@ -12,8 +12,9 @@ namespace catgs {
 /// take 15 GB without SH.
 inline constexpr std::uint64_t max_gaussians = std::uint64_t{1} << 28;
 
-/// Throws InputError when a file announces no Gaussians or more than max_gaussians.
-void require_count(const ByteSource& file, std::string_view where, std::uint64_t count);
+/// Throws InputError when a file announces no Gaussians or more than `most`.
+void require_count(const ByteSource& file, std::string_view where, std::uint64_t count,
+                   std::uint64_t most = max_gaussians);
 
 /// The same for compressed files, where the count cannot be checked against the size. Refuses
 /// counts that need a compression of more than max_compression : 1. 2^16 Gaussians are always

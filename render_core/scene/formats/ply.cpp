@@ -136,7 +136,8 @@ std::size_t block_rows(std::size_t row_bytes) {
 }
 
 void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout& layout,
-                 bool big_endian, GaussianCloud& cloud, const LoadContext& context) {
+                 bool big_endian, const PlyRows& rows, GaussianCloud& cloud,
+                 const LoadContext& context) {
   const bool plain =
       !big_endian && std::all_of(layout.fields.begin(), layout.fields.end(), [&](const Field& f) {
         return vertex.properties[f.property].type == PlyType::f32;
@@ -148,16 +149,21 @@ void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout&
                                  : load_scalar(from + p.offset, p.type, big_endian);
     }
   };
-  context.for_blocks(cloud.size(), block_rows(vertex.row_bytes),
-                     [&](std::size_t begin, std::size_t end) {
-                       std::vector<std::byte> bytes((end - begin) * vertex.row_bytes);
-                       file.read(vertex.data_offset + begin * vertex.row_bytes, bytes);
-                       std::array<float, row_fields> fields{};
-                       for (std::size_t i = begin; i < end; ++i) {
-                         decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
-                         store(std::bit_cast<Row>(fields), cloud, i);
-                       }
-                     });
+  context.for_blocks(
+      cloud.size(), block_rows(vertex.row_bytes), [&](std::size_t begin, std::size_t end) {
+        std::vector<std::byte> bytes((end - begin) * vertex.row_bytes);
+        // One read where the rows are neighbours.
+        const std::size_t together = rows.step == 1 ? end - begin : 1;
+        for (std::size_t i = begin; i < end; i += together)
+          file.read(vertex.data_offset + (rows.first + i * rows.step) * vertex.row_bytes,
+                    std::span(bytes).subspan((i - begin) * vertex.row_bytes,
+                                             together * vertex.row_bytes));
+        std::array<float, row_fields> fields{};
+        for (std::size_t i = begin; i < end; ++i) {
+          decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
+          store(std::bit_cast<Row>(fields), cloud, i);
+        }
+      });
 }
 
 /// Numbers of an ASCII file, one after the other, read through a bounded buffer.
@@ -239,20 +245,26 @@ GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header,
                        const LoadContext& context) {
   const PlyElement* vertex = header.find("vertex");
   if (!vertex) throw InputError(file.name(), "header", "there is no element vertex");
-  const Layout layout = find_fields(file, *vertex);
-  const bool ascii = header.encoding == PlyEncoding::ascii;
-  if (ascii)
-    require_ascii_rows(file, header, *vertex);
-  else
+  if (header.encoding != PlyEncoding::ascii) {
     require_rows_in_file(file, *vertex);
-
+    return read_ply_rows(file, header, {0, vertex->count}, context);
+  }
+  const Layout layout = find_fields(file, *vertex);
+  require_ascii_rows(file, header, *vertex);
   GaussianCloud cloud;
   cloud.resize(vertex->count, layout.sh_degree);
-  if (ascii)
-    read_ascii(file, header, *vertex, layout, cloud, context);
-  else
-    read_binary(file, *vertex, layout, header.encoding == PlyEncoding::binary_big_endian, cloud,
-                context);
+  read_ascii(file, header, *vertex, layout, cloud, context);
+  return cloud;
+}
+
+GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const PlyRows& rows,
+                            const LoadContext& context) {
+  const PlyElement& vertex = *header.find("vertex");
+  const Layout layout = find_fields(file, vertex);
+  GaussianCloud cloud;
+  cloud.resize(rows.count, layout.sh_degree);
+  read_binary(file, vertex, layout, header.encoding == PlyEncoding::binary_big_endian, rows, cloud,
+              context);
   return cloud;
 }
 

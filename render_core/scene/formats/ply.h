@@ -16,6 +16,15 @@ namespace catgs {
 /// The result is not sanitized. Throws InputError.
 GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header, const LoadContext& context);
 
+/// Some rows of a binary file: `first`, `first + step` and so on, `count` of them.
+struct PlyRows {
+  std::uint64_t first = 0, count = 0, step = 1;
+};
+/// The same of some rows. The file's element `vertex` has them, and its rows have a fixed size
+/// (require_rows_in_file()). Throws InputError.
+GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const PlyRows& rows,
+                            const LoadContext& context);
+
 /// Writes the original's layout: binary little-endian, all float, zero normals. Means, unit
 /// rotations and SH are kept bit for bit, scales to 1e-6 (relative), opacities to 1e-7 (absolute).
 void write_ply(const GaussianCloud& cloud, std::ostream& to);

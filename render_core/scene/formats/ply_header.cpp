@@ -194,7 +194,7 @@ PlyHeader read_ply_header(const ByteSource& file) {
   return HeaderParser(file, text).parse();
 }
 
-void require_rows_in_file(const ByteSource& file, const PlyElement& element) {
+void require_rows_in_file(const ByteSource& file, const PlyElement& element, std::uint64_t most) {
   const std::string where = fmt::format("element {}", element.name);
   if (element.data_offset == 0)
     throw InputError(file.name(), where,
@@ -202,7 +202,7 @@ void require_rows_in_file(const ByteSource& file, const PlyElement& element) {
                      "property or is cut off");
   if (element.has_list)
     throw InputError(file.name(), where, "has a list property, so its rows have no fixed size");
-  require_count(file, where, element.count);
+  require_count(file, where, element.count, most);
   if (element.row_bytes > 0 &&
       element.count > (file.size() - element.data_offset) / element.row_bytes)
     throw InputError(

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/format_limits.h"
 
 namespace catgs {
 
@@ -45,8 +46,9 @@ struct PlyHeader {
 /// Throws InputError naming the header line.
 PlyHeader read_ply_header(const ByteSource& file);
 
-/// Checks that the binary rows of `element` lie inside the file and that their count can be held
-/// (max_gaussians). Throws InputError; call before allocating by count.
-void require_rows_in_file(const ByteSource& file, const PlyElement& element);
+/// Checks that the binary rows of `element` lie inside the file and that they are at most `most`.
+/// Throws InputError; call before allocating by count.
+void require_rows_in_file(const ByteSource& file, const PlyElement& element,
+                          std::uint64_t most = max_gaussians);
 
 }  // namespace catgs

@@ -26,7 +26,7 @@ constexpr std::size_t pages_at_a_time = 256;
 
 /// What the first reading of a scene tells.
 struct Extent {
-  std::uint64_t gaussians = 0;
+  std::uint64_t gaussians = 0, dropped = 0;
   int sh_degree = 0;
   glm::vec3 low{std::numeric_limits<float>::max()}, high{std::numeric_limits<float>::lowest()};
 
@@ -183,7 +183,7 @@ class PageStream {
 
 Extent measure(const SceneParts& scene, const std::filesystem::path& out) {
   Extent extent;
-  scene.each([&](const GaussianCloud& part) { extent.add(part); });
+  extent.dropped = scene.each([&](const GaussianCloud& part) { extent.add(part); });
   if (extent.gaussians == 0)
     throw InputError(out.string(), "", "there are no Gaussians to build a tree of");
   if (extent.gaussians > TreeShape::max_gaussians)
@@ -220,8 +220,8 @@ TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
   const TreeShape shape(extent.gaussians, extent.sh_degree);
   check_space(out, shape, memory_bytes);
 
-  GaussianSorter sorter(MortonCurve(extent.low, extent.high), extent.sh_degree, memory_bytes, out,
-                        pool);
+  GaussianSorter sorter(MortonCurve(extent.low, extent.high), extent.gaussians, extent.sh_degree,
+                        memory_bytes, out, pool);
   std::uint64_t done = 0;
   const auto share = [&] {
     return static_cast<double>(done) / static_cast<double>(extent.gaussians);
@@ -246,7 +246,7 @@ TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
   header.gaussians = extent.gaussians;
   header.low = extent.low;
   header.high = extent.high;
-  header.dropped = scene.report.dropped;
+  header.dropped = extent.dropped;
   header.read = header.gaussians + header.dropped;
   scene.format.copy(header.source.data(), header.source.size() - 1);
   header.levels = pages.levels();

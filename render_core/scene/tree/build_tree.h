@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -8,7 +9,6 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/scene/scene.h"
 #include "render_core/scene/tree/tree_file.h"
 
 namespace catgs {
@@ -16,10 +16,9 @@ namespace catgs {
 /// A scene that is read part by part, so that it need not fit into memory.
 struct SceneParts {
   /// Calls `take` with every part, in the same order with the same bits each time it is called. The
-  /// parts share one SH degree and are sanitized.
-  std::function<void(const std::function<void(const GaussianCloud&)>& take)> each;
+  /// parts share one SH degree and are sanitized. Returns how many Gaussians were dropped.
+  std::function<std::uint64_t(const std::function<void(const GaussianCloud&)>& take)> each;
   std::string format;  // of the scene, for people
-  SanitizeReport report;
 };
 
 /// Builds a tree of the scene in `out`, which appears when it is whole.

@@ -80,16 +80,21 @@ void ScratchFile::forget(std::uint64_t offset, std::uint64_t size) {
 
 // --- GaussianSorter ---
 
-GaussianSorter::GaussianSorter(const MortonCurve& curve, int sh_degree, std::size_t memory_bytes,
-                               std::filesystem::path beside, ThreadPool& pool)
+GaussianSorter::GaussianSorter(const MortonCurve& curve, std::uint64_t gaussians, int sh_degree,
+                               std::size_t memory_bytes, std::filesystem::path beside,
+                               ThreadPool& pool)
     : curve_(curve),
       degree_(sh_degree),
       record_bytes_(record_bytes(sh_degree)),
       memory_bytes_(memory_bytes),
-      capacity_(
-          std::max(fewest_in_memory, memory_bytes / (record_bytes_ + 2 * sizeof(CodedIndex)))),
+      capacity_(std::min<std::uint64_t>(
+          gaussians,
+          std::max(fewest_in_memory, memory_bytes / (record_bytes_ + 2 * sizeof(CodedIndex))))),
       beside_(std::move(beside)),
-      pool_(pool) {}
+      pool_(pool),
+      records_(capacity_ * record_bytes_) {
+  codes_.reserve(capacity_);
+}
 
 std::uint64_t GaussianSorter::disk_bytes(std::uint64_t gaussians, int sh_degree) {
   return gaussians * record_bytes(sh_degree);
@@ -107,13 +112,6 @@ void GaussianSorter::add(const GaussianCloud& part) {
   for (std::size_t i = 0; i < part.size(); ++i) {
     if (codes_.size() == capacity_) spill();
     const std::size_t index = codes_.size();
-    // Grows by doubling only up to what the memory allows.
-    if (records_.size() == index * record_bytes_) {
-      const std::size_t room = std::min(capacity_, std::max(fewest_in_memory, 2 * index));
-      records_.reserve(room * record_bytes_);
-      records_.resize(room * record_bytes_);
-      codes_.reserve(room);
-    }
     codes_.push_back({curve_.code(part.mean[i]), static_cast<std::uint32_t>(index)});
     std::byte* to = put(record(index), &part.mean[i]);
     to = put(to, &part.rotation[i]);

@@ -42,10 +42,10 @@ class ScratchFile {
 /// on the memory: equal codes keep the order in which they were added. A Gaussian keeps every bit.
 class GaussianSorter {
  public:
-  /// Holds at most `memory_bytes`, but no less than 4096 Gaussians. `beside`: as for ScratchFile,
-  /// which is made when memory does not suffice.
-  GaussianSorter(const MortonCurve& curve, int sh_degree, std::size_t memory_bytes,
-                 std::filesystem::path beside, ThreadPool& pool);
+  /// For `gaussians` that will be added. Holds at most `memory_bytes`, but no less than 4096
+  /// Gaussians. `beside`: as for ScratchFile, which is made when memory does not suffice.
+  GaussianSorter(const MortonCurve& curve, std::uint64_t gaussians, int sh_degree,
+                 std::size_t memory_bytes, std::filesystem::path beside, ThreadPool& pool);
 
   void add(const GaussianCloud& part);
   /// Ends adding. Call once, before next().

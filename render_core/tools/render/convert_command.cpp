@@ -8,6 +8,7 @@
 #include "render_core/base/printable.h"
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/files/scene_parts.h"
 #include "render_core/scene/prune.h"
 #include "render_core/scene/scene.h"
 #include "render_core/tools/commands.h"
@@ -44,9 +45,31 @@ void check_output(const ConvertOptions& options) {
     throw InputError(options.out, "", "is the scene that is read", "give the output another name");
 }
 
-void save_tree(const Scene& scene, const ConvertOptions& options, bool quiet) {
+void print_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", printable(note));
+}
+
+/// Writes a tree without holding the scene, if its format allows that.
+bool convert_in_parts(const ConvertOptions& options, bool quiet) {
+  if (!is_tree_name(options.out) || options.keep_fraction < 1.0) return false;
+  if (options.in.lod || options.in.budget) return false;
+  const auto pool = std::make_shared<ThreadPool>(options.threads);
+  const auto scene = scene_in_parts(options.in.path, up_of(options.in), pool);
+  if (!scene) return false;
+  write_tree(scene->parts, options.tree, options.out, *pool, quiet);
+  print_notes(scene->notes);
+  write_hints_beside(scene->hints, options.out);
+  return true;
+}
+
+void save(const Scene& scene, const ConvertOptions& options, bool quiet) {
+  if (!is_tree_name(options.out)) return save_scene(scene.cloud, options.out);
   ThreadPool pool(options.threads);
-  const SceneParts whole{[&](const auto& take) { take(scene.cloud); }, scene.format, scene.report};
+  const SceneParts whole{[&](const auto& take) {
+                           take(scene.cloud);
+                           return std::uint64_t{scene.report.dropped};
+                         },
+                         scene.format};
   write_tree(whole, options.tree, options.out, pool, quiet);
 }
 
@@ -55,13 +78,11 @@ void convert(const ConvertOptions& options, bool quiet) {
     throw InputError("--keep-fraction", "",
                      fmt::format("{} is not in (0, 1]", options.keep_fraction));
   check_output(options);
+  if (convert_in_parts(options, quiet)) return;
   Scene scene = load_scene(options.in, options.threads, quiet);
   const std::size_t loaded = scene.cloud.size();
   keep_most_important(scene.cloud, options.keep_fraction);
-  if (is_tree_name(options.out))
-    save_tree(scene, options, quiet);
-  else
-    save_scene(scene.cloud, options.out);
+  save(scene, options, quiet);
   fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
              scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),
              scene.format);
@@ -70,7 +91,7 @@ void convert(const ConvertOptions& options, bool quiet) {
                scene.report.dropped);
   if (scene.cloud.size() < loaded)
     fmt::print("{} least important Gaussians were pruned\n", loaded - scene.cloud.size());
-  for (const std::string& note : scene.notes) fmt::print(stderr, "note: {}\n", printable(note));
+  print_notes(scene.notes);
   write_hints_beside(scene.hints, options.out);
 }
 

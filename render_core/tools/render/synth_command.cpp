@@ -27,9 +27,9 @@ void write_tree(SynthKind kind, const SynthOptions& options, bool quiet) {
   const SceneParts parts{[&](const auto& take) {
                            hints =
                                synthesize_parts(kind, options.gaussians, options.seed, pool, take);
+                           return std::uint64_t{0};
                          },
-                         "procedural",
-                         {}};
+                         "procedural"};
   write_tree(parts, options.tree, options.out, pool, quiet);
   write_sidecar(hints, sidecar_of(options.out));
 }

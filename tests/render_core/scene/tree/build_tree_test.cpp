@@ -52,6 +52,8 @@ TEST(BuildTree, LevelsGetCoarserAndTheHeaderCountsThem) {
   TreeFile tree(source_of(tree_bytes(random_cloud(100'000, 0, 5), pool)), std::size_t{1} << 26);
   const TreeShape& shape = tree.shape();
   ASSERT_EQ(shape.levels(), 10);  // 391 leaves
+  EXPECT_EQ(tree.header().dropped, 3u);
+  EXPECT_EQ(tree.header().read, 100'003u);
   for (int level = 0; level < shape.levels(); ++level) {
     std::uint64_t gaussians = 0;
     float max_error = 0.0f;
@@ -106,7 +108,7 @@ TEST(BuildTree, FaintGaussiansAreNotLost) {
 TEST(BuildTree, RefusesNothingAndLeavesNothing) {
   ThreadPool pool(1);
   const TemporaryFolder folder;
-  const SceneParts nothing{[](const auto&) {}, "none", {}};
+  const SceneParts nothing{[](const auto&) { return 0; }, "none"};
   EXPECT_THROW(build_tree(nothing, folder / "a.tree", 0, pool, LoadContext(pool)), InputError);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }

@@ -22,8 +22,8 @@ GaussianCloud sorted(const GaussianCloud& cloud, std::size_t memory_bytes, std::
     low = glm::min(low, mean);
     high = glm::max(high, mean);
   }
-  GaussianSorter sorter(MortonCurve(low, high), cloud.sh_degree, memory_bytes, folder / "sort",
-                        pool);
+  GaussianSorter sorter(MortonCurve(low, high), cloud.size(), cloud.sh_degree, memory_bytes,
+                        folder / "sort", pool);
   sorter.add(cloud);
   sorter.finish();
   GaussianCloud all, some;
@@ -69,7 +69,8 @@ TEST(GaussianSorter, EqualPlacesKeepTheirOrderOverRuns) {
 
 TEST(GaussianSorter, NamesTheFolderThatCannotBeWritten) {
   ThreadPool pool(1);
-  GaussianSorter sorter(MortonCurve(glm::vec3(0), glm::vec3(1)), 0, 0, "/nowhere/at/all", pool);
+  GaussianSorter sorter(MortonCurve(glm::vec3(0), glm::vec3(1)), 5000, 0, 0, "/nowhere/at/all",
+                        pool);
   EXPECT_THROW(sorter.add(test::random_cloud(5000, 0, 1)), InputError);
 }
 

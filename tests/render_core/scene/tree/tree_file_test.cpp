@@ -148,7 +148,8 @@ TEST_F(TreeFileTest, ACutFileShowsWhatIsLeft) {
 
 TEST_F(TreeFileTest, MoreThanFitIntoASceneAreRefusedBeforeAnythingIsRead) {
   const std::string bytes = with_header([](TreeHeader& h) {
-    h.gaussians = h.read = std::uint64_t{1} << 33;
+    h.gaussians = std::uint64_t{1} << 33;
+    h.read = h.gaussians + h.dropped;
     const TreeShape shape(h.gaussians, 0);
     for (int l = 0; l < shape.levels(); ++l)
       h.levels[static_cast<std::size_t>(l)] = {shape.nodes_on(l) * cluster_size, 0.0f, 0.0f};

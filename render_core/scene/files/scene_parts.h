@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/scene.h"
+#include "render_core/scene/tree/build_tree.h"
+
+namespace catgs {
+
+/// A scene that is read in parts.
+struct PartedScene {
+  SceneParts parts;                // as load_scene() has them; they keep the file open
+  SceneHints hints;                // found as load_scene() finds them, from an even sample
+  std::vector<std::string> notes;  // as Scene::notes
+};
+
+/// The scene at `path` if its format can be read in parts, which a binary 3DGS .ply can: of up to
+/// TreeShape::max_gaussians. Throws InputError when such a file is wrong. `up` as in LoadOptions;
+/// `part_rows`: Gaussians of a part before faulty ones are dropped.
+std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
+                                          const std::optional<glm::vec3>& up,
+                                          const std::shared_ptr<ThreadPool>& pool,
+                                          std::uint64_t part_rows = 1'000'000);
+
+}  // namespace catgs
