@@ -25,7 +25,7 @@ struct SceneParts {
 ///
 /// The scene is read twice: for the box of its means, then into a GaussianSorter. Leaves follow
 /// from the sorted stream, and every page is made as soon as its children are, in parallel. So
-/// memory does not grow with the scene: `memory_bytes` for sorting, and about 200 MB. What does not
+/// memory does not grow with the scene: `memory_bytes` for sorting, and about 300 MB. What does not
 /// fit is sorted in a file beside `out`, of as many bytes as the scene has in memory.
 /// The bytes of `out` depend on the scene alone, not on threads or memory.
 ///

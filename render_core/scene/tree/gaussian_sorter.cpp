@@ -145,9 +145,10 @@ void GaussianSorter::spill() {
 void GaussianSorter::finish() {
   if (!file_) return sort_codes();
   if (!codes_.empty()) spill();
-  records_ = {};
-  codes_ = {};
-  scratch_codes_ = {};
+  // An assignment of {} would keep the memory, which the buffers of the runs need.
+  std::vector<std::byte>().swap(records_);
+  std::vector<CodedIndex>().swap(codes_);
+  std::vector<CodedIndex>().swap(scratch_codes_);
   const std::size_t rows =
       std::max<std::size_t>(16, memory_bytes_ / 2 / runs_.size() / record_bytes_);
   for (std::size_t r = 0; r < runs_.size(); ++r) {
