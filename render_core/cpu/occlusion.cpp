@@ -66,7 +66,8 @@ void Occlusion::spread_ends(int radius, ThreadPool& pool) {
 
 void Occlusion::find_limits(const SimdKernels& kernels, ThreadPool& pool) {
   const auto longest = static_cast<unsigned>(std::max(parts_.x, parts_.y));
-  const int levels = static_cast<int>(std::bit_width(longest)) + 1;
+  const int levels =
+      std::max(static_cast<int>(std::bit_width(longest)), DepthLimits::tile_level) + 1;
   limits_.resize(ends_.size() * static_cast<std::size_t>(levels));
   pool.parallel_for(static_cast<std::size_t>(parts_.y), [&](std::size_t y) {
     kernels.find_limits({&now_, &*last_, deepest_.data(), room_.x, parts_, static_cast<int>(y),

@@ -60,20 +60,13 @@ __device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t 
 // were counted but are not found stay padding.
 constexpr float emit_slack_px = 0.5f * static_cast<float>(listing_slack_px);
 
-/// The end of a splat's entries.
-template <class Tile>
-__device__ std::uint32_t entries_end(const EmitParams<Tile>& p, std::uint32_t slot,
-                                     std::uint32_t at) {
-  return at + p.tile_count[slot];
-}
-
 /// All lanes write one splat. Rows stay in order, so that the list is the same as if a single lane
 /// wrote it.
 template <class Tile, class Outline>
 __device__ void emit_together(const EmitParams<Tile>& p, Window& window,
                               const TileFootprint<Outline>& f, std::uint32_t slot,
                               std::uint32_t at) {
-  const std::uint32_t last = entries_end(p, slot, at);
+  const std::uint32_t last = at + p.tile_count[slot];
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   for (int top = f.first_row; top <= f.last_row && at < window.end; top += warp_size) {
     const int row = top + lane;
@@ -225,8 +218,11 @@ template <class Tile>
 void launch_emit(const EmitParams<Tile>& params, cudaStream_t stream) {
   const std::uint32_t counted = params.in_window != nullptr ? params.shape.tiles() : 0;
   const std::size_t shared_bytes = (most_splats + counted) * sizeof(std::uint32_t);
+  // The attribute belongs to the device, not to the launch: other Views may draw other sizes.
+  constexpr std::size_t most_shared_bytes =
+      (most_splats + most_sorted_tiles) * sizeof(std::uint32_t);
   check(cudaFuncSetAttribute(emit_kernel<Tile>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                             static_cast<int>(shared_bytes)),
+                             static_cast<int>(most_shared_bytes)),
         "emit");
   emit_kernel<<<blocks_for(params.shape.list_bound, list_window), block_size, shared_bytes,
                 stream>>>(params);

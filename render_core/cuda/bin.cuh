@@ -8,7 +8,7 @@
 namespace catgs::cuda {
 
 // Tile: std::uint16_t or std::uint32_t, whichever can hold shape.tiles(). The narrow type saves a
-// quarter of the bytes that sorting moves.
+// sixth of the bytes that sorting moves.
 
 /// Writes the tile list entries of all visible splats in depth order.
 template <class Tile>

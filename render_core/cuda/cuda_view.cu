@@ -27,7 +27,6 @@ void set_tiles(FrameShape& shape, glm::ivec2 size_px, int tile_side) {
   shape.height_px = size_px.y;
   shape.tiles_x = tiles.x;
   shape.tiles_y = tiles.y;
-  shape.tile_bound = shape.tiles();
 }
 
 Finish finish_of(Pipeline pipeline) {

@@ -77,7 +77,6 @@ struct __align__(8) TileEntry {
 struct FrameShape {
   int width_px = 0, height_px = 0;
   int tiles_x = 0, tiles_y = 0;
-  std::uint32_t tile_bound = 0;     // room for tiles
   std::uint32_t visible_bound = 0;  // room for visible Gaussians
   std::uint32_t list_bound = 0;     // room for list entries
   std::uint32_t slice_bound = 0;    // room for slices of long tiles

@@ -12,8 +12,6 @@
 namespace catgs::cuda {
 namespace {
 
-constexpr int depth_end_bit = depth_bits_below + depth_bits;
-
 /// Tile count of the k-th splat in depth order.
 struct CountInOrder {
   const std::uint32_t* order;
@@ -48,8 +46,8 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   cub::DoubleBuffer<std::uint32_t> keys, values;
   cub::DoubleBuffer<std::uint16_t> narrow_keys;
   cub::DoubleBuffer<TileEntry> entries;
-  check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound,
-                                        depth_bits_below, depth_end_bit),
+  check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound, 0,
+                                        depth_bits),
         "depth sort size");
   check(cub::DeviceScan::ExclusiveScan(nullptr, scan, counts_in_order({}),
                                        static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
@@ -68,8 +66,8 @@ void sort_by_depth(std::uint32_t visible, PingPong<std::uint32_t>& depth,
                    PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
   cub::DoubleBuffer<std::uint32_t> values(order.current, order.other);
-  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, visible,
-                                        depth_bits_below, depth_end_bit, stream),
+  check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, visible, 0,
+                                        depth_bits, stream),
         "depth sort");
   depth = {keys.Current(), keys.Alternate()};
   order = {values.Current(), values.Alternate()};

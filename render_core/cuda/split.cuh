@@ -39,16 +39,16 @@ __host__ __device__ inline std::uint32_t slice_length(std::uint32_t mean) {
 }
 
 inline std::uint32_t task_bound(const FrameShape& shape) {
-  return shape.tile_bound + shape.slice_bound;
+  return shape.tiles() + shape.slice_bound;
 }
 
 /// Room for the queue: one place per tile in all classes but the last.
 inline std::uint32_t queue_bound(const FrameShape& shape) {
-  return (queue_classes - 1) * shape.tile_bound + shape.slice_bound;
+  return (queue_classes - 1) * shape.tiles() + shape.slice_bound;
 }
 
 /// Number of slices that are worth their pixels: twice what the paper's rule can ask for.
-inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tile_bound; }
+inline std::uint32_t most_slices(const FrameShape& shape) { return 4 * shape.tiles(); }
 
 /// Blends the slices of split tiles front to back: C = sum_i C_i prod_{m < i} T_m. Slices behind a
 /// finished pixel are not looked at.

@@ -8,8 +8,9 @@ namespace catgs::cuda {
 /// the lists evenly, whatever a splat's size.
 constexpr std::uint32_t list_window = 4096;
 
-/// The sort has a bin for each tile. More of them need more shared memory than all devices have.
-constexpr std::uint32_t most_sorted_tiles = 4096;
+/// The sort has a bin for each tile. With more tiles, its bins would not fit in the 99 KB of shared
+/// memory that every supported device allows a block.
+constexpr std::uint32_t most_sorted_tiles = 2816;
 
 /// Whether a picture has few enough tiles. Others take CUB's radix sort: sort_by_tile().
 inline bool sorts_in_one_pass(const FrameShape& shape) {
@@ -25,7 +26,7 @@ std::size_t window_tiles(const FrameShape& shape);
 struct TileSortParams {
   FrameShape shape;           // sorts_in_one_pass()
   const FrameCounts* counts;  // list_entries; the host need not know it
-  const std::uint16_t* tile;  // [list_bound]; shape.tiles() and more mean no tile
+  const std::uint16_t* tile;  // [list_bound]; shape.tiles() means no tile
   const TileEntry* unsorted;  // [list_bound]
   std::uint32_t* in_window;   // [windows][tiles], entries of each as launch_emit() counts them;
                               // used up

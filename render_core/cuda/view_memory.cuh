@@ -32,7 +32,7 @@ struct ViewSizes {
     return std::size_t{shape.slice_bound} * tile_pixels;
   }
   [[nodiscard]] std::size_t part_limits() const {
-    return occludes() ? std::size_t{shape.tile_bound} * parts_per_tile : 0;
+    return occludes() ? std::size_t{shape.tiles()} * parts_per_tile : 0;
   }
   /// Whether frames hide what their predecessors did not show.
   [[nodiscard]] bool occludes() const { return settings.pipeline == Pipeline::catgs; }
@@ -52,7 +52,7 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<U32> cull_mask{this, Life::group,
                            [](S s) { return cull_words(s.scene.cluster_count); }};
   DeviceRow<U32> visible{this, Life::group, [](S s) { return s.shape.visible_bound; }};
-  DeviceRow<uint2> range{this, Life::group, [](S s) { return s.shape.tile_bound; }};
+  DeviceRow<uint2> range{this, Life::group, [](S s) { return s.shape.tiles(); }};
   DeviceRow<TileEntry> entries{this, Life::group, [](S s) { return s.shape.list_bound; }};
   DeviceRow<FrameCounts> counts{this, Life::group, [](S) { return 1; }};
 
@@ -85,13 +85,13 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<float> part_ends{this, Life::view, [](S s) { return s.part_limits(); }};
   DeviceRow<float> part_limit{this, Life::frame, [](S s) { return s.part_limits(); }};
   DeviceRow<float2> tile_limit{this, Life::frame,
-                               [](S s) { return s.occludes() ? s.shape.tile_bound : 0; }};
+                               [](S s) { return s.occludes() ? s.shape.tiles() : 0; }};
 
   // Tasks of the blend.
-  DeviceRow<U32> reach{this, Life::view, [](S s) { return s.shape.tile_bound; }};
+  DeviceRow<U32> reach{this, Life::view, [](S s) { return s.shape.tiles(); }};
   DeviceRow<BlendTask> tasks{this, Life::frame, [](S s) { return task_bound(s.shape); }};
   DeviceRow<U32> queue{this, Life::frame, [](S s) { return queue_bound(s.shape); }};
-  DeviceRow<uint2> tile_slices{this, Life::frame, [](S s) { return s.shape.tile_bound; }};
+  DeviceRow<uint2> tile_slices{this, Life::frame, [](S s) { return s.shape.tiles(); }};
   DeviceRow<U32> consumed{this, Life::frame, [](S s) { return s.slice_parts(); }};
   DeviceRow<float> slice_transmittance{this, Life::frame, [](S s) { return s.slice_parts(); }};
   DeviceRow<float4> slice_pixels{this, Life::frame, [](S s) { return s.slice_pixels(); }};
@@ -105,7 +105,7 @@ struct ViewMemory : MemoryTable<ViewSizes> {
 
   /// Whether lists of this shape fit in the present memory.
   [[nodiscard]] bool holds_lists(const FrameShape& shape) const {
-    return shape.visible_bound <= visible.size() && shape.tile_bound <= range.size() &&
+    return shape.visible_bound <= visible.size() && shape.tiles() <= range.size() &&
            shape.list_bound <= entries.size();
   }
 };

@@ -19,8 +19,8 @@ namespace CATGS_MATH_NAMESPACE {
 // are view depths in world units. Infinity means that nothing is hidden.
 
 /// Parts around a place whose ends count there: 1 for a still camera, and more with the parallax of
-/// its step. -1 after a larger step: the last picture hides nothing then. `mean_inverse_depth`: of
-/// the last picture, 1 / world units.
+/// its step. -1 after a larger step, or where no depth is known: the last picture hides nothing
+/// then. `mean_inverse_depth`: of what the last picture drew, 1 / world units; 0: not known.
 template <class T>
 CATGS_HD_INLINE int occlusion_radius(const CameraModel<T>& now, const CameraModel<T>& last,
                                      T mean_inverse_depth, int part_px) {
@@ -28,7 +28,7 @@ CATGS_HD_INLINE int occlusion_radius(const CameraModel<T>& now, const CameraMode
   // How far near surfaces move against those behind them. With parts of the place alone (radius 0),
   // blocks fell to 13 dB where surfaces came out behind others.
   const T parallax_px = T(2.0) * now.focal_px.x * mean_inverse_depth * sqrt(dot(step, step));
-  if (!(parallax_px < T(most_occlusion_px))) return -1;
+  if (!(mean_inverse_depth > T(0.0) && parallax_px < T(most_occlusion_px))) return -1;
   return 1 + static_cast<int>(parallax_px / T(part_px));
 }
 

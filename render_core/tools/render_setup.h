@@ -51,7 +51,7 @@ struct RenderSetup {
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
   ViewSettings view;            // pipeline and its parts; callers set format and memory space
-  PredictorSettings predictor;  // of the catgs pipeline's forecasts
+  PredictorSettings predictor;  // of the paper pipeline's forecasts
   Trajectory samples;           // the camera as recorded
   Trajectory poses;             // one per frame
   std::size_t first = 0;        // number of poses[0] in the whole path

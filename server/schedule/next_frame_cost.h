@@ -22,8 +22,7 @@ class NextFrameCost {
     sub_frames_left_ = ticket.speculated ? sub_frames_left_ - 1 : static_cast<int>(ticket.window);
   }
 
-  /// True: the last key frame's window is used up. A core may decide otherwise: an earlier key
-  /// frame if the camera left its guard set, or more sub-frames if it stays inside.
+  /// True: the last key frame's window is used up. A core may decide otherwise.
   [[nodiscard]] bool key_is_next() const { return sub_frames_left_ <= 0; }
   /// The predicted cost of rendering and encoding the next frame; 0 before the first.
   [[nodiscard]] Clock::duration next() const { return (key_is_next() ? key_ : sub_) + encode_; }

@@ -216,6 +216,16 @@ TEST(CatgsView, ANewImageSizeHidesNothing) {
   }
 }
 
+TEST(CatgsView, DrawsTheSmallestPictures) {
+  const auto renderer = renderer_of(wall_before_many());
+  const auto view = renderer->make_view(catgs_settings), exact = renderer->make_view({});
+  for (const glm::ivec2 size : {glm::ivec2(1, 1), glm::ivec2(4, 4), glm::ivec2(5, 3)}) {
+    const FrameRequest request = request_at({}, size);
+    for (int frame = 0; frame < 3; ++frame)
+      EXPECT_GE(test::psnr_db(render_in(*view, request).rgb, render_in(*exact, request).rgb), 40.0);
+  }
+}
+
 TEST(CatgsView, EachInstructionSetAndAnyNumberOfThreadsDrawTheSame) {
   const auto cloud = wall_before_many();
   const test::Move move = test::moves().back();

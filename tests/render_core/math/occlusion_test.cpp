@@ -94,6 +94,7 @@ TEST(OcclusionRadius, GrowsWithTheParallaxOfAStep) {
   EXPECT_EQ(radius(0.05f), 2);   // 4.6 px
   EXPECT_EQ(radius(0.34f), 8);   // 31.1 px
   EXPECT_EQ(radius(0.36f), -1);  // 32.9 px
+  EXPECT_EQ(math::occlusion_radius<double>(model_of({}), model_of({}), 0.0, 8), -1) << "no depth";
 }
 
 }  // namespace

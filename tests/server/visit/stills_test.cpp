@@ -45,7 +45,6 @@ TEST_F(StillTest, IsOfItsOwnSizeAndSoIsMotionAfterIt) {
   EXPECT_EQ(still.ticket.size_px, glm::ivec2(1280, 720));
   EXPECT_EQ(still.encoding.size_px, still.ticket.size_px);
   EXPECT_EQ(still.request.camera.size_px, still.ticket.size_px);
-  EXPECT_FALSE(still.request.forecast);
   ASSERT_EQ(host.count<StreamConfig>(), 1);
   EXPECT_EQ(session.stream().config().size_px, glm::ivec2(1280, 720));
   EXPECT_EQ(session.stream().config().fps, policy.default_fps) << "that of moving pictures";

@@ -41,9 +41,8 @@ class SortStage : public StageTest {};
 TEST_F(SortStage, OrdersSplatsByDepthAsAStableSort) {
   constexpr std::uint32_t count = 30'000;
   const FrameShape shape{.tiles_x = 4, .tiles_y = 4, .visible_bound = count, .list_bound = 1};
-  // Few depths, so that many are equal; their lowest bits say nothing.
+  // Few depths, so that many are equal.
   Numbers keys = random_numbers(count, 5000, 1);
-  for (std::uint32_t& key : keys) key = key << depth_bits_below | key % (1u << depth_bits_below);
   keys[7] = most_depth_key;
   const auto key = upload(keys), other_key = upload(keys);
   const auto slot = upload(counting(count)), other_slot = upload(Numbers(count));
@@ -54,8 +53,7 @@ TEST_F(SortStage, OrdersSplatsByDepthAsAStableSort) {
   sort_by_depth(count, depth, order, {.memory = scratch.get(), .bytes = scratch.bytes()},
                 stream.get());
   Numbers expected = counting(count);
-  std::ranges::stable_sort(expected, {},
-                           [&](std::uint32_t i) { return keys[i] >> depth_bits_below; });
+  std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return keys[i]; });
   const Numbers drawn = fetch(order.current, count);
   Mismatches places("sort: places in depth order", 0.0);
   for (std::uint32_t k = 0; k < count; ++k) places.add(drawn[k] != expected[k]);
@@ -157,19 +155,16 @@ Numbers count_windows(const std::vector<std::uint16_t>& tile_of, std::uint32_t t
 TEST_F(SortStage, OrdersEntriesByTileInOnePass) {
   constexpr std::uint32_t count = 300'000, room = count + 2 * list_window;
   const Stream stream;
-  for (const glm::ivec2 tiles : {glm::ivec2(60, 34), glm::ivec2(64, 64), glm::ivec2(1, 1)}) {
-    const FrameShape shape{.tiles_x = tiles.x,
-                           .tiles_y = tiles.y,
-                           .tile_bound = static_cast<std::uint32_t>(tiles.x * tiles.y),
-                           .visible_bound = 1,
-                           .list_bound = room};
+  for (const glm::ivec2 tiles : {glm::ivec2(60, 34), glm::ivec2(64, 44), glm::ivec2(1, 1)}) {
+    const FrameShape shape{
+        .tiles_x = tiles.x, .tiles_y = tiles.y, .visible_bound = 1, .list_bound = room};
     ASSERT_TRUE(sorts_in_one_pass(shape));
     // Half of the entries crowd in few tiles; the largest number means no tile.
     Numbers numbers = random_numbers(count, shape.tiles() + 1, 5);
     for (std::uint32_t i = 0; i < count; i += 2) numbers[i] %= 7;
     const std::vector<std::uint16_t> tile_of(numbers.begin(), numbers.end());
     Numbers in_window = count_windows(tile_of, shape.tiles());
-    in_window.resize(window_tiles(shape));
+    in_window.resize(window_tiles(shape), ~0u);  // of no use, and not to be read
     const auto counted = upload(in_window);
     FrameCounts counts;
     counts.list_entries = count;
@@ -259,17 +254,17 @@ TEST_P(EmitStage, ListsWhatTheCpuCoreListsAndMissesNoPixel) {
   std::uint32_t depth = 0;
   for (std::size_t k = 0; k < entries.size(); ++k) {
     const std::uint32_t slot = entries[k].slot;
-    if (tiles[k] == lists.shape().tiles()) continue;   // it reaches no block
-    EXPECT_GE(keys[slot] >> depth_bits_below, depth);  // in depth order
-    depth = keys[slot] >> depth_bits_below;
+    if (tiles[k] == lists.shape().tiles()) continue;  // it reaches no block
+    EXPECT_GE(keys[slot], depth);                     // in depth order
+    depth = keys[slot];
     EXPECT_TRUE(listed.emplace(tiles[k], scene.order[visible[slot]]).second) << "listed twice";
     blocks[{tiles[k], slot}] = entries[k].blocks;
   }
   const std::set<Entry> expected = cpu_entries(lists);
   {
     // Each core widens outlines by its own allowance for rounding. Here, an entry must reach a
-    // block; there, the tile.
-    Mismatches missing("emit: entries of the CPU core that are missing", 0.02);
+    // block; there, the tile, or only the box does where that is one row or column of tiles.
+    Mismatches missing("emit: entries of the CPU core that are missing", 0.04);
     for (const Entry& entry : expected) missing.add(!listed.contains(entry));
     Mismatches added("emit: entries that the CPU core does not have", 0.05);
     for (const Entry& entry : listed) added.add(!expected.contains(entry));

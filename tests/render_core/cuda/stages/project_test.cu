@@ -9,13 +9,12 @@
 namespace catgs::cuda::stages {
 namespace {
 
-/// depth_key() on the host.
-std::uint32_t key_of(float depth, float near_z) {
-  if (!(depth > near_z)) return 0;
-  constexpr std::uint32_t below = (1u << depth_bits_below) - 1u;
-  return std::min(
-      std::bit_cast<std::uint32_t>(depth) - (std::bit_cast<std::uint32_t>(near_z) & ~below),
-      most_depth_key);
+/// depth_key() in double precision.
+double key_of(float depth, float near_z) {
+  if (!(depth > near_z)) return 0.0;
+  const double steps = static_cast<double>(std::bit_cast<std::uint32_t>(depth)) -
+                       static_cast<double>(std::bit_cast<std::uint32_t>(near_z));
+  return std::min(steps * 65536.0 / (20.0 * (1 << 23)), 65535.0);
 }
 
 class ProjectStage : public ListStage {};
@@ -40,7 +39,7 @@ TEST_P(ProjectStage, SplatsAreThoseOfTheCpuCore) {
   Difference shape("project: whitening, share of its entries' sum", 5e-3);
   Difference opacity("project: log2 of opacity", 1e-4), colour("project: colour", 0.02);
   Difference path("project: path, share of 1 px and its length", 5e-3);
-  Mismatches depth("project: depth keys", 0.0);
+  Difference depth("project: depth keys, steps", 1.0);  // keys are rounded down
   const auto on_cpu = lists.on_cpu();
   float nearest = std::numeric_limits<float>::infinity(), longest = 0.0f;
   for (std::size_t v = 0; v < visible.size(); ++v) {
@@ -62,7 +61,7 @@ TEST_P(ProjectStage, SplatsAreThoseOfTheCpuCore) {
     colour.add(red_green.x - e.red);
     colour.add(red_green.y - e.green);
     colour.add(__half2float(r.colour.blue) - e.blue);
-    depth.add(keys[v] != key_of(e.depth, staged.camera.near_z));
+    depth.add(keys[v] - key_of(e.depth, staged.camera.near_z));
     if (e.depth > lists.request().min_depth) nearest = std::min(nearest, e.depth);
     if (!sweeps) continue;
     const double length = 1.0 + std::hypot(expected->path->dx, expected->path->dy);

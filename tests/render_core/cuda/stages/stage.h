@@ -117,7 +117,6 @@ inline FrameShape picture_shape(glm::ivec2 size_px) {
   shape.height_px = size_px.y;
   shape.tiles_x = (size_px.x + tile_side_px - 1) / tile_side_px;
   shape.tiles_y = (size_px.y + tile_side_px - 1) / tile_side_px;
-  shape.tile_bound = shape.tiles();
   return shape;
 }
 
