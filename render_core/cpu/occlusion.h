@@ -15,8 +15,8 @@ namespace catgs {
 
 struct SimdKernels;
 
-/// What the last frame of a View shows to be hidden in the next one; math/occlusion-inl.h has the
-/// method.
+/// Finds what the last frame of a View shows to be hidden in the next one. math/occlusion-inl.h has
+/// the method.
 class Occlusion {
  public:
   /// Starts a frame: finds its limits, if the last frame is known and near enough.
@@ -28,7 +28,7 @@ class Occlusion {
   /// The next frame will have no limits.
   void forget() { last_.reset(); }
 
-  /// Of the frame that has begun.
+  /// The limits of the frame that has begun.
   [[nodiscard]] DepthLimits limits() const;
   [[nodiscard]] PartEnds ends_of_tile(glm::ivec2 tile);
   /// Whether all Gaussians of a cluster are hidden.

@@ -13,10 +13,10 @@ CATGS_BEFORE_MATH();
 namespace catgs {
 namespace CATGS_MATH_NAMESPACE {
 
-// What the last picture shows to be hidden in the next one. The last picture keeps the *end* of
-// each part: the view depth behind which nothing of it shows. The next picture gets a *limit* for
-// each of its parts, and leaves out Gaussians behind the limits of all parts that they meet. Depths
-// are view depths in world units. Infinity means that nothing is hidden.
+// The last picture shows what is hidden in the next one. It keeps the *end* of each part: the view
+// depth behind which nothing of it shows. The next picture gets a *limit* for each of its parts,
+// and leaves out Gaussians behind the limits of all parts that they meet. Depths are view depths in
+// world units. Infinity means that nothing is hidden.
 
 /// Parts around a place whose ends count there: 1 for a still camera, and more with the parallax of
 /// its step. -1 after a larger step, or where no depth is known: the last picture hides nothing

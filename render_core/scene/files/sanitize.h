@@ -28,12 +28,12 @@ namespace catgs {
 /// The kept Gaussians stay in order, and the vectors keep their allocations.
 SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context);
 
-/// What is not absurd by rule 3: unlimited while `radius` is 0.
+/// A sphere that holds all places that are not absurd by rule 3. A `radius` of 0 sets no limit.
 struct SaneReach {
   glm::vec3 centre{0.0f};
   float radius = 0.0f;
 };
-/// Of a scene, or of an even sample of it.
+/// Finds the sphere of a scene, or of an even sample of it.
 SaneReach sane_reach(const GaussianCloud& cloud);
 
 /// Judges a part of a scene by the reach of the whole.

@@ -24,7 +24,7 @@ namespace {
 /// Pages of leaves that are made at a time: work for every thread, and 80 MB.
 constexpr std::size_t pages_at_a_time = 256;
 
-/// What the first reading of a scene tells.
+/// The first reading of a scene finds this.
 struct Extent {
   std::uint64_t gaussians = 0, dropped = 0;
   int sh_degree = 0;
