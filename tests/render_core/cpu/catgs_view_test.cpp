@@ -65,16 +65,18 @@ struct PathQuality {
   double worst_frame = std::numeric_limits<double>::infinity();
   double worst_block = std::numeric_limits<double>::infinity();
   int frames = 0;
+  std::int64_t left_out = 0;  // list entries of exact that catgs did not have
 
   void follow(Renderer& renderer, const Trajectory& path) {
     const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
     for (const TimedPose& sample : path) {
       FrameRequest request;
       request.camera = make_camera(sample.world_from_camera, {320, 192}, 183.0f);
-      const auto image = [&](View& of) {
-        return Image{request.camera.size_px, render_in(of, request).rgb};
-      };
-      const ImageQuality quality = compare_images(image(*view), image(*exact));
+      const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
+      const ImageQuality quality = compare_images(Image{request.camera.size_px, drawn.rgb},
+                                                  Image{request.camera.size_px, expected.rgb});
+      left_out += static_cast<std::int64_t>(expected.stats.list_entries) -
+                  static_cast<std::int64_t>(drawn.stats.list_entries);
       squares += std::pow(10.0, -0.1 * quality.psnr());
       worst_frame = std::min(worst_frame, quality.psnr());
       worst_block = std::min(worst_block, quality.worst_block_psnr());
@@ -87,6 +89,7 @@ struct PathQuality {
     EXPECT_GE(mean(), 50.0);
     EXPECT_GE(worst_frame, 40.0);
     EXPECT_GE(worst_block, 30.0);
+    EXPECT_GT(left_out, 0);
   }
 };
 
