@@ -26,13 +26,14 @@ void Occlusion::begin(const Camera& camera, float mean_inverse_depth, const Simd
                       ThreadPool& pool) {
   if (camera.size_px != now_.size_px) last_.reset();
   now_ = camera;
+  model_ = model_of(camera);
   parts_ = (camera.size_px + (part_side_px - 1)) / part_side_px;
   room_ = (camera.size_px + (tile_size_px - 1)) / tile_size_px * parts_across;
   ends_.resize(area(room_));
   limited_ = false;
   if (!last_) return;
   const int radius =
-      math::occlusion_radius(model_of(now_), model_of(*last_), mean_inverse_depth, part_side_px);
+      math::occlusion_radius(model_, model_of(*last_), mean_inverse_depth, part_side_px);
   if (radius < 0) return;
   spread_ends(radius, pool);
   find_limits(kernels, pool);
@@ -102,7 +103,7 @@ PartEnds Occlusion::ends_of_tile(glm::ivec2 tile) {
 
 bool Occlusion::hides(const Cluster& cluster) const {
   if (!limited_) return false;
-  const auto camera = model_of(now_);
+  const math::CameraModel<float>& camera = model_;
   const glm::vec3& c = cluster.centre;
   const glm::vec3& h = cluster.half_extent;
   const auto along = [&](const math::Vec3<float>& axis) {
@@ -114,7 +115,8 @@ bool Occlusion::hides(const Cluster& cluster) const {
   if (!(nearest > camera.near_z)) return false;
   // The means lie in this box of the camera's space. See ClusterCuller for how far beyond them
   // Gaussians reach.
-  const float blur = std::sqrt(static_cast<float>(-2.0 * std::log(alpha_min) * low_pass_px2));
+  static const float blur =
+      std::sqrt(static_cast<float>(-2.0 * std::log(alpha_min) * low_pass_px2));
   const auto interval = [&](float at, float half, float focal, float principal, float low_slope,
                             float high_slope) {
     const float low = at - half, high = at + half;

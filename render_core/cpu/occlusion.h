@@ -8,6 +8,7 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/cpu/depth_limits.h"
+#include "render_core/math/camera-inl.h"
 #include "render_core/math/camera.h"
 #include "render_core/scene/clusters.h"
 
@@ -41,8 +42,9 @@ class Occlusion {
   void find_limits(const SimdKernels& kernels, ThreadPool& pool);
 
   Camera now_;
-  std::optional<Camera> last_;     // whose ends are known
-  glm::ivec2 parts_{0}, room_{0};  // parts of the picture, and those of its tiles
+  math::CameraModel<float> model_{};  // of now_
+  std::optional<Camera> last_;        // whose ends are known
+  glm::ivec2 parts_{0}, room_{0};     // parts of the picture, and those of its tiles
   bool limited_ = false;
   // Rows of room_.x parts: ends of the last frame, then of this one; the deepest end around, in a
   // row and in all.

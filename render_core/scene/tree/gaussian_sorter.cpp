@@ -189,7 +189,7 @@ void GaussianSorter::next(std::size_t count, GaussianCloud& cloud) {
   cloud.resize(count, degree_);
   std::size_t i = 0;
   for (; i < count && !heads_.empty(); ++i) {
-    // Of equal codes the earlier run's comes first: it was added before.
+    // The earlier run comes first among equal codes, since it was added before.
     const std::size_t r = heads_.top().second;
     heads_.pop();
     Run& run = runs_[r];

@@ -14,7 +14,7 @@
 
 namespace catgs {
 
-/// What a tree knows of one of its levels.
+/// Sizes and errors of one level of a tree.
 struct TreeLevel {
   std::uint64_t gaussians = 0;
   float mean_error = 0.0f, max_error = 0.0f;  // of its nodes, world units

@@ -18,7 +18,7 @@ constexpr float largest_sh_unit = 1e3f / 127.0f * 0x1p15f;  // sanitize() allows
 
 bool finite_half(std::uint16_t bits) { return (bits & 0x7c00u) != 0x7c00u; }
 
-/// What is wrong with a node's facts; null: nothing.
+/// Names the first fact of a node that is out of range; null if none is.
 const char* fault_of(const NodeFacts& facts) {
   const Cluster& b = facts.bounds;
   if (facts.count < 1 || facts.count > cluster_size) return "count";

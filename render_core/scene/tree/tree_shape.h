@@ -21,7 +21,7 @@ struct NodeId {
   bool operator==(const NodeId&) const = default;
 };
 
-/// What a page says about a node beside its records.
+/// The facts of a node that a page holds beside its records.
 struct alignas(16) NodeFacts {
   PackedUnits units;
   Cluster bounds;             // of the node's Gaussians and of all that it stands for

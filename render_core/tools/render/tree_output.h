@@ -22,7 +22,7 @@ void add_tree_options(CLI::App& command, TreeOptions& options);
 void write_tree(const SceneParts& scene, const TreeOptions& options,
                 const std::filesystem::path& out, ThreadPool& pool, bool quiet);
 
-/// What `info` says about a tree, from its header alone.
+/// Describes a tree for `info`, from its header alone.
 nlohmann::ordered_json describe_tree(const std::filesystem::path& path, const TreeHeader& header);
 void print_tree(const nlohmann::ordered_json& tree);
 

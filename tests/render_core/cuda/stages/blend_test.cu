@@ -231,7 +231,7 @@ TEST_F(BlendStage, FinishedPixelsFillTheRestWithTheirColour) {
   const std::vector<float> exact = on_device(exact_finish, reached, ends);
   const std::vector<float> a = on_device(dark, reached, ends);
   const std::vector<float> b = on_device(filled, reached, ends);
-  // What shows behind is as bright as what stands before, on average.
+  // Splats behind are as bright as those in front, on average.
   EXPECT_GT(catgs::test::psnr_db(b, exact), catgs::test::psnr_db(a, exact));
   EXPECT_GT(catgs::test::psnr_db(b, exact), 35.0);
 }
