@@ -10,7 +10,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto session_patience = 10s;
-// A key frame of the largest scene and picture size takes a busy processor seconds.
+// A frame of the largest scene and picture size takes a busy processor seconds.
 constexpr auto frame_patience = 30s;
 
 }  // namespace

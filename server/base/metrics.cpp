@@ -49,7 +49,7 @@ prometheus::Histogram& Metrics::stage(const char* name) {
       .Name("catgs_frame_stage_seconds")
       .Help(
           "Duration of a frame's stages: queue_wait (it could start, others' turns came first), "
-          "hand_off (to the thread that renders), render_key, render_sub, encode_wait (to the "
+          "hand_off (to the thread that renders), render, encode_wait (to the "
           "thread that encodes), encode, send (encoded to handed to the socket)")
       .Register(registry_)
       .Add({{"stage", name}}, latency_buckets_s);

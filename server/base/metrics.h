@@ -142,8 +142,7 @@ class Metrics {
       counter("catgs_list_entries_overflowed_total", "Tile list entries that found no memory");
   prometheus::Histogram& queue_wait_seconds = stage("queue_wait");
   prometheus::Histogram& hand_off_seconds = stage("hand_off");
-  prometheus::Histogram& render_key_seconds = stage("render_key");
-  prometheus::Histogram& render_sub_seconds = stage("render_sub");
+  prometheus::Histogram& render_seconds = stage("render");
   prometheus::Histogram& encode_wait_seconds = stage("encode_wait");
   prometheus::Histogram& encode_seconds = stage("encode");
   prometheus::Histogram& send_seconds = stage("send");

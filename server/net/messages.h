@@ -135,8 +135,6 @@ struct Welcome {
 struct Stats {
   float fps = 0.0f;
   float bitrate_kbps = 0.0f;
-  std::uint32_t key_frames = 0;
-  std::uint32_t sub_frames = 0;
   std::uint32_t dropped_packets = 0;
   std::uint32_t sessions = 0;
   int target_bitrate_kbps = 0;

@@ -280,8 +280,6 @@ void fill(const Stats& stats, v1::ServerMessage& out) {
   auto& message = *out.mutable_stats();
   message.set_fps(stats.fps);
   message.set_bitrate_kbps(stats.bitrate_kbps);
-  message.set_key_frames(stats.key_frames);
-  message.set_sub_frames(stats.sub_frames);
   message.set_dropped_packets(stats.dropped_packets);
   message.set_sessions(stats.sessions);
   message.set_target_bitrate_kbps(static_cast<std::uint32_t>(stats.target_bitrate_kbps));
@@ -362,9 +360,7 @@ v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   header.set_render_us(elapsed_us(ticket.render->start, ticket.render->end));
   header.set_encode_us(elapsed_us(ticket.render->end, ticket.encode->end));
   header.set_send_wait_us(elapsed_us(ticket.encode->end, now));
-  header.set_speculated(ticket.speculated);
   header.set_still(ticket.still);
-  header.set_window(ticket.window);
   return header;
 }
 

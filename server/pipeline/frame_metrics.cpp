@@ -20,8 +20,7 @@ void observe_frame(Metrics& metrics, const FrameTicket& ticket, TimePoint now) {
   if (ticket.still) return;  // late on purpose, and perhaps larger
   metrics.queue_wait_seconds.Observe(seconds(ticket.ready, ticket.started));
   metrics.hand_off_seconds.Observe(seconds(ticket.started, ticket.render->start));
-  (ticket.speculated ? metrics.render_sub_seconds : metrics.render_key_seconds)
-      .Observe(seconds(ticket.render->start, ticket.render->end));
+  metrics.render_seconds.Observe(seconds(ticket.render->start, ticket.render->end));
   metrics.pose_to_frame_seconds.Observe(seconds(ticket.pose_received, now));
 }
 

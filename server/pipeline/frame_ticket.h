@@ -32,8 +32,6 @@ struct FrameTicket {
   bool still = false;    // drawn at rest: late on purpose, perhaps larger
   bool refined = false;  // a still that is encoded once more: nothing is rendered
   glm::ivec2 size_px{0};
-  bool speculated = false;   // a sub-frame
-  std::uint32_t window = 0;  // W of its key frame
 
   TimePoint pose_received{};
   TimePoint ready{};    // the session could have started it, had its turn come

@@ -62,8 +62,6 @@ bool render_now(FrameJob& job, FrameResult& result) {
       return false;
     }
     result.stats = stream.picture.stats;
-    ticket.speculated = result.stats.kind == FrameKind::sub;
-    ticket.window = static_cast<std::uint32_t>(result.stats.window);
   }
   ticket.render = {start, Clock::now()};
   return true;

@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <unordered_map>
-#include <utility>
 
 #include "server/base/clock.h"
 
@@ -15,7 +14,6 @@ struct FrameCandidate {
   TimePoint ready;              // not before (its nominal rate)
   TimePoint deadline;           // when its nominal rate says that the frame is due
   Clock::duration cost{};       // predicted from measurements
-  bool key = false;             // probably a key frame
   std::optional<int> device{};  // the device that renders it, if devices have numbers
 
   [[nodiscard]] TimePoint latest_start() const { return deadline - cost; }
@@ -27,10 +25,8 @@ struct FrameCandidate {
 /// session's deadline from the moment it started. Under overload the sessions therefore take turns:
 /// all rates fall and no session starves.
 ///
-/// Key frames cost several times a sub-frame, and sessions that began together need theirs
-/// together. While a device renders a key frame, its sub-frames go first as long as the next key
-/// frame can still meet its deadline. No slot stays empty for that. A device takes no more than its
-/// share of the slots, so that late frames of an overloaded device leave slots to others.
+/// A device takes no more than its share of the slots, so that late frames of an overloaded device
+/// leave slots to others.
 ///
 /// A source is asked for its next frame only when its own state changed. A change costs O(log n)
 /// for n sources. Not thread-safe.
@@ -78,7 +74,7 @@ class FrameScheduler {
   /// free.
   std::optional<Turn> take(TimePoint now) {
     while (!later_.empty() && later_.begin()->first <= now) line_up(*later_.begin()->second, now);
-    while (Source* const source = has_free_slot() ? first_in_line(now) : nullptr) {
+    while (Source* const source = has_free_slot() ? first_in_line() : nullptr) {
       const Offer offer = offers_.at(source);
       if (source->next_frame() != offer.frame) {  // a change that was not reported
         changed(*source, now);
@@ -88,7 +84,6 @@ class FrameScheduler {
       Device& device = devices_[offer.frame.device];
       ++running_;
       ++device.frames;
-      if (offer.frame.key) ++device.key_frames;
       return Turn{*source, offer.frame, std::min(offer.ready, now)};
     }
     return std::nullopt;
@@ -98,7 +93,6 @@ class FrameScheduler {
     Device& device = devices_[frame.device];
     --running_;
     --device.frames;
-    if (frame.key) --device.key_frames;
   }
 
   /// The time at which the next waiting source becomes ready.
@@ -116,14 +110,13 @@ class FrameScheduler {
   };
   struct Device {
     int frames = 0;
-    int key_frames = 0;
-    Line waiting_subs, waiting_keys;  // ready, by their latest start
+    Line waiting;  // ready, by their latest start
   };
 
   void put_in_line(Source& source, const FrameCandidate& frame, TimePoint ready, TimePoint now) {
     Device& device = devices_[frame.device];
     const bool later = frame.ready > now;
-    Line& line = later ? later_ : frame.key ? device.waiting_keys : device.waiting_subs;
+    Line& line = later ? later_ : device.waiting;
     const auto place = line.emplace(later ? frame.ready : frame.latest_start(), &source);
     offers_.emplace(&source, Offer{frame, ready, &line, place});
   }
@@ -132,24 +125,14 @@ class FrameScheduler {
     withdraw(source);
     put_in_line(source, offer.frame, offer.ready, now);
   }
-  Source* first_in_line(TimePoint now) {
-    using Rank = std::pair<bool, TimePoint>;
-    Source* first = nullptr;
-    Rank first_rank;
-    for (auto& [number, device] : devices_) {
-      if (device.frames >= slots_of_device_) continue;
-      for (const Line* line : {&device.waiting_subs, &device.waiting_keys}) {
-        if (line->empty()) continue;
-        const auto& [latest_start, source] = *line->begin();
-        const bool can_wait =
-            line == &device.waiting_keys && device.key_frames > 0 && latest_start > now;
-        const Rank rank{can_wait, latest_start};
-        if (first && first_rank <= rank) continue;
-        first = source;
-        first_rank = rank;
-      }
+  Source* first_in_line() {
+    const typename Line::value_type* first = nullptr;
+    for (const auto& [number, device] : devices_) {
+      if (device.frames >= slots_of_device_ || device.waiting.empty()) continue;
+      const auto& candidate = *device.waiting.begin();
+      if (!first || candidate.first < first->first) first = &candidate;
     }
-    return first;
+    return first ? first->second : nullptr;
   }
 
   const int slots_;

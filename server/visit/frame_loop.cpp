@@ -61,25 +61,25 @@ bool FrameLoop::acknowledged(const Ack& ack, TimePoint now) {
   return true;
 }
 
-bool FrameLoop::view_has_changed() const {
-  return !shown_ || !same_view(*shown_, track_.aim(), near_z_);
+bool FrameLoop::shows(const PoseSample& pose) const {
+  return shown_ && same_view(*shown_, pose, near_z_);
 }
 
 std::optional<FrameCandidate> FrameLoop::next(const IdrPolicy& idr, bool still_size) const {
   if (!track_.newest() || !flow_.may_send()) return std::nullopt;
-  const bool moved = view_has_changed();
-  FrameCandidate frame{{}, {}, cost_.next(), cost_.key_is_next()};
+  const bool moved = !shows(track_.aim());
+  FrameCandidate frame{{}, {}, cost_.next()};
   std::optional<TimePoint> ready = moved ? pace_.next_start_of_pose() : pace_.next_start();
   if (!moved) {
     // Between two poses of a moving camera a still would only delay the next picture.
     const TimePoint rest = rest_.begins();
-    const bool draws = shown_is_passing_ || !still_size;  // the shown picture is not fit as a still
+    // A forecast is not fit as a still, and neither is a picture of another size.
+    const bool draws = !still_size || !shows(*track_.newest());
     const bool refines = refinements_left_ > 0;
     if (idr.wanted() && (!(draws || refines) || idr.earliest() <= rest)) {
       ready = std::max(ready, idr.earliest());
     } else if (draws || refines) {
       ready = std::max({ready, std::optional(rest), next_refinement_});
-      frame.key = draws;
       frame.cost = draws ? cost_.still() : cost_.refinement();
     } else {
       return std::nullopt;
@@ -94,10 +94,10 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   assert(track_.newest());
   FrameTicket& ticket = order.ticket;
   // A still shows the pose itself. A forecast overshoots a camera that stops.
-  ticket.refined = ticket.still && !order.force_idr && !view_has_changed() && !shown_is_passing_;
+  ticket.refined =
+      ticket.still && !order.force_idr && shows(track_.aim()) && shows(*track_.newest());
   if (ticket.still) track_.aim_at_newest();
   const PoseSample& aim = track_.aim();
-  shown_is_passing_ = !same_view(aim, *track_.newest(), near_z_);
   shown_ = aim;
   limit(order, now);
 
@@ -148,7 +148,6 @@ bool FrameLoop::made(const FrameResult& result, glm::ivec2 moving_size_px, TimeP
   const FrameTicket& ticket = result.frame.ticket;
   if (ticket.frame_id <= obsolete_frames_) return false;
   cost_.add(ticket);
-  if (ticket.speculated) shown_is_passing_ = true;
   // The VBV follows the bitrate one picture late. The first still in the stream of motion therefore
   // had no more room than a picture in motion.
   const bool had_room =

@@ -61,7 +61,8 @@ class FrameLoop {
   }
 
  private:
-  [[nodiscard]] bool view_has_changed() const;
+  /// True: the last picture rendered shows this pose.
+  [[nodiscard]] bool shows(const PoseSample& pose) const;
   /// Limits the frame's size and schedules the next refinement.
   void limit(FrameOrder& order, TimePoint now);
 
@@ -75,7 +76,6 @@ class FrameLoop {
   Rest rest_;
   NextFrameCost cost_;
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
-  bool shown_is_passing_ = false;    // a sub-frame or a forecast: not fit as a still
   int refinements_left_ = 0;
   std::optional<TimePoint> next_refinement_;
   int failures_ = 0;  // in a row

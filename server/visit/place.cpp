@@ -82,7 +82,7 @@ void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::
                           TimePoint now) {
   if (!audience_.is_visitor(by)) return;
   usage_.frame_sent(ticket, now);
-  visit_.on_frame_sent(ticket, packet_bytes);
+  visit_.on_frame_sent(packet_bytes);
 }
 
 void Place::on_close(ClientConnection& closed, bool by_leaving) {

@@ -31,9 +31,7 @@ class Visit {
   void on_stream_opened(const StreamOpened& opened, TimePoint now);
   void on_frame(FrameResult result, TimePoint now);
   void on_link(const LinkState& link, TimePoint now) { flow_.observed(link, now); }
-  void on_frame_sent(const FrameTicket& ticket, std::size_t bytes) {
-    statistics_.frame_sent(ticket, bytes);
-  }
+  void on_frame_sent(std::size_t bytes) { statistics_.frame_sent(bytes); }
   /// Call it at least four times a second. Handles timeouts, statistics and the heartbeat.
   void on_tick(TimePoint now);
   /// Asks for admission again. Only while the visit waits for a place.

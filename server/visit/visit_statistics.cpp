@@ -7,12 +7,11 @@ namespace catgs {
 
 using namespace std::chrono_literals;
 
-void VisitStatistics::frame_sent(const FrameTicket& ticket, std::size_t bytes) {
+void VisitStatistics::frame_sent(std::size_t bytes) {
   ++frames_sent_;
   bytes_sent_ += bytes;
   ++second_frames_;
   second_bytes_ += bytes;
-  if (!ticket.refined) ++(ticket.speculated ? stats_.sub_frames : stats_.key_frames);
 }
 
 void VisitStatistics::frames_lost(std::size_t count) {

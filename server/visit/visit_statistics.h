@@ -7,7 +7,6 @@
 #include "server/base/clock.h"
 #include "server/flow/flow_control.h"
 #include "server/net/messages.h"
-#include "server/pipeline/frame_ticket.h"
 
 namespace catgs {
 
@@ -18,7 +17,7 @@ class VisitStatistics {
   explicit VisitStatistics(TimePoint now) : second_start_(now) {}
 
   /// A frame left through the socket. Only now does it count as sent.
-  void frame_sent(const FrameTicket& ticket, std::size_t bytes);
+  void frame_sent(std::size_t bytes);
   /// Frames were dropped before they reached the socket.
   void frames_lost(std::size_t count);
   void frame_dropped_by_client() { ++frames_dropped_; }

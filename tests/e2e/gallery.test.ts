@@ -128,7 +128,7 @@ const states: Readonly<Record<string, State>> = {
   statistics: {
     reach: async (page) => {
       await panel('Statistics')(page);
-      await expect.poll(() => page.locator('.uplot canvas').count()).toBe(3);
+      await expect.poll(() => page.locator('.uplot canvas').count()).toBe(2);
     },
   },
   'statistics-at-rest': {

@@ -264,7 +264,7 @@ describe('page', () => {
     expect(await panels()).toEqual(['stats-panel']);
     const panel = page.locator('#stats-panel');
     const goes_on = (): Promise<boolean> => panel.evaluate((e) => e.classList.contains('more-below'));
-    await expect.poll(() => panel.locator('.uplot canvas').count()).toBe(3);
+    await expect.poll(() => panel.locator('.uplot canvas').count()).toBe(2);
     await expect.poll(goes_on).toBe(true);
     await panel.evaluate((e) => e.scrollTo(0, e.scrollHeight));
     await expect.poll(goes_on).toBe(false);

@@ -57,7 +57,7 @@ describe('a visit', () => {
     await panel.getByText(/libx264/).waitFor();
     await panel.getByText(/CPU|CUDA/).waitFor();
     expect(await panel.innerText()).toMatch(/640 × 360|480 × 270|320 × 180/);
-    await expect.poll(() => panel.locator('.uplot canvas').count()).toBe(3);
+    await expect.poll(() => panel.locator('.uplot canvas').count()).toBe(2);
     const download = page.waitForEvent('download');
     await panel.getByRole('button', { name: 'Save as JSON' }).click();
     const saved = JSON.parse(readFileSync(await (await download).path(), 'utf8')) as {

@@ -216,8 +216,6 @@ export const text = {
     age_title: 'Age of the camera that the picture shows, while moving: median / 95th percentile',
     bitrate: 'Bitrate',
     picture: 'Picture',
-    window: 'Window, sub-frames',
-    window_title: 'Frames promised by a key frame, and the share of frames made from its caches',
     drops: 'Drops',
     drops_title: 'Frames that arrived and were never shown; packets that the server never sent',
     drops_value: (here: number, server: number): string => `${here} here, ${server} at the server`,
@@ -232,11 +230,8 @@ export const text = {
   plots: {
     latency: 'Motion to photon by stage',
     rates: 'Frames and bits',
-    caches: 'Window and sub-frames',
     fps: 'Frames shown',
     bitrate: 'Bitrate',
-    window: 'Window',
-    sub_share: 'Sub-frames',
   },
   tour: {
     untitled: 'Tour',

@@ -219,7 +219,7 @@ class FlowSimulation {
     trace.arrival = link_.send(trace.bytes, now_);
     trace.queueing = trace.arrival - trace.sent - scenario_.link.delay;
     client_.receive(trace.ticket, trace.arrival);
-    visit_.on_frame_sent(trace.ticket, trace.bytes);
+    visit_.on_frame_sent(trace.bytes);
     frames_.push_back(trace);
   }
 

@@ -228,7 +228,7 @@ TEST(SessionLifeOnSockets, TellsWhatASessionTakesAndWhereItsTimeGoes) {
             session.at("times_ms").at("render").at("p50"));
 
   const std::string metrics = http_get(server.admin_port(), "/metrics").body;
-  for (const char* stage : {"queue_wait", "hand_off", "render_key", "render_sub", "encode", "send"})
+  for (const char* stage : {"queue_wait", "hand_off", "render", "encode_wait", "encode", "send"})
     EXPECT_THAT(metrics,
                 HasSubstr("catgs_frame_stage_seconds_count{stage=\"" + std::string(stage) + "\"}"));
   EXPECT_GE(metric(server, "catgs_pose_to_frame_seconds_count"), in_motion);

@@ -123,25 +123,10 @@ TEST(FrameScheduler, KnowsSinceWhenAFrameCouldHaveStarted) {
   EXPECT_EQ(scheduler.take(now + 11ms)->ready, now + 10ms);
 }
 
-TEST(FrameScheduler, KeyFramesOfADeviceMakeWayForSubFramesWhileTheyCan) {
-  Scheduler scheduler(4);
-  Source key{FrameCandidate{now, now + 16ms, 10ms, true, 0}};
-  Source other_device{FrameCandidate{now, now + 17ms, 10ms, true, 1}};
-  Source sub{FrameCandidate{now, now + 16ms, 3ms, false, 0}};
-  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now), &key);
-  run(scheduler, key);
-  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now), &sub);
-  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now + 6ms), &key) << "it can wait no longer";
-  EXPECT_EQ(first_of(scheduler, {&key}, now), &key) << "no slot stays empty";
-  EXPECT_EQ(first_of(scheduler, {&sub, &other_device}, now), &other_device);
-  scheduler.frame_ended(*key.frame);
-  EXPECT_EQ(first_of(scheduler, {&sub, &key}, now), &key);
-}
-
 TEST(FrameScheduler, ADeviceThatCannotKeepUpLeavesTheOthersTheirSlots) {
   Scheduler scheduler(5, 2);
-  Source late{FrameCandidate{now, now - 100ms, 10ms, false, 0}};
-  Source punctual{FrameCandidate{now, now + 16ms, 3ms, false, 1}};
+  Source late{FrameCandidate{now, now - 100ms, 10ms, 0}};
+  Source punctual{FrameCandidate{now, now + 16ms, 3ms, 1}};
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(first_of(scheduler, {&punctual, &late}, now), &late);
     run(scheduler, late);
@@ -164,20 +149,13 @@ TEST(FrameScheduler, ChoosesAsASearchThroughAllWould) {
   TimePoint at = now;
   const auto search = [&]() -> const Source* {
     const Source* best = nullptr;
-    std::pair<bool, TimePoint> best_rank;
     for (const Source& source : sources) {
       const auto& frame = source.frame;
       const auto on_device = [&](const auto& r) { return r.device == frame->device; };
-      const auto key_on_device = [&](const auto& r) { return on_device(r) && r.key; };
       if (!frame || frame->ready > at || std::ssize(running) == slots ||
           std::ranges::count_if(running, on_device) == slots / devices)
         continue;
-      const bool can_wait = frame->key && std::ranges::count_if(running, key_on_device) > 0 &&
-                            frame->latest_start() > at;
-      const std::pair rank{can_wait, frame->latest_start()};
-      if (best && best_rank <= rank) continue;
-      best = &source;
-      best_rank = rank;
+      if (!best || frame->latest_start() < best->frame->latest_start()) best = &source;
     }
     return best;
   };
@@ -189,7 +167,7 @@ TEST(FrameScheduler, ChoosesAsASearchThroughAllWould) {
       source.frame.reset();
     else  // with the step in it, so that no two are equal
       source.frame = FrameCandidate{at + 1us * below(4000), at + 1us * below(20'000) + 1ns * step,
-                                    1us * below(9000), below(3) == 0, below(devices)};
+                                    1us * below(9000), below(devices)};
     scheduler.changed(source, at);
     if (!running.empty() && below(3) > 0) {
       scheduler.frame_ended(running.back());
@@ -210,16 +188,14 @@ TEST(FrameScheduler, ChoosesAsASearchThroughAllWould) {
 struct Overload {
   struct Load {
     Clock::duration interval;
-    Clock::duration key_cost, sub_cost;
+    Clock::duration cost;
     TimePoint next_start{};
-    int window_left = 0;
     bool busy = false;
     int frames = 0;
 
     [[nodiscard]] std::optional<FrameCandidate> next_frame() const {
       if (busy) return std::nullopt;
-      const bool key = window_left == 0;
-      return FrameCandidate{next_start, next_start + interval, key ? key_cost : sub_cost, key, 0};
+      return FrameCandidate{next_start, next_start + interval, cost, 0};
     }
   };
   struct Running {
@@ -250,7 +226,6 @@ struct Overload {
       while (const auto turn = scheduler.take(time)) {
         Load& load = turn->source;
         load.busy = true;
-        load.window_left = load.window_left == 0 ? 4 : load.window_left - 1;
         load.next_start = std::max(load.next_start, time - load.interval) + load.interval;
         running.push_back({&load, turn->frame, time + turn->frame.cost});
       }
@@ -261,7 +236,7 @@ struct Overload {
 // Eight sessions at 60 Hz want twice what two slots give, some of them with dearer frames.
 TEST(FrameScheduler, IsFairUnderTwiceTheLoad) {
   Overload overload;
-  for (int i = 0; i < 8; ++i) overload.loads.push_back({16'667us, 15ms + i * 1ms, 4ms + i * 1ms});
+  for (int i = 0; i < 8; ++i) overload.loads.push_back({16'667us, 6ms + i * 1ms});
   overload.run(20s);
   const auto [least, most] = std::ranges::minmax(overload.loads, {}, &Overload::Load::frames);
   EXPECT_LE(most.frames, 1.2 * least.frames);
@@ -271,17 +246,15 @@ TEST(FrameScheduler, IsFairUnderTwiceTheLoad) {
 // Sessions of different nominal rates, all asking for more than the device can do.
 TEST(FrameScheduler, NobodyStarvesUnderOverload) {
   Overload overload;
-  for (const auto interval : {8ms, 16ms, 33ms, 16ms})
-    overload.loads.push_back({interval, 100ms, 50ms});
+  for (const auto interval : {8ms, 16ms, 33ms, 16ms}) overload.loads.push_back({interval, 60ms});
   overload.run(20s);
   const auto [least, most] = std::ranges::minmax(overload.loads, {}, &Overload::Load::frames);
   EXPECT_LE(most.frames, 1.2 * least.frames);
 }
 
-TEST(NextFrameCost, TellsKeyFramesFromSubFrames) {
+TEST(NextFrameCost, TellsFramesInMotionFromStills) {
   NextFrameCost cost;
   EXPECT_EQ(cost.next(), 0ms);
-  EXPECT_TRUE(cost.key_is_next());
   FrameTicket ticket;
   const auto add = [&](Clock::duration render, Clock::duration encode) {
     const TimePoint rendered = TimePoint{} + render;
@@ -289,17 +262,11 @@ TEST(NextFrameCost, TellsKeyFramesFromSubFrames) {
     ticket.encode = {rendered, rendered + encode};
     cost.add(ticket);
   };
-  ticket.window = 2;
   add(10ms, 4ms);
-  EXPECT_FALSE(cost.key_is_next());
-  ticket.speculated = true;
-  add(3ms, 4ms);
-  EXPECT_EQ(cost.next(), 7ms);
-  EXPECT_FALSE(cost.key_is_next());
-  add(3ms, 4ms);
-  EXPECT_TRUE(cost.key_is_next());
   EXPECT_EQ(cost.next(), 14ms);
-  EXPECT_EQ(cost.still(), 14ms) << "of the same size, as far as is known";
+  add(18ms, 4ms);
+  EXPECT_EQ(cost.next(), 15ms) << "smoothed";
+  EXPECT_EQ(cost.still(), 15ms) << "of the same size, as far as is known";
   EXPECT_EQ(cost.refinement(), 4ms);
   ticket.still = true;
   add(40ms, 20ms);
@@ -307,8 +274,7 @@ TEST(NextFrameCost, TellsKeyFramesFromSubFrames) {
   add(0ms, 15ms);
   EXPECT_EQ(cost.still(), 60ms);
   EXPECT_EQ(cost.refinement(), 15ms);
-  EXPECT_TRUE(cost.key_is_next());
-  EXPECT_EQ(cost.next(), 14ms) << "of another size";
+  EXPECT_EQ(cost.next(), 15ms) << "of another size";
 }
 
 }  // namespace

@@ -256,22 +256,6 @@ TEST_F(AimTest, APictureThatStaysIsOfThePoseItself) {
   EXPECT_TRUE(run().ticket.refined);
 }
 
-TEST_F(FrameLoopTest, APictureThatStaysIsAKeyFrame) {
-  pose(1, 0.0f);
-  FrameOrder order = start();
-  order.ticket.speculated = true;  // the core drew a sub-frame
-  made(order);
-  ack(order);
-  EXPECT_FALSE(is_due()) << "the camera may still move";
-  now += policy.still_after + 17ms;
-  ASSERT_TRUE(is_due());
-  const FrameOrder again = run();
-  EXPECT_FALSE(again.ticket.refined);
-  now += 70ms;
-  ASSERT_TRUE(is_due());
-  EXPECT_TRUE(run().ticket.refined);
-}
-
 /// Moving pictures of 426x240, whatever the reason, and still ones of 1280x720.
 class RestTest : public FrameLoopTest {
  protected:

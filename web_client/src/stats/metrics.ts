@@ -23,9 +23,6 @@ export interface Motion {
   readonly pose_age_ms: Percentiles;
   /** Means over frames, from the server's header and the client's clock. */
   readonly stages_ms: Readonly<Record<Stage, number>>;
-  /** Mean number of sub-frames that key frames promise, and the share of frames that are sub-frames. */
-  readonly window: number;
-  readonly sub_share: number;
 }
 
 /** Figures of the last seconds; NaN where nothing was measured. */
@@ -52,8 +49,6 @@ export class Metrics {
   private readonly motion_us_ = new TimeWindow(span_us);
   private readonly pose_age_ = new PoseAge(span_us, 1e6 / 60);
   private readonly stages_us_ = of_stages(() => new TimeWindow(span_us));
-  private readonly windows_ = new TimeWindow(span_us);
-  private readonly subs_ = new TimeWindow(span_us);
   private last_pose_id_ = -1n;
   private frames_shown_ = 0;
   private frames_dropped_ = 0;
@@ -82,14 +77,12 @@ export class Metrics {
     const is_first = header.poseId > 0n && header.poseId !== this.last_pose_id_;
     this.last_pose_id_ = header.poseId;
     if (is_first) this.pose_age_.shown(header.poseId, pose_time_us, now_us);
-    // A still comes late on purpose, perhaps in another size, and is a key frame without a window.
+    // A still comes late on purpose, perhaps in another size.
     if (header.still) return;
     const of = this.stages_us_;
     if (is_first) {
       this.motion_us_.push(now_us, now_us - pose_time_us);
       of.network.push(now_us, network_us(frame));
-      this.windows_.push(now_us, header.window);
-      this.subs_.push(now_us, header.speculated ? 1 : 0);
     }
     of.wait.push(now_us, header.waitUs);
     of.render.push(now_us, header.renderUs);
@@ -135,8 +128,6 @@ export class Metrics {
       motion_to_photon_ms: percentiles_ms(this.motion_us_),
       pose_age_ms: percentiles_ms(this.pose_age_),
       stages_ms: of_stages((stage) => mean(this.stages_us_[stage]) / 1000),
-      window: mean(this.windows_),
-      sub_share: mean(this.subs_),
     };
   }
 }

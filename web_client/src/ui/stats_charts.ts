@@ -57,13 +57,6 @@ const line = (label: string, stroke: string, scale: string): uPlot.Series => ({
   points: { show: false },
 });
 
-interface Curve {
-  readonly label: string;
-  readonly unit: string;
-  readonly colour: string;
-  readonly value: (stats: StatsSnapshot) => number;
-}
-
 interface Chart {
   readonly plot: uPlot;
   readonly data: (history: StatsHistory) => (number | null)[][];
@@ -73,20 +66,7 @@ export class StatsCharts {
   private readonly charts_: Chart[];
 
   constructor(private readonly host_: HTMLElement) {
-    const { fps, bitrate, window, sub_share } = text.plots;
-    this.charts_ = [
-      this.latency(),
-      this.two_scales(
-        text.plots.rates,
-        { label: fps, unit: 'fps', colour: '#4b7bd6', value: (s) => s.fps_shown },
-        { label: bitrate, unit: 'Mb/s', colour: '#e07a3f', value: (s) => s.bitrate_kbps / 1000, scale: 'bits' },
-      ),
-      this.two_scales(
-        text.plots.caches,
-        { label: window, unit: 'W', colour: '#6fae5c', value: (s) => s.window },
-        { label: sub_share, unit: '%', colour: '#9a68c4', value: (s) => s.sub_share * 100, scale: 'share' },
-      ),
-    ];
+    this.charts_ = [this.latency(), this.rates()];
     new ResizeObserver(() => {
       const width = this.width();
       for (const { plot } of this.charts_) plot.setSize({ width, height: height_px });
@@ -117,16 +97,15 @@ export class StatsCharts {
     };
   }
 
-  /** Two curves; the second one has a scale of its own, at the right. */
-  private two_scales(title: string, left: Curve, right: Curve & { scale: string }): Chart {
-    const { scale } = right;
+  /** Bits have a scale of their own, at the right. */
+  private rates(): Chart {
     return {
       plot: this.plot(
-        title,
-        [line(left.label, left.colour, 'y'), line(right.label, right.colour, scale)],
-        [axis(this.host_, left.unit), axis(this.host_, right.unit, { side: 1, scale, grid: { show: false } })],
+        text.plots.rates,
+        [line(text.plots.fps, '#4b7bd6', 'y'), line(text.plots.bitrate, '#e07a3f', 'bits')],
+        [axis(this.host_, 'fps'), axis(this.host_, 'Mb/s', { side: 1, scale: 'bits', grid: { show: false } })],
       ),
-      data: (history) => [history.column(left.value), history.column(right.value)],
+      data: (history) => [history.column((s) => s.fps_shown), history.column((s) => s.bitrate_kbps / 1000)],
     };
   }
 
@@ -139,7 +118,7 @@ export class StatsCharts {
         height: height_px,
         series: [{}, ...series],
         axes: [time_axis(this.host_), ...axes],
-        scales: { x: { time: false }, y: from_zero, bits: from_zero, share: { range: [0, 100] } },
+        scales: { x: { time: false }, y: from_zero, bits: from_zero },
         cursor: { show: false },
         legend: { live: false },
       },

@@ -54,12 +54,6 @@ export const stats_rows: readonly Row[] = [
   ...stages.map(stage_row),
   { label: text.stats.picture, text: once_shown((s) => `${s.width_px} × ${s.height_px}`) },
   {
-    label: text.stats.window,
-    title: text.stats.window_title,
-    text: ({ window, sub_share }) =>
-      Number.isFinite(window) ? `${window.toFixed(1)}, ${Math.round(sub_share * 100)} %` : nothing,
-  },
-  {
     label: text.stats.drops,
     title: text.stats.drops_title,
     text: once_shown((s) => text.stats.drops_value(s.frames_dropped, s.packets_dropped)),
