@@ -20,6 +20,7 @@ namespace catgs {
 
 class DeviceSet;
 class ThreadPool;
+class TreeFile;
 
 // One interface for every core. A Renderer owns one scene, with a copy on each of its devices; a
 // View is one client's share of one of them (its caches and its output image). Views of a Renderer
@@ -62,6 +63,11 @@ struct FrameStats {
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::uint64_t tasks = 0;               // parts into which the tiles were cut for the blend
+  // Scenes in pages (TreeFile); see scene/tree/cut.h
+  std::uint32_t nodes = 0;          // clusters drawn
+  std::uint32_t missing_pages = 0;  // that would refine the picture, of late
+  float coarsest_px = 0.0f;         // the largest error that is drawn for want of them
+  bool settled = true;              // a camera at rest would see no other picture in the next frame
   // Pipeline::paper
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
@@ -76,6 +82,11 @@ struct FrameRequest {
   Camera camera;
   glm::vec3 background{0.0f};
   std::optional<Forecast> forecast{};  // Pipeline::paper; without it no sub-frame follows
+  // Scenes in pages: the largest error to be drawn, in pixels; 0 draws every Gaussian.
+  float detail_px = 0.0f;
+  // Scenes in pages: where the camera may be soon. Pages are read for it, too.
+  std::optional<Pose> soon{};
+  bool waits_for_pages = false;  // the pages that the frame needs are read before it is drawn
 };
 
 struct Plane {
@@ -148,7 +159,8 @@ class Renderer {
 
   /// For people: "CPU, AVX3_DL, 2 threads", "CUDA, 2 x NVIDIA H200".
   [[nodiscard]] virtual std::string description() const = 0;
-  /// Bytes of the scene on one device; each device holds its own copy.
+  /// Bytes of the scene on one device; each device holds its own copy. Of a scene in pages, the
+  /// memory for its pages.
   [[nodiscard]] virtual std::size_t scene_bytes() const = 0;
   /// May be called from any thread. Throws where the device has no room left for the View.
   [[nodiscard]] virtual std::unique_ptr<View> make_view(const ViewSettings& settings) = 0;
@@ -161,6 +173,7 @@ struct RendererOptions {
   std::shared_ptr<ThreadPool> pool;      // CPU core; null: the Renderer makes its own
   std::string simd = "auto";             // CPU core: auto or a name of simd_targets()
   std::shared_ptr<DeviceSet> devices{};  // CUDA core; null: device 0
+  std::uint64_t scene_memory = std::uint64_t{4} << 30;  // bounds the pages of a scene, bytes
 };
 
 /// Refuses options that contradict each other, as make_renderer() does, but before a large scene is
@@ -180,5 +193,8 @@ std::vector<std::string_view> simd_targets();
 /// wanted device does not exist.
 MadeRenderer make_renderer(std::shared_ptr<const GaussianCloud> cloud,
                            const RendererOptions& options = {});
+/// The same for a scene in pages, of which any part may be in memory. Views have no
+/// Pipeline::vanilla, and the reference renderer cannot draw it.
+MadeRenderer make_renderer(std::shared_ptr<TreeFile> tree, const RendererOptions& options = {});
 
 }  // namespace catgs

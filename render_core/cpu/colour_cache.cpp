@@ -18,11 +18,12 @@ ColourCache::ColourCache(std::size_t clusters)
   if (!colours_) throw std::bad_alloc();
 }
 
-ClusterColours ColourCache::of_cluster(std::size_t index, const Cluster& bounds,
+ClusterColours ColourCache::of_cluster(std::size_t index, std::uint64_t page, const Cluster& bounds,
                                        const glm::vec3& position) {
   assert(index < shadings_.size());
   Shading& shading = shadings_[index];
-  if (!colours_hold(bounds, shading.position, position)) shading = {position, {}};
+  if (shading.page != page || !colours_hold(bounds, shading.position, position))
+    shading = {position, page, {}};
   return {colours_.get() + index * floats_per_cluster, &shading.shaded};
 }
 

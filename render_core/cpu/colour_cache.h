@@ -19,14 +19,17 @@ class ColourCache {
   explicit ColourCache(std::size_t clusters);
 
   /// The known colours of a cluster, for a camera at `position`: none when the camera has moved too
-  /// far. Clusters may be asked for in parallel, each by one thread at a time.
-  ClusterColours of_cluster(std::size_t index, const Cluster& bounds, const glm::vec3& position);
+  /// far, or when the cluster belonged to another `page` before. Clusters may be asked for in
+  /// parallel, each by one thread at a time.
+  ClusterColours of_cluster(std::size_t index, std::uint64_t page, const Cluster& bounds,
+                            const glm::vec3& position);
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
   struct Shading {
     glm::vec3 position{0.0f};  // of the camera
+    std::uint64_t page = 0;    // of the cluster
     ClusterMembers shaded{};   // colours that are known from `position`
   };
   std::vector<Shading> shadings_;               // [cluster]

@@ -20,7 +20,7 @@ class CpuRenderer final : public Renderer {
     return "CPU, " + std::string(scene_->kernels.name) + ", " + std::to_string(threads) +
            (threads == 1 ? " thread" : " threads");
   }
-  std::size_t scene_bytes() const override { return scene_->store.bytes(); }
+  std::size_t scene_bytes() const override { return scene_->store().bytes(); }
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     return std::make_unique<CpuView>(scene_, settings);
   }
@@ -58,8 +58,22 @@ std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
                                             std::shared_ptr<ThreadPool> pool,
                                             std::string_view simd) {
   const SimdKernels& kernels = choose_kernels(simd);
-  auto scene = std::make_shared<const CpuScene>(
-      CpuScene{SceneStore(cloud, *pool), std::move(pool), kernels});
+  auto scene = std::make_shared<CpuScene>();
+  scene->whole.emplace(cloud, *pool);
+  scene->pool = std::move(pool);
+  scene->kernels = kernels;
+  return std::make_unique<CpuRenderer>(std::move(scene));
+}
+
+std::unique_ptr<Renderer> make_cpu_renderer(std::shared_ptr<TreeFile> tree,
+                                            std::uint64_t memory_bytes,
+                                            std::shared_ptr<ThreadPool> pool,
+                                            std::string_view simd) {
+  auto scene = std::make_shared<CpuScene>();
+  scene->kernels = choose_kernels(simd);
+  scene->pages = std::make_unique<PageSlots>(tree->shape(), memory_bytes);
+  scene->pool = std::move(pool);
+  scene->pager = std::make_unique<TreePager>(std::move(tree), *scene->pages);
   return std::make_unique<CpuRenderer>(std::move(scene));
 }
 

@@ -14,4 +14,10 @@ std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
                                             std::shared_ptr<ThreadPool> pool,
                                             std::string_view simd);
 
+/// The same for a scene in pages. `memory_bytes` bounds the pages in memory.
+std::unique_ptr<Renderer> make_cpu_renderer(std::shared_ptr<TreeFile> tree,
+                                            std::uint64_t memory_bytes,
+                                            std::shared_ptr<ThreadPool> pool,
+                                            std::string_view simd);
+
 }  // namespace catgs

@@ -39,7 +39,8 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
     : scene_(std::move(scene)), settings_(settings), driver_(settings) {
   if (keeps_colours(settings.pipeline) && settings.colour_cache)
-    colours_.emplace(scene_->store.clusters().size());
+    colours_.emplace(scene_->store().clusters().size());
+  if (scene_->pager) paged_.emplace(*scene_->pager, settings);
 }
 
 RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noexcept {
@@ -60,7 +61,7 @@ FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
   if (settings_.pipeline == Pipeline::vanilla) {
     draw_boxes(camera, stats);
   } else if (plan.kind == FrameKind::key) {
-    draw_lists(camera, plan, stats);
+    draw_lists(request, plan, stats);
   } else {
     draw_cached_lists(camera, stats);
   }
@@ -86,6 +87,8 @@ void CpuView::summarise(FrameStats& stats) const {
   }
   if (counted > 0)
     stats.mean_inverse_depth = static_cast<float>(inverse_depths / static_cast<double>(counted));
+  stats.nodes = static_cast<std::uint32_t>(clusters_.size());
+  if (paged_) paged_->report(stats);
   stats.tasks = lists_.tiles();  // each tile is one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();
@@ -103,9 +106,14 @@ void CpuView::draw_boxes(const Camera& camera, FrameStats& stats) {
 }
 
 /// Makes the lists for `camera`, and with a window for all cameras on the way to its end.
-void CpuView::draw_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats) {
+void CpuView::draw_lists(const FrameRequest& request, const FramePlan& plan, FrameStats& stats) {
+  const Camera& camera = request.camera;
   StageClock clock(stats);
-  cull_clusters(camera, plan);
+  if (paged_) {
+    cut_tree(request, plan);
+  } else {
+    cull_clusters(camera, plan);
+  }
   lists_.begin(tiles_, segments(), settings_.max_list_entries);
   // Listed while the splats are in cache. Reading them again would cost as much as the listing.
   project(camera, plan, [&](std::size_t segment, std::size_t rank) {
@@ -127,21 +135,38 @@ void CpuView::draw_cached_lists(const Camera& camera, FrameStats& stats) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       if (counts_[rank] == 0) continue;
       summaries_[rank] = scene_->kernels.refresh_cluster(
-          {&scene_->store, &camera, clusters_[rank], &members_[rank],
-           splats_.data() + rank * cluster_size, min_depth, colours_of(clusters_[rank], camera)});
+          {&scene_->store(), &camera, clusters_[rank], &members_[rank],
+           splats_.data() + rank * cluster_size, min_depth, shares_[rank],
+           colours_of(clusters_[rank], camera)});
     }
   });
   clock.end(Stage::project);
 }
 
 void CpuView::cull_clusters(const Camera& camera, const FramePlan& plan) {
-  const std::span<const Cluster> clusters = scene_->store.clusters();
+  const std::span<const Cluster> clusters = scene_->store().clusters();
   const ListCuller culler(camera, plan);
   const bool cull = settings_.pipeline != Pipeline::vanilla;
   clusters_.clear();
   for (std::size_t c = 0; c < clusters.size(); ++c) {
     if (cull && (culler.outside(clusters[c]) || occlusion_.hides(clusters[c]))) continue;
     clusters_.push_back(static_cast<std::uint32_t>(c));
+  }
+  shares_.assign(clusters_.size(), 1.0f);
+}
+
+/// Finds the clusters of a scene in pages, and how much of each is drawn.
+void CpuView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
+  paged_->begin(request, plan);
+  const PageTable& table = paged_->table();
+  clusters_.clear();
+  shares_.clear();
+  const Cut cut = table.cut(paged_->cameras(), request.detail_px, paged_->now_s());
+  for (const auto& [node, share] : cut.drawn) {
+    const std::uint32_t c = table.cluster_of(node);
+    if (occlusion_.hides(scene_->store().clusters()[c])) continue;
+    clusters_.push_back(c);
+    shares_.push_back(share);
   }
 }
 
@@ -159,7 +184,12 @@ SplatTable CpuView::table(const FramePlan& plan) const {
 
 ClusterColours CpuView::colours_of(std::uint32_t cluster, const Camera& camera) {
   if (!colours_) return {nullptr, nullptr};
-  return colours_->of_cluster(cluster, scene_->store.clusters()[cluster],
+  std::uint64_t page = 0;
+  if (paged_) {
+    const PageTable& table = paged_->table();
+    page = table.pages()[cluster / table.shape().slots()]->page;
+  }
+  return colours_->of_cluster(cluster, page, scene_->store().clusters()[cluster],
                               camera.world_from_camera.position);
 }
 
@@ -181,12 +211,13 @@ void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& d
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;
       summaries_[rank] = scene_->kernels.project_cluster(
-          {.scene = &scene_->store,
+          {.scene = &scene_->store(),
            .camera = &camera,
            .pipeline = is_exact ? Pipeline::exact : settings_.pipeline,
            .cluster = clusters_[rank],
            .splats = splats_.data() + first,
            .min_depth = min_depth,
+           .share = shares_[rank],
            .limits = occlusion_.limits(),
            .colours = colours_of(clusters_[rank], camera),
            .window_end = &plan.window_end,
@@ -230,8 +261,8 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         occlusion_.memory_bytes() + bytes(clusters_) + bytes(members_) + bytes(summaries_) +
-         bytes(counts_) + bytes(splats_) + bytes(paths_);
+         occlusion_.memory_bytes() + bytes(clusters_) + bytes(shares_) + bytes(members_) +
+         bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_);
 }
 
 }  // namespace catgs

@@ -9,20 +9,27 @@
 #include "render_core/cpu/colour_cache.h"
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/occlusion.h"
+#include "render_core/cpu/page_slots.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
 #include "render_core/frame_driver.h"
 #include "render_core/image/host_image.h"
 #include "render_core/motion/frame_groups.h"
+#include "render_core/paged_frame.h"
 #include "render_core/renderer.h"
 
 namespace catgs {
 
-/// The data that all Views of a renderer share; constant after construction.
+/// The data that all Views of a renderer share.
 struct CpuScene {
-  SceneStore store;
+  [[nodiscard]] const SceneStore& store() const { return pages ? pages->store() : *whole; }
+
+  // One of the two: a scene that is in memory as a whole, or the pages of a tree.
+  std::optional<SceneStore> whole;
+  std::unique_ptr<PageSlots> pages;
   std::shared_ptr<ThreadPool> pool;
   SimdKernels kernels;
+  std::unique_ptr<TreePager> pager;  // of `pages`
 };
 
 /// Buffers of a frame, kept for the next one. In Pipeline::paper, those of a key frame are the
@@ -39,9 +46,10 @@ class CpuView final : public View {
  private:
   FrameView draw(const FrameRequest& request, const FramePlan& plan);
   void draw_boxes(const Camera& camera, FrameStats& stats);
-  void draw_lists(const Camera& camera, const FramePlan& plan, FrameStats& stats);
+  void draw_lists(const FrameRequest& request, const FramePlan& plan, FrameStats& stats);
   void draw_cached_lists(const Camera& camera, FrameStats& stats);
   void cull_clusters(const Camera& camera, const FramePlan& plan);
+  void cut_tree(const FrameRequest& request, const FramePlan& plan);
   template <class Done>
   void project(const Camera& camera, const FramePlan& plan, const Done& done);
   std::uint64_t blend(const FrameRequest& request);
@@ -56,6 +64,7 @@ class CpuView final : public View {
   glm::ivec2 tiles_{0};  // of the picture
   HostImage image_;
   std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
+  std::vector<float> shares_;              // [rank]: the part of the cluster that is drawn
   std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians
   std::vector<ClusterSummary> summaries_;  // [rank]
   std::vector<std::uint32_t> counts_;      // [rank]: visible Gaussians
@@ -65,6 +74,7 @@ class CpuView final : public View {
   TileLists lists_;
   Occlusion occlusion_;              // Pipeline::catgs
   float mean_inverse_depth_ = 0.0f;  // of the last frame
+  std::optional<PagedFrame> paged_;
 };
 
 }  // namespace catgs

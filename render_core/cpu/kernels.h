@@ -69,6 +69,7 @@ struct ProjectTask {
   std::size_t cluster;
   Splat* splats;
   float min_depth;       // world units; nearer Gaussians do not count in ClusterSummary
+  float share = 1.0f;    // of the cluster that is drawn, see math/fade-inl.h
   DepthLimits limits{};  // Gaussians behind them are not visible
   ClusterColours colours{nullptr, nullptr};
   // For paper only.
@@ -86,6 +87,7 @@ struct RefreshTask {
   const ClusterMembers* members;
   Splat* splats;  // without the fields that only listing needs
   float min_depth;
+  float share;
   ClusterColours colours;
 };
 

@@ -5,6 +5,7 @@
 #define CATGS_CPU_LANES_INL_H
 #endif
 
+#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 #include "render_core/base/host_device.h"
@@ -162,6 +163,11 @@ CATGS_HD_INLINE Lanes<D> exp2_of_alpha(const Lanes<D>& x) {
   const L quarter = eighth_root * eighth_root;
   const L half = quarter * quarter;
   return half * half;
+}
+
+template <class D>
+CATGS_HD_INLINE Lanes<D> log2_of_share(const Lanes<D>& x) {
+  return Lanes<D>(hn::Log2(D(), x.v));
 }
 
 using Floats = Lanes<hn::ScalableTag<float>>;

@@ -103,42 +103,22 @@ PartEnds Occlusion::ends_of_tile(glm::ivec2 tile) {
 
 bool Occlusion::hides(const Cluster& cluster) const {
   if (!limited_) return false;
-  const math::CameraModel<float>& camera = model_;
-  const glm::vec3& c = cluster.centre;
-  const glm::vec3& h = cluster.half_extent;
-  const auto along = [&](const math::Vec3<float>& axis) {
-    return std::abs(axis.x) * h.x + std::abs(axis.y) * h.y + std::abs(axis.z) * h.z;
-  };
-  const auto centre = math::camera_from_world<float>(camera, {c.x, c.y, c.z});
-  const float nearest = centre.z - along(camera.forward),
-              farthest = centre.z + along(camera.forward);
-  if (!(nearest > camera.near_z)) return false;
-  // The means lie in this box of the camera's space. See ClusterCuller for how far beyond them
-  // Gaussians reach.
-  static const float blur =
-      std::sqrt(static_cast<float>(-2.0 * std::log(alpha_min) * low_pass_px2));
-  const auto interval = [&](float at, float half, float focal, float principal, float low_slope,
-                            float high_slope) {
-    const float low = at - half, high = at + half;
-    const float steepest = std::max(std::abs(low_slope), std::abs(high_slope));
-    const float reach = blur + 1.0f + focal * std::hypot(1.0f, steepest) * cluster.reach / nearest;
-    return glm::vec2(focal * (low / (low < 0.0f ? nearest : farthest)) + principal - reach,
-                     focal * (high / (high < 0.0f ? farthest : nearest)) + principal + reach);
-  };
-  const glm::vec2 x = interval(centre.x, along(camera.right), camera.focal_px.x,
-                               camera.principal_point_px.x, camera.slope_min.x, camera.slope_max.x);
-  const glm::vec2 y = interval(centre.y, along(camera.down), camera.focal_px.y,
-                               camera.principal_point_px.y, camera.slope_min.y, camera.slope_max.y);
+  const glm::vec3 &c = cluster.centre, &h = cluster.half_extent;
+  const auto box =
+      math::cluster_box<float>(model_, {c.x, c.y, c.z}, {h.x, h.y, h.z}, cluster.reach);
+  if (!(box.nearest > 0.0f)) return false;
   const glm::vec2 last(now_.size_px - 1), per_part(1.0f / part_side_px);
-  const glm::ivec2 low(glm::clamp(glm::vec2(x.x, y.x), glm::vec2(0.0f), last) * per_part);
-  const glm::ivec2 high(glm::clamp(glm::vec2(x.y, y.y), glm::vec2(0.0f), last) * per_part);
+  const glm::ivec2 low(glm::clamp(glm::vec2(box.low_px.x, box.low_px.y), glm::vec2(0.0f), last) *
+                       per_part);
+  const glm::ivec2 high(glm::clamp(glm::vec2(box.high_px.x, box.high_px.y), glm::vec2(0.0f), last) *
+                        per_part);
   // At most 9x9 cells.
   const int span = std::max(high.x - low.x, high.y - low.y);
   const int level = std::max(0, static_cast<int>(std::bit_width(static_cast<unsigned>(span))) - 3);
   const DepthLimits limits = this->limits();
   for (int row = low.y >> level; row <= high.y >> level; ++row)
     for (int column = low.x >> level; column <= high.x >> level; ++column)
-      if (!(nearest > limits.at(level, column, row))) return false;
+      if (!(box.nearest > limits.at(level, column, row))) return false;
   return true;
 }
 

@@ -91,7 +91,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   Extremes extremes;
   for (std::size_t i = begin; i < end; i += Floats::count) {
     const Floats depth = depths(context, scene, i);
-    const Floats log2_opacity = load(scene, SceneStore::log2_opacity, i);
+    const Floats log2_opacity = load_log2_opacity(scene, i, task.share);
     const Floats reach = max(reach_of(log2_opacity), Floats(0.0));
     const auto opaque = reach_of(log2_opacity) >= Floats(0.0);
     const Vec3<Floats> mean = load_mean(scene, i);
@@ -167,7 +167,7 @@ inline ClusterSummary refresh_cluster(const RefreshTask& task) {
         project(context.camera, mean, load_factor(scene, i), max(look.depth, context.near_z));
     look.centre_px = shape.centre_px;
     look.w = whitening(shape);
-    look.log2_opacity = load(scene, SceneStore::log2_opacity, i);
+    look.log2_opacity = load_log2_opacity(scene, i, task.share);
     look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
     look.original_index = load_index(scene, i);
     extremes.add_depths(mask_of_bits<hn::ScalableTag<float>>(hits) & in_front &

@@ -2,67 +2,104 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "render_core/math/projection-inl.h"
 
 namespace catgs {
+namespace {
+
+std::size_t packet_bytes(int sh_degree) {
+  const auto sh_floats = static_cast<std::size_t>(3 * sh_coefficient_count(sh_degree));
+  return packet_size *
+         ((SceneStore::attribute_count + sh_floats) * sizeof(float) + sizeof(std::uint32_t));
+}
+
+}  // namespace
+
 SceneStore::SceneStore(const GaussianCloud& cloud, ThreadPool& pool)
     : size_(cloud.size()),
       padded_((cloud.size() + packet_size - 1) / packet_size * packet_size),
       sh_degree_(cloud.sh_degree) {
-  const std::size_t packets = padded_ / packet_size;
-  attributes_ = hwy::AllocateAligned<float>(std::max<std::size_t>(1, padded_ * attribute_count));
-  original_index_ = hwy::AllocateAligned<std::uint32_t>(std::max<std::size_t>(1, padded_));
-  sh_ = hwy::AllocateAligned<float>(std::max<std::size_t>(1, packets * sh_floats_per_packet()));
-  if (!attributes_ || !original_index_ || !sh_) throw std::bad_alloc();
-
+  allocate();
   const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
-  clusters_.resize(clusters_of(size_));
   pool.parallel_for(clusters_.size(), [&](std::size_t c) {
-    constexpr std::size_t packets_per_cluster = cluster_size / packet_size;
-    const std::size_t end = std::min(packets, (c + 1) * packets_per_cluster);
-    for (std::size_t p = c * packets_per_cluster; p < end; ++p) fill_packet(cloud, order, p);
-    clusters_[c] = bound(c);
+    const std::size_t first = c * cluster_size, end = std::min(size_, first + cluster_size);
+    for (std::size_t slot = first; slot < end; ++slot) {
+      const std::uint32_t i = order[slot];
+      const glm::vec3& scale = cloud.scale[i];
+      const glm::dquat q = glm::normalize(glm::dquat(cloud.rotation[i]));
+      const double rotation[4] = {q.x, q.y, q.z, q.w};
+      set(slot, cloud, i,
+          math::covariance_factor(rotation, math::Vec3<double>{scale.x, scale.y, scale.z}), i);
+    }
+    for (std::size_t slot = end; slot < std::min(padded_, first + cluster_size); ++slot) pad(slot);
+    clusters_[c] = bound(first, end - first);
   });
 }
 
+SceneStore::SceneStore(std::size_t clusters, int sh_degree)
+    : size_(clusters * cluster_size), padded_(size_), sh_degree_(sh_degree) {
+  allocate();
+}
+
+void SceneStore::allocate() {
+  attributes_ = hwy::AllocateAligned<float>(std::max<std::size_t>(1, padded_ * attribute_count));
+  original_index_ = hwy::AllocateAligned<std::uint32_t>(std::max<std::size_t>(1, padded_));
+  sh_ = hwy::AllocateAligned<float>(
+      std::max<std::size_t>(1, padded_ / packet_size * sh_floats_per_packet()));
+  if (!attributes_ || !original_index_ || !sh_) throw std::bad_alloc();
+  clusters_.resize(clusters_of(size_));
+}
+
+void SceneStore::put(std::size_t c, const GaussianCloud& cloud,
+                     std::span<const math::CovarianceFactor<double>> factors,
+                     std::uint32_t first_index) {
+  assert(c < clusters_.size() && !factors.empty() && factors.size() <= cluster_size);
+  const std::size_t first = c * cluster_size;
+  for (std::size_t i = 0; i < factors.size(); ++i)
+    set(first + i, cloud, i, factors[i], first_index + static_cast<std::uint32_t>(i));
+  for (std::size_t slot = first + factors.size(); slot < first + cluster_size; ++slot) pad(slot);
+  clusters_[c] = bound(first, factors.size());
+}
+
 std::size_t SceneStore::bytes() const {
-  return padded_ * (attribute_count * sizeof(float) + sizeof(std::uint32_t)) +
-         padded_ / packet_size * sh_floats_per_packet() * sizeof(float) +
-         clusters_.size() * sizeof(Cluster);
+  return padded_ / packet_size * packet_bytes(sh_degree_) + clusters_.size() * sizeof(Cluster);
 }
 
-void SceneStore::fill_packet(const GaussianCloud& cloud, std::span<const std::uint32_t> order,
-                             std::size_t packet) {
+std::size_t SceneStore::cluster_bytes(int sh_degree) {
+  return cluster_size / packet_size * packet_bytes(sh_degree) + sizeof(Cluster);
+}
+
+void SceneStore::set(std::size_t slot, const GaussianCloud& cloud, std::size_t i,
+                     const math::CovarianceFactor<double>& factor, std::uint32_t index) {
+  const glm::vec3& mean = cloud.mean[i];
+  const std::array<double, attribute_count> values = {
+      mean.x,    mean.y,    mean.z,    factor.xx, factor.yx,
+      factor.yy, factor.zx, factor.zy, factor.zz, std::log2(static_cast<double>(cloud.opacity[i]))};
+  for (std::size_t a = 0; a < attribute_count; ++a)
+    attributes_[a * padded_ + slot] = static_cast<float>(values[a]);
+  original_index_[slot] = index;
+  float* const sh = sh_.get() + slot / packet_size * sh_floats_per_packet() + slot % packet_size;
   const int sh_count = sh_coefficient_count(sh_degree_);
-  float* const sh = sh_.get() + packet * sh_floats_per_packet();
-  for (std::size_t lane = 0; lane < packet_size; ++lane) {
-    const std::size_t slot = packet * packet_size + lane;
-    const bool padding = slot >= size_;
-    const std::uint32_t i = order[padding ? size_ - 1 : slot];
-    const glm::vec3& mean = cloud.mean[i];
-    const glm::vec3& scale = cloud.scale[i];
-    const glm::dquat q = glm::normalize(glm::dquat(cloud.rotation[i]));
-    const double rotation[4] = {q.x, q.y, q.z, q.w};
-    const auto l = math::covariance_factor(rotation, math::Vec3<double>{scale.x, scale.y, scale.z});
-    const double opacity = padding ? 0.0 : static_cast<double>(cloud.opacity[i]);
-    const std::array<double, attribute_count> values = {
-        mean.x, mean.y, mean.z, l.xx, l.yx, l.yy, l.zx, l.zy, l.zz, std::log2(opacity)};
-    for (std::size_t a = 0; a < attribute_count; ++a)
-      attributes_[a * padded_ + slot] = static_cast<float>(values[a]);
-    original_index_[slot] = i;
-    for (int k = 0; k < sh_count; ++k)
-      for (int channel = 0; channel < 3; ++channel)
-        sh[(static_cast<std::size_t>(k) * 3 + channel) * packet_size + lane] =
-            cloud.sh_of(i)[k][channel];
-  }
+  for (int k = 0; k < sh_count; ++k)
+    for (int channel = 0; channel < 3; ++channel)
+      sh[(static_cast<std::size_t>(k) * 3 + channel) * packet_size] = cloud.sh_of(i)[k][channel];
 }
 
-Cluster SceneStore::bound(std::size_t cluster) const {
+/// The last Gaussian before the slot again, with opacity 0.
+void SceneStore::pad(std::size_t slot) {
+  for (std::size_t a = 0; a < attribute_count; ++a)
+    attributes_[a * padded_ + slot] = attributes_[a * padded_ + slot - 1];
+  attributes_[log2_opacity * padded_ + slot] = -std::numeric_limits<float>::infinity();
+  original_index_[slot] = original_index_[slot - 1];
+}
+
+Cluster SceneStore::bound(std::size_t first, std::size_t count) const {
   ClusterBounds bounds;
-  const std::size_t end = std::min(size_, (cluster + 1) * cluster_size);
-  for (std::size_t i = cluster * cluster_size; i < end; ++i) {
+  for (std::size_t i = first; i < first + count; ++i) {
     // The Frobenius norm of the factor bounds the largest standard deviation.
     double variance = 0.0;
     for (const Attribute a : {factor_xx, factor_yx, factor_yy, factor_zx, factor_zy, factor_zz})

@@ -12,21 +12,37 @@
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
+namespace math {
+// Declared only: SIMD files include the formulas of math/ anew for each instruction set.
+template <class T>
+struct CovarianceFactor;
+}  // namespace math
 
 /// Lanes of the widest SIMD target; the storage is padded and interleaved for it.
 inline constexpr std::size_t packet_size = 16;
 
-/// A GaussianCloud laid out for the CPU core: Morton order, structure of arrays, covariances
-/// factored. N = size() rounded up to whole packets; the padding has opacity 0 and is never
-/// visible.
+/// Gaussians laid out for the CPU core: clusters, structure of arrays, covariances factored. N =
+/// size() rounded up to whole packets; the padding has opacity 0 and is never visible.
 class SceneStore {
  public:
+  /// A whole scene, in Morton order.
   SceneStore(const GaussianCloud& cloud, ThreadPool& pool);
+  /// Room for clusters that put() fills. Until then their contents are undefined, and take no
+  /// physical memory.
+  SceneStore(std::size_t clusters, int sh_degree);
+
+  /// Fills cluster `c` with the first cluster_size Gaussians of `cloud` or less. `factors`: of
+  /// their covariances. `first_index`: original_index() of the first one. Different clusters may be
+  /// filled by several threads.
+  void put(std::size_t c, const GaussianCloud& cloud,
+           std::span<const math::CovarianceFactor<double>> factors, std::uint32_t first_index);
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] int sh_degree() const { return sh_degree_; }
   [[nodiscard]] std::span<const Cluster> clusters() const { return clusters_; }
   [[nodiscard]] std::size_t bytes() const;
+  /// Bytes of one cluster.
+  [[nodiscard]] static std::size_t cluster_bytes(int sh_degree);
 
   /// Rows of `attribute_stride()` floats, one per attribute, packet-aligned.
   enum Attribute {
@@ -45,7 +61,7 @@ class SceneStore {
   [[nodiscard]] const float* attribute(Attribute a) const {
     return attributes_.get() + static_cast<std::size_t>(a) * padded_;
   }
-  /// Index of each Gaussian in the GaussianCloud; decides the order of equal depths.
+  /// Index of each Gaussian in its scene, modulo 2^32; decides the order of equal depths.
   [[nodiscard]] const std::uint32_t* original_index() const { return original_index_.get(); }
   /// SH of packet p: [coefficient][channel][lane], packet_size lanes.
   [[nodiscard]] const float* sh_of_packet(std::size_t p) const {
@@ -57,9 +73,11 @@ class SceneStore {
   }
 
  private:
-  void fill_packet(const GaussianCloud& cloud, std::span<const std::uint32_t> order,
-                   std::size_t packet);
-  [[nodiscard]] Cluster bound(std::size_t cluster) const;
+  void allocate();
+  void set(std::size_t slot, const GaussianCloud& cloud, std::size_t i,
+           const math::CovarianceFactor<double>& factor, std::uint32_t index);
+  void pad(std::size_t slot);
+  [[nodiscard]] Cluster bound(std::size_t first, std::size_t count) const;
 
   std::size_t size_;
   std::size_t padded_;

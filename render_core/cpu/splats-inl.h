@@ -14,6 +14,7 @@
 #include "render_core/cpu/lanes-inl.h"
 #include "render_core/math/camera-inl.h"
 #include "render_core/math/ellipse-inl.h"
+#include "render_core/math/fade-inl.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/math/spherical_harmonics-inl.h"
 
@@ -66,6 +67,12 @@ HWY_INLINE CovarianceFactor<Floats> load_factor(const SceneStore& scene, std::si
   return {load(scene, SceneStore::factor_xx, i), load(scene, SceneStore::factor_yx, i),
           load(scene, SceneStore::factor_yy, i), load(scene, SceneStore::factor_zx, i),
           load(scene, SceneStore::factor_zy, i), load(scene, SceneStore::factor_zz, i)};
+}
+
+/// `share`: the part of the Gaussians that is drawn.
+HWY_INLINE Floats load_log2_opacity(const SceneStore& scene, std::size_t i, float share) {
+  const Floats all = load(scene, SceneStore::log2_opacity, i);
+  return share < 1.0f ? faded_log2_opacity(all, Floats(share)) : all;
 }
 
 /// Original indices as fields of a Splat.

@@ -134,9 +134,12 @@ std::string free_memory() {
   return text;
 }
 
-/// Copies the scene to a device, which becomes the current one of the calling thread. Throws
+/// Makes the scene on the current device, which has this number. Throws CudaError.
+using MakeScene = std::function<DeviceScene*(int device)>;
+
+/// Makes the scene on a device, which becomes the current one of the calling thread. Throws
 /// DevicesUnusable.
-Device open_device(const SceneSource& source, int index) {
+Device open_device(const MakeScene& make, int index) {
   const std::string flag = "--device " + std::to_string(index);
   cudaDeviceProp properties{};
   try {
@@ -146,7 +149,7 @@ Device open_device(const SceneSource& source, int index) {
       (void)cudaSetDevice(index);  // see ~PlacedView()
       delete scene;
     };
-    return {index, properties.name, {new DeviceScene(source), free_there}};
+    return {index, properties.name, {make(index), free_there}};
   } catch (const CudaError& error) {
     const bool full = error.status_code() == RenderStatus::Code::out_of_memory;
     throw DevicesUnusable(
@@ -174,16 +177,16 @@ std::string cuda_obstacle() {
          ".0 or more";
 }
 
-MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
-                                ThreadPool& pool) {
+namespace {
+
+MadeRenderer make_on(const std::shared_ptr<DeviceSet>& devices, const cuda::MakeScene& make) {
   if (const std::string obstacle = cuda_obstacle(); !obstacle.empty())
     throw DevicesUnusable("--renderer cuda", "", obstacle, "use --renderer cpu");
   int count = 0;
   (void)cudaGetDeviceCount(&count);
-  const cuda::SceneSource source{cloud, morton_order(cloud.mean, pool), pool};
   std::vector<std::future<cuda::Device>> uploads;
   for (const int index : devices->among(count)) {
-    uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(source), index));
+    uploads.push_back(std::async(std::launch::async, cuda::open_device, std::cref(make), index));
   }
   std::vector<cuda::Device> opened;
   std::string left_out;
@@ -196,7 +199,21 @@ MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<Devi
     }
   }
   if (opened.empty()) throw DevicesUnusable("--device all", "", left_out);
-  return {std::make_unique<cuda::CudaRenderer>(std::move(opened), std::move(devices)), left_out};
+  return {std::make_unique<cuda::CudaRenderer>(std::move(opened), devices), left_out};
+}
+
+}  // namespace
+
+MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
+                                ThreadPool& pool) {
+  const cuda::SceneSource source{cloud, morton_order(cloud.mean, pool), pool};
+  return make_on(devices, [&](int) { return new cuda::DeviceScene(source); });
+}
+
+MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> tree, std::uint64_t memory_bytes,
+                                std::shared_ptr<DeviceSet> devices) {
+  return make_on(devices,
+                 [&](int device) { return new cuda::DeviceScene(tree, memory_bytes, device); });
 }
 
 }  // namespace catgs

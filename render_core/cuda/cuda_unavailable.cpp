@@ -6,9 +6,22 @@ namespace catgs {
 
 std::string cuda_obstacle() { return "this build has no CUDA core"; }
 
+namespace {
+
+[[noreturn]] void refuse() {
+  throw InputError("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
+}
+
+}  // namespace
+
 MadeRenderer make_cuda_renderer(const GaussianCloud& /*cloud*/,
                                 std::shared_ptr<DeviceSet> /*devices*/, ThreadPool& /*pool*/) {
-  throw InputError("--renderer cuda", "", cuda_obstacle(), "use auto or cpu");
+  refuse();
+}
+
+MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> /*tree*/, std::uint64_t /*memory_bytes*/,
+                                std::shared_ptr<DeviceSet> /*devices*/) {
+  refuse();
 }
 
 }  // namespace catgs

@@ -45,8 +45,9 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       settings_(settings),
       driver_(settings_),
       room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
-      builder_(scene_->arrays(), memory_, processors_),
+      builder_(memory_, processors_),
       blend_warps_(blend_warps(processors_)) {
+  if (scene_->pager() != nullptr) paged_.emplace(*scene_->pager(), settings);
   // The memory that does not depend on the image is the largest part of a small scene's View. A
   // device without room for it should say so while another can be chosen. For a large scene, only
   // the first frame tells how much is in view.
@@ -100,7 +101,10 @@ void CudaView::reserve(Headroom headroom) {
     roomy.visible_bound = std::min(most.visible, shape_.visible_bound + shape_.visible_bound / 4);
     roomy.list_bound = std::min(most.list_entries, shape_.list_bound + shape_.list_bound / 4);
   }
-  if (memory_.reserve({.shape = roomy, .scene = scene_->arrays(), .settings = settings_})) {
+  if (memory_.reserve({.shape = roomy,
+                       .scene = scene_->arrays(),
+                       .in_pages = paged_.has_value(),
+                       .settings = settings_})) {
     reach_known_ = false;
     ends_of_.reset();
   }
@@ -138,9 +142,13 @@ bool CudaView::needs_more_room() {
 
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   ListRequest listed(request.camera, plan, settings_.speculation);
+  if (settings_.pipeline == Pipeline::catgs) listed.depth_bits = catgs_depth_bits;
+  if (paged_) paged_->begin(request, plan);
   for (;;) {
     make_room(request.camera.size_px);
     times_.begin(stream_.get());
+    listed.scene = scene_arrays();
+    if (paged_) listed.cut = cut_tree(request, plan);
     listed.occlusion = want_occlusion(request.camera);
     list_tiles(listed);
     split();
@@ -152,6 +160,23 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   }
   reach_known_ = true;
   if (settings_.pipeline == Pipeline::catgs) ends_of_ = request.camera;
+}
+
+/// The scene, and the part of each cluster that is drawn.
+SceneArrays CudaView::scene_arrays() const {
+  SceneArrays scene = scene_->arrays();
+  if (paged_) scene.share = memory_.share.get();
+  return scene;
+}
+
+/// The cut of a scene in pages for the frame that paged_ has begun.
+TreeCut CudaView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
+  return {.tree = scene_->tree(paged_->table()),
+          .now = CutEye(request.camera),
+          .end = CutEye(plan.window > 0 ? plan.window_end : request.camera),
+          .detail_px = request.detail_px,
+          .now_s = paged_->now_s(),
+          .share = memory_.share.get()};
 }
 
 /// Finds what the last frame shows to be hidden in this one.
@@ -178,7 +203,7 @@ void CudaView::list_tiles(const ListRequest& request) {
   builder_.cull(request, shape_, stream);
   builder_.project(request, shape_, stream);
   times_.end(Stage::project, stream);
-  builder_.sort_by_depth(shape_, stream);
+  builder_.sort_by_depth(request, shape_, stream);
   times_.end_depth_sort(stream);
   builder_.emit(request, shape_, stream);
   times_.end(Stage::bin, stream);
@@ -194,9 +219,10 @@ void CudaView::draw_sub(const FrameRequest& request) {
                         sizeof(FrameCounts) - kept, stream),
         "counts");
   const CameraPair now = make_camera_pair(request.camera);
-  launch_project({.scene = scene_->arrays(),
+  launch_project({.scene = scene_arrays(),
                   .camera = {.now = now, .end = now.single, .near_z = request.camera.near_z},
                   .shape = shape_,
+                  .depth_bits = exact_depth_bits,
                   .min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z),
                   .counts = m.counts.get(),
                   .visible = m.visible.get(),
@@ -221,7 +247,7 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   const ViewMemory& m = memory_;
   const FrameShape picture{.width_px = request.camera.size_px.x,
                            .height_px = request.camera.size_px.y};
-  (void)memory_.reserve({.shape = picture, .scene = {}, .settings = settings_});
+  (void)memory_.reserve({.shape = picture, .scene = {}, .in_pages = false, .settings = settings_});
   set_shape(request.camera.size_px, tile_size_px);
   shape_.list_bound = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
@@ -363,6 +389,7 @@ FrameView CudaView::finished(FrameKind kind, float near_z) {
     frame.planes = {Plane{rgb, 3 * sizeof(float) * width}, Plane{}, Plane{}};
   }
   frame.stats = frame_stats(*memory_.host_counts.get(), shape_, kind, near_z);
+  if (paged_) paged_->report(frame.stats);
   mean_inverse_depth_ = frame.stats.mean_inverse_depth;
   times_.read(settings_.pipeline != Pipeline::vanilla && kind == FrameKind::key,
               frame.stats.stage_ms);

@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "render_core/cuda/device_scene.cuh"
+#include "render_core/cuda/device_pages.cuh"
 #include "render_core/cuda/frame_room.h"
 #include "render_core/cuda/list_builder.cuh"
 #include "render_core/cuda/splat.cuh"
@@ -13,6 +13,7 @@
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/cuda/view_memory.cuh"
 #include "render_core/frame_driver.h"
+#include "render_core/paged_frame.h"
 #include "render_core/renderer.h"
 
 namespace catgs::cuda {
@@ -38,6 +39,8 @@ class CudaView final : public View {
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   void draw_sub(const FrameRequest& request);
   void draw_vanilla(const FrameRequest& request);
+  [[nodiscard]] SceneArrays scene_arrays() const;
+  [[nodiscard]] TreeCut cut_tree(const FrameRequest& request, const FramePlan& plan);
   [[nodiscard]] Occlusion want_occlusion(const Camera& camera);
   void list_tiles(const ListRequest& request);
   void split();
@@ -53,6 +56,7 @@ class CudaView final : public View {
   Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame has arrived
   StageTimes times_;
   FrameDriver driver_;
+  std::optional<PagedFrame> paged_;  // of a scene in pages
   FrameShape shape_;
   FrameRoom room_;
   ViewMemory memory_;

@@ -17,10 +17,29 @@ constexpr int block_size = cluster_size;
 constexpr int warps = block_size / warp_size;
 constexpr int blocks_per_processor = 8;
 
+/// Whether a cluster is behind what the last frame shows.
+__device__ bool is_hidden(const CullParams& p, const Cluster& cluster) {
+  if (p.occlusion.part == nullptr) return false;
+  const glm::vec3 &c = cluster.centre, &h = cluster.half_extent;
+  const auto box = math::cluster_box<float>(p.camera.now.single, {c.x, c.y, c.z}, {h.x, h.y, h.z},
+                                            cluster.reach);
+  return box.nearest > 0.0f &&
+         p.occlusion.hides(p.shape, make_float2(box.low_px.x, box.low_px.y),
+                           make_float2(box.high_px.x, box.high_px.y), box.nearest);
+}
+
 // Separate from the selection kernel, whose few blocks would test one cluster after another.
 __global__ void __launch_bounds__(block_size) sight_kernel(const CullParams p) {
   const std::uint32_t c = blockIdx.x * block_size + threadIdx.x;
-  if (c < p.scene.cluster_count) p.seen[c] = p.culler.outside(p.scene.clusters[c]) ? 0 : 1;
+  if (c >= p.scene.cluster_count) return;
+  bool drawn = true;
+  if (p.cut) {
+    const float share = p.cut->share_of(p.scene.clusters, c);
+    p.cut->share[c] = share;
+    drawn = share > 0.0f;
+  }
+  const Cluster& cluster = p.scene.clusters[c];
+  p.seen[c] = drawn && !p.culler.outside(cluster) && !is_hidden(p, cluster) ? 1 : 0;
 }
 
 template <bool sweeps>

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <optional>
+
 #include "render_core/cuda/frame_arrays.cuh"
 #include "render_core/cuda/occlusion.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
+#include "render_core/cuda/tree_cut.cuh"
 #include "render_core/motion/list_culler.h"
 
 namespace catgs::cuda {
@@ -14,6 +17,7 @@ namespace catgs::cuda {
 /// sight, not on the size of the scene.
 struct CullParams {
   SceneArrays scene;
+  std::optional<TreeCut> cut;  // of a scene in pages
   ListCuller culler;
   FrameCameras camera;
   bool sweeps;

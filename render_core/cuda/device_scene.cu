@@ -12,22 +12,35 @@ namespace {
 constexpr std::size_t clusters_per_upload = 1024;
 
 template <class T>
-void upload(T* target, const std::vector<T>& source, std::size_t count) {
+void copy(T* target, const std::vector<T>& source, std::size_t count) {
   check(cudaMemcpy(target, source.data(), count * sizeof(T), cudaMemcpyHostToDevice),
         "scene upload");
 }
 
 }  // namespace
 
-DeviceScene::DeviceScene(const SceneSource& source) {
+ClusterMemory::ClusterMemory(std::size_t cluster_count, int sh_degree) : sh_degree_(sh_degree) {
+  blocks.reserve(cluster_count * packed_block_bytes(sh_degree));
+  units.reserve(cluster_count);
+  clusters.reserve(cluster_count);
+}
+
+SceneArrays ClusterMemory::arrays(std::size_t gaussians) const {
+  return {.count = static_cast<std::uint32_t>(gaussians),
+          .cluster_count = static_cast<std::uint32_t>(clusters_of(gaussians)),
+          .sh_degree = sh_degree_,
+          .blocks = blocks.get(),
+          .units = units.get(),
+          .clusters = clusters.get()};
+}
+
+ClusterMemory upload(const SceneSource& source) {
   const GaussianCloud& cloud = source.cloud;
   const std::span<const std::uint32_t> order = source.order;
   assert(order.size() == cloud.size());
   const std::size_t clusters = clusters_of(order.size());
   const std::size_t block_bytes = packed_block_bytes(cloud.sh_degree);
-  blocks_.reserve(clusters * block_bytes);
-  units_.reserve(clusters);
-  clusters_.reserve(clusters);
+  ClusterMemory memory(clusters, cloud.sh_degree);
 
   std::vector<PackedUnits> units(clusters);
   std::vector<Cluster> bounds(clusters);
@@ -43,19 +56,14 @@ DeviceScene::DeviceScene(const SceneSource& source) {
       units[first + c] = packed.units;
       bounds[first + c] = packed.bounds;
     });
-    upload(blocks_.get() + first * block_bytes, blocks, count * block_bytes);
+    copy(memory.blocks.get() + first * block_bytes, blocks, count * block_bytes);
   }
-  upload(units_.get(), units, clusters);
-  upload(clusters_.get(), bounds, clusters);
+  copy(memory.units.get(), units, clusters);
+  copy(memory.clusters.get(), bounds, clusters);
   // Copies from pageable memory may return before they have ended, and Views' streams do not wait
   // for them.
   check(cudaStreamSynchronize(cudaStreamLegacy), "scene upload");
-  arrays_ = {.count = static_cast<std::uint32_t>(order.size()),
-             .cluster_count = static_cast<std::uint32_t>(clusters),
-             .sh_degree = cloud.sh_degree,
-             .blocks = blocks_.get(),
-             .units = units_.get(),
-             .clusters = clusters_.get()};
+  return memory;
 }
 
 }  // namespace catgs::cuda

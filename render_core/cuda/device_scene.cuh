@@ -19,6 +19,8 @@ struct SceneArrays {
   const std::byte* blocks = nullptr;   // [cluster_count][packed_block_bytes(sh_degree)]
   const PackedUnits* units = nullptr;  // [cluster_count]
   const Cluster* clusters = nullptr;   // [cluster_count]
+  // [cluster_count], the part of each cluster that a frame draws, see math/fade-inl.h; null: all.
+  const float* share = nullptr;
 };
 
 /// The source of the copies on all devices.
@@ -28,22 +30,27 @@ struct SceneSource {
   ThreadPool& pool;
 };
 
-/// One scene on one device, shared by all Views.
-class DeviceScene {
+/// Device memory for clusters.
+class ClusterMemory {
  public:
   /// Allocates on the current device. Throws CudaError.
-  explicit DeviceScene(const SceneSource& source);
+  ClusterMemory(std::size_t clusters, int sh_degree);
 
-  [[nodiscard]] const SceneArrays& arrays() const { return arrays_; }
   [[nodiscard]] std::size_t bytes() const {
-    return blocks_.bytes() + units_.bytes() + clusters_.bytes();
+    return blocks.bytes() + units.bytes() + clusters.bytes();
   }
+  /// The first `gaussians` of the memory.
+  [[nodiscard]] SceneArrays arrays(std::size_t gaussians) const;
+
+  DeviceBuffer<std::byte> blocks;
+  DeviceBuffer<PackedUnits> units;
+  DeviceBuffer<Cluster> clusters;
 
  private:
-  DeviceBuffer<std::byte> blocks_;
-  DeviceBuffer<PackedUnits> units_;
-  DeviceBuffer<Cluster> clusters_;
-  SceneArrays arrays_;
+  int sh_degree_;
 };
+
+/// Copies a whole scene to the current device. Throws CudaError.
+ClusterMemory upload(const SceneSource& source);
 
 }  // namespace catgs::cuda

@@ -11,6 +11,7 @@ FrameStats frame_stats(const FrameCounts& counts, const FrameShape& shape, Frame
                        float near_z) {
   FrameStats stats;
   stats.visible = counts.visible;
+  stats.nodes = counts.clusters;
   stats.list_entries = std::min(counts.list_entries, shape.list_bound);
   stats.overflowed_entries = counts.list_entries - stats.list_entries;
   stats.list_max = counts.list_max;

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "render_core/cuda/device_scene.cuh"
+#include "render_core/math/fade-inl.h"
 #include "render_core/math/projection-inl.h"
 
 namespace catgs::cuda {
@@ -34,8 +35,13 @@ struct Centre {
 
 __device__ inline Centre load_centre(const SceneArrays& scene, std::uint32_t i) {
   const uint4 word = load_geometry(scene, i, 0);
+  float log2_opacity = unpack_log2_opacity(word.w & 0xffffu);
+  if (scene.share != nullptr) {
+    const float share = scene.share[i / cluster_size];
+    if (share < 1.0f) log2_opacity = math::faded_log2_opacity(log2_opacity, share);
+  }
   return {{__uint_as_float(word.x), __uint_as_float(word.y), __uint_as_float(word.z)},
-          unpack_log2_opacity(word.w & 0xffffu)};
+          log2_opacity};
 }
 
 __device__ inline math::CovarianceFactor<float> load_factor(const SceneArrays& scene,

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <optional>
+
 #include "render_core/cuda/occlusion.cuh"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/stream.h"
+#include "render_core/cuda/tree_cut.cuh"
 #include "render_core/cuda/view_memory.cuh"
 #include "render_core/motion/list_culler.h"
 
@@ -13,10 +16,13 @@ namespace catgs::cuda {
 struct ListRequest {
   ListRequest(const Camera& camera, const FramePlan& plan, const SpeculationSettings& settings);
 
+  SceneArrays scene{};
+  std::optional<TreeCut> cut{};  // of a scene in pages
   FrameCameras cameras;
   ListCuller culler;
   bool sweeps;      // trails are listed, not ellipses
   float min_depth;  // as in ProjectParams
+  int depth_bits = exact_depth_bits;
   Occlusion occlusion{};
 };
 
@@ -26,14 +32,13 @@ struct ListRequest {
 /// all stages of a frame.
 class ListBuilder {
  public:
-  ListBuilder(const SceneArrays& scene, ViewMemory& memory, int processors)
-      : scene_(scene), memory_(memory), processors_(processors) {}
+  ListBuilder(ViewMemory& memory, int processors) : memory_(memory), processors_(processors) {}
 
   /// Finds the Gaussians in view. Sets the frame's counts to zero first.
   void cull(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   /// Projects and shades them.
   void project(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
-  void sort_by_depth(const FrameShape& shape, cudaStream_t stream);
+  void sort_by_depth(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   void emit(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   /// Completes the lists.
   void sort_by_tile(const FrameShape& shape, cudaStream_t stream);
@@ -45,7 +50,6 @@ class ListBuilder {
   template <class Tile>
   void sort_as(const FrameShape& shape, cudaStream_t stream);
 
-  SceneArrays scene_;
   ViewMemory& memory_;
   int processors_;
   // Signals the count that the host waits for next. The host polls it: it comes soon, and the

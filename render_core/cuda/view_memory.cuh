@@ -19,6 +19,7 @@ bool speculates(const ViewSettings& settings);
 struct ViewSizes {
   FrameShape shape;
   SceneArrays scene;
+  bool in_pages;  // the scene is
   ViewSettings settings;
 
   [[nodiscard]] std::size_t pixels() const {
@@ -49,6 +50,8 @@ struct ViewMemory : MemoryTable<ViewSizes> {
 
   // The frustum cache and the sort cache: the Gaussians in view, and the list of every tile.
   DeviceRow<U32> clusters{this, Life::group, [](S s) { return s.scene.cluster_count; }};
+  DeviceRow<float> share{this, Life::group,
+                         [](S s) { return s.in_pages ? s.scene.cluster_count : 0; }};
   DeviceRow<U32> cull_mask{this, Life::group,
                            [](S s) { return cull_words(s.scene.cluster_count); }};
   DeviceRow<U32> visible{this, Life::group, [](S s) { return s.shape.visible_bound; }};

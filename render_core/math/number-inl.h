@@ -48,6 +48,10 @@ CATGS_HD_INLINE double neg_mul_add(double a, double b, double c) { return c - a 
 CATGS_HD_INLINE float exp2_of_alpha(float x) { return exp2f(x); }
 CATGS_HD_INLINE double exp2_of_alpha(double x) { return exp2(x); }
 
+/// log2(x) for a transmittance or an opacity, x in (0, 1].
+CATGS_HD_INLINE float log2_of_share(float x) { return log2f(x); }
+CATGS_HD_INLINE double log2_of_share(double x) { return log2(x); }
+
 template <class T>
 CATGS_HD_INLINE T clamp(T value, T low, T high) {
   return min(max(value, low), high);

@@ -78,6 +78,41 @@ CATGS_HD_INLINE T occlusion_limit(const CameraModel<T>& now, const CameraModel<T
   return select(known, T(1.0 + occlusion_margin) * (end - ray.offset.z) / ray.direction.z, unknown);
 }
 
+/// A box in the picture that holds all that a cluster may draw, px, and its least view depth. The
+/// depth is 0 where the cluster comes to the near plane.
+template <class T>
+struct ClusterBox {
+  Vec2<T> low_px, high_px;
+  T nearest;
+};
+
+/// `centre` and `half_extent`: of the box around the means, world. `reach`: how far beyond them the
+/// Gaussians reach, world units; see ClusterCuller.
+template <class T>
+CATGS_HD_INLINE ClusterBox<T> cluster_box(const CameraModel<T>& camera, const Vec3<T>& centre,
+                                          const Vec3<T>& half_extent, T reach) {
+  const auto along = [&](const Vec3<T>& axis) {
+    return abs(axis.x) * half_extent.x + abs(axis.y) * half_extent.y + abs(axis.z) * half_extent.z;
+  };
+  const Vec3<T> at = camera_from_world(camera, centre);
+  const T nearest = at.z - along(camera.forward), farthest = at.z + along(camera.forward);
+  if (!(nearest > camera.near_z)) return {{T(0.0), T(0.0)}, {T(0.0), T(0.0)}, T(0.0)};
+  // The low-pass filter's part of a splat's reach, and a pixel for rounding.
+  constexpr double blur_px = 1.83 + 1.0;  // sqrt(2 ln(255) low_pass_px2) + 1
+  const auto interval = [&](T middle, T half, T focal, T principal, T low_slope, T high_slope) {
+    const T low = middle - half, high = middle + half;
+    const T steepest = max(abs(low_slope), abs(high_slope));
+    const T beyond = T(blur_px) + focal * sqrt(T(1.0) + steepest * steepest) * reach / nearest;
+    return Vec2<T>{focal * (low / (low < T(0.0) ? nearest : farthest)) + principal - beyond,
+                   focal * (high / (high < T(0.0) ? farthest : nearest)) + principal + beyond};
+  };
+  const Vec2<T> x = interval(at.x, along(camera.right), camera.focal_px.x,
+                             camera.principal_point_px.x, camera.slope_min.x, camera.slope_max.x);
+  const Vec2<T> y = interval(at.y, along(camera.down), camera.focal_px.y,
+                             camera.principal_point_px.y, camera.slope_min.y, camera.slope_max.y);
+  return {{x.x, y.x}, {x.y, y.y}, nearest};
+}
+
 }  // namespace CATGS_MATH_NAMESPACE
 }  // namespace catgs
 CATGS_AFTER_MATH();

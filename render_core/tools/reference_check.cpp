@@ -7,7 +7,8 @@ namespace catgs {
 double reference_error(const RenderSetup& setup, std::size_t i, const FrameView& frame,
                        std::size_t count) {
   const auto pixels = random_pixels(frame.size_px, count, setup.first + i);
-  const auto truth = render_reference_pixels(*setup.cloud, setup.request(i), pixels, *setup.pool);
+  const auto truth = render_reference_pixels(setup.whole_cloud("--pixels, --quality of exact"),
+                                             setup.request(i), pixels, *setup.pool);
   double sum = 0.0;
   for (std::size_t k = 0; k < pixels.size(); ++k) {
     const auto* row = reinterpret_cast<const float*>(frame.planes[0].data +

@@ -13,7 +13,9 @@
 #include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/motion/camera_path.h"
+#include "render_core/scene/tree/tree_file.h"
 #include "render_core/tools/parse_name.h"
+#include "render_core/tools/scene_hash.h"
 
 namespace catgs {
 namespace {
@@ -100,6 +102,17 @@ void add_frame_options(CLI::App& command, RenderOptions& options) {
       ->capture_default_str();
   command.add_option("--device", options.device,
                      "CUDA core: all, or numbers of CUDA devices, like 0 or 0,1 [0]");
+  command
+      .add_option(
+          "--detail", options.detail_px,
+          "Trees: largest error in pixels that is drawn; 0: every Gaussian. The scene stays "
+          "on disk, and what a picture needs is read [the whole scene is loaded]")
+      ->check(CLI::Range(0.0, 64.0));
+  command
+      .add_option(
+          "--scene-memory", options.scene_memory_gb,
+          "Trees: memory for the parts of the scene that are read, GB, on each device [4.3]")
+      ->check(CLI::Range(0.001, 10'000.0));
   command.add_option("--simd", options.simd, "CPU core: auto, scalar or a target's name")
       ->capture_default_str();
   command.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
@@ -113,7 +126,24 @@ FrameRequest RenderSetup::request(std::size_t i) const {
   request.camera = camera;
   request.camera.world_from_camera = poses[i].world_from_camera;
   request.background = background;
+  request.detail_px = detail_px;
+  request.waits_for_pages = true;
   return request;
+}
+
+std::uint64_t RenderSetup::gaussians() const {
+  return tree ? tree->header().gaussians : cloud->size();
+}
+
+std::string RenderSetup::hash() const {
+  return fmt::format("{:016x}", tree ? tree->header().checksum : scene_hash(*cloud));
+}
+
+const GaussianCloud& RenderSetup::whole_cloud(std::string_view flag) const {
+  if (tree)
+    throw InputError(flag, "", "needs all Gaussians in memory",
+                     "leave --detail and --scene-memory out");
+  return *cloud;
 }
 
 ScriptOptions script_options(const RenderOptions& options) {
@@ -156,13 +186,20 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
   setup.predictor = predictor_settings(options.pipeline);
-  setup.scene = load_scene(options.scene, options.threads, quiet);
+  if (options.in_pages()) {
+    SceneInPages scene = open_in_pages(options.scene, options.threads, quiet);
+    setup.tree = std::move(scene.tree);
+    setup.scene = std::move(scene.outline);
+    setup.detail_px = options.detail_px.value_or(0.0f);
+  } else {
+    setup.scene = load_scene(options.scene, options.threads, quiet);
+  }
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
   setup.predictor.lever = forecast_lever(setup.camera.near_z);
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   core.pool = setup.pool;
-  setup.made = make_renderer(setup.cloud, core);
+  setup.made = setup.tree ? make_renderer(setup.tree, core) : make_renderer(setup.cloud, core);
   return setup;
 }
 
@@ -178,6 +215,8 @@ RendererOptions renderer_options(const RenderOptions& options) {
                                         {"cuda", RendererKind::cuda},
                                         {"reference", RendererKind::reference}});
   core.simd = options.simd;
+  if (options.scene_memory_gb)
+    core.scene_memory = static_cast<std::uint64_t>(1e9 * *options.scene_memory_gb);
   if (!options.device.empty()) {
     try {
       core.devices = std::make_shared<DeviceSet>(parse_devices(options.device));

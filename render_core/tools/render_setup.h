@@ -35,7 +35,11 @@ struct RenderOptions {
   std::string renderer = "auto";
   std::string device;  // empty: the first device, if CUDA renders
   PipelineOptions pipeline;
+  std::optional<float> detail_px;  // trees; one of the two: the scene is drawn from pages
+  std::optional<double> scene_memory_gb;
   std::string simd = "auto";
+
+  [[nodiscard]] bool in_pages() const { return detail_px || scene_memory_gb; }
   int threads = 0;
 };
 
@@ -46,8 +50,10 @@ void add_frame_options(CLI::App& command, RenderOptions& options);
 
 /// The options, loaded and checked.
 struct RenderSetup {
-  Scene scene;  // its cloud has moved to `cloud`
-  std::shared_ptr<const GaussianCloud> cloud;
+  Scene scene;                                 // its cloud has moved to `cloud`
+  std::shared_ptr<const GaussianCloud> cloud;  // of a scene in pages, an outline
+  std::shared_ptr<TreeFile> tree;              // a scene in pages; otherwise null
+  float detail_px = 0.0f;
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
   ViewSettings view;            // pipeline and its parts; callers set format and memory space
@@ -59,8 +65,15 @@ struct RenderSetup {
   Camera camera;                // without the pose
   glm::vec3 background{0.0f};
 
-  /// The request for frame i alone, without a forecast; see FrameFeed.
+  /// The request for frame i alone, without a forecast; see FrameFeed. It waits for pages.
   [[nodiscard]] FrameRequest request(std::size_t i) const;
+  /// Gaussians of the whole scene.
+  [[nodiscard]] std::uint64_t gaussians() const;
+  /// The scene_hash() of a scene in memory, the header's checksum of a tree: hexadecimal.
+  [[nodiscard]] std::string hash() const;
+  /// The cloud, for what needs all Gaussians. Throws InputError naming `flag` if the scene is in
+  /// pages.
+  [[nodiscard]] const GaussianCloud& whole_cloud(std::string_view flag) const;
 };
 
 /// Loads scene and path, makes the renderer. Without options of the lens, the lens is that of the

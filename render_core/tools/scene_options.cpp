@@ -46,15 +46,28 @@ std::optional<glm::vec3> up_of(const SceneOptions& options) {
   return up;
 }
 
-Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
-  Progress progress("loading", quiet);
+namespace {
+
+LoadOptions load_options(const SceneOptions& options, int threads, Progress& progress) {
   LoadOptions load;
   load.lod = options.lod;
   load.gaussian_budget = options.budget;
   load.up = up_of(options);
   load.threads = threads;
-  load.progress = [&](double fraction) { progress.update(fraction); };
-  return load_scene(options.path, load);
+  load.progress = [&progress](double fraction) { progress.update(fraction); };
+  return load;
+}
+
+}  // namespace
+
+Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
+  Progress progress("loading", quiet);
+  return load_scene(options.path, load_options(options, threads, progress));
+}
+
+SceneInPages open_in_pages(const SceneOptions& options, int threads, bool quiet) {
+  Progress progress("opening", quiet);
+  return open_in_pages(options.path, load_options(options, threads, progress));
 }
 
 void add_lens_options(CLI::App& command, LensOptions& options) {

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "render_core/math/camera.h"
+#include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
 
 namespace catgs {
@@ -27,6 +28,9 @@ std::optional<glm::vec3> up_of(const SceneOptions& options);
 
 /// Shows its progress on a terminal. Throws InputError.
 Scene load_scene(const SceneOptions& options, int threads, bool quiet);
+
+/// The same for a scene in pages.
+SceneInPages open_in_pages(const SceneOptions& options, int threads, bool quiet);
 
 /// A camera without a pose.
 struct LensOptions {

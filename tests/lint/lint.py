@@ -47,7 +47,7 @@ class IncludeRule(NamedTuple):
 LAYERS = {name: rank for rank, line in enumerate([
     "render_core/base", "render_core/math", "render_core/scene", "render_core/scene/analysis render_core/scene/formats",
     "render_core/scene/tree",
-    "render_core/motion", "render_core/renderer", "render_core/device_error", "render_core/frame_driver", "render_core/image",
+    "render_core/motion", "render_core/renderer", "render_core/device_error", "render_core/frame_driver", "render_core/paged_frame", "render_core/image",
     "render_core/metrics render_core/reference render_core/cpu render_core/cuda", "render_core/make_renderer",
     "render_core/first_sight", "render_core/scene/files", "render_core/synth", "render_core/tools",
     "render_core/tools/bench render_core/tools/render render_core/tools/trace", "render_core/tools/paper",

@@ -3,11 +3,14 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "render_core/scene/scene.h"
 
 namespace catgs {
+
+class TreeFile;
 
 struct LoadOptions {
   std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
@@ -23,5 +26,14 @@ struct LoadOptions {
 /// of a file decides its format before its name does. Throws InputError; the error for an unknown
 /// format lists the supported ones. Memory peaks at the cloud and a few bytes per Gaussian.
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
+
+/// A scene in pages, of which renderers read what they need.
+struct SceneInPages {
+  std::shared_ptr<TreeFile> tree;
+  Scene outline;  // its cloud is a coarse level, for hints and analysis; `report` is of all
+};
+
+/// Opens a .tree file. Throws InputError, also for other formats.
+SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options = {});
 
 }  // namespace catgs

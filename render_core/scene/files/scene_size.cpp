@@ -52,7 +52,7 @@ SceneSize size_of_file(const std::filesystem::path& path) {
   if (begins == "PK\x03\x04") return size_of_sog(ZipFiles(file, "meta.json"));
   if (is_tree(file)) {
     const TreeHeader header = read_tree_header(file);
-    return {header.gaussians, static_cast<int>(header.sh_degree)};
+    return {header.gaussians, static_cast<int>(header.sh_degree), true};
   }
   if (is_spz(file)) {
     const SpzSize size = read_spz_size(file);

@@ -12,6 +12,7 @@ struct SceneSize {
   std::uint64_t gaussians = 0;
   /// SH degree of the scene as loaded, 0…3; where only images tell it, the highest possible one.
   int sh_degree = 0;
+  bool in_pages = false;  // a tree, of which any part may be in memory
 
   /// Size of the decoded scene; no core's copy is larger.
   [[nodiscard]] std::uint64_t bytes() const;

@@ -11,18 +11,11 @@ namespace {
 
 constexpr float unbounded_px = std::numeric_limits<float>::infinity();
 
-/// A camera as the walk through the tree sees it.
 struct Eye {
-  explicit Eye(const Camera& camera)
-      : culler(camera),
-        position(camera.world_from_camera.position),
-        forward(camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f)),
-        focal_px(std::max(camera.focal_px.x, camera.focal_px.y)),
-        near_z(camera.near_z) {}
+  explicit Eye(const Camera& camera) : culler(camera), eye(camera) {}
 
   ClusterCuller culler;
-  glm::vec3 position, forward;
-  float focal_px, near_z;
+  CutEye eye;
 };
 
 /// Largest error of a node in pixels over the cameras that may see it; negative: none does.
@@ -31,51 +24,91 @@ float visible_error_px(std::span<const Eye> eyes, const NodeFacts& facts) {
   float largest = -1.0f;
   for (const Eye& eye : eyes)
     if (!eye.culler.outside(facts.bounds))
-      largest = std::max(largest, error_px(facts.error, facts.bounds, eye.position, eye.forward,
-                                           eye.focal_px, eye.near_z));
+      largest = std::max(largest, eye.eye.error_px(facts.error, facts.bounds));
   return largest;
 }
+
+/// A node on the walk, and the part of it that its ancestors leave to it.
+struct Step {
+  NodeId node;
+  float taken = 1.0f;
+};
+
+class Walk {
+ public:
+  Walk(const TreeShape& shape, std::span<const Camera> cameras, float detail_px,
+       const FindPage& find)
+      : shape_(shape), eyes_(cameras.begin(), cameras.end()), detail_px_(detail_px), find_(find) {}
+
+  Cut run() {
+    const std::uint64_t first = shape_.page_of(shape_.root());
+    if (page_at(first).facts == nullptr) {
+      cut_.missing.push_back({first, unbounded_px});
+      return std::move(cut_);
+    }
+    stack_.push_back({shape_.root()});
+    while (!stack_.empty()) {
+      const Step step = stack_.back();
+      stack_.pop_back();
+      visit(step);
+    }
+    std::ranges::sort(cut_.missing, [](const PageUse& a, const PageUse& b) {
+      return std::tie(b.error_px, a.page) < std::tie(a.error_px, b.page);
+    });
+    return std::move(cut_);
+  }
+
+ private:
+  /// Most steps stay in the page of the step before.
+  PageInMemory page_at(std::uint64_t number) {
+    if (number != last_number_) last_ = find_(number);
+    last_number_ = number;
+    return last_;
+  }
+
+  void visit(const Step& step) {
+    const NodeFacts* facts = page_at(shape_.page_of(step.node)).facts;
+    const float error = visible_error_px(eyes_, facts[shape_.slot_of(step.node)]);
+    if (error < 0.0f) return;
+    const float split = step.node.level == 0 ? 0.0f : split_into_children(step, error);
+    if (split < step.taken) cut_.drawn.push_back({step.node, step.taken - split});
+  }
+
+  /// The part of a node that its children take over. They are visited next.
+  float split_into_children(const Step& step, float error) {
+    float split = std::min(step.taken, split_share(error, detail_px_));
+    if (split <= 0.0f) return 0.0f;
+    const auto below = static_cast<std::uint8_t>(step.node.level - 1);
+    const NodeId children[2] = {{below, 2 * step.node.index}, {below, 2 * step.node.index + 1}};
+    const std::size_t count = children[1].index < shape_.nodes_on(below) ? 2 : 1;
+    const std::uint64_t page = shape_.page_of(step.node);
+    for (const NodeId& child : std::span(children).first(count)) {
+      const std::uint64_t its_page = shape_.page_of(child);
+      if (its_page == page) continue;
+      const PageInMemory found = find_(its_page);
+      (found.facts != nullptr ? cut_.used : cut_.missing).push_back({its_page, error});
+      split = found.facts != nullptr ? std::min(split, found.shown) : 0.0f;
+    }
+    if (split > 0.0f)
+      for (std::size_t i = count; i-- > 0;) stack_.push_back({children[i], split});
+    return split;
+  }
+
+  const TreeShape& shape_;
+  const std::vector<Eye> eyes_;
+  const float detail_px_;
+  const FindPage& find_;
+  std::uint64_t last_number_ = ~std::uint64_t{0};
+  PageInMemory last_;
+  std::vector<Step> stack_;
+  Cut cut_;
+};
 
 }  // namespace
 
 Cut choose_cut(const TreeShape& shape, std::span<const Camera> cameras, float detail_px,
-               const ResidentPage& resident) {
-  Cut cut;
-  const std::vector<Eye> eyes(cameras.begin(), cameras.end());
-  if (!resident(shape.page_of(shape.root()))) {
-    cut.missing.push_back({shape.page_of(shape.root()), unbounded_px});
-    return cut;
-  }
-  std::vector<NodeId> stack = {shape.root()};
-  while (!stack.empty()) {
-    const NodeId node = stack.back();
-    stack.pop_back();
-    const NodeFacts* facts = resident(shape.page_of(node));
-    const float error = visible_error_px(eyes, facts[shape.slot_of(node)]);
-    if (error < 0.0f) continue;
-    if (node.level == 0 || error < detail_px) {
-      cut.drawn.push_back(node);
-      continue;
-    }
-    const auto below = static_cast<std::uint8_t>(node.level - 1);
-    const NodeId children[2] = {{below, 2 * node.index}, {below, 2 * node.index + 1}};
-    const std::size_t count = children[1].index < shape.nodes_on(below) ? 2 : 1;
-    bool whole = true;
-    for (const NodeId& child : std::span(children).first(count))
-      if (!resident(shape.page_of(child))) {
-        cut.missing.push_back({shape.page_of(child), error});
-        whole = false;
-      }
-    if (!whole) {
-      cut.drawn.push_back(node);
-      continue;
-    }
-    for (std::size_t i = count; i-- > 0;) stack.push_back(children[i]);
-  }
-  std::ranges::sort(cut.missing, [](const MissingPage& a, const MissingPage& b) {
-    return std::tie(b.error_px, a.page) < std::tie(a.error_px, b.page);
-  });
-  return cut;
+               const FindPage& find) {
+  return Walk(shape, cameras, detail_px, find).run();
 }
 
 }  // namespace catgs

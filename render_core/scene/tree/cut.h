@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -11,44 +13,86 @@
 
 namespace catgs {
 
-/// An upper bound of a node's error in pixels: error x focal / the depth of the nearest point of
-/// its box. Infinite where that point is nearer than the near plane. `forward` is the camera's view
-/// axis in the world, unit.
-CATGS_HD inline float error_px(float error, const Cluster& bounds, const glm::vec3& position,
-                               const glm::vec3& forward, float focal_px, float near_z) {
-  const float centre = forward.x * (bounds.centre.x - position.x) +
-                       forward.y * (bounds.centre.y - position.y) +
-                       forward.z * (bounds.centre.z - position.z);
-  const float nearest =
-      centre - (fabsf(forward.x) * bounds.half_extent.x + fabsf(forward.y) * bounds.half_extent.y +
-                fabsf(forward.z) * bounds.half_extent.z);
-  // The magnitude of infinity is fixed, so that device code needs no library for it.
-  return nearest > near_z ? error * focal_px / nearest : 3e38f;
+/// A camera as a cut sees it.
+struct CutEye {
+  explicit CutEye(const Camera& camera)
+      : position(camera.world_from_camera.position),
+        forward(camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f)),
+        focal_px(std::max(camera.focal_px.x, camera.focal_px.y)),
+        near_z(camera.near_z) {}
+
+  /// An upper bound of a node's error in pixels: error x focal / the depth of the nearest point of
+  /// its box. Infinite where that point is nearer than the near plane. It grows towards the root.
+  [[nodiscard]] CATGS_HD float error_px(float error, const Cluster& bounds) const {
+    const float centre = forward.x * (bounds.centre.x - position.x) +
+                         forward.y * (bounds.centre.y - position.y) +
+                         forward.z * (bounds.centre.z - position.z);
+    const float nearest = centre - (fabsf(forward.x) * bounds.half_extent.x +
+                                    fabsf(forward.y) * bounds.half_extent.y +
+                                    fabsf(forward.z) * bounds.half_extent.z);
+    // The magnitude of infinity is fixed, so that device code needs no library for it.
+    return nearest > near_z ? error * focal_px / nearest : 3e38f;
+  }
+
+  glm::vec3 position, forward;  // world; the view axis, unit
+  float focal_px, near_z;
+};
+
+/// Below this share of the wanted detail, an error is not worth a node's children. From there to
+/// the detail itself, a node gives way to its children little by little, so that nothing pops.
+inline constexpr float blend_begin = 0.9f;
+
+/// The part of a node that its children have taken over, 0 to 1, for its error in pixels.
+CATGS_HD inline float split_share(float error_px, float detail_px) {
+  const float begin = blend_begin * detail_px;
+  if (error_px >= detail_px) return 1.0f;
+  return error_px <= begin ? 0.0f : (error_px - begin) / (detail_px - begin);
 }
 
-/// A page that a cut would refine a node with.
-struct MissingPage {
+/// The part of a page's nodes that is shown when the page has been in memory for so long, 0 to 1.
+/// All of it is shown after all_shown_s.
+inline constexpr double all_shown_s = 0.1;
+CATGS_HD inline float shown_share(double seconds) {
+  const double share = seconds / all_shown_s;
+  return share >= 1.0 ? 1.0f : share > 0.0 ? static_cast<float>(share) : 0.0f;
+}
+
+/// A node to draw. Where its share is under 1, ancestors or descendants are drawn in the same
+/// place, and the shares along each path from the root to a leaf sum to 1.
+struct DrawnNode {
+  NodeId node;
+  float share = 1.0f;  // see math/fade-inl.h
+};
+
+/// A page, and the error of the node that it refines, as the cut's cameras see it.
+struct PageUse {
   std::uint64_t page = 0;
-  float error_px = 0.0f;  // of the node that is drawn meanwhile
+  float error_px = 0.0f;
 };
 
 struct Cut {
-  std::vector<NodeId> drawn;         // in the order of the leaves that they stand for
-  std::vector<MissingPage> missing;  // largest error first
+  std::vector<DrawnNode>
+      drawn;                  // in the order of the leaves that they stand for, coarse ones first
+  std::vector<PageUse> used;  // pages whose nodes were looked at, without that of the root
+  std::vector<PageUse> missing;  // pages that would refine a node, largest error first
 };
 
-/// The facts of a page's slots if its blocks are in memory, else null. They stay valid during
-/// choose_cut().
-using ResidentPage = std::function<const NodeFacts*(std::uint64_t page)>;
+/// A page in memory. `facts`: of its slots, valid during choose_cut(); null: it is not there.
+/// `shown`: the part of its nodes that may be shown, no more than that of the page above.
+struct PageInMemory {
+  const NodeFacts* facts = nullptr;
+  float shown = 1.0f;
+};
+using FindPage = std::function<PageInMemory(std::uint64_t page)>;
 
-/// The nodes to draw for all `cameras` at once, with a detail of `detail_px`: a node is drawn when
-/// its error is under `detail_px` in every camera that it may be visible in, or when a page of its
-/// children is not resident. Else its children are looked at. Nodes outside of all cameras' views
-/// are left out with all that they stand for. So every leaf that may be visible has exactly one
-/// node drawn, itself or an ancestor, and `detail_px` = 0 gives all leaves that are resident.
+/// The nodes to draw for all `cameras` at once, with a detail of `detail_px`. A node whose error
+/// reaches the detail in a camera that it may be visible in gives way to its children, if all of
+/// them are in memory. Nodes outside of all cameras' views are left out with all that they stand
+/// for. So the shares sum to 1 over each leaf that may be visible and its ancestors. No error over
+/// `detail_px` is drawn unless pages are missing, and `detail_px` = 0 gives all leaves in memory.
 /// Without cameras nothing is outside, and every error is infinite. Nothing is drawn while the
 /// root's page is missing.
 Cut choose_cut(const TreeShape& shape, std::span<const Camera> cameras, float detail_px,
-               const ResidentPage& resident);
+               const FindPage& find);
 
 }  // namespace catgs

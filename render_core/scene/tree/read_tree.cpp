@@ -54,35 +54,60 @@ GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes,
   return cloud;
 }
 
-TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context) {
-  constexpr std::size_t memory_bytes = std::size_t{64} << 20;
-  const std::string name = file->name();
-  TreeFile tree(std::move(file), memory_bytes);
-  const TreeShape& shape = tree.shape();
-  if (shape.gaussians() > max_gaussians)
-    throw InputError(name, "",
-                     fmt::format("has {} Gaussians, at most {} are loaded at once",
-                                 shape.gaussians(), max_gaussians),
-                     "split the scene before it is converted");
+namespace {
 
+/// The finest level whose Gaussians may be read in pages down to it, and which is the last one of
+/// its pages. The root's pages may always be read.
+int finest_level(const TreeShape& shape, std::uint64_t most) {
+  int band = 0;
+  while (band + 1 < shape.bands() &&
+         std::uint64_t{shape.nodes_on(band * shape.page_levels())} * cluster_size > most)
+    ++band;
+  return band * shape.page_levels();
+}
+
+}  // namespace
+
+TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadContext& context) {
+  const TreeShape& shape = tree.shape();
+  const int finest = finest_level(shape, most_gaussians);
+  // Pages are numbered from the root's on, level by level.
+  const std::uint64_t wanted =
+      shape.page_of({static_cast<std::uint8_t>(finest), shape.nodes_on(finest) - 1}) + 1;
   // Without cameras no facts are looked at, only whether a page is there.
-  std::vector<char> sound(shape.pages());
+  std::vector<char> sound(wanted);
   context.part(0.0, 0.4).for_blocks(
-      tree.pages_in_file(), 1, [&](auto page, auto) { sound[page] = tree.page(page) != nullptr; });
+      std::min(wanted, tree.pages_in_file()), 1,
+      [&](auto page, auto) { sound[page] = tree.page(page) != nullptr; });
   const std::vector<NodeFacts> unseen(shape.slots());
-  const Cut all = choose_cut(
-      shape, {}, 0.0f, [&](std::uint64_t page) { return sound[page] ? unseen.data() : nullptr; });
+  const Cut all = choose_cut(shape, {}, 0.0f, [&](std::uint64_t page) -> PageInMemory {
+    return {page < wanted && sound[page] ? unseen.data() : nullptr};
+  });
   const std::string first = tree.damage().first;
   if (all.drawn.empty())
-    throw InputError(name, "page 0", "is damaged or missing, and nothing can be seen without it",
+    throw InputError(tree.name(), "page 0",
+                     "is damaged or missing, and nothing can be seen without it",
                      "convert the scene again");
+  std::vector<NodeId> nodes;
+  for (const DrawnNode& drawn : all.drawn) nodes.push_back(drawn.node);
   TreeScene scene;
-  scene.cloud = read_nodes(tree, all.drawn, context.part(0.4, 1.0));
+  scene.cloud = read_nodes(tree, nodes, context.part(0.4, 1.0));
   if (const auto lost = std::ranges::count(sound, 0); lost > 0)
     scene.notes.push_back(
-        fmt::format("{} of {} pages are damaged or missing and show less detail{}{}", lost,
-                    shape.pages(), first.empty() ? "" : "; the first: ", first));
+        fmt::format("{} of {} pages are damaged or missing and show less detail{}{}", lost, wanted,
+                    first.empty() ? "" : "; the first: ", first));
   return scene;
+}
+
+TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context) {
+  constexpr std::size_t memory_bytes = std::size_t{64} << 20;
+  TreeFile tree(std::move(file), memory_bytes);
+  if (tree.shape().gaussians() > max_gaussians)
+    throw InputError(tree.name(), "",
+                     fmt::format("has {} Gaussians, at most {} are loaded at once",
+                                 tree.shape().gaussians(), max_gaussians),
+                     "give --detail, so that only what a picture needs is in memory");
+  return read_tree(tree, max_gaussians, context);
 }
 
 }  // namespace catgs

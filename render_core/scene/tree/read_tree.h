@@ -25,4 +25,8 @@ struct TreeScene {
 };
 TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context);
 
+/// The same for the finest level with at most `most_gaussians` that ends a page, or that of the
+/// root's page: an outline of a scene of any size.
+TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadContext& context);
+
 }  // namespace catgs

@@ -55,6 +55,7 @@ class TreeFile {
   /// InputError as read_tree_header() does.
   TreeFile(std::unique_ptr<const ByteSource> file, std::size_t memory_bytes);
 
+  [[nodiscard]] const std::string& name() const { return file_->name(); }
   [[nodiscard]] const TreeHeader& header() const { return header_; }
   [[nodiscard]] const TreeShape& shape() const { return shape_; }
   /// Less than shape().pages() where the file is cut off.

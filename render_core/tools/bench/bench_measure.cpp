@@ -15,6 +15,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::size_t page_step = 10;  // frames from one wait for pages to the next
+
 double ms_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
@@ -28,7 +30,9 @@ std::vector<Measurement::Frame> time_path(const RenderSetup& setup, const ViewSe
   auto last = Clock::now();
   for (std::size_t i = 0; i < setup.poses.size(); ++i) {
     FrameView frame;
-    render_or_throw(view, feed.next(), frame);
+    FrameRequest request = feed.next();
+    request.waits_for_pages = false;
+    render_or_throw(view, request, frame);
     const auto now = Clock::now();
     frames.push_back({ms_between(last, now), frame.stats, i == 0});
     last = now;
@@ -94,6 +98,18 @@ ListLength Measurement::list_length(Kind kind) const {
   return length;
 }
 
+PageUsage Measurement::pages() const {
+  PageUsage usage;
+  const double share = 1.0 / static_cast<double>(std::max<std::size_t>(frames.size(), 1));
+  for (const Frame& frame : frames) {
+    usage.nodes_mean += share * frame.stats.nodes;
+    usage.missing_mean += share * frame.stats.missing_pages;
+    usage.missing_max = std::max(usage.missing_max, frame.stats.missing_pages);
+    usage.coarsest_px = std::max(usage.coarsest_px, frame.stats.coarsest_px);
+  }
+  return usage;
+}
+
 std::map<int, std::size_t> Measurement::window_histogram() const {
   std::map<int, std::size_t> histogram;
   for_each_frame(*this, FrameKind::key,
@@ -149,6 +165,11 @@ Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t
     for (std::size_t i = 0; i < warmup; ++i) {
       render_or_throw(*warm[v], feed.next(), frame);
     }
+    // Where memory has room, the pages of the whole path are there before it is measured.
+    if (setup.tree)
+      for (std::size_t i = 0; i < setup.poses.size(); i += page_step) {
+        render_or_throw(*warm[v], setup.request(i), frame);
+      }
   });
 
   std::vector<std::vector<Measurement::Frame>> passes(views);

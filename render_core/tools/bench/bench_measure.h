@@ -20,6 +20,14 @@ struct ListLength {
   double visible_mean = 0.0;
 };
 
+/// The parts of a scene in pages that a set of frames drew, and those that it lacked.
+struct PageUsage {
+  double nodes_mean = 0.0;
+  double missing_mean = 0.0;  // pages
+  std::uint32_t missing_max = 0;
+  float coarsest_px = 0.0f;  // the largest error drawn for want of pages
+};
+
 /// One pass over the path, or several: frames back to back, none skipped. The queries below are
 /// about all frames, or those of one kind.
 struct Measurement {
@@ -37,6 +45,7 @@ struct Measurement {
   [[nodiscard]] std::vector<double> frame_ms(Kind kind = std::nullopt) const;
   [[nodiscard]] double mean_stage_ms(Stage stage, Kind kind = std::nullopt) const;
   [[nodiscard]] ListLength list_length(Kind kind = std::nullopt) const;
+  [[nodiscard]] PageUsage pages() const;
   /// Key frames by the window that they promised.
   [[nodiscard]] std::map<int, std::size_t> window_histogram() const;
   [[nodiscard]] double frames_per_key() const;

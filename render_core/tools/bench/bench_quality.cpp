@@ -96,6 +96,7 @@ class Judge {
   Image exact_image(std::size_t i, float background) {
     FrameRequest request = setup_.request(i);
     request.background = glm::vec3(background);
+    request.detail_px = 0.0f;  // of a tree, all Gaussians
     FrameView frame;
     render_or_throw(*exact_, request, frame);
     return copy_image(frame);

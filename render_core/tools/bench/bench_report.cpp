@@ -7,7 +7,6 @@
 
 #include "render_core/base/build_info.h"
 #include "render_core/metrics/summary.h"
-#include "render_core/tools/scene_hash.h"
 
 namespace catgs {
 namespace {
@@ -77,6 +76,14 @@ void add_times(Json& json, const Measurement& measurement, Measurement::Kind kin
   json["frame_ms" + suffix] = to_json(summarize(times));
   json["stage_ms" + suffix] = times.empty() ? Json() : stages_json(measurement, kind);
   json["list_length" + suffix] = times.empty() ? Json() : lists_json(measurement, kind);
+}
+
+Json pages_json(const Measurement& measurement) {
+  const PageUsage pages = measurement.pages();
+  return {{"nodes_mean", pages.nodes_mean},
+          {"missing_mean", pages.missing_mean},
+          {"missing_max", pages.missing_max},
+          {"coarsest_px", pages.coarsest_px}};
 }
 
 Json settings_json(const RenderOptions& options, const RenderSetup& setup,
@@ -174,7 +181,7 @@ void print_quality(const QualityReport& quality) {
 double BenchResult::ns_per_gaussian(const RenderSetup& setup) const {
   const double ms = measurement.mean_stage_ms(Stage::project) +
                     measurement.mean_stage_ms(Stage::bin) + measurement.mean_stage_ms(Stage::sort);
-  return 1e6 * ms / static_cast<double>(std::max<std::size_t>(setup.cloud->size(), 1));
+  return 1e6 * ms / static_cast<double>(std::max<std::uint64_t>(setup.gaussians(), 1));
 }
 
 Json report_json(const RenderOptions& options, const RenderSetup& setup,
@@ -192,9 +199,9 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
                {"scene",
                 {{"name", setup.scene.name},
                  {"format", setup.scene.format},
-                 {"gaussians", setup.cloud->size()},
+                 {"gaussians", setup.gaussians()},
                  {"sh_degree", setup.cloud->sh_degree},
-                 {"hash", fmt::format("{:016x}", scene_hash(*setup.cloud))}}},
+                 {"hash", setup.hash()}}},
                {"settings", settings_json(options, setup, result)},
                {"fps_mean", measurement.fps()},
                {"flatness", flatness(measurement.frame_ms())}};
@@ -209,6 +216,7 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
   json["keys_without_window"] = measurement.keys_without_window();
   json["window_histogram"] = windows;
   json["windows_cut"] = measurement.windows_cut();
+  if (setup.tree) json["pages"] = pages_json(measurement);
   json["ns_per_gaussian"] = result.ns_per_gaussian(setup);
   json["ns_per_blended_pair"] = result.pair_cost.ns_per_pair;
   json["blended_pairs_mean"] = result.pair_cost.pairs_per_frame;
@@ -219,11 +227,23 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
   return json;
 }
 
+namespace {
+
+void print_pages(const Measurement& measurement, float detail_px) {
+  const PageUsage pages = measurement.pages();
+  fmt::print(
+      "{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most; coarsest {:.1f} px\n",
+      "detail", detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
+      pages.coarsest_px);
+}
+
+}  // namespace
+
 void print_report(const RenderSetup& setup, const BenchResult& result) {
   const Measurement& measurement = result.measurement;
   const ListLength lists = measurement.list_length();
   const bool groups = result.settings.pipeline == Pipeline::paper;
-  fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.cloud->size(),
+  fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.gaussians(),
              setup.cloud->sh_degree, setup.camera.size_px.x, setup.camera.size_px.y,
              pipeline_name(result.settings.pipeline));
   fmt::print("{} ({})\n", setup.made.renderer->description(), setup.made.reason);
@@ -244,6 +264,7 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
   fmt::print("{:<14}{:.1f} MB scene, {:.1f} MB view\n", "memory",
              1e-6 * static_cast<double>(setup.made.renderer->scene_bytes()),
              1e-6 * static_cast<double>(measurement.view_bytes));
+  if (setup.tree) print_pages(measurement, setup.detail_px);
   if (lists.overflowed > 0) {
     fmt::print("{:<14}{} list entries found no memory and were not drawn\n", "OVERFLOW",
                lists.overflowed);

@@ -90,7 +90,7 @@ PaperCase::PaperCase(const PaperCase& whole, RenderSetup setup)
       setup_(std::move(setup)) {}
 
 PaperCase PaperCase::pruned(double keep_fraction) const {
-  GaussianCloud cloud = *setup_.cloud;
+  GaussianCloud cloud = setup_.whole_cloud("--table pruned");
   keep_most_important(cloud, keep_fraction);
   RenderSetup setup;
   setup.scene = setup_.scene;  // with the whole scene's hints, so that paths stay the same

@@ -13,7 +13,6 @@
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
 #include "render_core/tools/paper/paper_tables.h"
-#include "render_core/tools/scene_hash.h"
 
 namespace catgs {
 namespace {
@@ -159,9 +158,9 @@ Json case_json(const PaperCase& scene, const std::vector<std::string>& files) {
   const RenderSetup& setup = scene.setup();
   return {{"name", scene.label()},
           {"scene", setup.scene.name},
-          {"gaussians", setup.cloud->size()},
+          {"gaussians", setup.gaussians()},
           {"sh_degree", setup.cloud->sh_degree},
-          {"hash", fmt::format("{:016x}", scene_hash(*setup.cloud))},
+          {"hash", setup.hash()},
           {"traces", std::vector<std::string>(files.begin() + 1, files.end())},
           {"device", setup.made.renderer->description()},
           {"near", setup.camera.near_z}};

@@ -27,7 +27,7 @@ MeanWork count_work(PaperCase& scene) {
     const std::size_t count = std::min(max_counted_frames, setup.poses.size());
     for (std::size_t k = 0; k < count; ++k) {
       const Camera camera = setup.request(k * setup.poses.size() / count).camera;
-      const WorkCount work = count_work(*setup.cloud, camera, *setup.pool);
+      const WorkCount work = count_work(setup.whole_cloud("--table floor"), camera, *setup.pool);
       mean.reached_entries += static_cast<double>(work.reached_entries);
       mean.warp_evaluations += static_cast<double>(work.warp_evaluations);
       mean.blended_pairs += static_cast<double>(work.blended_pairs);
@@ -47,7 +47,7 @@ FrameWork frame_work(const PaperCase& scene, const MeanWork& work) {
   const glm::ivec2 size = setup.camera.size_px;
   const glm::ivec2 tiles = (size + (tile_size_px - 1)) / tile_size_px;
   FrameWork frame;
-  frame.gaussians = static_cast<double>(setup.cloud->size());
+  frame.gaussians = static_cast<double>(setup.gaussians());
   frame.scene_bytes = static_cast<double>(setup.made.renderer->scene_bytes());
   frame.reached_entries = work.reached_entries;
   frame.warp_evaluations = work.warp_evaluations;

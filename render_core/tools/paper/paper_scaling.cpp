@@ -17,7 +17,7 @@ PaperTable scaling_table(PaperCase& scene) {
   const Measurement exact = pooled(scene.runs(variants::exact));
   const Measurement paper = pooled(scene.runs(variants::paper));
   const Measurement ours = pooled(scene.runs(variants::ours));
-  const auto gaussians = static_cast<double>(scene.setup().cloud->size());
+  const auto gaussians = static_cast<double>(scene.setup().gaussians());
   const auto scene_bytes = static_cast<double>(scene.setup().made.renderer->scene_bytes());
   const auto stage = [&](Stage which, FrameKind kind) {
     return Number{paper.frame_ms(kind).empty() ? Number::nothing : paper.mean_stage_ms(which, kind),

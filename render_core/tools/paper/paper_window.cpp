@@ -56,7 +56,7 @@ void add_trails(const RenderSetup& setup, const ViewSettings& settings, const Me
     if (!takes(frame) || key++ % stride != 0) continue;
     Camera end = request.camera;
     end.world_from_camera = request.forecast->world_from_camera;
-    add_trails(*setup.cloud, request.camera, end, trails);
+    add_trails(setup.whole_cloud("--table window"), request.camera, end, trails);
   }
 }
 

@@ -92,7 +92,7 @@ void render_frames(const FramesOptions& options, bool quiet) {
   FrameFeed feed(setup, settings);
   std::optional<LayerRenderer> layers;
   if (sink && (options.alpha || options.depth))
-    layers.emplace(*setup.cloud, options.alpha, options.depth, setup.pool);
+    layers.emplace(setup.whole_cloud("--alpha, --depth"), options.alpha, options.depth, setup.pool);
   if (!quiet) {
     fmt::print(stderr, "{} ({})\n", setup.made.renderer->description(), setup.made.reason);
   }

@@ -57,21 +57,24 @@ void seal(std::string& file) {
   }
 }
 
-/// The cut of what is there stands for no leaf twice.
+/// The shares of all nodes that stand for a leaf are no more than one leaf.
 void require_sound_cut(TreeFile& tree) {
   const TreeShape& shape = tree.shape();
   const Camera camera = make_camera({}, {64, 48}, 50.0f);
   std::vector<std::shared_ptr<const TreePage>> pages(tree.pages_in_file());
   for (std::uint64_t p = 0; p < pages.size(); ++p) pages[p] = tree.page(p);
-  const Cut cut = choose_cut(shape, std::span(&camera, 1), 1.0f, [&](std::uint64_t page) {
-    return page < pages.size() && pages[page] ? &pages[page]->facts(0) : nullptr;
-  });
-  std::uint64_t end = 0;
-  for (const NodeId node : cut.drawn) {
+  const Cut cut =
+      choose_cut(shape, std::span(&camera, 1), 1.0f, [&](std::uint64_t page) -> PageInMemory {
+        return {page < pages.size() && pages[page] ? &pages[page]->facts(0) : nullptr};
+      });
+  std::vector<float> shares(shape.leaves());
+  for (const auto& [node, share] : cut.drawn) {
+    require(share > 0.0f, "a node that is drawn has a share");
     const std::uint64_t first = std::uint64_t{node.index} << node.level;
-    require(first >= end && first < shape.leaves(), "no leaf is drawn twice");
-    end = first + (std::uint64_t{1} << node.level);
+    const std::uint64_t end = std::min<std::uint64_t>(shape.leaves(), first + (1ull << node.level));
+    for (std::uint64_t leaf = first; leaf < end; ++leaf) shares[leaf] += share;
   }
+  for (const float share : shares) require(share < 1.001f, "no leaf is drawn twice");
 }
 
 void parse_tree(Bytes input) {

@@ -20,7 +20,7 @@
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/cuda/device_scene.cuh"
+#include "render_core/cuda/device_pages.cuh"
 #include "render_core/cuda/list_builder.cuh"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/view_memory.cuh"
@@ -149,12 +149,14 @@ class StagedLists {
       : scene_(scene),
         camera_(camera),
         plan_(plan),
-        builder_(scene.device.arrays(), memory_, processors()),
+        builder_(memory_, processors()),
         request_(camera, plan, settings.speculation),
         shape_(picture_shape(camera.size_px)) {
+    request_.scene = scene.device.arrays();
     shape_.visible_bound = std::max(scene.device.arrays().count, 1u);
     shape_.list_bound = 64 * shape_.visible_bound + 4096;
-    (void)memory_.reserve({.shape = shape_, .scene = scene.device.arrays(), .settings = settings});
+    (void)memory_.reserve(
+        {.shape = shape_, .scene = scene.device.arrays(), .in_pages = false, .settings = settings});
   }
 
   [[nodiscard]] const FrameShape& shape() const { return shape_; }
@@ -164,7 +166,7 @@ class StagedLists {
 
   void cull() { builder_.cull(request_, shape_, stream_.get()); }
   void project() { builder_.project(request_, shape_, stream_.get()); }
-  void sort_by_depth() { builder_.sort_by_depth(shape_, stream_.get()); }
+  void sort_by_depth() { builder_.sort_by_depth(request_, shape_, stream_.get()); }
   void emit() { builder_.emit(request_, shape_, stream_.get()); }
 
   /// What the CPU core has in view, by index in the cloud; nothing for the others.

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+
+#include "render_core/scene/clusters.h"
+#include "render_core/scene/tree/cut.h"
+
+namespace catgs::cuda {
+
+/// A slot for a page, as kernels see it.
+struct PageEntry {
+  static constexpr std::uint32_t no_node = ~std::uint32_t{0};
+  static constexpr int most_bottom_nodes = 16;
+
+  double shown_since_s;  // infinite: the slot is free
+  // For each node of the page's last row: shown_since_s of the pages with its children; infinite
+  // where they are not in memory, or where there are none.
+  double below_since_s[most_bottom_nodes];
+  std::uint32_t above;  // cluster of the node that the page refines; no_node: the root's page
+  std::uint32_t first_bottom;  // first node of the last row
+};
+
+/// The nodes of a tree that are in memory.
+struct TreeArrays {
+  const PageEntry* pages = nullptr;  // [slot]
+  const float* errors = nullptr;     // [cluster], world units; negative: there is no such node
+  std::uint32_t nodes_per_page = 1;
+};
+
+/// A cut of a tree: choose_cut() for each node by itself.
+struct TreeCut {
+  TreeArrays tree;
+  CutEye now, end;  // at the end of the frame's window; the same if it has none
+  float detail_px;
+  double now_s;
+  float* share;  // [cluster], the part of each node that is drawn
+
+  /// The part of node `c` that its descendants have taken over where they are all shown.
+  __device__ float split(const Cluster* clusters, std::uint32_t c) const {
+    const float error = tree.errors[c];
+    return split_share(fmaxf(now.error_px(error, clusters[c]), end.error_px(error, clusters[c])),
+                       detail_px);
+  }
+
+  /// The part of node `c` that is drawn. Both cuts of a node and of its children follow from errors
+  /// that grow towards the root, and from pages that come no earlier than the page above. So no
+  /// other node needs to be asked.
+  __device__ float share_of(const Cluster* clusters, std::uint32_t c) const {
+    const std::uint32_t in_page = c % tree.nodes_per_page;
+    const PageEntry& page = tree.pages[c / tree.nodes_per_page];
+    const float shown = shown_share(now_s - page.shown_since_s);
+    if (shown <= 0.0f || tree.errors[c] < 0.0f) return 0.0f;
+    const std::uint32_t above = in_page == 0 ? page.above : c - in_page + (in_page - 1) / 2;
+    const float taken = above == PageEntry::no_node ? 1.0f : fminf(shown, split(clusters, above));
+    const float shown_below =
+        in_page < page.first_bottom
+            ? shown
+            : shown_share(now_s - page.below_since_s[in_page - page.first_bottom]);
+    const float given = shown_below > 0.0f ? fminf(shown_below, split(clusters, c)) : 0.0f;
+    return fmaxf(0.0f, taken - given);
+  }
+};
+
+}  // namespace catgs::cuda

@@ -1,0 +1,36 @@
+#include "render_core/paged_frame.h"
+
+#include <utility>
+
+#include "render_core/base/error.h"
+
+namespace catgs {
+
+PagedFrame::PagedFrame(TreePager& pager, const ViewSettings& settings)
+    : pager_(pager), watch_(pager.watch()) {
+  if (settings.pipeline == Pipeline::vanilla)
+    throw InputError("--pipeline vanilla", "", "draws whole scenes only, not parts of a tree",
+                     "leave --detail and --scene-memory out");
+}
+
+void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
+  cameras_ = {request.camera};
+  if (plan.window > 0) cameras_.push_back(plan.window_end);
+  Lookout lookout{cameras_, request.detail_px};
+  if (request.soon) {
+    lookout.cameras.push_back(request.camera);
+    lookout.cameras.back().world_from_camera = *request.soon;
+  }
+  if (request.waits_for_pages) pager_.settle(lookout);
+  watch_->look(std::move(lookout));
+  table_ = pager_.table();
+  now_s_ = pager_.now_s();
+}
+
+void PagedFrame::report(FrameStats& stats) const {
+  stats.missing_pages = watch_->missing();
+  stats.coarsest_px = watch_->coarsest_px();
+  stats.settled = !watch_->waits(pager_.now_s());
+}
+
+}  // namespace catgs

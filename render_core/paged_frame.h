@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "render_core/motion/frame_groups.h"
+#include "render_core/renderer.h"
+#include "render_core/scene/tree/tree_pager.h"
+
+namespace catgs {
+
+/// The part of a View that all cores share for scenes in pages. It tells the pager what the View
+/// looks at, and holds the table of the pages that its frames read.
+class PagedFrame {
+ public:
+  /// `pager` must outlive it. Throws InputError for a pipeline that cannot draw pages.
+  PagedFrame(TreePager& pager, const ViewSettings& settings);
+
+  /// Call before a frame is drawn that finds its clusters afresh. The table stays until the next
+  /// call.
+  void begin(const FrameRequest& request, const FramePlan& plan);
+  [[nodiscard]] const PageTable& table() const { return *table_; }
+  /// The frame's time, as PageInSlot::shown_since_s.
+  [[nodiscard]] double now_s() const { return now_s_; }
+  /// The cameras that the frame draws for: now, and at the end of its window if it has one.
+  [[nodiscard]] const std::vector<Camera>& cameras() const { return cameras_; }
+
+  /// Fills in what the statistics say of pages.
+  void report(FrameStats& stats) const;
+
+ private:
+  TreePager& pager_;
+  std::shared_ptr<Watch> watch_;
+  std::shared_ptr<const PageTable> table_;
+  double now_s_ = 0.0;
+  std::vector<Camera> cameras_;
+};
+
+}  // namespace catgs

@@ -1,0 +1,158 @@
+#pragma once
+
+// Scenes in pages, drawn by a core: what all cores must do alike.
+
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "render_core/renderer.h"
+#include "render_core/scene/tree/read_tree.h"
+#include "tests/render_core/scene/tree/tree_test_support.h"
+#include "tests/support/rendered.h"
+#include "tests/support/test_scenes.h"
+
+namespace catgs::test {
+
+/// A scene of 60,000 Gaussians as a tree, and all its leaves as a cloud.
+struct TreeScenes {
+  TreeScenes() : bytes(tree_bytes(random_cloud(60'000, 1, 21), pool)) {
+    cloud =
+        std::make_shared<const GaussianCloud>(read_tree(source_of(bytes), LoadContext(pool)).cloud);
+  }
+  [[nodiscard]] std::shared_ptr<TreeFile> tree() const {
+    return std::make_shared<TreeFile>(source_of(bytes), std::size_t{1} << 26);
+  }
+  [[nodiscard]] std::unique_ptr<Renderer> in_pages(RendererKind kind,
+                                                   std::uint64_t memory_bytes = std::uint64_t{1}
+                                                                                << 28) const {
+    RendererOptions options;
+    options.kind = kind;
+    options.scene_memory = memory_bytes;
+    return make_renderer(tree(), options).renderer;
+  }
+  [[nodiscard]] std::unique_ptr<Renderer> whole(RendererKind kind) const {
+    return make_renderer(cloud, {.kind = kind, .pool = {}}).renderer;
+  }
+
+  ThreadPool pool{2};
+  std::string bytes;
+  std::shared_ptr<const GaussianCloud> cloud;
+};
+
+inline FrameRequest tree_request(float distance, float detail_px) {
+  FrameRequest request;
+  request.camera = make_camera(look_at({0, 0, 5 - distance}, {0, 0, 5}), {320, 192}, 300.0f);
+  request.detail_px = detail_px;
+  request.waits_for_pages = true;
+  return request;
+}
+
+inline void expect_zero_detail_is_the_whole_scene(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto paged = scenes.in_pages(kind), whole = scenes.whole(kind);
+  for (const Pipeline pipeline : {Pipeline::exact, Pipeline::paper, Pipeline::catgs}) {
+    const auto view = paged->make_view({.pipeline = pipeline});
+    const auto expected_view = whole->make_view({.pipeline = pipeline});
+    for (const float distance : {3.0f, 3.05f, 30.0f}) {
+      const FrameRequest request = tree_request(distance, 0.0f);
+      const Rendered drawn = render_in(*view, request);
+      const Rendered expected = render_in(*expected_view, request);
+      EXPECT_NEAR(drawn.stats.visible, expected.stats.visible, 2 + expected.stats.visible / 500);
+      EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 70.0) << "from " << distance;
+      EXPECT_EQ(drawn.stats.missing_pages, 0u);
+    }
+  }
+}
+
+inline void expect_detail_to_leave_out_little(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto renderer = scenes.in_pages(kind);
+  const auto view = renderer->make_view({});
+  const Rendered all = render_in(*view, tree_request(60.0f, 0.0f));
+  double before = all.stats.visible, quality_db = 200.0;
+  for (const float detail_px : {2.0f, 4.0f, 8.0f}) {
+    const Rendered drawn = render_in(*view, tree_request(60.0f, detail_px));
+    EXPECT_LT(drawn.stats.visible, 0.8 * before) << detail_px << " px";
+    const double now_db = psnr_db(drawn.rgb, all.rgb);
+    EXPECT_LT(now_db, quality_db);
+    EXPECT_GE(now_db, 25.0) << detail_px << " px";
+    before = drawn.stats.visible;
+    quality_db = now_db;
+  }
+}
+
+/// A flight through all levels: no step may change the picture by more than the steps of the whole
+/// scene do.
+inline void expect_no_pops(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto renderer = scenes.in_pages(kind);
+  const auto cut = renderer->make_view({}), all = renderer->make_view({});
+  const auto mean_change = [](const std::vector<float>& a, const std::vector<float>& b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(static_cast<double>(a[i] - b[i]));
+    return sum / static_cast<double>(a.size());
+  };
+  Rendered cut_before, all_before;
+  for (int step = 0; step <= 100; ++step) {
+    const float distance = 20.0f * std::pow(1.003f, static_cast<float>(step));
+    const Rendered cut_now = render_in(*cut, tree_request(distance, 4.0f));
+    const Rendered all_now = render_in(*all, tree_request(distance, 0.0f));
+    if (step > 0) {
+      EXPECT_LE(mean_change(cut_now.rgb, cut_before.rgb),
+                mean_change(all_now.rgb, all_before.rgb) + 1.0 / 255.0)
+          << "step " << step;
+    }
+    cut_before = cut_now;
+    all_before = all_now;
+  }
+}
+
+/// With room for few pages, the picture is coarser. It has no holes: where all of the scene hides
+/// the background, so does what is there of it.
+inline void expect_short_memory_to_be_coarser(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto few = scenes.in_pages(kind, 1);
+  const auto view = few->make_view({});
+  FrameRequest request = tree_request(8.0f, 0.0f);
+  const Rendered coarse = render_in(*view, request);
+  const Rendered all = render_in(*scenes.whole(kind)->make_view({}), request);
+  EXPECT_GT(coarse.stats.missing_pages, 0u);
+  EXPECT_GT(coarse.stats.coarsest_px, 0.0f);
+  EXPECT_LT(few->scene_bytes(), scenes.bytes.size());
+  request.background = glm::vec3(1.0f);
+  const Rendered coarse_on_white = render_in(*view, request);
+  const Rendered all_on_white = render_in(*scenes.whole(kind)->make_view({}), request);
+  std::size_t hidden = 0, holes = 0;
+  for (std::size_t i = 0; i < all.rgb.size(); ++i) {
+    if (all_on_white.rgb[i] - all.rgb[i] > 0.02f) continue;
+    ++hidden;
+    holes += coarse_on_white.rgb[i] - coarse.rgb[i] > 0.5f ? 1 : 0;
+  }
+  EXPECT_GT(hidden, all.rgb.size() / 20);
+  EXPECT_LE(holes, hidden / 200);
+}
+
+inline void expect_sub_frames_to_keep_the_cut(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto renderer = scenes.in_pages(kind);
+  const auto view = renderer->make_view({.pipeline = Pipeline::paper});
+  FrameRequest request = tree_request(40.0f, 3.0f);
+  request.forecast = Forecast{.world_from_camera = request.camera.world_from_camera, .frames = 4};
+  const Rendered key = render_in(*view, request);
+  EXPECT_EQ(key.stats.kind, FrameKind::key);
+  request.waits_for_pages = false;
+  const Rendered sub = render_in(*view, request);
+  EXPECT_EQ(sub.stats.kind, FrameKind::sub);
+  EXPECT_GE(psnr_db(sub.rgb, key.rgb), 60.0);
+}
+
+inline void expect_vanilla_to_be_refused(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto renderer = scenes.in_pages(kind);
+  EXPECT_THROW((void)renderer->make_view({.pipeline = Pipeline::vanilla}), InputError);
+}
+
+}  // namespace catgs::test
