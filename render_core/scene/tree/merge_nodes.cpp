@@ -25,6 +25,7 @@ constexpr int most_members = 2 * static_cast<int>(cluster_size);
 // How far a full step of colour counts, in mean sizes. On the city of 1 M, 2 loses 1.3 dB at the
 // same number of Gaussians, and 24 gains nothing.
 constexpr float colour_reach = 12.0f;
+constexpr float too_far = 1e18f;  // for any partner, in mean sizes
 
 /// Covariance of a Gaussian: the upper triangle.
 struct Covariance {
@@ -103,6 +104,12 @@ struct Members {
 };
 
 /// Joins the cheapest pair of groups again and again.
+///
+/// Each group keeps the cheapest partner that it found when it last searched. Groups only vanish or
+/// become new ones, and a new group searches at once. So the cost that a group keeps stays a lower
+/// bound of its pairs with older groups. The group with the least bound searches again if its
+/// partner has changed since (Müllner, "Modern hierarchical, agglomerative clustering algorithms",
+/// 2011). A search leaves out the blocks of groups that are too far away.
 class Grouping {
  public:
   explicit Grouping(const Members& members);
@@ -119,30 +126,36 @@ class Grouping {
   static constexpr std::int32_t index_mask = most_members - 1;
   static constexpr std::int32_t no_key = std::numeric_limits<std::int32_t>::max();
   static constexpr int feature_count = 7;  // place, size, colour
+  static constexpr int box_count = 4;      // the first ones: boxes of colours would exclude little
+  static constexpr int block_size = 16, most_blocks = most_members / block_size;
 
-  /// In several chains, so that each minimum need not wait for the one before.
-  static std::int32_t least_of(const std::int32_t (&keys)[most_members]) {
-    constexpr int chains = 16;
-    std::int32_t least[chains];
-    std::ranges::fill(least, no_key);
-    for (int j = 0; j < most_members; j += chains)
-      for (int c = 0; c < chains; ++c) least[c] = std::min(least[c], keys[j + c]);
-    return *std::ranges::min_element(least);
+  /// A loop that becomes vectors, unlike std::ranges::min.
+  template <std::size_t count>
+  static std::int32_t least_of(const std::int32_t (&keys)[count]) {
+    std::int32_t least = no_key;
+    for (const std::int32_t key : keys) least = std::min(least, key);
+    return least;
   }
 
-  void find_costs(int i);
-  void find_partner(int i);
+  void widen_box(int i);
+  [[nodiscard]] std::int32_t cheapest_in(int block, int i) const;
+  void find_bounds(int i);
+  void find_partner(int i, int first_block);
   void join(int a, int b);
 
-  int count_, groups_;
+  int count_, blocks_, groups_;
   double variance_[most_members], weight_[most_members];
-  alignas(32) float features_[feature_count][most_members];
-  alignas(32) std::int32_t keys_[most_members];     // of pairs with the latest group
-  alignas(32) std::int32_t partner_[most_members];  // the cheapest of each group
+  alignas(64) float features_[feature_count][most_members];
+  alignas(64) std::int32_t partner_[most_blocks][block_size];  // the key that each group keeps
   int joined_[most_members];
+  // By block: a box around its groups, the least key that they keep, and a lower bound of their
+  // costs with the group that searches.
+  alignas(64) float low_[box_count][most_blocks], high_[box_count][most_blocks];
+  alignas(64) std::int32_t least_[most_blocks], bound_[most_blocks];
 };
 
-Grouping::Grouping(const Members& members) : count_(members.size()), groups_(count_) {
+Grouping::Grouping(const Members& members)
+    : count_(members.size()), blocks_((count_ + block_size - 1) / block_size), groups_(count_) {
   double size = 0.0;
   glm::dvec3 middle(0.0);
   for (int i = 0; i < count_; ++i) {
@@ -152,6 +165,12 @@ Grouping::Grouping(const Members& members) : count_(members.size()), groups_(cou
   }
   size = std::max(size / count_, 1e-30);
   middle /= count_;
+  for (int f = 0; f < feature_count; ++f) {
+    std::ranges::fill(features_[f], too_far);
+    if (f >= box_count) continue;
+    std::ranges::fill(low_[f], too_far);
+    std::ranges::fill(high_[f], -too_far);
+  }
   // In units of the mean size, so that no square leaves the range of a float.
   constexpr double farthest = 1e15;
   for (int i = 0; i < count_; ++i) {
@@ -167,29 +186,64 @@ Grouping::Grouping(const Members& members) : count_(members.size()), groups_(cou
     features_[3][i] = static_cast<float>(std::sqrt(variance_[i]));
     weight_[i] = members.weights[at];
     joined_[i] = i;
+    widen_box(i);
   }
-  std::ranges::fill(keys_, no_key);
-  std::ranges::fill(partner_, no_key);
-  for (int i = 0; i < count_; ++i) find_partner(i);
+  for (auto& keys : partner_) std::ranges::fill(keys, no_key);
+  std::ranges::fill(least_, no_key);
+  // A pair needs only one of its groups to know of it.
+  for (int i = 0; i < count_; ++i) find_partner(i, i / block_size);
 }
 
-void Grouping::find_costs(int i) {
+void Grouping::widen_box(int i) {
+  const int block = i / block_size;
+  for (int f = 0; f < box_count; ++f) {
+    low_[f][block] = std::min(low_[f][block], features_[f][i]);
+    high_[f][block] = std::max(high_[f][block], features_[f][i]);
+  }
+}
+
+/// The least key of group i with those of a block.
+std::int32_t Grouping::cheapest_in(int block, int i) const {
   float at[feature_count];
   for (int f = 0; f < feature_count; ++f) at[f] = features_[f][i];
-  for (int j = 0; j < count_; ++j) {
+  std::int32_t keys[block_size];
+  const int first = block * block_size;
+  for (int j = 0; j < block_size; ++j) {
     float cost = 0.0f;
     for (int f = 0; f < feature_count; ++f) {
-      const float d = features_[f][j] - at[f];
+      const float d = features_[f][first + j] - at[f];
       cost += d * d;
     }
-    keys_[j] = (std::bit_cast<std::int32_t>(cost) & ~index_mask) | j;
+    keys[j] = (std::bit_cast<std::int32_t>(cost) & ~index_mask) | (first + j);
   }
-  keys_[i] = no_key;
+  if (block == i / block_size) keys[i % block_size] = no_key;
+  return least_of(keys);
 }
 
-void Grouping::find_partner(int i) {
-  find_costs(i);
-  partner_[i] = least_of(keys_);
+void Grouping::find_bounds(int i) {
+  float at[box_count];
+  for (int f = 0; f < box_count; ++f) at[f] = features_[f][i];
+  for (int block = 0; block < most_blocks; ++block) {
+    float cost = 0.0f;
+    for (int f = 0; f < box_count; ++f) {
+      const float below = low_[f][block] - at[f], above = at[f] - high_[f][block];
+      // x + |x| = 2 max(x, 0), which GCC does not turn into vectors.
+      const float twice = below + std::abs(below) + (above + std::abs(above));
+      cost += twice * twice;
+    }
+    bound_[block] = std::bit_cast<std::int32_t>(0.25f * cost) & ~index_mask;
+  }
+}
+
+/// Searches the group's own block, and all from `first_block` on.
+void Grouping::find_partner(int i, int first_block) {
+  find_bounds(i);
+  const int own = i / block_size;
+  std::int32_t least = cheapest_in(own, i);
+  for (int block = first_block; block < blocks_; ++block)
+    if (bound_[block] < least && block != own) least = std::min(least, cheapest_in(block, i));
+  partner_[own][i % block_size] = least;
+  least_[own] = least_of(partner_[own]);
 }
 
 void Grouping::join(int a, int b) {
@@ -198,34 +252,33 @@ void Grouping::join(int a, int b) {
   for (int f = 0; f < feature_count; ++f) {
     const double d = static_cast<double>(features_[f][b]) - static_cast<double>(features_[f][a]);
     if (f < 3) moved += d * d;
-    features_[f][a] += static_cast<float>(share * d);
+    features_[f][b] = features_[f][a] + static_cast<float>(share * d);
   }
-  variance_[a] += share * (variance_[b] - variance_[a]) + share * (1.0 - share) * moved / 3.0;
-  features_[3][a] = static_cast<float>(std::sqrt(variance_[a]));
-  weight_[a] = sum;
-  joined_[b] = a;
-  features_[0][b] = 1e18f;  // too far away for any partner
-  partner_[b] = no_key;
+  variance_[b] =
+      variance_[a] + share * (variance_[b] - variance_[a]) + share * (1.0 - share) * moved / 3.0;
+  features_[3][b] = static_cast<float>(std::sqrt(variance_[b]));
+  weight_[b] = sum;
+  widen_box(b);
+  joined_[a] = b;
+  features_[0][a] = too_far;
+  partner_[a / block_size][a % block_size] = no_key;
+  least_[a / block_size] = least_of(partner_[a / block_size]);
   --groups_;
 }
 
 void Grouping::join_until(int groups) {
   while (groups_ > groups) {
-    const std::int32_t least = least_of(partner_);
-    const auto a = static_cast<int>(std::find(partner_, partner_ + count_, least) - partner_);
+    const std::int32_t least = least_of(least_);
+    const auto block = static_cast<int>(std::ranges::find(least_, least) - least_);
+    const auto& keys = partner_[block];
+    const int a = block * block_size + static_cast<int>(std::ranges::find(keys, least) - keys);
     const int b = least & index_mask;
-    join(a, b);
-    find_partner(a);
-    std::array<std::int32_t, most_members> costs;
-    std::copy_n(keys_, count_, costs.begin());
-    for (int i = 0; i < count_; ++i) {
-      if (partner_[i] == no_key || i == a) continue;
-      const int partner = partner_[i] & index_mask;
-      if (partner == a || partner == b)
-        find_partner(i);
-      else
-        partner_[i] = std::min(partner_[i], (costs[static_cast<std::size_t>(i)] & ~index_mask) | a);
+    if (cheapest_in(b / block_size, a) != least) {
+      find_partner(a, 0);
+      if (keys[a % block_size] != least) continue;
     }
+    join(a, b);
+    find_partner(b, 0);
   }
 }
 
