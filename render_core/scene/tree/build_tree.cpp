@@ -4,8 +4,10 @@
 #include <array>
 #include <bit>
 #include <limits>
+#include <mutex>
 #include <numeric>
 #include <ostream>
+#include <span>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -21,7 +23,7 @@
 namespace catgs {
 namespace {
 
-/// Pages of leaves that are made at a time: work for every thread, and 80 MB.
+/// Pages of leaves that are made at a time: work for every thread, from 120 MB of Gaussians.
 constexpr std::size_t pages_at_a_time = 256;
 
 /// The first reading of a scene finds this.
@@ -80,21 +82,27 @@ class PageStream {
 
  private:
   /// Calls fill_lowest(page, i) for each of the next `count` pages of a band, then merges, writes
-  /// and keeps the roots.
+  /// and keeps the roots. A thread holds one page at a time.
   template <class FillLowest>
   void make_pages(int band, std::size_t count, const FillLowest& fill_lowest) {
     const auto b = static_cast<std::size_t>(band);
-    std::vector<TreePage> pages(count, TreePage(shape_));
+    std::vector<LooseNode>& roots = roots_[b];
+    const std::size_t first = roots.size();
+    roots.resize(first + count);
+    std::vector<std::vector<NodeFacts>> facts(count);
     pool_.parallel_for(count, [&](std::size_t i) {
-      fill_lowest(pages[i], i);
-      merge_upwards(band, pages[i], done_[b] + i);
-      pages[i].seal(number(band, done_[b] + i));
+      TreePage page(shape_);
+      fill_lowest(page, i);
+      merge_upwards(band, page, done_[b] + i);
+      page.seal(number(band, done_[b] + i));
+      for (std::size_t slot = 0; slot < shape_.slots(); ++slot)
+        facts[i].push_back(page.facts(slot));
+      const auto block = std::as_const(page).block(0);
+      roots[first + i] = {page.facts(0), {block.begin(), block.end()}};
+      write(page, number(band, done_[b] + i));
     });
-    for (std::size_t i = 0; i < count; ++i) {
-      write(pages[i], number(band, done_[b] + i));
-      const auto block = std::as_const(pages[i]).block(0);
-      roots_[b].push_back({pages[i].facts(0), {block.begin(), block.end()}});
-    }
+    // In order, since sums of errors round.
+    for (const auto& of_page : facts) count_nodes(of_page, shape_.top_level(band));
     done_[b] += count;
   }
 
@@ -153,15 +161,18 @@ class PageStream {
     }
   }
 
-  void write(TreePage& page, std::uint64_t number) {
+  void write(const TreePage& page, std::uint64_t number) {
+    const std::lock_guard lock(writing_);
     to_.seekp(static_cast<std::streamoff>(shape_.page_offset(number)));
     to_.write(reinterpret_cast<const char*>(page.bytes().data()),
               static_cast<std::streamsize>(page.bytes().size()));
-    const NodeId root = shape_.root_of(number);
-    for (std::size_t slot = 0; slot < shape_.slots(); ++slot) {
-      const NodeFacts& facts = page.facts(slot);
+  }
+
+  void count_nodes(std::span<const NodeFacts> of_page, int root_level) {
+    for (std::size_t slot = 0; slot < of_page.size(); ++slot) {
+      const NodeFacts& facts = of_page[slot];
       if (facts.count == 0) continue;
-      const std::size_t level = root.level + 1u - std::bit_width(slot + 1);
+      const std::size_t level = root_level + 1u - std::bit_width(slot + 1);
       levels_[level].gaussians += facts.count;
       levels_[level].max_error = std::max(levels_[level].max_error, facts.error);
       error_sums_[level] += static_cast<double>(facts.error);
@@ -174,6 +185,7 @@ class PageStream {
 
   const TreeShape& shape_;
   std::ostream& to_;
+  std::mutex writing_;
   ThreadPool& pool_;
   std::vector<std::vector<LooseNode>> roots_;  // by band: those whose parents are not made yet
   std::vector<std::uint64_t> done_;            // pages, by band

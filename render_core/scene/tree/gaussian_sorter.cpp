@@ -12,11 +12,13 @@
 #include <unistd.h>
 
 #include "render_core/base/error.h"
+#include "render_core/scene/formats/load_context.h"
 
 namespace catgs {
 namespace {
 
 constexpr std::size_t fewest_in_memory = 4096;
+constexpr std::size_t block_rows = 4096;  // that a thread copies at a time
 constexpr std::size_t write_bytes = std::size_t{4} << 20;
 
 // A record: mean, rotation, scale, opacity, harmonics.
@@ -92,7 +94,7 @@ GaussianSorter::GaussianSorter(const MortonCurve& curve, std::uint64_t gaussians
           std::max(fewest_in_memory, memory_bytes / (record_bytes_ + 2 * sizeof(CodedIndex))))),
       beside_(std::move(beside)),
       pool_(pool),
-      records_(capacity_ * record_bytes_) {
+      records_(std::make_unique_for_overwrite<std::byte[]>(capacity_ * record_bytes_)) {
   codes_.reserve(capacity_);
 }
 
@@ -109,15 +111,23 @@ std::uint64_t GaussianSorter::code_of(const std::byte* record) const {
 void GaussianSorter::add(const GaussianCloud& part) {
   assert(part.sh_degree == degree_);
   const auto sh_count = static_cast<std::size_t>(part.sh_count());
-  for (std::size_t i = 0; i < part.size(); ++i) {
+  for (std::size_t first = 0; first < part.size();) {
     if (codes_.size() == capacity_) spill();
-    const std::size_t index = codes_.size();
-    codes_.push_back({curve_.code(part.mean[i]), static_cast<std::uint32_t>(index)});
-    std::byte* to = put(record(index), &part.mean[i]);
-    to = put(to, &part.rotation[i]);
-    to = put(to, &part.scale[i]);
-    to = put(to, &part.opacity[i]);
-    put(to, part.sh_of(i), sh_count);
+    const std::size_t begin = codes_.size();
+    const std::size_t count = std::min(part.size() - first, capacity_ - begin);
+    codes_.resize(begin + count);
+    LoadContext(pool_).for_blocks(count, block_rows, [&](std::size_t from, std::size_t end) {
+      for (std::size_t k = from; k < end; ++k) {
+        const std::size_t i = first + k, index = begin + k;
+        codes_[index] = {curve_.code(part.mean[i]), static_cast<std::uint32_t>(index)};
+        std::byte* to = put(record(index), &part.mean[i]);
+        to = put(to, &part.rotation[i]);
+        to = put(to, &part.scale[i]);
+        to = put(to, &part.opacity[i]);
+        put(to, part.sh_of(i), sh_count);
+      }
+    });
+    first += count;
   }
 }
 
@@ -145,8 +155,8 @@ void GaussianSorter::spill() {
 void GaussianSorter::finish() {
   if (!file_) return sort_codes();
   if (!codes_.empty()) spill();
-  // An assignment of {} would keep the memory, which the buffers of the runs need.
-  std::vector<std::byte>().swap(records_);
+  // The buffers of the runs need the memory, and an assignment of {} would keep it.
+  records_.reset();
   std::vector<CodedIndex>().swap(codes_);
   std::vector<CodedIndex>().swap(scratch_codes_);
   const std::size_t rows =
@@ -182,8 +192,10 @@ void GaussianSorter::next(std::size_t count, GaussianCloud& cloud) {
   if (!file_) {
     const std::size_t end = std::min(codes_.size(), taken_ + count);
     cloud.resize(end - taken_, degree_);
-    for (std::size_t i = 0; taken_ < end; ++i, ++taken_)
-      load(record(codes_[taken_].value), cloud, i);
+    LoadContext(pool_).for_blocks(cloud.size(), block_rows, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) load(record(codes_[taken_ + i].value), cloud, i);
+    });
+    taken_ = end;
     return;
   }
   cloud.resize(count, degree_);

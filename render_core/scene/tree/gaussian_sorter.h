@@ -65,7 +65,7 @@ class GaussianSorter {
   };
   using Head = std::pair<std::uint64_t, std::size_t>;  // code of a run's next Gaussian, the run
 
-  [[nodiscard]] std::byte* record(std::size_t i) { return records_.data() + i * record_bytes_; }
+  [[nodiscard]] std::byte* record(std::size_t i) { return records_.get() + i * record_bytes_; }
   [[nodiscard]] std::uint64_t code_of(const std::byte* record) const;
   void sort_codes();
   void spill();
@@ -77,7 +77,7 @@ class GaussianSorter {
   std::size_t record_bytes_, memory_bytes_, capacity_;
   std::filesystem::path beside_;
   ThreadPool& pool_;
-  std::vector<std::byte> records_;
+  std::unique_ptr<std::byte[]> records_;
   std::vector<CodedIndex> codes_, scratch_codes_;
   RadixSorter sorter_;
   std::size_t taken_ = 0;  // of codes_, without runs
