@@ -26,19 +26,25 @@ namespace {
 /// Pages of leaves that are made at a time: work for every thread, from 120 MB of Gaussians.
 constexpr std::size_t pages_at_a_time = 256;
 
-/// The first reading of a scene finds this.
-struct Extent {
+/// What the first reading of a scene finds: its extent, and its parts where all of them fit into
+/// memory.
+struct FirstReading {
   std::uint64_t gaussians = 0, dropped = 0;
   int sh_degree = 0;
   glm::vec3 low{std::numeric_limits<float>::max()}, high{std::numeric_limits<float>::lowest()};
+  std::vector<GaussianCloud> parts;
 
-  void add(const GaussianCloud& part) {
+  void add(const GaussianCloud& part, std::size_t memory_bytes) {
     gaussians += part.size();
     sh_degree = part.sh_degree;
     for (const glm::vec3& mean : part.mean) {
       low = glm::min(low, mean);
       high = glm::max(high, mean);
     }
+    if (GaussianCloud::bytes(gaussians, sh_degree) <= memory_bytes)
+      parts.push_back(part);
+    else
+      parts.clear();
   }
 };
 
@@ -193,17 +199,19 @@ class PageStream {
   std::array<double, TreeHeader::most_levels> error_sums_{};
 };
 
-Extent measure(const SceneParts& scene, const std::filesystem::path& out) {
-  Extent extent;
-  extent.dropped = scene.each([&](const GaussianCloud& part) { extent.add(part); });
-  if (extent.gaussians == 0)
+FirstReading read_first(const SceneParts& scene, const std::filesystem::path& out,
+                        std::size_t memory_bytes) {
+  FirstReading first;
+  first.dropped = scene.each(
+      [&](const GaussianCloud& part) { first.add(part, scene.in_memory ? 0 : memory_bytes); });
+  if (first.gaussians == 0)
     throw InputError(out.string(), "", "there are no Gaussians to build a tree of");
-  if (extent.gaussians > TreeShape::max_gaussians)
+  if (first.gaussians > TreeShape::max_gaussians)
     throw InputError(out.string(), "",
-                     fmt::format("{} Gaussians, a tree has at most {}", extent.gaussians,
+                     fmt::format("{} Gaussians, a tree has at most {}", first.gaussians,
                                  TreeShape::max_gaussians),
                      "split the scene");
-  return extent;
+  return first;
 }
 
 /// Now, and not after an hour. The sorter gives its disk back while the tree grows.
@@ -227,38 +235,43 @@ TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
                       std::size_t memory_bytes, ThreadPool& pool, const LoadContext& context) {
   constexpr double measured = 0.1, sorted = 0.3;  // of the time, about
   PartFile file(out);
-  const Extent extent = measure(scene, out);
+  FirstReading first = read_first(scene, out, memory_bytes);
   context.report(measured);
-  const TreeShape shape(extent.gaussians, extent.sh_degree);
+  const TreeShape shape(first.gaussians, first.sh_degree);
   check_space(out, shape, memory_bytes);
 
-  GaussianSorter sorter(MortonCurve(extent.low, extent.high), extent.gaussians, extent.sh_degree,
+  GaussianSorter sorter(MortonCurve(first.low, first.high), first.gaussians, first.sh_degree,
                         memory_bytes, out, pool);
   std::uint64_t done = 0;
   const auto share = [&] {
-    return static_cast<double>(done) / static_cast<double>(extent.gaussians);
+    return static_cast<double>(done) / static_cast<double>(first.gaussians);
   };
-  scene.each([&](const GaussianCloud& part) {
+  const auto sort = [&](const GaussianCloud& part) {
     sorter.add(part);
     done += part.size();
     context.report(measured + (sorted - measured) * share());
-  });
+  };
+  if (first.parts.empty()) scene.each(sort);
+  for (GaussianCloud& part : first.parts) {
+    sort(part);
+    part = {};
+  }
   sorter.finish();
 
   PageStream pages(shape, file.stream(), pool);
   GaussianCloud gaussians;
-  for (done = 0; done < extent.gaussians; done += gaussians.size()) {
+  for (done = 0; done < first.gaussians; done += gaussians.size()) {
     sorter.next(pages_at_a_time * pages.gaussians_of_a_page(), gaussians);
     pages.add(gaussians);
     context.report(sorted + (1.0 - sorted) * share());
   }
 
   TreeHeader header;
-  header.sh_degree = static_cast<std::uint32_t>(extent.sh_degree);
-  header.gaussians = extent.gaussians;
-  header.low = extent.low;
-  header.high = extent.high;
-  header.dropped = extent.dropped;
+  header.sh_degree = static_cast<std::uint32_t>(first.sh_degree);
+  header.gaussians = first.gaussians;
+  header.low = first.low;
+  header.high = first.high;
+  header.dropped = first.dropped;
   header.read = header.gaussians + header.dropped;
   scene.format.copy(header.source.data(), header.source.size() - 1);
   header.levels = pages.levels();

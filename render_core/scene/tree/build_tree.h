@@ -18,15 +18,17 @@ struct SceneParts {
   /// Calls `take` with every part, in the same order with the same bits each time it is called. The
   /// parts share one SH degree and are sanitized. Returns how many Gaussians were dropped.
   std::function<std::uint64_t(const std::function<void(const GaussianCloud&)>& take)> each;
-  std::string format;  // of the scene, for people
+  std::string format;      // of the scene, for people
+  bool in_memory = false;  // whether the parts are in memory anyway, so that calling costs nothing
 };
 
 /// Builds a tree of the scene in `out`, which appears when it is whole.
 ///
-/// The scene is read twice: for the box of its means, then into a GaussianSorter. Leaves follow
-/// from the sorted stream, and every page is made as soon as its children are, in parallel. So
-/// memory does not grow with the scene: `memory_bytes` for sorting, and about 300 MB. What does not
-/// fit is sorted in a file beside `out`, of as many bytes as the scene has in memory.
+/// The scene is read for the box of its means, and its parts then go into a GaussianSorter. Parts
+/// that do not fit into `memory_bytes` are read a second time for that. Leaves follow from the
+/// sorted stream, and every page is made as soon as its children are, in parallel. So memory does
+/// not grow with the scene: `memory_bytes` for sorting, a part, and about 200 MB. What does not fit
+/// is sorted in a file beside `out`, of as many bytes as the scene has in memory.
 /// The bytes of `out` depend on the scene alone, not on threads or memory.
 ///
 /// Throws InputError: no Gaussians, more than TreeShape::max_gaussians, or no space on the disk.

@@ -69,7 +69,7 @@ void save(const Scene& scene, const ConvertOptions& options, bool quiet) {
                            take(scene.cloud);
                            return std::uint64_t{scene.report.dropped};
                          },
-                         scene.format};
+                         scene.format, true};
   write_tree(whole, options.tree, options.out, pool, quiet);
 }
 
