@@ -2,47 +2,117 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdint>
+#include <functional>
+#include <span>
 #include <string_view>
 #include <utility>
 
-#include "render_core/base/error.h"
+#include <fmt/format.h>
+
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/files/sanitize.h"
+#include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
+#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/formats/ply.h"
+#include "render_core/scene/formats/splat.h"
+#include "render_core/scene/formats/spz.h"
+#include "render_core/scene/formats/streamed_sog.h"
+#include "render_core/scene/keep_if.h"
+#include "render_core/scene/tree/tree_file.h"
 
 namespace catgs {
 namespace {
 
-constexpr std::uint64_t sample_rows = std::uint64_t{1}
-                                      << 16;  // as many as robust_bounds() looks at
+constexpr std::uint64_t sample_size = std::uint64_t{1} << 16;  // robust_bounds() looks at as many
 
-/// A file whose rows are read where they are.
-struct RowFile {
-  explicit RowFile(const std::filesystem::path& path) : file(path), header(read_ply_header(file)) {}
-
-  [[nodiscard]] std::uint64_t rows() const { return header.find("vertex")->count; }
-
-  FileSource file;
-  PlyHeader header;
+/// A scene that is read part by part, not sanitized.
+struct Parts {
+  std::string format;  // as Scene::format
+  std::uint64_t count = 0;
+  std::function<GaussianCloud(std::uint64_t part, const LoadContext&)> read;
+  GaussianCloud sample;  // even
 };
 
-/// The file, unless it is of another format.
-std::shared_ptr<const RowFile> open_rows(const std::filesystem::path& path) {
-  std::array<char, 3> begins{};
-  {
-    const FileSource file(path);
-    if (file.size() < begins.size()) return nullptr;
-    file.read(0, std::as_writable_bytes(std::span(begins)));
+/// A file of which any rows can be read.
+template <class ReadRows>
+Parts parts_of_rows(std::string format, std::uint64_t rows, std::uint64_t part_rows,
+                    const ReadRows& read, const LoadContext& context) {
+  const std::uint64_t step = (rows + sample_size - 1) / sample_size;
+  const auto read_part = [=](std::uint64_t part, const LoadContext& reading) {
+    const std::uint64_t first = part * part_rows;
+    return read(FileRows{first, std::min(part_rows, rows - first)}, reading);
+  };
+  return {std::move(format), (rows + part_rows - 1) / part_rows, read_part,
+          read(FileRows{0, (rows + step - 1) / step, step}, context)};
+}
+
+std::optional<Parts> ply_in_parts(const std::shared_ptr<const ByteSource>& file,
+                                  std::uint64_t part_rows, const LoadContext& context) {
+  const auto header = std::make_shared<const PlyHeader>(read_ply_header(*file));
+  const PlyElement* vertex = header->find("vertex");
+  if (!vertex || header->encoding == PlyEncoding::ascii || is_compressed_ply(*header))
+    return std::nullopt;
+  require_rows_in_file(*file, *vertex, TreeShape::max_gaussians);
+  const auto read = [=](const FileRows& rows, const LoadContext& reading) {
+    return read_ply_rows(*file, *header, rows, reading);
+  };
+  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context);
+}
+
+Parts splat_in_parts(const std::shared_ptr<const ByteSource>& file, std::uint64_t part_rows,
+                     const LoadContext& context) {
+  const auto read = [=](const FileRows& rows, const LoadContext& reading) {
+    return read_splat_rows(*file, rows, reading);
+  };
+  return parts_of_rows("splat", count_splat(*file, TreeShape::max_gaussians), part_rows, read,
+                       context);
+}
+
+/// The formats are told apart as load_scene() does.
+std::optional<Parts> file_in_parts(const std::filesystem::path& path, std::uint64_t part_rows,
+                                   const LoadContext& context) {
+  const auto file = std::make_shared<const FileSource>(path);
+  std::array<char, 4> magic{};
+  const auto start = std::span(magic).first(std::min<std::uint64_t>(4, file->size()));
+  file->read(0, std::as_writable_bytes(start));
+  const std::string_view begins(start.data(), start.size());
+  if (begins.starts_with("ply")) return ply_in_parts(file, part_rows, context);
+  if (path.extension() != ".splat" || begins == "PK\x03\x04" || is_tree(*file) || is_spz(*file))
+    return std::nullopt;
+  return splat_in_parts(file, part_rows, context);
+}
+
+/// The sample is the coarsest level, which costs little to read. So a single level is no scene in
+/// parts.
+std::optional<Parts> streamed_sog_in_parts(const std::filesystem::path& path,
+                                           const LoadContext& context) {
+  const auto folder = std::make_shared<const FolderFiles>(path);
+  const auto scene = std::make_shared<const OpenStreamedSog>(
+      open_streamed_sog(*folder, {}, {}, TreeShape::max_gaussians));
+  if (scene->levels == 1) return std::nullopt;
+  Parts parts{fmt::format("streamed sog ({})", scene->detail), scene->parts.size(),
+              [=](std::uint64_t part, const LoadContext& reading) {
+                return read_streamed_sog_part(*folder, *scene, part, reading);
+              },
+              read_streamed_sog(*folder, scene->levels - 1, {}, context).cloud};
+  const std::size_t step = (parts.sample.size() + sample_size - 1) / sample_size;
+  keep_if(parts.sample, [&](std::size_t i) { return i % step == 0; });
+  return parts;
+}
+
+std::optional<Parts> open_parts(const SceneLocation& location, std::uint64_t part_rows,
+                                const LoadContext& context) {
+  switch (location.kind) {
+    case SceneLocation::Kind::file:
+      return file_in_parts(location.path, part_rows, context);
+    case SceneLocation::Kind::streamed_sog_folder:
+      return streamed_sog_in_parts(location.path, context);
+    case SceneLocation::Kind::sog_folder:
+      break;
   }
-  if (std::string_view(begins.data(), begins.size()) != "ply") return nullptr;
-  auto open = std::make_shared<const RowFile>(path);
-  const PlyElement* vertex = open->header.find("vertex");
-  if (!vertex || open->header.encoding == PlyEncoding::ascii || is_compressed_ply(open->header))
-    return nullptr;
-  require_rows_in_file(open->file, *vertex, TreeShape::max_gaussians);
-  return open;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -52,26 +122,21 @@ std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
                                           const std::shared_ptr<ThreadPool>& pool,
                                           std::uint64_t part_rows) {
   const SceneLocation location = locate_scene(path);
-  if (location.kind != SceneLocation::Kind::file) return std::nullopt;
-  const std::shared_ptr<const RowFile> open = open_rows(location.path);
-  if (!open) return std::nullopt;
-
   const LoadContext context(*pool);
-  const std::uint64_t step = (open->rows() + sample_rows - 1) / sample_rows;
-  GaussianCloud sample =
-      read_ply_rows(open->file, open->header, {0, (open->rows() + step - 1) / step, step}, context);
+  std::optional<Parts> parts = open_parts(location, part_rows, context);
+  if (!parts) return std::nullopt;
+  GaussianCloud& sample = parts->sample;
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
   PartedScene scene;
   if (!sample.empty()) scene.hints = find_hints(sample, location.hints, up, scene.notes, pool);
-  scene.parts.format = "3DGS ply";
-  scene.parts.each = [open, reach, pool, part_rows](const auto& take) {
+  scene.parts.format = parts->format;
+  scene.parts.each = [read = parts->read, count = parts->count, reach, pool](const auto& take) {
     const LoadContext reading(*pool);
     std::uint64_t dropped = 0;
-    for (std::uint64_t first = 0; first < open->rows(); first += part_rows) {
-      GaussianCloud part = read_ply_rows(
-          open->file, open->header, {first, std::min(part_rows, open->rows() - first)}, reading);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      GaussianCloud part = read(i, reading);
       dropped += sanitize(part, reach, reading).dropped;
       take(part);
     }

@@ -20,9 +20,10 @@ struct PartedScene {
   std::vector<std::string> notes;  // as Scene::notes
 };
 
-/// The scene at `path` if its format can be read in parts, which a binary 3DGS .ply can: of up to
-/// TreeShape::max_gaussians. Throws InputError when such a file is wrong. `up` as in LoadOptions;
-/// `part_rows`: Gaussians of a part before faulty ones are dropped.
+/// The scene at `path` if its format can be read in parts: a binary 3DGS .ply, a .splat, or a
+/// streamed SOG of several levels, of which each SOG of the finest is a part. It may have
+/// TreeShape::max_gaussians. Throws InputError when such a scene is wrong. `up` as in LoadOptions;
+/// `part_rows`: Gaussians of a file's part before faulty ones are dropped.
 std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
                                           const std::optional<glm::vec3>& up,
                                           const std::shared_ptr<ThreadPool>& pool,

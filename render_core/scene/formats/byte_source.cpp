@@ -35,6 +35,18 @@ std::vector<std::byte> ByteSource::read_all(std::uint64_t limit) const {
   return bytes;
 }
 
+std::vector<std::byte> read_rows(const ByteSource& file, std::uint64_t offset,
+                                 std::size_t row_bytes, const FileRows& rows, std::size_t begin,
+                                 std::size_t end) {
+  std::vector<std::byte> bytes((end - begin) * row_bytes);
+  // One read where the rows are neighbours.
+  const std::size_t together = rows.step == 1 ? end - begin : 1;
+  for (std::size_t i = begin; i < end; i += together)
+    file.read(offset + (rows.first + i * rows.step) * row_bytes,
+              std::span(bytes).subspan((i - begin) * row_bytes, together * row_bytes));
+  return bytes;
+}
+
 FileSource::Opened FileSource::open(const std::filesystem::path& path) {
   // O_NONBLOCK: opening a named pipe by mistake must not wait for a writer.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);

@@ -43,6 +43,17 @@ class ByteSource {
   std::uint64_t size_;
 };
 
+/// Some rows of a file of rows: `first`, `first + step` and so on, `count` of them.
+struct FileRows {
+  std::uint64_t first = 0, count = 0, step = 1;
+};
+
+/// The bytes of rows [begin, end) among `rows`. The file's rows have `row_bytes` each, and the
+/// first one starts at byte `offset`. Throws InputError as ByteSource::read() does.
+std::vector<std::byte> read_rows(const ByteSource& file, std::uint64_t offset,
+                                 std::size_t row_bytes, const FileRows& rows, std::size_t begin,
+                                 std::size_t end);
+
 class FileSource final : public ByteSource {
  public:
   /// Throws InputError when the file cannot be opened or is not a regular file.

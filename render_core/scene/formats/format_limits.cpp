@@ -16,8 +16,9 @@ void require_count(const ByteSource& file, std::string_view where, std::uint64_t
 }
 
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
-                             std::size_t plain_bytes, std::uint64_t compressed_bytes) {
-  require_count(file, where, count);
+                             std::size_t plain_bytes, std::uint64_t compressed_bytes,
+                             std::uint64_t most) {
+  require_count(file, where, count, most);
   if (count > (1 << 16) && count * plain_bytes / max_compression > compressed_bytes)
     throw InputError(
         file.name(), where,

@@ -21,7 +21,8 @@ void require_count(const ByteSource& file, std::string_view where, std::uint64_t
 /// allowed, so a lying header can make us allocate at most 15 MB or about 3,000 times the file's
 /// size. `plain_bytes`: decompressed bytes of the file per Gaussian.
 void require_plausible_count(const ByteSource& file, std::string_view where, std::uint64_t count,
-                             std::size_t plain_bytes, std::uint64_t compressed_bytes);
+                             std::size_t plain_bytes, std::uint64_t compressed_bytes,
+                             std::uint64_t most = max_gaussians);
 
 /// Far above what captures reach, far below what deflate can (1032).
 inline constexpr std::uint64_t max_compression = 256;

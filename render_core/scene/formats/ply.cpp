@@ -136,7 +136,7 @@ std::size_t block_rows(std::size_t row_bytes) {
 }
 
 void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout& layout,
-                 bool big_endian, const PlyRows& rows, GaussianCloud& cloud,
+                 bool big_endian, const FileRows& rows, GaussianCloud& cloud,
                  const LoadContext& context) {
   const bool plain =
       !big_endian && std::all_of(layout.fields.begin(), layout.fields.end(), [&](const Field& f) {
@@ -149,21 +149,16 @@ void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout&
                                  : load_scalar(from + p.offset, p.type, big_endian);
     }
   };
-  context.for_blocks(
-      cloud.size(), block_rows(vertex.row_bytes), [&](std::size_t begin, std::size_t end) {
-        std::vector<std::byte> bytes((end - begin) * vertex.row_bytes);
-        // One read where the rows are neighbours.
-        const std::size_t together = rows.step == 1 ? end - begin : 1;
-        for (std::size_t i = begin; i < end; i += together)
-          file.read(vertex.data_offset + (rows.first + i * rows.step) * vertex.row_bytes,
-                    std::span(bytes).subspan((i - begin) * vertex.row_bytes,
-                                             together * vertex.row_bytes));
-        std::array<float, row_fields> fields{};
-        for (std::size_t i = begin; i < end; ++i) {
-          decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
-          store(std::bit_cast<Row>(fields), cloud, i);
-        }
-      });
+  context.for_blocks(cloud.size(), block_rows(vertex.row_bytes),
+                     [&](std::size_t begin, std::size_t end) {
+                       const std::vector<std::byte> bytes =
+                           read_rows(file, vertex.data_offset, vertex.row_bytes, rows, begin, end);
+                       std::array<float, row_fields> fields{};
+                       for (std::size_t i = begin; i < end; ++i) {
+                         decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
+                         store(std::bit_cast<Row>(fields), cloud, i);
+                       }
+                     });
 }
 
 /// Numbers of an ASCII file, one after the other, read through a bounded buffer.
@@ -257,7 +252,7 @@ GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header,
   return cloud;
 }
 
-GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const PlyRows& rows,
+GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const FileRows& rows,
                             const LoadContext& context) {
   const PlyElement& vertex = *header.find("vertex");
   const Layout layout = find_fields(file, vertex);

@@ -16,13 +16,9 @@ namespace catgs {
 /// The result is not sanitized. Throws InputError.
 GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header, const LoadContext& context);
 
-/// Some rows of a binary file: `first`, `first + step` and so on, `count` of them.
-struct PlyRows {
-  std::uint64_t first = 0, count = 0, step = 1;
-};
-/// The same of some rows. The file's element `vertex` has them, and its rows have a fixed size
-/// (require_rows_in_file()). Throws InputError.
-GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const PlyRows& rows,
+/// The same of some rows of a binary file. Its element `vertex` has them, and its rows have a fixed
+/// size (require_rows_in_file()). Throws InputError.
+GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const FileRows& rows,
                             const LoadContext& context);
 
 /// Writes the original's layout: binary little-endian, all float, zero normals. Means, unit

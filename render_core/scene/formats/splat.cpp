@@ -9,7 +9,6 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
-#include "render_core/scene/formats/format_limits.h"
 
 namespace catgs {
 
@@ -39,21 +38,30 @@ void store(const SplatRow& row, GaussianCloud& cloud, std::size_t i) {
 
 }  // namespace
 
-GaussianCloud read_splat(const ByteSource& file, const LoadContext& context) {
+std::uint64_t count_splat(const ByteSource& file, std::uint64_t most) {
   if (file.size() % sizeof(SplatRow) != 0)
     throw InputError(file.name(), fmt::format("byte {}", file.size()),
                      "the size of a .splat file is a multiple of 32 bytes",
                      "the file is cut off or of another format");
   const std::uint64_t count = file.size() / sizeof(SplatRow);
-  require_count(file, "", count);
+  require_count(file, "", count, most);
+  return count;
+}
+
+GaussianCloud read_splat_rows(const ByteSource& file, const FileRows& rows,
+                              const LoadContext& context) {
   GaussianCloud cloud;
-  cloud.resize(count, 0);
-  context.for_blocks(count, block_rows, [&](std::size_t begin, std::size_t end) {
-    std::vector<SplatRow> rows(end - begin);
-    file.read(begin * sizeof(SplatRow), std::as_writable_bytes(std::span(rows)));
-    for (std::size_t i = begin; i < end; ++i) store(rows[i - begin], cloud, i);
+  cloud.resize(rows.count, 0);
+  context.for_blocks(rows.count, block_rows, [&](std::size_t begin, std::size_t end) {
+    const std::vector<std::byte> bytes = read_rows(file, 0, sizeof(SplatRow), rows, begin, end);
+    for (std::size_t i = begin; i < end; ++i)
+      store(load_as<SplatRow>(&bytes[(i - begin) * sizeof(SplatRow)]), cloud, i);
   });
   return cloud;
+}
+
+GaussianCloud read_splat(const ByteSource& file, const LoadContext& context) {
+  return read_splat_rows(file, {0, count_splat(file)}, context);
 }
 
 void write_splat(const GaussianCloud& cloud, std::ostream& to) {

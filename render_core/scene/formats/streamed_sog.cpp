@@ -11,9 +11,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
-#include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/json_field.h"
-#include "render_core/scene/formats/sog.h"
 
 namespace catgs {
 
@@ -106,33 +104,25 @@ class UnsharedFiles final : public FileSet {
   mutable std::uint64_t bytes_ = 0;
 };
 
-/// One of the SOGs that the tree refers to. Nothing of its files stays in memory, because a scene
-/// may have thousands.
-struct Part {
-  std::string archive;  // its name; empty: its files lie in the folder
-  SogMeta meta;
-  std::vector<SogRange> ranges;
-};
-
-Part open_part(const FileSet& folder, const std::string& name) {
+StreamedSogPart open_part(const FileSet& folder, const std::string& name) {
   if (name.ends_with(".sog"))
     return {name, read_sog_meta(ZipFiles(*folder.open(name)), "meta.json"), {}};
   return {"", read_sog_meta(folder, name), {}};
 }
 
-void decode_part(const FileSet& folder, const Part& part, GaussianCloud& cloud,
+void decode_part(const FileSet& folder, const StreamedSogPart& part, GaussianCloud& cloud,
                  const LoadContext& context) {
   if (part.archive.empty()) return decode_sog(folder, part.meta, part.ranges, cloud, context);
   decode_sog(ZipFiles(*folder.open(part.archive)), part.meta, part.ranges, cloud, context);
 }
 
 /// Files of the chosen pieces, with ranges that fill the cloud from 0 on.
-std::vector<Part> open_parts(const FileSet& folder, const LodTree& tree,
-                             std::vector<LodPiece> pieces, std::size_t& total) {
+std::vector<StreamedSogPart> open_parts(const FileSet& folder, const LodTree& tree,
+                                        std::vector<LodPiece> pieces, std::size_t& total) {
   std::stable_sort(pieces.begin(), pieces.end(), [](const LodPiece& a, const LodPiece& b) {
     return std::pair(a.file, a.offset) < std::pair(b.file, b.offset);
   });
-  std::vector<Part> parts;
+  std::vector<StreamedSogPart> parts;
   std::optional<std::size_t> open_file;
   std::size_t end_of_last = 0;
   for (const LodPiece& piece : pieces) {
@@ -142,7 +132,7 @@ std::vector<Part> open_parts(const FileSet& folder, const LodTree& tree,
       open_file = piece.file;
       end_of_last = 0;
     }
-    Part& part = parts.back();
+    StreamedSogPart& part = parts.back();
     if (piece.offset < end_of_last || piece.offset + piece.count > part.meta.count)
       throw InputError(
           tree.name, "tree",
@@ -245,41 +235,58 @@ std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
   return choose(tree, level, budget, environment).count + environment;
 }
 
-StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
-                              std::optional<std::size_t> budget, const LoadContext& context) {
+OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> level,
+                                  std::optional<std::size_t> budget, std::uint64_t most) {
   const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
   const UnsharedFiles files(folder, tree.name);
-  std::vector<Part> environment;
+  std::vector<StreamedSogPart> environment;
   if (!tree.environment.empty()) environment.push_back(open_part(files, tree.environment));
   const std::size_t environment_count = environment.empty() ? 0 : environment[0].meta.count;
   const LodChoice choice = choose(tree, level, budget, environment_count);
 
   if (choice.pieces.empty()) throw InputError(tree.name, "tree", "has no levels of detail");
 
-  std::size_t total = 0;
-  std::vector<Part> parts = open_parts(files, tree, choice.pieces, total);
-  for (Part& part : environment) {
-    part.ranges.push_back({0, part.meta.count, total});
-    total += part.meta.count;
-    parts.push_back(std::move(part));
+  OpenStreamedSog scene;
+  scene.levels = tree.levels;
+  scene.parts = open_parts(files, tree, choice.pieces, scene.count);
+  for (StreamedSogPart& part : environment) {
+    part.ranges.push_back({0, part.meta.count, scene.count});
+    scene.count += part.meta.count;
+    scene.parts.push_back(std::move(part));
   }
-  require_plausible_count(*folder.open("lod-meta.json"), "tree", total, sog_least_bytes,
-                          files.bytes());
+  require_plausible_count(*folder.open("lod-meta.json"), "tree", scene.count, sog_least_bytes,
+                          files.bytes(), most);
+  for (const StreamedSogPart& part : scene.parts)
+    scene.sh_degree = std::max(scene.sh_degree, part.meta.sh_degree);
+  scene.detail = choice.finest == choice.coarsest
+                     ? fmt::format("level {} of 0…{}", choice.finest, tree.levels - 1)
+                     : fmt::format("levels {} and {} of 0…{}", choice.finest, choice.coarsest,
+                                   tree.levels - 1);
+  return scene;
+}
 
-  int degree = 0;
-  for (const Part& part : parts) degree = std::max(degree, part.meta.sh_degree);
-  StreamedSog result;
-  result.detail = choice.finest == choice.coarsest
-                      ? fmt::format("level {} of 0…{}", choice.finest, tree.levels - 1)
-                      : fmt::format("levels {} and {} of 0…{}", choice.finest, choice.coarsest,
-                                    tree.levels - 1);
-  result.cloud.resize(total, degree);
+GaussianCloud read_streamed_sog_part(const FileSet& folder, const OpenStreamedSog& scene,
+                                     std::size_t part, const LoadContext& context) {
+  StreamedSogPart alone = scene.parts[part];
+  const std::size_t first = alone.ranges.front().destination;
+  for (SogRange& range : alone.ranges) range.destination -= first;
+  GaussianCloud cloud;
+  cloud.resize(alone.ranges.back().destination + alone.ranges.back().count, scene.sh_degree);
+  decode_part(folder, alone, cloud, context);
+  return cloud;
+}
+
+StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
+                              std::optional<std::size_t> budget, const LoadContext& context) {
+  const OpenStreamedSog scene = open_streamed_sog(folder, level, budget);
+  StreamedSog result{scene.detail, {}};
+  result.cloud.resize(scene.count, scene.sh_degree);
+  const auto total = static_cast<double>(scene.count);
   std::size_t done = 0;
-  for (const Part& part : parts) {
-    const double from = static_cast<double>(done) / static_cast<double>(total);
+  for (const StreamedSogPart& part : scene.parts) {
+    const double from = static_cast<double>(done) / total;
     for (const SogRange& range : part.ranges) done += range.count;
-    decode_part(folder, part, result.cloud,
-                context.part(from, static_cast<double>(done) / static_cast<double>(total)));
+    decode_part(folder, part, result.cloud, context.part(from, static_cast<double>(done) / total));
   }
   return result;
 }

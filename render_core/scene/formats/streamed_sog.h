@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/sog.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
@@ -53,14 +56,41 @@ std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t b
 std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget);
 
+/// One of the SOGs that a level consists of. Nothing of its files stays in memory, because a scene
+/// may have thousands.
+struct StreamedSogPart {
+  std::string archive;  // its name; empty: its files lie in the folder
+  SogMeta meta;
+  std::vector<SogRange> ranges;  // consecutive in the whole scene
+};
+
+/// A streamed SOG whose meta data was read and checked.
+struct OpenStreamedSog {
+  int levels = 0;
+  std::string detail;  // the chosen levels, for people: "level 2 of 0…6"
+  int sh_degree = 0;
+  std::size_t count = 0;  // Gaussians, at least 1
+  std::vector<StreamedSogPart> parts;
+};
+
+/// Opens the streamed SOG in `folder`; without `level` and `budget` the finest level. The
+/// environment counts towards the budget. Throws InputError. Errors include: both are given, there
+/// is no such level, the coarsest level exceeds the budget, SOGs share a file, there are more than
+/// `most` Gaussians.
+OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> level,
+                                  std::optional<std::size_t> budget,
+                                  std::uint64_t most = max_gaussians);
+
+/// The Gaussians of a part with the SH degree of the whole, not sanitized. Throws InputError.
+GaussianCloud read_streamed_sog_part(const FileSet& folder, const OpenStreamedSog& scene,
+                                     std::size_t part, const LoadContext& context);
+
 struct StreamedSog {
-  std::string detail;   // the chosen levels, for people: "level 2 of 0…6"
+  std::string detail;   // as OpenStreamedSog::detail
   GaussianCloud cloud;  // not sanitized
 };
 
-/// Loads the streamed SOG in `folder`; without `level` and `budget` the finest level. The
-/// environment counts towards the budget. Throws InputError. Errors include: both are given, there
-/// is no such level, the coarsest level exceeds the budget, SOGs share a file.
+/// Loads all parts of what open_streamed_sog() opens. Throws InputError.
 StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
                               std::optional<std::size_t> budget, const LoadContext& context);
 

@@ -1,8 +1,14 @@
 #include "render_core/scene/files/scene_parts.h"
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/formats/splat.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
@@ -13,6 +19,43 @@ using ::testing::HasSubstr;
 
 class ScenePartsTest : public FolderTest {
  protected:
+  std::string built(const SceneParts& parts, std::size_t memory_bytes = std::size_t{1} << 30) {
+    build_tree(parts, folder_ / "out.tree", memory_bytes, *pool_, LoadContext(*pool_));
+    std::ifstream file(folder_ / "out.tree", std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  /// Fails unless the tree of the scene's parts is that of the loaded scene.
+  void expect_same_tree(const std::filesystem::path& path, std::size_t dropped) {
+    const Scene whole = load_scene(path);
+    ASSERT_EQ(whole.report.dropped, dropped);
+    const auto each = [&](const auto& take) {
+      take(whole.cloud);
+      return std::uint64_t{whole.report.dropped};
+    };
+    const std::string bytes = built({each, whole.format, true});
+    const auto scene = scene_in_parts(path, {}, pool_, 777);
+    ASSERT_TRUE(scene);
+    EXPECT_TRUE(built(scene->parts) == bytes) << "read once";
+    EXPECT_TRUE(built(scene->parts, 0) == bytes) << "read twice";
+  }
+
+  /// Writes a streamed SOG with the levels' SOGs, all of them below one node each.
+  std::filesystem::path write_streamed_sog(const std::vector<std::vector<GaussianCloud>>& levels) {
+    nlohmann::json meta = {{"lodLevels", levels.size()}, {"filenames", nlohmann::json::array()}};
+    for (std::size_t level = 0; level < levels.size(); ++level)
+      for (std::size_t i = 0; i < levels[level].size(); ++i) {
+        const GaussianCloud& cloud = levels[level][i];
+        const std::string name = std::to_string(level) + "_" + std::to_string(i);
+        for (const auto& [file, content] : encode_sog(cloud, 2))
+          write("streamed/" + name + "/" + file, content);
+        meta["tree"]["children"][i]["lods"][std::to_string(level)] = {
+            {"file", meta["filenames"].size()}, {"offset", 0}, {"count", cloud.size()}};
+        meta["filenames"].push_back(name + "/meta.json");
+      }
+    return write("streamed/lod-meta.json", meta.dump()).parent_path();
+  }
+
   const std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
 };
 
@@ -62,11 +105,30 @@ TEST_F(ScenePartsTest, JudgeWhatIsAbsurdByASample) {
   EXPECT_EQ(taken, load_scene(path).cloud.size());
 }
 
+TEST_F(ScenePartsTest, ASplatGivesTheTreeOfTheLoadedScene) {
+  GaussianCloud cloud = random_cloud(5000, 0);
+  for (std::size_t i = 0; i < cloud.size(); i += 10) cloud.opacity[i] = 1e-4f;
+  cloud.mean[4001].y = 3e7f;  // absurd
+  std::ostringstream bytes;
+  write_splat(cloud, bytes);
+  expect_same_tree(write("a.splat", bytes.str()), 501);
+}
+
+TEST_F(ScenePartsTest, AStreamedSogGivesTheTreeOfTheLoadedScene) {
+  GaussianCloud fine = random_cloud(1500, 2, 1);
+  for (std::size_t i = 0; i < fine.size(); i += 10) fine.opacity[i] = 1e-4f;
+  expect_same_tree(write_streamed_sog({{fine, random_cloud(700, 1, 2), random_cloud(300, 0, 3)},
+                                       {random_cloud(90, 1, 4), random_cloud(80, 0, 5)}}),
+                   150);
+}
+
 TEST_F(ScenePartsTest, AreNotOfOtherFormats) {
   const GaussianCloud cloud = random_cloud(300, 0);
   for (const auto& path :
-       {write("a.spz", encode_spz(cloud, {.version = 3})), write("b.splat", std::string(64, 'x')),
-        write("c.ply", encode_compressed_ply(cloud, false)), write("d.splat", "x")})
+       {write("a.spz", encode_spz(cloud, {.version = 3})),
+        write("b.splat", encode_spz(cloud, {.version = 3})),
+        write("c.sog", zip(encode_sog(cloud, 2))),
+        write("d.ply", encode_compressed_ply(cloud, false)), write_streamed_sog({{cloud}})})
     EXPECT_FALSE(scene_in_parts(path, {}, pool_)) << path;
 }
 
@@ -75,6 +137,8 @@ TEST_F(ScenePartsTest, AFileThatIsCutOffIsRefused) {
   bytes.resize(bytes.size() - 1);
   const auto path = write("a.ply", bytes);
   EXPECT_THAT(input_error([&] { scene_in_parts(path, {}, pool_); }), HasSubstr("cut off"));
+  const auto splat = write("b.splat", "x");
+  EXPECT_THAT(input_error([&] { scene_in_parts(splat, {}, pool_); }), HasSubstr("cut off"));
 }
 
 }  // namespace
