@@ -142,7 +142,6 @@ bool CudaView::needs_more_room() {
 
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   ListRequest listed(request.camera, plan, settings_.speculation);
-  if (settings_.pipeline == Pipeline::catgs) listed.depth_bits = catgs_depth_bits;
   if (paged_) paged_->begin(request, plan);
   for (;;) {
     make_room(request.camera.size_px);
@@ -203,7 +202,7 @@ void CudaView::list_tiles(const ListRequest& request) {
   builder_.cull(request, shape_, stream);
   builder_.project(request, shape_, stream);
   times_.end(Stage::project, stream);
-  builder_.sort_by_depth(request, shape_, stream);
+  builder_.sort_by_depth(shape_, stream);
   times_.end_depth_sort(stream);
   builder_.emit(request, shape_, stream);
   times_.end(Stage::bin, stream);
@@ -222,7 +221,6 @@ void CudaView::draw_sub(const FrameRequest& request) {
   launch_project({.scene = scene_arrays(),
                   .camera = {.now = now, .end = now.single, .near_z = request.camera.near_z},
                   .shape = shape_,
-                  .depth_bits = exact_depth_bits,
                   .min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z),
                   .counts = m.counts.get(),
                   .visible = m.visible.get(),

@@ -62,7 +62,6 @@ void ListBuilder::project(const ListRequest& request, const FrameShape& shape,
   launch_project({.scene = request.scene,
                   .camera = request.cameras,
                   .shape = shape,
-                  .depth_bits = request.depth_bits,
                   .min_depth = request.min_depth,
                   .counts = m.counts.get(),
                   .visible = m.visible.get(),
@@ -76,14 +75,13 @@ void ListBuilder::project(const ListRequest& request, const FrameShape& shape,
                  request.sweeps ? Listing::trails : Listing::ellipses, stream);
 }
 
-void ListBuilder::sort_by_depth(const ListRequest& request, const FrameShape& shape,
-                                cudaStream_t stream) {
+void ListBuilder::sort_by_depth(const FrameShape& shape, cudaStream_t stream) {
   const ViewMemory& m = memory_;
   check(cudaEventSynchronize(counted_.get()), "visible Gaussians");
   visible_ = std::min(m.list_counts.get()->visible, shape.visible_bound);
   PingPong<std::uint32_t> depth{.current = m.depth.get(), .other = m.other_depth.get()};
   PingPong<std::uint32_t> order{.current = m.order.get(), .other = m.other_order.get()};
-  cuda::sort_by_depth(visible_, request.depth_bits, depth, order, scratch(), stream);
+  cuda::sort_by_depth(visible_, depth, order, scratch(), stream);
   order_ = order.current;
 }
 

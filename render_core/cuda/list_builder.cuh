@@ -22,7 +22,6 @@ struct ListRequest {
   ListCuller culler;
   bool sweeps;      // trails are listed, not ellipses
   float min_depth;  // as in ProjectParams
-  int depth_bits = exact_depth_bits;
   Occlusion occlusion{};
 };
 
@@ -38,7 +37,7 @@ class ListBuilder {
   void cull(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   /// Projects and shades them.
   void project(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
-  void sort_by_depth(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
+  void sort_by_depth(const FrameShape& shape, cudaStream_t stream);
   void emit(const ListRequest& request, const FrameShape& shape, cudaStream_t stream);
   /// Completes the lists.
   void sort_by_tile(const FrameShape& shape, cudaStream_t stream);

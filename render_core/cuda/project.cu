@@ -44,7 +44,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const PackedColour colour =
       pack(shade(sh, p.scene.sh_degree, math::view_direction<float>(now.position, centre.mean)));
   p.records[v] = {splat.centre_px, splat.whitening, splat.log2_opacity, colour};
-  p.depth_key[v] = depth_key(splat.depth, p.camera.near_z, p.depth_bits);
+  p.depth_key[v] = depth_key(splat.depth, p.camera.near_z);
   if (p.splat_depth != nullptr) p.splat_depth[v] = splat.depth;
   const bool listed = listing == Listing::none || splat.in_view;
   const bool counted = listed && splat.depth > fmaxf(p.min_depth, p.camera.near_z);

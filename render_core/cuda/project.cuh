@@ -11,7 +11,6 @@ struct ProjectParams {
   SceneArrays scene;
   FrameCameras camera;
   FrameShape shape;
-  int depth_bits;                // of depth_key
   float min_depth;               // nearer splats do not count in displacement and nearness
   FrameCounts* counts;           // displacement, nearness, depths
   const std::uint32_t* visible;  // [visible_bound], scene indices

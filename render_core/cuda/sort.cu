@@ -47,7 +47,7 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   cub::DoubleBuffer<std::uint16_t> narrow_keys;
   cub::DoubleBuffer<TileEntry> entries;
   check(cub::DeviceRadixSort::SortPairs(nullptr, depth, keys, values, shape.visible_bound, 0,
-                                        exact_depth_bits),
+                                        depth_bits),
         "depth sort size");
   check(cub::DeviceScan::ExclusiveScan(nullptr, scan, counts_in_order({}),
                                        static_cast<std::uint32_t*>(nullptr), SaturatingSum{}, 0u,
@@ -62,12 +62,12 @@ std::size_t sort_scratch_bytes(const FrameShape& shape) {
   return std::max({depth, scan, narrow, wide});
 }
 
-void sort_by_depth(std::uint32_t visible, int bits, PingPong<std::uint32_t>& depth,
+void sort_by_depth(std::uint32_t visible, PingPong<std::uint32_t>& depth,
                    PingPong<std::uint32_t>& order, SortScratch scratch, cudaStream_t stream) {
   cub::DoubleBuffer<std::uint32_t> keys(depth.current, depth.other);
   cub::DoubleBuffer<std::uint32_t> values(order.current, order.other);
   check(cub::DeviceRadixSort::SortPairs(scratch.memory, scratch.bytes, keys, values, visible, 0,
-                                        bits, stream),
+                                        depth_bits, stream),
         "depth sort");
   depth = {keys.Current(), keys.Alternate()};
   order = {values.Current(), values.Alternate()};

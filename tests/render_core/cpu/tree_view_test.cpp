@@ -7,7 +7,9 @@ namespace {
 
 constexpr RendererKind kind = RendererKind::cpu;
 
-TEST(TreeViews, ZeroDetailIsTheWholeScene) { test::expect_zero_detail_is_the_whole_scene(kind); }
+TEST(TreeViews, ZeroDetailIsTheWholeScene) {
+  test::expect_zero_detail_is_the_whole_scene(kind, 70.0);
+}
 TEST(TreeViews, DetailLeavesOutLittle) { test::expect_detail_to_leave_out_little(kind); }
 TEST(TreeViews, NothingPops) { test::expect_no_pops(kind); }
 TEST(TreeViews, ShortMemoryIsCoarser) { test::expect_short_memory_to_be_coarser(kind); }

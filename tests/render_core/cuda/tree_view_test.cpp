@@ -10,7 +10,7 @@ constexpr RendererKind kind = RendererKind::cuda;
 
 TEST(CudaFrames, ZeroDetailIsTheWholeScene) {
   REQUIRE_DEVICE();
-  test::expect_zero_detail_is_the_whole_scene(kind);
+  test::expect_zero_detail_is_the_whole_scene(kind, 50.0);
 }
 
 TEST(CudaFrames, DetailLeavesOutLittle) {

@@ -43,15 +43,15 @@ TEST_F(SortStage, OrdersSplatsByDepthAsAStableSort) {
   const FrameShape shape{.tiles_x = 4, .tiles_y = 4, .visible_bound = count, .list_bound = 1};
   // Few depths, so that many are equal.
   Numbers keys = random_numbers(count, 5000, 1);
-  keys[7] = (1u << exact_depth_bits) - 1u;
+  keys[7] = most_depth_key;
   const auto key = upload(keys), other_key = upload(keys);
   const auto slot = upload(counting(count)), other_slot = upload(Numbers(count));
   const auto scratch = scratch_for(shape);
   const Stream stream;
   PingPong<std::uint32_t> depth{.current = key.get(), .other = other_key.get()};
   PingPong<std::uint32_t> order{.current = slot.get(), .other = other_slot.get()};
-  sort_by_depth(count, exact_depth_bits, depth, order,
-                {.memory = scratch.get(), .bytes = scratch.bytes()}, stream.get());
+  sort_by_depth(count, depth, order, {.memory = scratch.get(), .bytes = scratch.bytes()},
+                stream.get());
   Numbers expected = counting(count);
   std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return keys[i]; });
   const Numbers drawn = fetch(order.current, count);

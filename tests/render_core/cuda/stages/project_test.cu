@@ -14,7 +14,7 @@ double key_of(float depth, float near_z) {
   if (!(depth > near_z)) return 0.0;
   const double steps = static_cast<double>(std::bit_cast<std::uint32_t>(depth)) -
                        static_cast<double>(std::bit_cast<std::uint32_t>(near_z));
-  const double keys = std::exp2(exact_depth_bits);
+  const double keys = std::exp2(depth_bits);
   return std::min(steps * keys / (20.0 * (1 << 23)), keys - 1.0);
 }
 

@@ -166,7 +166,7 @@ class StagedLists {
 
   void cull() { builder_.cull(request_, shape_, stream_.get()); }
   void project() { builder_.project(request_, shape_, stream_.get()); }
-  void sort_by_depth() { builder_.sort_by_depth(request_, shape_, stream_.get()); }
+  void sort_by_depth() { builder_.sort_by_depth(shape_, stream_.get()); }
   void emit() { builder_.emit(request_, shape_, stream_.get()); }
 
   /// What the CPU core has in view, by index in the cloud; nothing for the others.
