@@ -19,7 +19,6 @@ namespace {
 
 constexpr std::size_t fewest_in_memory = 4096;
 constexpr std::size_t block_rows = 4096;  // that a thread copies at a time
-constexpr std::size_t write_bytes = std::size_t{4} << 20;
 
 // A record: mean, rotation, scale, opacity, harmonics.
 constexpr std::size_t record_bytes(int sh_degree) { return GaussianCloud::bytes(1, sh_degree); }
@@ -49,16 +48,16 @@ ScratchFile::ScratchFile(const std::filesystem::path& beside) : beside_(beside) 
 
 ScratchFile::~ScratchFile() { ::close(descriptor_); }
 
-void ScratchFile::append(std::span<const std::byte> bytes) {
+void ScratchFile::write(std::uint64_t offset, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t done =
-        ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(size_));
+        ::pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (done < 0 && errno == EINTR) continue;
     if (done <= 0)
       throw InputError(beside_.string(), "sorting on disk", std::generic_category().message(errno),
                        "more memory or more space on the disk");
     bytes = bytes.subspan(static_cast<std::size_t>(done));
-    size_ += static_cast<std::uint64_t>(done);
+    offset += static_cast<std::uint64_t>(done);
   }
 }
 
@@ -139,16 +138,14 @@ void GaussianSorter::sort_codes() {
 void GaussianSorter::spill() {
   if (!file_) file_ = std::make_unique<ScratchFile>(beside_);
   sort_codes();
-  const std::uint64_t begin = file_->size();
-  const std::size_t rows = std::max<std::size_t>(1, write_bytes / record_bytes_);
-  std::vector<std::byte> buffer(rows * record_bytes_);
-  for (std::size_t first = 0; first < codes_.size(); first += rows) {
-    const std::size_t count = std::min(rows, codes_.size() - first);
-    for (std::size_t k = 0; k < count; ++k)
-      std::memcpy(&buffer[k * record_bytes_], record(codes_[first + k].value), record_bytes_);
-    file_->append(std::span(buffer).first(count * record_bytes_));
-  }
-  runs_.push_back({begin, file_->size(), {}});
+  const std::uint64_t begin = runs_.empty() ? 0 : runs_.back().end;
+  LoadContext(pool_).for_blocks(codes_.size(), block_rows, [&](std::size_t from, std::size_t to) {
+    std::vector<std::byte> buffer((to - from) * record_bytes_);
+    for (std::size_t k = from; k < to; ++k)
+      std::memcpy(&buffer[(k - from) * record_bytes_], record(codes_[k].value), record_bytes_);
+    file_->write(begin + from * record_bytes_, buffer);
+  });
+  runs_.push_back({begin, begin + codes_.size() * record_bytes_, {}});
   codes_.clear();
 }
 

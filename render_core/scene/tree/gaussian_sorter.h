@@ -25,16 +25,15 @@ class ScratchFile {
   ScratchFile(const ScratchFile&) = delete;
   ScratchFile& operator=(const ScratchFile&) = delete;
 
-  void append(std::span<const std::byte> bytes);
+  /// May be called from several threads.
+  void write(std::uint64_t offset, std::span<const std::byte> bytes);
   void read(std::uint64_t offset, std::span<std::byte> to) const;
   /// Gives the blocks of a range back to the disk, where the file system can.
   void forget(std::uint64_t offset, std::uint64_t size);
-  [[nodiscard]] std::uint64_t size() const { return size_; }
 
  private:
   std::filesystem::path beside_;
   int descriptor_;
-  std::uint64_t size_ = 0;
 };
 
 /// Sorts Gaussians along a Morton curve in bounded memory: sorted runs that fill the memory go to
