@@ -6,6 +6,7 @@
 #include <charconv>
 #include <iterator>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -38,23 +39,27 @@ const std::string& single(const Values& values) {
   return values.front();
 }
 
-int parse_int(std::string_view text, int low, int high) {
-  int value = 0;
+/// An int, or a double.
+template <class T>
+T parse_number(std::string_view text, T low, T high) {
+  T value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || value < low || value > high)
-    throw std::invalid_argument(
-        fmt::format("\"{}\" is not a whole number in {}…{}", text, low, high));
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= low && value <= high))
+    throw std::invalid_argument(fmt::format("\"{}\" is not a {} in {}…{}", text,
+                                            std::is_integral_v<T> ? "whole number" : "number", low,
+                                            high));
   return value;
 }
 
-Setting integer(std::string name, std::string value_name, std::string help,
-                int ServerConfig::*member, int low, int high) {
+template <class T>
+Setting number(std::string name, std::string value_name, std::string help, T ServerConfig::*member,
+               T low, T high) {
   return {std::move(name),
           Setting::Kind::number,
           std::move(value_name),
           std::move(help),
-          [=](ServerConfig& c, const Values& v) { c.*member = parse_int(single(v), low, high); },
-          [=](const ServerConfig& c) { return std::to_string(c.*member); }};
+          [=](ServerConfig& c, const Values& v) { c.*member = parse_number(single(v), low, high); },
+          [=](const ServerConfig& c) { return fmt::format("{}", c.*member); }};
 }
 
 Setting text(std::string name, std::string value_name, std::string help,
@@ -180,14 +185,18 @@ std::vector<Setting> scene_settings() {
       list("scene-folder", "DIR",
            "Folders of scenes that are loaded when somebody asks; the server finds new ones",
            &C::scene_folders),
-      integer("scene-memory", "MB",
-              "Memory for all scenes on each device; for more, the least recently used scene of "
-              "--scene-folder is released; 0: no bound",
-              &C::scene_memory_mb, 0, 10'000'000),
+      number("scene-memory", "MB",
+             "Memory for all scenes on each device; for more, the least recently used scene of "
+             "--scene-folder is released. Of a .tree, half of it at most is used. 0: no bound, "
+             "and 4 GB for a .tree",
+             &C::scene_memory_mb, 0, 10'000'000),
+      number("detail", "PX",
+             "Scenes in a .tree: largest error that is drawn, pixels; 0: every Gaussian",
+             &C::detail_px, 0.0, 64.0),
       choice<std::string>("up", "Axis that points up in scenes whose sidecar does not say so",
                           &C::up, words({"auto", "+x", "-x", "+y", "-y", "+z", "-z"})),
       text("bind", "ADDRESS", "Address to listen on; 0.0.0.0 or :: is every interface", &C::bind),
-      integer("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
+      number("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
       admin_bind(),
       text("client-dir", "DIR", "Folder of the built browser client; by default beside the program",
            &C::client_dir),
@@ -203,13 +212,13 @@ std::vector<Setting> picture_settings() {
            {"cpu", RendererKind::cpu},
            {"cuda", RendererKind::cuda}}),
       device(),
-      integer("threads", "N", "Threads that render and encode; 0: one per processor", &C::threads,
-              0, 1024),
-      integer("lod", "N", "Streamed SOG: level of detail, 0 is the finest; -1: by --budget",
-              &C::lod, -1, 1000),
-      integer("budget", "N",
-              "Streamed SOG: the finest levels with at most this many Gaussians; 0: no bound",
-              &C::gaussian_budget, 0, 1'000'000'000),
+      number("threads", "N", "Threads that render and encode; 0: one per processor", &C::threads, 0,
+             1024),
+      number("lod", "N", "Streamed SOG: level of detail, 0 is the finest; -1: by --budget", &C::lod,
+             -1, 1000),
+      number("budget", "N",
+             "Streamed SOG: the finest levels with at most this many Gaussians; 0: no bound",
+             &C::gaussian_budget, 0, 1'000'000'000),
       choice<EncoderKind>("encoder", "Video encoder", &C::encoder,
                           {{"auto", EncoderKind::automatic},
                            {"nvenc", EncoderKind::nvenc},
@@ -218,34 +227,34 @@ std::vector<Setting> picture_settings() {
       choice<std::string>("x264-preset", "Preset of libx264; auto: by how busy the processors are",
                           &C::x264_preset,
                           words({"auto", "ultrafast", "ultrafast-subpel", "superfast"})),
-      integer("fps", "N", "Nominal frame rate of a session", &C::fps, 1, 240),
-      integer("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
-              200'000),
+      number("fps", "N", "Nominal frame rate of a session", &C::fps, 1, 240),
+      number("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
+             200'000),
   };
 }
 
 std::vector<Setting> session_settings() {
   using C = ServerConfig;
   return {
-      integer("max-sessions", "N", "Most sessions at the same time", &C::max_sessions, 1, 10'000),
-      integer("min-fps", "N",
-              "Admit sessions while measured costs let all keep this frame rate; 0: no such limit",
-              &C::min_fps, 0, 240),
-      integer("max-sessions-per-address", "N", "Most sessions at the same time from one address",
-              &C::max_sessions_per_address, 1, 10'000),
-      integer("max-queue", "N", "Most clients that may wait for a place; others are refused",
-              &C::max_queue, 0, 10'000),
-      integer("idle-timeout", "SECONDS",
-              "End a session when nothing has moved for this long; 0: never", &C::idle_timeout_s, 0,
-              86'400),
-      integer("max-spectators", "N", "Most clients that may watch one session; 0: none",
-              &C::max_spectators, 0, 1000),
-      integer("drain-wait", "SECONDS",
-              "After SIGTERM, time for proxies to see /readyz fail before clients are told",
-              &C::drain_wait_s, 0, 600),
-      integer("drain-deadline", "SECONDS",
-              "After --drain-wait, time for clients to move to another server",
-              &C::drain_deadline_s, 0, 3600),
+      number("max-sessions", "N", "Most sessions at the same time", &C::max_sessions, 1, 10'000),
+      number("min-fps", "N",
+             "Admit sessions while measured costs let all keep this frame rate; 0: no such limit",
+             &C::min_fps, 0, 240),
+      number("max-sessions-per-address", "N", "Most sessions at the same time from one address",
+             &C::max_sessions_per_address, 1, 10'000),
+      number("max-queue", "N", "Most clients that may wait for a place; others are refused",
+             &C::max_queue, 0, 10'000),
+      number("idle-timeout", "SECONDS",
+             "End a session when nothing has moved for this long; 0: never", &C::idle_timeout_s, 0,
+             86'400),
+      number("max-spectators", "N", "Most clients that may watch one session; 0: none",
+             &C::max_spectators, 0, 1000),
+      number("drain-wait", "SECONDS",
+             "After SIGTERM, time for proxies to see /readyz fail before clients are told",
+             &C::drain_wait_s, 0, 600),
+      number("drain-deadline", "SECONDS",
+             "After --drain-wait, time for clients to move to another server", &C::drain_deadline_s,
+             0, 3600),
   };
 }
 
@@ -341,7 +350,8 @@ std::string scalar_text(const toml::node& node) {
   if (const auto s = node.value_exact<std::string>()) return *s;
   if (const auto b = node.value_exact<bool>()) return *b ? "true" : "false";
   if (const auto i = node.value_exact<std::int64_t>()) return std::to_string(*i);
-  throw std::invalid_argument("a text, a whole number or true/false is expected");
+  if (const auto d = node.value_exact<double>()) return fmt::format("{}", *d);
+  throw std::invalid_argument("a text, a number or true/false is expected");
 }
 
 Values toml_values(const toml::node& node) {
@@ -435,7 +445,7 @@ Endpoint parse_endpoint(std::string_view text_value) {
   std::string_view address = text_value.substr(0, colon);
   if (address.starts_with('[') && address.ends_with(']'))
     address = address.substr(1, address.size() - 2);
-  return {std::string(address), parse_int(text_value.substr(colon + 1), 0, 65535)};
+  return {std::string(address), parse_number(text_value.substr(colon + 1), 0, 65535)};
 }
 
 }  // namespace catgs

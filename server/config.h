@@ -18,6 +18,7 @@ struct ServerConfig {
   std::vector<std::string> scenes;  // paths, or synth:KIND:COUNT[:SEED]
   std::vector<std::string> scene_folders;
   int scene_memory_mb = 0;     // 0: no bound
+  double detail_px = 0.5;      // of trees: the largest error that is drawn
   int scene_residency_s = 10;  // at least; no setting: tests shorten it
   std::string bind = "127.0.0.1";
   int port = 8080;

@@ -16,9 +16,6 @@ void validate(const ServerConfig& config, const ConfigSources& sources) {
   check({.kind = config.renderer,
          .pool = {},
          .devices = std::make_shared<DeviceSet>(config.devices)});
-  if (config.scene_memory_mb > 0 && config.scene_folders.empty())
-    throw InputError("--scene-memory", {}, "is about --scene-folder, which is not given",
-                     "scenes of --scene stay in memory");
   if (config.lod >= 0 && config.gaussian_budget > 0)
     throw InputError("--lod, --budget", {}, "both are given", "give one of them");
   // The default of one is no contradiction to the other.

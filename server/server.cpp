@@ -68,6 +68,7 @@ VisitOptions visit_options(const ServerConfig& config) {
   VisitOptions options;
   options.policy.idle_timeout = std::chrono::seconds(config.idle_timeout_s);
   options.policy.default_fps = config.fps;
+  options.policy.detail_px = static_cast<float>(config.detail_px);
   options.policy.default_bitrate_kbps = config.bitrate_kbps;
   options.max_sessions = config.max_sessions;
   options.max_sessions_per_address = config.max_sessions_per_address;

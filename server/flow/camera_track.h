@@ -36,6 +36,10 @@ class CameraTrack {
   [[nodiscard]] const std::optional<PoseSample>& newest() const { return newest_; }
   /// The newest pose, with the camera moved to where it will be when the picture is seen.
   [[nodiscard]] const PoseSample& aim() const { return aim_; }
+  /// The camera so long after the newest pose, if that can be told.
+  [[nodiscard]] std::optional<Pose> ahead(std::chrono::microseconds time) const {
+    return newest_ ? forecast_.at(newest_->client_time_us + time.count()) : std::nullopt;
+  }
   /// Aims at the newest pose itself, because the camera stands still.
   void aim_at_newest() { aim_ = *newest_; }
 

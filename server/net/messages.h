@@ -142,6 +142,12 @@ struct Stats {
   std::uint32_t steps_down = 0;
   std::uint32_t queue_delay_us = 0;
   std::uint32_t rtt_us = 0;
+  // The last picture of a scene in pages.
+  std::uint32_t gaussians_drawn = 0;
+  std::uint32_t nodes_drawn = 0;
+  std::uint32_t missing_pages = 0;
+  float coarsest_px = 0.0f;
+  float detail_px = 0.0f;
 };
 
 struct Heartbeat {

@@ -287,6 +287,11 @@ void fill(const Stats& stats, v1::ServerMessage& out) {
   message.set_steps_down(stats.steps_down);
   message.set_queue_delay_us(stats.queue_delay_us);
   message.set_rtt_us(stats.rtt_us);
+  message.set_gaussians_drawn(stats.gaussians_drawn);
+  message.set_nodes_drawn(stats.nodes_drawn);
+  message.set_missing_pages(stats.missing_pages);
+  message.set_coarsest_px(stats.coarsest_px);
+  message.set_detail_px(stats.detail_px);
 }
 
 void fill(const Heartbeat& heartbeat, v1::ServerMessage& out) {

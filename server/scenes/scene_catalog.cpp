@@ -18,6 +18,7 @@
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/tree/tree_file.h"
 #include "render_core/synth/synth.h"
 #include "server/base/log_event.h"
 #include "server/net/http.h"
@@ -64,17 +65,30 @@ bool has_levels(const std::string& spec) {
   return locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
 }
 
-Scene load(const std::string& spec, const ServerConfig& config, LoadOptions options) {
-  if (is_synthetic(spec)) return synthesize(spec);
+bool is_tree(const std::string& spec) {
+  const SceneLocation location = locate_scene(spec);
+  return location.kind == SceneLocation::Kind::file && is_tree(FileSource(location.path));
+}
+
+/// A scene in memory; or, with a tree, its outline.
+SceneInPages load(const std::string& spec, const ServerConfig& config, LoadOptions options) {
+  if (is_synthetic(spec)) return {nullptr, synthesize(spec)};
   if (has_levels(spec)) {
     if (config.lod >= 0) options.lod = config.lod;
     if (config.gaussian_budget > 0)
       options.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
   }
-  return load_scene(spec, options);
+  if (is_tree(spec)) return open_in_pages(spec, options);
+  return {nullptr, load_scene(spec, options)};
 }
 
 }  // namespace
+
+std::uint64_t tree_memory(const ServerConfig& config) {
+  constexpr std::uint64_t megabyte = 1'000'000;
+  if (config.scene_memory_mb == 0) return RendererOptions{}.scene_memory;
+  return static_cast<std::uint64_t>(config.scene_memory_mb) * megabyte / 2;
+}
 
 std::shared_ptr<const SceneEntry> load_scene(
     const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
@@ -85,11 +99,12 @@ std::shared_ptr<const SceneEntry> load_scene(
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
-  Scene scene = load(spec, config, std::move(options));
+  auto [tree, scene] = load(spec, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
-  entry->facts.gaussians = scene.cloud.size();
+  entry->facts.gaussians = tree ? tree->header().gaussians : scene.cloud.size();
+  entry->in_pages = tree != nullptr;
   use_hints(scene.hints, scene.name, entry->facts);
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);
@@ -100,7 +115,11 @@ std::shared_ptr<const SceneEntry> load_scene(
     if (text) entry->sidecar_tag = etag_of(*text);
     entry->tours = ToursAnswers(tours_of(entry->sidecar, text));
   }
-  auto made = make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
+  RendererOptions with_memory = core;
+  with_memory.scene_memory = tree_memory(config);
+  auto made = tree ? make_renderer(tree, with_memory)
+                   : make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)),
+                                   with_memory);
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
   entry->poster = make_poster(*entry->renderer, entry->facts);

@@ -10,6 +10,10 @@
 
 namespace catgs {
 
+/// The memory for pages of one scene on each device, bytes. With half of --scene-memory, two scenes
+/// fit at any time.
+std::uint64_t tree_memory(const ServerConfig& config);
+
 /// Loads one scene (a path, or synth:KIND:COUNT[:SEED]) and builds its renderer with the options
 /// and pool of `core`. `id_of` makes the id from the name. `threads` threads read the file.
 /// `progress` is called repeatedly and may throw to cancel. Throws InputError.

@@ -17,6 +17,7 @@ struct SceneEntry {
   SceneFacts facts;
   std::string name{};  // of its file, for people
   std::shared_ptr<Renderer> renderer;
+  bool in_pages = false;      // a tree: its frames have a detail
   std::string renderer_text;  // description and reason, for people
   std::shared_ptr<const SurfacePoints> surface{};
   std::filesystem::path sidecar{};  // where it is or would be; empty: nowhere

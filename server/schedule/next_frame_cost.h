@@ -22,6 +22,7 @@ class NextFrameCost {
 
   /// The predicted cost of rendering and encoding the next frame; 0 before the first.
   [[nodiscard]] Clock::duration next() const { return render_ + encode_; }
+  [[nodiscard]] Clock::duration render() const { return render_; }
   /// The predicted cost of a still. Before the first still, it is that of a frame in motion.
   [[nodiscard]] Clock::duration still() const {
     return still_ == Clock::duration{} ? next() : still_;

@@ -12,6 +12,9 @@ using namespace std::chrono_literals;
 
 constexpr int max_failures_in_a_row = 3;
 
+// How far ahead a scene's pages are read: they take some tens of milliseconds.
+constexpr auto pages_ahead = 150ms;
+
 // The interval between refinements of a still: its time on the link, plus a quarter so that queues
 // drain.
 constexpr double still_pause = 1.25;
@@ -31,6 +34,7 @@ void FrameLoop::enter_scene(const SceneFacts& scene) {
   near_z_ = scene.near_z;
   background_ = colour_of(scene.about.background_rgb);
   track_ = CameraTrack(near_z_);
+  settled_ = true;
 }
 
 bool FrameLoop::pose_arrived(const PoseSample& sample, TimePoint now) {
@@ -67,7 +71,7 @@ bool FrameLoop::shows(const PoseSample& pose) const {
 
 std::optional<FrameCandidate> FrameLoop::next(const IdrPolicy& idr, bool still_size) const {
   if (!track_.newest() || !flow_.may_send()) return std::nullopt;
-  const bool moved = !shows(track_.aim());
+  const bool moved = !settled_ || !shows(track_.aim());
   FrameCandidate frame{{}, {}, cost_.next()};
   std::optional<TimePoint> ready = moved ? pace_.next_start_of_pose() : pace_.next_start();
   if (!moved) {
@@ -111,6 +115,8 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   order.request.camera = make_camera(aim.world_from_camera, ticket.size_px,
                                      focal_from_fov_y(aim.fov_y_rad, ticket.size_px.y), near_z_);
   order.request.background = background_;
+  order.request.detail_px = ticket.still ? policy_.detail_px : detail_.detail_px();
+  order.request.soon = track_.ahead(pages_ahead);
 }
 
 void FrameLoop::limit(FrameOrder& order, TimePoint now) {
@@ -148,6 +154,8 @@ bool FrameLoop::made(const FrameResult& result, glm::ivec2 moving_size_px, TimeP
   const FrameTicket& ticket = result.frame.ticket;
   if (ticket.frame_id <= obsolete_frames_) return false;
   cost_.add(ticket);
+  if (!ticket.refined) settled_ = result.stats.settled;
+  if (!ticket.still) detail_.update(cost_.render(), interval(), now);
   // The VBV follows the bitrate one picture late. The first still in the stream of motion therefore
   // had no more room than a picture in motion.
   const bool had_room =

@@ -8,6 +8,7 @@
 
 #include "server/base/clock.h"
 #include "server/flow/camera_track.h"
+#include "server/flow/detail_ladder.h"
 #include "server/flow/flow_control.h"
 #include "server/flow/frame_pace.h"
 #include "server/flow/idr_policy.h"
@@ -27,7 +28,7 @@ namespace catgs {
 class FrameLoop {
  public:
   FrameLoop(const VisitPolicy& policy, FlowControl& flow)
-      : policy_(policy), flow_(flow), rest_(policy.still_after) {}
+      : policy_(policy), flow_(flow), rest_(policy.still_after), detail_(policy.detail_px) {}
 
   /// Forgets the poses of the previous scene.
   void enter_scene(const SceneFacts& scene);
@@ -45,7 +46,7 @@ class FrameLoop {
   /// last frame has the size of a still.
   [[nodiscard]] std::optional<FrameCandidate> next(const IdrPolicy& idr, bool still_size) const;
   /// True: a frame that starts now may be a still. Valid after the first pose, as is start().
-  [[nodiscard]] bool rests(TimePoint now) const { return now >= rest_.begins(); }
+  [[nodiscard]] bool rests(TimePoint now) const { return settled_ && now >= rest_.begins(); }
   /// Fills in the pose and the size limit of a frame. `order` already holds the encoder settings.
   void start(FrameOrder& order, TimePoint now);
   /// A frame was made and is about to be sent. False: discard it.
@@ -55,6 +56,8 @@ class FrameLoop {
   /// Like failed(), with nothing changed for the next frame. True: too many failed in a row.
   bool failed_again();
 
+  /// The detail of pictures of a moving camera.
+  [[nodiscard]] float detail_px() const { return detail_.detail_px(); }
   /// The real interval between frames.
   [[nodiscard]] std::chrono::microseconds interval() const {
     return std::max(flow_.frame_interval(), pace_.real_interval());
@@ -75,6 +78,8 @@ class FrameLoop {
   FramePace pace_;
   Rest rest_;
   NextFrameCost cost_;
+  DetailLadder detail_;
+  bool settled_ = true;  // the last picture has all the detail that its scene's pages can give it
   std::optional<PoseSample> shown_;  // pose of the last picture rendered
   int refinements_left_ = 0;
   std::optional<TimePoint> next_refinement_;

@@ -197,6 +197,8 @@ void Visit::on_frame(FrameResult result, TimePoint now) {
   }
   if (!frames_.made(result, stream_.plan().moving().size_px, now)) return;
   last_said_ = now;
+  if (stream_.scene()->in_pages && !result.frame.ticket.refined)
+    statistics_.pages_drawn(result.stats, frames_.detail_px());
   if (stream_.describe(result)) say(stream_.introduction(), now);
   const auto dropped = host_.send(std::move(result.frame));
   for (const std::uint64_t id : dropped) flow_.lost(id);

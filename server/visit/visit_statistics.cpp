@@ -14,6 +14,14 @@ void VisitStatistics::frame_sent(std::size_t bytes) {
   second_bytes_ += bytes;
 }
 
+void VisitStatistics::pages_drawn(const FrameStats& frame, float detail_px) {
+  stats_.gaussians_drawn = frame.visible;
+  stats_.nodes_drawn = frame.nodes;
+  stats_.missing_pages = frame.missing_pages;
+  stats_.coarsest_px = frame.coarsest_px;
+  stats_.detail_px = detail_px;
+}
+
 void VisitStatistics::frames_lost(std::size_t count) {
   frames_dropped_ += count;
   stats_.dropped_packets += static_cast<std::uint32_t>(count);

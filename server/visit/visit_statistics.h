@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "render_core/renderer.h"
 #include "server/base/clock.h"
 #include "server/flow/flow_control.h"
 #include "server/net/messages.h"
@@ -18,6 +19,8 @@ class VisitStatistics {
 
   /// A frame left through the socket. Only now does it count as sent.
   void frame_sent(std::size_t bytes);
+  /// A frame of a scene in pages was drawn.
+  void pages_drawn(const FrameStats& frame, float detail_px);
   /// Frames were dropped before they reached the socket.
   void frames_lost(std::size_t count);
   void frame_dropped_by_client() { ++frames_dropped_; }

@@ -216,6 +216,13 @@ export const text = {
     age_title: 'Age of the camera that the picture shows, while moving: median / 95th percentile',
     bitrate: 'Bitrate',
     picture: 'Picture',
+    detail: 'Detail',
+    detail_title:
+      'Scenes that the server reads in pages: the largest error it draws, the Gaussians in the picture, and the pages that are still missing',
+    detail_value: (px: number, gaussians: number, missing_pages: number): string => {
+      const drawn = `${px < 100 ? px.toFixed(1) : '> 100'} px, ${(gaussians / 1e6).toFixed(2)} M`;
+      return missing_pages === 0 ? drawn : `${drawn}, ${missing_pages} pages missing`;
+    },
     drops: 'Drops',
     drops_title: 'Frames that arrived and were never shown; packets that the server never sent',
     drops_value: (here: number, server: number): string => `${here} here, ${server} at the server`,

@@ -50,6 +50,7 @@ class FrameLoopTest : public testing::Test {
     result.frame.ticket.render = result.frame.ticket.encode = {now, now};
     result.frame.bitstream.resize(order.ticket.still ? still_bytes : 100);
     result.sharp = sharp;
+    result.stats.settled = settled;
     return loop.made(result, moving_px, now);
   }
   void ack(const FrameOrder& order, std::uint32_t pose_age_us = 0) {
@@ -83,6 +84,7 @@ class FrameLoopTest : public testing::Test {
   glm::ivec2 still_px{640, 360};
   glm::ivec2 shown_px{0};
   bool sharp = false;  // what the encoder says of its pictures
+  bool settled = true;  // all pages of the scene are there that the picture needs
   std::size_t still_bytes = 100;
   std::uint64_t poses = 0;
   TimePoint now = TimePoint{} + 1h;
@@ -129,6 +131,25 @@ TEST_F(FrameLoopTest, KeepsTheNominalRateAndUsesTheNewestPose) {
     ++frames;
   }
   EXPECT_NEAR(frames, 60, 1);
+}
+
+// A camera that rests has a new picture as long as pages come in. Its still waits for the last.
+TEST_F(FrameLoopTest, DrawsOnUntilThePictureHasItsDetail) {
+  settled = false;
+  moved();
+  for (int i = 0; i < 30; ++i) {
+    now += 17ms;
+    ASSERT_TRUE(is_due());
+    EXPECT_FALSE(run().ticket.still);
+  }
+  settled = true;
+  now += 17ms;
+  EXPECT_FALSE(run().ticket.still);
+  now += 17ms;
+  ASSERT_TRUE(is_due());
+  const FrameOrder still = run();
+  EXPECT_TRUE(still.ticket.still);
+  EXPECT_EQ(still.request.detail_px, policy.detail_px);
 }
 
 TEST_F(FrameLoopTest, IgnoresAPoseThatWasOvertaken) {

@@ -34,6 +34,17 @@ export interface StatsSnapshot extends Motion {
   readonly frames_shown: number; // since the page was opened
   readonly frames_dropped: number; // never shown by this client
   readonly packets_dropped: number; // never sent by the server
+  /** Of the last picture; undefined where the scene is in the server's memory as a whole. */
+  readonly pages: PagesDrawn | undefined;
+}
+
+/** What the last picture shows of a scene that is read in pages. */
+export interface PagesDrawn {
+  readonly gaussians: number;
+  readonly nodes: number;
+  readonly missing_pages: number;
+  readonly detail_px: number; // largest error drawn on purpose
+  readonly coarsest_px: number; // largest error drawn for want of pages
 }
 
 /** Present figures, and those of the last time the camera moved. */
@@ -54,6 +65,7 @@ export class Metrics {
   private frames_dropped_ = 0;
   private size_px_: readonly [number, number] = [0, 0];
   private packets_dropped_ = 0;
+  private pages_: PagesDrawn | undefined;
 
   configured(config: StreamConfig): void {
     this.pose_age_.set_rate(config.fps);
@@ -98,6 +110,16 @@ export class Metrics {
 
   server_said(stats: Stats): void {
     this.packets_dropped_ = stats.droppedPackets;
+    const in_pages = stats.nodesDrawn > 0;
+    this.pages_ = !in_pages
+      ? undefined
+      : {
+          gaussians: stats.gaussiansDrawn,
+          nodes: stats.nodesDrawn,
+          missing_pages: stats.missingPages,
+          detail_px: stats.detailPx,
+          coarsest_px: stats.coarsestPx,
+        };
   }
 
   snapshot(now_us: number): StatsReport {
@@ -111,6 +133,7 @@ export class Metrics {
       frames_shown: this.frames_shown_,
       frames_dropped: this.frames_dropped_,
       packets_dropped: this.packets_dropped_,
+      pages: this.pages_,
       last_motion: this.motion((window) => window.newest()),
     };
   }

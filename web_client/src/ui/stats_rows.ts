@@ -54,6 +54,14 @@ export const stats_rows: readonly Row[] = [
   ...stages.map(stage_row),
   { label: text.stats.picture, text: once_shown((s) => `${s.width_px} × ${s.height_px}`) },
   {
+    label: text.stats.detail,
+    title: text.stats.detail_title,
+    text: ({ pages: p }) =>
+      p === undefined
+        ? nothing
+        : text.stats.detail_value(Math.max(p.detail_px, p.coarsest_px), p.gaussians, p.missing_pages),
+  },
+  {
     label: text.stats.drops,
     title: text.stats.drops_title,
     text: once_shown((s) => text.stats.drops_value(s.frames_dropped, s.packets_dropped)),
