@@ -7,7 +7,7 @@
 namespace catgs {
 
 PagedFrame::PagedFrame(TreePager& pager, const ViewSettings& settings)
-    : pager_(pager), watch_(pager.watch()) {
+    : pager_(pager), keeps_pages_(settings.pipeline == Pipeline::paper), watch_(pager.watch()) {
   if (settings.pipeline == Pipeline::vanilla)
     throw InputError("--pipeline vanilla", "", "draws whole scenes only, not parts of a tree",
                      "leave --detail and --scene-memory out");
@@ -21,13 +21,15 @@ void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
     lookout.cameras.push_back(request.camera);
     lookout.cameras.back().world_from_camera = *request.soon;
   }
+  table_.reset();
   if (request.waits_for_pages) pager_.settle(lookout);
   watch_->look(std::move(lookout));
   table_ = pager_.table();
   now_s_ = pager_.now_s();
 }
 
-void PagedFrame::report(FrameStats& stats) const {
+void PagedFrame::end(FrameStats& stats) {
+  if (!keeps_pages_) table_.reset();
   stats.missing_pages = watch_->missing();
   stats.coarsest_px = watch_->coarsest_px();
   stats.settled = !watch_->waits(pager_.now_s());

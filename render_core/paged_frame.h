@@ -16,20 +16,22 @@ class PagedFrame {
   /// `pager` must outlive it. Throws InputError for a pipeline that cannot draw pages.
   PagedFrame(TreePager& pager, const ViewSettings& settings);
 
-  /// Call before a frame is drawn that finds its clusters afresh. The table stays until the next
-  /// call.
+  /// Call before a frame is drawn that finds its clusters afresh.
   void begin(const FrameRequest& request, const FramePlan& plan);
+  /// Valid from begin() to end().
   [[nodiscard]] const PageTable& table() const { return *table_; }
   /// The frame's time, as PageInSlot::shown_since_s.
   [[nodiscard]] double now_s() const { return now_s_; }
   /// The cameras that the frame draws for: now, and at the end of its window if it has one.
   [[nodiscard]] const std::vector<Camera>& cameras() const { return cameras_; }
 
-  /// Fills in what the statistics say of pages.
-  void report(FrameStats& stats) const;
+  /// Call after each frame. Fills in what the statistics say of pages. The pages of a frame that no
+  /// sub-frame follows may go from now on.
+  void end(FrameStats& stats);
 
  private:
   TreePager& pager_;
+  bool keeps_pages_;  // for sub-frames
   std::shared_ptr<Watch> watch_;
   std::shared_ptr<const PageTable> table_;
   double now_s_ = 0.0;

@@ -70,6 +70,7 @@ FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
   clock.end(Stage::blend);
   if (occludes) occlusion_.finish();
   summarise(stats);
+  if (paged_) paged_->end(stats);
   mean_inverse_depth_ = stats.mean_inverse_depth;
   return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats};
 }
@@ -88,7 +89,6 @@ void CpuView::summarise(FrameStats& stats) const {
   if (counted > 0)
     stats.mean_inverse_depth = static_cast<float>(inverse_depths / static_cast<double>(counted));
   stats.nodes = static_cast<std::uint32_t>(clusters_.size());
-  if (paged_) paged_->report(stats);
   stats.tasks = lists_.tiles();  // each tile is one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();

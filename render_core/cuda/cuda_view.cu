@@ -387,7 +387,7 @@ FrameView CudaView::finished(FrameKind kind, float near_z) {
     frame.planes = {Plane{rgb, 3 * sizeof(float) * width}, Plane{}, Plane{}};
   }
   frame.stats = frame_stats(*memory_.host_counts.get(), shape_, kind, near_z);
-  if (paged_) paged_->report(frame.stats);
+  if (paged_) paged_->end(frame.stats);
   mean_inverse_depth_ = frame.stats.mean_inverse_depth;
   times_.read(settings_.pipeline != Pipeline::vanilla && kind == FrameKind::key,
               frame.stats.stage_ms);

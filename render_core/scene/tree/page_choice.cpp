@@ -41,7 +41,8 @@ void PageChoice::note(const Cut& cut) {
   }
 }
 
-PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t most) {
+PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t held_slots,
+                                  std::uint32_t most) {
   Step step;
   std::uint32_t left_out = 0;  // pages
   float left_out_error = 0.0f;
@@ -56,7 +57,7 @@ PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t most) 
     left_out += size;
     if (left_out >= most) break;
   }
-  const auto free_then = free_slots - static_cast<std::uint32_t>(step.load.size());
+  const auto free_then = free_slots + held_slots - static_cast<std::uint32_t>(step.load.size());
   const std::uint32_t goal = reserve_ + (reserve_ > 0 ? std::min(left_out, most) : 0);
   if (free_then < goal) drop_for(goal - free_then, left_out_error, step.drop);
   return step;

@@ -27,9 +27,9 @@ class PageChoice {
     std::vector<std::uint64_t> load;  // whole families, largest error first
     std::vector<std::uint64_t> drop;  // whole families
   };
-  /// `free_slots`: those that may be written now. Dropped pages free theirs later, when no frame
-  /// needs them any more. At most `most` pages are loaded, in whole families.
-  Step next(std::uint32_t free_slots, std::uint32_t most);
+  /// `free_slots`: those that may be written now. `held_slots`: those of dropped pages that a frame
+  /// still needs. At most `most` pages are loaded, in whole families.
+  Step next(std::uint32_t free_slots, std::uint32_t held_slots, std::uint32_t most);
   /// A page of the last step's `load` cannot be read, so its family is not in memory, and is not
   /// asked for again.
   void failed(std::uint64_t page);

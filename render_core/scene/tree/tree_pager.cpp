@@ -201,7 +201,9 @@ bool TreePager::turn(std::span<const std::shared_ptr<Watch>> watches, const Look
     if (!cut.missing.empty()) waiting.push_back(watch.get());
   }
   if (settled != nullptr) choice_.note(table->cut(settled->cameras, settled->detail_px, later));
-  const PageChoice::Step step = choice_.next(free_->count(), most_pages);
+  const std::uint32_t free = free_->count();
+  const auto in_memory = static_cast<std::uint32_t>(table->size());
+  const PageChoice::Step step = choice_.next(free, store_.slots() - free - in_memory, most_pages);
   const bool changed = carry_out(step, settled != nullptr ? Arrival::at_once : Arrival::blends);
   if (changed)
     for (Watch* watch : waiting) watch->blends_until(now_s() + all_shown_s);

@@ -43,7 +43,7 @@ class Memory {
   PageChoice::Step turn(const Cut& cut, std::uint32_t most = 8) {
     choice_.begin(now_s_ += 0.01);
     choice_.note(cut);
-    PageChoice::Step step = choice_.next(free(), most);
+    PageChoice::Step step = choice_.next(free(), 0, most);
     EXPECT_LE(step.load.size(), std::min(free(), most));
     for (const std::uint64_t page : step.drop) EXPECT_EQ(resident_.erase(page), 1u);
     for (const std::uint64_t page : step.load) EXPECT_TRUE(resident_.insert(page).second);
@@ -123,17 +123,39 @@ TEST(PageChoice, ThoseInUseStayUnlessOthersNeedItClearlyMore) {
   EXPECT_FALSE(memory.resident().contains(last));
 }
 
+// Slots that frames hold come free by themselves, so nothing more is dropped for want of them.
+TEST(PageChoice, NoMoreIsDroppedThanIsNeeded) {
+  Memory memory(20);
+  Cut all;
+  for (std::uint64_t page = 1; page < memory.shape().pages(); ++page) memory.want(page, 1.0f, all);
+  for (int turn = 0; turn < 50; ++turn) memory.turn(all);
+  Cut elsewhere;
+  memory.want(memory.shape().pages() - 1, 50.0f, elsewhere);
+  memory.choice().begin(10.0);
+  memory.choice().note(elsewhere);
+  const PageChoice::Step first = memory.choice().next(0, 0, 8);
+  EXPECT_FALSE(first.drop.empty());
+  const auto held = static_cast<std::uint32_t>(first.drop.size());
+  for (int turn = 1; turn < 10; ++turn) {
+    memory.choice().begin(10.0 + turn);
+    memory.choice().note(elsewhere);
+    const PageChoice::Step next = memory.choice().next(0, held, 8);
+    EXPECT_TRUE(next.load.empty());
+    EXPECT_TRUE(next.drop.empty());
+  }
+}
+
 TEST(PageChoice, UnreadablePagesAreAskedForOnce) {
   Memory memory(100);
   Cut cut;
   memory.want(1, 4.0f, cut);
   memory.choice().begin(1.0);
   memory.choice().note(cut);
-  EXPECT_EQ(memory.choice().next(99, 8).load.size(), 2u);
+  EXPECT_EQ(memory.choice().next(99, 0, 8).load.size(), 2u);
   memory.choice().failed(1);
   memory.choice().begin(2.0);
   memory.choice().note(cut);
-  EXPECT_TRUE(memory.choice().next(99, 8).load.empty());
+  EXPECT_TRUE(memory.choice().next(99, 0, 8).load.empty());
 }
 
 TEST(PageChoice, AnyWishesKeepItsRules) {

@@ -121,6 +121,20 @@ TEST_F(TreePagerTest, FramesKeepWhatTheyReadWhileTheCameraMoves) {
   other.join();
 }
 
+// A frame that holds its pages for long holds up the others, but takes nothing from them.
+TEST_F(TreePagerTest, PagesThatAFrameHoldsCostNoOthers) {
+  RecordingStore store(8);
+  TreePager pager(tree_of(bytes_), store);
+  pager.settle({{camera_at(-2, -6)}, 0.0f});
+  const std::size_t full = pager.table()->size();
+  auto held = pager.table();
+  for (int i = 0; i < 20; ++i) pager.settle({{camera_at(2, 5)}, 0.0f});
+  EXPECT_GE(pager.table()->size() + 6, full);
+  held.reset();
+  pager.settle({{camera_at(2, 5)}, 0.0f});
+  EXPECT_GE(pager.table()->size() + 3, full);
+}
+
 TEST_F(TreePagerTest, BlendsInAndComesToRest) {
   RecordingStore store(64);
   TreePager pager(tree_of(bytes_), store);
