@@ -1,7 +1,6 @@
 #include "server/config.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <charconv>
 #include <iterator>

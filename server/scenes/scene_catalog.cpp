@@ -90,6 +90,10 @@ std::uint64_t tree_memory(const ServerConfig& config) {
   return static_cast<std::uint64_t>(config.scene_memory_mb) * megabyte / 2;
 }
 
+std::uint64_t most_bytes(const SceneSize& size, const ServerConfig& config) {
+  return size.in_pages ? std::min(size.bytes(), tree_memory(config)) : size.bytes();
+}
+
 std::shared_ptr<const SceneEntry> load_scene(
     const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
     const ServerConfig& config, const RendererOptions& core, int threads,

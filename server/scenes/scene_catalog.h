@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "render_core/scene/files/scene_size.h"
 #include "server/config.h"
 #include "server/scenes/scene_entry.h"
 
@@ -13,6 +14,9 @@ namespace catgs {
 /// The memory for pages of one scene on each device, bytes. With half of --scene-memory, two scenes
 /// fit at any time.
 std::uint64_t tree_memory(const ServerConfig& config);
+
+/// The most memory that a scene of this size takes on each device, bytes.
+std::uint64_t most_bytes(const SceneSize& size, const ServerConfig& config);
 
 /// Loads one scene (a path, or synth:KIND:COUNT[:SEED]) and builds its renderer with the options
 /// and pool of `core`. `id_of` makes the id from the name. `threads` threads read the file.

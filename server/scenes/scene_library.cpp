@@ -89,7 +89,7 @@ void SceneLibrary::open_folders() {
                      "put one there, or give --scene");
   const auto& [id, book] = *shelf_.begin();
   const TimePoint now = clock_();
-  const auto wish = residency_.want(id, bytes_of(book.found), now, in_use());
+  const auto wish = residency_.want(id, most_bytes(book.found.size, config_), now, in_use());
   if (wish != SceneResidency::Wish::awaited)
     throw InputError("--scene-memory", {}, refusal(wish, id, book).message);
   residency_.next(now, in_use());
@@ -137,11 +137,6 @@ bool SceneLibrary::Book::in_use() const {
   return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1);
 }
 
-std::uint64_t SceneLibrary::bytes_of(const FoundScene& found) const {
-  const std::uint64_t all = found.size.bytes();
-  return found.size.in_pages ? std::min(all, tree_memory(config_)) : all;
-}
-
 SceneResidency::InUse SceneLibrary::in_use() const {
   return [this](const std::string& id) {
     const auto it = shelf_.find(id);
@@ -158,10 +153,10 @@ SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
   if (book.retry_at && now < *book.retry_at)
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("the scene \"{}\" could not be loaded", name_in(id)), false};
-  const auto wish = residency_.want(id, bytes_of(book.found), now, in_use());
+  const auto wish = residency_.want(id, most_bytes(book.found.size, config_), now, in_use());
   if (wish != SceneResidency::Wish::awaited) return refusal(wish, id, book);
   start_next(now);
-  return SceneAwaited{estimate(bytes_of(book.found))};
+  return SceneAwaited{estimate(most_bytes(book.found.size, config_))};
 }
 
 ErrorMessage SceneLibrary::refusal(SceneResidency::Wish wish, const std::string& id,
@@ -169,7 +164,7 @@ ErrorMessage SceneLibrary::refusal(SceneResidency::Wish wish, const std::string&
   if (wish == SceneResidency::Wish::too_large)
     return {ErrorCode::unknown_scene,
             fmt::format("the scene \"{}\" takes {}, more than this server has for scenes",
-                        name_in(id), megabytes(bytes_of(book.found))),
+                        name_in(id), megabytes(most_bytes(book.found.size, config_))),
             false};
   if (wish == SceneResidency::Wish::no_room)
     return {
@@ -187,7 +182,7 @@ void SceneLibrary::want_poster(const std::string& id) {
     if (it == shelf_.end() || making_poster_ || residency_.busy()) return;
     Book& book = it->second;
     if (book.gone || book.entry || book.poster || book.poster_tried ||
-        !residency_.has_room(bytes_of(book.found)))
+        !residency_.has_room(most_bytes(book.found.size, config_)))
       return;
     making_poster_ = book.poster_tried = true;
     boost::asio::post(loader_, [this, id, found = book.found] {
@@ -277,7 +272,8 @@ void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint sta
   const std::uint64_t bytes = loaded.entry->renderer->scene_bytes();
   const double seconds = std::chrono::duration<double>(now - started).count();
   bytes_per_second_ =
-      std::max(1e6, static_cast<double>(bytes_of(it->second.found)) / std::max(seconds, 0.1));
+      std::max(1e6, static_cast<double>(most_bytes(it->second.found.size, config_)) /
+                        std::max(seconds, 0.1));
   metrics_.scenes_loaded.Increment();
   residency_.loaded(id, bytes, now);
   it->second.entry = std::move(loaded.entry);

@@ -93,8 +93,6 @@ class SceneLibrary final : public SceneSource {
   void pin(std::shared_ptr<const SceneEntry> entry);
   void open_folders();
   [[nodiscard]] SceneResidency::InUse in_use() const;
-  /// The most memory that the scene takes.
-  [[nodiscard]] std::uint64_t bytes_of(const FoundScene& found) const;
   void start_next(TimePoint now);
   void release(const std::string& id);
   [[nodiscard]] std::shared_ptr<const SceneEntry> read(const std::string& id,

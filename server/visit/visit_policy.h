@@ -21,7 +21,7 @@ struct VisitPolicy {
   int default_bitrate_kbps = 8000;
   int max_bitrate_kbps = 100'000;
   int max_pixels = 3840 * 2160;                // larger wishes are scaled down
-  float detail_px = 0.5f;  // of trees: the finest, see DetailLadder
+  float detail_px = 0.5f;                      // of trees: the finest, see DetailLadder
   std::chrono::milliseconds still_after{100};  // without another view, at least: see Rest
   int refine_frames = 60;  // that sharpen a still picture at most, where the link is slow
   /// Between encoders that a client's settings ask for; the newest ones count.

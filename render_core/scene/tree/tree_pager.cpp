@@ -69,31 +69,28 @@ void Watch::look(Lookout lookout) {
     const std::lock_guard lock(mutex_);
     if (lookout == lookout_) return;
     lookout_ = std::move(lookout);
-    taken_ = false;
+    ++number_;
   }
   wake_();
 }
 
-Lookout Watch::take() {
+Watch::Numbered Watch::lookout() const {
   const std::lock_guard lock(mutex_);
-  taken_ = true;
-  return lookout_;
+  return {lookout_, number_};
 }
 
-void Watch::blends_until(double time_s) {
+void Watch::turned(std::uint64_t number, const Cut& cut, bool came, double now_s) {
   const std::lock_guard lock(mutex_);
-  blends_until_s_ = time_s;
+  turned_ = number;
+  missing_ = static_cast<std::uint32_t>(cut.missing.size());
+  coarsest_px_ = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
+  more_comes_ = came && !cut.missing.empty();
+  if (more_comes_) blends_until_s_ = now_s + all_shown_s;
 }
 
 bool Watch::waits(double now_s) const {
   const std::lock_guard lock(mutex_);
-  return !taken_ || now_s < blends_until_s_;
-}
-
-void Watch::note(const Cut& cut) {
-  const std::lock_guard lock(mutex_);
-  missing_ = static_cast<std::uint32_t>(cut.missing.size());
-  coarsest_px_ = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
+  return turned_ != number_ || more_comes_ || now_s < blends_until_s_;
 }
 
 std::uint32_t Watch::missing() const {
@@ -190,24 +187,26 @@ bool TreePager::turn(std::span<const std::shared_ptr<Watch>> watches, const Look
   const std::shared_ptr<const PageTable> table = this->table();
   // Pages that are only being blended in count as shown.
   constexpr double later = std::numeric_limits<double>::infinity();
-  std::vector<Watch*> waiting;
+  struct Looked {
+    Watch* watch;
+    std::uint64_t number;
+    Cut cut;
+  };
+  std::vector<Looked> looked;
   choice_.begin(now_s());
   for (const std::shared_ptr<Watch>& watch : watches) {
-    const Lookout lookout = watch->take();
+    const auto [lookout, number] = watch->lookout();
     if (lookout.cameras.empty()) continue;
-    const Cut cut = table->cut(lookout.cameras, lookout.detail_px, later);
-    choice_.note(cut);
-    watch->note(cut);
-    if (!cut.missing.empty()) waiting.push_back(watch.get());
+    looked.push_back({watch.get(), number, table->cut(lookout.cameras, lookout.detail_px, later)});
+    choice_.note(looked.back().cut);
   }
   if (settled != nullptr) choice_.note(table->cut(settled->cameras, settled->detail_px, later));
   const std::uint32_t free = free_->count();
   const auto in_memory = static_cast<std::uint32_t>(table->size());
   const PageChoice::Step step = choice_.next(free, store_.slots() - free - in_memory, most_pages);
-  const bool changed = carry_out(step, settled != nullptr ? Arrival::at_once : Arrival::blends);
-  if (changed)
-    for (Watch* watch : waiting) watch->blends_until(now_s() + all_shown_s);
-  return changed;
+  const bool came = carry_out(step, settled != nullptr ? Arrival::at_once : Arrival::blends);
+  for (const Looked& l : looked) l.watch->turned(l.number, l.cut, came, now_s());
+  return came;
 }
 
 /// Returns whether pages came or went.

@@ -58,14 +58,17 @@ class Watch {
 
   /// Says what the View draws now.
   void look(Lookout lookout);
-  /// Takes the lookout, for a turn of the pager.
-  [[nodiscard]] Lookout take();
-  /// Takes note of the pages that were missing in a cut for the lookout.
-  void note(const Cut& cut);
-  /// Pages for the lookout are blended in until then, in the pager's time.
-  void blends_until(double time_s);
-  /// Whether the next frame for the same lookout may look better than one at `now_s`: pages are
-  /// being blended in, or the pager has yet to look for them.
+  /// The lookout, and its number.
+  struct Numbered {
+    Lookout lookout;
+    std::uint64_t number = 0;
+  };
+  [[nodiscard]] Numbered lookout() const;
+  /// A turn of the pager has looked at the lookout with this number. `cut`: what was missing before
+  /// the turn. `came`: whether pages came or went in it, so that there will be another.
+  void turned(std::uint64_t number, const Cut& cut, bool came, double now_s);
+  /// Whether the next frame for the same lookout may look better than one at `now_s`, in the
+  /// pager's time: pages are still being read or blended in.
   [[nodiscard]] bool waits(double now_s) const;
   /// Number of pages that were missing of late: they are being read, or find no room.
   [[nodiscard]] std::uint32_t missing() const;
@@ -76,7 +79,8 @@ class Watch {
   const std::function<void()> wake_;
   mutable std::mutex mutex_;  // guards the rest
   Lookout lookout_;
-  bool taken_ = true;  // lookout_ is
+  std::uint64_t number_ = 0, turned_ = 0;  // of lookout_, and of the last one that was looked at
+  bool more_comes_ = false;
   double blends_until_s_ = 0.0;
   std::uint32_t missing_ = 0;
   float coarsest_px_ = 0.0f;

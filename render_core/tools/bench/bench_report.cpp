@@ -231,10 +231,9 @@ namespace {
 
 void print_pages(const Measurement& measurement, float detail_px) {
   const PageUsage pages = measurement.pages();
-  fmt::print(
-      "{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most; coarsest {:.1f} px\n",
-      "detail", detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
-      pages.coarsest_px);
+  fmt::print("{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most{}\n", "detail",
+             detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
+             pages.missing_max > 0 ? fmt::format("; coarsest {:.3g} px", pages.coarsest_px) : "");
 }
 
 }  // namespace

@@ -327,6 +327,34 @@ TEST_F(CatgsRender, ConvertsToATreeAndBack) {
   EXPECT_THAT(memory.out, HasSubstr("--memory"));
 }
 
+TEST_F(CatgsRender, DrawsATreeFromItsPages) {
+  const std::string tree = path("city.tree");
+  ASSERT_EQ(run("synth city --gaussians 40000 " + tree).exit_code, 0);
+  const auto bench = [&](const std::string& flags) {
+    const Outcome done = run(fmt::format(
+        "bench {} --script walk --duration 0.2 --fps 30 --size 160x90 --renderer cpu --pipeline "
+        "catgs --quality --quality-every 3 --json - {}",
+        tree, flags));
+    EXPECT_EQ(done.exit_code, 0) << done.out;
+    return nlohmann::json::parse(done.out);
+  };
+  const auto all = bench("--detail 0"), coarse = bench("--detail 8");
+  const auto few = bench("--detail 0 --scene-memory 0.001");
+  EXPECT_EQ(all.at("pages").at("missing_max"), 0);
+  EXPECT_GT(all.at("quality").at("key").at("psnr_db").at("mean"), 50.0);
+  EXPECT_LT(coarse.at("visible_mean"), 0.7 * all.at("visible_mean").get<double>());
+  EXPECT_GT(few.at("pages").at("missing_max"), 0);
+  EXPECT_LT(few.at("scene_bytes"), all.at("scene_bytes"));
+
+  const Outcome whole = frames("--trace " + path("path.tum") + " --detail 1 --out " + path("out"));
+  EXPECT_EQ(whole.exit_code, 2);
+  EXPECT_THAT(whole.out, AllOf(HasSubstr("ball.ply"), HasSubstr("convert")));
+  const Outcome alpha = run(fmt::format(
+      "frames {} --script still --size 64x48 --detail 1 --alpha --out {}", tree, path("out")));
+  EXPECT_EQ(alpha.exit_code, 2);
+  EXPECT_THAT(alpha.out, HasSubstr("--detail"));
+}
+
 TEST_F(CatgsRender, SynthesizedTreesAreThoseOfTheWholeScene) {
   ASSERT_EQ(run("synth city --gaussians 5000 " + path("a.tree")).exit_code, 0);
   ASSERT_EQ(run("synth city --gaussians 5000 --memory 0 " + path("b.tree")).exit_code, 0);

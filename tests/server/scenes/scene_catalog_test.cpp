@@ -6,6 +6,7 @@
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/render_core/scene/tree/tree_test_support.h"
 
 namespace catgs::test {
 namespace {
@@ -63,6 +64,24 @@ TEST_F(SceneCatalog, RefusesALevelThatNoSceneHas) {
   config_.scenes = {folder_ / "plain.splat", "synth:city:1000"};
   EXPECT_THAT([&] { gaussians(0); },
               ThrowsMessage<InputError>(AllOf(HasSubstr("--lod"), HasSubstr("streamed SOG"))));
+}
+
+// A tree may have any number of Gaussians: --scene-memory bounds what is in memory of it.
+TEST_F(SceneCatalog, ReadsATreeInPages) {
+  ThreadPool pool(2);
+  write("large.tree", tree_bytes(random_cloud(60'000, 0), pool));
+  config_.scenes = {folder_ / "large.tree"};
+  config_.scene_memory_mb = 8;
+  const auto entry =
+      load_scenes(config_, {.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(2)})
+          .at(0);
+  EXPECT_EQ(entry->facts.gaussians, 60'000u);
+  EXPECT_TRUE(entry->in_pages);
+  EXPECT_LE(entry->renderer->scene_bytes(), tree_memory(config_));
+  EXPECT_LE(tree_memory(config_), 4'000'000u);
+  EXPECT_NE(entry->poster, nullptr);
+  config_.scenes = {folder_ / "plain.splat"};
+  EXPECT_FALSE(load_scenes(config_, {.pool = std::make_shared<ThreadPool>(2)}).at(0)->in_pages);
 }
 
 TEST_F(SceneCatalog, NamesASceneThatIsNotThere) {

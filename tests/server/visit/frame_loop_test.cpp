@@ -83,7 +83,7 @@ class FrameLoopTest : public testing::Test {
   glm::ivec2 moving_px{640, 360};
   glm::ivec2 still_px{640, 360};
   glm::ivec2 shown_px{0};
-  bool sharp = false;  // what the encoder says of its pictures
+  bool sharp = false;   // what the encoder says of its pictures
   bool settled = true;  // all pages of the scene are there that the picture needs
   std::size_t still_bytes = 100;
   std::uint64_t poses = 0;
