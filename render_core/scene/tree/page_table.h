@@ -56,7 +56,7 @@ class PageTable {
            static_cast<std::uint32_t>(shape_->slot_of(node));
   }
 
-  /// What the core keeps with the table.
+  /// Data that the core keeps with the table.
   std::shared_ptr<const void> of_core;
 
   void add(std::shared_ptr<const PageInSlot> page) {

@@ -42,7 +42,7 @@ class PageStore {
 std::uint32_t slots_in(std::uint64_t memory_bytes, std::size_t cluster_bytes,
                        const TreeShape& shape);
 
-/// What a View looks at.
+/// The cameras and the detail of a View.
 struct Lookout {
   std::vector<Camera> cameras;  // now, and where it may be soon
   float detail_px = 0.0f;

@@ -11,7 +11,7 @@
 namespace catgs {
 namespace {
 
-// What two shares hide together is what all of it hides.
+// Two shares together hide what all of it hides.
 TEST(FadedOpacity, SharesHideAsMuchAsAll) {
   test::RandomSource random(3);
   for (int trial = 0; trial < 1000; ++trial) {

@@ -91,7 +91,7 @@ std::vector<NodeId> children_of(const TreeShape& shape, NodeId node) {
   return children;
 }
 
-/// What choose_cut() promises, looked at from each leaf and all that stands for it.
+/// Checks the promises of choose_cut() for each leaf and all that stands for it.
 void expect_sound(const SomePages& tree, std::span<const Camera> cameras, float detail_px) {
   const TreeShape& shape = tree.shape();
   const Cut cut = tree.cut(cameras, detail_px);
