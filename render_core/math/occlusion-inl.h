@@ -98,11 +98,13 @@ CATGS_HD_INLINE ClusterBox<T> cluster_box(const CameraModel<T>& camera, const Ve
   const T nearest = at.z - along(camera.forward), farthest = at.z + along(camera.forward);
   if (!(nearest > camera.near_z)) return {{T(0.0), T(0.0)}, {T(0.0), T(0.0)}, T(0.0)};
   // The low-pass filter's part of a splat's reach, and a pixel for rounding.
-  constexpr double blur_px = 1.83 + 1.0;  // sqrt(2 ln(255) low_pass_px2) + 1
+  constexpr double blur_px = 1.83, ln_2 = 0.6931471805599453;
+  static_assert(blur_px * blur_px > -2.0 * ln_2 * log2_alpha_min * low_pass_px2);
   const auto interval = [&](T middle, T half, T focal, T principal, T low_slope, T high_slope) {
     const T low = middle - half, high = middle + half;
     const T steepest = max(abs(low_slope), abs(high_slope));
-    const T beyond = T(blur_px) + focal * sqrt(T(1.0) + steepest * steepest) * reach / nearest;
+    const T beyond =
+        T(blur_px + 1.0) + focal * sqrt(T(1.0) + steepest * steepest) * reach / nearest;
     return Vec2<T>{focal * (low / (low < T(0.0) ? nearest : farthest)) + principal - beyond,
                    focal * (high / (high < T(0.0) ? farthest : nearest)) + principal + beyond};
   };

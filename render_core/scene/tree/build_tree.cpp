@@ -26,7 +26,7 @@ namespace {
 /// Pages of leaves that are made at a time: work for every thread, from 120 MB of Gaussians.
 constexpr std::size_t pages_at_a_time = 256;
 
-/// What the first reading of a scene finds: its extent, and its parts where all of them fit into
+/// The first reading of a scene finds its extent. It keeps the parts where all of them fit into
 /// memory.
 struct FirstReading {
   std::uint64_t gaussians = 0, dropped = 0;

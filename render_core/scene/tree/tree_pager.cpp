@@ -121,6 +121,7 @@ TreePager::~TreePager() = default;
 
 std::shared_ptr<const PageTable> TreePager::table() const {
   const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(failure_);
   return table_;
 }
 
@@ -156,7 +157,13 @@ void TreePager::run(const std::stop_token& stop) {
       looked_ = false;
     }
     if (stop.stop_requested()) return;
-    goes_on = turn(watches(), nullptr);
+    try {
+      goes_on = turn(watches(), nullptr);
+    } catch (...) {  // a lost device, or no memory: the next frame says so
+      const std::lock_guard lock(mutex_);
+      failure_ = std::current_exception();
+      return;
+    }
     std::unique_lock lock(mutex_);
     wake_.wait_until(lock, stop, began + least_turn, [] { return false; });
   }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -106,7 +107,7 @@ class TreePager {
   ~TreePager();
 
   [[nodiscard]] const TreeShape& shape() const { return tree_->shape(); }
-  /// The pages in memory now.
+  /// The pages in memory now. Throws what ended the pager: its core failed to take a page.
   [[nodiscard]] std::shared_ptr<const PageTable> table() const;
   /// The time of PageInSlot::shown_since_s.
   [[nodiscard]] double now_s() const;
@@ -135,12 +136,13 @@ class TreePager {
   std::mutex turn_mutex_;  // one turn at a time; guards choice_
   PageChoice choice_;
 
-  mutable std::mutex mutex_;  // guards the next five
+  mutable std::mutex mutex_;  // guards the next six
   std::condition_variable_any wake_;
   std::shared_ptr<const PageTable> table_;
   std::vector<std::weak_ptr<Watch>> watches_;
   PagerStats stats_;
-  bool looked_ = false;  // since the last turn
+  bool looked_ = false;         // since the last turn
+  std::exception_ptr failure_;  // that ended the thread
 
   ThreadPool readers_;
   std::jthread thread_;

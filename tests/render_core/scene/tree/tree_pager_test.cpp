@@ -4,6 +4,7 @@
 #include <chrono>
 #include <map>
 #include <set>
+#include <stdexcept>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -24,6 +25,7 @@ class RecordingStore final : public PageStore {
     return static_cast<std::uint32_t>(held_.size());
   }
   void put(std::uint32_t slot, const TreePage& page, std::uint64_t number) override {
+    if (broken) throw std::runtime_error("the device is lost");
     EXPECT_EQ(readers_[slot].load(), 0) << "slot " << slot << " is being read";
     EXPECT_GT(page.facts(0).count, 0u);
     held_[slot] = number;
@@ -47,6 +49,8 @@ class RecordingStore final : public PageStore {
       }
   }
   [[nodiscard]] int published() const { return published_; }
+
+  std::atomic<bool> broken{false};
 
  private:
   std::vector<std::atomic<std::uint64_t>> held_;
@@ -164,6 +168,25 @@ TEST_F(TreePagerTest, DamagedPagesCostDetailOnly) {
   const Cut cut = pager.table()->cut(std::span(&camera, 1), 0.0f, pager.now_s());
   EXPECT_FALSE(cut.drawn.empty());
   EXPECT_FALSE(cut.missing.empty());
+}
+
+TEST_F(TreePagerTest, ACoreThatFailsFailsTheNextFrame) {
+  RecordingStore store(64);
+  TreePager pager(tree_of(bytes_), store);
+  store.broken = true;
+  const auto watch = pager.watch();
+  watch->look({{camera_at(0, -6)}, 0.0f});
+  const auto failed = [&] {
+    try {
+      (void)pager.table();
+      return false;
+    } catch (const std::runtime_error&) {
+      return true;
+    }
+  };
+  for (int i = 0; i < 1000 && !failed(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_TRUE(failed());
 }
 
 TEST_F(TreePagerTest, WithoutTheRootThereIsNothing) {
