@@ -41,6 +41,26 @@ std::vector<Measurement::Frame> time_path(const RenderSetup& setup, const ViewSe
   return frames;
 }
 
+/// See Measurement::sharp_ms.
+std::vector<double> time_rests(const RenderSetup& setup, const ViewSettings& settings) {
+  constexpr std::size_t places = 8;
+  const auto view = setup.made.renderer->make_view(settings);
+  std::vector<double> times;
+  for (std::size_t place = 0; place < std::min(places, setup.poses.size()); ++place) {
+    FrameRequest request = setup.request(place * setup.poses.size() / places);
+    request.waits_for_pages = false;
+    const auto arrival = Clock::now();
+    FrameView frame;
+    double ms = 0.0;
+    do {
+      render_or_throw(*view, request, frame);
+      ms = ms_between(arrival, Clock::now());
+    } while (!frame.stats.settled && ms < Measurement::longest_rest_ms);
+    times.push_back(std::min(ms, Measurement::longest_rest_ms));
+  }
+  return times;
+}
+
 /// Calls body(i) for every i in [0, count): the first on this thread, each other on a thread of its
 /// own. When all have ended, rethrows an exception of one of them.
 template <class Body>
@@ -157,6 +177,8 @@ Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t
                     const ProgressReport& report, std::size_t views) {
   settings.format = PixelFormat::rgb_f32;
   settings.space = MemorySpace::device;
+  Measurement measurement;
+  if (setup.tree) measurement.sharp_ms = time_rests(setup, settings);
   std::vector<std::unique_ptr<View>> warm(views);
   side_by_side(views, [&](std::size_t v) {
     warm[v] = setup.made.renderer->make_view(settings);
@@ -178,7 +200,6 @@ Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t
     passes[v] = time_path(
         setup, settings, *warm[v], v == 0 ? report : [](double) {});
   });
-  Measurement measurement;
   measurement.wall_ms = ms_between(start, Clock::now());
   for (std::size_t v = 0; v < views; ++v) {
     measurement.frames.insert(measurement.frames.end(), passes[v].begin(), passes[v].end());

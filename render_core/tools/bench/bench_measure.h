@@ -36,9 +36,14 @@ struct Measurement {
     FrameStats stats;
     bool first = false;  // of a pass
   };
-  std::vector<Frame> frames;   // pass by pass
-  double wall_ms = 0.0;        // of the whole pass, work between frames included
+  std::vector<Frame> frames;  // pass by pass
+  double wall_ms = 0.0;       // of the whole pass, work between frames included
+  // Scenes in pages: a camera jumps to places along the path, whose pages were not needed yet, and
+  // rests. Time until no page makes its picture sharper, for each place; at most longest_rest_ms.
+  std::vector<double> sharp_ms;
   std::size_t view_bytes = 0;  // memory of a View at the end; it never shrinks
+
+  static constexpr double longest_rest_ms = 5000.0;
 
   using Kind = std::optional<FrameKind>;
   [[nodiscard]] double fps() const;

@@ -83,7 +83,8 @@ Json pages_json(const Measurement& measurement) {
   return {{"nodes_mean", pages.nodes_mean},
           {"missing_mean", pages.missing_mean},
           {"missing_max", pages.missing_max},
-          {"coarsest_px", pages.coarsest_px}};
+          {"coarsest_px", pages.coarsest_px},
+          {"sharp_ms", to_json(summarize(measurement.sharp_ms))}};
 }
 
 Json settings_json(const RenderOptions& options, const RenderSetup& setup,
@@ -234,6 +235,9 @@ void print_pages(const Measurement& measurement, float detail_px) {
   fmt::print("{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most{}\n", "detail",
              detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
              pages.missing_max > 0 ? fmt::format("; coarsest {:.3g} px", pages.coarsest_px) : "");
+  const Summary sharp = summarize(measurement.sharp_ms);
+  fmt::print("{:<14}{:.0f} ms after a jump to a new place, {:.0f} ms at most\n", "sharp",
+             sharp.mean, sharp.max);
 }
 
 }  // namespace

@@ -341,6 +341,7 @@ TEST_F(CatgsRender, DrawsATreeFromItsPages) {
   const auto all = bench("--detail 0"), coarse = bench("--detail 8");
   const auto few = bench("--detail 0 --scene-memory 0.001");
   EXPECT_EQ(all.at("pages").at("missing_max"), 0);
+  EXPECT_GT(all.at("pages").at("sharp_ms").at("mean"), 0.0);
   EXPECT_GT(all.at("quality").at("key").at("psnr_db").at("mean"), 50.0);
   EXPECT_LT(coarse.at("visible_mean"), 0.7 * all.at("visible_mean").get<double>());
   EXPECT_GT(few.at("pages").at("missing_max"), 0);
