@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "render_core/tools/bench/bench_measure.h"
-#include "render_core/tools/paper/floor_model.h"
 #include "render_core/tools/render_setup.h"
 
 namespace catgs {
@@ -25,7 +24,6 @@ struct PaperOptions {
   std::size_t every = 10;                       // quality and tiles look at one frame in this many
   std::vector<double> keep_fractions = {1.0, 0.5, 0.25};
   std::vector<std::string> variants;  // flags of additional rows of ablation
-  DeviceRates rates;                  // of floor
 };
 
 /// A renderer in the tables: a pipeline, and the flags that tell `bench` to leave out a part of it.

@@ -119,17 +119,14 @@ void refuse_unused(const CLI::App& app, const PaperOptions& options,
     const char* option;
     std::vector<std::string_view> tables;
   };
-  static const std::array<Use, 11> uses = {{{"--baseline", {"fps"}},
-                                            {"--images", {"quality"}},
-                                            {"--image-rate", {"quality"}},
-                                            {"--image-folder", {"quality"}},
-                                            {"--llffhold", {"quality"}},
-                                            {"--keep-fraction", {"pruned"}},
-                                            {"--variant", {"ablation"}},
-                                            {"--every", {"quality", "tiles", "traces"}},
-                                            {"--dram-bytes-per-s", {"floor"}},
-                                            {"--warp-instructions-per-s", {"floor"}},
-                                            {"--instructions-per-evaluation", {"floor"}}}};
+  static const std::array<Use, 8> uses = {{{"--baseline", {"fps"}},
+                                           {"--images", {"quality"}},
+                                           {"--image-rate", {"quality"}},
+                                           {"--image-folder", {"quality"}},
+                                           {"--llffhold", {"quality"}},
+                                           {"--keep-fraction", {"pruned"}},
+                                           {"--variant", {"ablation"}},
+                                           {"--every", {"quality", "tiles", "traces"}}}};
   for (const Use& use : uses) {
     const bool used = std::ranges::any_of(kinds, [&](const PaperTableKind* kind) {
       if (use.option == std::string_view("--every") && is_of_photographs(options, *kind))
@@ -261,18 +258,6 @@ void paper(const PaperCommand& command, const CLI::App& app) {
   if (!command.json.empty()) write_json(command.json, report);
 }
 
-void add_device_rates(CLI::App& command, DeviceRates& rates) {
-  const auto add = [&](const char* name, double& rate, const char* what) {
-    command.add_option(name, rate, what)->check(CLI::PositiveNumber)->capture_default_str();
-  };
-  add("--dram-bytes-per-s", rates.dram_bytes_per_s,
-      "floor: rate of the device's memory (default: H200)");
-  add("--warp-instructions-per-s", rates.warp_instructions_per_s,
-      "floor: rate of its processors (default: H200)");
-  add("--instructions-per-evaluation", rates.instructions_per_evaluation,
-      "floor: instructions for a list entry on a warp's pixels");
-}
-
 void add_photograph_options(CLI::App& command, PaperOptions& options) {
   auto* images = command.add_option("--images", options.images,
                                     "quality: compare with the photographs (PNG or JPEG) of a "
@@ -301,7 +286,7 @@ void add_photograph_options(CLI::App& command, PaperOptions& options) {
 }  // namespace
 
 std::span<const PaperTableKind> paper_table_kinds() {
-  static constexpr std::array<PaperTableKind, 11> kinds = {
+  static constexpr std::array<PaperTableKind, 10> kinds = {
       {{"fps", "Average frame rate", fps_table, side_by_side, true},
        {"quality", "Render quality", quality_table, side_by_side, true},
        {"ablation", "Impact of the major mechanisms", ablation_table, first_column_first, true},
@@ -311,9 +296,7 @@ std::span<const PaperTableKind> paper_table_kinds() {
        {"tiles", "Distribution of the load over tiles", tiles_table, side_by_side, true},
        {"pruned", "Frame rate on pruned scenes", pruned_table, side_by_side, true},
        {"traces", "Each trace alone", traces_table, one_each, false},
-       {"scaling", "One view of scenes of several sizes", scaling_table, growing, false},
-       {"floor", "Stages and the least times for their bytes and evaluations", floor_table,
-        one_each, false}}};
+       {"scaling", "One view of scenes of several sizes", scaling_table, growing, false}}};
   return kinds;
 }
 
@@ -354,7 +337,6 @@ void add_paper_command(CLI::App& app) {
                    "ablation: add a row for the paper's pipeline with these flags of bench, like "
                    "\"--window 8\"")
       ->allow_extra_args(false);
-  add_device_rates(*paper_app, options.rates);
   paper_app->add_flag("--anchor", options.render.anchor,
                       "Move the traces to the start pose of their scene");
   add_frame_options(*paper_app, options.render);

@@ -26,7 +26,6 @@ PaperTable pruned_table(PaperCase& scene);    // appendix: pruned scenes
 // Not in the paper.
 PaperTable traces_table(PaperCase& scene);   // each trace alone, with its quality
 PaperTable scaling_table(PaperCase& scene);  // one view of scenes of several sizes
-PaperTable floor_table(PaperCase& scene);    // stages and the least times of their work
 
 /// The tables by their names in --table, with the way to join those of several scenes.
 struct PaperTableKind {

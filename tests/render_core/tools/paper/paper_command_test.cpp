@@ -85,7 +85,7 @@ TEST_F(Paper, OptionsThatWouldChangeNothingAreRefused) {
   };
   for (const char* option :
        {"--baseline x", "--images x", "--keep-fraction 1", "--variant '--window 2'", "--every 2",
-        "--images x --image-rate 5", "--images x --llffhold 2", "--dram-bytes-per-s 1"}) {
+        "--images x --image-rate 5", "--images x --llffhold 2"}) {
     EXPECT_THAT(complaint(fmt::format("--table list {} {}", cloud_case(), option)),
                 HasSubstr("has no effect on the requested tables (it belongs to --table"))
         << option;
@@ -191,28 +191,6 @@ TEST_F(Paper, ScalingComparesWithTheFirstScene) {
   }
   EXPECT_NEAR(value("Scene bytes per Gaussian", "cloud") * 2e-3, value("Scene MB", "cloud"), 1e-9);
   EXPECT_GT(value("View MB", "mist"), 0.0);
-}
-
-TEST_F(Paper, FloorHoldsTheStagesAgainstTheirWork) {
-  const Json floor = tables("floor", "--warp-instructions-per-s 1e9");
-  ASSERT_EQ(floor.size(), 2u);
-  const Json& rows = floor.at(0).at("rows");
-  EXPECT_THAT(names(rows),
-              ElementsAre("Exact project", "Exact bin", "Exact sort", "Exact blend", "Exact",
-                          "Key frame project", "Key frame bin", "Key frame sort", "Key frame blend",
-                          "Key frame", "Sub-frame project", "Sub-frame bin", "Sub-frame sort",
-                          "Sub-frame blend", "Sub-frame"));
-  const auto value = [&](const char* row, const char* column) {
-    return rows.at(row).at(column).get<double>();
-  };
-  EXPECT_GT(value("Exact blend", "Evaluations (10⁶)"), 0.0);
-  EXPECT_NEAR(value("Exact blend", "ms of evaluations"),
-              16.0 * value("Exact blend", "Evaluations (10⁶)"), 1e-9);
-  EXPECT_EQ(value("Exact blend", "Floor ms"), value("Exact blend", "ms of evaluations"));
-  EXPECT_EQ(value("Exact sort", "Floor ms"), value("Exact sort", "ms of bytes"));
-  EXPECT_LT(value("Sub-frame project", "MB"), value("Exact project", "MB"));
-  EXPECT_NEAR(value("Exact", "Measured over floor"),
-              value("Exact", "Measured ms") / value("Exact", "Floor ms"), 1e-9);
 }
 
 TEST_F(Paper, QualityAgainstExactIsBestForKeyFrames) {
