@@ -61,7 +61,7 @@ inline void resolve_block(BlockPixels& pixels, const glm::vec3& background, bool
   const Vec3<Floats> behind{Floats(background.x), Floats(background.y), Floats(background.z)};
   for (int at = 0; at < block_px; at += lanes) {
     PixelState<Floats> pixel = pixels.load(at);
-    if (fills) pixel = filled(pixel);
+    if (fills) pixel = filled(pixel, Floats(static_cast<float>(least_shown)));
     pixel.colour = resolve(pixel, behind);
     pixels.store(at, pixel);
   }

@@ -1,6 +1,5 @@
 #include "render_core/cuda/blend_round.cuh"
 #include "render_core/cuda/cuda_check.h"
-#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/part_pixels.cuh"
 #include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/splat.cuh"
@@ -381,7 +380,6 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
 template <bool count_pairs>
 __global__ void __launch_bounds__(block_size, blocks_per_processor)
     blend_kernel(const BlendParams p) {
-  let_next_kernel_begin();
   __shared__ WarpScratch scratch[warps_per_block];
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   const int warp = static_cast<int>(threadIdx.x) / warp_size;

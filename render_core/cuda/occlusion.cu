@@ -41,12 +41,14 @@ __global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionPa
     limit = limit_of(p, static_cast<float>(corner.x) + 0.5f * part_side_px,
                      static_cast<float>(corner.y) + 0.5f * part_side_px);
   p.part[at] = limit;
-  static_assert(warp_size % parts_per_tile == 0);
+  // The parts of a tile are lanes of one warp. The warp's other tile may not exist.
+  static_assert(warp_size == 2 * parts_per_tile);
+  const unsigned lanes = 0xffffu << (threadIdx.x % warp_size / parts_per_tile * parts_per_tile);
   float2 of_tile = make_float2(limit, limit);
 #pragma unroll
   for (int step = parts_per_tile / 2; step > 0; step /= 2) {
-    of_tile.x = fminf(of_tile.x, __shfl_xor_sync(__activemask(), of_tile.x, step));
-    of_tile.y = fmaxf(of_tile.y, __shfl_xor_sync(__activemask(), of_tile.y, step));
+    of_tile.x = fminf(of_tile.x, __shfl_xor_sync(lanes, of_tile.x, step));
+    of_tile.y = fmaxf(of_tile.y, __shfl_xor_sync(lanes, of_tile.y, step));
   }
   if (part == 0) p.tile[tile] = of_tile;
 }

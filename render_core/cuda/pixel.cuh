@@ -23,11 +23,7 @@ __device__ inline void show_pixel(float* rgb, const FrameShape& shape, int x_px,
                                   math::PixelState<float> pixel, float3 background,
                                   const Finish& finish) {
   if (!in_picture(shape, x_px, y_px)) return;
-  if (finish.fills && fabsf(pixel.transmittance) < finish.transmittance) {
-    const float scale = __fdividef(1.0f, 1.0f - fabsf(pixel.transmittance));
-    pixel.colour = {scale * pixel.colour.x, scale * pixel.colour.y, scale * pixel.colour.z};
-    pixel.transmittance = 0.0f;
-  }
+  if (finish.fills) pixel = math::filled(pixel, finish.transmittance);
   const auto shown = math::resolve<float>(pixel, {background.x, background.y, background.z});
   float* out = rgb + 3 * (static_cast<std::size_t>(y_px) * shape.width_px + x_px);
   out[0] = shown.x;

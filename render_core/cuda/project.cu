@@ -1,4 +1,4 @@
-#include "render_core/cuda/early_launch.cuh"
+#include "render_core/cuda/cuda_check.h"
 #include "render_core/cuda/project.cuh"
 #include "render_core/cuda/shade.cuh"
 #include "render_core/cuda/sort.cuh"
@@ -33,7 +33,6 @@ __device__ void add_inverse_depth(const ProjectParams& p, bool counted, float de
 template <Listing listing>
 __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams p) {
   const std::uint32_t v = blockIdx.x * block_size + threadIdx.x;
-  wait_for_earlier_work();
   if (v >= min(p.counts->visible, p.shape.visible_bound)) return;
   if constexpr (listing != Listing::none) p.order[v] = v;
   const std::uint32_t i = p.visible[v];
@@ -75,7 +74,8 @@ void launch_project(const ProjectParams& params, Listing listing, cudaStream_t s
   const auto kernel = listing == Listing::none       ? project_kernel<Listing::none>
                       : listing == Listing::ellipses ? project_kernel<Listing::ellipses>
                                                      : project_kernel<Listing::trails>;
-  launch_early("project", kernel, blocks, block_size, stream, params);
+  kernel<<<blocks, block_size, 0, stream>>>(params);
+  check_launch("project");
 }
 
 }  // namespace catgs::cuda

@@ -2,7 +2,6 @@
 #include <cub/block/block_scan.cuh>
 
 #include "render_core/cuda/cuda_check.h"
-#include "render_core/cuda/early_launch.cuh"
 #include "render_core/cuda/pixel.cuh"
 #include "render_core/cuda/split.cuh"
 
@@ -120,7 +119,6 @@ __device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places&
 }
 
 __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p) {
-  let_next_kernel_begin();
   using Scan = cub::BlockScan<Places, split_block>;
   __shared__ Scan::TempStorage scratch;
   __shared__ std::uint32_t queued[queue_classes];  // by the block; then before the block
@@ -191,7 +189,6 @@ __device__ Look fold(const CompositeParams& p, std::uint32_t tile, uint2 slices,
 
 /// A block takes the tiles in turn, some parts at a time.
 __global__ void __launch_bounds__(composite_block) composite_kernel(const CompositeParams p) {
-  wait_for_earlier_work();
   const std::uint32_t tile = blockIdx.x / (parts_per_tile / parts_per_block);
   const uint2 slices = p.tile_slices[tile];
   if (slices.y == 0) return;
@@ -227,9 +224,9 @@ void launch_split(const SplitParams& params, cudaStream_t stream) {
 }
 
 void launch_composite(const CompositeParams& params, cudaStream_t stream) {
-  launch_early("composite", composite_kernel,
-               params.shape.tiles() * (parts_per_tile / parts_per_block), composite_block, stream,
-               params);
+  const std::uint32_t blocks = params.shape.tiles() * (parts_per_tile / parts_per_block);
+  composite_kernel<<<blocks, composite_block, 0, stream>>>(params);
+  check_launch("composite");
 }
 
 }  // namespace catgs::cuda

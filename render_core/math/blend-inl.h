@@ -101,11 +101,11 @@ CATGS_HD_INLINE auto blend_on(PixelState<T>& pixel, T exponent, const Vec3<T>& c
   return pixel.transmittance >= T(least_shown);
 }
 
-/// A pixel below least_shown shows what lies behind it in its own colour.
+/// A pixel whose transmittance is below `least` shows what lies behind it in its own colour.
 template <class T>
-CATGS_HD_INLINE PixelState<T> filled(const PixelState<T>& pixel) {
+CATGS_HD_INLINE PixelState<T> filled(const PixelState<T>& pixel, T least) {
   const T rest = abs(pixel.transmittance);
-  const auto fills = rest < T(least_shown);
+  const auto fills = rest < least;
   const T scale = select(fills, T(1.0) / (T(1.0) - rest), T(1.0));
   return {pixel.colour * scale, select(fills, T(0.0), pixel.transmittance)};
 }
