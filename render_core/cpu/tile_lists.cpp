@@ -253,6 +253,7 @@ std::uint32_t TileLists::longest() const {
 std::size_t TileLists::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   std::size_t sum = bytes(starts_) + bytes(entries_) + bytes(tiles_by_length_) +
+                    bytes(entries_of_slot_) + bytes(by_depth_) + bytes(by_depth_scratch_) +
                     bytes(key_offsets_) + bytes(keys_) + bytes(key_scratch_);
   for (const Segment& segment : segments_) sum += bytes(segment.runs) + bytes(segment.positions);
   return sum;
