@@ -219,6 +219,7 @@ PairCost count_pairs(const RenderSetup& setup, ViewSettings settings,
   for (std::size_t k = 0; k < counted; ++k) {
     const std::size_t i = k * setup.poses.size() / counted;
     FrameView frame;
+    render_or_throw(*view, setup.request(i > 0 ? i - 1 : i), frame);
     render_or_throw(*view, setup.request(i), frame);
     pairs += static_cast<double>(frame.stats.blended_pairs);
     blend_ms += measurement.frames[i].stats.stage_ms[static_cast<std::size_t>(Stage::blend)];

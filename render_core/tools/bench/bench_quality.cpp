@@ -58,7 +58,7 @@ class Judge {
   }
 
   /// `before` and `after`: frames i - 1 and i of the judged pipeline.
-  void compare_switch(std::size_t i, const Image& before, const Image& after) {
+  void compare_step(std::size_t i, const Image& before, const Image& after) {
     const double excess =
         pop_excess({before, after}, {exact_image(i - 1, 0.0f), exact_image(i, 0.0f)});
     if (excess > quality_.pop.max) quality_.worst_pop_frame = setup_.first + i;
@@ -131,19 +131,17 @@ QualityReport judge_by_exact(const RenderSetup& setup, const ViewSettings& setti
   FrameFeed feed(setup, settings);
   Judge judge(setup, quality);
   Image before;
-  FrameKind kind_before = FrameKind::key;
-  std::size_t switches = 0;
+  std::size_t steps = 0;
   for (std::size_t i = 0; i < setup.poses.size(); ++i) {
     FrameView frame;  // every frame is rendered, because caches depend on earlier frames
     render_or_throw(*view, feed.next(), frame);
     const FrameKind kind = frame.stats.kind;
     Image image = copy_image(frame);
-    if (kind == FrameKind::key && kind_before == FrameKind::sub && switches++ % every == 0) {
-      judge.compare_switch(i, before, image);
+    if (kind == FrameKind::key && i > 0 && steps++ % every == 0) {
+      judge.compare_step(i, before, image);
     }
     if (i % every == 0) judge.compare(i, kind, image);
     before = std::move(image);
-    kind_before = kind;
     report(static_cast<double>(i + 1) / static_cast<double>(setup.poses.size()));
   }
   judge.finish();

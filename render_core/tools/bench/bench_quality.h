@@ -69,13 +69,14 @@ struct QualityReport {
   // Share of pixels that more than half of the background shows through. A view of almost nothing
   // flatters every PSNR.
   Extent see_through;
-  // pop_excess() at the switches from a sub-frame to the next key frame.
+  // pop_excess() at the steps from one frame to a key frame. All frames but those of the paper
+  // pipeline are key frames.
   Extent pop;
-  std::size_t pops = 0;  // switches over max_pop
+  std::size_t pops = 0;  // steps over max_pop
   std::size_t worst_pop_frame = 0;
 };
 
-/// The largest change that a switch may add to the one that the exact pipeline shows there.
+/// The largest change that a step may add to the one that the exact pipeline shows there.
 inline constexpr double max_pop = 1.0 / 255.0;
 
 /// Makes the folder for write_worst_frames(), and tries whether files can be created in it. Throws
@@ -89,7 +90,7 @@ void write_worst_frames(const std::filesystem::path& folder, const QualityReport
 
 /// Judges a pipeline at its own poses. The reference judges `exact`, at random pixels of a few
 /// frames. The exact pipeline judges all others, on whole pictures: every `every`-th frame and
-/// every `every`-th switch.
+/// every `every`-th step to a key frame.
 QualityReport judge(const RenderSetup& setup, const ViewSettings& settings, std::size_t every,
                     const ProgressReport& report);
 

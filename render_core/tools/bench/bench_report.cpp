@@ -46,12 +46,9 @@ Json to_json(const QualityReport& quality) {
     json["see_through"] = {{"mean", quality.see_through.mean()}, {"max", quality.see_through.max}};
   }
   if (quality.pop.count > 0) {
-    json["pop"] = {{"switches", quality.pop.count},
-                   {"mean", quality.pop.mean()},
-                   {"max", quality.pop.max},
-                   {"worst_frame", quality.worst_pop_frame},
-                   {"allowed", max_pop},
-                   {"over", quality.pops}};
+    json["pop"] = {{"steps", quality.pop.count}, {"mean", quality.pop.mean()},
+                   {"max", quality.pop.max},     {"worst_frame", quality.worst_pop_frame},
+                   {"allowed", max_pop},         {"over", quality.pops}};
   }
   return json;
 }
@@ -171,7 +168,8 @@ void print_quality(const QualityReport& quality) {
   }
   if (quality.pop.count > 0) {
     fmt::print(
-        "{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} key switches (frame {}), {} over 1/255\n",
+        "{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} steps to key frames (frame {}), {} over "
+        "1/255\n",
         "pop", 255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
         quality.worst_pop_frame, quality.pops);
   }

@@ -165,7 +165,7 @@ TEST_F(CatgsRender, BenchTellsSubFramesFromKeyFrames) {
   };
   EXPECT_GE(worst_psnr("key"), 60.0);
   EXPECT_GE(worst_psnr("sub"), 50.0);
-  EXPECT_EQ(json.at("quality").at("pop").at("switches"), 11);
+  EXPECT_EQ(json.at("quality").at("pop").at("steps"), 13);
   EXPECT_LE(json.at("quality").at("pop").at("max").get<double>(), 2.0 / 255.0);
   EXPECT_GT(json.at("quality").at("see_through").at("mean").get<double>(), 0.2);
 

@@ -129,8 +129,9 @@ TEST_F(BenchParts, JudgeFindsTheKnownErrors) {
   EXPECT_NEAR(quality.sub.worst_block_psnr(), -20.0 * std::log10(sub_error), 0.01);
   EXPECT_EQ(quality.see_through.count, 23u);
   EXPECT_EQ(quality.see_through.mean(), 1.0);  // transmittance 0.6 everywhere
-  // At a switch the picture falls by 0.009 on top of the true step of 0.001 upwards.
-  EXPECT_EQ(quality.pop.count, 4u);
+  // From a sub-frame to a key frame, the picture falls by 0.009 on top of the true step of 0.001
+  // upwards. The two steps between key frames add nothing.
+  EXPECT_EQ(quality.pop.count, 6u);
   EXPECT_NEAR(quality.pop.max, sub_error - key_error - 2 * 0.001, 1e-5);
   EXPECT_EQ(quality.pops, 4u);
   EXPECT_GT(quality.worst_pop_frame, 0u);  // the first has none before it
@@ -157,7 +158,13 @@ TEST_F(BenchParts, TheWorstFramesAreKeptAndWritten) {
               0.5f / 255.0f);
 }
 
-TEST_F(BenchParts, JudgeTakesEveryNthFrameAndSwitch) {
+TEST_F(BenchParts, PopsAreJudgedInEveryPipeline) {
+  const QualityReport quality = judge(setup_, {.pipeline = Pipeline::catgs}, 1, no_report);
+  EXPECT_EQ(quality.pop.count, 22u);
+  EXPECT_NEAR(quality.pop.max, 0.0, 1e-6);
+}
+
+TEST_F(BenchParts, JudgeTakesEveryNthFrameAndStep) {
   const QualityReport quality = judge(setup_, paper_, 3, no_report);
   EXPECT_EQ(quality.key.frames() + quality.sub.frames(), 8u);
   EXPECT_EQ(quality.pop.count, 2u);
