@@ -1,30 +1,31 @@
 // Pipeline::catgs in the CPU core against its exact pipeline at the same poses.
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "render_core/base/thread_pool.h"
-#include "render_core/metrics/image_quality.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/motion/script.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/renderer.h"
 #include "render_core/synth/synth.h"
 #include "tests/support/camera_moves.h"
-#include "tests/support/rendered.h"
+#include "tests/support/catgs_views.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {
 namespace {
 
+using test::catgs_settings;
+using test::PathQuality;
 using test::render_in;
 using test::Rendered;
+using test::request_at;
+using test::wall_before_many;
 
 std::unique_ptr<Renderer> renderer_of(std::shared_ptr<const GaussianCloud> cloud, int threads = 2,
                                       const std::string& simd = "auto") {
@@ -32,66 +33,6 @@ std::unique_ptr<Renderer> renderer_of(std::shared_ptr<const GaussianCloud> cloud
                        {RendererKind::cpu, std::make_shared<ThreadPool>(threads), simd})
       .renderer;
 }
-
-const ViewSettings catgs_settings{.pipeline = Pipeline::catgs};
-
-/// A closed wall 4 units away, and 30,000 Gaussians behind it from 6 units on.
-std::shared_ptr<const GaussianCloud> wall_before_many() {
-  GaussianCloud cloud = test::random_cloud(30'000, 0, 11);
-  const std::size_t behind = cloud.size(), side = 40;
-  for (glm::vec3& mean : cloud.mean) mean.z = 6.0f + std::abs(mean.z);
-  cloud.resize(behind + 2 * side * side, 0);
-  for (std::size_t i = 0; i < 2 * side * side; ++i) {
-    const std::size_t k = i % (side * side), at = behind + i;
-    cloud.mean[at] = {0.2f * (static_cast<float>(k % side) - 20.0f),
-                      0.2f * (static_cast<float>(k / side) - 20.0f), i < side * side ? 4.0f : 4.1f};
-    cloud.scale[at] = glm::vec3(0.2f, 0.2f, 0.01f);
-    cloud.rotation[at] = glm::quat(1.0f, 0.0f, 0.0f, 0.0f);
-    cloud.opacity[at] = 0.99f;
-    cloud.sh[at] = glm::vec3(k % 7 == 0 ? 1.0f : -0.5f);
-  }
-  return std::make_shared<const GaussianCloud>(std::move(cloud));
-}
-
-FrameRequest request_at(const Pose& pose, glm::ivec2 size_px = {320, 192}) {
-  FrameRequest request;
-  request.camera = make_camera(pose, size_px, 300.0f);
-  return request;
-}
-
-/// The quality of catgs along a path.
-struct PathQuality {
-  double squares = 0.0;
-  double worst_frame = std::numeric_limits<double>::infinity();
-  double worst_block = std::numeric_limits<double>::infinity();
-  int frames = 0;
-  std::int64_t left_out = 0;  // list entries of exact that catgs did not have
-
-  void follow(Renderer& renderer, const Trajectory& path) {
-    const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
-    for (const TimedPose& sample : path) {
-      FrameRequest request;
-      request.camera = make_camera(sample.world_from_camera, {320, 192}, 183.0f);
-      const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
-      const ImageQuality quality = compare_images(Image{request.camera.size_px, drawn.rgb},
-                                                  Image{request.camera.size_px, expected.rgb});
-      left_out += static_cast<std::int64_t>(expected.stats.list_entries) -
-                  static_cast<std::int64_t>(drawn.stats.list_entries);
-      squares += std::pow(10.0, -0.1 * quality.psnr());
-      worst_frame = std::min(worst_frame, quality.psnr());
-      worst_block = std::min(worst_block, quality.worst_block_psnr());
-      ++frames;
-    }
-  }
-  [[nodiscard]] double mean() const { return -10.0 * std::log10(squares / frames); }
-
-  void expect_good() const {
-    EXPECT_GE(mean(), 50.0);
-    EXPECT_GE(worst_frame, 40.0);
-    EXPECT_GE(worst_block, 30.0);
-    EXPECT_GT(left_out, 0);
-  }
-};
 
 class CatgsInTheCity : public testing::Test {
  protected:
@@ -138,72 +79,15 @@ TEST_F(CatgsInTheCity, KeepsItsQualityOnRecordedHeads) {
 }
 
 TEST(CatgsView, DoesNotDrawWhatAWallHides) {
-  const auto renderer = renderer_of(wall_before_many());
-  const auto view = renderer->make_view(catgs_settings), exact = renderer->make_view({});
-  const FrameRequest request = request_at({});
-  const Rendered expected = render_in(*exact, request);
-  EXPECT_EQ(render_in(*view, request).stats.visible, expected.stats.visible) << "nothing is known";
-  for (int frame = 0; frame < 3; ++frame) {
-    const Rendered drawn = render_in(*view, request);
-    EXPECT_LT(2 * drawn.stats.visible, expected.stats.visible);
-    EXPECT_LT(2 * drawn.stats.list_entries, expected.stats.list_entries);
-    EXPECT_GE(test::psnr_db(drawn.rgb, expected.rgb), 45.0);
-  }
+  test::expect_a_wall_to_hide(*renderer_of(wall_before_many()));
 }
 
 TEST(CatgsView, ALeapOfTheCameraHidesNothing) {
-  const auto renderer = renderer_of(wall_before_many());
-  const auto view = renderer->make_view(catgs_settings), exact = renderer->make_view({});
-  // Beyond the wall, to the side, and the other way round.
-  const Pose leaps[] = {
-      {{0, 0, 5}, {1, 0, 0, 0}}, {{30, 0, 0}, {1, 0, 0, 0}}, {{0, 0, 40}, {0, 0, 1, 0}}};
-  for (const Pose& leap : leaps) {
-    for (int frame = 0; frame < 2; ++frame) render_in(*view, request_at({}));
-    const Rendered drawn = render_in(*view, request_at(leap));
-    const Rendered expected = render_in(*exact, request_at(leap));
-    EXPECT_EQ(drawn.stats.visible, expected.stats.visible);
-    EXPECT_GE(test::psnr_db(drawn.rgb, expected.rgb), 45.0);
-  }
+  test::expect_a_leap_to_hide_nothing(*renderer_of(wall_before_many()));
 }
 
-// A camera goes along a plate and looks past its edge. Behind it is a pattern that a frame without
-// it would lack.
 TEST(CatgsView, DrawsWhatComesOutBehindAnEdge) {
-  GaussianCloud cloud;
-  const auto add = [&](glm::vec3 mean, glm::vec3 scale, glm::vec3 sh) {
-    cloud.resize(cloud.size() + 1, 0);
-    cloud.mean.back() = mean;
-    cloud.scale.back() = scale;
-    cloud.rotation.back() = glm::quat(1.0f, 0.0f, 0.0f, 0.0f);
-    cloud.opacity.back() = 0.99f;
-    cloud.sh.back() = sh;
-  };
-  for (int copy = 0; copy < 2; ++copy) {
-    for (int y = -20; y <= 20; ++y) {
-      for (int x = -40; x <= 40; ++x) {
-        const glm::vec2 at(x, y);
-        const glm::vec3 pattern((x + y) % 2 == 0 ? 1.5f : -1.5f);
-        add({0.3f * at, 10.0f}, {0.2f, 0.2f, 0.01f}, pattern);
-        if (x <= 0) add({0.1f * at, 3.0f}, {0.07f, 0.07f, 0.01f}, glm::vec3(-0.5f));
-      }
-    }
-  }
-  const auto renderer = renderer_of(std::make_shared<const GaussianCloud>(std::move(cloud)));
-  for (const float step : {0.005f, 0.02f, 0.05f, -0.02f}) {
-    SCOPED_TRACE(step);
-    const auto view = renderer->make_view(catgs_settings), exact = renderer->make_view({});
-    std::uint32_t hidden = 0;
-    for (int k = 0; k < 20; ++k) {
-      const FrameRequest request = request_at({{step * static_cast<float>(k), 0, 0}, {1, 0, 0, 0}});
-      const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
-      hidden += expected.stats.visible - drawn.stats.visible;
-      const ImageQuality quality = compare_images({request.camera.size_px, drawn.rgb},
-                                                  {request.camera.size_px, expected.rgb});
-      EXPECT_GE(quality.psnr(), 45.0) << k;
-      EXPECT_GE(quality.worst_block_psnr(), 30.0) << k;
-    }
-    EXPECT_GT(hidden, 0u);
-  }
+  test::expect_what_comes_out_behind_an_edge(*renderer_of(test::plate_before_pattern()));
 }
 
 TEST(CatgsView, ANewImageSizeHidesNothing) {

@@ -1,14 +1,12 @@
-// Blending, against the CPU core's kernel on the same splats and lists; folding slices and
-// conversion to video, against the formulas on the host.
+// Blending, against the CPU core's kernel on the same splats and lists; folding slices, against the
+// formulas on the host.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
 
-#include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/split.cuh"
-#include "render_core/math/colour-inl.h"
 #include "render_core/math/ellipse-inl.h"
 #include "tests/render_core/cuda/stages/stage.h"
 
@@ -121,49 +119,99 @@ class BlendStage : public StageTest {
     return rgb;
   }
 
-  /// The device's picture, of tiles in one task each, and where its parts end.
-  std::vector<float> on_device(const Finish& finish, std::vector<std::uint32_t>& reached,
-                               std::vector<float>& ends) {
-    const std::uint32_t tiles = shape_.tiles();
-    std::vector<BlendTask> whole;
-    std::vector<std::uint32_t> numbers;
-    for (std::uint32_t t = 0; t < tiles; ++t) {
-      whole.push_back({t, ranges_[t].x, ranges_[t].y, 0, 1});
-      numbers.push_back(t);
-    }
-    numbers.resize(queue_bound(shape_));
+  /// Tasks and their queue: whole tiles first, then slices.
+  struct Tasks {
+    std::vector<BlendTask> tasks;  // one a tile, then one a slice
+    std::vector<uint2> of_tile;    // first slice, count
+    std::vector<std::uint32_t> queue;
     FrameCounts counts;
-    counts.queued[0] = tiles;
+  };
+  /// Tiles in slices of `slice` entries; 0: each in one task.
+  Tasks cut(std::uint32_t slice) {
+    const std::uint32_t tiles = shape_.tiles();
+    Tasks cut;
+    for (std::uint32_t t = 0; t < tiles; ++t)
+      cut.tasks.push_back({t, ranges_[t].x, ranges_[t].y, 0, 1});
+    std::vector<std::uint32_t> whole, sliced;
+    for (std::uint32_t t = 0; t < tiles; ++t) {
+      const auto first = static_cast<std::uint32_t>(cut.tasks.size()) - tiles;
+      const std::uint32_t listed = ranges_[t].y - ranges_[t].x;
+      const std::uint32_t slices = slice == 0 ? 1 : (listed + slice - 1) / slice;
+      cut.of_tile.push_back(make_uint2(first, slices > 1 ? slices : 0));
+      if (slices <= 1) {
+        whole.push_back(t);
+        continue;
+      }
+      for (std::uint32_t s = 0; s < slices; ++s) {
+        const std::uint32_t begin = ranges_[t].x + s * slice;
+        sliced.push_back(static_cast<std::uint32_t>(cut.tasks.size()));
+        cut.tasks.push_back({t, begin, std::min(begin + slice, ranges_[t].y),
+                             static_cast<std::uint16_t>(s), static_cast<std::uint16_t>(slices)});
+      }
+    }
+    shape_.slice_bound = static_cast<std::uint32_t>(cut.tasks.size()) - tiles;
+    cut.queue = whole;
+    cut.queue.resize((queue_classes - 1) * tiles);
+    cut.queue.insert(cut.queue.end(), sliced.begin(), sliced.end());
+    cut.counts.queued[0] = static_cast<std::uint32_t>(whole.size());
+    cut.counts.queued[queue_classes - 1] = static_cast<std::uint32_t>(sliced.size());
+    return cut;
+  }
+
+  /// The device's picture, blended in the tasks of cut(slice), and where its parts end.
+  std::vector<float> on_device(const Finish& finish, std::vector<std::uint32_t>& reached,
+                               std::vector<float>& ends, std::uint32_t slice = 0) {
+    const std::uint32_t tiles = shape_.tiles();
+    const Tasks cut = this->cut(slice);
+    const std::size_t slices = shape_.slice_bound;
     const auto record = upload(records_);
     const auto entry = upload(entries_);
-    const auto queue = upload(numbers);
+    const auto queue = upload(cut.queue);
     const auto reach = upload(std::vector<std::uint32_t>(tiles));
-    const auto task = upload(whole);
-    const auto on_device = upload(std::vector{counts});
+    const auto task = upload(cut.tasks);
+    const auto of_tile = upload(cut.of_tile);
+    const auto on_device = upload(std::vector{cut.counts});
+    const auto pixels = upload(std::vector<float4>(slices * tile_pixels));
+    const auto consumed = upload(std::vector<std::uint32_t>(slices * parts_per_tile));
+    const auto transmittance = upload(std::vector<float>(slices * parts_per_tile, 1.0f));
     const auto rgb =
         upload(std::vector<float>(3 * static_cast<std::size_t>(size_px.x * size_px.y), -1.0f));
     std::vector<float> depths;  // a splat's depth is its number
     for (std::size_t i = 0; i < splats_.size(); ++i) depths.push_back(static_cast<float>(i));
     const auto depth = upload(depths);
     const auto end = upload(std::vector<float>(std::size_t{tiles} * parts_per_tile, -1.0f));
+    const PartEnds part_ends{.splat_depth = depth.get(), .depth = end.get()};
+    const float3 behind = make_float3(background.x, background.y, background.z);
     const Stream stream;
     launch_blend({.shape = shape_,
                   .records = record.get(),
                   .entries = entry.get(),
                   .tasks = task.get(),
                   .queue = queue.get(),
-                  .background = make_float3(background.x, background.y, background.z),
+                  .background = behind,
                   .rgb = rgb.get(),
-                  .slice_pixels = nullptr,
-                  .consumed = nullptr,
-                  .slice_transmittance = nullptr,
-                  .ends = {.splat_depth = depth.get(), .depth = end.get()},
+                  .slice_pixels = pixels.get(),
+                  .consumed = consumed.get(),
+                  .slice_transmittance = transmittance.get(),
+                  .ends = part_ends,
                   .finish = finish,
                   .reach = reach.get(),
                   .counts = on_device.get(),
                   .count_pairs = false,
                   .warps = blend_warps(processors())},
                  stream.get());
+    launch_composite({.shape = shape_,
+                      .tasks = task.get(),
+                      .tile_slices = of_tile.get(),
+                      .slice_pixels = pixels.get(),
+                      .consumed = consumed.get(),
+                      .entries = entry.get(),
+                      .ends = part_ends,
+                      .finish = finish,
+                      .background = behind,
+                      .rgb = rgb.get(),
+                      .reach = reach.get()},
+                     stream.get());
     reached = fetch(reach.get(), tiles);
     ends = fetch(end.get(), std::size_t{tiles} * parts_per_tile);
     return fetch(rgb.get(), rgb.size());
@@ -197,12 +245,31 @@ TEST_F(BlendStage, IsTheCpuCoresButForTheRestOfARound) {
   }
 }
 
-// Splats behind the end of a part show nowhere in it.
-TEST_F(BlendStage, PartsEndBehindWhatShows) {
+TEST_F(BlendStage, SlicesFoldToTheWhole) {
+  std::vector<std::uint32_t> reached, reached_in_slices;
+  std::vector<float> ends;
+  const std::vector<float> whole = on_device(exact_finish, reached, ends);
+  for (const std::uint32_t slice : {1u, 40u, 150u}) {
+    SCOPED_TRACE(slice);
+    const std::vector<float> folded = on_device(exact_finish, reached_in_slices, ends, slice);
+    ASSERT_GT(shape_.slice_bound, shape_.tiles());
+    Difference colour("blend: colour of folded slices", 0.0101);
+    for (std::size_t i = 0; i < whole.size(); ++i) colour.add(folded[i] - whole[i]);
+    Difference quality("blend: dB below 60, of folded slices", 0.0);
+    quality.add(std::max(0.0, 60.0 - catgs::test::psnr_db(folded, whole)));
+    for (std::size_t t = 0; t < reached.size(); ++t)
+      EXPECT_LE(reached_in_slices[t], ranges_[t].y - ranges_[t].x);
+  }
+}
+
+class BlendEnds : public BlendStage, public testing::WithParamInterface<std::uint32_t> {};
+
+// Splats behind the end of a part show nowhere in it. The parameter is the length of slices.
+TEST_P(BlendEnds, PartsEndBehindWhatShows) {
   const Finish early{.transmittance = 0.05f, .fills = false};
   std::vector<std::uint32_t> reached;
   std::vector<float> ends;
-  const std::vector<float> drawn = on_device(early, reached, ends);
+  const std::vector<float> drawn = on_device(early, reached, ends, GetParam());
   std::size_t finished = 0, open = 0;
   std::vector<TileEntry> kept = entries_;
   for (std::uint32_t t = 0; t < shape_.tiles(); ++t) {
@@ -218,10 +285,12 @@ TEST_F(BlendStage, PartsEndBehindWhatShows) {
   }
   EXPECT_GT(finished, 10u);
   entries_ = kept;
-  const std::vector<float> without = on_device(early, reached, ends);
+  const std::vector<float> without = on_device(early, reached, ends, GetParam());
   Difference colour("blend: colour without what is behind the ends", 1e-6);
   for (std::size_t i = 0; i < drawn.size(); ++i) colour.add(drawn[i] - without[i]);
 }
+
+INSTANTIATE_TEST_SUITE_P(Slices, BlendEnds, testing::Values(0u, 200u));
 
 TEST_F(BlendStage, FinishedPixelsFillTheRestWithTheirColour) {
   std::vector<std::uint32_t> reached;
@@ -329,51 +398,6 @@ TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
     }
     reaches.add(reached[t] !=
                 (of_tile[t].y == 0 ? 0u : farthest - tasks[tiles + of_tile[t].x].first));
-  }
-}
-
-class ConvertStage : public StageTest {};
-
-TEST_F(ConvertStage, MakesTheCodesOfTheFormulas) {
-  constexpr int width = 130, height = 66;
-  std::mt19937_64 random(51);
-  std::vector<float> colours(3 * width * height);
-  for (float& c : colours) c = static_cast<float>(random() >> 40) * 0x1p-24f;
-  const auto rgb = upload(colours);
-  constexpr std::size_t pixels = width * height;
-  const auto codes = upload(std::vector<std::uint8_t>(pixels + pixels / 2));
-  const Stream stream;
-  launch_convert({.width_px = width,
-                  .height_px = height,
-                  .rgb = rgb.get(),
-                  .luma = codes.get(),
-                  .cb = codes.get() + pixels,
-                  .cr = codes.get() + pixels + pixels / 4},
-                 stream.get());
-  const std::vector<std::uint8_t> drawn = fetch(codes.get(), pixels + pixels / 2);
-  const auto colour = [&](int x, int y) {
-    const float* c = &colours[3 * static_cast<std::size_t>(y * width + x)];
-    return math::Vec3<double>{c[0], c[1], c[2]};
-  };
-  Difference code("convert: codes beyond rounding", 1e-3);
-  const auto add = [&](std::uint8_t found, double exact) {
-    code.add(std::max(0.0, std::abs(found - exact) - 0.5));
-  };
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      add(drawn[static_cast<std::size_t>(y * width + x)], math::luma_code(colour(x, y)));
-  for (int y = 0; y < height; y += 2) {
-    for (int x = 0; x < width; x += 2) {
-      math::Vec3<double> mean{0.0, 0.0, 0.0};
-      for (int j = 0; j < 4; ++j) {
-        const auto c = colour(x + j % 2, y + j / 2);
-        mean = {mean.x + 0.25 * c.x, mean.y + 0.25 * c.y, mean.z + 0.25 * c.z};
-      }
-      const auto chroma = math::chroma_codes<double>(mean);
-      const std::size_t at = pixels + static_cast<std::size_t>(y / 2 * (width / 2) + x / 2);
-      add(drawn[at], chroma.x);
-      add(drawn[at + pixels / 4], chroma.y);
-    }
   }
 }
 

@@ -164,6 +164,8 @@ class StagedLists {
   [[nodiscard]] const ViewMemory& memory() const { return memory_; }
   [[nodiscard]] FrameCounts counts() const { return fetch(memory_.counts.get(), 1)[0]; }
 
+  /// From now on, splats are hidden as `occlusion` says.
+  void hide(const Occlusion& occlusion) { request_.occlusion = occlusion; }
   void cull() { builder_.cull(request_, shape_, stream_.get()); }
   void project() { builder_.project(request_, shape_, stream_.get()); }
   void sort_by_depth() { builder_.sort_by_depth(shape_, stream_.get()); }

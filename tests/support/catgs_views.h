@@ -1,0 +1,153 @@
+#pragma once
+
+// Pipeline::catgs of any core against its exact pipeline at the same poses.
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "render_core/metrics/image_quality.h"
+#include "render_core/motion/trajectory.h"
+#include "render_core/renderer.h"
+#include "tests/support/rendered.h"
+#include "tests/support/test_scenes.h"
+
+namespace catgs::test {
+
+inline const ViewSettings catgs_settings{.pipeline = Pipeline::catgs};
+
+inline FrameRequest request_at(const Pose& pose, glm::ivec2 size_px = {320, 192}) {
+  FrameRequest request;
+  request.camera = make_camera(pose, size_px, 300.0f);
+  return request;
+}
+
+inline void add_opaque(GaussianCloud& cloud, glm::vec3 mean, glm::vec3 scale, glm::vec3 sh) {
+  cloud.resize(cloud.size() + 1, 0);
+  cloud.mean.back() = mean;
+  cloud.scale.back() = scale;
+  cloud.rotation.back() = glm::quat(1.0f, 0.0f, 0.0f, 0.0f);
+  cloud.opacity.back() = 0.99f;
+  cloud.sh.back() = sh;
+}
+
+/// A closed wall 4 units away, and 30,000 Gaussians behind it from 6 units on.
+inline std::shared_ptr<const GaussianCloud> wall_before_many() {
+  GaussianCloud cloud = random_cloud(30'000, 0, 11);
+  for (glm::vec3& mean : cloud.mean) mean.z = 6.0f + std::abs(mean.z);
+  constexpr int side = 40;
+  for (const float z : {4.0f, 4.1f})
+    for (int k = 0; k < side * side; ++k)
+      add_opaque(
+          cloud,
+          {0.2f * static_cast<float>(k % side - 20), 0.2f * static_cast<float>(k / side - 20), z},
+          {0.2f, 0.2f, 0.01f}, glm::vec3(k % 7 == 0 ? 1.0f : -0.5f));
+  return std::make_shared<const GaussianCloud>(std::move(cloud));
+}
+
+/// A plate with an edge, and a pattern behind it that a frame without it would lack. It is in
+/// several layers: a part may end some splats behind the one that finishes it.
+inline std::shared_ptr<const GaussianCloud> plate_before_pattern() {
+  GaussianCloud cloud;
+  for (int layer = 0; layer < 6; ++layer) {
+    for (int y = -20; y <= 20; ++y) {
+      for (int x = -40; x <= 40; ++x) {
+        const glm::vec2 at(x, y);
+        add_opaque(cloud, {0.3f * at, 10.0f + 0.5f * static_cast<float>(layer)},
+                   {0.2f, 0.2f, 0.01f}, glm::vec3((x + y) % 2 == 0 ? 1.5f : -1.5f));
+        if (x <= 0 && layer < 2)
+          add_opaque(cloud, {0.1f * at, 3.0f}, {0.07f, 0.07f, 0.01f}, glm::vec3(-0.5f));
+      }
+    }
+  }
+  return std::make_shared<const GaussianCloud>(std::move(cloud));
+}
+
+/// The quality of catgs along a path.
+struct PathQuality {
+  double squares = 0.0;
+  double worst_frame = std::numeric_limits<double>::infinity();
+  double worst_block = std::numeric_limits<double>::infinity();
+  int frames = 0;
+  std::int64_t left_out = 0;  // list entries of exact that catgs did not have
+
+  void follow(Renderer& renderer, const Trajectory& path) {
+    const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
+    for (const TimedPose& sample : path) {
+      FrameRequest request;
+      request.camera = make_camera(sample.world_from_camera, {320, 192}, 183.0f);
+      add(render_in(*view, request), render_in(*exact, request), request.camera.size_px);
+    }
+  }
+  void add(const Rendered& drawn, const Rendered& expected, glm::ivec2 size_px) {
+    const ImageQuality quality = compare_images({size_px, drawn.rgb}, {size_px, expected.rgb});
+    left_out += static_cast<std::int64_t>(expected.stats.list_entries) -
+                static_cast<std::int64_t>(drawn.stats.list_entries);
+    squares += std::pow(10.0, -0.1 * quality.psnr());
+    worst_frame = std::min(worst_frame, quality.psnr());
+    worst_block = std::min(worst_block, quality.worst_block_psnr());
+    ++frames;
+  }
+  [[nodiscard]] double mean() const { return -10.0 * std::log10(squares / frames); }
+
+  void expect_good() const {
+    EXPECT_GE(mean(), 50.0);
+    EXPECT_GE(worst_frame, 40.0);
+    EXPECT_GE(worst_block, 30.0);
+    EXPECT_GT(left_out, 0);
+  }
+};
+
+// What each core must keep to.
+
+inline void expect_a_wall_to_hide(Renderer& renderer) {
+  const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
+  const FrameRequest request = request_at({});
+  const Rendered expected = render_in(*exact, request);
+  EXPECT_EQ(render_in(*view, request).stats.visible, expected.stats.visible) << "nothing is known";
+  for (int frame = 0; frame < 3; ++frame) {
+    const Rendered drawn = render_in(*view, request);
+    EXPECT_LT(2 * drawn.stats.visible, expected.stats.visible);
+    EXPECT_LT(2 * drawn.stats.list_entries, expected.stats.list_entries);
+    EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 45.0);
+  }
+}
+
+inline void expect_a_leap_to_hide_nothing(Renderer& renderer) {
+  const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
+  // Beyond the wall, to the side, and the other way round.
+  const Pose leaps[] = {
+      {{0, 0, 5}, {1, 0, 0, 0}}, {{30, 0, 0}, {1, 0, 0, 0}}, {{0, 0, 40}, {0, 0, 1, 0}}};
+  for (const Pose& leap : leaps) {
+    for (int frame = 0; frame < 2; ++frame) render_in(*view, request_at({}));
+    const Rendered drawn = render_in(*view, request_at(leap));
+    const Rendered expected = render_in(*exact, request_at(leap));
+    EXPECT_EQ(drawn.stats.visible, expected.stats.visible);
+    EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 45.0);
+  }
+}
+
+/// `renderer`: of plate_before_pattern(). The camera goes along the plate and looks past its edge.
+inline void expect_what_comes_out_behind_an_edge(Renderer& renderer) {
+  for (const float step : {0.005f, 0.02f, 0.05f, -0.02f}) {
+    SCOPED_TRACE(step);
+    const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
+    PathQuality quality;
+    std::uint32_t hidden = 0;
+    for (int k = 0; k < 20; ++k) {
+      const FrameRequest request = request_at({{step * static_cast<float>(k), 0, 0}, {1, 0, 0, 0}});
+      const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
+      hidden += expected.stats.visible - drawn.stats.visible;
+      quality.add(drawn, expected, request.camera.size_px);
+    }
+    EXPECT_GE(quality.worst_frame, 45.0);
+    EXPECT_GE(quality.worst_block, 30.0);
+    EXPECT_GT(hidden, 0u);
+  }
+}
+
+}  // namespace catgs::test
