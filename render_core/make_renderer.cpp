@@ -70,9 +70,8 @@ MadeRenderer make_renderer(std::shared_ptr<TreeFile> tree, const RendererOptions
     throw InputError("--renderer reference", "", "draws whole scenes only, not parts of a tree",
                      "leave --detail and --scene-memory out");
   return choose_core(
-      options,
-      [&] { return make_cpu_renderer(tree, options.scene_memory, pool_of(options), options.simd); },
-      [&] { return make_cuda_renderer(tree, options.scene_memory, devices_of(options)); });
+      options, [&] { return make_cpu_renderer(tree, options, pool_of(options)); },
+      [&] { return make_cuda_renderer(tree, options, devices_of(options)); });
 }
 
 }  // namespace catgs

@@ -6,8 +6,8 @@
 
 namespace catgs {
 
-PagedFrame::PagedFrame(TreePager& pager, const ViewSettings& settings)
-    : pager_(pager), keeps_pages_(settings.pipeline == Pipeline::paper), watch_(pager.watch()) {
+PagedFrame::PagedFrame(PagedTree& tree, const ViewSettings& settings)
+    : tree_(tree), keeps_pages_(settings.pipeline == Pipeline::paper), watch_(tree.watch()) {
   if (settings.pipeline == Pipeline::vanilla)
     throw InputError("--pipeline vanilla", "", "draws whole scenes only, not parts of a tree",
                      "leave --detail and --scene-memory out");
@@ -16,23 +16,23 @@ PagedFrame::PagedFrame(TreePager& pager, const ViewSettings& settings)
 void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
   cameras_ = {request.camera};
   if (plan.window > 0) cameras_.push_back(plan.window_end);
-  Lookout lookout{cameras_, request.detail_px};
+  Lookout lookout{cameras_, request.detail_px, request.waits_for_pages};
   if (request.soon) {
     lookout.cameras.push_back(request.camera);
     lookout.cameras.back().world_from_camera = *request.soon;
   }
   table_.reset();
-  if (request.waits_for_pages) pager_.settle(lookout);
   watch_->look(std::move(lookout));
-  table_ = pager_.table();
-  now_s_ = pager_.now_s();
+  if (request.waits_for_pages) tree_.settle(*watch_);
+  table_ = tree_.table();
+  now_s_ = tree_.now_s();
 }
 
 void PagedFrame::end(FrameStats& stats) {
   if (!keeps_pages_) table_.reset();
   stats.missing_pages = watch_->missing();
   stats.coarsest_px = watch_->coarsest_px();
-  stats.settled = !watch_->waits(pager_.now_s());
+  stats.settled = !watch_->waits(tree_.now_s());
 }
 
 }  // namespace catgs

@@ -5,16 +5,16 @@
 
 #include "render_core/motion/frame_groups.h"
 #include "render_core/renderer.h"
-#include "render_core/scene/tree/tree_pager.h"
+#include "render_core/scene/tree/paged_tree.h"
 
 namespace catgs {
 
-/// The part of a View that all cores share for scenes in pages. It tells the pager what the View
-/// looks at, and holds the table of the pages that its frames read.
+/// The part of a View that all cores share for scenes in pages. It tells the pool of
+/// pages what the View looks at, and holds the table of the pages that its frames read.
 class PagedFrame {
  public:
-  /// `pager` must outlive it. Throws InputError for a pipeline that cannot draw pages.
-  PagedFrame(TreePager& pager, const ViewSettings& settings);
+  /// `tree` must outlive it. Throws InputError for a pipeline that cannot draw pages.
+  PagedFrame(PagedTree& tree, const ViewSettings& settings);
 
   /// Call before a frame is drawn that finds its clusters afresh.
   void begin(const FrameRequest& request, const FramePlan& plan);
@@ -30,7 +30,7 @@ class PagedFrame {
   void end(FrameStats& stats);
 
  private:
-  TreePager& pager_;
+  PagedTree& tree_;
   bool keeps_pages_;  // for sub-frames
   std::shared_ptr<Watch> watch_;
   std::shared_ptr<const PageTable> table_;

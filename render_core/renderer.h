@@ -15,10 +15,12 @@
 #include "render_core/math/camera.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/tree/page_figures.h"
 
 namespace catgs {
 
 class DeviceSet;
+class PagePools;
 class ThreadPool;
 class TreeFile;
 
@@ -64,7 +66,9 @@ struct FrameStats {
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::uint64_t tasks = 0;               // parts into which the tiles were cut for the blend
   // Scenes in pages (TreeFile); see scene/tree/cut.h
-  std::uint32_t nodes = 0;          // clusters drawn
+  std::uint32_t nodes = 0;  // clusters drawn
+  // Levels of these nodes; 0: leaves.
+  int finest_level = 0, coarsest_level = 0;
   std::uint32_t missing_pages = 0;  // that would refine the picture, of late
   float coarsest_px = 0.0f;         // the largest error that is drawn for want of them
   bool settled = true;              // a camera at rest would see no other picture in the next frame
@@ -160,8 +164,10 @@ class Renderer {
   /// For people: "CPU, AVX3_DL, 2 threads", "CUDA, 2 x NVIDIA H200".
   [[nodiscard]] virtual std::string description() const = 0;
   /// Bytes of the scene on one device; each device holds its own copy. Of a scene in pages, the
-  /// memory for its pages.
+  /// memory for pages, which it may share with others.
   [[nodiscard]] virtual std::size_t scene_bytes() const = 0;
+  /// Of a scene in pages: its pages on each device. May be called from any thread.
+  [[nodiscard]] virtual std::vector<PageFigures> pages() const { return {}; }
   /// May be called from any thread. Throws where the device has no room left for the View.
   [[nodiscard]] virtual std::unique_ptr<View> make_view(const ViewSettings& settings) = 0;
 };
@@ -173,7 +179,9 @@ struct RendererOptions {
   std::shared_ptr<ThreadPool> pool;      // CPU core; null: the Renderer makes its own
   std::string simd = "auto";             // CPU core: auto or a name of simd_targets()
   std::shared_ptr<DeviceSet> devices{};  // CUDA core; null: device 0
-  std::uint64_t scene_memory = std::uint64_t{4} << 30;  // bounds the pages of a scene, bytes
+  // Pools that scenes in pages share; null: each scene has one of its own, of `scene_memory` bytes.
+  std::shared_ptr<PagePools> pages{};
+  std::uint64_t scene_memory = std::uint64_t{4} << 30;
 };
 
 /// Refuses options that contradict each other, as make_renderer() does, but before a large scene is

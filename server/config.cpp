@@ -186,8 +186,8 @@ std::vector<Setting> scene_settings() {
            &C::scene_folders),
       number("scene-memory", "MB",
              "Memory for all scenes on each device; for more, the least recently used scene of "
-             "--scene-folder is released. Of a .tree, half of it at most is used. 0: no bound, "
-             "and 4 GB for a .tree",
+             "--scene-folder is released. Half of it is for the pages of all .tree scenes, while "
+             "there are any. 0: no bound, and 4 GiB for these pages",
              &C::scene_memory_mb, 0, 10'000'000),
       number("detail", "PX",
              "Scenes in a .tree: largest error that is drawn, pixels; 0: every Gaussian",

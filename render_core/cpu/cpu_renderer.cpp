@@ -21,6 +21,10 @@ class CpuRenderer final : public Renderer {
            (threads == 1 ? " thread" : " threads");
   }
   std::size_t scene_bytes() const override { return scene_->store().bytes(); }
+  std::vector<PageFigures> pages() const override {
+    if (!scene_->tree) return {};
+    return {scene_->tree->figures()};
+  }
   std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     return std::make_unique<CpuView>(scene_, settings);
   }
@@ -66,14 +70,14 @@ std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
 }
 
 std::unique_ptr<Renderer> make_cpu_renderer(std::shared_ptr<TreeFile> tree,
-                                            std::uint64_t memory_bytes,
-                                            std::shared_ptr<ThreadPool> pool,
-                                            std::string_view simd) {
+                                            const RendererOptions& options,
+                                            std::shared_ptr<ThreadPool> pool) {
   auto scene = std::make_shared<CpuScene>();
-  scene->kernels = choose_kernels(simd);
-  scene->pages = std::make_unique<PageSlots>(tree->shape(), memory_bytes);
+  scene->kernels = choose_kernels(options.simd);
   scene->pool = std::move(pool);
-  scene->pager = std::make_unique<TreePager>(std::move(tree), *scene->pages);
+  auto pages = host_pool(tree->shape(), options);
+  scene->pages = std::make_unique<PageSlots>(tree->shape(), pages->slots());
+  scene->tree = std::make_unique<PagedTree>(std::move(pages), std::move(tree), *scene->pages);
   return std::make_unique<CpuRenderer>(std::move(scene));
 }
 

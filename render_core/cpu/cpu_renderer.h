@@ -14,10 +14,9 @@ std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
                                             std::shared_ptr<ThreadPool> pool,
                                             std::string_view simd);
 
-/// The same for a scene in pages. `memory_bytes` bounds the pages in memory.
+/// The same for a scene in pages, with `simd` and the memory for pages from the options.
 std::unique_ptr<Renderer> make_cpu_renderer(std::shared_ptr<TreeFile> tree,
-                                            std::uint64_t memory_bytes,
-                                            std::shared_ptr<ThreadPool> pool,
-                                            std::string_view simd);
+                                            const RendererOptions& options,
+                                            std::shared_ptr<ThreadPool> pool);
 
 }  // namespace catgs

@@ -40,7 +40,7 @@ CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& sett
     : scene_(std::move(scene)), settings_(settings), driver_(settings) {
   if (keeps_colours(settings.pipeline) && settings.colour_cache)
     colours_.emplace(scene_->store().clusters().size());
-  if (scene_->pager) paged_.emplace(*scene_->pager, settings);
+  if (scene_->tree) paged_.emplace(*scene_->tree, settings);
 }
 
 RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noexcept {
@@ -89,6 +89,11 @@ void CpuView::summarise(FrameStats& stats) const {
   if (counted > 0)
     stats.mean_inverse_depth = static_cast<float>(inverse_depths / static_cast<double>(counted));
   stats.nodes = static_cast<std::uint32_t>(clusters_.size());
+  if (!nodes_.empty()) {
+    const auto [finest, coarsest] = std::ranges::minmax(nodes_, {}, &NodeId::level);
+    stats.finest_level = finest.level;
+    stats.coarsest_level = coarsest.level;
+  }
   stats.tasks = lists_.tiles();  // each tile is one part
   stats.list_entries = lists_.entries();
   stats.list_max = lists_.longest();
@@ -134,10 +139,10 @@ void CpuView::draw_cached_lists(const Camera& camera, FrameStats& stats) {
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       if (counts_[rank] == 0) continue;
-      summaries_[rank] = scene_->kernels.refresh_cluster(
-          {&scene_->store(), &camera, clusters_[rank], &members_[rank],
-           splats_.data() + rank * cluster_size, min_depth, shares_[rank],
-           colours_of(clusters_[rank], camera)});
+      summaries_[rank] =
+          scene_->kernels.refresh_cluster({&scene_->store(), &camera, clusters_[rank],
+                                           &members_[rank], splats_.data() + rank * cluster_size,
+                                           min_depth, shares_[rank], colours_of(rank, camera)});
     }
   });
   clock.end(Stage::project);
@@ -161,12 +166,14 @@ void CpuView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
   const PageTable& table = paged_->table();
   clusters_.clear();
   shares_.clear();
+  nodes_.clear();
   const Cut cut = table.cut(paged_->cameras(), request.detail_px, paged_->now_s());
   for (const auto& [node, share] : cut.drawn) {
-    const std::uint32_t c = table.cluster_of(node);
+    const std::uint32_t c = table.cluster_of(node, table.shape().slots());
     if (occlusion_.hides(scene_->store().clusters()[c])) continue;
     clusters_.push_back(c);
     shares_.push_back(share);
+    nodes_.push_back(node);
   }
 }
 
@@ -182,13 +189,10 @@ SplatTable CpuView::table(const FramePlan& plan) const {
   return {splats_, plan.window > 0 ? paths_.data() : nullptr, counts_, occlusion_.limits()};
 }
 
-ClusterColours CpuView::colours_of(std::uint32_t cluster, const Camera& camera) {
+ClusterColours CpuView::colours_of(std::size_t rank, const Camera& camera) {
   if (!colours_) return {nullptr, nullptr};
-  std::uint64_t page = 0;
-  if (paged_) {
-    const PageTable& table = paged_->table();
-    page = table.pages()[cluster / table.shape().slots()]->page;
-  }
+  const std::uint32_t cluster = clusters_[rank];
+  const std::uint64_t page = paged_ ? paged_->table().shape().page_of(nodes_[rank]) : 0;
   return colours_->of_cluster(cluster, page, scene_->store().clusters()[cluster],
                               camera.world_from_camera.position);
 }
@@ -219,7 +223,7 @@ void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& d
            .min_depth = min_depth,
            .share = shares_[rank],
            .limits = occlusion_.limits(),
-           .colours = colours_of(clusters_[rank], camera),
+           .colours = colours_of(rank, camera),
            .window_end = &plan.window_end,
            .paths = sweeps ? paths_.data() + first : nullptr,
            .members = sweeps ? &members_[rank] : nullptr});
@@ -261,8 +265,8 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         occlusion_.memory_bytes() + bytes(clusters_) + bytes(shares_) + bytes(members_) +
-         bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_);
+         occlusion_.memory_bytes() + bytes(clusters_) + bytes(shares_) + bytes(nodes_) +
+         bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_);
 }
 
 }  // namespace catgs

@@ -29,7 +29,7 @@ struct CpuScene {
   std::unique_ptr<PageSlots> pages;
   std::shared_ptr<ThreadPool> pool;
   SimdKernels kernels;
-  std::unique_ptr<TreePager> pager;  // of `pages`
+  std::unique_ptr<PagedTree> tree;  // of `pages`
 };
 
 /// Buffers of a frame, kept for the next one. In Pipeline::paper, those of a key frame are the
@@ -56,7 +56,7 @@ class CpuView final : public View {
   void summarise(FrameStats& stats) const;
   [[nodiscard]] std::size_t segments() const;
   [[nodiscard]] SplatTable table(const FramePlan& plan) const;
-  ClusterColours colours_of(std::uint32_t cluster, const Camera& camera);
+  ClusterColours colours_of(std::size_t rank, const Camera& camera);
 
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
@@ -65,6 +65,7 @@ class CpuView final : public View {
   HostImage image_;
   std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
   std::vector<float> shares_;              // [rank]: the part of the cluster that is drawn
+  std::vector<NodeId> nodes_;              // [rank]: of a scene in pages
   std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians
   std::vector<ClusterSummary> summaries_;  // [rank]
   std::vector<std::uint32_t> counts_;      // [rank]: visible Gaussians

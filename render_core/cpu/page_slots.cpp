@@ -1,13 +1,34 @@
 #include "render_core/cpu/page_slots.h"
 
+#include <algorithm>
 #include <vector>
+
+#include "render_core/scene/tree/page_pools.h"
 
 namespace catgs {
 
-PageSlots::PageSlots(const TreeShape& shape, std::uint64_t memory_bytes)
-    : shape_(shape),
-      slots_(slots_in(memory_bytes, SceneStore::cluster_bytes(shape.sh_degree()), shape)),
-      store_(slots_ * shape.slots(), shape.sh_degree()) {}
+namespace {
+
+std::size_t slot_bytes(const TreeShape& shape) {
+  return shape.slots() * SceneStore::cluster_bytes(shape.sh_degree());
+}
+
+}  // namespace
+
+std::shared_ptr<PagePool> host_pool(const TreeShape& shape, const RendererOptions& options) {
+  if (!options.pages) {
+    const std::uint32_t slots = slots_in(options.scene_memory, slot_bytes(shape), shape);
+    return std::make_shared<PagePool>(slots, slots * slot_bytes(shape));
+  }
+  return options.pages->on(PagePools::host, [&] {
+    std::size_t largest = 0;
+    for (int degree = 0; degree <= max_sh_degree; ++degree)
+      largest = std::max(largest, slot_bytes(TreeShape(1, degree)));
+    const auto slots = static_cast<std::uint32_t>(
+        std::max<std::uint64_t>(PageChoice::least_slots, options.pages->memory_bytes() / largest));
+    return std::make_shared<PagePool>(slots, slots * largest);
+  });
+}
 
 void PageSlots::put(std::uint32_t slot, const TreePage& page, std::uint64_t number) {
   GaussianCloud cloud;

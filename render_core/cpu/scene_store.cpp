@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include "render_core/math/projection-inl.h"
 
 namespace catgs {
@@ -15,6 +18,15 @@ std::size_t packet_bytes(int sh_degree) {
   const auto sh_floats = static_cast<std::size_t>(3 * sh_coefficient_count(sh_degree));
   return packet_size *
          ((SceneStore::attribute_count + sh_floats) * sizeof(float) + sizeof(std::uint32_t));
+}
+
+/// The system's pages that lie within an array.
+template <class T>
+void give_back(T* first, std::size_t count) {
+  static const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const auto begin = (reinterpret_cast<std::uintptr_t>(first) + page - 1) / page * page;
+  const auto end = reinterpret_cast<std::uintptr_t>(first + count) / page * page;
+  if (begin < end) (void)::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
 }
 
 }  // namespace
@@ -63,6 +75,16 @@ void SceneStore::put(std::size_t c, const GaussianCloud& cloud,
     set(first + i, cloud, i, factors[i], first_index + static_cast<std::uint32_t>(i));
   for (std::size_t slot = first + factors.size(); slot < first + cluster_size; ++slot) pad(slot);
   clusters_[c] = bound(first, factors.size());
+}
+
+void SceneStore::forget(std::size_t first_cluster, std::size_t clusters) {
+  const std::size_t first = first_cluster * cluster_size, count = clusters * cluster_size;
+  assert(first + count <= padded_);
+  for (std::size_t a = 0; a < attribute_count; ++a)
+    give_back(attributes_.get() + a * padded_ + first, count);
+  give_back(original_index_.get() + first, count);
+  give_back(sh_.get() + first / packet_size * sh_floats_per_packet(),
+            count / packet_size * sh_floats_per_packet());
 }
 
 std::size_t SceneStore::bytes() const {

@@ -37,6 +37,10 @@ class SceneStore {
   void put(std::size_t c, const GaussianCloud& cloud,
            std::span<const math::CovarianceFactor<double>> factors, std::uint32_t first_index);
 
+  /// The contents of these clusters are undefined again. Gives their memory back to the system, but
+  /// for parts of its pages.
+  void forget(std::size_t first_cluster, std::size_t clusters);
+
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] int sh_degree() const { return sh_degree_; }
   [[nodiscard]] std::span<const Cluster> clusters() const { return clusters_; }

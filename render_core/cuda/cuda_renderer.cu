@@ -81,6 +81,16 @@ class CudaRenderer final : public Renderer {
 
   [[nodiscard]] std::size_t scene_bytes() const override { return devices_.front().scene->bytes(); }
 
+  [[nodiscard]] std::vector<PageFigures> pages() const override {
+    std::vector<PageFigures> all;
+    for (const Device& device : devices_) {
+      if (device.scene->tree() == nullptr) continue;
+      all.push_back(device.scene->tree()->figures());
+      all.back().device = device.index;
+    }
+    return all;
+  }
+
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     std::vector<int> candidates;
     for (const Device& device : devices_) candidates.push_back(device.index);
@@ -210,10 +220,9 @@ MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<Devi
   return make_on(devices, [&](int) { return new cuda::DeviceScene(source); });
 }
 
-MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> tree, std::uint64_t memory_bytes,
+MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> tree, const RendererOptions& options,
                                 std::shared_ptr<DeviceSet> devices) {
-  return make_on(devices,
-                 [&](int device) { return new cuda::DeviceScene(tree, memory_bytes, device); });
+  return make_on(devices, [&](int device) { return new cuda::DeviceScene(tree, options, device); });
 }
 
 }  // namespace catgs

@@ -17,8 +17,8 @@ namespace catgs {
 MadeRenderer make_cuda_renderer(const GaussianCloud& cloud, std::shared_ptr<DeviceSet> devices,
                                 ThreadPool& pool);
 
-/// The same for a scene in pages. `memory_bytes` bounds the pages on each device.
-MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> tree, std::uint64_t memory_bytes,
+/// The same for a scene in pages, with the memory for pages from the options.
+MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> tree, const RendererOptions& options,
                                 std::shared_ptr<DeviceSet> devices);
 
 /// Why no CUDA device can be used ("no CUDA device", …); empty when one can.

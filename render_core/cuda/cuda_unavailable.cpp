@@ -19,7 +19,8 @@ MadeRenderer make_cuda_renderer(const GaussianCloud& /*cloud*/,
   refuse();
 }
 
-MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> /*tree*/, std::uint64_t /*memory_bytes*/,
+MadeRenderer make_cuda_renderer(std::shared_ptr<TreeFile> /*tree*/,
+                                const RendererOptions& /*options*/,
                                 std::shared_ptr<DeviceSet> /*devices*/) {
   refuse();
 }

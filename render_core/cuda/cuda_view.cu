@@ -29,6 +29,11 @@ void set_tiles(FrameShape& shape, glm::ivec2 size_px, int tile_side) {
   shape.tiles_y = tiles.y;
 }
 
+/// The most Gaussians that a frame may look at.
+std::uint32_t most_gaussians(const SceneArrays& scene) {
+  return std::min(scene.count, scene.frame_clusters * std::uint32_t{cluster_size});
+}
+
 Finish finish_of(Pipeline pipeline) {
   if (pipeline == Pipeline::catgs)
     return {.transmittance = static_cast<float>(least_shown), .fills = true};
@@ -44,10 +49,10 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       processors_(processors_of(device)),
       settings_(settings),
       driver_(settings_),
-      room_(scene_->arrays().count, settings.max_list_entries, settings.split_tasks),
+      room_(most_gaussians(scene_->arrays()), settings.max_list_entries, settings.split_tasks),
       builder_(memory_, processors_),
       blend_warps_(blend_warps(processors_)) {
-  if (scene_->pager() != nullptr) paged_.emplace(*scene_->pager(), settings);
+  if (scene_->tree() != nullptr) paged_.emplace(*scene_->tree(), settings);
   // The memory that does not depend on the image is the largest part of a small scene's View. A
   // device without room for it should say so while another can be chosen. For a large scene, only
   // the first frame tells how much is in view.

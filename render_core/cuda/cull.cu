@@ -30,17 +30,34 @@ __device__ bool is_hidden(const CullParams& p, const Cluster& cluster) {
 
 // Separate from the selection kernel, whose few blocks would test one cluster after another.
 __global__ void __launch_bounds__(block_size) sight_kernel(const CullParams p) {
-  const std::uint32_t c = blockIdx.x * block_size + threadIdx.x;
-  if (c >= p.scene.cluster_count) return;
+  const std::uint32_t n = blockIdx.x * block_size + threadIdx.x;
+  if (n >= p.count()) return;
+  const std::uint32_t c = p.cut ? p.cut->cluster_of(n) : n;
   bool drawn = true;
   if (p.cut) {
-    const float share = p.cut->share_of(p.scene.clusters, c);
+    const float share = p.cut->share_of(p.scene.clusters, n);
     p.cut->share[c] = share;
     drawn = share > 0.0f;
   }
   const Cluster& cluster = p.scene.clusters[c];
-  p.seen[c] = drawn && !p.culler.outside(cluster) && !is_hidden(p, cluster) ? 1 : 0;
+  const bool seen = drawn && !p.culler.outside(cluster) && !is_hidden(p, cluster);
+  p.seen[n] = seen ? 1 : 0;
+  if (!p.cut) return;
+  // The threads of a warp have the nodes of one page.
+  static_assert(clusters_per_slot == warp_size);
+  const unsigned levels = __reduce_or_sync(~0u, seen ? 1u << p.cut->level_of(n) : 0u);
+  if (threadIdx.x % warp_size == 0 && (levels & ~p.counts->levels) != 0)
+    atomicOr(&p.counts->levels, levels);
 }
+
+/// The cluster that is the n-th that a frame looks at.
+struct ClusterAt {
+  const PageEntry* pages;  // null: clusters are looked at in their order
+  __device__ std::uint32_t operator()(std::uint32_t n) const {
+    if (pages == nullptr) return n;
+    return pages[n / clusters_per_slot].slot * clusters_per_slot + n % clusters_per_slot;
+  }
+};
 
 template <bool sweeps>
 __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
@@ -94,12 +111,13 @@ __global__ void __launch_bounds__(block_size) compact_kernel(const CullParams p)
   }
 }
 
-cudaError_t select_clusters(void* scratch, std::size_t& bytes, const std::uint32_t* in_sight,
-                            std::uint32_t* clusters, std::uint32_t* selected, std::uint32_t count,
-                            cudaStream_t stream) {
-  return cub::DeviceSelect::Flagged(scratch, bytes,
-                                    thrust::make_counting_iterator(std::uint32_t{0}), in_sight,
-                                    clusters, selected, count, stream);
+cudaError_t select_clusters(void* scratch, std::size_t& bytes, const ClusterAt& cluster_at,
+                            const std::uint32_t* in_sight, std::uint32_t* clusters,
+                            std::uint32_t* selected, std::uint32_t count, cudaStream_t stream) {
+  return cub::DeviceSelect::Flagged(
+      scratch, bytes,
+      thrust::make_transform_iterator(thrust::make_counting_iterator(std::uint32_t{0}), cluster_at),
+      in_sight, clusters, selected, count, stream);
 }
 
 cudaError_t sum_seen(void* scratch, std::size_t& bytes, const Seen& seen, std::uint32_t* before,
@@ -116,7 +134,8 @@ std::uint32_t cull_words(std::uint32_t cluster_count) { return cluster_count * w
 
 std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
   std::size_t select = 0, sum = 0;
-  check(select_clusters(nullptr, select, nullptr, nullptr, nullptr, cluster_count, nullptr),
+  check(select_clusters(nullptr, select, {nullptr}, nullptr, nullptr, nullptr, cluster_count,
+                        nullptr),
         "cull scratch size");
   check(sum_seen(nullptr, sum, {nullptr, nullptr}, nullptr, cluster_count, nullptr),
         "cull scratch size");
@@ -124,13 +143,13 @@ std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
 }
 
 void launch_cull(const CullParams& p, cudaStream_t stream) {
-  const std::uint32_t count = p.scene.cluster_count;
+  const std::uint32_t count = p.count();
   if (count == 0) return;
   sight_kernel<<<blocks_for(count, block_size), block_size, 0, stream>>>(p);
   check_launch("clusters in sight");
   std::size_t bytes = p.scratch.bytes;
-  check(select_clusters(p.scratch.memory, bytes, p.seen, p.clusters, &p.counts->clusters, count,
-                        stream),
+  check(select_clusters(p.scratch.memory, bytes, {p.cut ? p.cut->tree.pages : nullptr}, p.seen,
+                        p.clusters, &p.counts->clusters, count, stream),
         "cull clusters");
   const std::uint32_t blocks =
       std::min(count, static_cast<std::uint32_t>(p.processors * blocks_per_processor));

@@ -23,23 +23,28 @@ struct CullParams {
   bool sweeps;
   Occlusion occlusion;
   FrameShape shape;
-  std::uint32_t* clusters;  // [scene.cluster_count], those in sight; a cluster's position here is
-                            // its rank
-  std::uint32_t* mask;      // [cull_words(scene.cluster_count)], by rank, a bit per Gaussian
-  // [scene.cluster_count]. First, by cluster: whether it is in sight. Then, by rank: its number of
-  // set bits.
+  std::uint32_t* clusters;  // [count()], those in sight; a cluster's position here is its rank
+  std::uint32_t* mask;      // [cull_words(count())], by rank, a bit per Gaussian
+  // [count()]. First, of each that is looked at: whether it is in sight. Then, by rank: its number
+  // of set bits.
   std::uint32_t* seen;
-  std::uint32_t* before;    // [scene.cluster_count], Gaussians in clusters of lower rank
-  std::uint32_t* visible;   // [visible_bound], scene indices
-  FrameCounts* counts;      // `clusters` is set, and `visible`, which may exceed visible_bound
+  std::uint32_t* before;   // [count()], Gaussians in clusters of lower rank
+  std::uint32_t* visible;  // [visible_bound], scene indices
+  FrameCounts* counts;     // `clusters` is set, `levels` of a tree, and `visible`, which may exceed
+                           // visible_bound
   HostCounts* host_counts;  // `visible` is set
-  SortScratch scratch;      // at least cull_scratch_bytes(scene.cluster_count)
+  SortScratch scratch;      // at least cull_scratch_bytes(count())
   int processors;           // of the device
+
+  /// Clusters that the frame looks at: all, or those of the tree's pages.
+  [[nodiscard]] __host__ __device__ std::uint32_t count() const {
+    return cut ? cut->tree.nodes() : scene.cluster_count;
+  }
 };
 
 std::uint32_t cull_words(std::uint32_t cluster_count);
 std::size_t cull_scratch_bytes(std::uint32_t cluster_count);
-/// `visible` of both counts must be 0.
+/// `visible` of both counts must be 0, and `levels`.
 void launch_cull(const CullParams& params, cudaStream_t stream);
 
 }  // namespace catgs::cuda

@@ -8,42 +8,58 @@
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/tree_cut.cuh"
-#include "render_core/scene/tree/tree_pager.h"
+#include "render_core/renderer.h"
+#include "render_core/scene/tree/paged_tree.h"
 
 namespace catgs::cuda {
 
-/// The pages of a tree on one device: slot s has the clusters from s * TreeShape::slots() on. Pages
-/// are copied on a stream of their own.
+/// The pool of pages of one device. Slot s has the clusters from s * clusters_per_slot on.
+class DevicePool final : public PagePool {
+ public:
+  /// Allocates on the current device. `block_bytes`: of all blocks of the largest page. Throws
+  /// CudaError.
+  DevicePool(std::uint32_t slots, std::size_t block_bytes);
+
+  /// Bytes of a slot with so many bytes of blocks.
+  [[nodiscard]] static std::size_t slot_bytes(std::size_t block_bytes);
+  [[nodiscard]] const ClusterMemory& memory() const { return memory_; }
+  [[nodiscard]] float* errors() const { return errors_.get(); }
+  [[nodiscard]] std::size_t chunk_bytes() const { return memory_.blocks.bytes() / slots(); }
+
+ private:
+  ClusterMemory memory_;
+  DeviceBuffer<float> errors_;
+};
+
+/// The pages of a tree in the slots of a pool. They are copied on a stream of their own.
 class DevicePages final : public PageStore {
  public:
-  /// Allocates on the current device, which is `device`. `memory_bytes` bounds the pages, but there
-  /// is room for the fewest that a pager needs. Throws CudaError.
-  DevicePages(const TreeShape& shape, std::uint64_t memory_bytes, int device);
+  /// `pool` is on `device`, the current one. `shape` must outlive the pages.
+  DevicePages(const TreeShape& shape, const DevicePool& pool, int device);
 
   [[nodiscard]] SceneArrays arrays() const;
-  [[nodiscard]] std::size_t bytes() const;
   /// The tree as a table's frames see it. Valid as long as the table.
   [[nodiscard]] TreeArrays tree(const PageTable& table) const;
 
-  [[nodiscard]] std::uint32_t slots() const override { return slots_; }
   void put(std::uint32_t slot, const TreePage& page, std::uint64_t number) override;
   void publish(PageTable& table) override;
+  void release(std::uint32_t /*slot*/) override {}
 
  private:
-  using Entries = DeviceBuffer<PageEntry>;  // [slot]
+  using Entries = DeviceBuffer<PageEntry>;  // [most_pages_]
   /// Buffers that no table uses. Freeing one would wait for the whole device.
   struct Spares {
     std::mutex mutex;
     std::vector<std::unique_ptr<Entries>> buffers;
   };
   std::unique_ptr<Entries> take_entries();
+  [[nodiscard]] std::vector<PageEntry> entries_of(const PageTable& table) const;
 
   const TreeShape& shape_;
+  const DevicePool& pool_;
   int device_;
-  std::uint32_t slots_;
+  std::uint32_t most_pages_;  // in a table
   Stream stream_;
-  ClusterMemory memory_;
-  DeviceBuffer<float> errors_;
   std::shared_ptr<Spares> spares_ = std::make_shared<Spares>();
 };
 
@@ -51,22 +67,23 @@ class DevicePages final : public PageStore {
 class DeviceScene {
  public:
   /// Allocate on the current device. Throw CudaError, and for a tree InputError if its first page
-  /// cannot be read.
+  /// cannot be read. A tree takes the memory for pages from the options.
   explicit DeviceScene(const SceneSource& source);
-  DeviceScene(std::shared_ptr<TreeFile> tree, std::uint64_t memory_bytes, int device);
+  DeviceScene(std::shared_ptr<TreeFile> tree, const RendererOptions& options, int device);
 
   [[nodiscard]] const SceneArrays& arrays() const { return arrays_; }
-  [[nodiscard]] std::size_t bytes() const { return whole_ ? whole_->bytes() : pages_->bytes(); }
+  [[nodiscard]] std::size_t bytes() const { return whole_ ? whole_->bytes() : pool_->bytes(); }
   /// Null for whole scenes.
-  [[nodiscard]] TreePager* pager() const { return pager_.get(); }
+  [[nodiscard]] PagedTree* tree() const { return tree_.get(); }
   /// For a scene in pages.
   [[nodiscard]] TreeArrays tree(const PageTable& table) const { return pages_->tree(table); }
 
  private:
   std::optional<ClusterMemory> whole_;
+  std::shared_ptr<DevicePool> pool_;
   std::unique_ptr<DevicePages> pages_;
   SceneArrays arrays_;
-  std::unique_ptr<TreePager> pager_;
+  std::unique_ptr<PagedTree> tree_;
 };
 
 }  // namespace catgs::cuda

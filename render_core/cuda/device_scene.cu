@@ -19,16 +19,19 @@ void copy(T* target, const std::vector<T>& source, std::size_t count) {
 
 }  // namespace
 
-ClusterMemory::ClusterMemory(std::size_t cluster_count, int sh_degree) : sh_degree_(sh_degree) {
-  blocks.reserve(cluster_count * packed_block_bytes(sh_degree));
+ClusterMemory::ClusterMemory(std::size_t cluster_count, std::size_t bytes_of_blocks) {
+  blocks.reserve(bytes_of_blocks);
   units.reserve(cluster_count);
   clusters.reserve(cluster_count);
 }
 
-SceneArrays ClusterMemory::arrays(std::size_t gaussians) const {
+SceneArrays ClusterMemory::arrays(std::size_t gaussians, int sh_degree) const {
+  const auto cluster_count = static_cast<std::uint32_t>(clusters_of(gaussians));
   return {.count = static_cast<std::uint32_t>(gaussians),
-          .cluster_count = static_cast<std::uint32_t>(clusters_of(gaussians)),
-          .sh_degree = sh_degree_,
+          .cluster_count = cluster_count,
+          .frame_clusters = cluster_count,
+          .sh_degree = sh_degree,
+          .block_bytes = static_cast<std::uint32_t>(packed_block_bytes(sh_degree)),
           .blocks = blocks.get(),
           .units = units.get(),
           .clusters = clusters.get()};
@@ -40,7 +43,7 @@ ClusterMemory upload(const SceneSource& source) {
   assert(order.size() == cloud.size());
   const std::size_t clusters = clusters_of(order.size());
   const std::size_t block_bytes = packed_block_bytes(cloud.sh_degree);
-  ClusterMemory memory(clusters, cloud.sh_degree);
+  ClusterMemory memory(clusters, clusters * block_bytes);
 
   std::vector<PackedUnits> units(clusters);
   std::vector<Cluster> bounds(clusters);

@@ -33,6 +33,7 @@ constexpr int queue_classes = 8;
 struct FrameCounts {
   // Counts of the key frame, kept by its sub-frames.
   std::uint32_t clusters = 0;      // in sight
+  std::uint32_t levels = 0;        // of these, a bit each; only of scenes in pages
   std::uint32_t visible = 0;       // Gaussians in view
   std::uint32_t list_entries = 0;  // sum of all tile lists, before any bound was applied
   std::uint32_t displacement = 0;  // longest path in the window, px, as the bits of a float

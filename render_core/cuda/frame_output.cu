@@ -12,6 +12,10 @@ FrameStats frame_stats(const FrameCounts& counts, const FrameShape& shape, Frame
   FrameStats stats;
   stats.visible = counts.visible;
   stats.nodes = counts.clusters;
+  if (counts.levels != 0) {
+    stats.finest_level = std::countr_zero(counts.levels);
+    stats.coarsest_level = std::bit_width(counts.levels) - 1;
+  }
   stats.list_entries = std::min(counts.list_entries, shape.list_bound);
   stats.overflowed_entries = counts.list_entries - stats.list_entries;
   stats.list_max = counts.list_max;

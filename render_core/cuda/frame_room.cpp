@@ -69,9 +69,11 @@ bool FrameRoom::outgrown_by(const FrameSizes& needed) {
   slices_.outgrown_by(needed.slices);  // without them the frame was slower, not wrong
   const std::uint32_t had = visible_.size();
   const bool more_visible = visible_.outgrown_by(needed.visible);
-  // Splats that found no room had no entries counted. They are assumed to have as many as the
-  // others.
-  const double counted = std::min(1.0, static_cast<double>(had) / std::max(needed.visible, 1u));
+  // Splats that found no room had no entries counted. If they are few, they are assumed to have as
+  // many as the others. If they are many, the next drawing tells: the first Gaussians of a scene in
+  // pages are coarse and may have far more entries than the rest.
+  double counted = std::min(1.0, static_cast<double>(had) / std::max(needed.visible, 1u));
+  if (counted < 0.5) counted = 1.0;
   const bool longer_lists = lists_.outgrown_by(static_cast<std::uint32_t>(
       std::min<double>(needed.list_entries / counted, std::numeric_limits<std::uint32_t>::max())));
   return more_visible || longer_lists;

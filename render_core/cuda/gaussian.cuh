@@ -11,7 +11,10 @@ namespace catgs::cuda {
 // How kernels read a scene. No other code knows its layout.
 
 __device__ inline const std::byte* block_of(const SceneArrays& scene, std::uint32_t i) {
-  return scene.blocks + i / cluster_size * packed_block_bytes(scene.sh_degree);
+  const auto c = static_cast<std::uint32_t>(i / cluster_size);
+  const std::uint32_t in_chunk = c & ((1u << scene.chunk_shift) - 1u);
+  return scene.blocks + std::size_t{c >> scene.chunk_shift} * scene.chunk_bytes +
+         std::size_t{in_chunk} * scene.block_bytes;
 }
 
 /// Word `at` of the record of Gaussian i; at = 0 or 16, parts of its PackedGeometry.

@@ -11,7 +11,7 @@ bool speculates(const ViewSettings& settings) {
 
 std::size_t ViewSizes::scratch_bytes() const {
   if (shape.tiles() == 0) return 0;  // the View has no such lists
-  return std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene.cluster_count));
+  return std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene.frame_clusters));
 }
 
 std::size_t ViewSizes::host_image_bytes() const {

@@ -49,11 +49,11 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   using U32 = std::uint32_t;
 
   // The frustum cache and the sort cache: the Gaussians in view, and the list of every tile.
-  DeviceRow<U32> clusters{this, Life::group, [](S s) { return s.scene.cluster_count; }};
+  DeviceRow<U32> clusters{this, Life::group, [](S s) { return s.scene.frame_clusters; }};
   DeviceRow<float> share{this, Life::group,
                          [](S s) { return s.in_pages ? s.scene.cluster_count : 0; }};
   DeviceRow<U32> cull_mask{this, Life::group,
-                           [](S s) { return cull_words(s.scene.cluster_count); }};
+                           [](S s) { return cull_words(s.scene.frame_clusters); }};
   DeviceRow<U32> visible{this, Life::group, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<uint2> range{this, Life::group, [](S s) { return s.shape.tiles(); }};
   DeviceRow<TileEntry> entries{this, Life::group, [](S s) { return s.shape.list_bound; }};
@@ -66,8 +66,8 @@ struct ViewMemory : MemoryTable<ViewSizes> {
                                [](S s) { return s.occludes() ? s.shape.visible_bound : 0; }};
 
   // Used to make the lists. A sort may leave its result in a row or in its `other` one.
-  DeviceRow<U32> cull_seen{this, Life::frame, [](S s) { return s.scene.cluster_count; }};
-  DeviceRow<U32> cull_before{this, Life::frame, [](S s) { return s.scene.cluster_count; }};
+  DeviceRow<U32> cull_seen{this, Life::frame, [](S s) { return s.scene.frame_clusters; }};
+  DeviceRow<U32> cull_before{this, Life::frame, [](S s) { return s.scene.frame_clusters; }};
   DeviceRow<TileSpans> spans{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<SplatPath> path{this, Life::frame,
                             [](S s) { return speculates(s.settings) ? s.shape.visible_bound : 0; }};

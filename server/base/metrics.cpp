@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include <prometheus/text_serializer.h>
 
@@ -63,6 +64,10 @@ prometheus::Histogram& Metrics::latency(const char* name, const char* help) {
 std::string Metrics::scrape() const {
   auto families = registry_.Collect();
   std::ranges::move(process_metrics(), std::back_inserter(families));
+  {
+    const std::lock_guard lock(pages_mutex_);
+    std::ranges::move(page_metrics(pages_), std::back_inserter(families));
+  }
   prometheus::ClientMetric lost;
   lost.counter.value = static_cast<double>(log_lines_lost());
   families.push_back({"catgs_log_lines_lost_total",
@@ -75,6 +80,11 @@ std::string Metrics::scrape() const {
 
 void Metrics::set_views(int device, int views) {
   views_.Add({{"device", std::to_string(device)}}).Set(views);  // returns the existing gauge
+}
+
+void Metrics::set_pages(std::vector<ScenePages> pages) {
+  const std::lock_guard lock(pages_mutex_);
+  pages_ = std::move(pages);
 }
 
 void Metrics::set_loop_stalled(const std::string& loop, Clock::duration stalled) {

@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <vector>
 
 #include <prometheus/counter.h>
 #include <prometheus/family.h>
@@ -11,6 +13,7 @@
 #include <prometheus/registry.h>
 
 #include "server/base/clock.h"
+#include "server/base/page_metrics.h"
 
 namespace catgs {
 
@@ -27,6 +30,8 @@ class Metrics {
 
   /// Sets the current number of Views on a CUDA device.
   void set_views(int device, int views);
+  /// Sets the present pages of all scenes in pages.
+  void set_pages(std::vector<ScenePages> pages);
   /// Sets for how long a loop has not moved.
   void set_loop_stalled(const std::string& loop, Clock::duration stalled);
   /// Sets the current number of sessions with an encoder of this name.
@@ -41,6 +46,8 @@ class Metrics {
   prometheus::Histogram& stage(const char* name);
   prometheus::Histogram& latency(const char* name, const char* help);
 
+  mutable std::mutex pages_mutex_;
+  std::vector<ScenePages> pages_;
   prometheus::Registry registry_;
   prometheus::Family<prometheus::Gauge>& views_ = prometheus::BuildGauge()
                                                       .Name("catgs_device_views")

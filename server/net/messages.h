@@ -148,6 +148,8 @@ struct Stats {
   std::uint32_t missing_pages = 0;
   float coarsest_px = 0.0f;
   float detail_px = 0.0f;
+  int finest_level = 0;
+  int coarsest_level = 0;
 };
 
 struct Heartbeat {

@@ -292,6 +292,8 @@ void fill(const Stats& stats, v1::ServerMessage& out) {
   message.set_missing_pages(stats.missing_pages);
   message.set_coarsest_px(stats.coarsest_px);
   message.set_detail_px(stats.detail_px);
+  message.set_finest_level(static_cast<std::uint32_t>(stats.finest_level));
+  message.set_coarsest_level(static_cast<std::uint32_t>(stats.coarsest_level));
 }
 
 void fill(const Heartbeat& heartbeat, v1::ServerMessage& out) {

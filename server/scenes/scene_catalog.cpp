@@ -119,11 +119,9 @@ std::shared_ptr<const SceneEntry> load_scene(
     if (text) entry->sidecar_tag = etag_of(*text);
     entry->tours = ToursAnswers(tours_of(entry->sidecar, text));
   }
-  RendererOptions with_memory = core;
-  with_memory.scene_memory = tree_memory(config);
-  auto made = tree ? make_renderer(tree, with_memory)
-                   : make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)),
-                                   with_memory);
+  auto made =
+      tree ? make_renderer(tree, core)
+           : make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
   entry->poster = make_poster(*entry->renderer, entry->facts);

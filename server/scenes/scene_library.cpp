@@ -12,6 +12,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/tree/page_pools.h"
 #include "server/base/log_event.h"
 #include "server/base/scene_id.h"
 #include "server/scenes/scene_catalog.h"
@@ -38,7 +39,7 @@ LoadOptions size_options(const ServerConfig& config) {
 
 ResidencyLimits residency_limits(const ServerConfig& config) {
   constexpr std::uint64_t megabyte = 1'000'000;
-  return {static_cast<std::uint64_t>(config.scene_memory_mb) * megabyte,
+  return {static_cast<std::uint64_t>(config.scene_memory_mb) * megabyte, tree_memory(config),
           std::chrono::seconds(config.scene_residency_s)};
 }
 
@@ -65,6 +66,7 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
       folders_(paths(config.scene_folders), SceneIds(config.scenes, config.scene_folders),
                size_options(config), keys_of(config.scenes)),
       residency_(residency_limits(config)) {
+  core_.pages = std::make_shared<PagePools>(tree_memory(config));
   for (auto& entry : load_scenes(config_, core_)) pin(std::move(entry));
   if (!config_.scene_folders.empty()) open_folders();
   // The first scenes decide whether the server uses GPUs. With GPUs, the processors are reserved
@@ -89,7 +91,7 @@ void SceneLibrary::open_folders() {
                      "put one there, or give --scene");
   const auto& [id, book] = *shelf_.begin();
   const TimePoint now = clock_();
-  const auto wish = residency_.want(id, most_bytes(book.found.size, config_), now, in_use());
+  const auto wish = residency_.want(id, need_of(book), now, in_use());
   if (wish != SceneResidency::Wish::awaited)
     throw InputError("--scene-memory", {}, refusal(wish, id, book).message);
   residency_.next(now, in_use());
@@ -106,7 +108,7 @@ SceneLibrary::~SceneLibrary() {
 void SceneLibrary::pin(std::shared_ptr<const SceneEntry> entry) {
   const std::string& id = entry->facts.scene_id;
   if (preferred_scene_.empty()) preferred_scene_ = id;
-  residency_.pin(id, entry->renderer->scene_bytes());
+  residency_.pin(id, {entry->renderer->scene_bytes(), entry->in_pages});
   Book& book = book_of(id);
   book.found.name = entry->name;
   book.found.size.gaussians = entry->facts.gaussians;
@@ -137,6 +139,10 @@ bool SceneLibrary::Book::in_use() const {
   return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1);
 }
 
+SceneNeed SceneLibrary::need_of(const Book& book) const {
+  return {most_bytes(book.found.size, config_), book.found.size.in_pages};
+}
+
 SceneResidency::InUse SceneLibrary::in_use() const {
   return [this](const std::string& id) {
     const auto it = shelf_.find(id);
@@ -153,7 +159,7 @@ SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
   if (book.retry_at && now < *book.retry_at)
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("the scene \"{}\" could not be loaded", name_in(id)), false};
-  const auto wish = residency_.want(id, most_bytes(book.found.size, config_), now, in_use());
+  const auto wish = residency_.want(id, need_of(book), now, in_use());
   if (wish != SceneResidency::Wish::awaited) return refusal(wish, id, book);
   start_next(now);
   return SceneAwaited{estimate(most_bytes(book.found.size, config_))};
@@ -182,7 +188,7 @@ void SceneLibrary::want_poster(const std::string& id) {
     if (it == shelf_.end() || making_poster_ || residency_.busy()) return;
     Book& book = it->second;
     if (book.gone || book.entry || book.poster || book.poster_tried ||
-        !residency_.has_room(most_bytes(book.found.size, config_)))
+        !residency_.has_room(need_of(book)))
       return;
     making_poster_ = book.poster_tried = true;
     boost::asio::post(loader_, [this, id, found = book.found] {
@@ -211,7 +217,16 @@ void SceneLibrary::on_tick(TimePoint now) {
   }
   for (const std::string& id : outdated) release(id);
   start_next(now);
+  report_pages();
   if (next_scan_ && now >= *next_scan_) start_scan(now);
+}
+
+void SceneLibrary::report_pages() {
+  std::vector<ScenePages> all;
+  for (const auto& [id, book] : shelf_)
+    if (book.entry)
+      for (const PageFigures& figures : book.entry->renderer->pages()) all.push_back({id, figures});
+  metrics_.set_pages(std::move(all));
 }
 
 void SceneLibrary::start_next(TimePoint now) {
@@ -269,13 +284,13 @@ void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint sta
     if (it != shelf_.end()) it->second.retry_at = now + retry_after_failure;
     return start_next(now);
   }
-  const std::uint64_t bytes = loaded.entry->renderer->scene_bytes();
+  const SceneNeed need(loaded.entry->renderer->scene_bytes(), loaded.entry->in_pages);
   const double seconds = std::chrono::duration<double>(now - started).count();
   bytes_per_second_ =
       std::max(1e6, static_cast<double>(most_bytes(it->second.found.size, config_)) /
                         std::max(seconds, 0.1));
   metrics_.scenes_loaded.Increment();
-  residency_.loaded(id, bytes, now);
+  residency_.loaded(id, need, now);
   it->second.entry = std::move(loaded.entry);
   publish();
   start_next(now);

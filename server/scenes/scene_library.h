@@ -92,6 +92,7 @@ class SceneLibrary final : public SceneSource {
 
   void pin(std::shared_ptr<const SceneEntry> entry);
   void open_folders();
+  [[nodiscard]] SceneNeed need_of(const Book& book) const;
   [[nodiscard]] SceneResidency::InUse in_use() const;
   void start_next(TimePoint now);
   void release(const std::string& id);
@@ -100,6 +101,8 @@ class SceneLibrary final : public SceneSource {
   /// Like read(), with exceptions turned into `error`.
   Loaded load(const std::string& id, const FoundScene& found) const;
   void on_loaded(const std::string& id, Loaded loaded, TimePoint started, TimePoint now);
+  /// Tells the metrics which pages of trees are in memory.
+  void report_pages();
   void start_scan(TimePoint now);
   void merge(std::vector<FoundScene> found);
   /// Returns the book with this id and creates it if needed.

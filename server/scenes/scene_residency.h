@@ -14,14 +14,25 @@ namespace catgs {
 
 struct ResidencyLimits {
   std::uint64_t budget_bytes = 0;  // of all scenes in memory, on each device; 0: no bound
+  std::uint64_t pool_bytes = 0;    // a part of it, that all scenes in pages share
   /// The least time that a scene stays. Otherwise two visitors of different scenes could make the
   /// server reload them in turns.
   std::chrono::milliseconds min_residency{60'000};
 };
 
+/// The memory that a scene takes on each device: so many bytes, or a share of the pool of pages.
+struct SceneNeed {
+  SceneNeed(std::uint64_t of_bytes, bool is_in_pages = false)  // NOLINT: bytes are a need
+      : bytes(is_in_pages ? 0 : of_bytes), in_pages(is_in_pages) {}
+
+  std::uint64_t bytes;
+  bool in_pages;
+};
+
 /// Decides which scenes are in memory, which is loaded next and which are released for it. One
 /// scene loads at a time and one may wait. Scenes in use are never released; of the others, the
-/// least recently used goes first. Until a scene is loaded, its size is the one in its header.
+/// least recently used goes first. Until a scene is loaded, its size is the one in its header. The
+/// first scene in pages takes the whole pool, and the others nothing beside it.
 /// Pure: time comes in, decisions come out. Not thread-safe.
 class SceneResidency {
  public:
@@ -31,7 +42,7 @@ class SceneResidency {
   explicit SceneResidency(ResidencyLimits limits) : limits_(limits) {}
 
   /// Adds a scene that stays in memory for good.
-  void pin(const std::string& id, std::uint64_t bytes);
+  void pin(const std::string& id, const SceneNeed& need);
 
   enum class Wish {
     resident,   // it is in memory
@@ -40,8 +51,7 @@ class SceneResidency {
     no_room,    // those in memory are in use
     busy,       // one is being loaded and one waits
   };
-  /// Requests a scene that needs `bytes`.
-  Wish want(const std::string& id, std::uint64_t bytes, TimePoint now, const InUse& in_use);
+  Wish want(const std::string& id, const SceneNeed& need, TimePoint now, const InUse& in_use);
 
   /// The next step for the waiting scene. Do `release` first, because it makes room.
   struct Step {
@@ -52,7 +62,7 @@ class SceneResidency {
   /// caller carries the step out and then calls loaded() or failed().
   std::optional<Step> next(TimePoint now, const InUse& in_use);
 
-  void loaded(const std::string& id, std::uint64_t bytes, TimePoint now);
+  void loaded(const std::string& id, const SceneNeed& need, TimePoint now);
   void failed(const std::string& id);
   /// Removes a scene that is gone for another reason.
   void drop(const std::string& id) { residents_.erase(id); }
@@ -65,28 +75,34 @@ class SceneResidency {
   }
   /// True while a scene is being loaded or waits for it.
   [[nodiscard]] bool busy() const { return !loading_.empty() || waiting_; }
-  /// True if so many bytes fit without releasing a scene.
-  [[nodiscard]] bool has_room(std::uint64_t bytes) const {
-    return limits_.budget_bytes == 0 || this->bytes() + bytes <= limits_.budget_bytes;
-  }
+  /// True if it fits without releasing a scene.
+  [[nodiscard]] bool has_room(const SceneNeed& need) const { return fits({}, need); }
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::size_t count() const { return residents_.size(); }
 
  private:
   struct Resident {
-    std::uint64_t bytes = 0;
-    bool pinned = false;
+    SceneNeed need;
+    bool pinned;
     TimePoint since;
     TimePoint last_use;
   };
   struct Waiting {
     std::string id;
-    std::uint64_t bytes = 0;
+    SceneNeed need;
   };
-  /// The least recently used scenes to release for `bytes`, if `may_go` permits enough of them.
+  /// The memory of the scenes but for those that are `gone`.
+  [[nodiscard]] std::uint64_t bytes_without(const std::vector<std::string>& gone,
+                                            bool pool_stays) const;
+  /// Whether a scene fits when those are `gone`.
+  [[nodiscard]] bool fits(const std::vector<std::string>& gone, const SceneNeed& need) const {
+    return limits_.budget_bytes == 0 ||
+           bytes_without(gone, need.in_pages) + need.bytes <= limits_.budget_bytes;
+  }
+  /// The least recently used scenes to release for a scene, if `may_go` permits enough of them.
   /// Empty if there is room already.
   [[nodiscard]] std::optional<std::vector<std::string>> room_for(
-      std::uint64_t bytes,
+      const SceneNeed& need,
       const std::function<bool(const std::string&, const Resident&)>& may_go) const;
 
   const ResidencyLimits limits_;

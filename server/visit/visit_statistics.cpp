@@ -20,6 +20,8 @@ void VisitStatistics::pages_drawn(const FrameStats& frame, float detail_px) {
   stats_.missing_pages = frame.missing_pages;
   stats_.coarsest_px = frame.coarsest_px;
   stats_.detail_px = detail_px;
+  stats_.finest_level = frame.finest_level;
+  stats_.coarsest_level = frame.coarsest_level;
 }
 
 void VisitStatistics::frames_lost(std::size_t count) {

@@ -338,8 +338,8 @@ def check_metrics(options):
         text = scrape(port)
     served = set(re.findall(r"^# TYPE (\S+) ", text, re.M))
     served |= {name + suffix for name in re.findall(r"^# TYPE (\S+) histogram", text, re.M) for suffix in ("_bucket", "_sum", "_count")}
-    # Of a GPU that this machine may not have.
-    served |= {"catgs_device_views"}
+    # Of a GPU that this machine may not have, and of scenes in pages.
+    served |= {"catgs_device_views", "catgs_scene_pages", "catgs_scene_pages_loaded_total"}
     expressions = [(f"alert {rule['alert']}", rule["expr"]) for rule in alerts()]
     expressions += [(f"dashboard, {title}", expression) for title, expression in dashboard_expressions()]
     scaler = (DEPLOY / "kubernetes/overlays/keda/scaledobject.yaml").read_text()

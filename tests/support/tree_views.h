@@ -2,13 +2,17 @@
 
 // Scenes in pages, drawn by a core: what all cores must do alike.
 
+#include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
 #include "render_core/renderer.h"
+#include "render_core/scene/tree/page_pools.h"
 #include "render_core/scene/tree/read_tree.h"
 #include "tests/render_core/scene/tree/tree_test_support.h"
 #include "tests/support/rendered.h"
@@ -18,7 +22,8 @@ namespace catgs::test {
 
 /// A scene of 60,000 Gaussians as a tree, and all its leaves as a cloud.
 struct TreeScenes {
-  TreeScenes() : bytes(tree_bytes(random_cloud(60'000, 1, 21), pool)) {
+  explicit TreeScenes(int sh_degree = 1, std::uint32_t seed = 21)
+      : bytes(tree_bytes(random_cloud(60'000, sh_degree, seed), pool)) {
     cloud =
         std::make_shared<const GaussianCloud>(read_tree(source_of(bytes), LoadContext(pool)).cloud);
   }
@@ -31,6 +36,14 @@ struct TreeScenes {
     RendererOptions options;
     options.kind = kind;
     options.scene_memory = memory_bytes;
+    return make_renderer(tree(), options).renderer;
+  }
+  /// In a pool that it shares.
+  [[nodiscard]] std::unique_ptr<Renderer> in_pages(RendererKind kind,
+                                                   std::shared_ptr<PagePools> pages) const {
+    RendererOptions options;
+    options.kind = kind;
+    options.pages = std::move(pages);
     return make_renderer(tree(), options).renderer;
   }
   [[nodiscard]] std::unique_ptr<Renderer> whole(RendererKind kind) const {
@@ -64,6 +77,8 @@ inline void expect_zero_detail_is_the_whole_scene(RendererKind kind, double leas
       EXPECT_NEAR(drawn.stats.visible, expected.stats.visible, 2 + expected.stats.visible / 500);
       EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), least_db) << "from " << distance;
       EXPECT_EQ(drawn.stats.missing_pages, 0u);
+      EXPECT_EQ(drawn.stats.finest_level, 0);
+      EXPECT_EQ(drawn.stats.coarsest_level, 0);
     }
   }
 }
@@ -122,6 +137,8 @@ inline void expect_short_memory_to_be_coarser(RendererKind kind) {
   const Rendered all = render_in(*scenes.whole(kind)->make_view({}), request);
   EXPECT_GT(coarse.stats.missing_pages, 0u);
   EXPECT_GT(coarse.stats.coarsest_px, 0.0f);
+  EXPECT_GT(coarse.stats.coarsest_level, 0);
+  EXPECT_LE(coarse.stats.finest_level, coarse.stats.coarsest_level);
   EXPECT_LT(few->scene_bytes(), scenes.bytes.size());
   request.background = glm::vec3(1.0f);
   const Rendered coarse_on_white = render_in(*view, request);
@@ -134,6 +151,74 @@ inline void expect_short_memory_to_be_coarser(RendererKind kind) {
   }
   EXPECT_GT(hidden, all.rgb.size() / 20);
   EXPECT_LE(holes, hidden / 200);
+}
+
+/// Pools of so many slots each.
+inline std::shared_ptr<PagePools> pools_of(RendererKind kind, std::uint32_t slots) {
+  const TreeScenes scenes;
+  const PageFigures least = scenes.in_pages(kind, std::make_shared<PagePools>(1))->pages().at(0);
+  return std::make_shared<PagePools>(least.pool_bytes / least.slots * slots);
+}
+
+/// Two trees of different pages in a pool that is too small for either. Each draws as in a pool of
+/// its own when the other has no View.
+inline void expect_trees_to_share_a_pool(RendererKind kind) {
+  constexpr std::uint32_t slots = 12;
+  const TreeScenes low(1, 21), high(3, 22);
+  const auto pools = pools_of(kind, slots);
+  const auto first = low.in_pages(kind, pools);
+  EXPECT_EQ(first->pages().at(0).slots, slots);
+  FrameRequest request = tree_request(8.0f, 0.0f);
+  const auto alone = [&](const TreeScenes& scenes) {
+    const PageFigures least = scenes.in_pages(kind, 1)->pages().at(0);
+    // The root of the other tree takes a slot of the shared pool.
+    const auto own = scenes.in_pages(kind, least.pool_bytes / least.slots * (slots - 1));
+    EXPECT_EQ(own->pages().at(0).slots, slots - 1);
+    return render_in(*own->make_view({}), request);
+  };
+  const Rendered low_alone = alone(low), high_alone = alone(high);
+  EXPECT_GT(low_alone.stats.missing_pages, 0u);
+  {
+    const auto second = high.in_pages(kind, pools);
+    const auto expect_same = [&](Renderer& renderer, const Rendered& expected) {
+      const Rendered drawn = render_in(*renderer.make_view({}), request);
+      EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 90.0);
+      EXPECT_EQ(drawn.stats.nodes, expected.stats.nodes);
+      EXPECT_EQ(drawn.stats.coarsest_level, expected.stats.coarsest_level);
+    };
+    expect_same(*first, low_alone);
+    expect_same(*second, high_alone);
+    EXPECT_LE(first->pages().at(0).in_memory, 3u) << "an idle tree gives its pages up";
+    expect_same(*first, low_alone);
+    EXPECT_LE(second->pages().at(0).in_memory, 3u);
+    // Both at once are coarser, and not wrong.
+    const auto a = first->make_view({}), b = second->make_view({});
+    const Rendered low_beside = render_in(*a, request), high_beside = render_in(*b, request);
+    EXPECT_GE(psnr_db(low_beside.rgb, low_alone.rgb), 20.0);
+    EXPECT_GE(psnr_db(high_beside.rgb, high_alone.rgb), 20.0);
+  }
+  const PageFigures left = first->pages().at(0);
+  EXPECT_EQ(left.free_slots, slots - left.in_memory) << "a tree that goes frees its slots";
+}
+
+/// A View at rest that is short of memory has its last picture at some time, and reads no more.
+inline void expect_a_resting_view_to_settle(RendererKind kind) {
+  const TreeScenes scenes;
+  const auto renderer = scenes.in_pages(kind, pools_of(kind, 7));
+  const auto view = renderer->make_view({.pipeline = Pipeline::catgs});
+  FrameRequest request = tree_request(8.0f, 0.0f);
+  request.waits_for_pages = false;
+  Rendered drawn;
+  for (int frame = 0; frame < 1000 && (frame < 2 || !drawn.stats.settled); ++frame) {
+    drawn = render_in(*view, request);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_TRUE(drawn.stats.settled);
+  EXPECT_GT(drawn.stats.missing_pages, 0u);
+  const PageFigures figures = renderer->pages().at(0);
+  EXPECT_EQ(figures.loaded, figures.in_memory) << "what was read is there";
+  for (int frame = 0; frame < 10; ++frame) EXPECT_TRUE(render_in(*view, request).stats.settled);
+  EXPECT_EQ(renderer->pages().at(0).loaded, figures.loaded);
 }
 
 inline void expect_sub_frames_to_keep_the_cut(RendererKind kind) {

@@ -218,9 +218,15 @@ export const text = {
     picture: 'Picture',
     detail: 'Detail',
     detail_title:
-      'Scenes that the server reads in pages: the largest error it draws, the Gaussians in the picture, and the pages that are still missing',
-    detail_value: (px: number, gaussians: number, missing_pages: number): string => {
-      const drawn = `${px < 100 ? px.toFixed(1) : '> 100'} px, ${(gaussians / 1e6).toFixed(2)} M`;
+      'Scenes that the server reads in pages: the largest error it draws, the Gaussians in the picture, the finest and the coarsest level of the tree in it, and the pages that are still missing',
+    detail_value: (
+      px: number,
+      gaussians: number,
+      [finest, coarsest]: readonly [number, number],
+      missing_pages: number,
+    ): string => {
+      const levels = finest === coarsest ? `level ${finest}` : `levels ${finest} to ${coarsest}`;
+      const drawn = `${px < 100 ? px.toFixed(1) : '> 100'} px, ${(gaussians / 1e6).toFixed(2)} M, ${levels}`;
       return missing_pages === 0 ? drawn : `${drawn}, ${missing_pages} pages missing`;
     },
     drops: 'Drops',

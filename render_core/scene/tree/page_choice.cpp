@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <limits>
 #include <tuple>
 
 namespace catgs {
@@ -11,12 +12,28 @@ namespace {
 /// families of about the same error would replace each other again and again.
 constexpr float clearly_less = 0.8f;
 
+constexpr std::uint32_t slots_per_family = 2;
+
 }  // namespace
 
-PageChoice::PageChoice(const TreeShape& shape, std::uint32_t slots)
-    : shape_(shape),
-      reserve_(shape.pages() <= slots ? 0 : std::clamp<std::uint32_t>(slots / 8, 2, 64)) {
-  assert(slots >= least_slots);
+PageChoice::PageChoice(std::uint32_t slots) : slots_(slots) { assert(slots >= least_slots); }
+
+std::uint32_t PageChoice::slots_for(const TreeShape& shape) {
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(std::max<std::uint64_t>(least_slots, 1 + 2 * shape.families()),
+                              std::numeric_limits<std::uint32_t>::max()));
+}
+
+bool PageChoice::add(std::uint32_t tree, const TreeShape& shape) {
+  if (trees_.size() + 1 + slots_per_family > slots_) return false;
+  return trees_.emplace(tree, &shape).second;
+}
+
+void PageChoice::remove(std::uint32_t tree) {
+  trees_.erase(tree);
+  std::erase_if(families_, [=](const auto& family) { return family.first.tree == tree; });
+  std::erase_if(wanted_, [=](const auto& wanted) { return wanted.first.tree == tree; });
+  std::erase_if(unreadable_, [=](const PageOfTree& first) { return first.tree == tree; });
 }
 
 void PageChoice::begin(double now_s) {
@@ -24,9 +41,9 @@ void PageChoice::begin(double now_s) {
   wanted_.clear();
 }
 
-void PageChoice::note(const Cut& cut) {
+void PageChoice::note(std::uint32_t tree, const Cut& cut) {
   for (const PageUse& use : cut.used) {
-    const auto found = families_.find(family_of(use.page));
+    const auto found = families_.find(family_of({tree, use.page}));
     if (found == families_.end()) continue;
     Family& family = found->second;
     const bool first = family.wanted_at_s != now_s_;
@@ -34,33 +51,56 @@ void PageChoice::note(const Cut& cut) {
     family.wanted_at_s = now_s_;
   }
   for (const PageUse& use : cut.missing) {
-    const std::uint64_t first = family_of(use.page);
+    const PageOfTree first = family_of({tree, use.page});
     if (unreadable_.contains(first) || families_.contains(first)) continue;
     float& error = wanted_[first];
     error = std::max(error, use.error_px);
   }
 }
 
-PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t held_slots,
-                                  std::uint32_t most) {
+/// Goes through the wishes, largest error first, and stops at the first that finds no room. So what
+/// is loaded is never less wanted than what is left out.
+PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t most) {
   Step step;
-  std::uint32_t left_out = 0;  // pages
-  float left_out_error = 0.0f;
-  const std::uint32_t room = std::min(free_slots, most);
-  for (const Wanted& wanted : wanted_families()) {
-    const std::uint32_t size = size_of_family(wanted.first);
-    if (left_out == 0 && step.load.size() + size <= room) {
-      add(wanted, step.load);
-      continue;
-    }
-    left_out_error = std::max(left_out_error, wanted.error_px);
-    left_out += size;
-    if (left_out >= most) break;
+  std::int64_t room = capacity() - static_cast<std::int64_t>(families_.size());
+  std::optional<Victims> going;
+  const auto drop = [&](std::optional<float> below_px) {
+    if (!going) going = victims();
+    if (!drop_one(*going, below_px, step.drop)) return false;
+    ++room;
+    return true;
+  };
+  const auto within = [most](const std::vector<PageOfTree>& pages) {
+    return pages.size() + slots_per_family <= most;
+  };
+  while (room < 0 && drop(std::nullopt)) {  // a new tree's root has taken a slot
   }
-  const auto free_then = free_slots + held_slots - static_cast<std::uint32_t>(step.load.size());
-  const std::uint32_t goal = reserve_ + (reserve_ > 0 ? std::min(left_out, most) : 0);
-  if (free_then < goal) drop_for(goal - free_then, left_out_error, step.drop);
+  for (const Wanted& wanted : wanted_families()) {
+    // A family goes before the larger errors above it, unless the file is forged.
+    if (const auto up = above(wanted.first); up && !families_.contains(*up)) continue;
+    step.cut_short = !within(step.awaited) || (room <= 0 && !within(step.drop));
+    if (step.cut_short) break;
+    if (room <= 0 && !drop(clearly_less * wanted.error_px)) break;
+    --room;
+    if (step.awaited.empty() && within(step.load) &&
+        step.load.size() + slots_per_family <= free_slots)
+      add_family(wanted, step.load);
+    else
+      append(wanted.first, step.awaited);
+  }
+  while (room < reserve() && within(step.drop) && drop(0.0f)) {
+  }
   return step;
+}
+
+std::int64_t PageChoice::capacity() const {
+  return (std::int64_t{slots_} - static_cast<std::int64_t>(trees_.size())) / slots_per_family;
+}
+
+std::int64_t PageChoice::reserve() const {
+  std::int64_t all = 0;
+  for (const auto& [tree, shape] : trees_) all += static_cast<std::int64_t>(shape->families());
+  return all <= capacity() ? 0 : std::clamp<std::int64_t>(capacity() / 8, 1, 32);
 }
 
 std::vector<PageChoice::Wanted> PageChoice::wanted_families() const {
@@ -72,67 +112,59 @@ std::vector<PageChoice::Wanted> PageChoice::wanted_families() const {
   return all;
 }
 
-void PageChoice::add(const Wanted& wanted, std::vector<std::uint64_t>& pages) {
+PageChoice::Victims PageChoice::victims() const {
+  std::vector<Victim> all;
+  for (const auto& [first, family] : families_)
+    if (family.families_below == 0) all.push_back({family.wanted_at_s, family.error_px, first});
+  return Victims(std::greater<>(), std::move(all));
+}
+
+void PageChoice::add_family(const Wanted& wanted, std::vector<PageOfTree>& pages) {
   families_[wanted.first] = {0, wanted.error_px, now_s_};
-  if (Family* above = family_above(wanted.first)) ++above->families_below;
+  if (const auto up = above(wanted.first)) ++families_.at(*up).families_below;
   append(wanted.first, pages);
 }
 
-/// Drops families without families below them: those longest unused first, then those in use with
-/// errors clearly under `error_px`, smallest first.
-void PageChoice::drop_for(std::uint32_t pages, float error_px,
-                          std::vector<std::uint64_t>& dropped) {
-  struct Candidate {
-    double wanted_at_s;
-    float error_px;
-    std::uint64_t first;
-  };
-  std::vector<Candidate> candidates;
-  for (const auto& [first, family] : families_) {
-    const bool in_use = family.wanted_at_s == now_s_;
-    if (family.families_below > 0 || (in_use && family.error_px >= clearly_less * error_px))
-      continue;
-    candidates.push_back({family.wanted_at_s, family.error_px, first});
+bool PageChoice::drop_one(Victims& victims, std::optional<float> below_px,
+                          std::vector<PageOfTree>& dropped) {
+  if (victims.empty()) return false;
+  const Victim victim = victims.top();
+  const bool in_use = victim.wanted_at_s == now_s_;
+  if (in_use && below_px && !(victim.error_px < *below_px)) return false;
+  victims.pop();
+  families_.erase(victim.first);
+  append(victim.first, dropped);
+  if (const auto up = above(victim.first)) {
+    Family& family = families_.at(*up);
+    if (--family.families_below == 0) victims.push({family.wanted_at_s, family.error_px, *up});
   }
-  std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.wanted_at_s, a.error_px, a.first) <
-           std::tie(b.wanted_at_s, b.error_px, b.first);
-  });
-  for (const Candidate& candidate : candidates) {
-    if (dropped.size() >= pages) break;
-    if (Family* above = family_above(candidate.first)) --above->families_below;
-    families_.erase(candidate.first);
-    append(candidate.first, dropped);
-  }
+  return true;
 }
 
-void PageChoice::failed(std::uint64_t page) {
-  const std::uint64_t first = family_of(page);
+void PageChoice::failed(const PageOfTree& page) {
+  const PageOfTree first = family_of(page);
   if (!unreadable_.insert(first).second) return;
-  if (Family* above = family_above(first)) --above->families_below;
+  if (const auto up = above(first)) --families_.at(*up).families_below;
   families_.erase(first);
 }
 
-std::uint64_t PageChoice::family_of(std::uint64_t page) const {
-  const NodeId root = shape_.root_of(page);
-  return root.index % 2 == 1 ? page - 1 : page;
+PageOfTree PageChoice::family_of(const PageOfTree& page) const {
+  return {page.tree, trees_.at(page.tree)->family_of(page.page)};
 }
 
-std::uint32_t PageChoice::size_of_family(std::uint64_t first) const {
-  const NodeId root = shape_.root_of(first);
-  return root.index + 1 < shape_.nodes_on(root.level) ? 2 : 1;
+std::optional<PageOfTree> PageChoice::above(const PageOfTree& first) const {
+  const TreeShape& shape = *trees_.at(first.tree);
+  const NodeId root = shape.root_of(first.page);
+  if (root == shape.root()) return std::nullopt;
+  const NodeId node{static_cast<std::uint8_t>(root.level + 1), root.index / 2};
+  const PageOfTree up = family_of({first.tree, shape.page_of(node)});
+  if (shape.root_of(up.page) == shape.root()) return std::nullopt;
+  return up;
 }
 
-PageChoice::Family* PageChoice::family_above(std::uint64_t first) {
-  const NodeId root = shape_.root_of(first);
-  if (root == shape_.root()) return nullptr;
-  const NodeId above{static_cast<std::uint8_t>(root.level + 1), root.index / 2};
-  const auto found = families_.find(family_of(shape_.page_of(above)));
-  return found == families_.end() ? nullptr : &found->second;
-}
-
-void PageChoice::append(std::uint64_t first, std::vector<std::uint64_t>& pages) const {
-  for (std::uint32_t i = 0; i < size_of_family(first); ++i) pages.push_back(first + i);
+void PageChoice::append(const PageOfTree& first, std::vector<PageOfTree>& pages) const {
+  const std::uint32_t size = trees_.at(first.tree)->family_size(first.page);
+  for (std::uint32_t i = 0; i < size; ++i) pages.push_back({first.tree, first.page + i});
 }
 
 }  // namespace catgs

@@ -16,7 +16,7 @@ namespace catgs {
 struct PageInSlot {
   std::uint64_t page = 0;
   std::uint32_t slot = 0;
-  double shown_since_s = 0.0;     // in the pager's time
+  double shown_since_s = 0.0;     // in the pool's time
   std::vector<NodeFacts> facts;   // [TreeShape::slots()]
   std::shared_ptr<void> release;  // frees the slot
 };
@@ -25,14 +25,14 @@ struct PageInSlot {
 /// that refine one node come and go together, and a page is there only with the page above it.
 class PageTable {
  public:
-  PageTable(const TreeShape& shape, std::uint32_t slots) : shape_(&shape), pages_(slots) {}
+  explicit PageTable(const TreeShape& shape) : shape_(&shape) {}
 
   [[nodiscard]] const TreeShape& shape() const { return *shape_; }
-  /// [slot]; null: free.
+  /// In no order.
   [[nodiscard]] const std::vector<std::shared_ptr<const PageInSlot>>& pages() const {
     return pages_;
   }
-  [[nodiscard]] std::size_t size() const { return by_number_.size(); }
+  [[nodiscard]] std::size_t size() const { return pages_.size(); }
   /// Null if it is not in memory.
   [[nodiscard]] const PageInSlot* find(std::uint64_t page) const {
     const auto found = by_number_.find(page);
@@ -50,26 +50,32 @@ class PageTable {
     const PageInSlot* above = this->above(page);
     return above == nullptr ? long_ago_s : above->shown_since_s;
   }
-  /// A node's place in a core's arrays of clusters. Its page is in memory.
-  [[nodiscard]] std::uint32_t cluster_of(NodeId node) const {
-    return find(shape_->page_of(node))->slot * static_cast<std::uint32_t>(shape_->slots()) +
-           static_cast<std::uint32_t>(shape_->slot_of(node));
+  /// A node's place in a core's arrays of clusters, where each slot has so many. Its page is in
+  /// memory.
+  [[nodiscard]] std::uint32_t cluster_of(NodeId node, std::size_t clusters_per_slot) const {
+    return static_cast<std::uint32_t>(find(shape_->page_of(node))->slot * clusters_per_slot +
+                                      shape_->slot_of(node));
   }
 
   /// Data that the core keeps with the table.
   std::shared_ptr<const void> of_core;
 
   void add(std::shared_ptr<const PageInSlot> page) {
-    by_number_[page->page] = page->slot;
-    pages_[page->slot] = std::move(page);
+    by_number_[page->page] = pages_.size();
+    pages_.push_back(std::move(page));
   }
   void remove(std::uint64_t page) {
     const auto found = by_number_.find(page);
-    pages_[found->second].reset();
+    const std::size_t at = found->second;
     by_number_.erase(found);
+    if (at + 1 < pages_.size()) {
+      pages_[at] = std::move(pages_.back());
+      by_number_[pages_[at]->page] = at;
+    }
+    pages_.pop_back();
   }
 
-  /// The nodes to draw: choose_cut() of what is in memory, `now_s` in the pager's time.
+  /// The nodes to draw: choose_cut() of what is in memory, `now_s` in the pool's time.
   [[nodiscard]] Cut cut(std::span<const Camera> cameras, float detail_px, double now_s) const {
     return choose_cut(*shape_, cameras, detail_px, [&](std::uint64_t number) -> PageInMemory {
       const PageInSlot* page = find(number);
@@ -81,7 +87,7 @@ class PageTable {
  private:
   const TreeShape* shape_;
   std::vector<std::shared_ptr<const PageInSlot>> pages_;
-  std::unordered_map<std::uint64_t, std::uint32_t> by_number_;
+  std::unordered_map<std::uint64_t, std::size_t> by_number_;  // places in pages_
 };
 
 }  // namespace catgs

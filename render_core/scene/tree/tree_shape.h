@@ -93,6 +93,20 @@ class TreeShape {
     return {static_cast<std::uint8_t>(top_level(band)),
             static_cast<std::uint32_t>(page - first_page_[static_cast<std::size_t>(band)])};
   }
+  /// Pages come and go by family: the one or two pages that refine one node. The first of them.
+  [[nodiscard]] std::uint64_t family_of(std::uint64_t page) const {
+    return root_of(page).index % 2 == 1 ? page - 1 : page;
+  }
+  /// The pages of the family that begins with `first`.
+  [[nodiscard]] std::uint32_t family_size(std::uint64_t first) const {
+    const NodeId root = root_of(first);
+    return root.index + 1 < nodes_on(root.level) ? 2 : 1;
+  }
+  [[nodiscard]] std::uint64_t families() const {
+    std::uint64_t sum = 0;
+    for (int band = 0; band + 1 < bands_; ++band) sum += nodes_on(top_level(band) + 1);
+    return sum;
+  }
 
   // --- Nodes in pages ---
   [[nodiscard]] std::uint64_t page_of(NodeId node) const {

@@ -14,6 +14,8 @@ TEST(TreeViews, DetailLeavesOutLittle) { test::expect_detail_to_leave_out_little
 TEST(TreeViews, NothingPops) { test::expect_no_pops(kind); }
 TEST(TreeViews, ShortMemoryIsCoarser) { test::expect_short_memory_to_be_coarser(kind); }
 TEST(TreeViews, SubFramesKeepTheCut) { test::expect_sub_frames_to_keep_the_cut(kind); }
+TEST(TreeViews, TreesShareAPool) { test::expect_trees_to_share_a_pool(kind); }
+TEST(TreeViews, AViewAtRestSettles) { test::expect_a_resting_view_to_settle(kind); }
 TEST(TreeViews, VanillaIsRefused) { test::expect_vanilla_to_be_refused(kind); }
 
 TEST(TreeViews, TheReferenceDrawsNoParts) {

@@ -92,6 +92,17 @@ TEST(FrameRoom, IsOutgrownByWhatWouldBeMissing) {
   EXPECT_FALSE(room.outgrown_by({90'000, 500'000, 0}));
 }
 
+// The first Gaussians of a scene in pages are coarse, and may have far more entries than the rest.
+TEST(FrameRoom, ListsFollowFromSplatsOnlyIfMostWereCounted) {
+  FrameRoom few(64'000'000, 1u << 26, true);
+  EXPECT_TRUE(few.outgrown_by({8'000'000, 3'000'000, 0}));
+  EXPECT_LT(few.sizes().list_entries, 4'000'000u);
+  FrameRoom most(64'000'000, 1u << 26, true);
+  const std::uint32_t visible = most.sizes().visible / 3 * 4;
+  EXPECT_TRUE(most.outgrown_by({visible, 3'000'000, 0}));
+  EXPECT_GE(most.sizes().list_entries, 4'000'000u);
+}
+
 TEST(FrameRoom, OfAnEmptySceneOrWithoutSlices) {
   FrameRoom empty(0, 0, false);
   for (int i = 0; i < 3 * patience; ++i) ASSERT_FALSE(empty.outgrown_by({}));

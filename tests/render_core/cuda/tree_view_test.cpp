@@ -33,6 +33,16 @@ TEST(CudaFrames, SubFramesKeepTheCut) {
   test::expect_sub_frames_to_keep_the_cut(kind);
 }
 
+TEST(CudaFrames, TreesShareAPool) {
+  REQUIRE_DEVICE();
+  test::expect_trees_to_share_a_pool(kind);
+}
+
+TEST(CudaFrames, AViewAtRestSettles) {
+  REQUIRE_DEVICE();
+  test::expect_a_resting_view_to_settle(kind);
+}
+
 TEST(CudaFrames, VanillaIsRefusedForPages) {
   REQUIRE_DEVICE();
   test::expect_vanilla_to_be_refused(kind);
@@ -47,6 +57,8 @@ TEST(CudaFrames, CutsAreThoseOfTheCpuCore) {
     const test::Rendered drawn = test::render_in(*cuda->make_view({}), request);
     const test::Rendered expected = test::render_in(*cpu->make_view({}), request);
     EXPECT_NEAR(drawn.stats.nodes, expected.stats.nodes, 2 + expected.stats.nodes / 100);
+    EXPECT_NEAR(drawn.stats.finest_level, expected.stats.finest_level, 1);
+    EXPECT_NEAR(drawn.stats.coarsest_level, expected.stats.coarsest_level, 1);
     EXPECT_GE(test::psnr_db(drawn.rgb, expected.rgb), 50.0) << "from " << distance;
   }
 }

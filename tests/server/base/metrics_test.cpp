@@ -23,6 +23,36 @@ TEST(Metrics, ADeviceHasOneGaugeThatFollowsItsViews) {
   EXPECT_THAT(metrics.scrape(), Not(HasSubstr("{device=\"0\"} 2")));
 }
 
+TEST(Metrics, PagesAreCountedBySceneAndDeviceAndGoWithTheScene) {
+  Metrics metrics;
+  EXPECT_THAT(metrics.scrape(), Not(HasSubstr("catgs_scene_pages")));
+  const PageFigures city{.device = 1,
+                         .in_memory = 7,
+                         .missing = 3,
+                         .loaded = 9,
+                         .unreadable = 2,
+                         .slots = 20,
+                         .free_slots = 4,
+                         .pool_bytes = 6000};
+  const PageFigures hall{
+      .device = 1, .in_memory = 9, .slots = 20, .free_slots = 4, .pool_bytes = 6000};
+  metrics.set_pages({{"city", city}, {"hall", hall}});
+  const std::string text = metrics.scrape();
+  for (const char* line :
+       {"catgs_scene_pages{scene=\"city\",device=\"1\",state=\"in_memory\"} 7",
+        "catgs_scene_pages{scene=\"city\",device=\"1\",state=\"missing\"} 3",
+        "catgs_scene_pages{scene=\"city\",device=\"1\",state=\"unreadable\"} 2",
+        "catgs_scene_pages{scene=\"hall\",device=\"1\",state=\"in_memory\"} 9",
+        "catgs_scene_pages_loaded_total{scene=\"city\",device=\"1\"} 9",
+        "catgs_page_pool_bytes{device=\"1\"} 6000", "catgs_page_pool_slots{device=\"1\"} 20",
+        "catgs_page_pool_free_slots{device=\"1\"} 4"})
+    EXPECT_THAT(text, HasSubstr(std::string("\n") + line + "\n"));
+  metrics.set_pages({{"hall", {.in_memory = 1}}});
+  EXPECT_THAT(metrics.scrape(), Not(HasSubstr("scene=\"city\"")));
+  EXPECT_THAT(metrics.scrape(),
+              HasSubstr("catgs_scene_pages{scene=\"hall\",device=\"cpu\",state=\"missing\"} 0"));
+}
+
 TEST(Metrics, TellsWhatTheProcessTakes) {
   const auto value = [](const std::string& text, const std::string& name) {
     const auto at = text.find("\n" + name + " ");

@@ -4,6 +4,7 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/tree/page_pools.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/render_core/scene/tree/tree_test_support.h"
@@ -72,9 +73,9 @@ TEST_F(SceneCatalog, ReadsATreeInPages) {
   write("large.tree", tree_bytes(random_cloud(60'000, 0), pool));
   config_.scenes = {folder_ / "large.tree"};
   config_.scene_memory_mb = 8;
-  const auto entry =
-      load_scenes(config_, {.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(2)})
-          .at(0);
+  RendererOptions core{.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(2)};
+  core.pages = std::make_shared<PagePools>(tree_memory(config_));
+  const auto entry = load_scenes(config_, core).at(0);
   EXPECT_EQ(entry->facts.gaussians, 60'000u);
   EXPECT_TRUE(entry->in_pages);
   EXPECT_LE(entry->renderer->scene_bytes(), tree_memory(config_));

@@ -15,6 +15,8 @@ using Wish = SceneResidency::Wish;
 
 class SceneResidencyTest : public testing::Test {
  protected:
+  explicit SceneResidencyTest(std::uint64_t pool_bytes = 0)
+      : residency_({.budget_bytes = 100, .pool_bytes = pool_bytes, .min_residency = 60s}) {}
   Wish want(const std::string& id, std::uint64_t bytes) {
     return residency_.want(id, bytes, now_, in_use_);
   }
@@ -32,7 +34,7 @@ class SceneResidencyTest : public testing::Test {
   const SceneResidency::InUse in_use_ = [this](const std::string& id) {
     return used_.contains(id);
   };
-  SceneResidency residency_{{.budget_bytes = 100, .min_residency = 60s}};
+  SceneResidency residency_;
 };
 
 TEST_F(SceneResidencyTest, LoadsOnDemandOneAtATime) {
@@ -151,6 +153,61 @@ TEST_F(SceneResidencyTest, AFailureLeavesRoomForTheNext) {
   EXPECT_EQ(next()->load, "b");
   residency_.loaded("b", 50, now_);
   EXPECT_EQ(want("a", 50), Wish::awaited) << "it may be tried again";
+}
+
+class SharedPoolTest : public SceneResidencyTest {
+ protected:
+  SharedPoolTest() : SceneResidencyTest(50) {}
+  static SceneNeed pages() { return {1'000'000, true}; }
+  void visit_tree(const std::string& id) {
+    ASSERT_EQ(residency_.want(id, pages(), now_, in_use_), Wish::awaited) << id;
+    const auto step = next();
+    ASSERT_TRUE(step && step->load == id) << id;
+    residency_.loaded(id, pages(), now_);
+    now_ += 120s;
+  }
+};
+
+TEST_F(SharedPoolTest, TheFirstTreeTakesThePoolAndTheOthersNothing) {
+  visit_tree("city");
+  EXPECT_EQ(residency_.bytes(), 50u);
+  visit_tree("hall");
+  EXPECT_EQ(residency_.bytes(), 50u);
+  EXPECT_EQ(want("whole", 50), Wish::awaited);
+  EXPECT_THAT(next()->release, IsEmpty());
+}
+
+TEST_F(SharedPoolTest, AllTreesGoForAWholeSceneThatNeedsThePool) {
+  visit_tree("city");
+  visit_tree("hall");
+  EXPECT_EQ(want("whole", 60), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("city", "hall"));
+  residency_.loaded("whole", 60, now_);
+  EXPECT_EQ(residency_.bytes(), 60u);
+}
+
+TEST_F(SharedPoolTest, TreesStayWhereTheirPoolDoes) {
+  visit_tree("city");
+  visit_tree("hall");
+  visit("whole", 40);
+  now_ += 120s;
+  used_ = {"hall"};
+  EXPECT_EQ(want("other", 30), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("whole"));
+}
+
+TEST_F(SharedPoolTest, AWholeSceneGoesForThePool) {
+  visit("whole", 60);
+  now_ += 120s;
+  EXPECT_FALSE(residency_.has_room(pages()));
+  EXPECT_EQ(residency_.want("city", pages(), now_, in_use_), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("whole"));
+}
+
+TEST_F(SharedPoolTest, WholeScenesInUseKeepTheTreesOut) {
+  visit("whole", 60);
+  used_ = {"whole"};
+  EXPECT_EQ(residency_.want("city", pages(), now_, in_use_), Wish::no_room);
 }
 
 }  // namespace

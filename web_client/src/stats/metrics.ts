@@ -45,6 +45,9 @@ export interface PagesDrawn {
   readonly missing_pages: number;
   readonly detail_px: number; // largest error drawn on purpose
   readonly coarsest_px: number; // largest error drawn for want of pages
+  // Levels of the tree that are drawn; 0: every Gaussian.
+  readonly finest_level: number;
+  readonly coarsest_level: number;
 }
 
 /** Present figures, and those of the last time the camera moved. */
@@ -119,6 +122,8 @@ export class Metrics {
           missing_pages: stats.missingPages,
           detail_px: stats.detailPx,
           coarsest_px: stats.coarsestPx,
+          finest_level: stats.finestLevel,
+          coarsest_level: stats.coarsestLevel,
         };
   }
 

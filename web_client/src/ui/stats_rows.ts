@@ -59,7 +59,12 @@ export const stats_rows: readonly Row[] = [
     text: ({ pages: p }) =>
       p === undefined
         ? nothing
-        : text.stats.detail_value(Math.max(p.detail_px, p.coarsest_px), p.gaussians, p.missing_pages),
+        : text.stats.detail_value(
+            Math.max(p.detail_px, p.coarsest_px),
+            p.gaussians,
+            [p.finest_level, p.coarsest_level],
+            p.missing_pages,
+          ),
   },
   {
     label: text.stats.drops,

@@ -1,0 +1,62 @@
+#include "render_core/scene/tree/watch.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace catgs {
+namespace {
+
+bool same(const Camera& a, const Camera& b) {
+  const Pose &at = a.world_from_camera, &bt = b.world_from_camera;
+  return at.position == bt.position && at.orientation == bt.orientation && a.size_px == b.size_px &&
+         a.focal_px == b.focal_px && a.principal_point_px == b.principal_point_px &&
+         a.near_z == b.near_z;
+}
+
+}  // namespace
+
+bool Lookout::operator==(const Lookout& other) const {
+  return detail_px == other.detail_px && at_once == other.at_once &&
+         std::ranges::equal(cameras, other.cameras, same);
+}
+
+void Watch::look(Lookout lookout) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (number_ > 0 && lookout == lookout_) return;
+    lookout_ = std::move(lookout);
+    ++number_;
+  }
+  wake_();
+}
+
+Watch::Numbered Watch::lookout() const {
+  const std::lock_guard lock(mutex_);
+  return {lookout_, number_};
+}
+
+void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double now_s) {
+  const std::lock_guard lock(mutex_);
+  turned_ = number;
+  missing_ = static_cast<std::uint32_t>(cut.missing.size());
+  coarsest_px_ = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
+  changes_ = changes;
+  if (changes_ && !lookout_.at_once) blends_until_s_ = now_s + all_shown_s;
+}
+
+bool Watch::waits(double now_s) const {
+  const std::lock_guard lock(mutex_);
+  return turned_ != number_ || changes_ || now_s < blends_until_s_;
+}
+
+std::uint32_t Watch::missing() const {
+  const std::lock_guard lock(mutex_);
+  return missing_;
+}
+
+float Watch::coarsest_px() const {
+  const std::lock_guard lock(mutex_);
+  return coarsest_px_;
+}
+
+}  // namespace catgs
