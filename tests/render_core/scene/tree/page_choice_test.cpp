@@ -15,13 +15,13 @@ namespace {
 class Memory {
  public:
   explicit Memory(std::uint32_t slots, std::uint32_t trees = 1) : slots_(slots), choice_(slots) {
-    for (std::uint32_t tree = 0; tree < trees; ++tree) add(tree);
+    for (std::uint32_t tree = 0; tree < trees; ++tree) {
+      EXPECT_TRUE(choice_.add(tree, shape_));
+      read_root(tree);
+    }
   }
 
-  void add(std::uint32_t tree) {
-    ASSERT_TRUE(choice_.add(tree, shape_));
-    resident_.insert({tree, 0});
-  }
+  void read_root(std::uint32_t tree) { resident_.insert({tree, 0}); }
   void remove(std::uint32_t tree) {
     choice_.remove(tree);
     std::erase_if(resident_, [=](const PageOfTree& of) { return of.tree == tree; });
@@ -273,6 +273,7 @@ TEST(PageChoice, ANewTreeGetsARootAndALeavingOneGivesAllBack) {
   const PageChoice::Step step = memory.turn(want_all(0));
   EXPECT_EQ(step.drop.size(), 2u) << "the root needs a slot";
   EXPECT_TRUE(step.load.empty());
+  memory.read_root(1);
   memory.remove(0);
   for (int turn = 0; turn < 50; ++turn) memory.turn({{1, want_all(1)}});
   EXPECT_GE(memory.pages_of(1), 12u);
