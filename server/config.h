@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <string>
@@ -18,8 +19,12 @@ struct ServerConfig {
   std::vector<std::string> scenes;  // paths, or synth:KIND:COUNT[:SEED]
   std::vector<std::string> scene_folders;
   int scene_memory_mb = 0;     // 0: no bound
+  std::string cache_dir;       // of trees; empty: none are built
   double detail_px = 0.5;      // of trees: the largest error that is drawn
   int scene_residency_s = 10;  // at least; no setting: tests shorten it
+  // Scenes of so many Gaussians get a tree, as do those that do not fit into memory. With fewer, a
+  // tree saves a processor nothing. No setting: tests lower it.
+  std::uint64_t gaussians_of_a_tree = 2'000'000;
   std::string bind = "127.0.0.1";
   int port = 8080;
   std::string admin_bind = "127.0.0.1:9090";  // address:port or "off"

@@ -1,4 +1,6 @@
+#include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -8,6 +10,18 @@
 #include "server/net/http.h"
 
 namespace catgs {
+namespace {
+
+/// The trees of a cache would be offered as scenes.
+void check_cache_dir(const ServerConfig& config) {
+  if (config.cache_dir.empty()) return;
+  for (const std::string& folder : config.scene_folders)
+    if (std::error_code error; std::filesystem::equivalent(folder, config.cache_dir, error))
+      throw InputError("--cache-dir " + config.cache_dir, {}, "is a --scene-folder",
+                       "name another folder, for trees alone");
+}
+
+}  // namespace
 
 void validate(const ServerConfig& config, const ConfigSources& sources) {
   if (config.scenes.empty() && config.scene_folders.empty())
@@ -16,6 +30,7 @@ void validate(const ServerConfig& config, const ConfigSources& sources) {
   check({.kind = config.renderer,
          .pool = {},
          .devices = std::make_shared<DeviceSet>(config.devices)});
+  check_cache_dir(config);
   if (config.lod >= 0 && config.gaussian_budget > 0)
     throw InputError("--lod, --budget", {}, "both are given", "give one of them");
   // The default of one is no contradiction to the other.

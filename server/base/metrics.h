@@ -123,6 +123,13 @@ class Metrics {
   prometheus::Counter& scenes_released =
       counter("catgs_scenes_released_total",
               "Scenes that left memory for others, or because their file changed");
+  prometheus::Gauge& tree_progress =
+      gauge("catgs_tree_build_progress_ratio",
+            "How much of a scene's tree is built, of the one that is being built; 0: none");
+  prometheus::Counter& trees_built =
+      counter("catgs_trees_built_total", "Trees of scenes built into --cache-dir");
+  prometheus::Counter& tree_builds_failed =
+      counter("catgs_tree_builds_failed_total", "Trees of scenes that could not be built");
   prometheus::Counter& frames_rendered = counter("catgs_frames_rendered_total", "Frames rendered");
   prometheus::Counter& frames_refined = counter(
       "catgs_frames_refined_total", "Frames that sharpened a still picture, not rendered again");

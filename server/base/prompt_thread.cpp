@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include <sched.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -32,6 +33,11 @@ void run_promptly() noexcept {
   attributes.size = sizeof attributes;
   attributes.runtime_ns = shortest_slice_ns;
   ::syscall(SYS_sched_setattr, 0, &attributes, 0);
+}
+
+void run_in_background() noexcept {
+  constexpr int lowest = 19;
+  ::setpriority(PRIO_PROCESS, 0, lowest);  // of one thread, on Linux
 }
 
 }  // namespace catgs

@@ -13,6 +13,7 @@ constexpr glm::ivec2 size_px = poster_size_px;
 constexpr float fov_y_rad = 1.0471976f;  // as in a page's first view: 60 degrees
 // MJPEG keeps a frame to bitrate / fps: 100 kB.
 constexpr int fps = 10;
+constexpr float detail_px = 0.5f;  // of a scene in pages
 constexpr int bitrate_kbps = 8000;
 
 std::string render(Renderer& renderer, const SceneFacts& facts) {
@@ -21,6 +22,8 @@ std::string render(Renderer& renderer, const SceneFacts& facts) {
   request.camera =
       make_camera(facts.start_pose, size_px, focal_from_fov_y(fov_y_rad, size_px.y), facts.near_z);
   request.background = colour_of(facts.about.background_rgb);
+  request.detail_px = detail_px;
+  request.waits_for_pages = true;
   FrameView picture;
   const RenderStatus rendered = view->render(request, picture);
   if (!rendered.ok()) throw std::runtime_error(rendered.message);

@@ -33,13 +33,15 @@ HttpResponse json_response(std::shared_ptr<const std::string> body) {
 std::shared_ptr<const std::string> scene_list(
     const std::vector<const SceneLibrary::Listing*>& scenes) {
   auto list = nlohmann::json::array();
-  for (const auto* scene : scenes)
+  for (const auto* scene : scenes) {
     list.push_back({{"id", scene->id},
                     {"title", scene->title},
                     {"credits", scene->about.credits},
                     {"licence", scene->about.licence},
                     {"gaussians", scene->gaussians},
                     {"loaded", scene->loaded}});
+    if (!scene->state.empty()) list.back()["state"] = scene->state;
+  }
   return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
 }
 

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <filesystem>
+#include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -57,12 +56,7 @@ Scene synthesize(const std::string& spec) {
 
 /// Only streamed SOG folders have levels of detail to choose from.
 bool has_levels(const std::string& spec) {
-  if (is_synthetic(spec)) return false;
-  std::error_code error;
-  if (!std::filesystem::exists(spec, error))
-    throw InputError("--scene " + spec, {}, "there is no such file or folder",
-                     "check the path, or try --scene synth:city:300000");
-  return locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
+  return !is_synthetic(spec) && locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
 }
 
 bool is_tree(const std::string& spec) {
@@ -70,13 +64,37 @@ bool is_tree(const std::string& spec) {
   return location.kind == SceneLocation::Kind::file && is_tree(FileSource(location.path));
 }
 
+/// A tree of a cache can be built again, so it is used only if all of it is there.
+SceneInPages open_cached(const std::filesystem::path& path, const std::string& spec,
+                         const LoadOptions& options) {
+  const auto refuse = [&](std::string_view why) { throw UnusableTree(path.string(), {}, why); };
+  constexpr std::string_view damaged = "pages are missing or damaged";
+  try {
+    TreeFile tree(std::make_unique<FileSource>(path), 0);
+    if (tree.pages_in_file() < tree.shape().pages() || !tree.page(0)) refuse(damaged);
+  } catch (const UnusableTree&) {
+    throw;
+  } catch (const InputError& error) {
+    refuse(error.what());
+  }
+  SceneInPages scene = open_in_pages(path, options, spec);
+  if (scene.tree->damage().pages > 0) refuse(damaged);
+  return scene;
+}
+
 /// A scene in memory; or, with a tree, its outline.
-SceneInPages load(const std::string& spec, const ServerConfig& config, LoadOptions options) {
+SceneInPages load(const std::string& spec, const SceneForm& form, const ServerConfig& config,
+                  LoadOptions options) {
   if (is_synthetic(spec)) return {nullptr, synthesize(spec)};
+  if (!form.tree.empty()) return open_cached(form.tree, spec, options);
   if (has_levels(spec)) {
-    if (config.lod >= 0) options.lod = config.lod;
-    if (config.gaussian_budget > 0)
-      options.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
+    const LoadOptions levels = chosen_levels(config);
+    options.lod = levels.lod;
+    options.gaussian_budget = levels.gaussian_budget;
+    if (form.most_gaussians > 0) {
+      options.lod.reset();
+      options.gaussian_budget = form.most_gaussians;
+    }
   }
   if (is_tree(spec)) return open_in_pages(spec, options);
   return {nullptr, load_scene(spec, options)};
@@ -94,21 +112,42 @@ std::uint64_t most_bytes(const SceneSize& size, const ServerConfig& config) {
   return size.in_pages ? std::min(size.bytes(), tree_memory(config)) : size.bytes();
 }
 
+LoadOptions chosen_levels(const ServerConfig& config) {
+  LoadOptions levels;
+  if (config.lod >= 0) levels.lod = config.lod;
+  if (config.gaussian_budget > 0)
+    levels.gaussian_budget = static_cast<std::size_t>(config.gaussian_budget);
+  return levels;
+}
+
+void check_scenes(const ServerConfig& config) {
+  for (const std::string& spec : config.scenes)
+    if (std::error_code error; !is_synthetic(spec) && !std::filesystem::exists(spec, error))
+      throw InputError("--scene " + spec, {}, "there is no such file or folder",
+                       "check the path, or try --scene synth:city:300000");
+  if ((config.lod >= 0 || config.gaussian_budget > 0) && config.scene_folders.empty() &&
+      std::ranges::none_of(config.scenes, has_levels))
+    throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
+                     "no scene has levels of detail to choose from",
+                     "levels and budgets are for streamed SOG folders");
+}
+
 std::shared_ptr<const SceneEntry> load_scene(
-    const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
-    const ServerConfig& config, const RendererOptions& core, int threads,
-    const std::function<void(double)>& progress) {
+    const std::string& spec, const SceneForm& form,
+    const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
+    const RendererOptions& core, int threads, const std::function<void(double)>& progress) {
   log_info({.event = "scene_loading"}, "loading {}", spec);
   LoadOptions options;
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
-  auto [tree, scene] = load(spec, config, std::move(options));
+  auto [tree, scene] = load(spec, form, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
   entry->facts.gaussians = tree ? tree->header().gaussians : scene.cloud.size();
   entry->in_pages = tree != nullptr;
+  entry->coarse = form.most_gaussians > 0;
   use_hints(scene.hints, scene.name, entry->facts);
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);
@@ -130,29 +169,6 @@ std::shared_ptr<const SceneEntry> load_scene(
            entry->facts.gaussians, scene.format,
            static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
   return entry;
-}
-
-std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& config,
-                                                           const RendererOptions& core) {
-  if ((config.lod >= 0 || config.gaussian_budget > 0) && config.scene_folders.empty() &&
-      std::ranges::none_of(config.scenes, has_levels))
-    throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
-                     "no scene has levels of detail to choose from",
-                     "levels and budgets are for streamed SOG folders");
-  const SceneIds ids(config.scenes, config.scene_folders);
-  std::vector<std::shared_ptr<const SceneEntry>> entries;
-  std::set<std::string> keys;
-  for (const auto& spec : config.scenes) {
-    if (!keys.insert(scene_key(spec)).second) continue;  // given twice
-    const auto id_of = [&](const std::string& name) { return ids.id_of(spec, name); };
-    auto entry = load_scene(spec, id_of, config, core, core.pool->threads());
-    // The banner shows the first scene's renderer.
-    if (!entries.empty() && entry->renderer_text != entries.front()->renderer_text)
-      log_info({.event = "renderer", .scene = entry->facts.scene_id}, "scene {}: renderer {}",
-               entry->facts.scene_id, entry->renderer_text);
-    entries.push_back(std::move(entry));
-  }
-  return entries;
 }
 
 }  // namespace catgs

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
+#include "render_core/base/error.h"
+#include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/scene_size.h"
 #include "server/config.h"
 #include "server/scenes/scene_entry.h"
@@ -18,17 +22,31 @@ std::uint64_t tree_memory(const ServerConfig& config);
 /// The most memory that a scene of this size takes on each device, bytes.
 std::uint64_t most_bytes(const SceneSize& size, const ServerConfig& config);
 
-/// Loads one scene (a path, or synth:KIND:COUNT[:SEED]) and builds its renderer with the options
-/// and pools of `core`. `id_of` makes the id from the name. `threads` threads read the file.
-/// `progress` is called repeatedly and may throw to cancel. Throws InputError.
-std::shared_ptr<const SceneEntry> load_scene(
-    const std::string& spec, const std::function<std::string(const std::string& name)>& id_of,
-    const ServerConfig& config, const RendererOptions& core, int threads,
-    const std::function<void(double)>& progress = {});
+/// The levels of streamed SOGs that the configuration chooses.
+LoadOptions chosen_levels(const ServerConfig& config);
 
-/// Loads every configured scene once, for all sessions. Throws InputError, because a bad scene is
-/// an operator's mistake that should stop the server.
-std::vector<std::shared_ptr<const SceneEntry>> load_scenes(const ServerConfig& config,
-                                                           const RendererOptions& core);
+/// Checks that the scenes of --scene are there, and that one has levels where levels are chosen.
+/// Throws InputError.
+void check_scenes(const ServerConfig& config);
+
+/// The form in which a scene comes into memory.
+struct SceneForm {
+  std::filesystem::path tree{};  // of a cache, to be read instead of the scene
+  std::size_t most_gaussians =
+      0;  // of a streamed SOG: its finest levels that fit; 0: as configured
+};
+
+/// A tree of a cache is damaged, or of another version.
+struct UnusableTree : InputError {
+  using InputError::InputError;
+};
+
+/// Loads one scene (a path, or synth:KIND:COUNT[:SEED]) in a form and builds its renderer with the
+/// options and pool of `core`. `id_of` makes the id from the name. `threads` threads read the file.
+/// `progress` is called repeatedly and may throw to cancel. Throws InputError or UnusableTree.
+std::shared_ptr<const SceneEntry> load_scene(
+    const std::string& spec, const SceneForm& form,
+    const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
+    const RendererOptions& core, int threads, const std::function<void(double)>& progress = {});
 
 }  // namespace catgs

@@ -18,6 +18,7 @@ struct SceneEntry {
   std::string name{};  // of its file, for people
   std::shared_ptr<Renderer> renderer;
   bool in_pages = false;      // a tree: its frames have a detail
+  bool coarse = false;        // a coarser level, as the finest one does not fit into memory
   std::string renderer_text;  // description and reason, for people
   std::shared_ptr<const SurfacePoints> surface{};
   std::filesystem::path sidecar{};  // where it is or would be; empty: nowhere
@@ -29,5 +30,18 @@ struct SceneEntry {
     return {ray.id, surface ? surface->distance_along(ray.origin, ray.direction) : std::nullopt};
   }
 };
+
+/// The scene of `entry`, as its author describes it now, drawn by the renderer of `other`.
+inline std::shared_ptr<const SceneEntry> redrawn(const SceneEntry& entry, const SceneEntry& other) {
+  auto scene = std::make_shared<SceneEntry>(entry);
+  scene->facts.gaussians = other.facts.gaussians;
+  scene->renderer = other.renderer;
+  scene->in_pages = other.in_pages;
+  scene->coarse = other.coarse;
+  scene->renderer_text = other.renderer_text;
+  scene->surface = other.surface;
+  scene->poster = other.poster;
+  return scene;
+}
 
 }  // namespace catgs

@@ -11,6 +11,7 @@
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
+#include "server/scenes/tree_cache.h"
 
 namespace catgs {
 namespace {
@@ -53,6 +54,21 @@ fs::file_time_type time_of(const fs::path& path) {
 
 }  // namespace
 
+FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
+  FoundScene found;
+  found.changed = time_of(path);
+  const SceneLocation location = locate_scene(path);
+  found.path = path;
+  found.name = printable(to_utf8(location.name));
+  found.id = look.ids.id_of(path.string(), found.name);
+  found.has_levels = location.kind == SceneLocation::Kind::streamed_sog_folder;
+  const LoadOptions levels = found.has_levels ? look.levels : LoadOptions();
+  found.size = read_scene_size(path, levels);
+  found.about = about_in(location.hints.sidecar);
+  if (look.names_trees && !found.size.in_pages) found.tree = tree_name(path, levels);
+  return found;
+}
+
 std::vector<fs::path> SceneFolders::list() const {
   std::vector<fs::path> paths;
   std::set<fs::path> listed;
@@ -94,15 +110,7 @@ std::vector<FoundScene> SceneFolders::scan() {
     } else {
       now.changed = changed;
       try {
-        const SceneLocation location = locate_scene(path);
-        std::string name = printable(to_utf8(location.name));
-        std::string id = ids_.id_of(path.string(), name);
-        now.scene = {path,
-                     std::move(name),
-                     std::move(id),
-                     read_scene_size(path, options_),
-                     about_in(location.hints.sidecar),
-                     changed};
+        now.scene = look_at_scene(path, look_);
         now.good = true;
       } catch (
           const std::exception& error) {  // it may be half copied: its next change is read again

@@ -13,7 +13,7 @@
 
 namespace catgs {
 
-/// A scene found in a folder, as described by its headers.
+/// A scene as described by its headers.
 struct FoundScene {
   std::filesystem::path path;
   std::string name;  // for people
@@ -23,19 +23,28 @@ struct FoundScene {
   /// Modification time of the file, or of the newest one directly in its folder. A new value means
   /// a new scene.
   std::filesystem::file_time_type changed;
+  bool has_levels = false;  // a streamed SOG, of which a coarser level may be loaded
+  std::string tree{};       // tree_name(), for a scene that may get one; else empty
 };
+
+/// What is read of scenes that are found.
+struct SceneLook {
+  SceneIds ids;
+  LoadOptions levels;  // see read_scene_size()
+  bool names_trees = false;
+};
+
+/// Reads the headers of the scene at a path. Throws InputError.
+FoundScene look_at_scene(const std::filesystem::path& path, const SceneLook& look);
 
 /// Scans folders for scenes repeatedly. Only headers of new and changed scenes are read, because a
 /// folder may be a slow mount of an object store. Not thread-safe.
 class SceneFolders {
  public:
   /// `elsewhere`: scene_key() of scenes that are offered anyway.
-  SceneFolders(std::vector<std::filesystem::path> folders, SceneIds ids, LoadOptions options,
+  SceneFolders(std::vector<std::filesystem::path> folders, SceneLook look,
                std::set<std::string> elsewhere = {})
-      : folders_(std::move(folders)),
-        ids_(std::move(ids)),
-        options_(std::move(options)),
-        elsewhere_(std::move(elsewhere)) {}
+      : folders_(std::move(folders)), look_(std::move(look)), elsewhere_(std::move(elsewhere)) {}
 
   /// Lists the present scenes in order of path: scene files, SOG folders and training output
   /// folders directly in the folders. At most max_scenes are listed; a warning names further ones.
@@ -55,8 +64,7 @@ class SceneFolders {
   std::vector<std::filesystem::path> list() const;
 
   const std::vector<std::filesystem::path> folders_;
-  const SceneIds ids_;
-  const LoadOptions options_;
+  const SceneLook look_;
   const std::set<std::string> elsewhere_;
   std::map<std::filesystem::path, Known> known_;
   bool told_of_too_many_ = false;

@@ -4,9 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,10 +14,11 @@
 
 #include "server/base/metrics.h"
 #include "server/config.h"
-#include "server/scenes/scene_entry.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_residency.h"
+#include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_source.h"
+#include "server/scenes/scene_trees.h"
 
 namespace catgs {
 
@@ -28,16 +27,7 @@ namespace catgs {
 /// functions run on the session thread unless marked.
 class SceneLibrary final : public SceneSource {
  public:
-  /// One scene in the listing for pages that offer scenes.
-  struct Listing {
-    std::string id;
-    std::string title;
-    std::uint64_t gaussians = 0;
-    SceneAbout about{};
-    bool loaded = false;
-    std::optional<ToursAnswers> tours{};          // of a loaded one
-    std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
-  };
+  using Listing = SceneListing;
 
   /// Loads the scenes of --scene, or else the first scene of the folders, so that a running server
   /// can always show one. `clock` times loads. Throws InputError.
@@ -45,14 +35,17 @@ class SceneLibrary final : public SceneSource {
                Metrics& metrics, std::function<TimePoint()> clock = Clock::now);
   ~SceneLibrary() override;  // waits until the current part of a scene is read
 
-  [[nodiscard]] std::string default_scene() const override;
-  [[nodiscard]] std::vector<std::string> scene_ids() const override;
-  /// Any thread. Returns the id of the only scene with this name, or else the wish itself. If two
-  /// paths have had the name since the start, it stands for neither, because a link by name does
-  /// not tell them apart.
-  [[nodiscard]] std::string resolve(std::string_view wish) const override;
-  [[nodiscard]] bool has(const std::string& id) const override { return shelf_.contains(id); }
+  [[nodiscard]] std::string default_scene() const override { return shelf_.default_scene(); }
+  [[nodiscard]] std::vector<std::string> scene_ids() const override { return shelf_.scene_ids(); }
+  /// Any thread. See SceneShelf.
+  [[nodiscard]] std::string resolve(std::string_view wish) const override {
+    return shelf_.resolve(wish);
+  }
+  [[nodiscard]] bool has(const std::string& id) const override {
+    return shelf_.books().contains(id);
+  }
   SceneAnswer want(const std::string& id, TimePoint now) override;
+  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) override;
   void on_tick(TimePoint now) override;
 
   /// Returns null if the scene is not in memory.
@@ -64,52 +57,39 @@ class SceneLibrary final : public SceneSource {
   /// The renderer's description for the default scene.
   [[nodiscard]] std::string renderer_text() const;
   /// Any thread.
-  [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const;
+  [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const {
+    return shelf_.listing();
+  }
   /// Any thread. Loads a scene for a moment to make its poster, once and one at a time. Does
   /// nothing while a visitor waits for a scene, or where it would not fit beside the scenes in
   /// memory.
   void want_poster(const std::string& id);
 
  private:
-  struct Book {
-    FoundScene found;                         // for scenes of --scene, only name and size are set
-    std::shared_ptr<const SceneEntry> entry;  // while in memory
-    std::shared_ptr<const std::string> poster{};  // stays when the entry goes
-    bool poster_tried = false;                    // for this content of the file
-    bool pinned = false;
-    bool outdated = false;                // the file has changed since
-    bool gone = false;                    // the file is gone: not offered any more
-    bool told = false;                    // the log has named its path, as others share its name
-    std::optional<TimePoint> retry_at{};  // after a failure
-
-    /// True if a user besides the shelf holds the scene.
-    [[nodiscard]] bool in_use() const;
-  };
   struct Loaded {
     std::shared_ptr<const SceneEntry> entry;
-    std::string error;
+    std::string error{};
+    bool unusable_tree = false;  // the error is that of the scene's tree
   };
 
-  void pin(std::shared_ptr<const SceneEntry> entry);
+  void pin_scenes();
   void open_folders();
-  [[nodiscard]] SceneNeed need_of(const Book& book) const;
-  [[nodiscard]] SceneResidency::InUse in_use() const;
+  /// Loads a scene on this thread, before the server runs. Throws InputError.
+  std::shared_ptr<const SceneEntry> load_now(const FoundScene& found);
+  /// Loads a scene on the loader's thread.
+  Loaded load(const FoundScene& found, const SceneForm& form) const;
   void start_next(TimePoint now);
-  void release(const std::string& id);
-  [[nodiscard]] std::shared_ptr<const SceneEntry> read(const std::string& id,
-                                                       const FoundScene& found) const;
-  /// Like read(), with exceptions turned into `error`.
-  Loaded load(const std::string& id, const FoundScene& found) const;
   void on_loaded(const std::string& id, Loaded loaded, TimePoint started, TimePoint now);
   /// Tells the metrics which pages of trees are in memory.
   void report_pages();
+  void release(const std::string& id);
   void start_scan(TimePoint now);
   void merge(std::vector<FoundScene> found);
-  /// Returns the book with this id and creates it if needed.
-  Book& book_of(const std::string& id);
-  [[nodiscard]] std::chrono::seconds estimate(std::uint64_t bytes) const;
-  [[nodiscard]] ErrorMessage refusal(SceneResidency::Wish wish, const std::string& id,
-                                     const Book& book) const;
+  /// Has trees built for scenes in memory, and draws these scenes from their trees.
+  void tend_trees(TimePoint now);
+  void start_redrawing(const std::string& id);
+  void on_redrawn(const std::string& id, const FoundScene& found, Loaded loaded,
+                  const std::shared_ptr<Renderer>& before);
   /// Updates listing() and the metrics.
   void publish();
 
@@ -118,19 +98,17 @@ class SceneLibrary final : public SceneSource {
   boost::asio::io_context& io_;
   Metrics& metrics_;
   const std::function<TimePoint()> clock_;
+  SceneTrees trees_;
+  const SceneLook look_;
   SceneFolders folders_;  // used on the loader's thread after construction
-  std::map<std::string, Book> shelf_;
-  std::string preferred_scene_;  // the default scene while its file exists
+  SceneShelf shelf_;
   SceneResidency residency_;
+  const SceneResidency::InUse in_use_;
   double bytes_per_second_ = 100e6;     // of the last load
   std::optional<TimePoint> next_scan_;  // nothing without folders
   bool scanning_ = false;
   bool making_poster_ = false;
-
-  mutable std::mutex published_mutex_;  // guards the next two
-  std::shared_ptr<const std::vector<Listing>> published_;
-  std::map<std::string, std::string, std::less<>>
-      by_name_;  // name to id; empty: two scenes have had the name
+  bool redrawing_ = false;
 
   std::atomic<bool> stopping_{false};
   boost::asio::thread_pool loader_{1};

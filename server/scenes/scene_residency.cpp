@@ -16,7 +16,7 @@ SceneResidency::Wish SceneResidency::want(const std::string& id, const SceneNeed
     return Wish::resident;
   }
   if (awaited(id)) return Wish::awaited;
-  if (!room_for(need, [](const auto&, const Resident&) { return true; })) return Wish::too_large;
+  if (!could_fit(need)) return Wish::too_large;
   if (!room_for(need, [&](const auto& other, const Resident&) { return !in_use(other); }))
     return Wish::no_room;
   if (waiting_) return Wish::busy;

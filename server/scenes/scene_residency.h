@@ -25,6 +25,14 @@ struct SceneNeed {
   SceneNeed(std::uint64_t of_bytes, bool is_in_pages = false)  // NOLINT: bytes are a need
       : bytes(is_in_pages ? 0 : of_bytes), in_pages(is_in_pages) {}
 
+  /// That of two forms of one scene.
+  [[nodiscard]] SceneNeed with(const SceneNeed& other) const {
+    SceneNeed both = *this;
+    both.bytes += other.bytes;
+    both.in_pages |= other.in_pages;
+    return both;
+  }
+
   std::uint64_t bytes;
   bool in_pages;
 };
@@ -66,6 +74,8 @@ class SceneResidency {
   void failed(const std::string& id);
   /// Removes a scene that is gone for another reason.
   void drop(const std::string& id) { residents_.erase(id); }
+  /// The scene takes so much from now on.
+  void resize(const std::string& id, const SceneNeed& need) { residents_.at(id).need = need; }
   /// Records that the scene is in use now.
   void note_use(const std::string& id, TimePoint now);
 
@@ -77,6 +87,10 @@ class SceneResidency {
   [[nodiscard]] bool busy() const { return !loading_.empty() || waiting_; }
   /// True if it fits without releasing a scene.
   [[nodiscard]] bool has_room(const SceneNeed& need) const { return fits({}, need); }
+  /// True if it fits when all scenes have left that may leave.
+  [[nodiscard]] bool could_fit(const SceneNeed& need) const {
+    return room_for(need, [](const auto&, const Resident&) { return true; }).has_value();
+  }
   [[nodiscard]] std::uint64_t bytes() const;
   [[nodiscard]] std::size_t count() const { return residents_.size(); }
 

@@ -37,6 +37,11 @@ class SceneSource {
   /// Requests a scene for a client that may see it. The scene stays in memory as long as its entry
   /// is held.
   virtual SceneAnswer want(const std::string& id, TimePoint now) = 0;
+  /// The entry that replaces one that a visitor sees, of the same scene in another form; null: it
+  /// stays.
+  [[nodiscard]] virtual std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& /*seen*/) {
+    return nullptr;
+  }
   /// Call it at least four times a second.
   virtual void on_tick(TimePoint now) = 0;
 };

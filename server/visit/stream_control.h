@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "server/flow/idr_policy.h"
 #include "server/visit/picture_plan.h"
@@ -20,6 +21,11 @@ class StreamControl {
   bool begin(Admission admission, const Hello& hello);
   /// Switches to another scene. open() must follow.
   void enter_scene(std::shared_ptr<const SceneEntry> scene);
+  /// Goes on with another form of the same scene, between two frames. The client need not know.
+  void redraw(std::shared_ptr<const SceneEntry> scene) {
+    scene_ = std::move(scene);
+    open();
+  }
   /// Opens the stream, or reopens it as soon as it is ready().
   void open();
   /// The result of open(). `opened` counts only if the stream is not opening() again afterwards.

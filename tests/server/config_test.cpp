@@ -208,6 +208,16 @@ TEST_F(ConfigTest, LevelAndBudgetExcludeEachOther) {
   EXPECT_EQ(config.gaussian_budget, 1'000'000);
 }
 
+TEST_F(ConfigTest, TreesAreNotKeptAmongScenes) {
+  config.scene_folders = {folder.path()};
+  config.cache_dir = folder / ".";
+  EXPECT_THAT(
+      [&] { validate(config); },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("--cache-dir"), HasSubstr("--scene-folder"))));
+  config.cache_dir = folder / "trees";
+  EXPECT_NO_THROW(validate(config));
+}
+
 TEST_F(ConfigTest, NoSessionIsPromisedMoreThanItsNominalRate) {
   read_toml("scene = \"a.ply\"\nfps = 5\n");
   EXPECT_NO_THROW(validate(config, sources)) << "the default of min-fps contradicts nothing";

@@ -104,27 +104,29 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   return scene;
 }
 
-SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options) {
+SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options,
+                           const std::filesystem::path& made_of) {
   constexpr std::uint64_t outline_gaussians = 1'000'000;
   constexpr std::size_t memory_bytes = std::size_t{64} << 20;  // of pages on their way to a core
   const SceneLocation location = locate_scene(path);
   if (location.kind != SceneLocation::Kind::file || !is_tree(FileSource(location.path)))
     throw InputError(path.string(), "", "is no tree, so it has no detail to choose",
                      "make one with catgs-render convert IN OUT.tree");
+  const SceneLocation named = made_of.empty() ? location : locate_scene(made_of);
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const LoadContext context(*pool, options.progress);
   SceneInPages scene;
   scene.tree =
       std::make_shared<TreeFile>(std::make_unique<FileSource>(location.path), memory_bytes);
   TreeScene outline = read_tree(*scene.tree, outline_gaussians, context.part(0.0, 0.9));
-  scene.outline.name = to_utf8(location.name);
+  scene.outline.name = to_utf8(named.name);
   scene.outline.format = "tree";
   scene.outline.cloud = std::move(outline.cloud);
   scene.outline.notes = std::move(outline.notes);
   const TreeHeader& header = scene.tree->header();
   scene.outline.report = {.read = header.read, .dropped = header.dropped};
   scene.outline.hints =
-      find_hints(scene.outline.cloud, location.hints, options.up, scene.outline.notes, pool);
+      find_hints(scene.outline.cloud, named.hints, options.up, scene.outline.notes, pool);
   context.report(1.0);
   return scene;
 }

@@ -33,7 +33,9 @@ struct SceneInPages {
   Scene outline;  // its cloud is a coarse level, for hints and analysis; `report` is of all
 };
 
-/// Opens a .tree file. Throws InputError, also for other formats.
-SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options = {});
+/// Opens a .tree file. `made_of`: the scene that it was made of, if it shall have that one's name
+/// and hints. Throws InputError, also for other formats.
+SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options = {},
+                           const std::filesystem::path& made_of = {});
 
 }  // namespace catgs

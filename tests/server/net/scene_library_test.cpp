@@ -8,6 +8,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "render_core/renderer.h"
+#include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/save_scene.h"
 #include "server/base/scene_id.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -157,6 +159,35 @@ TEST_F(SceneLibraryTest, ServesAFolderAlone) {
   EXPECT_TRUE(loaded("attic")) << "a server that is up can show something";
   const auto client = connect();
   EXPECT_EQ(name_in(client->greet().scene().scene_id()), "attic");
+}
+
+TEST_F(SceneLibraryTest, AVisitorGoesOnWithTheTreeOfItsScene) {
+  server_ = std::make_unique<RunningServer>([&](ServerConfig& config) {
+    config.scene_folders = {folder_.path()};
+    config.cache_dir = folder_ / "trees";
+    config.gaussians_of_a_tree = 5000;
+  });
+  const double city_bytes = metric(*server_, "catgs_scene_bytes");
+  const auto client = connect();
+  visit(*client, "attic");
+  client->send_pose(1);
+  EXPECT_TRUE(client->receive_frame().header.idr());
+  eventually([&] { return metric(*server_, "catgs_trees_built_total") == 1; }, "a tree is built");
+  std::filesystem::path file;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "trees"))
+    if (entry.path().extension() == ".tree") file = entry.path();
+  const auto tree = make_renderer(open_in_pages(file).tree, {.kind = RendererKind::cpu});
+  const double tree_bytes = static_cast<double>(tree.renderer->scene_bytes());
+  eventually([&] { return metric(*server_, "catgs_scene_bytes") == city_bytes + tree_bytes; },
+             "nobody holds the whole scene any more");
+  client->send_pose(2, 1.0f);
+  for (bool seen = false; !seen;) {
+    const Received received = client->receive();
+    ASSERT_FALSE(received.closed);
+    EXPECT_FALSE(received.message && received.message->has_welcome()) << "it is the same visit";
+    if (received.frame) client->send_ack(received.frame->header.frame_id());
+    seen = received.frame && received.frame->header.pose_id() == 2;
+  }
 }
 
 /// As a part of a path: every byte that is no letter as %41.

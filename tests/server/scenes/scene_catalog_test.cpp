@@ -36,11 +36,16 @@ class SceneCatalog : public FolderTest {
     save_scene(random_cloud(30, 0), folder_ / "plain.splat");
     config_.scenes = {folder_ / "streamed", folder_ / "plain.splat"};
   }
-  std::uint64_t gaussians(std::size_t scene) {
-    return load_scenes(config_, {.pool = std::make_shared<ThreadPool>(2)})
-        .at(scene)
-        ->facts.gaussians;
+  std::shared_ptr<const SceneEntry> load(std::size_t scene, const SceneForm& form = {}) {
+    check_scenes(config_);
+    return load_scene(
+        config_.scenes.at(scene), form, [](const std::string& name) { return name; }, config_,
+        {.kind = RendererKind::cpu,
+         .pool = std::make_shared<ThreadPool>(2),
+         .pages = std::make_shared<PagePools>(tree_memory(config_))},
+        2);
   }
+  std::uint64_t gaussians(std::size_t scene) { return load(scene)->facts.gaussians; }
 
   ServerConfig config_;
 };
@@ -73,16 +78,34 @@ TEST_F(SceneCatalog, ReadsATreeInPages) {
   write("large.tree", tree_bytes(random_cloud(60'000, 0), pool));
   config_.scenes = {folder_ / "large.tree"};
   config_.scene_memory_mb = 8;
-  RendererOptions core{.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(2)};
-  core.pages = std::make_shared<PagePools>(tree_memory(config_));
-  const auto entry = load_scenes(config_, core).at(0);
+  const auto entry = load(0);
   EXPECT_EQ(entry->facts.gaussians, 60'000u);
   EXPECT_TRUE(entry->in_pages);
   EXPECT_LE(entry->renderer->scene_bytes(), tree_memory(config_));
   EXPECT_LE(tree_memory(config_), 4'000'000u);
   EXPECT_NE(entry->poster, nullptr);
   config_.scenes = {folder_ / "plain.splat"};
-  EXPECT_FALSE(load_scenes(config_, {.pool = std::make_shared<ThreadPool>(2)}).at(0)->in_pages);
+  EXPECT_FALSE(load(0)->in_pages);
+}
+
+TEST_F(SceneCatalog, ReadsASceneFromATreeOfItsOwn) {
+  ThreadPool pool(2);
+  const auto tree = write("other.tree", tree_bytes(random_cloud(300, 0), pool));
+  const auto entry = load(1, {.tree = tree});
+  EXPECT_TRUE(entry->in_pages);
+  EXPECT_EQ(entry->facts.gaussians, 300u);
+  EXPECT_EQ(entry->name, "plain");
+  EXPECT_EQ(entry->sidecar, folder_ / "plain.json");
+  std::filesystem::resize_file(tree, std::filesystem::file_size(tree) - 1);
+  EXPECT_THROW(load(1, {.tree = tree}), UnusableTree);
+}
+
+TEST_F(SceneCatalog, ReadsTheFinestLevelThatFits) {
+  config_.lod = 0;
+  const auto entry = load(0, {.most_gaussians = 100});
+  EXPECT_EQ(entry->facts.gaussians, 50u);
+  EXPECT_TRUE(entry->coarse);
+  EXPECT_FALSE(load(0)->coarse);
 }
 
 TEST_F(SceneCatalog, NamesASceneThatIsNotThere) {

@@ -28,7 +28,7 @@ class SceneFolderTest : public FolderTest {
     std::filesystem::last_write_time(folder_ / name, before + std::chrono::seconds(2));
   }
 
-  SceneFolders folders_{{folder_.path()}, SceneIds({}, {folder_.path()}), {}};
+  SceneFolders folders_{{folder_.path()}, {SceneIds({}, {folder_.path()}), {}}};
 };
 
 TEST_F(SceneFolderTest, FindsFilesAndFoldersThatAreScenes) {
@@ -50,7 +50,7 @@ TEST_F(SceneFolderTest, FindsFilesAndFoldersThatAreScenes) {
 TEST_F(SceneFolderTest, NamedTwiceHoldsEachSceneOnce) {
   save_scene(random_cloud(10, 0), folder_ / "a.ply");
   const std::string path = folder_.path().string();
-  SceneFolders twice({path, path + "/.", path + "/"}, SceneIds({}, {path, path + "/."}), {});
+  SceneFolders twice({path, path + "/.", path + "/"}, {SceneIds({}, {path, path + "/."}), {}});
   const auto scenes = twice.scan();
   ASSERT_EQ(scenes.size(), 1u);
   EXPECT_EQ(scenes[0].id, folders_.scan()[0].id);
@@ -87,7 +87,7 @@ TEST_F(SceneFolderTest, OffersNoMoreThanItsLimit) {
 }
 
 TEST_F(SceneFolderTest, NamesAFolderThatIsNotThere) {
-  SceneFolders absent({folder_ / "absent"}, SceneIds({}, {}), {});
+  SceneFolders absent({folder_ / "absent"}, {SceneIds({}, {}), {}});
   EXPECT_THAT(
       [&] { absent.scan(); },
       ThrowsMessage<InputError>(HasSubstr("--scene-folder " + (folder_ / "absent").string())));

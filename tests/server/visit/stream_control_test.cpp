@@ -63,6 +63,21 @@ TEST_F(StreamControlTest, OpensAsPlannedAndWelcomes) {
   EXPECT_TRUE(std::holds_alternative<StreamConfig>(stream.introduction())) << "it is welcomed once";
 }
 
+TEST_F(StreamControlTest, AnotherFormOfItsSceneNeedsNoWelcome) {
+  begin();
+  EXPECT_TRUE(std::holds_alternative<Welcome>(stream.introduction()));
+  stream.begin_frame(false, now);
+  const auto tree = test::named_scene("a");
+  stream.redraw(tree);
+  EXPECT_EQ(host.opened.size(), 1u) << "a frame is under way";
+  stream.end_frame();
+  ASSERT_EQ(host.opened.size(), 2u);
+  opened();
+  EXPECT_EQ(stream.scene(), tree.get());
+  EXPECT_TRUE(std::holds_alternative<StreamConfig>(stream.introduction()));
+  EXPECT_TRUE(stream.begin_frame(false, now).force_idr);
+}
+
 TEST_F(StreamControlTest, WhatIsWantedWhileItIsInUseIsOpenedAfterwards) {
   begin();
   stream.begin_frame(false, now);

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/clock.h"
+#include "server/scenes/scene_entry.h"
+#include "server/scenes/scene_folder.h"
+
+namespace catgs {
+
+/// One scene in the listing for pages that offer scenes.
+struct SceneListing {
+  std::string id;
+  std::string title;
+  std::uint64_t gaussians = 0;
+  SceneAbout about{};
+  bool loaded = false;
+  std::string state{};                          // for people: "building tree 37 %"; often empty
+  std::optional<ToursAnswers> tours{};          // of a loaded one
+  std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
+};
+
+/// What the server knows of a scene that it offers.
+struct SceneBook {
+  FoundScene found;  // of procedural scenes, only path, name and size are set
+  std::shared_ptr<const SceneEntry> entry;      // while in memory
+  std::shared_ptr<const SceneEntry> former{};   // drawn before `entry`; while visitors still see it
+  std::shared_ptr<const std::string> poster{};  // stays when the entry goes
+  bool poster_tried = false;                    // for this content of the file
+  bool pinned = false;
+  bool outdated = false;                // the file has changed since
+  bool gone = false;                    // the file is gone: not offered any more
+  bool told = false;                    // the log has named its path, as others share its name
+  std::optional<TimePoint> retry_at{};  // after a failure
+
+  /// True if a user besides the shelf holds the scene.
+  [[nodiscard]] bool in_use() const { return former || held_elsewhere(entry); }
+  /// True if only the shelf holds the former entry.
+  [[nodiscard]] bool former_is_left() const { return former && !held_elsewhere(former); }
+
+ private:
+  /// Scenes come into use on the session thread only, so an unused scene stays unused. Uses may end
+  /// elsewhere without harm.
+  static bool held_elsewhere(const std::shared_ptr<const SceneEntry>& entry) {
+    return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1);
+  }
+};
+
+/// The scenes that a server offers, by id and by name, and their listing. All functions run on the
+/// session thread unless marked.
+class SceneShelf {
+ public:
+  using Books = std::map<std::string, SceneBook>;
+  [[nodiscard]] Books& books() { return books_; }
+  [[nodiscard]] const Books& books() const { return books_; }
+  /// Null: there is none.
+  [[nodiscard]] SceneBook* find(const std::string& id);
+  /// Returns the book with this id and creates it if needed.
+  SceneBook& book_of(const std::string& id);
+  /// Takes over the result of a scan. Books of scenes that are gone are removed, unless they are in
+  /// memory or `awaited`.
+  void merge(std::vector<FoundScene> found,
+             const std::function<bool(const std::string& id)>& awaited);
+
+  /// Makes a scene the default one while its file exists. Empty: none was named.
+  void prefer(const std::string& id) { preferred_ = id; }
+  [[nodiscard]] const std::string& preferred() const { return preferred_; }
+  [[nodiscard]] std::string default_scene() const;
+  [[nodiscard]] std::vector<std::string> scene_ids() const;
+  /// Any thread. Returns the id of the only scene with this name, or else the wish itself. If two
+  /// paths have had the name since the start, it stands for neither, because a link by name does
+  /// not tell them apart.
+  [[nodiscard]] std::string resolve(std::string_view wish) const;
+
+  /// Updates listing(). `state_of`: what is done for a scene at the moment, for people.
+  void publish(const std::function<std::string(const FoundScene&)>& state_of);
+  /// Any thread.
+  [[nodiscard]] std::shared_ptr<const std::vector<SceneListing>> listing() const;
+
+ private:
+  Books books_;
+  std::string preferred_;
+  mutable std::mutex published_mutex_;  // guards the next two
+  std::shared_ptr<const std::vector<SceneListing>> published_;
+  std::map<std::string, std::string, std::less<>>
+      by_name_;  // name to id; empty: two scenes have had the name
+};
+
+}  // namespace catgs

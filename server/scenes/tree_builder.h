@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+
+#include "render_core/scene/files/load_scene.h"
+
+namespace catgs {
+
+struct TreeBuild {
+  std::filesystem::path scene;
+  LoadOptions levels;         // of a streamed SOG; only `lod` and `gaussian_budget` count
+  std::filesystem::path out;  // appears when it is whole
+  std::size_t memory_bytes = 0;
+  int threads = 1;
+};
+
+/// Builds a scene's tree on this thread and further ones. Formats that can be read in parts take
+/// `memory_bytes` and about 200 MB; others are loaded for that. `progress` is called often, with
+/// 0…1, and may throw to cancel. Throws InputError: the scene is wrong, there is no room on the
+/// disk.
+void build_scene_tree(const TreeBuild& build, const std::function<void(double)>& progress);
+
+}  // namespace catgs

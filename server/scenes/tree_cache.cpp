@@ -1,0 +1,176 @@
+#include "server/scenes/tree_cache.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <span>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/tree/tree_file.h"
+#include "server/access/signed_token.h"
+#include "server/base/log_event.h"
+#include "server/scenes/scene_ids.h"
+
+namespace catgs {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A tree's file carries the time when its scene was last seen, about.
+constexpr std::chrono::hours noted_every{1}, kept_for{7 * 24};
+constexpr std::size_t path_digits = 8, content_digits = 16;
+constexpr std::string_view extension = ".tree";
+
+bool is_tree_name(std::string_view name) {
+  const auto ends_with_digits = [&](std::size_t digits) {
+    if (name.size() <= digits || name[name.size() - digits - 1] != '-') return false;
+    const bool hex = name.find_last_not_of("0123456789abcdef") == name.size() - digits - 1;
+    name.remove_suffix(digits + 1);
+    return hex;
+  };
+  if (!name.ends_with(extension)) return false;
+  name.remove_suffix(extension.size());
+  return ends_with_digits(content_digits) && ends_with_digits(path_digits) && !name.empty();
+}
+
+/// What a killed build leaves of a tree: PartFile and ScratchFile add to its name.
+bool is_remnant(std::string_view name) { return is_tree_name(name.substr(0, name.rfind('.'))); }
+
+std::string hex_digest(const std::string& text, std::size_t bytes) {
+  const TokenDigest digest = digest_of(text);
+  return fmt::format("{:02x}", fmt::join(std::span(digest).first(bytes), ""));
+}
+
+/// The part of a tree's name that stands for its scene.
+std::string_view scene_part(std::string_view name) {
+  return name.substr(0, name.size() - extension.size() - content_digits - 1);
+}
+
+/// Letters, digits and dashes. A name is for operators who look into the folder.
+std::string plain(std::string_view name) {
+  constexpr std::size_t most_chars = 40;
+  std::string text(name.substr(0, most_chars));
+  std::ranges::replace_if(
+      text,
+      [](char c) {
+        return !((c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'));
+      },
+      '-');
+  return text.empty() ? "scene" : text;
+}
+
+/// A folder's sidecar may be saved at any time, and is read when the scene is loaded.
+bool belongs_to_content(const fs::path& file) {
+  return file.extension() != ".json" || file.filename() == "meta.json" ||
+         file.filename() == "lod-meta.json";
+}
+
+struct Content {
+  std::uint64_t files = 0, bytes = 0;
+  fs::file_time_type newest = fs::file_time_type::min();
+
+  void add(const fs::path& file) {
+    ++files;
+    bytes += fs::file_size(file);
+    newest = std::max(newest, fs::last_write_time(file));
+  }
+};
+
+Content content_of(const fs::path& scene) {
+  Content content;
+  if (!fs::is_directory(scene)) {
+    content.add(scene);
+    return content;
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(scene))
+    if (entry.is_regular_file() && belongs_to_content(entry.path())) content.add(entry.path());
+  return content;
+}
+
+[[noreturn]] void refuse(const fs::path& folder, const std::string& why,
+                         std::string_view remedy = "name a folder that the server may write") {
+  throw InputError("--cache-dir " + folder.string(), {}, why, remedy);
+}
+
+}  // namespace
+
+std::string tree_name(const fs::path& scene, const LoadOptions& levels) {
+  const SceneLocation location = locate_scene(scene);
+  try {
+    const Content content = content_of(location.path);
+    const std::string facts =
+        fmt::format("{}\n{} {} {}\n{} {}\n{}", location.path.string(), content.files, content.bytes,
+                    content.newest.time_since_epoch().count(), levels.lod.value_or(-1),
+                    levels.gaussian_budget.value_or(0), TreeHeader::right_version);
+    return fmt::format("{}-{}-{}{}", plain(location.name),
+                       hex_digest(scene_key(scene.string()), path_digits / 2),
+                       hex_digest(facts, content_digits / 2), extension);
+  } catch (const fs::filesystem_error& error) {
+    throw InputError(scene.string(), {}, "cannot be read: " + error.code().message());
+  }
+}
+
+TreeCache::TreeCache(fs::path folder) : folder_(std::move(folder)) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error && !fs::is_directory(folder_)) refuse(folder_, error.message());
+  const fs::path lock = folder_ / "lock";
+  lock_ = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (lock_ < 0) refuse(folder_, "cannot be written: " + std::generic_category().message(errno));
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    const bool taken = errno == EWOULDBLOCK;
+    const std::string why = taken ? "belongs to another server that runs"
+                                  : "cannot be locked: " + std::generic_category().message(errno);
+    ::close(lock_);
+    refuse(folder_, why, "give each server a folder of its own");
+  }
+  for (const auto& entry : fs::directory_iterator(folder_, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!entry.is_regular_file(error)) continue;
+    if (is_tree_name(name))
+      names_.insert(name);
+    else if (is_remnant(name))
+      fs::remove(entry.path(), error);
+  }
+}
+
+TreeCache::~TreeCache() { ::close(lock_); }
+
+void TreeCache::remove(const std::string& name) {
+  std::error_code error;
+  fs::remove(path_of(name), error);
+  names_.erase(name);
+}
+
+void TreeCache::keep(const std::set<std::string>& names) {
+  std::set<std::string_view> scenes;
+  for (const std::string& name : names) scenes.insert(scene_part(name));
+  std::vector<std::string> leaving;
+  const auto now = fs::file_time_type::clock::now();
+  for (const std::string& name : names_) {
+    std::error_code error;
+    const auto unseen_for = now - fs::last_write_time(path_of(name), error);
+    if (names.contains(name)) {
+      if (!error && unseen_for > noted_every) fs::last_write_time(path_of(name), now, error);
+    } else if (scenes.contains(scene_part(name)) || error || unseen_for > kept_for) {
+      leaving.push_back(name);
+    }
+  }
+  for (const std::string& name : leaving) {
+    log_info({.event = "tree_removed"}, "the tree {} is removed: no scene needs it", name);
+    remove(name);
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,360 @@
+// Scenes of a real library get trees, and are drawn from them.
+#include "server/scenes/scene_trees.h"
+
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
+#include "server/scenes/scene_library.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+using Entry = std::shared_ptr<const SceneEntry>;
+
+class SceneTreesTest : public FolderTest {
+ protected:
+  void SetUp() override {
+    fs::create_directory(folder_ / "scenes");
+    save_scene(random_cloud(3000, 0), folder_ / "scenes/a.ply");
+    config_.scenes = {"synth:city:1000"};
+    config_.scene_folders = {folder_ / "scenes"};
+    config_.cache_dir = folder_ / "trees";
+    config_.gaussians_of_a_tree = 1000;
+  }
+  void start() {
+    library_.reset();  // which takes the cache with it
+    library_ = std::make_unique<SceneLibrary>(
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
+        [this] { return now_; });
+  }
+  /// Lets loads and builds end, and ticks, until it holds.
+  void run_until(const std::function<bool()>& holds) {
+    for (int i = 0; i < 20'000 && !holds(); ++i) {
+      io_.restart();
+      io_.poll();
+      library_->on_tick(now_);
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_TRUE(holds());
+  }
+  std::string id(const std::string& name) const { return library_->resolve(name); }
+  Entry in_memory(const std::string& name) const { return library_->in_memory(id(name)); }
+  /// As a visitor does, who asks with each tick.
+  Entry load(const std::string& name) {
+    run_until([&] { return std::holds_alternative<Entry>(library_->want(id(name), now_)); });
+    return in_memory(name);
+  }
+  /// Loads the scene, and waits until it is drawn from its tree. Nobody looks at it any more.
+  void build(const std::string& name) {
+    load(name);
+    run_until([&] { return in_memory(name)->in_pages; });
+  }
+  std::string state(const std::string& name) const {
+    const auto listing = library_->listing();
+    return std::ranges::find(*listing, id(name), &SceneLibrary::Listing::id)->state;
+  }
+  std::vector<fs::path> trees() const {
+    std::vector<fs::path> trees;
+    for (const auto& entry : fs::directory_iterator(folder_ / "trees"))
+      if (entry.path().filename() != "lock") trees.push_back(entry.path());
+    return trees;
+  }
+  static std::string bytes_in(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  double built() const { return metrics_.trees_built.Value(); }
+  double failed() const { return metrics_.tree_builds_failed.Value(); }
+
+  boost::asio::io_context io_;
+  Metrics metrics_;
+  ServerConfig config_;
+  std::unique_ptr<SceneLibrary> library_;
+  TimePoint now_ = TimePoint{} + 1h;
+};
+
+TEST_F(SceneTreesTest, ASceneIsServedAtOnceAndThenFromItsTree) {
+  start();
+  Entry seen = load("a");
+  EXPECT_FALSE(seen->in_pages);
+  EXPECT_EQ(library_->newer_form(*seen), nullptr);
+  library_->on_tick(now_);
+  EXPECT_THAT(state("a"), HasSubstr("building tree"));
+  run_until([&] { return in_memory("a") != seen; });
+  const Entry tree = in_memory("a");
+  EXPECT_TRUE(tree->in_pages);
+  EXPECT_EQ(tree->facts.gaussians, 3000u);
+  EXPECT_EQ(tree->facts.start_pose.position, seen->facts.start_pose.position);
+  EXPECT_EQ(tree->facts.title, seen->facts.title);
+  EXPECT_EQ(library_->newer_form(*seen), tree) << "present visitors go on with it";
+  EXPECT_EQ(library_->newer_form(*tree), nullptr);
+  EXPECT_THAT(trees(), SizeIs(1));
+  EXPECT_EQ(state("a"), "");
+  EXPECT_EQ(built(), 1);
+  const double with_both = metrics_.scene_bytes.Value();
+  seen.reset();
+  library_->on_tick(now_);
+  EXPECT_LT(metrics_.scene_bytes.Value(), with_both) << "the whole one is left by all";
+}
+
+TEST_F(SceneTreesTest, TheNextStartUsesTheTree) {
+  start();
+  build("a");
+  ASSERT_THAT(trees(), SizeIs(1));
+  const fs::path tree = trees()[0];
+  const std::string bytes = bytes_in(tree);
+  start();
+  EXPECT_TRUE(load("a")->in_pages);
+  for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
+  EXPECT_EQ(built(), 1);
+  EXPECT_THAT(trees(), ElementsAre(tree));
+  EXPECT_EQ(bytes_in(tree), bytes);
+}
+
+TEST_F(SceneTreesTest, AScenesOwnNameAndSidecarCountInItsTree) {
+  write("scenes/a.json", R"({"title": "The hall", "near": 0.5})");
+  start();
+  build("a");
+  start();
+  const Entry tree = load("a");
+  EXPECT_TRUE(tree->in_pages);
+  EXPECT_EQ(tree->name, "a");
+  EXPECT_EQ(tree->facts.title, "The hall");
+  EXPECT_EQ(tree->facts.near_z, 0.5f);
+  EXPECT_EQ(tree->sidecar, folder_ / "scenes/a.json");
+}
+
+TEST_F(SceneTreesTest, AChangedSceneGetsAnotherTree) {
+  start();
+  build("a");
+  const fs::path before = trees().at(0);
+  const auto time = fs::last_write_time(folder_ / "scenes/a.ply");
+  save_scene(random_cloud(2000, 0), folder_ / "scenes/a.ply");
+  fs::last_write_time(folder_ / "scenes/a.ply", time + 2s);
+  now_ += 31s;
+  run_until([&] { return !fs::exists(before); });
+  run_until([&] { return !in_memory("a"); });
+  EXPECT_EQ(load("a")->facts.gaussians, 2000u);
+  build("a");
+  EXPECT_EQ(in_memory("a")->facts.gaussians, 2000u);
+  EXPECT_THAT(trees(), SizeIs(1));
+  EXPECT_EQ(built(), 2);
+}
+
+TEST_F(SceneTreesTest, ADamagedTreeIsBuiltAgain) {
+  start();
+  build("a");
+  const fs::path tree = trees().at(0);
+  const std::string bytes = bytes_in(tree);
+  const auto damaged = [&](std::size_t at) {
+    std::string copy = bytes;
+    copy[at] = static_cast<char>(copy[at] ^ 1);
+    return copy;
+  };
+  double builds = 1;
+  for (const std::string& broken : {std::string(), damaged(0), damaged(100), damaged(5000),
+                                    bytes.substr(0, 4096), bytes.substr(0, bytes.size() - 1)}) {
+    library_.reset();
+    std::ofstream(tree, std::ios::binary) << broken;
+    start();
+    EXPECT_FALSE(load("a")->in_pages) << "it is served as a whole meanwhile";
+    build("a");
+    EXPECT_EQ(built(), ++builds);
+    EXPECT_EQ(bytes_in(tree), bytes);
+  }
+}
+
+TEST_F(SceneTreesTest, WhatAKilledBuildLeftIsNotUsed) {
+  start();
+  build("a");
+  const fs::path tree = trees().at(0);
+  library_.reset();
+  fs::rename(tree, tree.string() + ".part");
+  start();
+  EXPECT_THAT(trees(), IsEmpty());
+  EXPECT_FALSE(load("a")->in_pages);
+}
+
+TEST_F(SceneTreesTest, ASceneThatDoesNotFitWaitsForItsTree) {
+  save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");  // 7.1 MB
+  config_.scene_memory_mb = 6;
+  start();
+  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("b"), now_)));
+  library_->on_tick(now_);
+  EXPECT_THAT(state("b"), HasSubstr("building tree"));
+  const Entry tree = load("b");
+  EXPECT_TRUE(tree->in_pages);
+  EXPECT_EQ(tree->facts.gaussians, 30'000u);
+  EXPECT_LE(metrics_.scene_bytes.Value(), 6e6);
+  config_.cache_dir.clear();
+  start();
+  const auto answer = library_->want(id("b"), now_);
+  ASSERT_TRUE(std::holds_alternative<ErrorMessage>(answer));
+  EXPECT_THAT(std::get<ErrorMessage>(answer).message, HasSubstr("more than this server has"));
+}
+
+TEST_F(SceneTreesTest, OneTreeIsBuiltAtATime) {
+  for (const char* name : {"b", "c", "d"})
+    save_scene(random_cloud(30'000, 3), folder_ / "scenes" / (std::string(name) + ".ply"));
+  config_.scene_memory_mb = 6;
+  start();
+  for (const char* name : {"b", "c", "d", "c"})
+    EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id(name), now_)));
+  library_->on_tick(now_);
+  EXPECT_THAT(state("b"), HasSubstr("building tree"));
+  EXPECT_THAT(state("c"), HasSubstr("waits"));
+  EXPECT_THAT(state("d"), HasSubstr("waits"));
+  run_until([&] { return state("c").starts_with("building"); });
+  EXPECT_THAT(state("d"), HasSubstr("waits")) << "asked for longer ago";
+  run_until([&] { return built() == 3; });
+}
+
+TEST_F(SceneTreesTest, OneOfTheSettingsIsReadyWhenTheServerIs) {
+  save_scene(random_cloud(30'000, 3), folder_ / "hall.ply");
+  config_.scenes = {folder_ / "hall.ply"};
+  config_.scene_memory_mb = 6;
+  start();
+  EXPECT_TRUE(in_memory("hall")->in_pages) << "it does not fit: its tree is built first";
+  EXPECT_EQ(built(), 1);
+  start();
+  EXPECT_TRUE(in_memory("hall")->in_pages);
+  EXPECT_EQ(built(), 1);
+  config_.scene_memory_mb = 0;
+  library_.reset();
+  fs::remove_all(folder_ / "trees");
+  start();
+  const Entry whole = in_memory("hall");
+  EXPECT_FALSE(whole->in_pages);
+  run_until([&] { return in_memory("hall")->in_pages; });
+  EXPECT_EQ(library_->newer_form(*whole), in_memory("hall"));
+}
+
+/// Levels of 30,000 and 1,000 Gaussians, of which the finest one takes 7.1 MB.
+TEST_F(SceneTreesTest, AStreamedSceneThatDoesNotFitBeginsWithACoarserLevel) {
+  nlohmann::json lods;
+  for (const int level : {0, 1}) {
+    const std::size_t count = level == 0 ? 30'000 : 1'000;
+    const std::string folder = "scenes/streamed/" + std::to_string(level);
+    for (const auto& [file, content] : encode_sog(random_cloud(count, 0), 2))
+      write(folder + "/" + file, content);
+    lods[std::to_string(level)] = {{"file", level}, {"offset", 0}, {"count", count}};
+  }
+  write("scenes/streamed/lod-meta.json",
+        nlohmann::json{{"version", 1},
+                       {"lodLevels", 2},
+                       {"filenames", {"0/meta.json", "1/meta.json"}},
+                       {"tree", {{"lods", lods}}}}
+            .dump());
+  config_.scene_memory_mb = 6;
+  start();
+  const Entry coarse = load("streamed");
+  EXPECT_EQ(coarse->facts.gaussians, 1'000u);
+  EXPECT_FALSE(coarse->in_pages);
+  run_until([&] { return library_->newer_form(*coarse) != nullptr; });
+  const Entry tree = library_->newer_form(*coarse);
+  EXPECT_EQ(tree->facts.gaussians, 30'000u);
+  EXPECT_TRUE(tree->in_pages);
+}
+
+TEST_F(SceneTreesTest, TheNextVisitorGetsTheTreeWhereBothFormsDoNotFit) {
+  save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");
+  config_.scene_memory_mb = 8;
+  start();
+  Entry whole = load("b");
+  EXPECT_FALSE(whole->in_pages);
+  run_until([&] { return built() == 1; });
+  for (int i = 0; i < 10; ++i) library_->on_tick(now_);
+  EXPECT_EQ(in_memory("b"), whole) << "somebody looks at it";
+  whole.reset();
+  run_until([&] { return !in_memory("b"); });
+  EXPECT_TRUE(load("b")->in_pages);
+}
+
+TEST_F(SceneTreesTest, SmallScenesGetNone) {
+  config_.gaussians_of_a_tree = 3001;
+  start();
+  load("a");
+  for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
+  EXPECT_EQ(state("a"), "");
+  EXPECT_THAT(trees(), IsEmpty());
+}
+
+TEST_F(SceneTreesTest, WithoutTheSettingNothingIsWritten) {
+  config_.cache_dir.clear();
+  start();
+  load("a");
+  for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
+  EXPECT_EQ(state("a"), "");
+  std::vector<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_.path()))
+    names.push_back(entry.path().filename());
+  EXPECT_THAT(names, testing::UnorderedElementsAre("scenes", "a.ply"));
+}
+
+TEST_F(SceneTreesTest, AFolderThatCannotBeUsedIsNamed) {
+  config_.cache_dir = write("file", "");
+  EXPECT_THAT(input_error([&] { start(); }),
+              AllOf(HasSubstr("--cache-dir"), HasSubstr((folder_ / "file").string())));
+}
+
+TEST_F(SceneTreesTest, AFailedBuildIsNotTriedAgainSoon) {
+  // In the place of the tree.
+  write("trees/" + tree_name(folder_ / "scenes/a.ply", {}) + "/file", "");
+  start();
+  const Entry whole = load("a");
+  run_until([&] { return failed() == 1; });
+  for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1min);
+  EXPECT_EQ(state("a"), "");
+  EXPECT_EQ(in_memory("a"), whole);
+  EXPECT_EQ(failed(), 1);
+  now_ += 30min;
+  run_until([&] { return failed() == 2; });
+}
+
+TEST_F(SceneTreesTest, ASceneThatChangesWhileItIsBuiltGetsNoTreeOfIt) {
+  start();
+  const auto time = fs::last_write_time(folder_ / "scenes/a.ply");
+  fs::last_write_time(folder_ / "scenes/a.ply", time + 2s);  // as by a copy that goes on
+  load("a");
+  run_until([&] { return failed() == 1; });
+  EXPECT_THAT(trees(), IsEmpty());
+}
+
+TEST_F(SceneTreesTest, AnEndingServerLeavesNoHalfTree) {
+  save_scene(random_cloud(100'000, 3), folder_ / "scenes/large.ply");
+  start();
+  load("large");
+  library_->on_tick(now_);
+  library_.reset();
+  for (const fs::path& tree : trees()) EXPECT_EQ(tree.extension(), ".tree");
+}
+
+TEST_F(SceneTreesTest, WhatAnAuthorSavesMeanwhileCounts) {
+  start();
+  const Entry seen = load("a");
+  run_until([&] { return in_memory("a") != seen; });
+  auto saved = std::make_shared<SceneEntry>(*seen);
+  saved->facts.title = "Saved";
+  library_->revise(id("a"), saved);
+  EXPECT_EQ(in_memory("a")->facts.title, "Saved");
+  EXPECT_TRUE(in_memory("a")->in_pages);
+}
+
+}  // namespace
+}  // namespace catgs::test

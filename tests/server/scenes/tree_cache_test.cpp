@@ -1,0 +1,113 @@
+#include "server/scenes/tree_cache.h"
+
+#include <chrono>
+
+#include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
+
+class TreeCacheTest : public FolderTest {
+ protected:
+  std::string name_of(const std::string& scene, const LoadOptions& levels = {}) {
+    return tree_name(folder_ / scene, levels);
+  }
+  void age(const fs::path& file, std::chrono::hours by) {
+    fs::last_write_time(file, fs::last_write_time(file) - by);
+  }
+  fs::path tree(const std::string& name) { return write("trees/" + name, "a tree"); }
+
+  const fs::path trees_ = folder_ / "trees";
+};
+
+TEST_F(TreeCacheTest, NamesFollowTheContentOfAScene) {
+  save_scene(random_cloud(10, 0), folder_ / "a hall.ply");
+  const std::string name = name_of("a hall.ply");
+  EXPECT_THAT(name, MatchesRegex("a-hall-[0-9a-f]+-[0-9a-f]+\\.tree"));
+  EXPECT_EQ(name_of("a hall.ply"), name);
+  write("a hall.json", R"({"title": "A sidecar does not count"})");
+  EXPECT_EQ(name_of("a hall.ply"), name);
+  LoadOptions coarse;
+  coarse.lod = 1;
+  EXPECT_NE(name_of("a hall.ply", coarse), name);
+  age(folder_ / "a hall.ply", 1h);
+  EXPECT_NE(name_of("a hall.ply"), name) << "another time";
+}
+
+TEST_F(TreeCacheTest, NamesFollowAllFilesOfAFolderButItsSidecar) {
+  for (const auto& [file, content] : encode_sog(random_cloud(40, 0), 2))
+    write("sog/" + file, content);
+  const std::string name = name_of("sog");
+  write("sog/scene.json", "{}");
+  EXPECT_EQ(name_of("sog"), name);
+  write("sog/deeper/0.webp", "pixels");
+  EXPECT_NE(name_of("sog"), name);
+}
+
+TEST_F(TreeCacheTest, RemovesWhatKilledBuildsHaveLeftAndNothingElse) {
+  const std::string whole = "hall-3f0c91d2-9b1deb4d3b7d4bad.tree";
+  tree(whole);
+  tree(whole + ".part");
+  tree(whole + ".x9Yb2c");
+  for (const char* other : {"hall.tree", "hall.tree.part", "hall-9b1deb4d3b7d4bad.tree.part",
+                            "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "notes"})
+    tree(other);
+  const TreeCache cache(trees_);
+  EXPECT_TRUE(cache.contains(whole));
+  EXPECT_TRUE(fs::exists(trees_ / whole));
+  EXPECT_FALSE(fs::exists(trees_ / (whole + ".part")));
+  EXPECT_FALSE(fs::exists(trees_ / (whole + ".x9Yb2c")));
+  for (const char* other : {"hall.tree", "hall.tree.part", "hall-9b1deb4d3b7d4bad.tree.part",
+                            "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "notes"}) {
+    EXPECT_TRUE(fs::exists(trees_ / other)) << other;
+    EXPECT_FALSE(cache.contains(other)) << other;
+  }
+}
+
+TEST_F(TreeCacheTest, MakesItsFolderAndNamesTheSettingWhereThatFails) {
+  EXPECT_FALSE(fs::exists(trees_));
+  { const TreeCache cache(trees_ / "deeper"); }
+  EXPECT_TRUE(fs::is_directory(trees_ / "deeper"));
+  const fs::path file = write("file", "no folder");
+  EXPECT_THAT(input_error([&] { TreeCache cache(file); }),
+              HasSubstr("--cache-dir " + file.string()));
+  EXPECT_THAT(input_error([&] { TreeCache cache(file / "below"); }), HasSubstr("--cache-dir"));
+}
+
+TEST_F(TreeCacheTest, AFolderServesOneServerAtATime) {
+  {
+    const TreeCache cache(trees_);
+    EXPECT_THAT(input_error([&] { TreeCache other(trees_); }), HasSubstr("another server"));
+  }
+  const TreeCache next(trees_);
+}
+
+TEST_F(TreeCacheTest, KeepsTheTreesOfPresentScenes) {
+  const std::string present = "hall-3f0c91d2-9b1deb4d3b7d4bad.tree";
+  const std::string changed = "hall-3f0c91d2-0000000000000000.tree";
+  const std::string absent = "barn-00000000-0000000000000001.tree";
+  for (const std::string& name : {present, changed, absent}) tree(name);
+  TreeCache cache(trees_);
+  age(trees_ / present, 24h * 30);
+  age(trees_ / absent, 24h * 6);
+  cache.keep({present});
+  EXPECT_TRUE(cache.contains(present));
+  EXPECT_FALSE(cache.contains(changed)) << "the scene has another content now";
+  EXPECT_FALSE(fs::exists(trees_ / changed));
+  EXPECT_TRUE(cache.contains(absent)) << "its folder may come back";
+  age(trees_ / absent, 24h * 2);
+  cache.keep({});
+  EXPECT_TRUE(cache.contains(present)) << "it was seen a moment ago";
+  EXPECT_FALSE(cache.contains(absent));
+  EXPECT_FALSE(fs::exists(trees_ / absent));
+}
+
+}  // namespace
+}  // namespace catgs::test
