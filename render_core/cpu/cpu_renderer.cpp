@@ -76,7 +76,7 @@ std::unique_ptr<Renderer> make_cpu_renderer(std::shared_ptr<TreeFile> tree,
   scene->kernels = choose_kernels(options.simd);
   scene->pool = std::move(pool);
   auto pages = host_pool(tree->shape(), options);
-  scene->pages = std::make_unique<PageSlots>(tree->shape(), pages->slots());
+  scene->pages = std::make_unique<PageSlots>(tree->shape(), tree->model(), pages->slots());
   scene->tree = std::make_unique<PagedTree>(std::move(pages), std::move(tree), *scene->pages);
   return std::make_unique<CpuRenderer>(std::move(scene));
 }

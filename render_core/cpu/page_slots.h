@@ -17,8 +17,8 @@ std::shared_ptr<PagePool> host_pool(const TreeShape& shape, const RendererOption
 /// memory.
 class PageSlots final : public PageStore {
  public:
-  PageSlots(const TreeShape& shape, std::uint32_t slots)
-      : shape_(shape), store_(slots * shape.slots(), shape.sh_degree()) {}
+  PageSlots(const TreeShape& shape, SplatModel model, std::uint32_t slots)
+      : shape_(shape), store_(slots * shape.slots(), shape.sh_degree(), model) {}
 
   [[nodiscard]] const SceneStore& store() const { return store_; }
   void put(std::uint32_t slot, const TreePage& page, std::uint64_t number) override;

@@ -44,6 +44,12 @@ HWY_INLINE SplatBox box_of(const Sweep<Floats>& s, const Floats& reach,
   return box;
 }
 
+/// The opacity with which splats are drawn.
+HWY_INLINE Floats look_of(const SceneStore& scene, const Floats& log2_opacity,
+                          const ProjectedGaussian<Floats>& shape) {
+  return scene.antialiased() ? antialiased_log2_opacity(log2_opacity, shape) : log2_opacity;
+}
+
 /// Whether splats are behind the limits of all parts that their boxes meet.
 HWY_INLINE FloatMask is_hidden(const DepthLimits& limits, const ProjectedGaussian<Floats>& shape,
                                const Floats& reach, const Floats& depth,
@@ -92,7 +98,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   for (std::size_t i = begin; i < end; i += Floats::count) {
     const Floats depth = depths(context, scene, i);
     const Floats log2_opacity = load_log2_opacity(scene, i, task.share);
-    const Floats reach = max(reach_of(log2_opacity), Floats(0.0));
+    Floats reach = max(reach_of(log2_opacity), Floats(0.0));
     const auto opaque = reach_of(log2_opacity) >= Floats(0.0);
     const Vec3<Floats> mean = load_mean(scene, i);
     Floats deepest = depth;
@@ -107,17 +113,20 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     } else {
       s.shape = project(context.camera, mean, factor, depth);
     }
+    SplatLook look;
+    look.log2_opacity = look_of(scene, log2_opacity, s.shape);
+    // On a path the footprint changes; that with all of the opacity holds it.
+    if constexpr (!sweeps) reach = max(reach_of(look.log2_opacity), Floats(0.0));
     SplatBox box = box_of<pipeline>(s, reach, last_px);
-    const auto hit = candidates & box.columns.hit & box.rows.hit;
+    const auto shown = candidates & (sweeps ? opaque : reach_of(look.log2_opacity) >= Floats(0.0));
+    const auto hit = shown & box.columns.hit & box.rows.hit;
     std::uint32_t hits = bits(hit);
     if (hits != 0 && task.limits)
       hits &= ~bits(is_hidden(task.limits, s.shape, reach, depth, last_px));
     if (hits == 0) continue;
 
-    SplatLook look;
     look.centre_px = s.shape.centre_px;
     look.w = whitening(s.shape);
-    look.log2_opacity = log2_opacity;
     look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
     look.depth = depth;
     look.original_index = load_index(scene, i);
@@ -167,7 +176,7 @@ inline ClusterSummary refresh_cluster(const RefreshTask& task) {
         project(context.camera, mean, load_factor(scene, i), max(look.depth, context.near_z));
     look.centre_px = shape.centre_px;
     look.w = whitening(shape);
-    look.log2_opacity = load_log2_opacity(scene, i, task.share);
+    look.log2_opacity = look_of(scene, load_log2_opacity(scene, i, task.share), shape);
     look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
     look.original_index = load_index(scene, i);
     extremes.add_depths(mask_of_bits<hn::ScalableTag<float>>(hits) & in_front &

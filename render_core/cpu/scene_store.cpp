@@ -34,7 +34,8 @@ void give_back(T* first, std::size_t count) {
 SceneStore::SceneStore(const GaussianCloud& cloud, ThreadPool& pool)
     : size_(cloud.size()),
       padded_((cloud.size() + packet_size - 1) / packet_size * packet_size),
-      sh_degree_(cloud.sh_degree) {
+      sh_degree_(cloud.sh_degree),
+      model_(cloud.model) {
   allocate();
   const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
   pool.parallel_for(clusters_.size(), [&](std::size_t c) {
@@ -52,8 +53,8 @@ SceneStore::SceneStore(const GaussianCloud& cloud, ThreadPool& pool)
   });
 }
 
-SceneStore::SceneStore(std::size_t clusters, int sh_degree)
-    : size_(clusters * cluster_size), padded_(size_), sh_degree_(sh_degree) {
+SceneStore::SceneStore(std::size_t clusters, int sh_degree, SplatModel model)
+    : size_(clusters * cluster_size), padded_(size_), sh_degree_(sh_degree), model_(model) {
   allocate();
 }
 

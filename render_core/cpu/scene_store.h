@@ -29,7 +29,7 @@ class SceneStore {
   SceneStore(const GaussianCloud& cloud, ThreadPool& pool);
   /// Room for clusters that put() fills. Until then their contents are undefined, and take no
   /// physical memory.
-  SceneStore(std::size_t clusters, int sh_degree);
+  SceneStore(std::size_t clusters, int sh_degree, SplatModel model);
 
   /// Fills cluster `c` with the first cluster_size Gaussians of `cloud` or less. `factors`: of
   /// their covariances. `first_index`: original_index() of the first one. Different clusters may be
@@ -43,6 +43,7 @@ class SceneStore {
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] int sh_degree() const { return sh_degree_; }
+  [[nodiscard]] bool antialiased() const { return model_ == SplatModel::antialiased; }
   [[nodiscard]] std::span<const Cluster> clusters() const { return clusters_; }
   [[nodiscard]] std::size_t bytes() const;
   /// Bytes of one cluster.
@@ -86,6 +87,7 @@ class SceneStore {
   std::size_t size_;
   std::size_t padded_;
   int sh_degree_;
+  SplatModel model_;
   hwy::AlignedFreeUniquePtr<float[]> attributes_;
   hwy::AlignedFreeUniquePtr<std::uint32_t[]> original_index_;
   hwy::AlignedFreeUniquePtr<float[]> sh_;

@@ -183,13 +183,16 @@ void DevicePages::publish(PageTable& table) {
 }
 
 DeviceScene::DeviceScene(const SceneSource& source)
-    : whole_(upload(source)),
-      arrays_(whole_->arrays(source.order.size(), source.cloud.sh_degree)) {}
+    : whole_(upload(source)), arrays_(whole_->arrays(source.order.size(), source.cloud.sh_degree)) {
+  arrays_.antialiased = source.cloud.model == SplatModel::antialiased;
+}
 
 DeviceScene::DeviceScene(std::shared_ptr<TreeFile> tree, const RendererOptions& options, int device)
     : pool_(pool_for(tree->shape(), options, device)),
       pages_(std::make_unique<DevicePages>(tree->shape(), *pool_, device)),
-      arrays_(pages_->arrays()),
-      tree_(std::make_unique<PagedTree>(pool_, std::move(tree), *pages_)) {}
+      arrays_(pages_->arrays()) {
+  arrays_.antialiased = tree->model() == SplatModel::antialiased;
+  tree_ = std::make_unique<PagedTree>(pool_, std::move(tree), *pages_);
+}
 
 }  // namespace catgs::cuda

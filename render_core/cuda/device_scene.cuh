@@ -22,6 +22,7 @@ struct SceneArrays {
   std::uint32_t cluster_count = 0;
   std::uint32_t frame_clusters = 0;  // the most that a frame may look at
   int sh_degree = 0;
+  bool antialiased = false;       // see SplatModel
   std::uint32_t block_bytes = 0;  // packed_block_bytes(sh_degree)
   std::uint32_t chunk_shift = one_chunk, chunk_bytes = 0;
   const std::byte* blocks = nullptr;

@@ -48,7 +48,7 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const math::CameraModel<float>& now = camera.now.single;
   const math::Vec3<float>& mean = centre.mean;
   out.depth = static_cast<float>(math::view_depth(camera.now.precise, math::convert<double>(mean)));
-  const float reach = math::reach_of(centre.log2_opacity);
+  float reach = math::reach_of(centre.log2_opacity);
   const bool in_front = out.depth > camera.near_z;
   const float end_depth = sweeps ? math::view_depth(camera.end, mean) : out.depth;
   if (reach < 0.0f || fmaxf(out.depth, end_depth) <= now.near_z) return out;
@@ -56,11 +56,19 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const math::CovarianceFactor<float> factor = load_factor(scene, i);
   math::Sweep<float> s{};
   math::Vec2<float> half;
+  float log2_opacity = centre.log2_opacity;
   if (sweeps) {
+    // The footprint changes on its path; that with all of the opacity holds it.
     s = math::sweep(now, camera.end, mean, factor, out.depth);
+    if (scene.antialiased) log2_opacity = math::antialiased_log2_opacity(log2_opacity, s.shape);
     half = math::half_extent(s.outline, reach);
   } else {
     s.shape = math::project(now, mean, factor, out.depth);
+    if (scene.antialiased) {
+      log2_opacity = math::antialiased_log2_opacity(log2_opacity, s.shape);
+      reach = math::reach_of(log2_opacity);
+      if (reach < 0.0f) return out;
+    }
     half = math::half_extent(s.shape, reach);
   }
   const float step_x = 0.5f * s.displacement.x, step_y = 0.5f * s.displacement.y;
@@ -74,7 +82,7 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
   out.half_px = make_float2(half.x, half.y);
   out.whitening = math::whitening(s.shape);
-  if (in_front) out.log2_opacity = centre.log2_opacity;
+  if (in_front) out.log2_opacity = log2_opacity;
   out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, {}};
   return out;
 }

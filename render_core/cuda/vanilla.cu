@@ -64,12 +64,13 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const std::uint32_t i = blockIdx.x * block_size + threadIdx.x;
   if (i >= p.scene.count) return;
   p.tile_count[i] = 0;
-  const auto [mean, log2_opacity] = load_centre(p.scene, i);
+  auto [mean, log2_opacity] = load_centre(p.scene, i);
   const math::CameraModel<float>& camera = p.camera.single;
   const float depth =
       static_cast<float>(math::view_depth(p.camera.precise, math::convert<double>(mean)));
   if (!(depth > camera.near_z) || math::reach_of(log2_opacity) < 0.0f) return;
   const auto g = math::project<float>(camera, mean, load_factor(p.scene, i), depth);
+  if (p.scene.antialiased) log2_opacity = math::antialiased_log2_opacity(log2_opacity, g);
   const float2 centre = make_float2(g.centre_px.x, g.centre_px.y);
   const ushort4 box = box_of(centre, math::three_sigma_radius(g), p.shape);
   const std::uint32_t tiles = static_cast<std::uint32_t>(box.z - box.x) * (box.w - box.y);

@@ -49,6 +49,7 @@ void append(const GaussianCloud& from, std::size_t i, float growth, GaussianClou
 /// (systematic sampling, Madow 1949). Those that stand for others grow, so that the area is kept.
 GaussianCloud sample(const GaussianCloud& cloud, const Bounds& core) {
   GaussianCloud small;
+  small.model = cloud.model;
   if (cloud.size() <= sample_size) {
     for (std::size_t i = 0; i < cloud.size(); ++i) append(cloud, i, 1.0f, small);
     return small;

@@ -59,6 +59,7 @@ struct ProjectedGaussian {
   Vec2<T> centre_px;
   // Covariance [[xx, xy], [xy, yy]] with the low-pass added, px^2, and its determinant.
   T xx, xy, yy, determinant;
+  T sharp_determinant;  // of the covariance without the low-pass
 };
 
 /// EWA projection (Zwicker et al. 2001): Sigma2 = J W Sigma W^T J^T + low_pass I, J the Jacobian of
@@ -95,8 +96,20 @@ CATGS_HD_INLINE ProjectedGaussian<T> project(const CameraModel<T>& camera, const
   out.xx = uu + low_pass;
   out.xy = dot(m_u, m_v);
   out.yy = vv + low_pass;
-  out.determinant = dot(area, area) + low_pass * (uu + vv + low_pass);
+  out.sharp_determinant = dot(area, area);
+  out.determinant = out.sharp_determinant + low_pass * (uu + vv + low_pass);
   return out;
+}
+
+/// The opacity of a Gaussian of an antialiased scene, as a base-2 logarithm. The low-pass filter
+/// spreads the Gaussian over more of the picture, so its peak sinks by the ratio of the areas:
+/// sqrt(det Sigma2 / det (Sigma2 + low_pass I)). Source: Mip-Splatting (Yu et al. 2024),
+/// equation 9.
+template <class T>
+CATGS_HD_INLINE T antialiased_log2_opacity(T log2_opacity, const ProjectedGaussian<T>& g) {
+  const T least = T(2.3e-10);  // 2^-32: invisible at any opacity
+  return mul_add(T(0.5), log2_of_share(max(g.sharp_determinant / g.determinant, least)),
+                 log2_opacity);
 }
 
 }  // namespace CATGS_MATH_NAMESPACE

@@ -53,13 +53,16 @@ std::vector<Splat> project_all(const GaussianCloud& cloud, const Camera& request
     const double depth = math::view_depth(camera, mean);
     Splat splat;
     splat.depth = static_cast<float>(depth);
-    splat.log2_opacity = std::log2(static_cast<double>(cloud.opacity[i]));
-    splat.reach = math::reach_of(splat.log2_opacity);
-    if (!(splat.depth > request_camera.near_z) || !(splat.reach >= 0.0)) continue;
+    if (!(splat.depth > request_camera.near_z)) continue;
     const glm::quat& q = cloud.rotation[i];
     const double rotation[4] = {q.x, q.y, q.z, q.w};
     const auto factor = math::covariance_factor(rotation, to_vec3(cloud.scale[i]));
     const auto projected = math::project(camera, mean, factor, depth);
+    splat.log2_opacity = std::log2(static_cast<double>(cloud.opacity[i]));
+    if (cloud.model == SplatModel::antialiased)
+      splat.log2_opacity = math::antialiased_log2_opacity(splat.log2_opacity, projected);
+    splat.reach = math::reach_of(splat.log2_opacity);
+    if (!(splat.reach >= 0.0)) continue;
     splat.centre_px = projected.centre_px;
     splat.whitening = math::whitening(projected);
     splat.colour = shade(cloud, i, camera.position);

@@ -7,6 +7,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 
+#include "render_core/scene/splat_model.h"
+
 namespace catgs {
 
 /// Spherical-harmonics coefficients per colour channel for a degree in 0…3: (degree + 1)^2.
@@ -22,6 +24,7 @@ constexpr int sh_degree_of(int k) { return k < 1 ? 0 : k < 4 ? 1 : k < 9 ? 2 : 3
 /// sh_coefficient_count(sh_degree). Invariants (established by `sanitize`): every value finite,
 /// `rotation` unit length, `scale` > 0, `opacity` in (0, 1).
 struct GaussianCloud {
+  SplatModel model = SplatModel::standard;
   int sh_degree = 0;
   std::vector<glm::vec3> mean;      // world units
   std::vector<glm::quat> rotation;  // Gaussian axes to world axes; memory order x, y, z, w

@@ -35,6 +35,15 @@ void add_scene_options(CLI::App& command, SceneOptions& options, const std::stri
       ->excludes(lod);
   command.add_option("--up", options.up,
                      "Axis that points up, like +z, where no sidecar says so [estimated]");
+  command
+      .add_option("--model", options.model,
+                  "What the Gaussians were trained to be [what the sidecar or the file says]")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(splat_model_names.begin(), splat_model_names.end())));
+}
+
+std::optional<SplatModel> model_of(const SceneOptions& options) {
+  return options.model ? splat_model_named(*options.model) : std::nullopt;
 }
 
 std::optional<glm::vec3> up_of(const SceneOptions& options) {
@@ -53,6 +62,7 @@ LoadOptions load_options(const SceneOptions& options, int threads, Progress& pro
   load.lod = options.lod;
   load.gaussian_budget = options.budget;
   load.up = up_of(options);
+  load.model = model_of(options);
   load.threads = threads;
   load.progress = [&progress](double fraction) { progress.update(fraction); };
   return load;

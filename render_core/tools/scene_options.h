@@ -19,9 +19,13 @@ struct SceneOptions {
   std::optional<int> lod;
   std::optional<std::size_t> budget;
   std::optional<std::string> up;
+  std::optional<std::string> model;
 };
 /// The path is the command's next positional argument.
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name = "scene");
+
+/// The model that --model names.
+std::optional<SplatModel> model_of(const SceneOptions& options);
 
 /// The direction that --up names. Throws InputError.
 std::optional<glm::vec3> up_of(const SceneOptions& options);

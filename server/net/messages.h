@@ -14,6 +14,7 @@
 
 #include "render_core/math/camera.h"
 #include "render_core/scene/scene_about.h"
+#include "render_core/scene/splat_model.h"
 #include "server/base/clock.h"
 #include "server/encode/encoder.h"
 
@@ -98,6 +99,7 @@ struct SceneFacts {
   std::string scene_id;
   std::string title;
   std::uint64_t gaussians = 0;
+  SplatModel model = SplatModel::standard;
   glm::vec3 up{0.0f, -1.0f, 0.0f};
   Pose start_pose;
   glm::vec3 focus{0.0f};

@@ -248,6 +248,7 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
   out.set_licence(scene.about.licence);
   out.set_mode(static_cast<v1::CameraMode>(scene.about.mode));  // of the same order
   out.set_background_rgb(scene.about.background_rgb);
+  if (scene.model != SplatModel::standard) out.set_model(std::string(name_of(scene.model)));
 }
 
 void fill(const Welcome& welcome, v1::ServerMessage& out) {

@@ -146,6 +146,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
   entry->facts.gaussians = tree ? tree->header().gaussians : scene.cloud.size();
+  entry->facts.model = scene.cloud.model;
   entry->in_pages = tree != nullptr;
   entry->coarse = form.most_gaussians > 0;
   use_hints(scene.hints, scene.name, entry->facts);

@@ -1,5 +1,6 @@
 #include "tests/support/test_scenes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -119,6 +120,22 @@ GaussianCloud faint_and_opaque() {
   return cloud;
 }
 
+/// Mostly smaller than a pixel, so that the low-pass filter takes most of their opacity.
+GaussianCloud antialiased() {
+  GaussianCloud cloud = random_cloud(4000, 1, 71);
+  cloud.model = SplatModel::antialiased;
+  for (glm::vec3& scale : cloud.scale) scale *= 0.2f;
+  return cloud;
+}
+
+/// Discs as sanitize() leaves them.
+GaussianCloud surfels() {
+  GaussianCloud cloud = random_cloud(2000, 1, 81);
+  cloud.model = SplatModel::surfels;
+  for (glm::vec3& scale : cloud.scale) scale.z = 1e-3f * std::min(scale.x, scale.y);
+  return cloud;
+}
+
 GaussianCloud far_from_origin() {
   GaussianCloud cloud = random_cloud(1500, 2, 61);
   for (glm::vec3& mean : cloud.mean) mean += glm::vec3(800, -300, 1200);
@@ -154,6 +171,8 @@ std::vector<TestScene> small_scenes() {
   scenes.push_back(scene("needles", needles(), aside, {200, 150}, 400));
   scenes.push_back(scene("coincident", coincident_gaussians(), still, {96, 80}, 120));
   scenes.push_back(scene("faint_and_opaque", faint_and_opaque(), aside, {128, 72}, 110));
+  scenes.push_back(scene("antialiased", antialiased(), aside, {160, 120}, 120));
+  scenes.push_back(scene("surfels", surfels(), aside, {128, 96}, 110));
   scenes.push_back(scene("far_from_origin", far_from_origin(),
                          look_at({801, -300, 1199}, {800, -300, 1205}), {120, 90}, 110));
   scenes.push_back(scene("empty", GaussianCloud{}, still, {40, 24}, 50));

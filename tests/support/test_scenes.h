@@ -22,7 +22,8 @@ inline void PrintTo(const TestScene& scene, std::ostream* out) { *out << scene.n
 
 /// Scenes small enough for the reference that hold what breaks renderers: near-plane crossings,
 /// Gaussians larger than the image, needles, nothing at all, one pixel, odd sizes, coincident
-/// centres, exact depth ties, faint and nearly opaque ones, cameras far from the origin.
+/// centres, exact depth ties, faint and nearly opaque ones, cameras far from the origin; and each
+/// SplatModel.
 std::vector<TestScene> small_scenes();
 
 /// `count` Gaussians around (0, 0, 5) with axis ratios up to 30 and SH of `degree`.

@@ -57,15 +57,26 @@ void use_cameras(const CameraFile& cameras, SceneHints& hints) {
   hints.source = cameras.source;
 }
 
+std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
+  std::error_code error;
+  if (path.empty() || !std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  return read_sidecar(FileSource(path));
+}
+
 }  // namespace
+
+void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, SplatModel& model,
+               std::vector<std::string>& notes) {
+  const std::optional<Sidecar> sidecar = wanted ? std::nullopt : sidecar_at(files.sidecar);
+  model = wanted.value_or(sidecar ? sidecar->model.value_or(model) : model);
+  if (model == SplatModel::surfels)
+    notes.emplace_back("its model is 2dgs, and its discs are drawn as flat Gaussians");
+}
 
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
                       const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
                       std::shared_ptr<ThreadPool> pool) {
-  std::error_code error;
-  std::optional<Sidecar> sidecar;
-  if (!files.sidecar.empty() && std::filesystem::is_regular_file(files.sidecar, error))
-    sidecar = read_sidecar(FileSource(files.sidecar));
+  const std::optional<Sidecar> sidecar = sidecar_at(files.sidecar);
   if (sidecar && sidecar->unknown)
     notes.push_back(
         fmt::format("{}: {} is ignored", files.sidecar.filename().string(), *sidecar->unknown));

@@ -95,7 +95,7 @@ Sidecar read_sidecar(const ByteSource& file) {
   if (!document.is_object()) root.fail("is not a JSON object");
   static constexpr std::array known = {"up",    "start_pose", "near",    "limits",
                                        "focus", "title",      "credits", "licence",
-                                       "mode",  "background", "tours"};
+                                       "mode",  "background", "model",   "tours"};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())
@@ -112,6 +112,11 @@ Sidecar read_sidecar(const ByteSource& file) {
   if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits);
   if (const auto focus = root.find("focus")) sidecar.focus = focus->place();
   sidecar.about = parse_about(root);
+  if (const auto model = root.find("model")) {
+    sidecar.model = splat_model_named(model->text());
+    if (!sidecar.model)
+      model->fail("is no model", fmt::format("write {}", fmt::join(splat_model_names, ", ")));
+  }
   return sidecar;
 }
 

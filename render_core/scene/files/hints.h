@@ -25,6 +25,7 @@ namespace catgs {
 ///   "title":      text of at most 800 bytes, as "credits" and "licence" are
 ///   "mode":       "orbit", "fly" or "walk": how a visitor moves at first
 ///   "background": "#rrggbb"
+///   "model":      "default", "antialiased" or "2dgs", in place of what the scene's file says
 ///   "tours":      for pages, see web_client/README.md
 struct Sidecar {
   struct StartPose {
@@ -38,6 +39,7 @@ struct Sidecar {
   std::optional<Bounds> limits;
   std::optional<glm::vec3> focus;
   SceneAbout about;
+  std::optional<SplatModel> model;
   std::optional<std::string> unknown;  // about a field that is none of the above, for people
 };
 
@@ -61,6 +63,11 @@ struct HintFiles {
   std::filesystem::path cameras;
   std::filesystem::path transforms;
 };
+
+/// Puts the model that `wanted` or else the sidecar names in place of the file's. Notes what people
+/// should know about it. Throws InputError for a faulty sidecar.
+void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, SplatModel& model,
+               std::vector<std::string>& notes);
 
 /// Takes each hint from the first source that has it: the sidecar; the training cameras (first
 /// camera, levelled by find_up(), the box around them grown by half its diagonal);

@@ -95,6 +95,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   scene.format = std::move(decoded.format);
   scene.cloud = std::move(decoded.cloud);
   scene.notes = std::move(decoded.notes);
+  use_model(location.hints, options.model, scene.cloud.model, scene.notes);
   scene.report = sanitize(scene.cloud, context.part(0.9, 1.0));
   if (scene.cloud.empty())
     throw InputError(path.string(), "",
@@ -118,11 +119,17 @@ SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions&
   SceneInPages scene;
   scene.tree =
       std::make_shared<TreeFile>(std::make_unique<FileSource>(location.path), memory_bytes);
+  SplatModel model = scene.tree->model();
+  use_model(named.hints, options.model, model, scene.outline.notes);
+  if (model == SplatModel::surfels && scene.tree->model() != model)
+    throw InputError(path.string(), "model", "cannot be made 2dgs in pages",
+                     "convert the scene with --model 2dgs");
+  scene.tree->set_model(model);
   TreeScene outline = read_tree(*scene.tree, outline_gaussians, context.part(0.0, 0.9));
   scene.outline.name = to_utf8(named.name);
   scene.outline.format = "tree";
   scene.outline.cloud = std::move(outline.cloud);
-  scene.outline.notes = std::move(outline.notes);
+  scene.outline.notes.insert(scene.outline.notes.end(), outline.notes.begin(), outline.notes.end());
   const TreeHeader& header = scene.tree->header();
   scene.outline.report = {.read = header.read, .dropped = header.dropped};
   scene.outline.hints =

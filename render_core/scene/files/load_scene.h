@@ -16,6 +16,7 @@ struct LoadOptions {
   std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
   std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
   std::optional<glm::vec3> up;                    // unit; where no sidecar says which way is up
+  std::optional<SplatModel> model;                // in place of what sidecar and file say
   std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
   int threads = 0;                                // 0: one per processor
 };

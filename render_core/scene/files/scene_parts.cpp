@@ -118,25 +118,29 @@ std::optional<Parts> open_parts(const SceneLocation& location, std::uint64_t par
 }  // namespace
 
 std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
-                                          const std::optional<glm::vec3>& up,
+                                          const LoadOptions& options,
                                           const std::shared_ptr<ThreadPool>& pool,
                                           std::uint64_t part_rows) {
   const SceneLocation location = locate_scene(path);
   const LoadContext context(*pool);
   std::optional<Parts> parts = open_parts(location, part_rows, context);
   if (!parts) return std::nullopt;
+  PartedScene scene;
   GaussianCloud& sample = parts->sample;
+  use_model(location.hints, options.model, sample.model, scene.notes);
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
-  PartedScene scene;
-  if (!sample.empty()) scene.hints = find_hints(sample, location.hints, up, scene.notes, pool);
+  if (!sample.empty())
+    scene.hints = find_hints(sample, location.hints, options.up, scene.notes, pool);
   scene.parts.format = parts->format;
-  scene.parts.each = [read = parts->read, count = parts->count, reach, pool](const auto& take) {
+  scene.parts.each = [read = parts->read, count = parts->count, used = sample.model, reach,
+                      pool](const auto& take) {
     const LoadContext reading(*pool);
     std::uint64_t dropped = 0;
     for (std::uint64_t i = 0; i < count; ++i) {
       GaussianCloud part = read(i, reading);
+      part.model = used;
       dropped += sanitize(part, reach, reading).dropped;
       take(part);
     }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/scene/tree/build_tree.h"
 
@@ -22,10 +23,11 @@ struct PartedScene {
 
 /// The scene at `path` if its format can be read in parts: a binary 3DGS .ply, a .splat, or a
 /// streamed SOG of several levels, of which each SOG of the finest is a part. It may have
-/// TreeShape::max_gaussians. Throws InputError when such a scene is wrong. `up` as in LoadOptions;
-/// `part_rows`: Gaussians of a file's part before faulty ones are dropped.
+/// TreeShape::max_gaussians. Throws InputError when such a scene is wrong. Of
+/// `options`, `up` and `model` count; `part_rows`: Gaussians of a file's part before faulty ones
+/// are dropped.
 std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
-                                          const std::optional<glm::vec3>& up,
+                                          const LoadOptions& options,
                                           const std::shared_ptr<ThreadPool>& pool,
                                           std::uint64_t part_rows = 1'000'000);
 

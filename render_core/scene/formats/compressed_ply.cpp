@@ -164,6 +164,7 @@ GaussianCloud read_compressed_ply(const ByteSource& file, const PlyHeader& heade
   const int degree = require_consistent(file, header, layout);
   GaussianCloud cloud;
   cloud.resize(layout.vertex->count, degree);
+  cloud.model = header.model.value_or(SplatModel::standard);
 
   const auto read_rows = [&](const PlyElement& element, std::size_t begin, std::size_t end) {
     std::vector<std::byte> bytes((end - begin) * element.row_bytes);

@@ -72,7 +72,8 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
   for (std::size_t k = 0; k < 3; ++k) {
     add(at(offsetof(Row, mean)) + k, std::string(1, "xyz"[k]));
     add(at(offsetof(Row, dc)) + k, fmt::format("f_dc_{}", k));
-    add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
+    if (k < 2 || vertex.find("scale_2") != nullptr)
+      add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
   }
   for (std::size_t k = 0; k < 4; ++k)
     add(at(offsetof(Row, rotation)) + k, fmt::format("rot_{}", k));
@@ -83,6 +84,11 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
       add(at(offsetof(Row, rest)) + channel * kept + k,
           fmt::format("f_rest_{}", channel * (rest / 3) + k));
   return layout;
+}
+
+SplatModel model_of(const PlyHeader& header, const PlyElement& vertex) {
+  if (vertex.find("scale_2") == nullptr) return SplatModel::surfels;
+  return header.model.value_or(SplatModel::standard);
 }
 
 void store(const Row& row, GaussianCloud& cloud, std::size_t i) {
@@ -248,6 +254,7 @@ GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header,
   require_ascii_rows(file, header, *vertex);
   GaussianCloud cloud;
   cloud.resize(vertex->count, layout.sh_degree);
+  cloud.model = model_of(header, *vertex);
   read_ascii(file, header, *vertex, layout, cloud, context);
   return cloud;
 }
@@ -258,6 +265,7 @@ GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, con
   const Layout layout = find_fields(file, vertex);
   GaussianCloud cloud;
   cloud.resize(rows.count, layout.sh_degree);
+  cloud.model = model_of(header, vertex);
   read_binary(file, vertex, layout, header.encoding == PlyEncoding::binary_big_endian, rows, cloud,
               context);
   return cloud;
@@ -265,8 +273,11 @@ GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, con
 
 void write_ply(const GaussianCloud& cloud, std::ostream& to) {
   const std::size_t rest = cloud.sh_count() - 1;
-  std::string header =
-      fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", cloud.size());
+  std::string header = "ply\nformat binary_little_endian 1.0\n";
+  if (cloud.model != SplatModel::standard)
+    header += fmt::format("comment SplatRenderMode: {}\n",
+                          cloud.model == SplatModel::surfels ? name_of(cloud.model) : "mip");
+  header += fmt::format("element vertex {}\n", cloud.size());
   const auto property = [&](std::string_view name) {
     header.append("property float ").append(name).append("\n");
   };

@@ -11,9 +11,9 @@ namespace catgs {
 
 /// Reads the point cloud that the original 3DGS training writes: element `vertex` with x y z,
 /// f_dc_0…2, f_rest_* (0, 9, 24, 45 or 72 of them, channel-major), opacity (logit), scale_0…2
-/// (logarithms) and rot_0…3 (w, x, y, z). Any order, any scalar type, any encoding; normals, other
-/// properties and other elements are ignored, SH above degree 3 is cut off.
-/// The result is not sanitized. Throws InputError.
+/// (logarithms; 2DGS has no scale_2) and rot_0…3 (w, x, y, z). Comments tell the model. Any order,
+/// any scalar type, any encoding; normals, other properties and other elements are ignored, SH
+/// above degree 3 is cut off. The result is not sanitized. Throws InputError.
 GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header, const LoadContext& context);
 
 /// The same of some rows of a binary file. Its element `vertex` has them, and its rows have a fixed

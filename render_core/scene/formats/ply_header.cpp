@@ -52,7 +52,7 @@ class HeaderParser {
       if (line_number_ == 1) {
         if (words.size() != 1 || words[0] != "ply") fail("a PLY file begins with the line 'ply'");
       } else if (words.empty() || words[0] == "comment" || words[0] == "obj_info") {
-        continue;
+        read_comment(words);
       } else if (words[0] == "format") {
         parse_format(words);
         format_known = true;
@@ -86,6 +86,16 @@ class HeaderParser {
     const auto line = text_.substr(at_, end - at_);
     at_ = end + 1;
     return line;
+  }
+
+  /// Comments of other programs and unknown values say nothing.
+  void read_comment(const std::vector<std::string_view>& words) {
+    if (words.size() != 3) return;
+    if (words[1] == "SplatRenderMode:") {
+      if (const auto model = splat_model_named(words[2])) header_.model = model;
+    } else if (words[1] == "antialiased" && (words[2] == "0" || words[2] == "1")) {
+      header_.model = words[2] == "1" ? SplatModel::antialiased : SplatModel::standard;
+    }
   }
 
   void parse_format(const std::vector<std::string_view>& words) {

@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/splat_model.h"
 
 namespace catgs {
 
@@ -38,6 +40,8 @@ struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::binary_little_endian;
   std::vector<PlyElement> elements;
   std::uint64_t bytes = 0;  // the data begins here
+  /// Of the comments "SplatRenderMode: default|mip|2dgs" (Brush) and "antialiased 0|1" (Postshot).
+  std::optional<SplatModel> model;
 
   [[nodiscard]] const PlyElement* find(std::string_view element) const;
 };

@@ -244,6 +244,10 @@ SogMeta parse(const ByteSource& file, const std::string& name) {
   else
     version->fail("is not supported", "versions 1 and 2 are");
 
+  if (const auto model = meta.find("model")) {
+    // A model of tomorrow is drawn as the usual one.
+    if (const auto known = splat_model_named(model->text())) sog.model = *known;
+  }
   sog.min_log_mean = meta.at("means").at("mins").vec3();
   sog.max_log_mean = meta.at("means").at("maxs").vec3();
   sog.means_low = image_name(meta, "means", 0, 2);
@@ -279,6 +283,7 @@ void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRa
     assert(range.begin + range.count <= meta.count);
     assert(range.destination + range.count <= cloud.size());
   }
+  cloud.model = meta.model;
   const Decoder decoder{files, meta, ranges, cloud};
   // The longest step first, so that threads end together.
   std::vector<std::function<void()>> steps;

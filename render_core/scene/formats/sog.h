@@ -30,6 +30,7 @@ struct SogMeta {
   std::string folder;  // folder of the images, "" or ending in "/"
   std::uint64_t count = 0;
   int sh_degree = 0;
+  SplatModel model = SplatModel::standard;
   glm::vec3 min_log_mean{0.0f}, max_log_mean{0.0f};  // of sign(x) ln(|x| + 1)
   std::array<Channel, 3> log_scale{}, sh0{};
   Channel opacity{};
@@ -53,7 +54,8 @@ struct SogRange {
 };
 
 /// Decodes ranges into a cloud that has room for them; coefficients above the SOG's degree stay as
-/// they are. One image per thread is in memory at a time. Throws InputError.
+/// they are. Sets the cloud's model. One image per thread is in memory at a time. Throws
+/// InputError.
 void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRange> ranges,
                 GaussianCloud& cloud, const LoadContext& context);
 

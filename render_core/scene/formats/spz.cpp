@@ -30,7 +30,7 @@ struct Header {
   std::uint32_t count = 0;
   int sh_degree = 0;
   int fractional_bits = 0;
-  bool has_extensions = false;
+  bool antialiased = false, has_extensions = false;
 };
 
 /// One attribute of all Gaussians: bytes per Gaussian in the file, and the function that stores
@@ -151,6 +151,7 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
   header.count = load_as<std::uint32_t>(bytes.data() + 8);
   header.sh_degree = byte_at(bytes.data(), 12);
   header.fractional_bits = byte_at(bytes.data(), 13);
+  header.antialiased = byte_at(bytes.data(), 14) & antialiased_flag;
   header.has_extensions = byte_at(bytes.data(), 14) & extensions_flag;
   if (load_as<std::uint32_t>(bytes.data()) != magic) fail(file, "magic", "is not 'NGSP'");
   if (header.version < 1 || header.version > 4)
@@ -200,6 +201,7 @@ void apply(const AxisFlip& flip, GaussianCloud& cloud, const LoadContext& contex
 GaussianCloud make_cloud(const Header& header) {
   GaussianCloud cloud;
   cloud.resize(header.count, std::min(header.sh_degree, max_sh_degree));
+  if (header.antialiased) cloud.model = SplatModel::antialiased;
   return cloud;
 }
 

@@ -122,6 +122,7 @@ void write_spz(const GaussianCloud& cloud, std::ostream& to) {
   std::copy_n(reinterpret_cast<const char*>(words.data()), sizeof words, header.begin());
   header[12] = static_cast<char>(cloud.sh_degree);
   header[13] = static_cast<char>(fractional_bits);
+  if (cloud.model == SplatModel::antialiased) header[14] = static_cast<char>(antialiased_flag);
   gzip.write(header);
 
   const auto write_attribute = [&](const std::function<void(std::string&, std::size_t)>& append) {

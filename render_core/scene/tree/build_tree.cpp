@@ -30,12 +30,14 @@ constexpr std::size_t pages_at_a_time = 256;
 /// memory.
 struct FirstReading {
   std::uint64_t gaussians = 0, dropped = 0;
+  SplatModel model = SplatModel::standard;
   int sh_degree = 0;
   glm::vec3 low{std::numeric_limits<float>::max()}, high{std::numeric_limits<float>::lowest()};
   std::vector<GaussianCloud> parts;
 
   void add(const GaussianCloud& part, std::size_t memory_bytes) {
     gaussians += part.size();
+    model = part.model;
     sh_degree = part.sh_degree;
     for (const glm::vec3& mean : part.mean) {
       low = glm::min(low, mean);
@@ -267,7 +269,8 @@ TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
   }
 
   TreeHeader header;
-  header.sh_degree = static_cast<std::uint32_t>(first.sh_degree);
+  header.sh_degree = static_cast<std::uint16_t>(first.sh_degree);
+  header.model = first.model;
   header.gaussians = first.gaussians;
   header.low = first.low;
   header.high = first.high;

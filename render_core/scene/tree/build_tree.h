@@ -16,7 +16,8 @@ namespace catgs {
 /// A scene that is read part by part, so that it need not fit into memory.
 struct SceneParts {
   /// Calls `take` with every part, in the same order with the same bits each time it is called. The
-  /// parts share one SH degree and are sanitized. Returns how many Gaussians were dropped.
+  /// parts share one SH degree and one model, and are sanitized. Returns how many Gaussians were
+  /// dropped.
   std::function<std::uint64_t(const std::function<void(const GaussianCloud&)>& take)> each;
   std::string format;      // of the scene, for people
   bool in_memory = false;  // whether the parts are in memory anyway, so that calling costs nothing

@@ -47,6 +47,7 @@ GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes,
   for (std::size_t n = 0; n < nodes.size(); ++n) first[n + 1] += first[n];
   GaussianCloud cloud;
   cloud.resize(first.back(), shape.sh_degree());
+  cloud.model = tree.model();
   context.part(0.5, 1.0).for_blocks(nodes.size(), nodes_at_a_time, [&](auto begin, auto end) {
     for (std::size_t n = begin; n < end; ++n)
       read_node(*page_of(tree, nodes[n]), shape.slot_of(nodes[n]), cloud, first[n]);

@@ -56,8 +56,10 @@ TreeHeader read_tree_header(const ByteSource& file) {
            "convert the scene again with this program");
   if (header.checksum != header.right_checksum())
     refuse("header", "its checksum is wrong", damaged);
-  if (header.sh_degree > static_cast<std::uint32_t>(max_sh_degree))
+  if (header.sh_degree > max_sh_degree)
     refuse("SH degree", fmt::format("{} is not in 0 to 3", header.sh_degree), damaged);
+  if (header.model > SplatModel::surfels || header.reserved != 0)
+    refuse("model", "is not known", "convert the scene again with this program");
   if (header.gaussians == 0 || header.gaussians > TreeShape::max_gaussians)
     refuse("Gaussians",
            fmt::format("{} is not in 1 to {}", header.gaussians, TreeShape::max_gaussians),

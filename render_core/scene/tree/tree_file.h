@@ -28,7 +28,9 @@ struct TreeHeader {
 
   std::array<char, 8> magic = right_magic;
   std::uint32_t version = right_version;
-  std::uint32_t sh_degree = 0;
+  std::uint16_t sh_degree = 0;
+  SplatModel model = SplatModel::standard;
+  std::uint8_t reserved = 0;
   std::uint64_t gaussians = 0;                  // of the leaves
   glm::vec3 low{0.0f}, high{0.0f};              // ends of the box of their means
   std::uint64_t read = 0, dropped = 0;          // SanitizeReport of the scene it was made from
@@ -58,6 +60,10 @@ class TreeFile {
   [[nodiscard]] const std::string& name() const { return file_->name(); }
   [[nodiscard]] const TreeHeader& header() const { return header_; }
   [[nodiscard]] const TreeShape& shape() const { return shape_; }
+  /// That of the header, or the one that set_model() has put in its place.
+  [[nodiscard]] SplatModel model() const { return header_.model; }
+  /// Call before others use the tree.
+  void set_model(SplatModel model) { header_.model = model; }
   /// Less than shape().pages() where the file is cut off.
   [[nodiscard]] std::uint64_t pages_in_file() const;
 

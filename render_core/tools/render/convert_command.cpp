@@ -54,7 +54,10 @@ bool convert_in_parts(const ConvertOptions& options, bool quiet) {
   if (!is_tree_name(options.out) || options.keep_fraction < 1.0) return false;
   if (options.in.lod || options.in.budget) return false;
   const auto pool = std::make_shared<ThreadPool>(options.threads);
-  const auto scene = scene_in_parts(options.in.path, up_of(options.in), pool);
+  LoadOptions load;
+  load.up = up_of(options.in);
+  load.model = model_of(options.in);
+  const auto scene = scene_in_parts(options.in.path, load, pool);
   if (!scene) return false;
   write_tree(scene->parts, options.tree, options.out, *pool, quiet);
   print_notes(scene->notes);

@@ -64,6 +64,7 @@ Json describe(const Scene& scene, double load_ms) {
   return {{"name", scene.name},
           {"format", scene.format},
           {"gaussians", cloud.size()},
+          {"model", name_of(cloud.model)},
           {"sh_degree", cloud.sh_degree},
           {"bytes", cloud.bytes()},
           {"robust_bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
@@ -113,6 +114,7 @@ void print_text(const Json& info) {
   const Json &report = info["sanitize"], &hints = info["hints"];
   line("scene", info["name"].get<std::string>());
   line("format", info["format"].get<std::string>());
+  line("model", info["model"].get<std::string>());
   line("Gaussians", fmt::format("{}, SH degree {}, {:.1f} MB", count(info["gaussians"]),
                                 info["sh_degree"].get<int>(), 1e-6 * bytes));
   line("5–95 % bounds", fmt::format("{}  to  {}", point(info["robust_bounds"]["min"]),

@@ -61,6 +61,7 @@ nlohmann::ordered_json describe_tree(const std::filesystem::path& path, const Tr
       {"format", "tree"},
       {"source", printable(header.source.data())},
       {"gaussians", header.gaussians},
+      {"model", name_of(header.model)},
       {"sh_degree", header.sh_degree},
       {"read", header.read},
       {"dropped", header.dropped},
@@ -80,6 +81,7 @@ void print_tree(const nlohmann::ordered_json& tree) {
   const auto count = [&](const char* name) { return tree[name].get<std::uint64_t>(); };
   line("scene", tree["name"].get<std::string>());
   line("format", "tree of clusters, from " + tree["source"].get<std::string>());
+  line("model", tree["model"].get<std::string>());
   line("Gaussians", fmt::format("{}, SH degree {}; {} of {} were dropped", count("gaussians"),
                                 count("sh_degree"), count("dropped"), count("read")));
   line("file",

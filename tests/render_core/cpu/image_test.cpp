@@ -47,6 +47,41 @@ TEST_P(SmallScenes, ExactMatchesReference) {
   }
 }
 
+/// Means of `factor` x `factor` pixels.
+std::vector<float> reduced(const std::vector<float>& rgb, glm::ivec2 size_px, int factor) {
+  std::vector<float> means(rgb.size() / static_cast<std::size_t>(factor * factor));
+  for (int y = 0; y < size_px.y; ++y)
+    for (int x = 0; x < size_px.x; ++x)
+      for (int c = 0; c < 3; ++c)
+        means[static_cast<std::size_t>((y / factor * (size_px.x / factor) + x / factor) * 3 + c)] +=
+            rgb[static_cast<std::size_t>((y * size_px.x + x) * 3 + c)] /
+            static_cast<float>(factor * factor);
+  return means;
+}
+
+// Gaussians much smaller than a pixel. A picture with many samples a pixel is the truth, and there
+// the low-pass filter changes little.
+TEST(Antialiasing, PicturesOfSmallGaussiansAreThoseOfManySamples) {
+  constexpr int factor = 8;
+  TestScene scene;
+  GaussianCloud cloud = test::random_cloud(3000, 0, 17);
+  for (glm::vec3& scale : cloud.scale) scale = glm::vec3(0.01f);
+  scene.request.camera = make_camera({}, {64, 48}, 40.0f);
+  const auto picture = [&](SplatModel model, int samples) {
+    cloud.model = model;
+    scene.cloud = std::make_shared<const GaussianCloud>(cloud);
+    scene.request.camera =
+        make_camera({}, glm::ivec2(64, 48) * samples, 40.0f * static_cast<float>(samples));
+    return render(scene, {RendererKind::cpu, pool_of(2), "auto"}).rgb;
+  };
+  const std::vector<float> truth =
+      reduced(picture(SplatModel::antialiased, factor), glm::ivec2(64, 48) * factor, factor);
+  const double antialiased = test::psnr_db(picture(SplatModel::antialiased, 1), truth);
+  const double standard = test::psnr_db(picture(SplatModel::standard, 1), truth);
+  EXPECT_GE(antialiased, 30.0);
+  EXPECT_GE(antialiased, standard + 6.0);
+}
+
 TEST_P(SmallScenes, VanillaMatchesExact) {
   const auto exact = render(GetParam(), {RendererKind::cpu, pool_of(2), "auto"});
   const auto vanilla =

@@ -104,6 +104,8 @@ TEST_F(Formulas, ProjectionIsLinearisedAtTheCentre) {
       jacobian[axis] = (pixel_of(c, g.mean + step) - pixel_of(c, g.mean - step)) / (2 * h);
     }
     glm::dmat2 sigma = jacobian * covariance(g) * glm::transpose(jacobian);
+    EXPECT_NEAR(p.sharp_determinant, glm::determinant(sigma),
+                1e-6 * (sigma[0][0] + sigma[1][1]) * (sigma[0][0] + sigma[1][1]));
     sigma[0][0] += low_pass_px2;
     sigma[1][1] += low_pass_px2;
     const double tolerance = 1e-6 * (sigma[0][0] + sigma[1][1]);
@@ -112,6 +114,24 @@ TEST_F(Formulas, ProjectionIsLinearisedAtTheCentre) {
     EXPECT_NEAR(p.yy, sigma[1][1], tolerance);
     EXPECT_NEAR(p.determinant, glm::determinant(sigma), tolerance * (sigma[0][0] + sigma[1][1]));
   }
+}
+
+// The sum of alpha over the picture is 2 pi opacity sqrt(determinant).
+TEST_F(Formulas, AntialiasingKeepsTheSumOfAGaussian) {
+  const auto model = math::make_camera_model(camera());
+  for (int n = 0; n < 200; ++n) {
+    const RandomGaussian g = gaussian();
+    const auto p = math::project(model, vec3(g.mean), factor(g), g.mean.z);
+    const double opacity = uniform(0.01, 0.99);
+    const double drawn = std::exp2(math::antialiased_log2_opacity(std::log2(opacity), p));
+    EXPECT_NEAR(drawn * std::sqrt(p.determinant), opacity * std::sqrt(p.sharp_determinant),
+                1e-9 * std::sqrt(p.determinant));
+    EXPECT_LT(drawn, opacity);
+  }
+  // A Gaussian seen edge-on has no area, and is not infinitely faint.
+  const math::ProjectedGaussian<double> edge{{0, 0}, 9.0, 0.0, 0.3, 2.7, 0.0};
+  EXPECT_LT(math::reach_of(math::antialiased_log2_opacity(0.0, edge)), 0.0);
+  EXPECT_TRUE(std::isfinite(math::antialiased_log2_opacity(0.0, edge)));
 }
 
 TEST_F(Formulas, FootprintIsClampedOutsideTheFieldOfView) {
@@ -142,9 +162,10 @@ TEST_F(Formulas, WhiteningGivesTheExponentOfTheConic) {
 
 TEST_F(Formulas, NeedleKeepsItsWidthInSinglePrecision) {
   // A thousand pixels long, low-pass thin, at 45 degrees: the conic in float is noise here.
-  const math::ProjectedGaussian<double> p{{0, 0}, 5e5 + 0.3, 5e5, 5e5 + 0.3, 0.3 * (1e6 + 0.3)};
-  const math::ProjectedGaussian<float> f{
-      {0, 0}, float(p.xx), float(p.xy), float(p.yy), float(p.determinant)};
+  const math::ProjectedGaussian<double> p{{0, 0},    5e5 + 0.3,         5e5,
+                                          5e5 + 0.3, 0.3 * (1e6 + 0.3), 0.0};
+  const math::ProjectedGaussian<float> f{{0, 0},      float(p.xx),          float(p.xy),
+                                         float(p.yy), float(p.determinant), 0.0f};
   const auto wide = math::whitening(p);
   const auto narrow = math::whitening(f);
   for (const double along : {0.0, 100.0, 700.0})

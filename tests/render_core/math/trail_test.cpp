@@ -43,7 +43,8 @@ class RandomCases {
                static_cast<float>(l2 * axis.x * axis.x + s2 * axis.y * axis.y),
                static_cast<float>((l2 - s2) * axis.x * axis.y),
                static_cast<float>(l2 * axis.y * axis.y + s2 * axis.x * axis.x),
-               static_cast<float>(l2 * s2)};
+               static_cast<float>(l2 * s2),
+               0.0f};
     c.w = math::whitening(c.shape);
     c.reach = static_cast<float>(one_in(20) ? uniform(0.0, 1e-3) : uniform(0.0, 7.9943));
     c.displacement = displacement(axis);
@@ -133,8 +134,9 @@ double squared_distance(const Case& c, const glm::dvec2& low, const glm::dvec2& 
 template <class T>
 math::Trail<T> trail_of(const Case& c) {
   const math::Whitening<T> w{T(c.w.xx), T(c.w.xy), T(c.w.yy)};
-  const math::ProjectedGaussian<T> shape{
-      {T(0), T(0)}, T(c.shape.xx), T(c.shape.xy), T(c.shape.yy), T(c.shape.determinant)};
+  const math::ProjectedGaussian<T> shape{{T(0), T(0)},           T(c.shape.xx),
+                                         T(c.shape.xy),          T(c.shape.yy),
+                                         T(c.shape.determinant), T(c.shape.sharp_determinant)};
   const T reach = T(c.reach);
   return math::make_trail(
       math::make_ellipse(w, reach, math::half_extent(shape, reach).x, math::rightmost_y(w, reach)),

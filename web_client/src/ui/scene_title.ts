@@ -6,7 +6,8 @@ import { by_id, make } from './dom';
 export function show_scene_title(scene: SceneFacts, several: boolean): void {
   const name = scene.title || scene.sceneId;
   const count = `${new Intl.NumberFormat('en').format(scene.gaussians)} Gaussians`;
-  by_id('scene-name', HTMLElement).replaceChildren(name, make('small', {}, count));
+  const what = scene.model === '' ? count : `${count}, ${scene.model}`;
+  by_id('scene-name', HTMLElement).replaceChildren(name, make('small', {}, what));
   by_id('scene-credits', HTMLElement).textContent = credit_line(scene);
   const all = by_id('all-scenes', HTMLAnchorElement);
   all.href = scene_address(location.href);

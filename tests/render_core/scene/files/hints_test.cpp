@@ -46,6 +46,14 @@ TEST(Sidecar, FieldsAreRead) {
   EXPECT_FALSE(parse_sidecar("{}").up);
 }
 
+TEST(Sidecar, NamesTheModel) {
+  EXPECT_EQ(parse_sidecar(R"({"model": "2dgs"})").model, SplatModel::surfels);
+  EXPECT_EQ(parse_sidecar(R"({"model": "antialiased"})").model, SplatModel::antialiased);
+  EXPECT_EQ(parse_sidecar("{}").model, std::nullopt);
+  EXPECT_THAT(input_error([] { parse_sidecar(R"({"model": "3dgs"})"); }),
+              AllOf(HasSubstr("model"), HasSubstr("antialiased")));
+}
+
 TEST(Sidecar, SaysWhatVisitorsAreTold) {
   const SceneAbout about = parse_sidecar(R"({
     "title": "The hall", "credits": "Ada\u202e", "licence": "CC-BY-4.0", "mode": "walk",

@@ -40,6 +40,26 @@ TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.ply.part"));
 }
 
+TEST_F(LoadScene, TheModelIsThatOfTheOptionElseTheSidecarElseTheFile) {
+  GaussianCloud cloud = random_cloud(1000, 0);
+  cloud.model = SplatModel::antialiased;
+  for (const char* name : {"room.ply", "room.spz"}) {
+    SCOPED_TRACE(name);
+    std::filesystem::remove(folder_ / "room.json");
+    const auto path = folder_ / name;
+    save_scene(cloud, path);
+    EXPECT_EQ(load_scene(path).cloud.model, SplatModel::antialiased);
+    write("room.json", R"({"model": "2dgs"})");
+    const Scene discs = load_scene(path);
+    EXPECT_EQ(discs.cloud.model, SplatModel::surfels);
+    EXPECT_LT(discs.cloud.scale[0].z, 0.002f * discs.cloud.scale[0].x);
+    EXPECT_THAT(discs.notes, ::testing::Contains(HasSubstr("drawn as flat Gaussians")));
+    LoadOptions options;
+    options.model = SplatModel::standard;
+    EXPECT_EQ(load_scene(path, options).cloud.model, SplatModel::standard);
+  }
+}
+
 TEST_F(LoadScene, AFileThatIsCutOffWhileItIsReadIsRefused) {
   const auto cut_off_at_the_first_piece = [&](const std::filesystem::path& path) {
     LoadOptions options;

@@ -22,6 +22,17 @@ TEST(Sanitize, SoundCloudsPassUntouched) {
   EXPECT_EQ(cloud.sh, before.sh);
 }
 
+TEST(Sanitize, MakesSurfelsFlat) {
+  GaussianCloud cloud = random_cloud(100, 0);
+  const GaussianCloud before = cloud;
+  cloud.model = SplatModel::surfels;
+  EXPECT_EQ(sanitize(cloud, two_threads()).repaired, 0u);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    EXPECT_EQ(cloud.scale[i].x, before.scale[i].x);
+    EXPECT_NEAR(cloud.scale[i].z, 1e-3f * std::min(before.scale[i].x, before.scale[i].y), 1e-6f);
+  }
+}
+
 TEST(Sanitize, DropsWhatCannotBeDrawnAndKeepsTheOrder) {
   GaussianCloud cloud = random_cloud(10000, 1);
   const GaussianCloud before = cloud;

@@ -59,6 +59,21 @@ class ScenePartsTest : public FolderTest {
   const std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
 };
 
+TEST_F(ScenePartsTest, ATreeKeepsTheModel) {
+  GaussianCloud cloud = random_cloud(2000, 0);
+  for (const SplatModel model : {SplatModel::antialiased, SplatModel::surfels}) {
+    cloud.model = model;
+    const auto path = write("a.ply", ply_bytes(cloud)), out = folder_ / "a.tree";
+    build_tree(scene_in_parts(path, {}, pool_, 777)->parts, out, 1'000'000, *pool_,
+               LoadContext(*pool_));
+    EXPECT_EQ(load_scene(out).cloud.model, model);
+    EXPECT_EQ(open_in_pages(out).tree->model(), model);
+  }
+  LoadOptions options;
+  options.model = SplatModel::antialiased;
+  EXPECT_EQ(open_in_pages(folder_ / "a.tree", options).tree->model(), SplatModel::antialiased);
+}
+
 TEST_F(ScenePartsTest, HaveTheGaussiansOfTheLoadedScene) {
   GaussianCloud cloud = random_cloud(5000, 1);
   for (std::size_t i = 0; i < cloud.size(); i += 7) cloud.mean[i].x = NAN;

@@ -42,6 +42,32 @@ TEST_P(PlyDegrees, WrittenCloudsReadBackTheSame) {
 
 INSTANTIATE_TEST_SUITE_P(Ply, PlyDegrees, ::testing::Values(0, 1, 2, 3));
 
+TEST(Ply, CommentsTellTheModel) {
+  const std::string bytes = ply_bytes(random_cloud(10, 0));
+  const auto model_with = [&](const std::string& comment) {
+    std::string commented = bytes;
+    return parse(commented.insert(commented.find("element"), comment + "\n")).model;
+  };
+  EXPECT_EQ(parse(bytes).model, SplatModel::standard);
+  EXPECT_EQ(model_with("comment SplatRenderMode: mip"), SplatModel::antialiased);
+  EXPECT_EQ(model_with("comment SplatRenderMode: 2dgs"), SplatModel::surfels);
+  EXPECT_EQ(model_with("comment SplatRenderMode: default"), SplatModel::standard);
+  EXPECT_EQ(model_with("comment antialiased 1"), SplatModel::antialiased);
+  EXPECT_EQ(model_with("comment antialiased 0"), SplatModel::standard);
+  for (const char* other : {"comment SplatRenderMode: tomorrow", "comment antialiased yes",
+                            "comment antialiased", "comment SplatRenderMode: mip or not"})
+    EXPECT_EQ(model_with(other), SplatModel::standard) << other;
+}
+
+TEST(Ply, EachModelIsWrittenAndReadAgain) {
+  GaussianCloud cloud = random_cloud(10, 1);
+  for (const SplatModel model :
+       {SplatModel::standard, SplatModel::antialiased, SplatModel::surfels}) {
+    cloud.model = model;
+    EXPECT_EQ(parse(ply_bytes(cloud)).model, model);
+  }
+}
+
 /// A test-side encoder: any order, types and encoding.
 struct Column {
   std::string name;
@@ -105,6 +131,17 @@ std::string encode(const std::vector<Column>& columns, const std::string& encodi
       }
     }
   return out + (encoding == "ascii" ? "3 0 1 2\n" : std::string(13, '\0'));
+}
+
+TEST(Ply, SurfelsHaveTwoScales) {
+  const GaussianCloud cloud = random_cloud(100, 0);
+  std::vector<Column> columns = columns_of(cloud);
+  std::erase_if(columns, [](const Column& column) { return column.name == "scale_2"; });
+  const GaussianCloud read = parse(encode(columns, "binary_little_endian"));
+  EXPECT_EQ(read.model, SplatModel::surfels);
+  ASSERT_EQ(read.size(), cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    EXPECT_NEAR(read.scale[i].y, cloud.scale[i].y, 1e-5f * cloud.scale[i].y);
 }
 
 class PlyEncodings : public ::testing::TestWithParam<const char*> {};

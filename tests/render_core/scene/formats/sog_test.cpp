@@ -61,6 +61,20 @@ INSTANTIATE_TEST_SUITE_P(Sog, SogVersions,
                          ::testing::Values(Case{1, 0}, Case{1, 1}, Case{1, 2}, Case{1, 3},
                                            Case{2, 0}, Case{2, 1}, Case{2, 2}, Case{2, 3}));
 
+TEST(Sog, MetaDataTellsTheModel) {
+  const Files files = encode_sog(random_cloud(100, 0), 2);
+  const auto model_with = [&](const nlohmann::json& model) {
+    return parse(zip(with_meta(files, [&](nlohmann::json& meta) { meta["model"] = model; })))
+        .cloud.model;
+  };
+  EXPECT_EQ(parse(zip(files)).cloud.model, SplatModel::standard);
+  EXPECT_EQ(model_with("default"), SplatModel::standard);
+  EXPECT_EQ(model_with("antialiased"), SplatModel::antialiased);
+  EXPECT_EQ(model_with("2dgs"), SplatModel::surfels);
+  EXPECT_EQ(model_with("tomorrow"), SplatModel::standard);
+  EXPECT_THAT(input_error([&] { model_with(7); }), HasSubstr("model"));
+}
+
 class SogFolder : public FolderTest {};
 
 TEST_F(SogFolder, FilesAreFoundBesideTheMetaData) {

@@ -74,6 +74,16 @@ TEST_P(SpzDegrees, RoundTripErrorsAreThoseStated) {
 
 INSTANTIATE_TEST_SUITE_P(Spz, SpzDegrees, ::testing::Values(0, 1, 2, 3));
 
+TEST(Spz, AFlagTellsAntialiasedScenes) {
+  GaussianCloud cloud = storable_cloud(10, 0);
+  for (const SplatModel model : {SplatModel::standard, SplatModel::antialiased}) {
+    cloud.model = model;
+    std::ostringstream out;
+    write_spz(cloud, out);
+    EXPECT_EQ(parse(out.str()).cloud.model, model);
+  }
+}
+
 TEST(Spz, LargeScenesKeepTheirExtentWithFewerFractionalBits) {
   GaussianCloud cloud = random_cloud(1000, 0);
   cloud.mean[7] = glm::vec3(100000.0f, -1.0f, 5.0f);

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace catgs {
+
+/// What the Gaussians of a scene were trained to be. Drawing them as another model is visibly
+/// wrong.
+enum class SplatModel : std::uint8_t {
+  standard,     // the original 3DGS: the low-pass filter widens a Gaussian and keeps its peak
+  antialiased,  // Mip-Splatting: it keeps the Gaussian's sum, see antialiased_log2_opacity()
+  surfels,      // 2DGS: discs in the plane of the first two axes, drawn as flat Gaussians
+};
+
+/// Names in files, flags and reports, in the order of SplatModel.
+inline constexpr std::array<std::string_view, 3> splat_model_names = {"default", "antialiased",
+                                                                      "2dgs"};
+
+constexpr std::string_view name_of(SplatModel model) {
+  return splat_model_names[static_cast<std::size_t>(model)];
+}
+
+/// Nothing for other names. "mip" is what Brush writes for antialiased scenes.
+constexpr std::optional<SplatModel> splat_model_named(std::string_view name) {
+  if (name == "mip") return SplatModel::antialiased;
+  const auto* found = std::ranges::find(splat_model_names, name);
+  if (found == splat_model_names.end()) return std::nullopt;
+  return static_cast<SplatModel>(found - splat_model_names.begin());
+}
+
+}  // namespace catgs
