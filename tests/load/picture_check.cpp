@@ -13,6 +13,7 @@
 #include "render_core/renderer.h"
 #include "server/base/scene_id.h"
 #include "server/scenes/scene_catalog.h"
+#include "server/scenes/scene_ids.h"
 
 namespace catgs::load {
 namespace {
@@ -72,7 +73,11 @@ void check_pictures(const std::string& scene, RunReport& report) {
   config.scenes = {scene};
   RendererOptions core;
   core.pool = std::make_shared<ThreadPool>(0);
-  const auto entry = load_scenes(config, core).front();
+  check_scenes(config);
+  const SceneIds ids(config.scenes, {});
+  const auto entry = load_scene(
+      scene, {}, [&](const std::string& name) { return ids.id_of(scene, name); }, config, core,
+      core.pool->threads());
   const auto view = entry->renderer->make_view({Pipeline::exact, PixelFormat::rgb_f32});
   for (GroupReport& group : report.groups) {
     for (const auto& session : group.sessions) {
