@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -12,6 +11,7 @@
 
 #include "render_core/math/spherical_harmonics-inl.h"
 #include "render_core/scene/activations.h"
+#include "render_core/scene/directions.h"
 
 namespace catgs {
 namespace {
@@ -58,24 +58,6 @@ bool is_near(const glm::dmat3& a, const glm::dmat3& b, double tolerance) {
     for (int r = 0; r < 3; ++r)
       if (!(std::abs(a[c][r] - b[c][r]) <= tolerance)) return false;
   return true;
-}
-
-/// Calls take(direction, weight) for points of a sphere whose weighted sum is the integral of every
-/// polynomial up to degree 7: Gauss-Legendre along z, even steps around it.
-template <class Take>
-void for_directions(const Take& take) {
-  constexpr std::array<double, 4> heights = {-0.8611363115940526, -0.3399810435848563,
-                                             0.3399810435848563, 0.8611363115940526};
-  constexpr std::array<double, 4> weights = {0.3478548451374538, 0.6521451548625461,
-                                             0.6521451548625461, 0.3478548451374538};
-  constexpr int steps = 8;
-  constexpr double step = 2.0 * std::numbers::pi / steps;
-  for (std::size_t ring = 0; ring < heights.size(); ++ring)
-    for (int k = 0; k < steps; ++k) {
-      const double radius = std::sqrt(1.0 - heights[ring] * heights[ring]);
-      take(glm::dvec3(radius * std::cos(k * step), radius * std::sin(k * step), heights[ring]),
-           weights[ring] * step);
-    }
 }
 
 }  // namespace

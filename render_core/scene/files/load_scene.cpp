@@ -15,6 +15,8 @@
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
 #include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/gltf.h"
+#include "render_core/scene/formats/gltf_document.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/formats/ply.h"
@@ -42,7 +44,8 @@ Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
   return {"3DGS ply", read_ply(file, header, context)};
 }
 
-/// The first bytes of a file tell its format. Only .splat has no such mark and is told by its name.
+/// The first bytes of a file tell its format. Only .splat and .gltf have no such mark and are told
+/// by their names.
 Decoded read_file(const std::filesystem::path& path, const LoadContext& context) {
   const FileSource file(path);
   std::array<char, 4> magic{};
@@ -61,6 +64,10 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
   if (is_spz(file)) {
     SpzFile spz = read_spz(file, context);
     return {fmt::format("spz v{}", spz.version), std::move(spz.cloud)};
+  }
+  if (is_glb(file) || path.extension() == ".gltf") {
+    GltfFile gltf = read_gltf(file, FolderFiles(path.parent_path()), context);
+    return {"glTF", std::move(gltf.cloud), std::move(gltf.notes)};
   }
   if (path.extension() == ".splat") return {"splat", read_splat(file, context)};
   throw InputError(path.string(), "", "is no scene of a known format", supported_scenes);

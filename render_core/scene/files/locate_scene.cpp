@@ -17,7 +17,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view iteration_prefix = "iteration_";
-constexpr std::array scene_extensions = {".ply", ".splat", ".spz", ".sog", ".tree"};
 
 std::optional<std::uint64_t> iteration_number(const fs::path& folder) {
   const std::string name = folder.filename().string();
@@ -54,10 +53,7 @@ std::optional<fs::path> training_of(const fs::path& file) {
 fs::path single_scene_file(const fs::path& folder) {
   std::vector<std::string> found;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string extension = entry.path().extension().string();
-    if (std::find(scene_extensions.begin(), scene_extensions.end(), extension) !=
-            scene_extensions.end() &&
-        entry.is_regular_file())
+    if (is_scene_name(entry.path()) && entry.is_regular_file())
       found.push_back(entry.path().filename().string());
   }
   if (found.empty()) throw InputError(folder.string(), "", "holds no scene", supported_scenes);
@@ -95,6 +91,12 @@ SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
 }
 
 }  // namespace
+
+bool is_scene_name(const fs::path& path) {
+  constexpr std::array extensions = {".ply", ".splat", ".spz", ".sog", ".glb", ".gltf", ".tree"};
+  return std::find(extensions.begin(), extensions.end(), path.extension().string()) !=
+         extensions.end();
+}
 
 SceneLocation locate_scene(const fs::path& given) {
   std::error_code error;

@@ -3,9 +3,11 @@
 #include <cassert>
 #include <ostream>
 #include <string>
+#include <string_view>
 
 #include "render_core/base/error.h"
 #include "render_core/base/part_file.h"
+#include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/formats/splat.h"
 #include "render_core/scene/formats/spz.h"
@@ -14,18 +16,20 @@ namespace catgs {
 
 namespace {
 
+constexpr std::string_view remedy = "use .ply, .splat, .spz or .glb";
+
 using Writer = void (*)(const GaussianCloud&, std::ostream&);
 
 Writer writer_for(const std::filesystem::path& path) {
   if (path.string().ends_with(".compressed.ply"))
-    throw InputError(path.string(), "", "compressed PLY is only read, not written",
-                     "use .ply, .splat or .spz");
+    throw InputError(path.string(), "", "compressed PLY is only read, not written", remedy);
   const std::string extension = path.extension().string();
   if (extension == ".ply") return write_ply;
   if (extension == ".splat") return write_splat;
   if (extension == ".spz") return write_spz;
+  if (extension == ".glb") return write_glb;
   throw InputError(path.string(), "", "cannot be written: unknown extension '" + extension + "'",
-                   "use .ply, .splat or .spz");
+                   remedy);
 }
 
 }  // namespace

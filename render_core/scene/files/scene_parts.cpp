@@ -14,6 +14,7 @@
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
 #include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/gltf_document.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/formats/splat.h"
@@ -79,7 +80,8 @@ std::optional<Parts> file_in_parts(const std::filesystem::path& path, std::uint6
   file->read(0, std::as_writable_bytes(start));
   const std::string_view begins(start.data(), start.size());
   if (begins.starts_with("ply")) return ply_in_parts(file, part_rows, context);
-  if (path.extension() != ".splat" || begins == "PK\x03\x04" || is_tree(*file) || is_spz(*file))
+  if (path.extension() != ".splat" || begins == "PK\x03\x04" || is_tree(*file) || is_spz(*file) ||
+      is_glb(*file))
     return std::nullopt;
   return splat_in_parts(file, part_rows, context);
 }

@@ -103,9 +103,9 @@ void convert(const ConvertOptions& options, bool quiet) {
 void add_convert_command(CLI::App& app) {
   auto options = std::make_shared<ConvertOptions>();
   CLI::App* command =
-      app.add_subcommand("convert", "Converts a scene to .ply, .splat, .spz or .tree");
+      app.add_subcommand("convert", "Converts a scene to .ply, .splat, .spz, .glb or .tree");
   add_scene_options(*command, options->in, "in");
-  command->add_option("out", options->out, "File to write: .ply, .splat, .spz or .tree")
+  command->add_option("out", options->out, "File to write: .ply, .splat, .spz, .glb or .tree")
       ->required();
   command
       ->add_option(

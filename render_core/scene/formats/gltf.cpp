@@ -1,0 +1,322 @@
+#include "render_core/scene/formats/gltf.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/math/spherical_harmonics-inl.h"
+#include "render_core/scene/activations.h"
+#include "render_core/scene/directions.h"
+#include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/gltf_document.h"
+#include "render_core/scene/transform.h"
+
+namespace catgs {
+
+namespace {
+
+constexpr std::size_t max_parts = 4096;
+constexpr std::string_view extension_name = "KHR_gaussian_splatting";
+
+/// A primitive with Gaussians at a node.
+struct Part {
+  AffineMap map;  // to GaussianCloud's world
+  GltfAccessor mean, rotation, scale, opacity;
+  std::vector<GltfAccessor> sh;  // by coefficient
+  bool linear_colours = false;
+
+  [[nodiscard]] int sh_degree() const { return sh_degree_of_rest(sh.size() - 1); }
+};
+
+struct Contents {
+  std::vector<Part> parts;
+  GltfSize size;
+  std::vector<std::string> notes;
+
+  void note(std::string text) {
+    if (std::find(notes.begin(), notes.end(), text) == notes.end())
+      notes.push_back(std::move(text));
+  }
+};
+
+/// Kinds of numbers that an attribute may have: any of these bits.
+constexpr unsigned kind(GltfComponent component, bool normalized) {
+  return 1u << (2 * (static_cast<int>(component) - static_cast<int>(GltfComponent::byte)) +
+                (normalized ? 1 : 0));
+}
+constexpr unsigned floats = kind(GltfComponent::float32, false);
+constexpr unsigned signed_fractions =
+    kind(GltfComponent::byte, true) | kind(GltfComponent::short_int, true);
+constexpr unsigned fractions =
+    kind(GltfComponent::unsigned_byte, true) | kind(GltfComponent::unsigned_short, true);
+constexpr unsigned counts =
+    kind(GltfComponent::unsigned_byte, false) | kind(GltfComponent::unsigned_short, false);
+constexpr unsigned signed_counts =
+    kind(GltfComponent::byte, false) | kind(GltfComponent::short_int, false);
+
+std::string attribute_name(std::string_view name) {
+  return fmt::format("{}:{}", extension_name, name);
+}
+
+std::string sh_name(int degree, int k) {
+  return attribute_name(fmt::format("SH_DEGREE_{}_COEF_{}", degree, k));
+}
+
+GltfAccessor attribute(GltfDocument& document, const JsonField& attributes, std::string_view name,
+                       std::size_t columns, unsigned kinds) {
+  const JsonField index = attributes.at(name);
+  const GltfAccessor accessor = document.accessor(index);
+  if (accessor.columns != columns)
+    index.fail(fmt::format("is a table of {} columns, not {}", accessor.columns, columns));
+  if (!(kinds & kind(accessor.component, accessor.normalized)))
+    index.fail("has a component type that this attribute may not have");
+  return accessor;
+}
+
+/// "ellipse" and the like: what we draw, whatever the file says.
+void check_words(const JsonField& extension, Contents& contents) {
+  const auto expect = [&](std::string_view key, std::string_view known, const JsonField& word) {
+    if (word.text() != known)
+      contents.note(fmt::format("{} '{}' is not known; drawn as '{}'", key, word.text(), known));
+  };
+  expect("kernel", "ellipse", extension.at("kernel"));
+  if (const auto word = extension.find("projection")) expect("projection", "perspective", *word);
+}
+
+bool has_linear_colours(const JsonField& extension, Contents& contents) {
+  const JsonField space = extension.at("colorSpace");
+  if (space.text() == "srgb_rec709_display") return false;
+  if (space.text() == "lin_rec709_display") {
+    contents.note("its colours are linear light: they were encoded as sRGB, and are blended so");
+    return true;
+  }
+  contents.note(
+      fmt::format("colorSpace '{}' is not known; drawn as 'srgb_rec709_display'", space.text()));
+  return false;
+}
+
+Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonField& extension,
+                Contents& contents) {
+  if (const auto mode = primitive.find("mode"); !mode || mode->count() != 0)
+    primitive.fail("has Gaussians, but its 'mode' is not 0 (points)");
+  check_words(extension, contents);
+  Part part;
+  part.linear_colours = has_linear_colours(extension, contents);
+  const JsonField attributes = primitive.at("attributes");
+  const auto read = [&](std::string_view name, std::size_t columns, unsigned kinds) {
+    const GltfAccessor accessor = attribute(document, attributes, name, columns, kinds);
+    if (part.mean.buffer && accessor.count != part.mean.count)
+      attributes.at(name).fail(
+          fmt::format("has {} rows, and POSITION {}", accessor.count, part.mean.count));
+    return accessor;
+  };
+  // Positions may have all types of KHR_mesh_quantization.
+  part.mean = read("POSITION", 3, floats | signed_fractions | fractions | counts | signed_counts);
+  part.rotation = read(attribute_name("ROTATION"), 4, floats | signed_fractions);
+  part.scale = read(attribute_name("SCALE"), 3, floats | counts | fractions);
+  part.opacity = read(attribute_name("OPACITY"), 1, floats | fractions);
+  part.sh.push_back(read(sh_name(0, 0), 3, floats));
+  for (int degree = 1; degree <= max_sh_degree; ++degree) {
+    if (!attributes.find(sh_name(degree, 0))) continue;
+    if (part.sh.size() != static_cast<std::size_t>(degree * degree))
+      attributes.fail(fmt::format("has harmonics of degree {} and not of all below", degree));
+    for (int k = 0; k <= 2 * degree; ++k) part.sh.push_back(read(sh_name(degree, k), 3, floats));
+  }
+  return part;
+}
+
+template <std::size_t Size>
+std::array<double, Size> doubles(const JsonField& field) {
+  if (field.size() != Size) field.fail(fmt::format("is not an array of {} numbers", Size));
+  std::array<double, Size> numbers;
+  for (std::size_t i = 0; i < Size; ++i) {
+    static_cast<void>(field[i].number());  // checks it
+    numbers[i] = field[i].value().get<double>();
+  }
+  return numbers;
+}
+
+/// From the node's space to that of the node above.
+AffineMap map_of(const JsonField& node) {
+  AffineMap map;
+  if (const auto field = node.find("matrix")) {
+    const auto m = doubles<16>(*field);  // by columns
+    if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] != 1.0)
+      field->fail("has a last row other than 0, 0, 0, 1");
+    map.linear = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
+    map.offset = {m[12], m[13], m[14]};
+    return map;
+  }
+  if (const auto field = node.find("translation")) {
+    const auto v = doubles<3>(*field);
+    map.offset = {v[0], v[1], v[2]};
+  }
+  if (const auto field = node.find("rotation")) {
+    map.linear = glm::mat3_cast(glm::normalize(glm::dquat(field->orientation())));
+  }
+  if (const auto field = node.find("scale")) {
+    const auto s = doubles<3>(*field);
+    for (int k = 0; k < 3; ++k) map.linear[k] *= s[static_cast<std::size_t>(k)];
+  }
+  return map;
+}
+
+/// The Gaussians of a node's mesh.
+void add_mesh(GltfDocument& document, const JsonField& node, const AffineMap& map,
+              Contents& contents) {
+  const auto index = node.find("mesh");
+  if (!index) return;
+  const JsonField primitives = document.at("meshes", *index).at("primitives");
+  for (std::size_t i = 0; i < primitives.size(); ++i) {
+    const JsonField primitive = primitives[i];
+    const auto extensions = primitive.find("extensions");
+    const auto extension = extensions ? extensions->find(extension_name) : std::nullopt;
+    if (!extension) {
+      contents.note("it has meshes beside its Gaussians, which are not shown");
+      continue;
+    }
+    if (contents.parts.size() == max_parts)
+      primitive.fail(fmt::format("is one of more than {} at nodes", max_parts));
+    if (!map.usable()) node.fail("has a transform without an inverse");
+    Part part = parse_part(document, primitive, *extension, contents);
+    part.map = map;
+    contents.size.count += part.mean.count;
+    contents.size.sh_degree = std::max(contents.size.sh_degree, part.sh_degree());
+    contents.parts.push_back(std::move(part));
+  }
+}
+
+void check_extensions(const JsonField& root) {
+  constexpr std::array<std::string_view, 2> known = {extension_name, "KHR_mesh_quantization"};
+  const auto required = root.find("extensionsRequired");
+  if (!required) return;
+  for (std::size_t i = 0; i < required->size(); ++i)
+    if (std::find(known.begin(), known.end(), (*required)[i].text()) == known.end())
+      (*required)[i].fail(fmt::format("'{}' is not supported", (*required)[i].text()),
+                          "export it without compression");
+}
+
+Contents contents_of(const ByteSource& file, GltfDocument& document) {
+  const JsonField root = document.root();
+  check_extensions(root);
+  struct Visit {
+    JsonField index;
+    AffineMap map;  // of the node above
+  };
+  std::vector<Visit> open;  // the next one last
+  const auto add = [&](const JsonField& indices, const AffineMap& map) {
+    for (std::size_t i = indices.size(); i > 0; --i) open.push_back({indices[i - 1], map});
+  };
+  AffineMap world;
+  world.linear = {-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0};
+  const JsonField scenes = root.at("scenes");
+  if (scenes.size() == 0) scenes.fail("is empty");
+  const auto scene = root.find("scene");
+  const auto roots = (scene ? document.at("scenes", *scene) : scenes[0]).find("nodes");
+  if (roots) add(*roots, world);
+
+  Contents contents;
+  std::vector<bool> seen(root.at("nodes").size());
+  while (!open.empty()) {
+    const Visit visit = open.back();
+    open.pop_back();
+    const JsonField node = document.at("nodes", visit.index);
+    if (seen[visit.index.count()]) node.fail("is held by two nodes, or by itself");
+    seen[visit.index.count()] = true;
+    const AffineMap map = visit.map * map_of(node);
+    add_mesh(document, node, map, contents);
+    if (const auto children = node.find("children")) add(*children, map);
+  }
+  if (contents.parts.empty())
+    throw InputError(file.name(), "", "holds no Gaussians",
+                     fmt::format("they are points with the extension {}", extension_name));
+  const auto coefficients = static_cast<std::size_t>(sh_coefficient_count(contents.size.sh_degree));
+  require_plausible_count(file, "scene", contents.size.count,
+                          sizeof(float) * (3 + 4 + 3 + 1 + 3 * coefficients), document.bytes());
+  return contents;
+}
+
+/// IEC 61966-2-1.
+double srgb_encoded(double linear) {
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
+}
+
+/// Replaces the coefficients of linear colours by those of the encoded ones.
+void encode_colours(glm::vec3* sh, int degree) {
+  const int coefficients = sh_coefficient_count(degree);
+  std::array<glm::dvec3, 16> sums{};
+  for_directions([&](const glm::dvec3& direction, double weight) {
+    double basis[16];
+    math::sh_basis<double>({direction.x, direction.y, direction.z}, degree, basis);
+    glm::dvec3 colour(0.5);
+    for (int k = 0; k < coefficients; ++k) colour += basis[k] * glm::dvec3(sh[k]);
+    for (int c = 0; c < 3; ++c) colour[c] = srgb_encoded(std::max(colour[c], 0.0)) - 0.5;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(coefficients); ++k)
+      sums[k] += weight * basis[k] * colour;
+  });
+  for (int k = 0; k < coefficients; ++k) sh[k] = glm::vec3(sums[static_cast<std::size_t>(k)]);
+}
+
+/// Stores a part from Gaussian `first` of the cloud on.
+void read_part(const Part& part, std::size_t first, GaussianCloud& cloud,
+               const LoadContext& context) {
+  const CloudTransform transform(part.map);
+  const std::size_t stride = static_cast<std::size_t>(cloud.sh_count());
+  context.for_blocks(part.mean.count, 4096, [&](std::size_t begin, std::size_t end) {
+    const std::vector<float> mean = part.mean.read(begin, end),
+                             rotation = part.rotation.read(begin, end),
+                             scale = part.scale.read(begin, end),
+                             opacity = part.opacity.read(begin, end);
+    const auto vec3_at = [](const std::vector<float>& rows, std::size_t i) {
+      return glm::vec3(rows[3 * i], rows[3 * i + 1], rows[3 * i + 2]);
+    };
+    for (std::size_t k = 0; k < part.sh.size(); ++k) {
+      const std::vector<float> sh = part.sh[k].read(begin, end);
+      for (std::size_t i = 0; i < end - begin; ++i)
+        cloud.sh[(first + begin + i) * stride + k] = vec3_at(sh, i);
+    }
+    for (std::size_t i = 0; i < end - begin; ++i) {
+      const std::size_t to = first + begin + i;
+      const float* q = &rotation[4 * i];
+      cloud.mean[to] = vec3_at(mean, i);
+      cloud.rotation[to] = unit(glm::quat(q[3], q[0], q[1], q[2]));
+      cloud.scale[to] = vec3_at(scale, i);
+      cloud.opacity[to] = opacity[i] == 1.0f ? max_opacity : opacity[i];
+      if (part.linear_colours) encode_colours(&cloud.sh[to * stride], part.sh_degree());
+      transform.apply(cloud, to);
+    }
+  });
+}
+
+}  // namespace
+
+GltfSize read_gltf_size(const ByteSource& file, const FileSet& beside) {
+  GltfDocument document(file, beside);
+  return contents_of(file, document).size;
+}
+
+GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadContext& context) {
+  GltfDocument document(file, beside);
+  const Contents contents = contents_of(file, document);
+  GltfFile result{{}, contents.notes};
+  result.cloud.resize(contents.size.count, contents.size.sh_degree);
+  const auto total = static_cast<double>(contents.size.count);
+  std::size_t first = 0;
+  for (const Part& part : contents.parts) {
+    const std::size_t end = first + part.mean.count;
+    read_part(part, first, result.cloud,
+              context.part(static_cast<double>(first) / total, static_cast<double>(end) / total));
+    first = end;
+  }
+  return result;
+}
+
+}  // namespace catgs

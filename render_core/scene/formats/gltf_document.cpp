@@ -1,0 +1,274 @@
+#include "render_core/scene/formats/gltf_document.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/format_limits.h"
+
+namespace catgs {
+
+namespace {
+
+constexpr std::uint64_t max_json_bytes = 16 << 20;
+constexpr std::size_t max_buffers = 256;         // a file of each stays open
+constexpr std::uint64_t max_stride = 252;        // by the specification
+constexpr std::uint32_t glb_magic = 0x46546c67;  // "glTF"
+constexpr std::uint32_t json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
+constexpr std::size_t glb_header_bytes = 12, chunk_header_bytes = 8;
+
+struct ChunkHeader {
+  std::uint32_t size, kind;
+};
+
+ChunkHeader read_chunk_header(const ByteSource& file, std::uint64_t at) {
+  std::array<std::uint32_t, 2> words;
+  file.read(at, std::as_writable_bytes(std::span(words)));
+  if (words[0] > file.size() - at - chunk_header_bytes)
+    throw InputError(file.name(), fmt::format("byte {}", at),
+                     fmt::format("a chunk of {} bytes is cut off", words[0]));
+  return {words[0], words[1]};
+}
+
+std::size_t component_bytes(GltfComponent component) {
+  switch (component) {
+    case GltfComponent::byte:
+    case GltfComponent::unsigned_byte:
+      return 1;
+    case GltfComponent::short_int:
+    case GltfComponent::unsigned_short:
+      return 2;
+    case GltfComponent::float32:
+      return 4;
+  }
+  return 0;
+}
+
+GltfComponent component_of(const JsonField& field) {
+  for (const GltfComponent known :
+       {GltfComponent::byte, GltfComponent::unsigned_byte, GltfComponent::short_int,
+        GltfComponent::unsigned_short, GltfComponent::float32})
+    if (field.count() == static_cast<std::uint64_t>(known)) return known;
+  field.fail("is no component type of an attribute");
+}
+
+std::size_t columns_of(const JsonField& field) {
+  constexpr std::array<std::string_view, 4> names = {"SCALAR", "VEC2", "VEC3", "VEC4"};
+  const auto found = std::find(names.begin(), names.end(), field.text());
+  if (found == names.end()) field.fail("is no SCALAR, VEC2, VEC3 or VEC4");
+  return static_cast<std::size_t>(found - names.begin()) + 1;
+}
+
+std::uint64_t count_or(const JsonField& object, std::string_view key, std::uint64_t otherwise) {
+  const auto field = object.find(key);
+  return field ? field->count() : otherwise;
+}
+
+/// Throws unless bytes [offset, offset + size) are among `held`.
+void require_inside(const JsonField& field, std::uint64_t offset, std::uint64_t size,
+                    std::uint64_t held) {
+  if (offset > held || size > held - offset)
+    field.fail(fmt::format("takes {} bytes from byte {} on, of {}", size, offset, held),
+               "the file is cut off or its JSON is wrong");
+}
+
+/// The number for each character of RFC 4648's alphabet; 64 for others.
+constexpr std::array<std::uint8_t, 256> base64_values() {
+  constexpr std::string_view alphabet =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::array<std::uint8_t, 256> values{};
+  values.fill(64);
+  for (std::size_t i = 0; i < alphabet.size(); ++i)
+    values[static_cast<unsigned char>(alphabet[i])] = static_cast<std::uint8_t>(i);
+  return values;
+}
+
+std::vector<std::byte> decode_base64(const JsonField& uri, std::string_view text) {
+  static constexpr auto values = base64_values();
+  while (text.ends_with('=')) text.remove_suffix(1);
+  std::vector<std::byte> bytes;
+  bytes.reserve(text.size() / 4 * 3 + 3);
+  std::uint32_t bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    const std::uint32_t value = values[static_cast<unsigned char>(c)];
+    if (value == 64) uri.fail("is no base64 data");
+    bits = bits << 6 | value;
+    held += 6;
+    if (held < 8) continue;
+    held -= 8;
+    bytes.push_back(static_cast<std::byte>(bits >> held));
+  }
+  return bytes;
+}
+
+/// A file's name, without the escapes of a URI ("%20").
+std::string unescaped(std::string_view uri) {
+  std::string name;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    unsigned char value = 0;
+    const char* digits = uri.data() + i + 1;
+    if (uri[i] == '%' && i + 2 < uri.size() &&
+        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
+      name.push_back(static_cast<char>(value));
+      i += 2;
+    } else {
+      name.push_back(uri[i]);
+    }
+  }
+  return name;
+}
+
+template <class T>
+void convert(const std::byte* from, const GltfAccessor& rows, std::vector<float>& to) {
+  float largest = 1.0f;
+  if constexpr (std::is_integral_v<T>)
+    if (rows.normalized) largest = static_cast<float>(std::numeric_limits<T>::max());
+  for (std::size_t i = 0; i < to.size(); from += rows.stride)
+    for (std::size_t c = 0; c < rows.columns; ++c, ++i) {
+      to[i] = static_cast<float>(load_as<T>(from + c * sizeof(T))) / largest;
+      if (largest > 1.0f) to[i] = std::max(to[i], -1.0f);  // -128 stands for -1, as -127 does
+    }
+}
+
+}  // namespace
+
+std::vector<float> GltfAccessor::read(std::size_t begin, std::size_t end) const {
+  std::vector<float> numbers((end - begin) * columns);
+  if (numbers.empty()) return numbers;
+  std::vector<std::byte> bytes((end - begin - 1) * stride + columns * component_bytes(component));
+  buffer->read(offset + begin * stride, bytes);
+  switch (component) {
+    case GltfComponent::byte:
+      convert<std::int8_t>(bytes.data(), *this, numbers);
+      break;
+    case GltfComponent::unsigned_byte:
+      convert<std::uint8_t>(bytes.data(), *this, numbers);
+      break;
+    case GltfComponent::short_int:
+      convert<std::int16_t>(bytes.data(), *this, numbers);
+      break;
+    case GltfComponent::unsigned_short:
+      convert<std::uint16_t>(bytes.data(), *this, numbers);
+      break;
+    case GltfComponent::float32:
+      convert<float>(bytes.data(), *this, numbers);
+      break;
+  }
+  return numbers;
+}
+
+bool is_glb(const ByteSource& file) {
+  std::uint32_t magic = 0;
+  if (file.size() >= sizeof magic) file.read(0, std::as_writable_bytes(std::span(&magic, 1)));
+  return magic == glb_magic;
+}
+
+GltfDocument::GltfDocument(const ByteSource& file, const FileSet& beside)
+    : name_(file.name()), beside_(beside) {
+  json_ = is_glb(file) ? read_glb(file) : read_json(file, max_json_bytes);
+  const JsonField version = root().at("asset").at("version");
+  if (!version.text().starts_with("2.")) version.fail("is not supported", "glTF 2.0 is");
+}
+
+nlohmann::json GltfDocument::read_glb(const ByteSource& file) {
+  std::array<std::uint32_t, 3> header;  // magic, version, size
+  file.read(0, std::as_writable_bytes(std::span(header)));
+  if (header[1] != 2)
+    throw InputError(file.name(), "byte 4", fmt::format("version {} of .glb", header[1]),
+                     "version 2 is supported");
+  const ChunkHeader first = read_chunk_header(file, glb_header_bytes);
+  if (first.kind != json_chunk)
+    throw InputError(file.name(), fmt::format("byte {}", glb_header_bytes),
+                     "the first chunk of a .glb holds its JSON");
+  if (first.size > max_json_bytes)
+    throw InputError(file.name(), "JSON",
+                     fmt::format("{} bytes, at most {} are supported", first.size, max_json_bytes));
+  std::vector<std::byte> text(first.size);
+  file.read(glb_header_bytes + chunk_header_bytes, text);
+  const std::uint64_t next = glb_header_bytes + chunk_header_bytes + first.size;
+  if (next + chunk_header_bytes <= file.size()) {
+    const ChunkHeader second = read_chunk_header(file, next);
+    if (second.kind == binary_chunk) chunk_ = {&file, next + chunk_header_bytes, second.size};
+  }
+  return read_json(MemorySource(file.name(), text), max_json_bytes);
+}
+
+JsonField GltfDocument::at(std::string_view list, const JsonField& index) const {
+  const JsonField entries = root().at(list);
+  if (index.count() >= entries.size())
+    index.fail(fmt::format("is {}, and there are {} {}", index.count(), entries.size(), list));
+  return entries[index.count()];
+}
+
+const ByteSource& GltfDocument::open(const JsonField& uri) {
+  const std::string text = uri.text();
+  std::unique_ptr<ByteSource>& file = files_[text];
+  if (file) return *file;
+  if (files_.size() > max_buffers) uri.fail(fmt::format("is of more than {} buffers", max_buffers));
+  if (!text.starts_with("data:")) {
+    file = beside_.open(unescaped(text));
+    return *file;
+  }
+  constexpr std::string_view marker = ";base64,";
+  const std::size_t found = text.find(marker);
+  if (found == std::string::npos) uri.fail("is a data: URI without base64");
+  data_.push_back(decode_base64(uri, std::string_view(text).substr(found + marker.size())));
+  file = std::make_unique<MemorySource>(name_ + ": data", data_.back());
+  return *file;
+}
+
+GltfDocument::Buffer GltfDocument::buffer(const JsonField& index) {
+  const JsonField field = at("buffers", index);
+  if (const auto uri = field.find("uri")) {
+    const ByteSource& file = open(*uri);
+    return {&file, 0, file.size()};
+  }
+  if (!chunk_.file || index.count() != 0)
+    field.fail("has no uri", "only the first buffer of a .glb lies in its own file");
+  return chunk_;
+}
+
+GltfAccessor GltfDocument::accessor(const JsonField& index) {
+  const JsonField field = at("accessors", index);
+  if (field.find("sparse")) field.at("sparse").fail("is not supported", "store all values");
+  GltfAccessor accessor;
+  accessor.count = field.at("count").count();
+  accessor.columns = columns_of(field.at("type"));
+  accessor.component = component_of(field.at("componentType"));
+  if (const auto flag = field.find("normalized")) {
+    if (!flag->value().is_boolean()) flag->fail("is neither true nor false");
+    accessor.normalized = flag->value().get<bool>();
+  }
+  if (accessor.count == 0 || accessor.count > max_gaussians)
+    field.at("count").fail(fmt::format("is not in 1…{}", max_gaussians));
+
+  const JsonField view = at("bufferViews", field.at("bufferView"));
+  const Buffer buffer = this->buffer(view.at("buffer"));
+  const std::uint64_t begin = count_or(view, "byteOffset", 0), size = view.at("byteLength").count();
+  require_inside(view, begin, size, buffer.size);
+  const std::uint64_t row_bytes = accessor.columns * component_bytes(accessor.component);
+  const std::uint64_t stride = count_or(view, "byteStride", row_bytes);
+  if (stride < row_bytes || stride > max_stride)
+    view.at("byteStride").fail(fmt::format("is not in {}…{}", row_bytes, max_stride));
+  const std::uint64_t first = count_or(field, "byteOffset", 0);
+  require_inside(field, first, (accessor.count - 1) * stride + row_bytes, size);
+  accessor.buffer = buffer.file;
+  accessor.offset = buffer.offset + begin + first;
+  accessor.stride = stride;
+  return accessor;
+}
+
+std::uint64_t GltfDocument::bytes() const {
+  std::uint64_t sum = chunk_.size;
+  for (const auto& [uri, file] : files_) sum += file->size();
+  return sum;
+}
+
+}  // namespace catgs
