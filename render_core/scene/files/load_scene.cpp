@@ -18,6 +18,7 @@
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/gltf_document.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/ksplat.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/formats/sog.h"
@@ -44,8 +45,8 @@ Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
   return {"3DGS ply", read_ply(file, header, context)};
 }
 
-/// The first bytes of a file tell its format. Only .splat and .gltf have no such mark and are told
-/// by their names.
+/// The first bytes of a file tell its format. Only .gltf, .ksplat and .splat have no such mark
+/// and are told by their names.
 Decoded read_file(const std::filesystem::path& path, const LoadContext& context) {
   const FileSource file(path);
   std::array<char, 4> magic{};
@@ -69,6 +70,7 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
     GltfFile gltf = read_gltf(file, FolderFiles(path.parent_path()), context);
     return {"glTF", std::move(gltf.cloud), std::move(gltf.notes)};
   }
+  if (path.extension() == ".ksplat") return {"ksplat", read_ksplat(file, context)};
   if (path.extension() == ".splat") return {"splat", read_splat(file, context)};
   throw InputError(path.string(), "", "is no scene of a known format", supported_scenes);
 }

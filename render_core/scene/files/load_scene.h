@@ -21,12 +21,12 @@ struct LoadOptions {
   int threads = 0;                                // 0: one per processor
 };
 
-/// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .spz,
-/// .sog, .glb, .gltf or .tree. It may be a streamed or unpacked SOG folder (or its lod-meta.json,
-/// meta.json), a training output folder (its newest iteration), or a folder with a single scene
-/// file. The content of a file decides its format before its name does. Throws InputError; the
-/// error for an unknown format lists the supported ones. Memory peaks at the cloud and a few bytes
-/// per Gaussian.
+/// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .ksplat,
+/// .spz, .sog, .glb, .gltf or .tree. It may be a streamed or unpacked SOG folder (or its
+/// lod-meta.json, meta.json), a training output folder (its newest iteration), or a folder with a
+/// single scene file. The content of a file decides its format before its name does. Throws
+/// InputError; the error for an unknown format lists the supported ones. Memory peaks at the cloud
+/// and a few bytes per Gaussian.
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// A scene in pages, of which renderers read what they need.

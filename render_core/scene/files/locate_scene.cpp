@@ -93,7 +93,8 @@ SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
 }  // namespace
 
 bool is_scene_name(const fs::path& path) {
-  constexpr std::array extensions = {".ply", ".splat", ".spz", ".sog", ".glb", ".gltf", ".tree"};
+  constexpr std::array extensions = {".ply", ".splat", ".ksplat", ".spz",
+                                     ".sog", ".glb",   ".gltf",   ".tree"};
   return std::find(extensions.begin(), extensions.end(), path.extension().string()) !=
          extensions.end();
 }

@@ -10,8 +10,8 @@ namespace catgs {
 
 /// For error messages.
 inline constexpr std::string_view supported_scenes =
-    "supported: .ply (3DGS or compressed), .splat, .spz, .sog, .glb, .gltf, .tree, a folder with "
-    "lod-meta.json (streamed SOG) or meta.json (SOG), a training output folder";
+    "supported: .ply (3DGS or compressed), .splat, .ksplat, .spz, .sog, .glb, .gltf, .tree, "
+    "a folder with lod-meta.json (streamed SOG) or meta.json (SOG), a training output folder";
 
 /// Whether a file has an extension of those formats.
 bool is_scene_name(const std::filesystem::path& path);

@@ -12,6 +12,7 @@
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/gltf_document.h"
+#include "render_core/scene/formats/ksplat.h"
 #include "render_core/scene/formats/ply_header.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/spz.h"
@@ -62,6 +63,10 @@ SceneSize size_of_file(const std::filesystem::path& path) {
   }
   if (is_glb(file) || path.extension() == ".gltf") {
     const GltfSize size = read_gltf_size(file, FolderFiles(path.parent_path()));
+    return {size.count, size.sh_degree};
+  }
+  if (path.extension() == ".ksplat") {
+    const KsplatSize size = read_ksplat_size(file);
     return {size.count, size.sh_degree};
   }
   if (path.extension() == ".splat") return {file.size() / splat_bytes, 0};

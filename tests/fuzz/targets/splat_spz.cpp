@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 
 #include "render_core/scene/formats/decompress.h"
+#include "render_core/scene/formats/ksplat.h"
 #include "render_core/scene/formats/splat.h"
 #include "render_core/scene/formats/spz.h"
 #include "tests/fuzz/target.h"
 #include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/formats/ksplat_encoder.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {
@@ -23,6 +25,48 @@ std::map<std::string, std::string> splat_seeds() {
   std::ostringstream hard;
   write_splat(cloud_hard_to_sort(), hard);
   return {{"five", out.str()}, {"hard_to_sort", hard.str()}};
+}
+
+constexpr std::size_t ksplat_header_bytes = 4096, ksplat_section_bytes = 1024;
+constexpr std::size_t ksplat_used_bytes = 44;  // of each of these headers; the rest is 0
+
+/// The headers come without the zeros that fill them.
+void parse_ksplat(Bytes input) {
+  const auto take = [&](std::size_t filled) {
+    const std::size_t used = std::min(ksplat_used_bytes, input.size());
+    std::string header = text_of(input.first(used));
+    header.resize(filled, '\0');
+    input = input.subspan(used);
+    return header;
+  };
+  std::string bytes = take(ksplat_header_bytes);
+  std::uint32_t sections = 0;
+  std::memcpy(&sections, bytes.data() + 4, sizeof sections);
+  for (std::uint32_t i = 0; i < std::min(sections, 8u); ++i) bytes += take(ksplat_section_bytes);
+  bytes += text_of(input);
+  const MemorySource file("input", bytes_of(bytes));
+  const KsplatSize size = read_ksplat_size(file);
+  const GaussianCloud cloud = read_ksplat(file, one_thread());
+  require(cloud.size() == size.count && cloud.sh_degree == size.sh_degree,
+          "as many are read as were announced");
+  require_sound(cloud);
+}
+
+std::map<std::string, std::string> ksplat_seeds() {
+  std::map<std::string, std::string> seeds;
+  for (const int level : {0, 1, 2})
+    for (const int degree : {0, 1, 2}) {
+      const test::KsplatStyle style{
+          .level = level, .sections = degree == 1 ? 2u : 1u, .bucket_rows = 3};
+      const std::string whole = test::encode_ksplat(test::random_cloud(8, degree), style);
+      const std::size_t sections = 2 * style.sections - 1;
+      std::string seed = whole.substr(0, ksplat_used_bytes);
+      for (std::size_t i = 0; i < sections; ++i)
+        seed += whole.substr(ksplat_header_bytes + i * ksplat_section_bytes, ksplat_used_bytes);
+      seed += whole.substr(ksplat_header_bytes + sections * ksplat_section_bytes);
+      seeds[fmt::format("level_{}_{}", level, degree)] = seed;
+    }
+  return seeds;
 }
 
 void parse_file(Bytes input) {
@@ -79,6 +123,11 @@ std::vector<Target> splat_spz_targets() {
        .parse = parse_splat,
        .seeds = splat_seeds,
        .dictionary = {"\xff\xff\xff\x7f", std::string("\0\0\x80\x7f", 4)},
+       .max_bytes = 2048},
+      {.name = "ksplat",
+       .parse = parse_ksplat,
+       .seeds = ksplat_seeds,
+       .dictionary = {"\xff\xff\xff\xff", std::string("\0\0\x80\x7f", 4)},
        .max_bytes = 2048},
       {.name = "spz",
        .parse = parse_spz,
