@@ -15,6 +15,7 @@
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
 #include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/gltf_document.h"
 #include "render_core/scene/formats/json_field.h"
@@ -38,11 +39,19 @@ struct Decoded {
   std::vector<std::string> notes{};
 };
 
+std::vector<std::string> notes_of_degree(int sh_degree) {
+  if (sh_degree <= max_sh_degree) return {};
+  return {fmt::format("its harmonics of degree {} are not shown, only those up to {}", sh_degree,
+                      max_sh_degree)};
+}
+
 Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
   const PlyHeader header = read_ply_header(file);
   if (is_compressed_ply(header))
     return {"compressed ply", read_compressed_ply(file, header, context)};
-  return {"3DGS ply", read_ply(file, header, context)};
+  GaussianCloud cloud = read_ply(file, header, context);
+  const std::size_t rest = header.find("vertex")->rest_count();
+  return {"3DGS ply", std::move(cloud), notes_of_degree(sh_degree_of_rest(rest / 3))};
 }
 
 /// The first bytes of a file tell its format. Only .gltf, .ksplat and .splat have no such mark
@@ -64,7 +73,8 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
   }
   if (is_spz(file)) {
     SpzFile spz = read_spz(file, context);
-    return {fmt::format("spz v{}", spz.version), std::move(spz.cloud)};
+    return {fmt::format("spz v{}", spz.version), std::move(spz.cloud),
+            notes_of_degree(spz.sh_degree)};
   }
   if (is_glb(file) || path.extension() == ".gltf") {
     GltfFile gltf = read_gltf(file, FolderFiles(path.parent_path()), context);

@@ -32,10 +32,7 @@ SceneSize size_of_ply(const ByteSource& file) {
     require_rows_in_file(file, *vertex);
   const PlyElement* sh = is_compressed_ply(header) ? header.find("sh") : vertex;
   if (!sh) return {vertex->count, 0};
-  const auto rest = std::ranges::count_if(sh->properties, [](const PlyProperty& property) {
-    return property.name.starts_with("f_rest_");
-  });
-  return {vertex->count, std::max(0, sh_degree_of_rest(static_cast<std::size_t>(rest) / 3))};
+  return {vertex->count, std::max(0, sh_degree_of_rest(sh->rest_count() / 3))};
 }
 
 SceneSize size_of_sog(const FileSet& files) {

@@ -55,9 +55,7 @@ std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
 }
 
 Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
-  const auto is_rest = [](const PlyProperty& p) { return p.name.starts_with("f_rest_"); };
-  const auto rest = static_cast<std::size_t>(
-      std::count_if(vertex.properties.begin(), vertex.properties.end(), is_rest));
+  const std::size_t rest = vertex.rest_count();
   const int file_degree = rest % 3 == 0 ? sh_degree_of_rest(rest / 3) : -1;
   if (file_degree < 0)
     throw InputError(file.name(), "property f_rest_*",

@@ -192,6 +192,11 @@ const PlyProperty* PlyElement::find(std::string_view property) const {
   return found == properties.end() ? nullptr : &*found;
 }
 
+std::size_t PlyElement::rest_count() const {
+  const auto is_rest = [](const PlyProperty& p) { return p.name.starts_with("f_rest_"); };
+  return static_cast<std::size_t>(std::count_if(properties.begin(), properties.end(), is_rest));
+}
+
 const PlyElement* PlyHeader::find(std::string_view element) const {
   const auto found = std::find_if(elements.begin(), elements.end(),
                                   [&](const PlyElement& e) { return e.name == element; });

@@ -34,6 +34,8 @@ struct PlyElement {
   bool has_list = false;
 
   [[nodiscard]] const PlyProperty* find(std::string_view property) const;
+  /// Harmonics above degree 0, all channels: properties called "f_rest_…".
+  [[nodiscard]] std::size_t rest_count() const;
 };
 
 struct PlyHeader {

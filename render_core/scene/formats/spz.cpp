@@ -16,6 +16,7 @@
 #include "render_core/scene/formats/decompress.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/spz_format.h"
+#include "render_core/scene/transform.h"
 
 namespace catgs {
 
@@ -167,8 +168,9 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
   return header;
 }
 
-/// The axes named by the extension records (u32 type, u32 length, payload), or the usual ones.
-AxisFlip axes_of(const ByteSource& file, std::span<const std::byte> extensions) {
+/// The coordinate system named by the extension records (u32 type, u32 length, payload), or the
+/// usual one.
+std::uint32_t system_of(const ByteSource& file, std::span<const std::byte> extensions) {
   while (extensions.size() >= 8) {
     const auto type = load_as<std::uint32_t>(extensions.data());
     const auto length = load_as<std::uint32_t>(extensions.data() + 4);
@@ -178,16 +180,24 @@ AxisFlip axes_of(const ByteSource& file, std::span<const std::byte> extensions) 
     const auto system = length >= 4 ? load_as<std::uint32_t>(extensions.data()) : 0;
     extensions = extensions.subspan(length);
     if (type != coordinate_system_extension || system == 0) continue;  // 0: unspecified
-    if (system > 8)
+    if (system > last_system)
       throw InputError(file.name(), "extension SPZ_ADOBE_coordinate_system",
-                       fmt::format("coordinate system {} is not supported", system),
-                       "store the scene with its y axis up or down");
-    return AxisFlip(signs_to_right_down_front(system));
+                       fmt::format("coordinate system {} is not in 1…{}", system, last_system));
+    return system;
   }
-  return AxisFlip(right_up_back);
+  return right_up_back_system;
 }
 
-void apply(const AxisFlip& flip, GaussianCloud& cloud, const LoadContext& context) {
+/// Turns the cloud from a coordinate system to right, down, front.
+void turn(std::uint32_t system, GaussianCloud& cloud, const LoadContext& context) {
+  if (system >= first_z_up_system) {
+    const CloudTransform transform({z_up_to_right_down_front(system), {}});
+    context.for_blocks(cloud.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) transform.apply(cloud, i);
+    });
+    return;
+  }
+  const AxisFlip flip(signs_to_right_down_front(system));
   const std::size_t sh_count = cloud.sh_count();
   context.for_blocks(cloud.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -198,11 +208,11 @@ void apply(const AxisFlip& flip, GaussianCloud& cloud, const LoadContext& contex
   });
 }
 
-GaussianCloud make_cloud(const Header& header) {
-  GaussianCloud cloud;
-  cloud.resize(header.count, std::min(header.sh_degree, max_sh_degree));
-  if (header.antialiased) cloud.model = SplatModel::antialiased;
-  return cloud;
+SpzFile make_file(const Header& header) {
+  SpzFile file{static_cast<int>(header.version), header.sh_degree, {}};
+  file.cloud.resize(header.count, std::min(header.sh_degree, max_sh_degree));
+  if (header.antialiased) file.cloud.model = SplatModel::antialiased;
+  return file;
 }
 
 /// Versions 1 to 3: one gzip stream, which tells the axes only at its end.
@@ -213,7 +223,7 @@ SpzFile read_gzip(const ByteSource& file, const LoadContext& context) {
   const Header header = parse_header(file, start);
   if (header.version > 3) fail(file, "version", "4 in a gzip stream");
 
-  SpzFile result{static_cast<int>(header.version), make_cloud(header)};
+  SpzFile result = make_file(header);
   const LoadContext decoding = context.part(0.0, 0.9);
   for (const Attribute& attribute : attributes(header))
     read_attribute(*stream, attribute, result.cloud, [&] {
@@ -221,7 +231,7 @@ SpzFile read_gzip(const ByteSource& file, const LoadContext& context) {
     });
   std::vector<std::byte> extensions(header.has_extensions ? max_extension_bytes : 0);
   const auto stored = std::span(extensions).first(stream->read_up_to(extensions));
-  apply(axes_of(file, stored), result.cloud, context.part(0.9, 1.0));
+  turn(system_of(file, stored), result.cloud, context.part(0.9, 1.0));
   return result;
 }
 
@@ -243,7 +253,8 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context) {
 
   std::vector<std::byte> extensions(table_offset - plain_header_bytes);
   file.read(plain_header_bytes, extensions);
-  const AxisFlip flip = header.has_extensions ? axes_of(file, extensions) : AxisFlip(right_up_back);
+  const std::uint32_t system =
+      header.has_extensions ? system_of(file, extensions) : right_up_back_system;
 
   std::vector<std::array<std::uint64_t, 2>> sizes(all.size());
   file.read(table_offset, std::as_writable_bytes(std::span(sizes)));
@@ -258,11 +269,11 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context) {
     offset += compressed;
   }
 
-  SpzFile result{static_cast<int>(header.version), make_cloud(header)};
+  SpzFile result = make_file(header);
   context.part(0.0, 0.9).for_blocks(all.size(), 1, [&](std::size_t a, std::size_t) {
     read_attribute(*open_zstd(file, offsets[a], sizes[a][0]), all[a], result.cloud, [] {});
   });
-  apply(flip, result.cloud, context.part(0.9, 1.0));
+  turn(system, result.cloud, context.part(0.9, 1.0));
   return result;
 }
 

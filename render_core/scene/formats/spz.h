@@ -12,12 +12,14 @@ namespace catgs {
 
 // Niantic's .spz: attributes one after the other, quantised to bytes. Versions 1 (half-float
 // positions) to 3 are one gzip stream; version 4 has a plain header and one zstd stream per
-// attribute. By its specification the axes are right, up, back unless an extension says otherwise.
+// attribute. By its specification the axes are right, up, back unless an extension names one of 16
+// other systems.
 // Tools that did not convert the axes wrote files that appear upside down; a sidecar's "up"
 // corrects that.
 
 struct SpzFile {
   int version = 0;
+  int sh_degree = 0;    // of the file, up to 4
   GaussianCloud cloud;  // not sanitized; SH above degree 3 is cut off
 };
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 // Constants of the .spz format that its reader and its writer share.
@@ -26,13 +27,26 @@ inline constexpr float magnitude_unit = 0.70710678f / static_cast<float>(max_mag
 
 /// Right, up, back, the axes of every file without an extension.
 inline constexpr glm::vec3 right_up_back(1.0f, -1.0f, -1.0f);  // signs to right, down, front
+inline constexpr std::uint32_t right_up_back_system = 4;
 
-/// Signs for the systems 1…8 of the coordinate system extension, which are numbered in binary:
-/// bit 0 right (not left), bit 1 up (not down), bit 2 front (not back).
+// The coordinate system extension numbers systems in binary, from 1 on. Bit 0: x points right (not
+// left). Bit 1: up (not down) is positive. Systems 1…8 have y up or down, and bit 2: z points front
+// (not back). Systems 9…16 have z up or down, and bit 2: y points back (not front).
+inline constexpr std::uint32_t first_z_up_system = 9, last_system = 16;
+
+/// Signs for the systems 1…8.
 inline glm::vec3 signs_to_right_down_front(std::uint32_t system) {
-  assert(system >= 1 && system <= 8);
+  assert(system >= 1 && system < first_z_up_system);
   const std::uint32_t bits = system - 1;
   return {bits & 1 ? 1.0f : -1.0f, bits & 2 ? -1.0f : 1.0f, bits & 4 ? 1.0f : -1.0f};
+}
+
+/// The map to right, down, front for the systems 9…16.
+inline glm::dmat3 z_up_to_right_down_front(std::uint32_t system) {
+  assert(system >= first_z_up_system && system <= last_system);
+  const std::uint32_t bits = system - first_z_up_system;
+  return {bits & 1 ? 1.0 : -1.0, 0.0, 0.0, 0.0, 0.0, bits & 4 ? -1.0 : 1.0, 0.0,
+          bits & 2 ? -1.0 : 1.0, 0.0};
 }
 
 }  // namespace catgs::spz

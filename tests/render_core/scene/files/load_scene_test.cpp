@@ -103,6 +103,23 @@ TEST_F(LoadScene, FilesAreToldApartByContent) {
   EXPECT_EQ(load_scene(folder_ / "g.spz").format, "spz v3");
 }
 
+TEST_F(LoadScene, HarmonicsThatAreCutOffAreTold) {
+  const GaussianCloud cloud = random_cloud(300, 3);
+  EXPECT_TRUE(load_scene(write("a.spz", encode_spz(cloud, {}))).notes.empty());
+  EXPECT_THAT(load_scene(write("b.spz", encode_spz(cloud, {.extra_sh_degree = 4}))).notes,
+              ::testing::ElementsAre(HasSubstr("degree 4 are not shown")));
+  std::string ply = ply_bytes(random_cloud(30, 0));
+  const std::size_t end = ply.find("end_header\n");
+  std::string properties, rows = ply.substr(end + 11);
+  for (int k = 0; k < 72; ++k) properties += "property float f_rest_" + std::to_string(k) + "\n";
+  const std::size_t row_bytes = rows.size() / 30;
+  for (std::size_t i = 30; i > 0; --i) rows.insert(i * row_bytes, 72 * 4, '\0');
+  const Scene scene =
+      load_scene(write("c.ply", ply.substr(0, end) + properties + "end_header\n" + rows));
+  EXPECT_EQ(scene.cloud.sh_degree, 3);
+  EXPECT_THAT(scene.notes, ::testing::ElementsAre(HasSubstr("degree 4 are not shown")));
+}
+
 TEST_F(LoadScene, FoldersAreRecognisedByWhatTheyHold) {
   const GaussianCloud cloud = random_cloud(300, 1);
   for (const auto& [name, content] : encode_sog(cloud, 2)) write("museum/" + name, content);

@@ -1,9 +1,11 @@
 #include "render_core/scene/formats/spz.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
+#include "render_core/math/spherical_harmonics-inl.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -104,9 +106,54 @@ TEST(Spz, TheAxesExtensionIsObeyed) {
     const GaussianCloud turned = parse(encode_spz(cloud, style)).cloud;
     EXPECT_NEAR(turned.mean[0].x, -cloud.mean[0].x, 0.001f);
     EXPECT_NEAR(turned.mean[0].y, cloud.mean[0].y, 0.001f);
-    style.coordinate_system = 9;  // left, front, down
+    style.coordinate_system = 17;
     EXPECT_THAT(input_error([&] { parse(encode_spz(cloud, style)); }),
-                HasSubstr("coordinate system 9"));
+                HasSubstr("coordinate system 17 is not in 1…16"));
+  }
+}
+
+/// Right, down, front of a place whose axes are named by letters: "LUB" is left, up, back.
+glm::dvec3 by_letters(const glm::dvec3& place, std::string_view axes) {
+  glm::dvec3 turned(0.0);
+  for (int k = 0; k < 3; ++k)
+    for (const std::string_view pair : {"RL", "DU", "FB"})
+      if (const auto at = pair.find(axes[static_cast<std::size_t>(k)]); at != pair.npos)
+        turned[pair == "RL" ? 0 : pair == "DU" ? 1 : 2] = at == 0 ? place[k] : -place[k];
+  return turned;
+}
+
+float green(const GaussianCloud& cloud, std::size_t i, const glm::dvec3& direction) {
+  double basis[16], sum = 0.5;
+  math::sh_basis<double>({direction.x, direction.y, direction.z}, cloud.sh_degree, basis);
+  for (int k = 0; k < cloud.sh_count(); ++k) sum += basis[k] * cloud.sh_of(i)[k].y;
+  return static_cast<float>(sum);
+}
+
+TEST(Spz, AllSixteenSystemsAreTurned) {
+  constexpr std::array<std::string_view, 16> systems = {"LDB", "RDB", "LUB", "RUB", "LDF", "RDF",
+                                                        "LUF", "RUF", "LFD", "RFD", "LFU", "RFU",
+                                                        "LBD", "RBD", "LBU", "RBU"};
+  const GaussianCloud cloud = storable_cloud(50, 3);
+  const GaussianCloud plain = parse(encode_spz(cloud, {.coordinate_system = 6})).cloud;
+  const glm::dvec3 d = glm::normalize(glm::dvec3(1, -2, 4));
+  for (std::size_t s = 0; s < systems.size(); ++s) {
+    SCOPED_TRACE(systems[s]);
+    const SpzStyle style{.coordinate_system = static_cast<std::uint32_t>(s + 1)};
+    const GaussianCloud read = parse(encode_spz(cloud, style)).cloud;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      EXPECT_LT(glm::distance(glm::dvec3(read.mean[i]),
+                              by_letters(glm::dvec3(plain.mean[i]), systems[s])),
+                1e-6);
+      EXPECT_NEAR(green(read, i, by_letters(d, systems[s])), green(plain, i, d), 1e-5f);
+      // The longest axis of a Gaussian, up to its sign.
+      const auto axis = [i](const GaussianCloud& of) {
+        glm::dvec3 along(0.0);
+        const glm::vec3& scale = of.scale[i];
+        along[scale.x > scale.y ? (scale.x > scale.z ? 0 : 2) : (scale.y > scale.z ? 1 : 2)] = 1.0;
+        return glm::dquat(of.rotation[i]) * along;
+      };
+      EXPECT_NEAR(std::abs(glm::dot(axis(read), by_letters(axis(plain), systems[s]))), 1.0, 1e-5);
+    }
   }
 }
 
@@ -115,6 +162,8 @@ TEST(Spz, ShOfDegreeFourIsCutToThree) {
   for (const int version : {3, 4})
     expect_near(cloud, parse(encode_spz(cloud, {.version = version, .extra_sh_degree = 4})).cloud,
                 byte_steps);
+  EXPECT_EQ(parse(encode_spz(cloud, {})).sh_degree, 3);
+  EXPECT_EQ(parse(encode_spz(cloud, {.extra_sh_degree = 4})).sh_degree, 4);
 }
 
 TEST(Spz, CutOffFilesAreRefusedAtEveryLength) {
