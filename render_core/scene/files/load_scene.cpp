@@ -93,8 +93,12 @@ Decoded read_location(const SceneLocation& location, const LoadOptions& options,
     SogFile sog = read_sog(folder, "meta.json", context);
     return {fmt::format("sog v{} (folder)", sog.version), std::move(sog.cloud)};
   }
-  StreamedSog sog = read_streamed_sog(folder, options.lod, options.gaussian_budget, context);
-  return {fmt::format("streamed sog ({})", sog.detail), std::move(sog.cloud)};
+  const auto read = [&](const FileSet& files) -> Decoded {
+    StreamedSog sog = read_streamed_sog(files, options.lod, options.gaussian_budget, context);
+    return {fmt::format("streamed sog ({})", sog.detail), std::move(sog.cloud)};
+  };
+  if (location.kind == SceneLocation::Kind::streamed_sog_folder) return read(folder);
+  return read(ZipFiles(FileSource(location.path)));
 }
 
 }  // namespace
@@ -103,10 +107,9 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const LoadContext context(*pool, options.progress);
   const SceneLocation location = locate_scene(path);
-  const bool streamed = location.kind == SceneLocation::Kind::streamed_sog_folder;
-  if (!streamed && (options.lod || options.gaussian_budget))
+  if (!location.is_streamed() && (options.lod || options.gaussian_budget))
     throw InputError(path.string(), "", "has no levels of detail to choose from",
-                     "levels and budgets are for streamed SOG folders");
+                     "levels and budgets are for streamed SOG");
 
   Scene scene;
   scene.name = to_utf8(location.name);

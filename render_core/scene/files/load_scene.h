@@ -22,7 +22,7 @@ struct LoadOptions {
 };
 
 /// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .ksplat,
-/// .spz, .sog, .glb, .gltf or .tree. It may be a streamed or unpacked SOG folder (or its
+/// .spz, .sog, .ssog, .glb, .gltf or .tree. It may be a streamed or unpacked SOG folder (or its
 /// lod-meta.json, meta.json), a training output folder (its newest iteration), or a folder with a
 /// single scene file. The content of a file decides its format before its name does. Throws
 /// InputError; the error for an unknown format lists the supported ones. Memory peaks at the cloud

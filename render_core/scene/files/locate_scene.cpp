@@ -71,6 +71,7 @@ fs::path single_scene_file(const fs::path& folder) {
 
 SceneLocation at_file(const fs::path& file) {
   SceneLocation location;
+  if (file.extension() == ".ssog") location.kind = SceneLocation::Kind::streamed_sog_archive;
   location.path = file;
   const auto training = training_of(file);
   const fs::path folder = training.value_or(file.parent_path());
@@ -93,8 +94,8 @@ SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
 }  // namespace
 
 bool is_scene_name(const fs::path& path) {
-  constexpr std::array extensions = {".ply", ".splat", ".ksplat", ".spz",
-                                     ".sog", ".glb",   ".gltf",   ".tree"};
+  constexpr std::array extensions = {".ply",  ".splat", ".ksplat", ".spz", ".sog",
+                                     ".ssog", ".glb",   ".gltf",   ".tree"};
   return std::find(extensions.begin(), extensions.end(), path.extension().string()) !=
          extensions.end();
 }

@@ -112,6 +112,7 @@ std::optional<Parts> open_parts(const SceneLocation& location, std::uint64_t par
     case SceneLocation::Kind::streamed_sog_folder:
       return streamed_sog_in_parts(location.path, context);
     case SceneLocation::Kind::sog_folder:
+    case SceneLocation::Kind::streamed_sog_archive:  // unpacked in memory as a whole
       break;
   }
   return std::nullopt;

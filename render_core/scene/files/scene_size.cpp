@@ -41,6 +41,14 @@ SceneSize size_of_sog(const FileSet& files) {
   return {meta.count, only_images_tell ? max_sh_degree : meta.sh_degree};
 }
 
+/// An archive is unpacked as a whole only where its environment counts, too.
+std::size_t count_in_archive(const ByteSource& file, const LoadOptions& options) {
+  const ZipFiles meta(file, "lod-meta.json");
+  if (read_lod_tree(*meta.open("lod-meta.json")).environment.empty())
+    return count_streamed_sog(meta, options.lod, options.gaussian_budget);
+  return count_streamed_sog(ZipFiles(file), options.lod, options.gaussian_budget);
+}
+
 SceneSize size_of_file(const std::filesystem::path& path) {
   constexpr std::uint64_t splat_bytes = 32;
   const FileSource file(path);
@@ -81,6 +89,8 @@ SceneSize read_scene_size(const std::filesystem::path& path, const LoadOptions& 
     size = size_of_file(location.path);
   else if (location.kind == SceneLocation::Kind::sog_folder)
     size = size_of_sog(FolderFiles(location.path));
+  else if (location.kind == SceneLocation::Kind::streamed_sog_archive)
+    size = {count_in_archive(FileSource(location.path), options), max_sh_degree};
   else
     size = {count_streamed_sog(FolderFiles(location.path), options.lod, options.gaussian_budget),
             max_sh_degree};

@@ -14,7 +14,8 @@ namespace catgs {
 
 namespace {
 
-constexpr std::size_t max_entries = 4096;  // a SOG has nine
+constexpr std::size_t max_entries = std::size_t{1}
+                                    << 16;  // a SOG has nine, a streamed one thousands
 
 /// libarchive's callbacks over a ByteSource. They must not throw through C, so a failed read is
 /// kept and thrown afterwards.

@@ -45,7 +45,7 @@ class FolderFiles final : public FileSet {
 };
 
 /// The entries of a zip archive, unpacked into memory. An archive may grow to at most four times
-/// its size, and has at most 4,096 entries: scene archives hold images, which hardly compress.
+/// its size, and has at most 65,536 entries: scene archives hold images, which hardly compress.
 class ZipFiles final : public FileSet {
  public:
   /// `only`: the one entry to unpack; empty: all. Throws InputError.

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/files/scene_size.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/support/descriptor_limit.h"
@@ -57,6 +59,30 @@ class StreamedSogTest : public FolderTest {
 
   Json meta_;
 };
+
+TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
+  std::map<std::string, std::string> files = {{"lod-meta.json", meta_.dump()}};
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    files[entry.path().lexically_relative(folder_.path()).string()] =
+        std::string(std::istreambuf_iterator<char>(in), {});
+  }
+  const auto path = write("museum.ssog", zip(files));
+  LoadOptions options;
+  EXPECT_EQ(load_scene(path, options).cloud.mean, load().cloud.mean);
+  options.lod = 2;
+  EXPECT_EQ(read_scene_size(path, options).gaussians, 33u);
+  const Scene scene = load_scene(path, options);
+  EXPECT_EQ(scene.cloud.size(), 33u);
+  EXPECT_EQ(scene.format, "streamed sog (level 2 of 0…2)");
+  files["env/meta.json"] = "";
+  for (const auto& [name, content] : encode_sog(random_cloud(7, 0), 2))
+    files["env/" + name] = content;
+  meta_["environment"] = "env/meta.json";
+  files["lod-meta.json"] = meta_.dump();
+  EXPECT_EQ(read_scene_size(write("museum.ssog", zip(files)), options).gaussians, 40u);
+}
 
 TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
   EXPECT_EQ(load().cloud.size(), 600u);
