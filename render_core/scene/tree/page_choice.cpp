@@ -14,14 +14,22 @@ constexpr float clearly_less = 0.8f;
 
 constexpr std::uint32_t slots_per_family = 2;
 
+/// All families of a tree.
+std::uint64_t families_of(const TreeShape& shape) {
+  std::uint64_t sum = 0;
+  for (int band = 0; band + 1 < shape.bands(); ++band)
+    sum += shape.nodes_on(shape.top_level(band) + 1);
+  return sum;
+}
+
 }  // namespace
 
 PageChoice::PageChoice(std::uint32_t slots) : slots_(slots) { assert(slots >= least_slots); }
 
 std::uint32_t PageChoice::slots_for(const TreeShape& shape) {
-  return static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(std::max<std::uint64_t>(least_slots, 1 + 2 * shape.families()),
-                              std::numeric_limits<std::uint32_t>::max()));
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(
+      std::max<std::uint64_t>(least_slots, 1 + slots_per_family * families_of(shape)),
+      std::numeric_limits<std::uint32_t>::max()));
 }
 
 bool PageChoice::add(std::uint32_t tree, const TreeShape& shape) {
@@ -99,7 +107,7 @@ std::int64_t PageChoice::capacity() const {
 
 std::int64_t PageChoice::reserve() const {
   std::int64_t all = 0;
-  for (const auto& [tree, shape] : trees_) all += static_cast<std::int64_t>(shape->families());
+  for (const auto& [tree, shape] : trees_) all += static_cast<std::int64_t>(families_of(*shape));
   return all <= capacity() ? 0 : std::clamp<std::int64_t>(capacity() / 8, 1, 32);
 }
 

@@ -102,11 +102,6 @@ class TreeShape {
     const NodeId root = root_of(first);
     return root.index + 1 < nodes_on(root.level) ? 2 : 1;
   }
-  [[nodiscard]] std::uint64_t families() const {
-    std::uint64_t sum = 0;
-    for (int band = 0; band + 1 < bands_; ++band) sum += nodes_on(top_level(band) + 1);
-    return sum;
-  }
 
   // --- Nodes in pages ---
   [[nodiscard]] std::uint64_t page_of(NodeId node) const {
