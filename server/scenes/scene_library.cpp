@@ -67,6 +67,15 @@ ErrorMessage refusal(SceneResidency::Wish wish, const std::string& id, std::uint
   return {ErrorCode::server_full, "other scenes are being loaded: try again in a minute", false};
 }
 
+/// The pages of trees that are in memory.
+std::vector<ScenePages> pages_of(const SceneShelf& shelf) {
+  std::vector<ScenePages> all;
+  for (const auto& [id, book] : shelf.books())
+    if (book.entry)
+      for (const PageFigures& figures : book.entry->renderer->pages()) all.push_back({id, figures});
+  return all;
+}
+
 /// Frees a scene on the loader's thread, because that may wait for the device.
 void free_on(boost::asio::thread_pool& loader, std::shared_ptr<const SceneEntry> entry) {
   boost::asio::post(loader, [entry = std::move(entry)]() mutable { entry.reset(); });
@@ -237,16 +246,8 @@ void SceneLibrary::on_tick(TimePoint now) {
   for (const std::string& id : outdated) release(id);
   tend_trees(now);
   start_next(now);
-  report_pages();
+  metrics_.set_pages(pages_of(shelf_));
   if (next_scan_ && now >= *next_scan_) start_scan(now);
-}
-
-void SceneLibrary::report_pages() {
-  std::vector<ScenePages> all;
-  for (const auto& [id, book] : shelf_.books())
-    if (book.entry)
-      for (const PageFigures& figures : book.entry->renderer->pages()) all.push_back({id, figures});
-  metrics_.set_pages(std::move(all));
 }
 
 void SceneLibrary::start_next(TimePoint now) {

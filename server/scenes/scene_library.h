@@ -80,8 +80,6 @@ class SceneLibrary final : public SceneSource {
   Loaded load(const FoundScene& found, const SceneForm& form) const;
   void start_next(TimePoint now);
   void on_loaded(const std::string& id, Loaded loaded, TimePoint started, TimePoint now);
-  /// Tells the metrics which pages of trees are in memory.
-  void report_pages();
   void release(const std::string& id);
   void start_scan(TimePoint now);
   void merge(std::vector<FoundScene> found);
