@@ -1,6 +1,7 @@
 #include "render_core/scene/files/save_scene.h"
 
 #include <cassert>
+#include <functional>
 #include <ostream>
 #include <string>
 #include <string_view>
@@ -9,6 +10,7 @@
 #include "render_core/base/part_file.h"
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/ply.h"
+#include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/splat.h"
 #include "render_core/scene/formats/spz.h"
 
@@ -16,11 +18,11 @@ namespace catgs {
 
 namespace {
 
-constexpr std::string_view remedy = "use .ply, .splat, .spz or .glb";
+constexpr std::string_view remedy = "use .ply, .splat, .spz, .sog or .glb";
 
-using Writer = void (*)(const GaussianCloud&, std::ostream&);
+using Writer = std::function<void(const GaussianCloud&, std::ostream&)>;
 
-Writer writer_for(const std::filesystem::path& path) {
+Writer writer_for(const std::filesystem::path& path, int threads = 0) {
   if (path.string().ends_with(".compressed.ply"))
     throw InputError(path.string(), "", "compressed PLY is only read, not written", remedy);
   const std::string extension = path.extension().string();
@@ -28,6 +30,11 @@ Writer writer_for(const std::filesystem::path& path) {
   if (extension == ".splat") return write_splat;
   if (extension == ".spz") return write_spz;
   if (extension == ".glb") return write_glb;
+  if (extension == ".sog")
+    return [threads](const GaussianCloud& cloud, std::ostream& to) {
+      ThreadPool pool(threads);
+      write_sog(cloud, pool, to);
+    };
   throw InputError(path.string(), "", "cannot be written: unknown extension '" + extension + "'",
                    remedy);
 }
@@ -36,9 +43,9 @@ Writer writer_for(const std::filesystem::path& path) {
 
 void check_can_be_saved(const std::filesystem::path& path) { writer_for(path); }
 
-void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path) {
+void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads) {
   assert(cloud.sizes_agree());
-  const Writer write = writer_for(path);
+  const Writer write = writer_for(path, threads);
   PartFile file(path);
   try {
     write(cloud, file.stream());

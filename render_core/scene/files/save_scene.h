@@ -10,7 +10,8 @@ namespace catgs {
 void check_can_be_saved(const std::filesystem::path& path);
 
 /// Writes the cloud in the format that the extension names. The file appears under its name only
-/// when it is complete. Throws InputError as check_can_be_saved does, and when writing fails.
-void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path);
+/// when it is complete. `threads`: 0 means one per processor. Throws InputError as
+/// check_can_be_saved does, and when writing fails.
+void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads = 0);
 
 }  // namespace catgs

@@ -2,12 +2,14 @@
 
 #include <array>
 #include <cstdint>
+#include <iosfwd>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
+#include "render_core/base/thread_pool.h"
 #include "render_core/scene/formats/file_set.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/gaussian_cloud.h"
@@ -67,4 +69,10 @@ struct SogFile {
 /// Reads the whole SOG whose meta data is `meta_name`. Throws InputError.
 SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadContext& context);
 
+/// Writes version 2 as a zip archive, in the order of a Morton curve. Its bytes depend on the cloud
+/// alone. Errors: means 1/131070 of the range of their logarithms; quaternion components
+/// 0.5 sqrt(2) / 255; opacity 0.5/255. Scales and constant SH are the nearest of 256 values each.
+/// SH above is the nearest of 256 values too, of at most 65,536 palette entries, so a larger scene
+/// shares entries. Throws InputError when there are more Gaussians than an image has room for.
+void write_sog(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to);
 }  // namespace catgs

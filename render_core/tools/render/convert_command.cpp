@@ -66,7 +66,7 @@ bool convert_in_parts(const ConvertOptions& options, bool quiet) {
 }
 
 void save(const Scene& scene, const ConvertOptions& options, bool quiet) {
-  if (!is_tree_name(options.out)) return save_scene(scene.cloud, options.out);
+  if (!is_tree_name(options.out)) return save_scene(scene.cloud, options.out, options.threads);
   ThreadPool pool(options.threads);
   const SceneParts whole{[&](const auto& take) {
                            take(scene.cloud);
@@ -103,9 +103,9 @@ void convert(const ConvertOptions& options, bool quiet) {
 void add_convert_command(CLI::App& app) {
   auto options = std::make_shared<ConvertOptions>();
   CLI::App* command =
-      app.add_subcommand("convert", "Converts a scene to .ply, .splat, .spz, .glb or .tree");
+      app.add_subcommand("convert", "Converts a scene to .ply, .splat, .spz, .sog, .glb or .tree");
   add_scene_options(*command, options->in, "in");
-  command->add_option("out", options->out, "File to write: .ply, .splat, .spz, .glb or .tree")
+  command->add_option("out", options->out, "File to write: .ply, .splat, .spz, .sog, .glb or .tree")
       ->required();
   command
       ->add_option(

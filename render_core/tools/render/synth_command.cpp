@@ -49,7 +49,8 @@ void add_synth_command(CLI::App& app) {
   auto options = std::make_shared<SynthOptions>();
   CLI::App* command = app.add_subcommand("synth", "Writes a procedural scene");
   command->add_option("kind", options->kind, "Kind of scene: city, garden or stress")->required();
-  command->add_option("out", options->out, "Scene to write: .ply, .splat, .spz, .glb or .tree")
+  command
+      ->add_option("out", options->out, "Scene to write: .ply, .splat, .spz, .sog, .glb or .tree")
       ->required();
   command
       ->add_option("--gaussians", options->gaussians,

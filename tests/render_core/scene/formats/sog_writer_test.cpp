@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "render_core/scene/clusters.h"
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/formats/sog.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+std::string written(const GaussianCloud& cloud, int threads = 2) {
+  ThreadPool pool(threads);
+  std::ostringstream out;
+  write_sog(cloud, pool, out);
+  return out.str();
+}
+
+GaussianCloud parse(const std::string& archive) {
+  return read_sog(ZipFiles(MemorySource("scene.sog", bytes_of(archive))), "meta.json",
+                  two_threads())
+      .cloud;
+}
+
+/// The Gaussians in the order of the file: along a Morton curve.
+GaussianCloud as_stored(const GaussianCloud& cloud) {
+  ThreadPool pool(2);
+  const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
+  GaussianCloud sorted;
+  sorted.resize(cloud.size(), cloud.sh_degree);
+  const auto stride = static_cast<std::size_t>(cloud.sh_count());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    sorted.mean[i] = cloud.mean[order[i]];
+    sorted.rotation[i] = cloud.rotation[order[i]];
+    sorted.scale[i] = cloud.scale[order[i]];
+    sorted.opacity[i] = cloud.opacity[order[i]];
+    std::copy_n(cloud.sh.begin() + order[i] * stride, stride, sorted.sh.begin() + i * stride);
+  }
+  return sorted;
+}
+
+class SogDegrees : public ::testing::TestWithParam<int> {};
+
+TEST_P(SogDegrees, RoundTripErrorsAreThoseStated) {
+  const GaussianCloud cloud = random_cloud(20'000, GetParam());
+  // A codebook's steps are widest where values are rare.
+  expect_near(as_stored(cloud), parse(written(cloud)),
+              {.mean = 0.0008f,  // 1/131070 of the range of logarithms, at 15 units
+               .log_scale = 0.1f,
+               .rotation_rad = smallest_three_angle(0.5f * 1.41422f / 255),
+               .opacity = 0.00197f,
+               .sh0 = 0.01f,
+               .sh1 = 0.05f,
+               .sh_rest = 0.05f});
+}
+
+INSTANTIATE_TEST_SUITE_P(Sog, SogDegrees, ::testing::Values(0, 1, 2, 3));
+
+TEST(SogWriter, HarmonicsOfLargeScenesAreAPalette) {
+  GaussianCloud cloud = random_cloud(70'000, 1);
+  const std::size_t kinds = 1000;
+  for (std::size_t i = kinds; i < cloud.size(); ++i)
+    for (std::size_t k = 1; k < 4; ++k) cloud.sh[4 * i + k] = cloud.sh[4 * (i % kinds) + k];
+  expect_near(as_stored(cloud), parse(written(cloud)),
+              {.mean = 0.001f,
+               .log_scale = 0.1f,
+               .rotation_rad = smallest_three_angle(0.5f * 1.41422f / 255),
+               .opacity = 0.00197f,
+               .sh0 = 0.01f,
+               .sh1 = 0.05f,
+               .sh_rest = 0.0f});
+}
+
+TEST(SogWriter, BytesDependOnTheSceneAlone) {
+  const GaussianCloud cloud = random_cloud(3000, 2);
+  EXPECT_EQ(written(cloud, 1), written(cloud, 4));
+}
+
+TEST(SogWriter, SmallAndFlatScenesAreWritten) {
+  for (const std::size_t count : {1, 2, 3, 300}) {
+    GaussianCloud cloud = random_cloud(count, 3);
+    for (glm::vec3& mean : cloud.mean) mean.y = 7.0f;
+    const GaussianCloud read = parse(written(cloud));
+    ASSERT_EQ(read.size(), count);
+    for (const glm::vec3& mean : read.mean) EXPECT_NEAR(mean.y, 7.0f, 1e-5f);
+  }
+}
+
+class SogFiles : public FolderTest {};
+
+TEST_F(SogFiles, AreSavedByTheirName) {
+  const GaussianCloud cloud = random_cloud(2000, 1);
+  save_scene(cloud, folder_ / "a.sog");
+  const Scene scene = load_scene(folder_ / "a.sog");
+  EXPECT_EQ(scene.format, "sog v2 (zip)");
+  EXPECT_EQ(scene.cloud.size(), cloud.size());
+}
+
+}  // namespace
+}  // namespace catgs::test
