@@ -94,6 +94,7 @@ class Writer {
       throw InputError("", "size", fmt::format("{} Gaussians do not fit into .sog", cloud.size()),
                        "prune the scene, or write .tree");
     meta_ = {{"version", 2}, {"asset", {{"generator", "CaT-GS"}}}, {"count", cloud.size()}};
+    if (cloud.model != SplatModel::standard) meta_["model"] = name_of(cloud.model);
   }
 
   /// The files of the archive.

@@ -88,6 +88,15 @@ TEST(SogWriter, SmallAndFlatScenesAreWritten) {
   }
 }
 
+TEST(SogWriter, EachModelIsWrittenAndReadAgain) {
+  GaussianCloud cloud = random_cloud(100, 0);
+  for (const SplatModel model :
+       {SplatModel::standard, SplatModel::antialiased, SplatModel::surfels}) {
+    cloud.model = model;
+    EXPECT_EQ(parse(written(cloud)).model, model);
+  }
+}
+
 class SogFiles : public FolderTest {};
 
 TEST_F(SogFiles, AreSavedByTheirName) {
