@@ -56,7 +56,7 @@ Scene synthesize(const std::string& spec) {
 
 /// Only streamed SOG folders have levels of detail to choose from.
 bool has_levels(const std::string& spec) {
-  return !is_synthetic(spec) && locate_scene(spec).kind == SceneLocation::Kind::streamed_sog_folder;
+  return !is_synthetic(spec) && locate_scene(spec).is_streamed();
 }
 
 bool is_tree(const std::string& spec) {

@@ -1,7 +1,6 @@
 #include "server/scenes/scene_folder.h"
 
 #include <algorithm>
-#include <array>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -17,11 +16,6 @@ namespace catgs {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool has_scene_extension(const fs::path& path) {
-  constexpr std::array extensions = {".ply", ".splat", ".spz", ".sog", ".tree"};
-  return std::ranges::count(extensions, path.extension().string()) > 0;
-}
 
 bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
 
@@ -61,7 +55,7 @@ FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
   found.path = path;
   found.name = printable(to_utf8(location.name));
   found.id = look.ids.id_of(path.string(), found.name);
-  found.has_levels = location.kind == SceneLocation::Kind::streamed_sog_folder;
+  found.has_levels = location.is_streamed();
   const LoadOptions levels = found.has_levels ? look.levels : LoadOptions();
   found.size = read_scene_size(path, levels);
   found.about = about_in(location.hints.sidecar);
@@ -81,7 +75,7 @@ std::vector<fs::path> SceneFolders::list() const {
                        "name a folder that the server may read");
     for (const auto& entry : entries) {
       const bool scene = entry.is_directory(error) ? is_scene_folder(entry.path())
-                                                   : has_scene_extension(entry.path());
+                                                   : is_scene_name(entry.path());
       if (scene && !is_hidden(entry.path())) paths.push_back(entry.path());
     }
   }

@@ -48,6 +48,7 @@ inline TestScene in_cluster_order(TestScene scene) {
   ThreadPool pool(2);
   const GaussianCloud& from = *scene.cloud;
   GaussianCloud to;
+  to.model = from.model;
   to.resize(from.size(), from.sh_degree);
   std::size_t i = 0;
   for (const std::uint32_t original : morton_order(from.mean, pool)) {
