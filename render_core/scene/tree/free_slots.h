@@ -35,10 +35,12 @@ class FreeSlots {
     rung_ = rung_ || awaited_;
     bell_.notify_all();
   }
-  /// Whether slots that come back ring the bell.
-  void await(bool awaited) {
+  /// Whether slots that come back ring the bell. `seen`: an earlier count(), beyond which slots
+  /// have come back since.
+  void await(bool awaited, std::uint32_t seen) {
     const std::lock_guard lock(mutex_);
     awaited_ = awaited;
+    rung_ = rung_ || (awaited && free_.size() > seen);
   }
   /// Waits for a free slot. False: none came in time.
   [[nodiscard]] bool wait_for_one(std::chrono::milliseconds most) {

@@ -92,8 +92,9 @@ bool PagePool::turn_locked() {
   choice_.begin(now_s());
   for (const auto& [number, tree] : trees_)
     for (const PagedTree::Seen& seen : tree->look()) choice_.note(number, seen.cut);
-  const PageChoice::Step step = choice_.next(free_->count(), most_pages);
-  free_->await(!step.awaited.empty());
+  const std::uint32_t free = free_->count();
+  const PageChoice::Step step = choice_.next(free, most_pages);
+  free_->await(!step.awaited.empty(), free);
   std::map<std::uint32_t, PageChanges> changes;
   for (const PageOfTree& of : step.load) changes[of.tree].load.push_back(of.page);
   for (const PageOfTree& of : step.drop) changes[of.tree].drop.push_back(of.page);
