@@ -7,7 +7,7 @@ namespace catgs {
 /// which needs no privilege and takes no more of the processor. It has no effect before Linux 6.12.
 void run_promptly() noexcept;
 
-/// Lets all other threads go first: this thread and those that it starts from now on.
+/// Lets other threads go first. It holds for this thread and those that it starts from now on.
 void run_in_background() noexcept;
 
 }  // namespace catgs

@@ -31,10 +31,11 @@ void build_whole(const TreeBuild& build, const std::shared_ptr<ThreadPool>& pool
 }  // namespace
 
 void build_scene_tree(const TreeBuild& build, const std::function<void(double)>& progress) {
+  constexpr std::uint64_t part_rows = 1'000'000;
   const auto pool = std::make_shared<ThreadPool>(build.threads);
   progress(0.0);
   const bool all_levels = !build.levels.lod && !build.levels.gaussian_budget;
-  auto parted = all_levels ? scene_in_parts(build.scene, {}, pool) : std::nullopt;
+  auto parted = all_levels ? scene_in_parts(build.scene, {}, pool, part_rows, false) : std::nullopt;
   if (!parted) return build_whole(build, pool, progress);
   // Reading a large scene takes minutes, and build_tree() reports only when it is through.
   double reported = 0.0;

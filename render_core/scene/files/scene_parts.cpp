@@ -123,7 +123,7 @@ std::optional<Parts> open_parts(const SceneLocation& location, std::uint64_t par
 std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
                                           const LoadOptions& options,
                                           const std::shared_ptr<ThreadPool>& pool,
-                                          std::uint64_t part_rows) {
+                                          std::uint64_t part_rows, bool wants_hints) {
   const SceneLocation location = locate_scene(path);
   const LoadContext context(*pool);
   std::optional<Parts> parts = open_parts(location, part_rows, context);
@@ -134,7 +134,7 @@ std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
-  if (!sample.empty())
+  if (wants_hints && !sample.empty())
     scene.hints = find_hints(sample, location.hints, options.up, scene.notes, pool);
   scene.parts.format = parts->format;
   scene.parts.each = [read = parts->read, count = parts->count, used = sample.model, reach,

@@ -17,7 +17,7 @@ namespace catgs {
 /// A scene that is read in parts.
 struct PartedScene {
   SceneParts parts;                // as load_scene() has them; they keep the file open
-  SceneHints hints;                // found as load_scene() finds them, from an even sample
+  SceneHints hints;                // as load_scene() finds them, from an even sample; if wanted
   std::vector<std::string> notes;  // as Scene::notes
 };
 
@@ -29,6 +29,7 @@ struct PartedScene {
 std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
                                           const LoadOptions& options,
                                           const std::shared_ptr<ThreadPool>& pool,
-                                          std::uint64_t part_rows = 1'000'000);
+                                          std::uint64_t part_rows = 1'000'000,
+                                          bool wants_hints = true);
 
 }  // namespace catgs
