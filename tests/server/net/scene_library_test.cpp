@@ -170,7 +170,9 @@ TEST_F(SceneLibraryTest, AVisitorGoesOnWithTheTreeOfItsScene) {
   const auto client = connect();
   visit(*client, "attic");
   client->send_pose(1);
-  EXPECT_TRUE(client->receive_frame().header.idr());
+  const ReceivedFrame first = client->receive_frame();
+  EXPECT_TRUE(first.header.idr());
+  client->send_ack(first.header.frame_id());
   eventually([&] { return metric(*server_, "catgs_trees_built_total") == 1; }, "a tree is built");
   const double pool_bytes = static_cast<double>(RendererOptions{}.scene_memory);
   eventually([&] { return metric(*server_, "catgs_scene_bytes") == city_bytes + pool_bytes; },
