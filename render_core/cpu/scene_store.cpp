@@ -20,13 +20,23 @@ std::size_t packet_bytes(int sh_degree) {
          ((SceneStore::attribute_count + sh_floats) * sizeof(float) + sizeof(std::uint32_t));
 }
 
-/// The system's pages that lie within an array.
+/// Tells the system about those of its pages that lie within an array.
 template <class T>
-void give_back(T* first, std::size_t count) {
+void advise(T* first, std::size_t count, int advice) {
   static const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
   const auto begin = (reinterpret_cast<std::uintptr_t>(first) + page - 1) / page * page;
   const auto end = reinterpret_cast<std::uintptr_t>(first + count) / page * page;
-  if (begin < end) (void)::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
+  if (begin < end) (void)::madvise(reinterpret_cast<void*>(begin), end - begin, advice);
+}
+
+template <class T>
+void give_back(T* first, std::size_t count) {
+  advise(first, count, MADV_DONTNEED);
+}
+
+template <class T>
+void use_small_pages(T* first, std::size_t count) {
+  advise(first, count, MADV_NOHUGEPAGE);
 }
 
 }  // namespace
@@ -56,6 +66,10 @@ SceneStore::SceneStore(const GaussianCloud& cloud, ThreadPool& pool)
 SceneStore::SceneStore(std::size_t clusters, int sh_degree, SplatModel model)
     : size_(clusters * cluster_size), padded_(size_), sh_degree_(sh_degree), model_(model) {
   allocate();
+  // A huge page would take memory for the clusters of other slots.
+  use_small_pages(attributes_.get(), attribute_count * padded_);
+  use_small_pages(original_index_.get(), padded_);
+  use_small_pages(sh_.get(), padded_ / packet_size * sh_floats_per_packet());
 }
 
 void SceneStore::allocate() {

@@ -71,6 +71,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   if (!(depth > camera.near_z) || math::reach_of(log2_opacity) < 0.0f) return;
   const auto g = math::project<float>(camera, mean, load_factor(p.scene, i), depth);
   if (p.scene.antialiased) log2_opacity = math::antialiased_log2_opacity(log2_opacity, g);
+  if (math::reach_of(log2_opacity) < 0.0f) return;
   const float2 centre = make_float2(g.centre_px.x, g.centre_px.y);
   const ushort4 box = box_of(centre, math::three_sigma_radius(g), p.shape);
   const std::uint32_t tiles = static_cast<std::uint32_t>(box.z - box.x) * (box.w - box.y);

@@ -103,8 +103,8 @@ CATGS_HD_INLINE ProjectedGaussian<T> project(const CameraModel<T>& camera, const
 
 /// The opacity of a Gaussian of an antialiased scene, as a base-2 logarithm. The low-pass filter
 /// spreads the Gaussian over more of the picture, so its peak sinks by the ratio of the areas:
-/// sqrt(det Sigma2 / det (Sigma2 + low_pass I)). Source: Mip-Splatting (Yu et al. 2024),
-/// equation 9.
+/// sqrt(det Sigma2 / det (Sigma2 + low_pass I)). Source: the 2D filter of
+/// Mip-Splatting (Yu et al. 2024).
 template <class T>
 CATGS_HD_INLINE T antialiased_log2_opacity(T log2_opacity, const ProjectedGaussian<T>& g) {
   const T least = T(2.3e-10);  // 2^-32: invisible at any opacity

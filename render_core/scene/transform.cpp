@@ -127,6 +127,11 @@ void CloudTransform::apply_to_shape(glm::quat& rotation, glm::vec3& scale) const
   rotation = unit(glm::quat(glm::quat_cast(singular.axes)));
 }
 
+void flatten(GaussianCloud& cloud) {
+  constexpr float thickness = 1e-3f;  // of the smaller radius
+  for (glm::vec3& scale : cloud.scale) scale.z = thickness * std::min(scale.x, scale.y);
+}
+
 void CloudTransform::apply(GaussianCloud& cloud, std::size_t i) const {
   cloud.mean[i] = glm::vec3(map_(glm::dvec3(cloud.mean[i])));
   apply_to_shape(cloud.rotation[i], cloud.scale[i]);

@@ -25,6 +25,10 @@ struct AffineMap {
 /// `second` after `first`.
 AffineMap operator*(const AffineMap& second, const AffineMap& first);
 
+/// Makes surfels of Gaussians. A disc has no thickness, and a Gaussian needs one; no picture shows
+/// this one. The last axis is the disc's normal.
+void flatten(GaussianCloud& cloud);
+
 /// Moves, turns, scales and stretches Gaussians. Means and covariances follow the map exactly.
 /// Harmonics follow its rotation alone (the orthogonal factor of its polar decomposition), as
 /// KHR_gaussian_splatting asks: a stretched sphere of directions has no harmonics of the same

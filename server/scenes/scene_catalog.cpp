@@ -54,7 +54,7 @@ Scene synthesize(const std::string& spec) {
   return synthesize(parse_synth_kind(parts[1]), count, seed);
 }
 
-/// Only streamed SOG folders have levels of detail to choose from.
+/// Only streamed SOGs have levels of detail to choose from.
 bool has_levels(const std::string& spec) {
   return !is_synthetic(spec) && locate_scene(spec).is_streamed();
 }
@@ -72,14 +72,14 @@ SceneInPages open_cached(const std::filesystem::path& path, const std::string& s
   try {
     TreeFile tree(std::make_unique<FileSource>(path), 0);
     if (tree.pages_in_file() < tree.shape().pages() || !tree.page(0)) refuse(damaged);
+    SceneInPages scene = open_in_pages(path, options, spec);
+    if (scene.tree->damage().pages > 0) refuse(damaged);
+    return scene;
   } catch (const UnusableTree&) {
     throw;
   } catch (const InputError& error) {
-    refuse(error.what());
+    throw UnusableTree(path.string(), {}, error.what());
   }
-  SceneInPages scene = open_in_pages(path, options, spec);
-  if (scene.tree->damage().pages > 0) refuse(damaged);
-  return scene;
 }
 
 /// A scene in memory; or, with a tree, its outline.

@@ -59,7 +59,9 @@ FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
   const LoadOptions levels = found.has_levels ? look.levels : LoadOptions();
   found.size = read_scene_size(path, levels);
   found.about = about_in(location.hints.sidecar);
-  if (look.names_trees && !found.size.in_pages) found.tree = tree_name(path, levels);
+  // A .gltf has its data in other files, whose changes would not be seen.
+  if (look.names_trees && !found.size.in_pages && path.extension() != ".gltf")
+    found.tree = tree_name(path, levels);
   return found;
 }
 
@@ -74,8 +76,8 @@ std::vector<fs::path> SceneFolders::list() const {
       throw InputError("--scene-folder " + folder.string(), {}, error.message(),
                        "name a folder that the server may read");
     for (const auto& entry : entries) {
-      const bool scene = entry.is_directory(error) ? is_scene_folder(entry.path())
-                                                   : is_scene_name(entry.path());
+      const bool scene =
+          entry.is_directory(error) ? is_scene_folder(entry.path()) : is_scene_name(entry.path());
       if (scene && !is_hidden(entry.path())) paths.push_back(entry.path());
     }
   }

@@ -151,7 +151,11 @@ void SceneLibrary::open_folders() {
   if (shelf_.books().empty())
     throw InputError("--scene-folder " + config_.scene_folders.front(), {}, "holds no scene",
                      "put one there, or give --scene");
-  const auto& [id, book] = *shelf_.books().begin();
+  // One that has to wait for its tree is the last choice.
+  const auto ready = std::ranges::find_if(shelf_.books(), [this](const auto& of) {
+    return trees_.form_of(of.second.found).has_value();
+  });
+  const auto& [id, book] = ready != shelf_.books().end() ? *ready : *shelf_.books().begin();
   const TimePoint now = clock_();
   const auto wish = residency_.want(id, trees_.need_of(book.found), now, in_use_);
   if (wish != SceneResidency::Wish::awaited)
@@ -310,8 +314,9 @@ void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint sta
   }
   const SceneNeed need = need_of(*loaded.entry);
   const double seconds = std::chrono::duration<double>(now - started).count();
-  bytes_per_second_ =
-      std::max(1e6, static_cast<double>(trees_.bytes_of(book->found)) / std::max(seconds, 0.1));
+  if (!loaded.entry->in_pages)
+    bytes_per_second_ =
+        std::max(1e6, static_cast<double>(trees_.bytes_of(book->found)) / std::max(seconds, 0.1));
   metrics_.scenes_loaded.Increment();
   residency_.loaded(id, need, now);
   book->entry = std::move(loaded.entry);
@@ -394,6 +399,7 @@ void SceneLibrary::start_redrawing(const std::string& id) {
   if (redrawing_ || residency_.busy()) return;
   redrawing_ = true;
   const SceneBook& book = *shelf_.find(id);
+  residency_.resize(id, need_of(*book.entry).with(trees_.need_of(book.found)));
   boost::asio::post(loader_, [this, id, found = book.found, before = book.entry->renderer,
                               form = *trees_.form_of(book.found)] {
     auto loaded = std::make_shared<Loaded>(load(found, form));
@@ -406,9 +412,10 @@ void SceneLibrary::start_redrawing(const std::string& id) {
 void SceneLibrary::on_redrawn(const std::string& id, const FoundScene& found, Loaded loaded,
                               const std::shared_ptr<Renderer>& before) {
   redrawing_ = false;
+  SceneBook* const book = shelf_.find(id);
+  if (book && book->entry) residency_.resize(id, need_of(*book->entry));
   if (loaded.unusable_tree) return trees_.discard(found, loaded.error);
   if (!loaded.entry) return trees_.give_up(found, loaded.error);
-  SceneBook* const book = shelf_.find(id);
   const bool still_wanted = book && book->entry && book->entry->renderer == before &&
                             book->found.tree == found.tree && !book->outdated;
   if (!still_wanted) return free_on(loader_, std::move(loaded.entry));

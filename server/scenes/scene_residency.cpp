@@ -68,6 +68,17 @@ std::uint64_t SceneResidency::bytes_without(const std::vector<std::string>& gone
   return sum + (has_pool ? limits_.pool_bytes : 0);
 }
 
+bool SceneResidency::fits(const std::vector<std::string>& gone, const SceneNeed& need) const {
+  const auto stays = [&](const auto& resident) {
+    return resident.second.need.in_pages && std::ranges::find(gone, resident.first) == gone.end();
+  };
+  if (need.in_pages &&
+      std::ranges::count_if(residents_, stays) >= std::ptrdiff_t{most_scenes_in_pages})
+    return false;
+  return limits_.budget_bytes == 0 ||
+         bytes_without(gone, need.in_pages) + need.bytes <= limits_.budget_bytes;
+}
+
 std::optional<std::vector<std::string>> SceneResidency::room_for(
     const SceneNeed& need,
     const std::function<bool(const std::string&, const Resident&)>& may_go) const {

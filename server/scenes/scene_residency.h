@@ -37,6 +37,9 @@ struct SceneNeed {
   bool in_pages;
 };
 
+/// Scenes in pages that are in memory at a time. Each holds an open file, and some host memory.
+inline constexpr std::size_t most_scenes_in_pages = 32;
+
 /// Decides which scenes are in memory, which is loaded next and which are released for it. One
 /// scene loads at a time and one may wait. Scenes in use are never released; of the others, the
 /// least recently used goes first. Until a scene is loaded, its size is the one in its header. The
@@ -109,10 +112,7 @@ class SceneResidency {
   [[nodiscard]] std::uint64_t bytes_without(const std::vector<std::string>& gone,
                                             bool pool_stays) const;
   /// Whether a scene fits when those are `gone`.
-  [[nodiscard]] bool fits(const std::vector<std::string>& gone, const SceneNeed& need) const {
-    return limits_.budget_bytes == 0 ||
-           bytes_without(gone, need.in_pages) + need.bytes <= limits_.budget_bytes;
-  }
+  [[nodiscard]] bool fits(const std::vector<std::string>& gone, const SceneNeed& need) const;
   /// The least recently used scenes to release for a scene, if `may_go` permits enough of them.
   /// Empty if there is room already.
   [[nodiscard]] std::optional<std::vector<std::string>> room_for(

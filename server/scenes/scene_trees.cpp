@@ -86,8 +86,8 @@ std::uint64_t SceneTrees::bytes_of(const FoundScene& scene) const {
 }
 
 SceneNeed SceneTrees::need_of(const FoundScene& scene) const {
-  const SceneSize size = size_of(scene);
-  return {most_bytes(size, config_), size.in_pages};
+  // Until its tree is there, a scene that needs one is in memory as a whole, on a coarser level.
+  return {bytes_of(scene), scene.size.in_pages || ready(scene)};
 }
 
 void SceneTrees::order(const FoundScene& scene, bool urgent) {

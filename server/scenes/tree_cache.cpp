@@ -107,12 +107,14 @@ Content content_of(const fs::path& scene) {
 
 std::string tree_name(const fs::path& scene, const LoadOptions& levels) {
   const SceneLocation location = locate_scene(scene);
+  const std::optional<SplatModel> model = model_in_sidecar(location.hints);
   try {
     const Content content = content_of(location.path);
     const std::string facts =
-        fmt::format("{}\n{} {} {}\n{} {}\n{}", location.path.string(), content.files, content.bytes,
-                    content.newest.time_since_epoch().count(), levels.lod.value_or(-1),
-                    levels.gaussian_budget.value_or(0), TreeHeader::right_version);
+        fmt::format("{}\n{} {} {}\n{} {}\n{} {}", location.path.string(), content.files,
+                    content.bytes, content.newest.time_since_epoch().count(),
+                    levels.lod.value_or(-1), levels.gaussian_budget.value_or(0),
+                    TreeHeader::right_version, model ? name_of(*model) : "");
     return fmt::format("{}-{}-{}{}", plain(location.name),
                        hex_digest(scene_key(scene.string()), path_digits / 2),
                        hex_digest(facts, content_digits / 2), extension);

@@ -65,10 +65,14 @@ std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::optional<SplatModel> model_in_sidecar(const HintFiles& files) {
+  const std::optional<Sidecar> sidecar = sidecar_at(files.sidecar);
+  return sidecar ? sidecar->model : std::nullopt;
+}
+
 void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, SplatModel& model,
                std::vector<std::string>& notes) {
-  const std::optional<Sidecar> sidecar = wanted ? std::nullopt : sidecar_at(files.sidecar);
-  model = wanted.value_or(sidecar ? sidecar->model.value_or(model) : model);
+  model = wanted ? *wanted : model_in_sidecar(files).value_or(model);
   if (model == SplatModel::surfels)
     notes.emplace_back("its model is 2dgs, and its discs are drawn as flat Gaussians");
 }

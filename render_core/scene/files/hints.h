@@ -64,6 +64,9 @@ struct HintFiles {
   std::filesystem::path transforms;
 };
 
+/// The model that the sidecar names, if any. Throws InputError for a faulty sidecar.
+std::optional<SplatModel> model_in_sidecar(const HintFiles& files);
+
 /// Puts the model that `wanted` or else the sidecar names in place of the file's. Notes what people
 /// should know about it. Throws InputError for a faulty sidecar.
 void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, SplatModel& model,

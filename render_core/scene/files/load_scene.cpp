@@ -27,6 +27,7 @@
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/transform.h"
 #include "render_core/scene/tree/read_tree.h"
 
 namespace catgs {
@@ -117,7 +118,10 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   scene.format = std::move(decoded.format);
   scene.cloud = std::move(decoded.cloud);
   scene.notes = std::move(decoded.notes);
+  // Surfels of a tree are flat already, and their axes are in another order.
+  const bool is_flat = scene.format == "tree" && scene.cloud.model == SplatModel::surfels;
   use_model(location.hints, options.model, scene.cloud.model, scene.notes);
+  if (scene.cloud.model == SplatModel::surfels && !is_flat) flatten(scene.cloud);
   scene.report = sanitize(scene.cloud, context.part(0.9, 1.0));
   if (scene.cloud.empty())
     throw InputError(path.string(), "",

@@ -57,6 +57,11 @@ fs::path single_scene_file(const fs::path& folder) {
       found.push_back(entry.path().filename().string());
   }
   if (found.empty()) throw InputError(folder.string(), "", "holds no scene", supported_scenes);
+  // A .glb or .gltf beside a scene is a mesh, most likely.
+  const auto may_be_mesh = [](const std::string& name) {
+    return name.ends_with(".glb") || name.ends_with(".gltf");
+  };
+  if (!std::ranges::all_of(found, may_be_mesh)) std::erase_if(found, may_be_mesh);
   std::sort(found.begin(), found.end());
   if (found.size() > 1)
     throw InputError(

@@ -75,14 +75,10 @@ bool repair_sh(GaussianCloud& cloud, std::size_t i, Repairs& repairs) {
   return bad;
 }
 
-// A disc has no thickness. As a Gaussian it needs one, but none that a picture shows.
-constexpr float surfel_thickness = 1e-3f;  // of its smaller radius
-
 Verdict judge(GaussianCloud& cloud, std::size_t i, const SaneReach& reach, Repairs& repairs) {
   glm::quat& q = cloud.rotation[i];
   glm::vec3& scale = cloud.scale[i];
   float& opacity = cloud.opacity[i];
-  if (cloud.model == SplatModel::surfels) scale.z = surfel_thickness * std::min(scale.x, scale.y);
   if (!finite(cloud.mean[i]) || !finite(scale) || !std::isfinite(opacity) ||
       !finite({q.x, q.y, q.z}) || !std::isfinite(q.w))
     return Verdict::not_finite;

@@ -23,7 +23,7 @@ namespace catgs {
 ///   5. scales under 1e-10 (their squares would be denormal; on screen the low-pass filter hides
 ///      the difference) and opacities of 1 are clamped into the valid range;
 ///   6. SH coefficients that are NaN or beyond 1000 become 0.
-/// Quaternions are normalised, and surfels made flat; that is not counted as a repair.
+/// Quaternions are normalised; that is not counted as a repair.
 ///
 /// The kept Gaussians stay in order, and the vectors keep their allocations.
 SanitizeReport sanitize(GaussianCloud& cloud, const LoadContext& context);

@@ -43,6 +43,13 @@ Writer writer_for(const std::filesystem::path& path, int threads = 0) {
 
 void check_can_be_saved(const std::filesystem::path& path) { writer_for(path); }
 
+bool keeps_model(const std::filesystem::path& path, SplatModel model) {
+  const std::string extension = path.extension().string();
+  if (model == SplatModel::standard) return true;
+  if (extension == ".spz") return model == SplatModel::antialiased;
+  return extension == ".ply" || extension == ".sog" || extension == ".tree";
+}
+
 void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads) {
   assert(cloud.sizes_agree());
   const Writer write = writer_for(path, threads);

@@ -9,6 +9,9 @@ namespace catgs {
 /// Throws InputError if save_scene has no writer for a file of this name.
 void check_can_be_saved(const std::filesystem::path& path);
 
+/// Whether a file of this name can tell the model.
+bool keeps_model(const std::filesystem::path& path, SplatModel model);
+
 /// Writes the cloud in the format that the extension names. The file appears under its name only
 /// when it is complete. `threads`: 0 means one per processor. Throws InputError as
 /// check_can_be_saved does, and when writing fails.

@@ -21,6 +21,7 @@
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "render_core/scene/keep_if.h"
+#include "render_core/scene/transform.h"
 #include "render_core/scene/tree/tree_file.h"
 
 namespace catgs {
@@ -131,6 +132,7 @@ std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
   PartedScene scene;
   GaussianCloud& sample = parts->sample;
   use_model(location.hints, options.model, sample.model, scene.notes);
+  if (sample.model == SplatModel::surfels) flatten(sample);
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
@@ -144,6 +146,7 @@ std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
     for (std::uint64_t i = 0; i < count; ++i) {
       GaussianCloud part = read(i, reading);
       part.model = used;
+      if (used == SplatModel::surfels) flatten(part);
       dropped += sanitize(part, reach, reading).dropped;
       take(part);
     }

@@ -23,7 +23,7 @@ namespace catgs {
 
 namespace {
 
-constexpr std::size_t max_parts = 4096;
+constexpr std::size_t max_parts = 4096, max_primitives = 65'536;
 constexpr std::string_view extension_name = "KHR_gaussian_splatting";
 
 /// A primitive with Gaussians at a node.
@@ -38,6 +38,7 @@ struct Part {
 
 struct Contents {
   std::vector<Part> parts;
+  std::size_t primitives = 0;  // at nodes, with Gaussians or without
   GltfSize size;
   std::vector<std::string> notes;
 
@@ -89,6 +90,8 @@ void check_words(const JsonField& extension, Contents& contents) {
   };
   expect("kernel", "ellipse", extension.at("kernel"));
   if (const auto word = extension.find("projection")) expect("projection", "perspective", *word);
+  if (const auto word = extension.find("sortingMethod"))
+    expect("sortingMethod", "cameraDistance", *word);
 }
 
 bool has_linear_colours(const JsonField& extension, Contents& contents) {
@@ -177,6 +180,8 @@ void add_mesh(GltfDocument& document, const JsonField& node, const AffineMap& ma
   const JsonField primitives = document.at("meshes", *index).at("primitives");
   for (std::size_t i = 0; i < primitives.size(); ++i) {
     const JsonField primitive = primitives[i];
+    if (++contents.primitives > max_primitives)
+      primitive.fail(fmt::format("is one of more than {} at nodes", max_primitives));
     const auto extensions = primitive.find("extensions");
     const auto extension = extensions ? extensions->find(extension_name) : std::nullopt;
     if (!extension) {
@@ -201,7 +206,7 @@ void check_extensions(const JsonField& root) {
   for (std::size_t i = 0; i < required->size(); ++i)
     if (std::find(known.begin(), known.end(), (*required)[i].text()) == known.end())
       (*required)[i].fail(fmt::format("'{}' is not supported", (*required)[i].text()),
-                          "export it without compression");
+                          "export it without this extension");
 }
 
 Contents contents_of(const ByteSource& file, GltfDocument& document) {

@@ -209,11 +209,15 @@ JsonField GltfDocument::at(std::string_view list, const JsonField& index) const 
 
 const ByteSource& GltfDocument::open(const JsonField& uri) {
   const std::string text = uri.text();
-  std::unique_ptr<ByteSource>& file = files_[text];
+  const bool is_data = text.starts_with("data:");
+  // A file counts once, whatever it is called.
+  const std::string name =
+      is_data ? text : std::filesystem::path(unescaped(text)).lexically_normal().string();
+  std::unique_ptr<ByteSource>& file = files_[name];
   if (file) return *file;
   if (files_.size() > max_buffers) uri.fail(fmt::format("is of more than {} buffers", max_buffers));
-  if (!text.starts_with("data:")) {
-    file = beside_.open(unescaped(text));
+  if (!is_data) {
+    file = beside_.open(name);
     return *file;
   }
   constexpr std::string_view marker = ";base64,";
@@ -225,10 +229,12 @@ const ByteSource& GltfDocument::open(const JsonField& uri) {
 }
 
 GltfDocument::Buffer GltfDocument::buffer(const JsonField& index) {
+  const auto known = buffers_.find(index.count());
+  if (known != buffers_.end()) return known->second;
   const JsonField field = at("buffers", index);
   if (const auto uri = field.find("uri")) {
     const ByteSource& file = open(*uri);
-    return {&file, 0, file.size()};
+    return buffers_[index.count()] = {&file, 0, file.size()};
   }
   if (!chunk_.file || index.count() != 0)
     field.fail("has no uri", "only the first buffer of a .glb lies in its own file");

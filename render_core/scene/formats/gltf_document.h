@@ -70,7 +70,8 @@ class GltfDocument {
   const FileSet& beside_;
   Buffer chunk_{nullptr, 0, 0};  // of a .glb
   nlohmann::json json_;
-  std::map<std::string, std::unique_ptr<ByteSource>> files_;  // by URI
+  std::map<std::string, std::unique_ptr<ByteSource>> files_;  // by URI, or by name
+  std::map<std::uint64_t, Buffer> buffers_;                   // that are open, by index
   std::vector<std::vector<std::byte>> data_;                  // of data: URIs
 };
 

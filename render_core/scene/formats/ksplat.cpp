@@ -43,10 +43,12 @@ struct Section {
     return offset + sizeof(std::uint32_t) * std::uint64_t{partial_buckets};
   }
   [[nodiscard]] std::uint64_t rows_offset() const {
-    return centres_offset() + std::uint64_t{bucket_bytes} * buckets;
+    const std::uint64_t centres = buckets;
+    return centres * bucket_bytes + centres_offset();
   }
   [[nodiscard]] std::uint64_t end() const {
-    return rows_offset() + std::uint64_t{row_bytes} * capacity;
+    const std::uint64_t rows = capacity;
+    return rows * row_bytes + rows_offset();
   }
 };
 

@@ -15,6 +15,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
 #include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/transform.h"
 
 namespace catgs {
 
@@ -54,6 +55,8 @@ std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
   return static_cast<std::size_t>(property - vertex.properties.data());
 }
 
+bool is_of_surfels(const PlyElement& vertex) { return vertex.find("scale_2") == nullptr; }
+
 Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
   const std::size_t rest = vertex.rest_count();
   const int file_degree = rest % 3 == 0 ? sh_degree_of_rest(rest / 3) : -1;
@@ -70,7 +73,7 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
   for (std::size_t k = 0; k < 3; ++k) {
     add(at(offsetof(Row, mean)) + k, std::string(1, "xyz"[k]));
     add(at(offsetof(Row, dc)) + k, fmt::format("f_dc_{}", k));
-    if (k < 2 || vertex.find("scale_2") != nullptr)
+    if (k < 2 || !is_of_surfels(vertex))
       add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
   }
   for (std::size_t k = 0; k < 4; ++k)
@@ -85,7 +88,7 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
 }
 
 SplatModel model_of(const PlyHeader& header, const PlyElement& vertex) {
-  if (vertex.find("scale_2") == nullptr) return SplatModel::surfels;
+  if (is_of_surfels(vertex)) return SplatModel::surfels;
   return header.model.value_or(SplatModel::standard);
 }
 
@@ -254,6 +257,7 @@ GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header,
   cloud.resize(vertex->count, layout.sh_degree);
   cloud.model = model_of(header, *vertex);
   read_ascii(file, header, *vertex, layout, cloud, context);
+  if (is_of_surfels(*vertex)) flatten(cloud);
   return cloud;
 }
 
@@ -266,6 +270,7 @@ GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, con
   cloud.model = model_of(header, vertex);
   read_binary(file, vertex, layout, header.encoding == PlyEncoding::binary_big_endian, rows, cloud,
               context);
+  if (is_of_surfels(vertex)) flatten(cloud);
   return cloud;
 }
 

@@ -95,7 +95,9 @@ class UnsharedFiles final : public FileSet {
     bytes_ += file->size();
     return file;
   }
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] std::uint64_t packed_bytes() const override { return folder_.packed_bytes(); }
+  /// Of the files, but no more than those of the archive that they are in.
+  [[nodiscard]] std::uint64_t bytes() const { return std::min(bytes_, packed_bytes()); }
 
  private:
   const FileSet& folder_;

@@ -85,10 +85,12 @@ PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t most) 
   }
   for (const Wanted& wanted : wanted_families()) {
     // A family goes before the larger errors above it, unless the file is forged.
-    if (const auto up = above(wanted.first); up && !families_.contains(*up)) continue;
+    const auto up = above(wanted.first);
+    if (up && !families_.contains(*up)) continue;
     step.cut_short = !within(step.awaited) || (room <= 0 && !within(step.drop));
     if (step.cut_short) break;
     if (room <= 0 && !drop(clearly_less * wanted.error_px)) break;
+    if (up && !families_.contains(*up)) continue;  // it was dropped: a forged file
     --room;
     if (step.awaited.empty() && within(step.load) &&
         step.load.size() + slots_per_family <= free_slots)

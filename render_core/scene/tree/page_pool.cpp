@@ -54,6 +54,7 @@ std::uint32_t PagePool::add(PagedTree& tree) {
     tree.open();
   } catch (...) {
     choice_.remove(number);
+    free_->ring();  // the pages that made room for it may come back
     throw;
   }
   trees_[number] = &tree;
@@ -89,6 +90,16 @@ bool PagePool::turn() {
 }
 
 bool PagePool::turn_locked() {
+  try {
+    return look_and_change();
+  } catch (...) {
+    const std::lock_guard lock(failure_mutex_);
+    failure_ = std::current_exception();
+    throw;
+  }
+}
+
+bool PagePool::look_and_change() {
   choice_.begin(now_s());
   for (const auto& [number, tree] : trees_)
     for (const PagedTree::Seen& seen : tree->look()) choice_.note(number, seen.cut);
@@ -99,16 +110,10 @@ bool PagePool::turn_locked() {
   for (const PageOfTree& of : step.load) changes[of.tree].load.push_back(of.page);
   for (const PageOfTree& of : step.drop) changes[of.tree].drop.push_back(of.page);
   for (const PageOfTree& of : step.awaited) changes[of.tree].awaited.push_back(of.page);
-  try {
-    for (const auto& [number, tree] : trees_) {
-      changes[number].more = step.cut_short;
-      for (const std::uint64_t page : tree->change(changes[number], readers_))
-        choice_.failed({number, page});
-    }
-  } catch (...) {
-    const std::lock_guard lock(failure_mutex_);
-    failure_ = std::current_exception();
-    throw;
+  for (const auto& [number, tree] : trees_) {
+    changes[number].more = step.cut_short;
+    for (const std::uint64_t page : tree->change(changes[number], readers_))
+      choice_.failed({number, page});
   }
   return !step.load.empty() || !step.drop.empty();
 }

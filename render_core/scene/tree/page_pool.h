@@ -47,7 +47,9 @@ class PagePool {
 
  private:
   void run(const std::stop_token& stop);
+  /// What it throws ends the pool.
   bool turn_locked();
+  bool look_and_change();
 
   const std::uint32_t slots_;
   const std::uint64_t bytes_;

@@ -133,8 +133,9 @@ void PagedTree::publish(std::span<const Page> loaded, std::span<const std::uint6
     ++count;
   }
   store_.publish(*next);
+  std::shared_ptr<const PageTable> now_old = std::move(next);  // goes without the lock
   const std::lock_guard lock(mutex_);
-  table_ = std::move(next);
+  table_.swap(now_old);
   loaded_ += count;
 }
 

@@ -77,8 +77,8 @@ Measurement measure(const RenderSetup& setup, ViewSettings settings, std::size_t
 /// Cost of the inner loop: blend time over (Gaussian, pixel) pairs blended, in nanoseconds of wall
 /// clock. Counting costs time, so pairs are counted afterwards on a few frames spread over the
 /// path; the time is that of the same frames in `measurement`. The frame before each of them is
-/// drawn first, because catgs leaves out what that one hides. Frames of the paper pipeline count as
-/// key frames, because a sub-frame blends nearly the same pairs.
+/// drawn first, because catgs leaves out what that one hides. All frames are key frames; a
+/// sub-frame of the paper pipeline blends nearly the same pairs.
 struct PairCost {
   double pairs_per_frame = 0.0;
   double ns_per_pair = 0.0;  // 0 when nothing was blended

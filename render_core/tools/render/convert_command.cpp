@@ -95,6 +95,9 @@ void convert(const ConvertOptions& options, bool quiet) {
   if (scene.cloud.size() < loaded)
     fmt::print("{} least important Gaussians were pruned\n", loaded - scene.cloud.size());
   print_notes(scene.notes);
+  if (!keeps_model(options.out, scene.cloud.model))
+    fmt::print(stderr, "note: {} cannot tell its model; write \"model\": \"{}\" into {}\n",
+               options.out, name_of(scene.cloud.model), sidecar_of(options.out).string());
   write_hints_beside(scene.hints, options.out);
 }
 

@@ -124,12 +124,16 @@ TEST_P(Kernels, NoVisibleGaussianIsCulled) {
   for (std::uint32_t i = 0; i < cloud.size(); ++i) {
     const auto mean = to_double(cloud.mean[i]);
     const double depth = math::view_depth(model, mean);
-    const double reach = math::reach_of(std::log2(static_cast<double>(cloud.opacity[i])));
-    if (static_cast<float>(depth) <= camera_.near_z || reach < 0.0 || visible.contains(i)) continue;
+    if (static_cast<float>(depth) <= camera_.near_z || visible.contains(i)) continue;
     const glm::quat& q = cloud.rotation[i];
     const double rotation[4] = {q.x, q.y, q.z, q.w};
     const auto p = math::project(
         model, mean, math::covariance_factor(rotation, to_double(cloud.scale[i])), depth);
+    double log2_opacity = std::log2(static_cast<double>(cloud.opacity[i]));
+    if (cloud.model == SplatModel::antialiased)
+      log2_opacity = math::antialiased_log2_opacity(log2_opacity, p);
+    const double reach = math::reach_of(log2_opacity);
+    if (reach < 0.0) continue;
     const auto w = math::whitening(p);
     for (int y = 0; y < camera_.size_px.y; ++y)
       for (int x = 0; x < camera_.size_px.x; ++x)

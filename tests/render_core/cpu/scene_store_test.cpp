@@ -13,7 +13,7 @@ TEST(SceneStore, ForgottenClustersGiveTheirMemoryBack) {
   constexpr std::size_t clusters = 48;
   const GaussianCloud cloud = random_cloud(cluster_size, 3, 5);
   const std::vector<math::CovarianceFactor<double>> factors(cluster_size, {1, 1, 1, 1, 1, 1});
-  SceneStore store(clusters, 3);
+  SceneStore store(clusters, 3, SplatModel::standard);
   for (std::size_t c = 0; c < clusters; ++c) store.put(c, cloud, factors, 7);
   store.forget(16, 16);
   const auto value = [&](std::size_t c) {

@@ -52,6 +52,25 @@ TEST_F(SceneResidencyTest, LoadsOnDemandOneAtATime) {
   EXPECT_EQ(residency_.bytes(), 31u) << "what it really takes";
 }
 
+TEST_F(SceneResidencyTest, FewTreesAreInMemoryAtATime) {
+  const SceneNeed tree(1000, true);
+  const auto name = [](std::size_t i) { return "tree " + std::to_string(100 + i); };
+  for (std::size_t i = 0; i <= most_scenes_in_pages; ++i) {
+    ASSERT_EQ(residency_.want(name(i), tree, now_, in_use_), Wish::awaited) << i;
+    const auto step = next();
+    ASSERT_TRUE(step) << i;
+    if (i < most_scenes_in_pages) {
+      EXPECT_THAT(step->release, IsEmpty());
+    } else {
+      EXPECT_THAT(step->release, ElementsAre(name(0))) << "the least recently used";
+    }
+    residency_.loaded(name(i), tree, now_);
+    now_ += 100s;
+  }
+  for (std::size_t i = 1; i <= most_scenes_in_pages; ++i) used_.insert(name(i));
+  EXPECT_EQ(residency_.want(name(0), tree, now_, in_use_), Wish::no_room);
+}
+
 TEST_F(SceneResidencyTest, OneWaitsWhileOneIsLoadedAndOthersAreRefused) {
   want("a", 10);
   next();

@@ -34,6 +34,9 @@ TEST_F(TreeCacheTest, NamesFollowTheContentOfAScene) {
   EXPECT_EQ(name_of("a hall.ply"), name);
   write("a hall.json", R"({"title": "A sidecar does not count"})");
   EXPECT_EQ(name_of("a hall.ply"), name);
+  write("a hall.json", R"({"title": "Its model counts", "model": "antialiased"})");
+  EXPECT_NE(name_of("a hall.ply"), name);
+  write("a hall.json", "{}");
   LoadOptions coarse;
   coarse.lod = 1;
   EXPECT_NE(name_of("a hall.ply", coarse), name);

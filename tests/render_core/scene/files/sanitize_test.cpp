@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "render_core/scene/transform.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
@@ -22,10 +23,10 @@ TEST(Sanitize, SoundCloudsPassUntouched) {
   EXPECT_EQ(cloud.sh, before.sh);
 }
 
-TEST(Sanitize, MakesSurfelsFlat) {
+TEST(Sanitize, SurfelsAreFlatAndSound) {
   GaussianCloud cloud = random_cloud(100, 0);
   const GaussianCloud before = cloud;
-  cloud.model = SplatModel::surfels;
+  flatten(cloud);
   EXPECT_EQ(sanitize(cloud, two_threads()).repaired, 0u);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     EXPECT_EQ(cloud.scale[i].x, before.scale[i].x);

@@ -105,6 +105,18 @@ TEST(GltfRefusals, NodesFormATree) {
   EXPECT_EQ(parse_gltf(parts.glb()).cloud.size(), 30u);
 }
 
+TEST(GltfRefusals, MeshesWithoutGaussiansHaveABoundToo) {
+  EXPECT_THAT(error_of([](Json& j) {
+                const Json primitives(1000, Json::object());
+                j["meshes"].push_back({{"primitives", primitives}});
+                for (std::size_t i = 1; i <= 100; ++i) {
+                  j["nodes"].push_back({{"mesh", 1}});
+                  j["scenes"][0]["nodes"].push_back(i);
+                }
+              }),
+              HasSubstr("is one of more than 65536 at nodes"));
+}
+
 TEST(GltfRefusals, ASmallFileIsNoLargeScene) {
   // Each use of a mesh is a copy of its Gaussians.
   EXPECT_THAT(error_of([](Json& j) {

@@ -212,6 +212,22 @@ TEST(PageChoice, AnyWishesKeepItsRules) {
 
 // Wishes at rest, for far more than there is room for: memory fills, comes to rest, and nothing is
 // read twice on the way.
+// Errors grow towards the root, but a forged file may say something else.
+TEST(PageChoice, ForgedErrorsKeepItsRules) {
+  Memory memory(PageChoice::least_slots);  // one family fits
+  Cut first;
+  memory.want(1, 1.0f, first);
+  memory.turn(first);
+  ASSERT_TRUE(memory.holds(1));
+  std::uint64_t below = 2;
+  while (memory.above(below) != 1) ++below;
+  Cut forged;
+  forged.used.push_back({1, 1.0f});
+  forged.missing.push_back({below, 100.0f});
+  for (int turn = 0; turn < 3; ++turn) memory.turn(forged);
+  EXPECT_FALSE(memory.holds(below)) << "the page above made room for it";
+}
+
 TEST(PageChoice, AtRestNothingIsLoadedTwice) {
   std::mt19937_64 random(8);
   for (const std::uint32_t slots : {6u, 11u, 50u, 120u}) {
