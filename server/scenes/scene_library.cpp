@@ -187,6 +187,7 @@ std::shared_ptr<const SceneEntry> SceneLibrary::load_now(const FoundScene& found
     if (!trees_.form_of(found)) trees_.build_now(found);
   } catch (const InputError& error) {
     trees_.give_up(found, error.what());
+    throw;  // as a whole it does not fit
   }
   return load_as(trees_.form_of(found).value_or(SceneForm()));
 }

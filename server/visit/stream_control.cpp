@@ -19,7 +19,15 @@ bool StreamControl::begin(Admission admission, const Hello& hello) {
 
 void StreamControl::enter_scene(std::shared_ptr<const SceneEntry> scene) {
   scene_ = std::move(scene);
+  former_.reset();
+  keeps_form_ = false;
   welcome_due_ = true;
+}
+
+void StreamControl::redraw(std::shared_ptr<const SceneEntry> scene) {
+  if (keeps_form_) return;
+  former_ = std::exchange(scene_, std::move(scene));
+  open();
 }
 
 void StreamControl::open() {
@@ -41,8 +49,14 @@ void StreamControl::on_opened(const StreamOpened& opened) {
   assert(opening());
   use_ = Use::none;
   if (opened.fault == Fault::encoder_unavailable && change_encoder(opened.fault)) return;
+  if (!opened.ok && former_) {
+    scene_ = std::exchange(former_, nullptr);
+    keeps_form_ = true;
+    return open();
+  }
   if (!opened.ok) return;
   if (outdated_) return open();
+  former_.reset();
   config_.codec = opened.codec;
   config_.codec_string = opened.codec_string;
   config_.encoder = encoder_.text;

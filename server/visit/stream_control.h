@@ -21,11 +21,9 @@ class StreamControl {
   bool begin(Admission admission, const Hello& hello);
   /// Switches to another scene. open() must follow.
   void enter_scene(std::shared_ptr<const SceneEntry> scene);
-  /// Goes on with another form of the same scene, between two frames. The client need not know.
-  void redraw(std::shared_ptr<const SceneEntry> scene) {
-    scene_ = std::move(scene);
-    open();
-  }
+  /// Goes on with another form of the same scene, between two frames. The client need not know. If
+  /// that form cannot be opened, the stream keeps the one that it has.
+  void redraw(std::shared_ptr<const SceneEntry> scene);
   /// Opens the stream, or reopens it as soon as it is ready().
   void open();
   /// The result of open(). `opened` counts only if the stream is not opening() again afterwards.
@@ -74,6 +72,8 @@ class StreamControl {
   VisitHost& host_;
   PicturePlan plan_;
   std::shared_ptr<const SceneEntry> scene_;
+  std::shared_ptr<const SceneEntry> former_;  // its form until the new one is open
+  bool keeps_form_ = false;                   // a new form could not be opened
   EncoderChoice encoder_;
   Use use_ = Use::none;
   bool outdated_ = false;  // another stream was requested while this one was in use

@@ -88,6 +88,10 @@ std::span<const PagedTree::Seen> PagedTree::look() {
     if (number == 0) continue;  // it has not looked yet
     Cut cut =
         table_->cut(lookout.cameras, lookout.detail_px, std::numeric_limits<double>::infinity());
+    // What cannot be read is not on its way, and no memory is short of it.
+    std::erase_if(cut.missing, [this](const PageUse& use) {
+      return broken_.contains(shape().family_of(use.page));
+    });
     seen_.push_back({std::move(watch), number, lookout.at_once, std::move(cut)});
   }
   return seen_;
@@ -98,7 +102,10 @@ std::vector<std::uint64_t> PagedTree::change(const PageChanges& changes, ThreadP
   if (!changes.load.empty() || !changes.drop.empty()) {
     const std::vector<Page> loaded = read(changes.load, readers);
     for (std::size_t i = 0; i < loaded.size(); ++i)
-      if (!loaded[i]) failed.push_back(changes.load[i]);
+      if (!loaded[i]) {
+        failed.push_back(changes.load[i]);
+        broken_.insert(shape().family_of(changes.load[i]));
+      }
     publish(loaded, changes.drop);
   }
   std::unordered_set<std::uint64_t> changing;

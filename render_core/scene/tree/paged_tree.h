@@ -5,6 +5,7 @@
 #include <mutex>
 #include <span>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "render_core/base/thread_pool.h"
@@ -92,7 +93,8 @@ class PagedTree {
   const std::shared_ptr<PagePool> pool_;
   const std::shared_ptr<TreeFile> file_;
   PageStore& store_;
-  std::vector<Seen> seen_;  // in this turn
+  std::vector<Seen> seen_;                    // in this turn
+  std::unordered_set<std::uint64_t> broken_;  // families with a page that cannot be read
 
   mutable std::mutex mutex_;  // guards the next three
   std::shared_ptr<const PageTable> table_;

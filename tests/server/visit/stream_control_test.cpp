@@ -78,6 +78,23 @@ TEST_F(StreamControlTest, AnotherFormOfItsSceneNeedsNoWelcome) {
   EXPECT_TRUE(stream.begin_frame(false, now).force_idr);
 }
 
+TEST_F(StreamControlTest, AFormThatCannotBeOpenedLeavesTheOneThatItHas) {
+  begin();
+  const SceneEntry* const whole = stream.scene();
+  const auto tree = test::named_scene("a");
+  stream.redraw(tree);
+  EXPECT_EQ(stream.scene(), tree.get());
+  stream.on_opened({.ok = false, .message = "no memory"});
+  EXPECT_TRUE(stream.opening()) << "it goes back";
+  EXPECT_EQ(stream.scene(), whole);
+  opened();
+  EXPECT_TRUE(stream.ready());
+  const std::size_t tries = host.opened.size();
+  stream.redraw(tree);
+  EXPECT_EQ(host.opened.size(), tries) << "it is not tried again";
+  EXPECT_EQ(stream.scene(), whole);
+}
+
 TEST_F(StreamControlTest, WhatIsWantedWhileItIsInUseIsOpenedAfterwards) {
   begin();
   stream.begin_frame(false, now);

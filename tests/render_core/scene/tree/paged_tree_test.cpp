@@ -279,6 +279,7 @@ TEST_F(PagedTreeTest, DamagedPagesCostDetailOfTheirTreeOnly) {
   EXPECT_FALSE(damaged.cut(camera).drawn.empty());
   EXPECT_FALSE(damaged.cut(camera).missing.empty());
   EXPECT_TRUE(damaged.comes_to_rest());
+  EXPECT_EQ(damaged.tree.figures().missing, 0u) << "no memory is short of it";
   EXPECT_EQ(sound.tree.figures().unreadable, 0u);
   EXPECT_TRUE(sound.cut(camera).missing.empty());
 }
