@@ -84,7 +84,10 @@ TEST_F(StreamControlTest, AFormThatCannotBeOpenedLeavesTheOneThatItHas) {
   const auto tree = test::named_scene("a");
   stream.redraw(tree);
   EXPECT_EQ(stream.scene(), tree.get());
-  stream.on_opened({.ok = false, .message = "no memory"});
+  StreamOpened refused;
+  refused.ok = false;
+  refused.message = "no memory";
+  stream.on_opened(refused);
   EXPECT_TRUE(stream.opening()) << "it goes back";
   EXPECT_EQ(stream.scene(), whole);
   opened();
