@@ -166,7 +166,7 @@ class Renderer {
   /// Bytes of the scene on one device; each device holds its own copy. Of a scene in pages, the
   /// memory for pages, which it may share with others.
   [[nodiscard]] virtual std::size_t scene_bytes() const = 0;
-  /// Of a scene in pages: its pages on each device. May be called from any thread.
+  /// The pages of a scene in pages, on each device. May be called from any thread.
   [[nodiscard]] virtual std::vector<PageFigures> pages() const { return {}; }
   /// May be called from any thread. Throws where the device has no room left for the View.
   [[nodiscard]] virtual std::unique_ptr<View> make_view(const ViewSettings& settings) = 0;

@@ -8,8 +8,8 @@
 
 namespace catgs {
 
-/// What the Gaussians of a scene were trained to be. Drawing them as another model is visibly
-/// wrong.
+/// The model says what the Gaussians of a scene were trained to be. Drawing them as another one is
+/// visibly wrong.
 enum class SplatModel : std::uint8_t {
   standard,     // the original 3DGS: the low-pass filter widens a Gaussian and keeps its peak
   antialiased,  // Mip-Splatting: it keeps the Gaussian's sum, see antialiased_log2_opacity()

@@ -42,7 +42,7 @@ struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::binary_little_endian;
   std::vector<PlyElement> elements;
   std::uint64_t bytes = 0;  // the data begins here
-  /// Of the comments "SplatRenderMode: default|mip|2dgs" (Brush) and "antialiased 0|1" (Postshot).
+  /// Comments tell it: "SplatRenderMode: default|mip|2dgs" (Brush), "antialiased 0|1" (Postshot).
   std::optional<SplatModel> model;
 
   [[nodiscard]] const PlyElement* find(std::string_view element) const;

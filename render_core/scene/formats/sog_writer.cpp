@@ -99,7 +99,7 @@ class Writer {
 
   /// The files of the archive.
   std::map<std::string, std::string> files() {
-    // What each step stores has a name of its own, so the steps share nothing. The longest is
+    // The steps share nothing, because each stores under names of its own. The longest is
     // first.
     std::vector<std::function<void()>> steps;
     if (cloud_.sh_degree > 0) steps.emplace_back([this] { rest(); });

@@ -96,7 +96,7 @@ class UnsharedFiles final : public FileSet {
     return file;
   }
   [[nodiscard]] std::uint64_t packed_bytes() const override { return folder_.packed_bytes(); }
-  /// Of the files, but no more than those of the archive that they are in.
+  /// The bytes of the files, but no more than their archive has.
   [[nodiscard]] std::uint64_t bytes() const { return std::min(bytes_, packed_bytes()); }
 
  private:

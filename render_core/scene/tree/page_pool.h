@@ -47,7 +47,7 @@ class PagePool {
 
  private:
   void run(const std::stop_token& stop);
-  /// What it throws ends the pool.
+  /// An exception ends the pool.
   bool turn_locked();
   bool look_and_change();
 
