@@ -20,7 +20,9 @@ class CpuRenderer final : public Renderer {
     return "CPU, " + std::string(scene_->kernels.name) + ", " + std::to_string(threads) +
            (threads == 1 ? " thread" : " threads");
   }
-  std::size_t scene_bytes() const override { return scene_->store().bytes(); }
+  std::size_t scene_bytes() const override {
+    return scene_->tree ? scene_->tree->figures().pool_bytes : scene_->store().bytes();
+  }
   std::vector<PageFigures> pages() const override {
     if (!scene_->tree) return {};
     return {scene_->tree->figures()};

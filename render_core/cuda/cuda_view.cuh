@@ -27,6 +27,7 @@ class CudaView final : public View {
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override;
   [[nodiscard]] std::vector<std::uint32_t> tile_loads() const override;
   [[nodiscard]] std::size_t memory_bytes() const override;
+  [[nodiscard]] bool outdated() const override { return paged_ && paged_->outdated(); }
 
  private:
   void set_shape(glm::ivec2 size_px, int tile_side);

@@ -32,7 +32,7 @@ __device__ bool is_hidden(const CullParams& p, const Cluster& cluster) {
 __global__ void __launch_bounds__(block_size) sight_kernel(const CullParams p) {
   const std::uint32_t n = blockIdx.x * block_size + threadIdx.x;
   if (n >= p.count()) return;
-  const std::uint32_t c = p.cut ? p.cut->cluster_of(n) : n;
+  const std::uint32_t c = p.cut ? p.cut->tree.cluster_of(n) : n;
   bool drawn = true;
   if (p.cut) {
     const float share = p.cut->share_of(p.scene.clusters, n);
@@ -52,10 +52,9 @@ __global__ void __launch_bounds__(block_size) sight_kernel(const CullParams p) {
 
 /// The cluster that is the n-th that a frame looks at.
 struct ClusterAt {
-  const PageEntry* pages;  // null: clusters are looked at in their order
+  TreeArrays tree;  // without pages, clusters are looked at in their order
   __device__ std::uint32_t operator()(std::uint32_t n) const {
-    if (pages == nullptr) return n;
-    return pages[n / clusters_per_slot].slot * clusters_per_slot + n % clusters_per_slot;
+    return tree.pages == nullptr ? n : tree.cluster_of(n);
   }
 };
 
@@ -134,8 +133,7 @@ std::uint32_t cull_words(std::uint32_t cluster_count) { return cluster_count * w
 
 std::size_t cull_scratch_bytes(std::uint32_t cluster_count) {
   std::size_t select = 0, sum = 0;
-  check(select_clusters(nullptr, select, {nullptr}, nullptr, nullptr, nullptr, cluster_count,
-                        nullptr),
+  check(select_clusters(nullptr, select, {}, nullptr, nullptr, nullptr, cluster_count, nullptr),
         "cull scratch size");
   check(sum_seen(nullptr, sum, {nullptr, nullptr}, nullptr, cluster_count, nullptr),
         "cull scratch size");
@@ -148,7 +146,7 @@ void launch_cull(const CullParams& p, cudaStream_t stream) {
   sight_kernel<<<blocks_for(count, block_size), block_size, 0, stream>>>(p);
   check_launch("clusters in sight");
   std::size_t bytes = p.scratch.bytes;
-  check(select_clusters(p.scratch.memory, bytes, {p.cut ? p.cut->tree.pages : nullptr}, p.seen,
+  check(select_clusters(p.scratch.memory, bytes, {p.cut ? p.cut->tree : TreeArrays{}}, p.seen,
                         p.clusters, &p.counts->clusters, count, stream),
         "cull clusters");
   const std::uint32_t blocks =

@@ -35,6 +35,9 @@ struct TreeArrays {
   const float* errors = nullptr;  // [cluster], world units; negative: there is no such node
 
   [[nodiscard]] CATGS_HD std::uint32_t nodes() const { return page_count * clusters_per_slot; }
+  [[nodiscard]] CATGS_HD std::uint32_t cluster_of(std::uint32_t n) const {
+    return pages[n / clusters_per_slot].slot * clusters_per_slot + n % clusters_per_slot;
+  }
 };
 
 /// A cut of a tree: choose_cut() for each node by itself.
@@ -45,9 +48,6 @@ struct TreeCut {
   double now_s;
   float* share;  // [cluster], the part of each node that is drawn
 
-  __device__ std::uint32_t cluster_of(std::uint32_t n) const {
-    return tree.pages[n / clusters_per_slot].slot * clusters_per_slot + n % clusters_per_slot;
-  }
   __device__ std::uint32_t level_of(std::uint32_t n) const {
     const int depth = 31 - __clz(static_cast<int>(n % clusters_per_slot + 1));
     return tree.pages[n / clusters_per_slot].top_level - static_cast<std::uint32_t>(depth);
@@ -67,7 +67,7 @@ struct TreeCut {
   __device__ float share_of(const Cluster* clusters, std::uint32_t n) const {
     const std::uint32_t in_page = n % clusters_per_slot;
     const PageEntry& page = tree.pages[n / clusters_per_slot];
-    const std::uint32_t c = page.slot * clusters_per_slot + in_page;
+    const std::uint32_t c = tree.cluster_of(n);
     const float shown = shown_share(now_s - page.shown_since_s);
     if (shown <= 0.0f || tree.errors[c] < 0.0f) return 0.0f;
     const std::uint32_t above = in_page == 0 ? page.above : c - in_page + (in_page - 1) / 2;

@@ -111,7 +111,7 @@ void SceneTrees::start_next() {
   logged_ = running_->started;
   changed_ = true;
   log_info({.event = "tree_building", .scene = running_->scene.id},
-           "scene {}: its tree is built from {}", running_->scene.id,
+           "scene {}: building its tree from {}", running_->scene.id,
            running_->scene.path.string());
   boost::asio::post(*builder_, [this, running = running_] {
     run_in_background();
@@ -148,7 +148,7 @@ void SceneTrees::build(const FoundScene& scene, const std::function<void(double)
 
 void SceneTrees::build_now(const FoundScene& scene) {
   log_info({.event = "tree_building", .scene = scene.id},
-           "scene {} does not fit into --scene-memory: its tree is built first", scene.id);
+           "scene {} does not fit into --scene-memory: building its tree first", scene.id);
   TimePoint logged = clock_();
   build(scene, [&](double progress) {
     if (clock_() - logged < progress_interval) return;
@@ -170,7 +170,7 @@ void SceneTrees::on_built(const Build& build, const std::string& error) {
   } else if (!build.cancelled) {
     metrics_.trees_built.Increment();
     log_info({.event = "tree_built", .scene = scene.id},
-             "scene {}: its tree is built after {:.1f} s", scene.id,
+             "scene {}: its tree is ready after {:.1f} s", scene.id,
              std::chrono::duration<double>(clock_() - build.started).count());
   }
   running_.reset();

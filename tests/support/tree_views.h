@@ -28,7 +28,7 @@ struct TreeScenes {
         std::make_shared<const GaussianCloud>(read_tree(source_of(bytes), LoadContext(pool)).cloud);
   }
   [[nodiscard]] std::shared_ptr<TreeFile> tree() const {
-    return std::make_shared<TreeFile>(source_of(bytes), std::size_t{1} << 26);
+    return std::make_shared<TreeFile>(source_of(bytes));
   }
   [[nodiscard]] std::unique_ptr<Renderer> in_pages(RendererKind kind,
                                                    std::uint64_t memory_bytes = std::uint64_t{1}

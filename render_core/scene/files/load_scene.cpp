@@ -134,7 +134,6 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
 SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options,
                            const std::filesystem::path& made_of) {
   constexpr std::uint64_t outline_gaussians = 1'000'000;
-  constexpr std::size_t memory_bytes = std::size_t{64} << 20;  // of pages on their way to a core
   const SceneLocation location = locate_scene(path);
   if (location.kind != SceneLocation::Kind::file || !is_tree(FileSource(location.path)))
     throw InputError(path.string(), "", "is no tree, so it has no detail to choose",
@@ -143,8 +142,7 @@ SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions&
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const LoadContext context(*pool, options.progress);
   SceneInPages scene;
-  scene.tree =
-      std::make_shared<TreeFile>(std::make_unique<FileSource>(location.path), memory_bytes);
+  scene.tree = std::make_shared<TreeFile>(std::make_unique<FileSource>(location.path));
   SplatModel model = scene.tree->model();
   use_model(named.hints, options.model, model, scene.outline.notes);
   if (model == SplatModel::surfels && scene.tree->model() != model)

@@ -23,8 +23,11 @@
 namespace catgs {
 namespace {
 
-/// Pages of leaves that are made at a time: work for every thread, from 120 MB of Gaussians.
-constexpr std::size_t pages_at_a_time = 256;
+/// Pages of leaves that are made at a time: work for every thread, and progress that is seen.
+std::size_t pages_at_a_time(const ThreadPool& pool) {
+  constexpr std::size_t least = 16, of_a_thread = 8;
+  return std::max(least, of_a_thread * static_cast<std::size_t>(pool.threads()));
+}
 
 /// The first reading of a scene finds its extent. It keeps the parts where all of them fit into
 /// memory.
@@ -263,7 +266,7 @@ TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
   PageStream pages(shape, file.stream(), pool);
   GaussianCloud gaussians;
   for (done = 0; done < first.gaussians; done += gaussians.size()) {
-    sorter.next(pages_at_a_time * pages.gaussians_of_a_page(), gaussians);
+    sorter.next(pages_at_a_time(pool) * pages.gaussians_of_a_page(), gaussians);
     pages.add(gaussians);
     context.report(sorted + (1.0 - sorted) * share());
   }

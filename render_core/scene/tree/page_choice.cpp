@@ -41,7 +41,6 @@ void PageChoice::remove(std::uint32_t tree) {
   trees_.erase(tree);
   std::erase_if(families_, [=](const auto& family) { return family.first.tree == tree; });
   std::erase_if(wanted_, [=](const auto& wanted) { return wanted.first.tree == tree; });
-  std::erase_if(unreadable_, [=](const PageOfTree& first) { return first.tree == tree; });
 }
 
 void PageChoice::begin(double now_s) {
@@ -60,7 +59,7 @@ void PageChoice::note(std::uint32_t tree, const Cut& cut) {
   }
   for (const PageUse& use : cut.missing) {
     const PageOfTree first = family_of({tree, use.page});
-    if (unreadable_.contains(first) || families_.contains(first)) continue;
+    if (families_.contains(first)) continue;
     float& error = wanted_[first];
     error = std::max(error, use.error_px);
   }
@@ -153,9 +152,8 @@ bool PageChoice::drop_one(Victims& victims, std::optional<float> below_px,
 
 void PageChoice::failed(const PageOfTree& page) {
   const PageOfTree first = family_of(page);
-  if (!unreadable_.insert(first).second) return;
+  if (families_.erase(first) == 0) return;  // its other page cannot be read either
   if (const auto up = above(first)) --families_.at(*up).families_below;
-  families_.erase(first);
 }
 
 PageOfTree PageChoice::family_of(const PageOfTree& page) const {

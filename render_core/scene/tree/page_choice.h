@@ -8,7 +8,6 @@
 #include <optional>
 #include <queue>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "render_core/scene/tree/cut.h"
@@ -57,8 +56,8 @@ class PageChoice {
   /// `free_slots`: those that may be written now. Fewer than there should be are free while frames
   /// still need pages that were dropped. At most `most` pages are loaded, and as many dropped.
   [[nodiscard]] Step next(std::uint32_t free_slots, std::uint32_t most);
-  /// A page of the last step's `load` cannot be read, so its family is not in memory, and is not
-  /// asked for again.
+  /// A page of the last step's `load` cannot be read, so its family is not in memory. Cuts that are
+  /// noted from now on must not miss it.
   void failed(const PageOfTree& page);
 
  private:
@@ -107,7 +106,6 @@ class PageChoice {
   std::map<std::uint32_t, const TreeShape*> trees_;
   std::unordered_map<PageOfTree, Family, Hash> families_;  // in memory, by their first page
   std::unordered_map<PageOfTree, float, Hash> wanted_;     // of this turn, by first page; error
-  std::unordered_set<PageOfTree, Hash> unreadable_;        // by first page
 };
 
 }  // namespace catgs

@@ -14,8 +14,8 @@
 namespace catgs {
 namespace {
 
-constexpr std::size_t nodes_at_a_time = 8;
-constexpr float least_scale = 1e-10f;  // as in sanitize()
+constexpr std::size_t nodes_at_a_time = 16;  // the last row of a page
+constexpr float least_scale = 1e-10f;        // as in sanitize()
 
 void read_node(const TreePage& page, std::size_t slot, GaussianCloud& cloud, std::size_t first) {
   const NodeFacts& facts = page.facts(slot);
@@ -28,29 +28,37 @@ void read_node(const TreePage& page, std::size_t slot, GaussianCloud& cloud, std
   }
 }
 
-std::shared_ptr<const TreePage> page_of(TreeFile& tree, NodeId node) {
-  const auto page = tree.page(tree.shape().page_of(node));
-  if (!page) throw InputError("", "", tree.damage().first);
-  return page;
+/// Calls visit(page, slot, n) for each node n of `nodes`. Reads a page once for all that follow
+/// each other. Throws InputError if it is damaged.
+template <class Visit>
+void for_each_node(TreeFile& tree, std::span<const NodeId> nodes, const LoadContext& context,
+                   const Visit& visit) {
+  const TreeShape& shape = tree.shape();
+  context.for_blocks(nodes.size(), nodes_at_a_time, [&](auto begin, auto end) {
+    std::unique_ptr<const TreePage> page;
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::uint64_t number = shape.page_of(nodes[n]);
+      if (n == begin || number != shape.page_of(nodes[n - 1])) page = tree.page(number);
+      if (!page) throw InputError("", "", tree.damage().first);
+      visit(*page, shape.slot_of(nodes[n]), n);
+    }
+  });
 }
 
 }  // namespace
 
 GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes,
                          const LoadContext& context) {
-  const TreeShape& shape = tree.shape();
   std::vector<std::size_t> first(nodes.size() + 1, 0);
-  context.part(0.0, 0.5).for_blocks(nodes.size(), nodes_at_a_time, [&](auto begin, auto end) {
-    for (std::size_t n = begin; n < end; ++n)
-      first[n + 1] = page_of(tree, nodes[n])->facts(shape.slot_of(nodes[n])).count;
+  for_each_node(tree, nodes, context.part(0.0, 0.5), [&](const auto& page, auto slot, auto n) {
+    first[n + 1] = page.facts(slot).count;
   });
   for (std::size_t n = 0; n < nodes.size(); ++n) first[n + 1] += first[n];
   GaussianCloud cloud;
-  cloud.resize(first.back(), shape.sh_degree());
+  cloud.resize(first.back(), tree.shape().sh_degree());
   cloud.model = tree.model();
-  context.part(0.5, 1.0).for_blocks(nodes.size(), nodes_at_a_time, [&](auto begin, auto end) {
-    for (std::size_t n = begin; n < end; ++n)
-      read_node(*page_of(tree, nodes[n]), shape.slot_of(nodes[n]), cloud, first[n]);
+  for_each_node(tree, nodes, context.part(0.5, 1.0), [&](const auto& page, auto slot, auto n) {
+    read_node(page, slot, cloud, first[n]);
   });
   return cloud;
 }
@@ -101,8 +109,7 @@ TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadCont
 }
 
 TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context) {
-  constexpr std::size_t memory_bytes = std::size_t{64} << 20;
-  TreeFile tree(std::move(file), memory_bytes);
+  TreeFile tree(std::move(file));
   if (tree.shape().gaussians() > max_gaussians)
     throw InputError(tree.name(), "",
                      fmt::format("has {} Gaussians, at most {} are loaded at once",

@@ -75,55 +75,33 @@ TreeHeader read_tree_header(const ByteSource& file) {
   return header;
 }
 
-TreeFile::TreeFile(std::unique_ptr<const ByteSource> file, std::size_t memory_bytes)
+TreeFile::TreeFile(std::unique_ptr<const ByteSource> file)
     : file_(std::move(file)),
       header_(read_tree_header(*file_)),
-      shape_(header_.gaussians, static_cast<int>(header_.sh_degree)),
-      most_pages_(std::max<std::size_t>(1, memory_bytes / shape_.page_bytes())) {}
+      shape_(header_.gaussians, static_cast<int>(header_.sh_degree)) {}
 
 std::uint64_t TreeFile::pages_in_file() const {
   const std::uint64_t size = std::max<std::uint64_t>(file_->size(), TreeShape::header_bytes);
   return std::min(shape_.pages(), (size - TreeShape::header_bytes) / shape_.page_bytes());
 }
 
-std::shared_ptr<const TreePage> TreeFile::page(std::uint64_t number) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (const auto found = by_number_.find(number); found != by_number_.end()) {
-      held_.splice(held_.begin(), held_, found->second);
-      return found->second->page;
-    }
-  }
-  // Two threads may read the same page; the second one's copy is dropped.
-  std::shared_ptr<const TreePage> page = read(number);
-  const std::lock_guard lock(mutex_);
-  if (const auto found = by_number_.find(number); found != by_number_.end())
-    return found->second->page;
-  held_.push_front({number, page});
-  by_number_[number] = held_.begin();
-  if (held_.size() > most_pages_) {
-    by_number_.erase(held_.back().number);
-    held_.pop_back();
-  }
-  return page;
-}
-
-std::shared_ptr<const TreePage> TreeFile::read(std::uint64_t number) {
+std::unique_ptr<const TreePage> TreeFile::page(std::uint64_t number) {
   try {
-    auto page = std::make_shared<TreePage>(shape_);
+    auto page = std::make_unique<TreePage>(shape_);
     file_->read(shape_.page_offset(number), page->bytes());
     page->check(number, file_->name());
     return page;
   } catch (const InputError& e) {
     const std::lock_guard lock(mutex_);
-    if (damage_.pages++ == 0) damage_.first = e.what();
+    if (damaged_.empty()) first_damage_ = e.what();
+    damaged_.insert(number);
     return nullptr;
   }
 }
 
 TreeFile::Damage TreeFile::damage() const {
   const std::lock_guard lock(mutex_);
-  return damage_;
+  return {damaged_.size(), first_damage_};
 }
 
 }  // namespace catgs

@@ -2,11 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <unordered_map>
+#include <unordered_set>
 
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/scene.h"
@@ -48,14 +47,13 @@ bool is_tree(const ByteSource& file);
 /// Reads the header. Throws InputError naming the field that is wrong. Pages may be missing.
 TreeHeader read_tree_header(const ByteSource& file);
 
-/// The pages of a tree in host memory: read when they are asked for, checked as they are read, and
-/// let go in the order of their last use. Thread-safe. Pages are read, not mapped, for the reasons
-/// that ByteSource gives; the system's cache holds what was read lately anyway.
+/// The pages of a tree, read when they are asked for, and checked as they are read. Thread-safe.
+/// Pages are read, not mapped, for the reasons that ByteSource gives. None is kept here, because
+/// the system's cache holds what was read lately.
 class TreeFile {
  public:
-  /// `memory_bytes` bounds the pages held here; those that callers hold count no more. Throws
-  /// InputError as read_tree_header() does.
-  TreeFile(std::unique_ptr<const ByteSource> file, std::size_t memory_bytes);
+  /// Throws InputError as read_tree_header() does.
+  explicit TreeFile(std::unique_ptr<const ByteSource> file);
 
   [[nodiscard]] const std::string& name() const { return file_->name(); }
   [[nodiscard]] const TreeHeader& header() const { return header_; }
@@ -68,7 +66,7 @@ class TreeFile {
   [[nodiscard]] std::uint64_t pages_in_file() const;
 
   /// A page of [0, shape().pages()); null if it is damaged or missing.
-  std::shared_ptr<const TreePage> page(std::uint64_t number);
+  std::unique_ptr<const TreePage> page(std::uint64_t number);
 
   struct Damage {
     std::uint64_t pages = 0;  // that were asked for and could not be used
@@ -77,20 +75,12 @@ class TreeFile {
   [[nodiscard]] Damage damage() const;
 
  private:
-  struct Held {
-    std::uint64_t number;
-    std::shared_ptr<const TreePage> page;  // null: damaged
-  };
-  std::shared_ptr<const TreePage> read(std::uint64_t number);
-
   std::unique_ptr<const ByteSource> file_;
   TreeHeader header_;
   TreeShape shape_;
-  std::size_t most_pages_;
-  mutable std::mutex mutex_;
-  std::list<Held> held_;  // latest use first
-  std::unordered_map<std::uint64_t, std::list<Held>::iterator> by_number_;
-  Damage damage_;
+  mutable std::mutex mutex_;  // guards the rest
+  std::unordered_set<std::uint64_t> damaged_;
+  std::string first_damage_;
 };
 
 }  // namespace catgs

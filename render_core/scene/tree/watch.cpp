@@ -40,13 +40,20 @@ void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double no
   turned_ = number;
   missing_ = static_cast<std::uint32_t>(cut.missing.size());
   coarsest_px_ = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
-  changes_ = changes;
-  if (changes_ && !lookout_.at_once) blends_until_s_ = now_s + all_shown_s;
+  changing_ = changes;
+  if (!changes) return;
+  ++changes_;
+  if (!lookout_.at_once) blends_until_s_ = now_s + all_shown_s;
 }
 
 bool Watch::waits(double now_s) const {
   const std::lock_guard lock(mutex_);
-  return turned_ != number_ || changes_ || now_s < blends_until_s_;
+  return turned_ != number_ || changing_ || now_s < blends_until_s_;
+}
+
+std::uint64_t Watch::changes() const {
+  const std::lock_guard lock(mutex_);
+  return changes_;
 }
 
 std::uint32_t Watch::missing() const {

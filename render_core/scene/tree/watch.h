@@ -42,6 +42,8 @@ class Watch {
   /// Whether the next frame for the same lookout may look better than one at `now_s`, in the pool's
   /// time: pages are still being read or blended in.
   [[nodiscard]] bool waits(double now_s) const;
+  /// Number of turns in which changes of its cuts have begun or gone on.
+  [[nodiscard]] std::uint64_t changes() const;
   /// Number of pages that were missing of late: they are being read, or find no room.
   [[nodiscard]] std::uint32_t missing() const;
   /// The largest error that is drawn for want of them, px.
@@ -52,7 +54,8 @@ class Watch {
   mutable std::mutex mutex_;  // guards the rest
   Lookout lookout_;
   std::uint64_t number_ = 0, turned_ = 0;  // of lookout_, and of the last one that was looked at
-  bool changes_ = false;
+  bool changing_ = false;
+  std::uint64_t changes_ = 0;
   double blends_until_s_ = 0.0;
   std::uint32_t missing_ = 0;
   float coarsest_px_ = 0.0f;

@@ -80,7 +80,7 @@ void require_sound_cut(TreeFile& tree) {
 void parse_tree(Bytes input) {
   std::string file = expanded(input);
   seal(file);
-  TreeFile tree(test::source_of(file), 4 * most_bytes);
+  TreeFile tree(test::source_of(file));
   require_sound_cut(tree);
   const TreeScene scene = read_tree(test::source_of(file), one_thread());
   require(scene.cloud.size() <= tree.shape().gaussians(),

@@ -12,7 +12,7 @@ namespace {
 
 __global__ void find_shares(const TreeCut cut, const Cluster* clusters) {
   const std::uint32_t n = blockIdx.x * blockDim.x + threadIdx.x;
-  if (n < cut.tree.nodes()) cut.share[cut.cluster_of(n)] = cut.share_of(clusters, n);
+  if (n < cut.tree.nodes()) cut.share[cut.tree.cluster_of(n)] = cut.share_of(clusters, n);
 }
 
 /// The share of each node that the walk on the host draws, by its place on the device.
@@ -30,8 +30,7 @@ TEST_F(TreeCutStage, SharesAreThoseOfTheWalk) {
   for (const int degree : {0, 3}) {
     ThreadPool pool(2);
     const auto tree = std::make_shared<TreeFile>(
-        test::source_of(test::tree_bytes(test::random_cloud(100'000, degree, 31), pool)),
-        std::size_t{1} << 26);
+        test::source_of(test::tree_bytes(test::random_cloud(100'000, degree, 31), pool)));
     // One device has room for all pages, and one for a third of them.
     const std::uint64_t all = tree->shape().pages() * tree->shape().page_bytes();
     for (const std::uint64_t memory : {2 * all, all / 3}) {

@@ -30,7 +30,7 @@ TEST(BuildTree, TheBytesDependOnTheSceneAlone) {
 TEST(BuildTree, LeavesAreTheClustersThatTheCoresMake) {
   ThreadPool pool(2);
   const GaussianCloud cloud = random_cloud(5'000, 3, 4);
-  TreeFile tree(source_of(tree_bytes(cloud, pool)), std::size_t{1} << 24);
+  TreeFile tree(source_of(tree_bytes(cloud, pool)));
   const auto order = morton_order(cloud.mean, pool);
   for (std::uint32_t l = 0; l < tree.shape().leaves(); ++l) {
     const std::size_t first = l * cluster_size;
@@ -49,7 +49,7 @@ TEST(BuildTree, LeavesAreTheClustersThatTheCoresMake) {
 
 TEST(BuildTree, LevelsGetCoarserAndTheHeaderCountsThem) {
   ThreadPool pool(2);
-  TreeFile tree(source_of(tree_bytes(random_cloud(100'000, 0, 5), pool)), std::size_t{1} << 26);
+  TreeFile tree(source_of(tree_bytes(random_cloud(100'000, 0, 5), pool)));
   const TreeShape& shape = tree.shape();
   ASSERT_EQ(shape.levels(), 10);  // 391 leaves
   EXPECT_EQ(tree.header().dropped, 3u);
@@ -59,7 +59,7 @@ TEST(BuildTree, LevelsGetCoarserAndTheHeaderCountsThem) {
     float max_error = 0.0f;
     for (std::uint32_t i = 0; i < shape.nodes_on(level); ++i) {
       const NodeId node{static_cast<std::uint8_t>(level), i};
-      const auto& facts = tree.page(shape.page_of(node))->facts(shape.slot_of(node));
+      const NodeFacts facts = tree.page(shape.page_of(node))->facts(shape.slot_of(node));
       gaussians += facts.count;
       max_error = std::max(max_error, facts.error);
     }

@@ -19,8 +19,7 @@ namespace {
 class SomePages {
  public:
   SomePages(std::size_t gaussians, int degree, std::uint64_t seed)
-      : file_(source_of(tree_bytes(random_cloud(gaussians, degree, seed), pool_)),
-              std::size_t{1} << 28),
+      : file_(source_of(tree_bytes(random_cloud(gaussians, degree, seed), pool_))),
         resident_(file_.shape().pages(), true),
         shown_(file_.shape().pages(), 1.0f) {
     for (std::uint64_t p = 0; p < file_.shape().pages(); ++p) pages_.push_back(file_.page(p));
@@ -59,7 +58,7 @@ class SomePages {
  private:
   ThreadPool pool_{2};
   TreeFile file_;
-  std::vector<std::shared_ptr<const TreePage>> pages_;
+  std::vector<std::unique_ptr<const TreePage>> pages_;
   std::vector<bool> resident_;
   std::vector<float> shown_;
 };

@@ -80,7 +80,7 @@ Camera camera_at(float x, float z) {
 }
 
 std::shared_ptr<TreeFile> tree_of(std::string bytes) {
-  return std::make_shared<TreeFile>(source_of(std::move(bytes)), std::size_t{1} << 24);
+  return std::make_shared<TreeFile>(source_of(std::move(bytes)));
 }
 
 /// A tree in a pool, as one View looks at it.
@@ -227,6 +227,24 @@ TEST_F(PagedTreeTest, AnIdleTreeGivesItsPagesUp) {
   EXPECT_EQ(b.tree.table()->size(), alone);
   EXPECT_LE(a.tree.table()->size(), 3u);
   EXPECT_GE(a.tree.table()->size(), 1u);
+}
+
+// A View at rest has what memory had room for. It is told when others leave more.
+TEST_F(PagedTreeTest, ViewsAtRestLearnOfRoom) {
+  Slots slots(12);
+  Looked a(slots, tree()), b(slots, tree());
+  a.watch->look({{camera_at(0, -6)}, 0.0f});
+  b.watch->look({{camera_at(0, -6)}, 0.0f});
+  ASSERT_TRUE(a.comes_to_rest());
+  ASSERT_TRUE(b.comes_to_rest());
+  ASSERT_TRUE(a.comes_to_rest());
+  ASSERT_GT(a.watch->missing(), 0u);
+  const std::uint64_t changes = a.watch->changes();
+  b.watch.reset();
+  for (int i = 0; i < 1000 && a.watch->changes() == changes; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_GT(a.watch->changes(), changes);
+  EXPECT_TRUE(a.comes_to_rest());
 }
 
 TEST_F(PagedTreeTest, ATreeThatGoesFreesItsSlots) {

@@ -50,7 +50,7 @@ class TreeFileTest : public ::testing::Test {
   }
   /// What is said about the page.
   [[nodiscard]] static std::string fault(std::string bytes, std::uint64_t page) {
-    TreeFile tree(source_of(std::move(bytes)), 1 << 20);
+    TreeFile tree(source_of(std::move(bytes)));
     EXPECT_EQ(tree.page(page), nullptr);
     EXPECT_EQ(tree.damage().pages, 1u);
     return tree.damage().first;
@@ -156,16 +156,6 @@ TEST_F(TreeFileTest, MoreThanFitIntoASceneAreRefusedBeforeAnythingIsRead) {
   });
   EXPECT_THAT(input_error([&] { read(bytes); }),
               AllOf(HasSubstr("8589934592"), HasSubstr("268435456")));
-}
-
-TEST_F(TreeFileTest, MemoryIsBoundedByTheLatestPages) {
-  TreeFile tree(source_of(bytes_), 2 * shape_.page_bytes());
-  const std::weak_ptr<const TreePage> first = tree.page(0), second = tree.page(1);
-  tree.page(0);
-  tree.page(2);
-  EXPECT_FALSE(first.expired());
-  EXPECT_TRUE(second.expired());
-  EXPECT_EQ(tree.damage().pages, 0u);
 }
 
 }  // namespace
