@@ -24,6 +24,7 @@ void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
   table_.reset();
   watch_->look(std::move(lookout));
   if (request.waits_for_pages) tree_.settle(*watch_);
+  changes_ = watch_->changes();
   table_ = tree_.table();
   now_s_ = tree_.now_s();
 }

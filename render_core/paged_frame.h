@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -28,12 +29,15 @@ class PagedFrame {
   /// Call after each frame. Fills in what the statistics say of pages. The pages of a frame that no
   /// sub-frame follows may go from now on.
   void end(FrameStats& stats);
+  /// See View::outdated().
+  [[nodiscard]] bool outdated() const { return watch_->changes() != changes_; }
 
  private:
   PagedTree& tree_;
   bool keeps_pages_;  // for sub-frames
   std::shared_ptr<Watch> watch_;
   std::shared_ptr<const PageTable> table_;
+  std::uint64_t changes_ = 0;  // of the watch, when the table was taken
   double now_s_ = 0.0;
   std::vector<Camera> cameras_;
 };

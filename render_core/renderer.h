@@ -148,6 +148,10 @@ class View {
   /// Memory of this View (caches, lists, image) where its core renders, without the scene.
   [[nodiscard]] virtual std::size_t memory_bytes() const = 0;
 
+  /// Whether the last frame would look better now, as pages of its scene have come since. Call it
+  /// between frames.
+  [[nodiscard]] virtual bool outdated() const { return false; }
+
   /// The CUDA device that the View lives on; nothing on other cores.
   [[nodiscard]] virtual std::optional<int> device() const { return std::nullopt; }
 };

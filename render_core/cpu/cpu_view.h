@@ -42,6 +42,7 @@ class CpuView final : public View {
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override;
   std::vector<std::uint32_t> tile_loads() const override;
   std::size_t memory_bytes() const override;
+  bool outdated() const override { return paged_ && paged_->outdated(); }
 
  private:
   FrameView draw(const FrameRequest& request, const FramePlan& plan);

@@ -51,6 +51,8 @@ class FrameLoop {
   void start(FrameOrder& order, TimePoint now);
   /// A frame was made and is about to be sent. False: discard it.
   bool made(const FrameResult& result, glm::ivec2 moving_size_px, TimePoint now);
+  /// The picture that is shown would look better now.
+  void outdate() { settled_ = false; }
   /// A frame failed, so its picture is not on the screen.
   void failed() { shown_.reset(); }
   /// Like failed(), with nothing changed for the next frame. True: too many failed in a row.

@@ -56,7 +56,7 @@ void StreamControl::on_opened(const StreamOpened& opened) {
   }
   if (!opened.ok) return;
   if (outdated_) return open();
-  former_.reset();
+  waits_for_pages_ = std::exchange(former_, nullptr) != nullptr;
   config_.codec = opened.codec;
   config_.codec_string = opened.codec_string;
   config_.encoder = encoder_.text;
@@ -87,6 +87,7 @@ FrameOrder StreamControl::begin_frame(bool still, TimePoint now) {
   encoded_as_ = order.encoding;
   described_ = plan_.moving();
   order.force_idr = idr_.take(now);
+  order.request.waits_for_pages = std::exchange(waits_for_pages_, false);
   return order;
 }
 

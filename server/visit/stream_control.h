@@ -74,6 +74,8 @@ class StreamControl {
   std::shared_ptr<const SceneEntry> scene_;
   std::shared_ptr<const SceneEntry> former_;  // its form until the new one is open
   bool keeps_form_ = false;                   // a new form could not be opened
+  bool waits_for_pages_ =
+      false;  // the next frame is the first of a form, and no coarser than before
   EncoderChoice encoder_;
   Use use_ = Use::none;
   bool outdated_ = false;  // another stream was requested while this one was in use

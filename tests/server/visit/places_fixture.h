@@ -89,6 +89,7 @@ class PretendedRenderer final : public Renderer {
   std::array<std::atomic<bool>, 2> lost{};  // as after a kernel error: nothing works on it any more
   std::array<std::atomic<bool>, 2> full{};  // for another View
   std::atomic<int> frames_without_memory{0};
+  std::atomic<bool> outdated{false};  // pages have come since the last frame
   std::atomic<int> views_made{0};
   std::function<void(int device)> before_frame = [](int) {};  // set before the first frame
   const std::string fault = "an illegal memory access was encountered";
@@ -108,10 +109,12 @@ class PretendedRenderer final : public Renderer {
         return {RenderStatus::Code::out_of_memory, "blend: out of memory"};
       }
       frame.size_px = request.camera.size_px;
+      renderer_.outdated = false;
       frame.stats.stage_ms[0] = renderer_.frame_ms[device];
       return {};
     }
     [[nodiscard]] std::size_t memory_bytes() const override { return 0; }
+    [[nodiscard]] bool outdated() const override { return renderer_.outdated; }
     [[nodiscard]] std::optional<int> device() const override { return place_.device(); }
 
    private:

@@ -107,6 +107,21 @@ TEST_F(PlacesTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
   EXPECT_THAT(ids, testing::Each(testing::MatchesRegex("[0-9a-f]{32}")));
 }
 
+TEST_F(PlacesTest, APictureAtRestIsDrawnAgainWhenPagesCome) {
+  start();
+  Visitor& visitor = join();
+  move(visitor);
+  const auto drawn = [&] { return metrics.frames_rendered.Value(); };
+  double before = -1.0;
+  while (drawn() != before || before == 0.0) {  // until it rests
+    before = drawn();
+    run_for(300ms);
+    acknowledge(visitor);
+  }
+  renderer->outdated = true;
+  run_until([&] { return drawn() > before; });
+}
+
 TEST_F(PlacesTest, RefusesConnectionsBeyondAllPlaces) {
   options.max_sessions = 2;
   options.max_spectators = 3;

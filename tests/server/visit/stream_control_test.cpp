@@ -75,7 +75,11 @@ TEST_F(StreamControlTest, AnotherFormOfItsSceneNeedsNoWelcome) {
   opened();
   EXPECT_EQ(stream.scene(), tree.get());
   EXPECT_TRUE(std::holds_alternative<StreamConfig>(stream.introduction()));
-  EXPECT_TRUE(stream.begin_frame(false, now).force_idr);
+  const FrameOrder first = stream.begin_frame(false, now);
+  EXPECT_TRUE(first.force_idr);
+  EXPECT_TRUE(first.request.waits_for_pages) << "it is no coarser than the picture before";
+  stream.end_frame();
+  EXPECT_FALSE(stream.begin_frame(false, now).request.waits_for_pages);
 }
 
 TEST_F(StreamControlTest, AFormThatCannotBeOpenedLeavesTheOneThatItHas) {
