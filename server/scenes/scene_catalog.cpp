@@ -70,7 +70,7 @@ SceneInPages open_cached(const std::filesystem::path& path, const std::string& s
   const auto refuse = [&](std::string_view why) { throw UnusableTree(path.string(), {}, why); };
   constexpr std::string_view damaged = "pages are missing or damaged";
   try {
-    TreeFile tree(std::make_unique<FileSource>(path), 0);
+    TreeFile tree(std::make_unique<FileSource>(path));
     if (tree.pages_in_file() < tree.shape().pages() || !tree.page(0)) refuse(damaged);
     SceneInPages scene = open_in_pages(path, options, spec);
     if (scene.tree->damage().pages > 0) refuse(damaged);
@@ -136,7 +136,10 @@ std::shared_ptr<const SceneEntry> load_scene(
     const std::string& spec, const SceneForm& form,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress) {
-  log_info({.event = "scene_loading"}, "loading {}", spec);
+  if (form.tree.empty())
+    log_info({.event = "scene_loading"}, "loading {}", spec);
+  else
+    log_info({.event = "scene_loading"}, "loading {} from its tree {}", spec, form.tree.string());
   LoadOptions options;
   options.threads = threads;
   options.up = axis_named(config.up);
@@ -166,8 +169,9 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->renderer = std::move(made.renderer);
   entry->poster = make_poster(*entry->renderer, entry->facts);
   log_info({.event = "scene_loaded", .scene = entry->facts.scene_id},
-           "scene {}: {} Gaussians, {}, {:.1f} MB per device, view from {}", entry->facts.scene_id,
-           entry->facts.gaussians, scene.format,
+           "scene {}: {} Gaussians, {}, {}{:.1f} MB per device, view from {}",
+           entry->facts.scene_id, entry->facts.gaussians, scene.format,
+           entry->in_pages ? "pages in a pool of " : "",
            static_cast<double>(entry->renderer->scene_bytes()) * 1e-6, scene.hints.source);
   return entry;
 }

@@ -76,6 +76,13 @@ std::vector<ScenePages> pages_of(const SceneShelf& shelf) {
   return all;
 }
 
+/// True if pages of the scene's tree in the cache could not be read.
+bool reads_damaged_tree(const SceneBook& book) {
+  return !book.found.tree.empty() && book.entry->in_pages &&
+         std::ranges::any_of(book.entry->renderer->pages(),
+                             [](const PageFigures& figures) { return figures.unreadable > 0; });
+}
+
 /// Frees a scene on the loader's thread, because that may wait for the device.
 void free_on(boost::asio::thread_pool& loader, std::shared_ptr<const SceneEntry> entry) {
   boost::asio::post(loader, [entry = std::move(entry)]() mutable { entry.reset(); });
@@ -140,7 +147,8 @@ void SceneLibrary::pin_scenes() {
   }
 }
 
-/// A running server can always show a scene: without others, the folders' first one is loaded.
+/// A running server can always show a scene: without others, the first one of the folders is loaded
+/// that can be.
 void SceneLibrary::open_folders() {
   std::vector<FoundScene> found = folders_.scan();
   log_info({.event = "scenes_found"}, "{} scenes in folders, loaded when somebody asks for them",
@@ -151,17 +159,32 @@ void SceneLibrary::open_folders() {
   if (shelf_.books().empty())
     throw InputError("--scene-folder " + config_.scene_folders.front(), {}, "holds no scene",
                      "put one there, or give --scene");
-  // One that has to wait for its tree is the last choice.
-  const auto ready = std::ranges::find_if(shelf_.books(), [this](const auto& of) {
-    return trees_.form_of(of.second.found).has_value();
+  // Those that have to wait for their trees are the last choice.
+  std::vector<std::string> ids;
+  for (const auto& [id, book] : shelf_.books()) ids.push_back(id);
+  std::ranges::stable_partition(ids, [this](const std::string& id) {
+    return trees_.form_of(shelf_.books().at(id).found).has_value();
   });
-  const auto& [id, book] = ready != shelf_.books().end() ? *ready : *shelf_.books().begin();
+  std::optional<InputError> first_error;
+  for (const std::string& id : ids) {
+    try {
+      return begin_with(id);
+    } catch (const InputError& error) {
+      on_loaded(id, {nullptr, error.what()}, clock_(), clock_());
+      if (!first_error) first_error = error;
+    }
+  }
+  throw InputError(*first_error);
+}
+
+void SceneLibrary::begin_with(const std::string& id) {
+  const FoundScene& found = shelf_.books().at(id).found;
   const TimePoint now = clock_();
-  const auto wish = residency_.want(id, trees_.need_of(book.found), now, in_use_);
+  const auto wish = residency_.want(id, trees_.need_of(found), now, in_use_);
   if (wish != SceneResidency::Wish::awaited)
-    throw InputError("--scene-memory", {}, refusal(wish, id, trees_.bytes_of(book.found)).message);
+    throw InputError("--scene-memory", {}, refusal(wish, id, trees_.bytes_of(found)).message);
   residency_.next(now, in_use_);
-  auto entry = load_now(book.found);
+  auto entry = load_now(found);
   shelf_.prefer(id);
   on_loaded(id, {std::move(entry)}, now, clock_());
 }
@@ -276,7 +299,7 @@ void SceneLibrary::release(const std::string& id) {
   metrics_.scenes_released.Increment();
   residency_.drop(id);
   auto entry = std::exchange(book.entry, nullptr);
-  book.outdated = false;
+  book.outdated = book.tree_lost = false;
   if (book.gone) shelf_.books().erase(id);
   publish();
   free_on(loader_, std::move(entry));
@@ -381,9 +404,14 @@ void SceneLibrary::tend_trees(TimePoint now) {
       changed = true;
     }
     const FoundScene& found = book.found;
-    if (!book.entry || book.entry->in_pages || book.outdated || book.gone ||
-        !(book.entry->coarse || trees_.deserves_one(found)) || trees_.given_up(found))
-      continue;
+    if (!book.entry || book.outdated || book.gone) continue;
+    if (!book.tree_lost && reads_damaged_tree(book)) {
+      trees_.discard(found, "pages are damaged");
+      book.tree_lost = true;  // what is left of it is drawn until there is another
+    }
+    const bool wants_tree =
+        book.entry->in_pages ? book.tree_lost : book.entry->coarse || trees_.deserves_one(found);
+    if (!wants_tree || trees_.given_up(found)) continue;
     if (!trees_.ready(found))
       trees_.order(found, false);
     else if (residency_.has_room(trees_.need_of(found)))
@@ -422,6 +450,7 @@ void SceneLibrary::on_redrawn(const std::string& id, const FoundScene& found, Lo
   if (!still_wanted) return free_on(loader_, std::move(loaded.entry));
   residency_.resize(id, need_of(*book->entry).with(need_of(*loaded.entry)));
   book->former = std::exchange(book->entry, redrawn(*book->entry, *loaded.entry));
+  book->tree_lost = false;
   log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
            id);
   publish();

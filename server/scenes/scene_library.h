@@ -29,8 +29,8 @@ class SceneLibrary final : public SceneSource {
  public:
   using Listing = SceneListing;
 
-  /// Loads the scenes of --scene, or else the first scene of the folders, so that a running server
-  /// can always show one. `clock` times loads. Throws InputError.
+  /// Loads the scenes of --scene, or else the first scene of the folders that can be loaded. So a
+  /// running server can always show one. `clock` times loads. Throws InputError.
   SceneLibrary(const ServerConfig& config, RendererOptions core, boost::asio::io_context& io,
                Metrics& metrics, std::function<TimePoint()> clock = Clock::now);
   ~SceneLibrary() override;  // waits until the current part of a scene is read
@@ -74,6 +74,8 @@ class SceneLibrary final : public SceneSource {
 
   void pin_scenes();
   void open_folders();
+  /// Loads a scene of the folders as the default one. Throws InputError.
+  void begin_with(const std::string& id);
   /// Loads a scene on this thread, before the server runs. Throws InputError.
   std::shared_ptr<const SceneEntry> load_now(const FoundScene& found);
   /// Loads a scene on the loader's thread.

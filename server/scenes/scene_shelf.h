@@ -37,6 +37,7 @@ struct SceneBook {
   bool poster_tried = false;                    // for this content of the file
   bool pinned = false;
   bool outdated = false;                // the file has changed since
+  bool tree_lost = false;               // the entry reads a tree with damage: another is built
   bool gone = false;                    // the file is gone: not offered any more
   bool told = false;                    // the log has named its path, as others share its name
   std::optional<TimePoint> retry_at{};  // after a failure

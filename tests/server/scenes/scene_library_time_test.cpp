@@ -383,5 +383,26 @@ TEST_F(SceneLibraryTime, AFileThatGoesBeforeItIsLoadedIsForgotten) {
   });
 }
 
+TEST_F(SceneLibraryTime, TheFirstSceneThatCanBeLoadedIsTheDefaultOne) {
+  library_.reset();
+  config_.scenes.clear();
+  const auto damage = [&](const std::filesystem::path& name) {
+    save_scene(random_cloud(5000, 3), folder_ / name);
+    std::filesystem::resize_file(folder_ / name, 20'000);
+  };
+  std::filesystem::remove(folder_ / "a.ply");
+  damage("a.spz");
+  start();
+  EXPECT_EQ(name_in(library_->default_scene()), "b");
+  EXPECT_THAT(refusal("a").message, HasSubstr("could not be loaded"));
+  EXPECT_EQ(metrics_.scene_loads_failed.Value(), 1);
+  library_.reset();
+  for (const char* name : {"b", "c"}) {
+    std::filesystem::remove(folder_ / (std::string(name) + ".ply"));
+    damage(std::string(name) + ".spz");
+  }
+  EXPECT_THAT(input_error([&] { start(); }), HasSubstr("a.spz"));
+}
+
 }  // namespace
 }  // namespace catgs::test

@@ -9,7 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/math/look_at.h"
 #include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/tree/tree_shape.h"
 #include "server/scenes/scene_library.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -176,6 +178,37 @@ TEST_F(SceneTreesTest, ADamagedTreeIsBuiltAgain) {
   }
   run_until([&] { return in_memory("a")->in_pages; });
   EXPECT_EQ(bytes_in(tree), bytes);
+}
+
+TEST_F(SceneTreesTest, DamageThatIsFoundLaterIsMended) {
+  save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");
+  config_.scene_memory_mb = 6;  // memory for four pages of nine
+  start();
+  const Entry seen = load("b");
+  const fs::path tree = trees().at(0);
+  const std::string bytes = bytes_in(tree);
+  std::fstream file(tree, std::ios::in | std::ios::out | std::ios::binary);
+  const TreeShape shape(30'000, 3);
+  for (std::uint64_t page = 1; page < shape.pages(); ++page) {
+    file.seekp(static_cast<std::streamoff>(shape.page_offset(page) + 200));
+    file.put(static_cast<char>(bytes[shape.page_offset(page) + 200] ^ 1));
+  }
+  file.close();
+  const auto view = seen->renderer->make_view({});
+  for (const float x : {-8.0f, 8.0f}) {
+    FrameRequest request;
+    request.camera = make_camera(look_at({x, 0, 0}, {0, 0, 0}, {0, -1, 0}), {64, 48}, 60.0f);
+    request.waits_for_pages = true;
+    FrameView frame;
+    ASSERT_TRUE(view->render(request, frame).ok());
+  }
+  ASSERT_GT(seen->renderer->pages().at(0).unreadable, 0u);
+  run_until([&] { return in_memory("b") != seen; });
+  EXPECT_EQ(built(), 2);
+  EXPECT_EQ(bytes_in(tree), bytes);
+  EXPECT_EQ(library_->newer_form(*seen), in_memory("b")) << "present visitors go on with it";
+  for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
+  EXPECT_THAT(trees(), ElementsAre(tree)) << "the new one is not that with the damage";
 }
 
 TEST_F(SceneTreesTest, WhatAKilledBuildLeftIsNotUsed) {
