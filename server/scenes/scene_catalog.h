@@ -41,6 +41,13 @@ struct UnusableTree : InputError {
   using InputError::InputError;
 };
 
+/// A scene that was loaded, or why it was not.
+struct LoadedScene {
+  std::shared_ptr<const SceneEntry> entry;
+  std::string error{};
+  bool unusable_tree = false;  // the error is that of the scene's tree
+};
+
 /// Loads one scene (a path, or synth:KIND:COUNT[:SEED]) in a form and builds its renderer with the
 /// options and pool of `core`. `id_of` makes the id from the name. `threads` threads read the file.
 /// `progress` is called repeatedly and may throw to cancel. Throws InputError or UnusableTree.

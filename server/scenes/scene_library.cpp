@@ -44,10 +44,6 @@ std::string megabytes(std::uint64_t bytes) {
   return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
 }
 
-SceneNeed need_of(const SceneEntry& entry) {
-  return {entry.renderer->scene_bytes(), entry.in_pages};
-}
-
 /// A quarter of the processors. Trees are built while visitors look.
 int builder_threads(const RendererOptions& core) { return std::max(1, core.pool->threads() / 4); }
 
@@ -76,18 +72,6 @@ std::vector<ScenePages> pages_of(const SceneShelf& shelf) {
   return all;
 }
 
-/// True if pages of the scene's tree in the cache could not be read.
-bool reads_damaged_tree(const SceneBook& book) {
-  return !book.found.tree.empty() && book.entry->in_pages &&
-         std::ranges::any_of(book.entry->renderer->pages(),
-                             [](const PageFigures& figures) { return figures.unreadable > 0; });
-}
-
-/// Frees a scene on the loader's thread, because that may wait for the device.
-void free_on(boost::asio::thread_pool& loader, std::shared_ptr<const SceneEntry> entry) {
-  boost::asio::post(loader, [entry = std::move(entry)]() mutable { entry.reset(); });
-}
-
 }  // namespace
 
 SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
@@ -106,7 +90,9 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
       in_use_([this](const std::string& id) {
         const SceneBook* const book = shelf_.find(id);
         return book && book->in_use();
-      }) {
+      }),
+      redrawing_(shelf_, trees_, residency_, io, loader_,
+                 [this](const auto& found, const auto& form) { return load(found, form); }) {
   core_.pages = std::make_shared<PagePools>(tree_memory(config));
   pin_scenes();
   if (config_.scene_folders.empty())
@@ -250,7 +236,7 @@ void SceneLibrary::want_poster(const std::string& id) {
     boost::asio::post(loader_, [this, id, form = *form, found = book->found] {
       // The scene goes here, on the loader's thread: that may wait for the device.
       std::shared_ptr<const std::string> poster;
-      if (const Loaded loaded = load(found, form); loaded.entry) poster = loaded.entry->poster;
+      if (const LoadedScene loaded = load(found, form); loaded.entry) poster = loaded.entry->poster;
       boost::asio::post(io_, [this, id, poster, changed = found.changed] {
         making_poster_ = false;
         SceneBook* const made_for = shelf_.find(id);
@@ -272,7 +258,9 @@ void SceneLibrary::on_tick(TimePoint now) {
       outdated.push_back(id);
   }
   for (const std::string& id : outdated) release(id);
-  tend_trees(now);
+  const auto [too_large, changed] = redrawing_.on_tick(now);
+  for (const std::string& id : too_large) release(id);
+  if (changed) publish();
   start_next(now);
   metrics_.set_pages(pages_of(shelf_));
   if (next_scan_ && now >= *next_scan_) start_scan(now);
@@ -286,7 +274,7 @@ void SceneLibrary::start_next(TimePoint now) {
   const auto form = trees_.form_of(found);
   if (!form) return residency_.failed(step->load);  // its tree was lost; visitors ask again
   boost::asio::post(loader_, [this, id = step->load, found, form = *form, now] {
-    auto loaded = std::make_shared<Loaded>(load(found, form));
+    auto loaded = std::make_shared<LoadedScene>(load(found, form));
     boost::asio::post(
         io_, [this, id, loaded, now] { on_loaded(id, std::move(*loaded), now, clock_()); });
   });
@@ -302,10 +290,10 @@ void SceneLibrary::release(const std::string& id) {
   book.outdated = book.tree_lost = false;
   if (book.gone) shelf_.books().erase(id);
   publish();
-  free_on(loader_, std::move(entry));
+  boost::asio::post(loader_, [entry = std::move(entry)]() mutable { entry.reset(); });
 }
 
-SceneLibrary::Loaded SceneLibrary::load(const FoundScene& found, const SceneForm& form) const {
+LoadedScene SceneLibrary::load(const FoundScene& found, const SceneForm& form) const {
   try {
     // Half of the processors stay free for the visitors' frames.
     const int threads = std::max(1, core_.pool->threads() / 2);
@@ -321,7 +309,7 @@ SceneLibrary::Loaded SceneLibrary::load(const FoundScene& found, const SceneForm
   }
 }
 
-void SceneLibrary::on_loaded(const std::string& id, Loaded loaded, TimePoint started,
+void SceneLibrary::on_loaded(const std::string& id, LoadedScene loaded, TimePoint started,
                              TimePoint now) {
   SceneBook* const book = shelf_.find(id);
   if (!loaded.entry || !book) {
@@ -386,73 +374,6 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
   for (const auto& [id, book] : shelf_.books())
     if (!book.found.tree.empty()) trees.insert(book.found.tree);
   trees_.keep(trees);
-  publish();
-}
-
-std::shared_ptr<const SceneEntry> SceneLibrary::newer_form(const SceneEntry& seen) {
-  const SceneBook* const book = shelf_.find(seen.facts.scene_id);
-  return book && book->former && book->former->renderer == seen.renderer ? book->entry : nullptr;
-}
-
-void SceneLibrary::tend_trees(TimePoint now) {
-  std::vector<std::string> too_large;
-  bool changed = false;
-  for (auto& [id, book] : shelf_.books()) {
-    if (book.former_is_left()) {
-      free_on(loader_, std::exchange(book.former, nullptr));
-      residency_.resize(id, need_of(*book.entry));
-      changed = true;
-    }
-    const FoundScene& found = book.found;
-    if (!book.entry || book.outdated || book.gone) continue;
-    if (!book.tree_lost && reads_damaged_tree(book)) {
-      trees_.discard(found, "pages are damaged");
-      book.tree_lost = true;  // what is left of it is drawn until there is another
-    }
-    const bool wants_tree =
-        book.entry->in_pages ? book.tree_lost : book.entry->coarse || trees_.deserves_one(found);
-    if (!wants_tree || trees_.given_up(found)) continue;
-    if (!trees_.ready(found))
-      trees_.order(found, false);
-    else if (residency_.has_room(trees_.need_of(found)))
-      start_redrawing(id);
-    else if (!book.pinned && !book.in_use())
-      too_large.push_back(id);
-  }
-  // Both forms of a scene do not fit. Its next visitor gets the tree.
-  for (const std::string& id : too_large) release(id);
-  if (trees_.on_tick(now) || changed) publish();
-}
-
-void SceneLibrary::start_redrawing(const std::string& id) {
-  if (redrawing_ || residency_.busy()) return;
-  redrawing_ = true;
-  const SceneBook& book = *shelf_.find(id);
-  residency_.resize(id, need_of(*book.entry).with(trees_.need_of(book.found)));
-  boost::asio::post(loader_, [this, id, found = book.found, before = book.entry->renderer,
-                              form = *trees_.form_of(book.found)] {
-    auto loaded = std::make_shared<Loaded>(load(found, form));
-    boost::asio::post(io_, [this, id, found, loaded, before] {
-      on_redrawn(id, found, std::move(*loaded), before);
-    });
-  });
-}
-
-void SceneLibrary::on_redrawn(const std::string& id, const FoundScene& found, Loaded loaded,
-                              const std::shared_ptr<Renderer>& before) {
-  redrawing_ = false;
-  SceneBook* const book = shelf_.find(id);
-  if (book && book->entry) residency_.resize(id, need_of(*book->entry));
-  if (loaded.unusable_tree) return trees_.discard(found, loaded.error);
-  if (!loaded.entry) return trees_.give_up(found, loaded.error);
-  const bool still_wanted = book && book->entry && book->entry->renderer == before &&
-                            book->found.tree == found.tree && !book->outdated;
-  if (!still_wanted) return free_on(loader_, std::move(loaded.entry));
-  residency_.resize(id, need_of(*book->entry).with(need_of(*loaded.entry)));
-  book->former = std::exchange(book->entry, redrawn(*book->entry, *loaded.entry));
-  book->tree_lost = false;
-  log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
-           id);
   publish();
 }
 

@@ -15,6 +15,7 @@
 #include "server/base/metrics.h"
 #include "server/config.h"
 #include "server/scenes/scene_folder.h"
+#include "server/scenes/scene_redrawing.h"
 #include "server/scenes/scene_residency.h"
 #include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_source.h"
@@ -45,7 +46,9 @@ class SceneLibrary final : public SceneSource {
     return shelf_.books().contains(id);
   }
   SceneAnswer want(const std::string& id, TimePoint now) override;
-  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) override;
+  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) override {
+    return redrawing_.newer_form(seen);
+  }
   void on_tick(TimePoint now) override;
 
   /// Returns null if the scene is not in memory.
@@ -66,12 +69,6 @@ class SceneLibrary final : public SceneSource {
   void want_poster(const std::string& id);
 
  private:
-  struct Loaded {
-    std::shared_ptr<const SceneEntry> entry;
-    std::string error{};
-    bool unusable_tree = false;  // the error is that of the scene's tree
-  };
-
   void pin_scenes();
   void open_folders();
   /// Loads a scene of the folders as the default one. Throws InputError.
@@ -79,17 +76,12 @@ class SceneLibrary final : public SceneSource {
   /// Loads a scene on this thread, before the server runs. Throws InputError.
   std::shared_ptr<const SceneEntry> load_now(const FoundScene& found);
   /// Loads a scene on the loader's thread.
-  Loaded load(const FoundScene& found, const SceneForm& form) const;
+  LoadedScene load(const FoundScene& found, const SceneForm& form) const;
   void start_next(TimePoint now);
-  void on_loaded(const std::string& id, Loaded loaded, TimePoint started, TimePoint now);
+  void on_loaded(const std::string& id, LoadedScene loaded, TimePoint started, TimePoint now);
   void release(const std::string& id);
   void start_scan(TimePoint now);
   void merge(std::vector<FoundScene> found);
-  /// Has trees built for scenes in memory, and draws these scenes from their trees.
-  void tend_trees(TimePoint now);
-  void start_redrawing(const std::string& id);
-  void on_redrawn(const std::string& id, const FoundScene& found, Loaded loaded,
-                  const std::shared_ptr<Renderer>& before);
   /// Updates listing() and the metrics.
   void publish();
 
@@ -108,10 +100,10 @@ class SceneLibrary final : public SceneSource {
   std::optional<TimePoint> next_scan_;  // nothing without folders
   bool scanning_ = false;
   bool making_poster_ = false;
-  bool redrawing_ = false;
 
   std::atomic<bool> stopping_{false};
   boost::asio::thread_pool loader_{1};
+  SceneRedrawing redrawing_;
 };
 
 }  // namespace catgs

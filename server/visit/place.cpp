@@ -182,10 +182,8 @@ LogFacts Place::facts() const {
 void Place::on_tick(TimePoint now) {
   visit_.on_tick(now);
   StreamControl& stream = visit_.stream();
-  if (visit_.life().resumable() && !visit_.life().lost()) {
+  if (visit_.life().resumable() && !visit_.life().lost())
     if (auto newer = around_.scenes.newer_form(*stream.scene())) stream.redraw(std::move(newer));
-    if (stream.ready() && stream_->view && stream_->view->outdated()) visit_.picture_is_outdated();
-  }
   audience_.keep_talking(now);
   if (audience_.wants_idr(now)) visit_.stream().idr().request();
 }

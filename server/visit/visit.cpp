@@ -222,6 +222,7 @@ void Visit::on_tick(TimePoint now) {
     return;
   }
   stream_.plan().on_tick(now);
+  if (stream_.ready() && host_.picture_is_outdated()) frames_.outdate();
   if (const auto idle = life_.idle_message(now)) {
     if (idle->fatal) return fail(idle->code, idle->message);
     say(*idle, now);

@@ -34,8 +34,6 @@ class Visit {
   void on_frame_sent(std::size_t bytes) { statistics_.frame_sent(bytes); }
   /// Call it at least four times a second. Handles timeouts, statistics and the heartbeat.
   void on_tick(TimePoint now);
-  /// The picture on the screen would look better now: it is drawn again.
-  void picture_is_outdated() { frames_.outdate(); }
   /// Asks for admission again. Only while the visit waits for a place.
   void ask_again(TimePoint now);
   /// The connection was lost without a farewell. The visit closes after the grace period.
