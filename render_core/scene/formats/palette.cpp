@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <span>
@@ -14,10 +16,9 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t ways = 16;  // children of a node
-constexpr std::size_t codebook_sample = std::size_t{1} << 20;
 constexpr int codebook_rounds = 60;
-constexpr std::size_t cluster_sample = 2048;  // vectors that a node's centres are found from
-constexpr int cluster_rounds = 4;
+constexpr std::size_t cluster_sample = 512;  // vectors that a node's centres are found from
+constexpr int cluster_rounds = 3;
 constexpr std::size_t block = 8192;
 
 /// Vectors [begin, end) of the order, which get at most `size` entries.
@@ -25,49 +26,98 @@ struct Node {
   std::size_t begin, end, size;
 };
 
-/// The centres of a node's children. Those of one dimension are neighbours, so that a vector is
-/// compared with all of them at once.
-class Centres {
- public:
-  explicit Centres(std::size_t dims) : dims_(dims), columns_(dims * ways, nowhere) {}
+// Distances are those of whole numbers: they are exact, so that the entries are the same on every
+// machine, and a register holds twice as many of them. With at most 48 values of this size, a
+// Centres::score() fits into 32 bits.
+constexpr float steps = 3800.0f;
+constexpr std::size_t max_dims = 48;
+constexpr double range_rms = 16.0;  // values beyond it are rare, and compared as if they were at it
 
-  void set(std::size_t k, const float* centre) {
-    for (std::size_t d = 0; d < dims_; ++d) columns_[d * ways + k] = centre[d];
+/// A vector in whole numbers, padded with zeros.
+template <std::size_t width>
+using Row = std::array<std::int16_t, width>;
+
+template <std::size_t width>
+std::int32_t dot(const Row<width>& a, const Row<width>& b) {
+  std::int32_t sum = 0;
+  for (std::size_t d = 0; d < width; ++d) sum += std::int32_t{a[d]} * std::int32_t{b[d]};
+  return sum;
+}
+
+/// The root mean square of the vectors' values; an even sample of the vectors is enough.
+double rms_of(const VectorTable& vectors) {
+  const std::size_t taken = std::min(vectors.count, std::size_t{1} << 14);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < taken; ++i) {
+    const float* vector = vectors[i * vectors.count / taken];
+    for (std::size_t d = 0; d < vectors.dims; ++d) sum += double{vector[d]} * vector[d];
   }
-  /// The nearest centre, and the squared distance to it.
-  [[nodiscard]] std::pair<std::size_t, float> nearest(const float* vector) const {
-    std::array<float, ways> squares{};
-    for (std::size_t d = 0; d < dims_; ++d) {
-      const float* column = &columns_[d * ways];
-      for (std::size_t k = 0; k < ways; ++k) {
-        const float difference = vector[d] - column[k];
-        squares[k] += difference * difference;
+  return std::sqrt(sum / static_cast<double>(taken * vectors.dims));
+}
+
+template <std::size_t width>
+std::vector<Row<width>> rows_of(const VectorTable& vectors, ThreadPool& pool) {
+  std::vector<Row<width>> rows(vectors.count);
+  const auto scale = static_cast<float>(steps / std::max(range_rms * rms_of(vectors), 1e-20));
+  pool.parallel_for((vectors.count + block - 1) / block, [&](std::size_t b) {
+    for (std::size_t i = b * block; i < std::min(vectors.count, (b + 1) * block); ++i) {
+      const float* vector = vectors[i];
+      for (std::size_t d = 0; d < vectors.dims; ++d) {
+        const float at = std::clamp(vector[d] * scale, -steps, steps);
+        rows[i][d] = static_cast<std::int16_t>(static_cast<int>(at + (steps + 0.5f)) -
+                                               static_cast<int>(steps));
       }
     }
-    const auto least = std::min_element(squares.begin(), squares.end());
-    return {static_cast<std::size_t>(least - squares.begin()), *least};
+  });
+  return rows;
+}
+
+/// The centres of a node's children.
+template <std::size_t width>
+class Centres {
+ public:
+  void add(const Row<width>& centre) { set(count_++, centre); }
+  void set(std::size_t k, const Row<width>& centre) {
+    rows_[k] = centre;
+    squares_[k] = dot(centre, centre);
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+  /// The squared distance to centre k, less the square of the vector.
+  [[nodiscard]] std::int32_t score(std::size_t k, const Row<width>& row) const {
+    return squares_[k] - 2 * dot(row, rows_[k]);
+  }
+  /// The nearest centre, and its score.
+  [[nodiscard]] std::pair<std::size_t, std::int32_t> nearest(const Row<width>& row) const {
+    std::size_t best = 0;
+    std::int32_t least = std::numeric_limits<std::int32_t>::max();
+    for (std::size_t k = 0; k < count_; ++k) {
+      const std::int32_t one = score(k, row);
+      best = one < least ? k : best;
+      least = std::min(one, least);
+    }
+    return {best, least};
   }
 
  private:
-  static constexpr float nowhere = 1e17f;  // farther than any vector, and its square is finite
-  std::size_t dims_;
-  std::vector<float> columns_;
+  std::array<Row<width>, ways> rows_;
+  std::array<std::int32_t, ways> squares_;
+  std::size_t count_ = 0;
 };
 
+template <std::size_t width>
 class Tree {
  public:
   Tree(const VectorTable& vectors, ThreadPool& pool)
-      : vectors_(vectors),
-        pool_(pool),
+      : pool_(pool),
+        rows_(rows_of<width>(vectors, pool)),
         order_(vectors.count),
-        scratch_(vectors.count),
         labels_(vectors.count) {
     std::iota(order_.begin(), order_.end(), 0u);
   }
 
   /// The nodes without children, in order.
   std::vector<Node> grow(std::size_t size) {
-    std::vector<Node> leaves, level = {{0, vectors_.count, size}};
+    std::vector<Node> leaves, level = {{0, order_.size(), size}};
     while (!level.empty()) {
       std::vector<std::vector<Node>> children(level.size());
       pool_.parallel_for(level.size(), [&](std::size_t i) { children[i] = split(level[i]); });
@@ -88,83 +138,87 @@ class Tree {
   }
 
  private:
-  [[nodiscard]] const float* vector(std::size_t place) const { return vectors_[order_[place]]; }
-
-  /// An even sample of a node's vectors.
-  [[nodiscard]] std::vector<const float*> sample(const Node& node) const {
+  /// An even sample of a node's vectors, by place in the order.
+  static std::vector<std::size_t> sample(const Node& node) {
     const std::size_t count = node.end - node.begin, taken = std::min(count, cluster_sample);
-    std::vector<const float*> some(taken);
-    for (std::size_t i = 0; i < taken; ++i) some[i] = vector(node.begin + i * count / taken);
+    std::vector<std::size_t> some(taken);
+    for (std::size_t i = 0; i < taken; ++i) some[i] = node.begin + i * count / taken;
     return some;
   }
 
   /// k-means++ (Arthur, Vassilvitskii 2007): a vector becomes a centre with a probability by its
   /// squared distance to those before. Fewer than `count` where there are fewer different vectors.
-  [[nodiscard]] std::vector<const float*> seeds(const std::vector<const float*>& some,
-                                                std::size_t count, std::uint64_t seed) const {
+  /// Labels the sample.
+  [[nodiscard]] Centres<width> seeds(const std::vector<std::size_t>& some, std::size_t count,
+                                     std::uint64_t seed) {
     SplitMix64 random(seed);
-    std::vector<const float*> chosen = {some[random.next() % some.size()]};
-    std::vector<float> squares(some.size(), std::numeric_limits<float>::max());
-    while (chosen.size() < count) {
-      double sum = 0.0;
+    Centres<width> centres;
+    std::vector<std::int32_t> scores(some.size(), std::numeric_limits<std::int32_t>::max());
+    std::vector<std::int32_t> own(some.size());
+    for (std::size_t i = 0; i < some.size(); ++i) own[i] = dot(rows_[some[i]], rows_[some[i]]);
+    const auto square = [&](std::size_t i) {
+      return static_cast<std::uint64_t>(std::int64_t{own[i]} + scores[i]);
+    };
+    std::size_t next = random.next() % some.size();
+    while (true) {
+      const std::size_t k = centres.count();
+      centres.add(rows_[some[next]]);
+      std::uint64_t sum = 0;
       for (std::size_t i = 0; i < some.size(); ++i) {
-        float square = 0.0f;
-        for (std::size_t d = 0; d < vectors_.dims; ++d) {
-          const float difference = some[i][d] - chosen.back()[d];
-          square += difference * difference;
+        const std::int32_t score = centres.score(k, rows_[some[i]]);
+        if (score < scores[i]) {
+          scores[i] = score;
+          labels_[some[i]] = static_cast<std::uint8_t>(k);
         }
-        squares[i] = std::min(squares[i], square);
-        sum += squares[i];
+        sum += square(i);
       }
-      if (!(sum > 0.0)) break;
-      double left = sum * static_cast<double>(random.next() >> 11) * 0x1p-53;
-      std::size_t next = 0;
-      for (std::size_t i = 0; i < some.size() && left >= 0.0; ++i) {
-        if (squares[i] > 0.0f) next = i;
-        left -= squares[i];
-      }
-      chosen.push_back(some[next]);
+      if (centres.count() == count || sum == 0) return centres;
+      std::uint64_t left = random.next() % sum;
+      for (next = 0; left >= square(next); ++next) left -= square(next);
     }
-    return chosen;
   }
 
-  [[nodiscard]] Centres centres_of(const Node& node, std::size_t count) const {
-    const std::vector<const float*> some = sample(node);
-    const std::vector<const float*> first = seeds(some, count, node.begin);
-    const std::size_t dims = vectors_.dims;
-    Centres centres(dims);
-    for (std::size_t k = 0; k < first.size(); ++k) centres.set(k, first[k]);
-    std::vector<float> sums(ways * dims);
+  [[nodiscard]] Centres<width> centres_of(const Node& node, std::size_t count) {
+    const std::vector<std::size_t> some = sample(node);
+    Centres<width> centres = seeds(some, count, node.begin);
     for (int round = 0; round < cluster_rounds; ++round) {
-      std::fill(sums.begin(), sums.end(), 0.0f);
-      std::array<std::size_t, ways> counts{};
-      for (const float* one : some) {
-        const std::size_t k = centres.nearest(one).first;
-        ++counts[k];
-        for (std::size_t d = 0; d < dims; ++d) sums[k * dims + d] += one[d];
-      }
-      for (std::size_t k = 0; k < ways; ++k) {
-        if (counts[k] == 0) continue;
-        for (std::size_t d = 0; d < dims; ++d) sums[k * dims + d] /= static_cast<float>(counts[k]);
-        centres.set(k, &sums[k * dims]);
-      }
+      if (round > 0)
+        for (const std::size_t i : some)
+          labels_[i] = static_cast<std::uint8_t>(centres.nearest(rows_[i]).first);
+      move_to_means(some, centres);
     }
     return centres;
   }
 
-  using Errors = std::array<double, ways>;
+  void move_to_means(const std::vector<std::size_t>& some, Centres<width>& centres) const {
+    std::array<std::array<std::int32_t, width>, ways> sums{};
+    std::array<std::int32_t, ways> counts{};
+    for (const std::size_t i : some) {
+      ++counts[labels_[i]];
+      for (std::size_t d = 0; d < width; ++d) sums[labels_[i]][d] += rows_[i][d];
+    }
+    for (std::size_t k = 0; k < centres.count(); ++k) {
+      if (counts[k] == 0) continue;
+      Row<width> mean;
+      for (std::size_t d = 0; d < width; ++d)
+        mean[d] = static_cast<std::int16_t>(sums[k][d] / counts[k]);
+      centres.set(k, mean);
+    }
+  }
+
+  using Errors = std::array<std::uint64_t, ways>;
 
   /// Labels a node's vectors; the sums of squared errors by label.
-  Errors label(const Node& node, const Centres& centres) {
+  Errors label(const Node& node, const Centres<width>& centres) {
     const std::size_t count = node.end - node.begin;
     std::vector<Errors> errors((count + block - 1) / block);
     pool_.parallel_for(errors.size(), [&](std::size_t b) {
       Errors sums{};
       const std::size_t end = std::min(node.end, node.begin + (b + 1) * block);
       for (std::size_t i = node.begin + b * block; i < end; ++i) {
-        const auto [k, square] = centres.nearest(vector(i));
+        const auto [k, score] = centres.nearest(rows_[i]);
         labels_[i] = static_cast<std::uint8_t>(k);
-        sums[k] += square;
+        sums[k] += static_cast<std::uint64_t>(std::int64_t{dot(rows_[i], rows_[i])} + score);
       }
       errors[b] = sums;
     });
@@ -186,10 +240,14 @@ class Tree {
       parts.push_back({begin, begin + counts[k], counts[k] > 0 ? std::size_t{1} : 0});
       begin += counts[k];
     }
-    for (std::size_t i = node.begin; i < node.end; ++i) scratch_[next[labels_[i]]++] = order_[i];
-    std::copy(scratch_.begin() + static_cast<std::ptrdiff_t>(node.begin),
-              scratch_.begin() + static_cast<std::ptrdiff_t>(node.end),
-              order_.begin() + static_cast<std::ptrdiff_t>(node.begin));
+    for (std::size_t k = 0; k < ways; ++k)
+      while (next[k] < parts[k].end) {
+        const std::size_t from = next[k], to = next[labels_[from]]++;
+        if (from == to) continue;
+        std::swap(rows_[from], rows_[to]);
+        std::swap(order_[from], order_[to]);
+        std::swap(labels_[from], labels_[to]);
+      }
     return parts;
   }
 
@@ -198,17 +256,18 @@ class Tree {
     std::size_t left = size;
     for (const Node& part : parts) left -= part.size;
     const auto room = [&](std::size_t k) {
-      return errors[k] > 0.0 ? parts[k].end - parts[k].begin - parts[k].size : 0;
+      return errors[k] > 0 ? parts[k].end - parts[k].begin - parts[k].size : 0;
     };
+    const auto weight_of = [&](std::size_t k) { return static_cast<double>(errors[k]); };
     for (bool gave = true; gave && left > 0;) {
       double weight = 0.0;
-      for (std::size_t k = 0; k < ways; ++k) weight += room(k) > 0 ? errors[k] : 0.0;
+      for (std::size_t k = 0; k < ways; ++k) weight += room(k) > 0 ? weight_of(k) : 0.0;
       gave = false;
       const auto share = static_cast<double>(left);
       for (std::size_t k = 0; k < ways; ++k) {
         if (room(k) == 0) continue;
         const std::size_t given =
-            std::min(room(k), static_cast<std::size_t>(share * errors[k] / weight));
+            std::min(room(k), static_cast<std::size_t>(share * weight_of(k) / weight));
         parts[k].size += given;
         left -= given;
         gave |= given > 0;
@@ -218,8 +277,8 @@ class Tree {
       std::size_t most = ways;
       for (std::size_t k = 0; k < ways; ++k)
         if (room(k) > 0 &&
-            (most == ways || errors[k] / static_cast<double>(parts[k].size) >
-                                 errors[most] / static_cast<double>(parts[most].size)))
+            (most == ways || weight_of(k) / static_cast<double>(parts[k].size) >
+                                 weight_of(most) / static_cast<double>(parts[most].size)))
           most = k;
       if (most == ways) return;
       ++parts[most].size;
@@ -235,7 +294,7 @@ class Tree {
       return parts;
     }
     if (node.size < 2) return parts;
-    const Centres centres = centres_of(node, std::min(ways, node.size));
+    const Centres<width> centres = centres_of(node, std::min(ways, node.size));
     const Errors errors = label(node, centres);
     parts = partition(node);
     divide(node.size, errors, parts);
@@ -243,62 +302,15 @@ class Tree {
     return parts;
   }
 
-  const VectorTable& vectors_;
   ThreadPool& pool_;
-  std::vector<std::uint32_t> order_, scratch_;
+  std::vector<Row<width>> rows_;  // in the order
+  std::vector<std::uint32_t> order_;
   std::vector<std::uint8_t> labels_;  // by place in the order
 };
 
-}  // namespace
-
-Codebook::Codebook(std::vector<float> values) {
-  assert(!values.empty());
-  if (values.size() > codebook_sample) {
-    const std::size_t count = values.size();
-    for (std::size_t i = 0; i < codebook_sample; ++i)
-      values[i] = values[i * count / codebook_sample];
-    values.resize(codebook_sample);
-  }
-  std::sort(values.begin(), values.end());
-  // Some values at even steps keep rare ones from being forgotten.
-  std::vector<float> weighted = values;
-  const std::size_t even = values.size() / 8 + 2 * values_.size();
-  const float step = (values.back() - values.front()) / static_cast<float>(even);
-  for (std::size_t i = 0; i <= even; ++i)
-    weighted.push_back(values.front() + step * static_cast<float>(i));
-  std::sort(weighted.begin(), weighted.end());
-
-  for (std::size_t k = 0; k < values_.size(); ++k) {  // between even shares and even steps
-    const float share = weighted[(2 * k + 1) * weighted.size() / (2 * values_.size())];
-    const float at = (static_cast<float>(k) + 0.5f) / static_cast<float>(values_.size());
-    values_[k] = 0.5f * (share + values.front() + at * (values.back() - values.front()));
-  }
-  for (int round = 0; round < codebook_rounds; ++round) move_to_means(weighted);
-  move_to_means(values);
-  for (std::size_t k = 0; k < middles_.size(); ++k)
-    middles_[k] = 0.5f * (values_[k] + values_[k + 1]);
-}
-
-void Codebook::move_to_means(const std::vector<float>& sorted) {
-  auto begin = sorted.begin();
-  for (std::size_t k = 0; k < values_.size(); ++k) {
-    auto end = sorted.end();
-    if (k + 1 < values_.size())
-      end = std::lower_bound(begin, end, 0.5f * (values_[k] + values_[k + 1]));
-    if (end > begin)
-      values_[k] =
-          static_cast<float>(std::accumulate(begin, end, 0.0) / static_cast<double>(end - begin));
-    begin = end;
-  }
-}
-
-std::uint8_t Codebook::nearest(float value) const {
-  return static_cast<std::uint8_t>(std::upper_bound(middles_.begin(), middles_.end(), value) -
-                                   middles_.begin());
-}
-
-Palette make_palette(const VectorTable& vectors, std::size_t size, ThreadPool& pool) {
-  Tree tree(vectors, pool);
+template <std::size_t width>
+Palette palette_of(const VectorTable& vectors, std::size_t size, ThreadPool& pool) {
+  Tree<width> tree(vectors, pool);
   const std::vector<Node> leaves = tree.grow(size);
   Palette palette;
   palette.entries.resize(leaves.size() * vectors.dims);
@@ -315,6 +327,65 @@ Palette make_palette(const VectorTable& vectors, std::size_t size, ThreadPool& p
           static_cast<float>(sums[d] / static_cast<double>(members.size()));
   });
   return palette;
+}
+
+}  // namespace
+
+Codebook::Codebook(std::vector<float> values) {
+  assert(!values.empty());
+  std::sort(values.begin(), values.end());
+  // Some values at even steps keep rare ones from being forgotten.
+  std::vector<float> weighted = values;
+  const std::size_t even = values.size() / 8 + 2 * values_.size();
+  const float step = (values.back() - values.front()) / static_cast<float>(even);
+  for (std::size_t i = 0; i <= even; ++i)
+    weighted.push_back(values.front() + step * static_cast<float>(i));
+  std::inplace_merge(weighted.begin(),
+                     weighted.begin() + static_cast<std::ptrdiff_t>(values.size()), weighted.end());
+
+  for (std::size_t k = 0; k < values_.size(); ++k) {  // between even shares and even steps
+    const float share = weighted[(2 * k + 1) * weighted.size() / (2 * values_.size())];
+    const float at = (static_cast<float>(k) + 0.5f) / static_cast<float>(values_.size());
+    values_[k] = 0.5f * (share + values.front() + at * (values.back() - values.front()));
+  }
+  move_to_means(weighted, codebook_rounds);
+  move_to_means(values, 1);
+  for (std::size_t k = 0; k < middles_.size(); ++k)
+    middles_[k] = 0.5f * (values_[k] + values_[k + 1]);
+}
+
+void Codebook::move_to_means(const std::vector<float>& sorted, int rounds) {
+  std::vector<double> sums(sorted.size() + 1);  // of those before
+  for (std::size_t i = 0; i < sorted.size(); ++i) sums[i + 1] = sums[i] + sorted[i];
+  for (int round = 0; round < rounds; ++round) {
+    std::size_t begin = 0;
+    for (std::size_t k = 0; k < values_.size(); ++k) {
+      std::size_t end = sorted.size();
+      if (k + 1 < values_.size())
+        end = static_cast<std::size_t>(
+            std::lower_bound(sorted.begin() + static_cast<std::ptrdiff_t>(begin), sorted.end(),
+                             0.5f * (values_[k] + values_[k + 1])) -
+            sorted.begin());
+      if (end > begin)
+        values_[k] =
+            static_cast<float>((sums[end] - sums[begin]) / static_cast<double>(end - begin));
+      begin = end;
+    }
+  }
+}
+
+std::uint8_t Codebook::nearest(float value) const {
+  std::size_t at = 0;  // a binary search without branches, which could not be foretold
+  for (std::size_t half = 128; half > 0; half /= 2)
+    at += static_cast<std::size_t>(middles_[at + half - 1] <= value) * half;
+  return static_cast<std::uint8_t>(at);
+}
+
+Palette make_palette(const VectorTable& vectors, std::size_t size, ThreadPool& pool) {
+  assert(vectors.dims <= max_dims);
+  if (vectors.dims <= 16) return palette_of<16>(vectors, size, pool);
+  if (vectors.dims <= 24) return palette_of<24>(vectors, size, pool);
+  return palette_of<max_dims>(vectors, size, pool);
 }
 
 }  // namespace catgs

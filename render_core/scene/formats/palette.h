@@ -12,22 +12,23 @@ namespace catgs {
 /// 256 ascending values that stand for many.
 class Codebook {
  public:
-  /// Finds values with a small squared error by Lloyd's algorithm, over `values` or an even sample
-  /// of them. Rare values keep errors of the size of common ones. `values` are finite and not none.
+  /// Finds values with a small squared error by Lloyd's algorithm. Rare values keep errors of the
+  /// size of common ones. `values` are finite and not none.
   explicit Codebook(std::vector<float> values);
   /// Index of the nearest value.
   [[nodiscard]] std::uint8_t nearest(float value) const;
   [[nodiscard]] const std::array<float, 256>& values() const { return values_; }
 
  private:
-  /// Each value becomes the mean of those that are nearest to it.
-  void move_to_means(const std::vector<float>& sorted);
+  /// In each round, each value becomes the mean of those that are nearest to it.
+  void move_to_means(const std::vector<float>& sorted, int rounds);
 
   std::array<float, 256> values_{};
   std::array<float, 255> middles_{};  // between neighbours
 };
 
-/// Vectors of `dims` numbers, `stride` apart.
+/// Vectors of `dims` numbers, `stride` apart. A palette takes at most 48, the harmonics of
+/// degree 3.
 struct VectorTable {
   const float* first = nullptr;
   std::size_t count = 0, stride = 0, dims = 0;
@@ -42,7 +43,7 @@ struct Palette {
 
 /// Finds at most `size` entries with a small squared error by a tree of k-means: each node divides
 /// its vectors among 16 children, and its entries by their squared errors. The time is linear in
-/// the number of vectors. The result does not depend on the number of threads.
+/// the number of vectors. The result depends neither on the number of threads nor on the machine.
 Palette make_palette(const VectorTable& vectors, std::size_t size, ThreadPool& pool);
 
 }  // namespace catgs

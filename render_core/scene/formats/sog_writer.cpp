@@ -28,9 +28,11 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t max_palette = 65536, palette_row = 64;
-constexpr std::size_t max_codebook_values = std::size_t{1} << 22;
-constexpr std::size_t max_texels_across = 16383;  // of a WebP image
-constexpr int webp_effort = 1;                    // 0…9
+constexpr std::size_t codebook_sample = std::size_t{1} << 16;  // triples
+constexpr std::size_t max_texels_across = 16383;               // of a WebP image
+// Of WebP, 0…9. Bytes that look like noise become 6 % larger in a third of the time. The labels
+// would become half as large again.
+constexpr int effort = 1, effort_for_noise = 0;
 
 /// A texel per Gaussian, or per coefficient of the palette.
 class Image {
@@ -43,17 +45,17 @@ class Image {
     std::copy(texel.begin(), texel.end(), rgba_.begin() + static_cast<std::ptrdiff_t>(4 * i));
   }
   /// As lossless WebP.
-  [[nodiscard]] std::string encoded() const;
+  [[nodiscard]] std::string encoded(int effort_of_webp) const;
 
  private:
   std::size_t width_, height_;
   std::vector<std::uint8_t> rgba_;
 };
 
-std::string Image::encoded() const {
+std::string Image::encoded(int effort_of_webp) const {
   WebPConfig config;
   WebPPicture picture;
-  if (!WebPConfigInit(&config) || !WebPConfigLosslessPreset(&config, webp_effort) ||
+  if (!WebPConfigInit(&config) || !WebPConfigLosslessPreset(&config, effort_of_webp) ||
       !WebPPictureInit(&picture))
     throw std::bad_alloc();
   config.exact = 1;  // keeps the colours of texels whose fourth channel is 0
@@ -73,11 +75,22 @@ std::string Image::encoded() const {
   return bytes;
 }
 
-/// An even sample of the values that `value_of` has for [0, count).
-template <class ValueOf>
-Codebook codebook_of(std::size_t count, const ValueOf& value_of) {
-  std::vector<float> values(std::min(count, max_codebook_values));
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = value_of(i * count / values.size());
+/// Of an even sample and the limits of the triples that `triple_of` has for [0, count).
+template <class TripleOf>
+Codebook codebook_of(std::size_t count, const TripleOf& triple_of) {
+  const std::size_t taken = std::min(count, codebook_sample);
+  std::vector<float> values;
+  for (std::size_t i = 0; i < taken; ++i) {
+    const glm::vec3 triple = triple_of(i * count / taken);
+    values.insert(values.end(), {triple.x, triple.y, triple.z});
+  }
+  float low = values.front(), high = low;
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::vec3 triple = triple_of(i);
+    low = std::min({low, triple.x, triple.y, triple.z});
+    high = std::max({high, triple.x, triple.y, triple.z});
+  }
+  values.insert(values.end(), {low, high});
   return Codebook(std::move(values));
 }
 
@@ -131,44 +144,43 @@ class Writer {
 
   /// An image of the Gaussians. `texel` tells the four bytes of one.
   template <class Texel>
-  void store(const char* name, const Texel& texel) {
+  void store(const char* name, int effort_of_webp, const Texel& texel) {
     Image image(width_, height_);
     for (std::size_t i = 0; i < order_.size(); ++i) {
       const std::array<std::uint8_t, 4> rgba = texel(order_[i]);
       image.set(i, rgba[0], rgba[1], rgba[2], rgba[3]);
     }
-    files_.at(name) = image.encoded();
+    files_.at(name) = image.encoded(effort_of_webp);
   }
 
   void means() {
+    std::vector<glm::vec3> logarithms(cloud_.size());
     glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-    const auto logarithms = [&](std::size_t i) {
-      const glm::vec3& m = cloud_.mean[i];
-      return glm::vec3(log_mean(m.x), log_mean(m.y), log_mean(m.z));
-    };
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      low = glm::min(low, logarithms(i));
-      high = glm::max(high, logarithms(i));
+      const glm::vec3& m = cloud_.mean[i];
+      logarithms[i] = {log_mean(m.x), log_mean(m.y), log_mean(m.z)};
+      low = glm::min(low, logarithms[i]);
+      high = glm::max(high, logarithms[i]);
     }
     const glm::vec3 steps = 65535.0f / glm::max(high - low, 1e-20f);
-    const auto store_byte = [&](const char* name, int shift) {
-      store(name, [&](std::size_t i) {
-        const glm::vec3 at = glm::clamp((logarithms(i) - low) * steps, 0.0f, 65535.0f);
+    const auto store_byte = [&](const char* name, int effort_of_webp, int shift) {
+      store(name, effort_of_webp, [&](std::size_t i) {
+        const glm::vec3 at = glm::clamp((logarithms[i] - low) * steps, 0.0f, 65535.0f);
         const auto byte = [&](float v) {
-          return static_cast<std::uint8_t>(std::lround(v) >> shift & 255);
+          return static_cast<std::uint8_t>(static_cast<int>(v + 0.5f) >> shift & 255);
         };
         return std::array<std::uint8_t, 4>{byte(at.x), byte(at.y), byte(at.z), 255};
       });
     };
-    store_byte("means_l.webp", 0);
-    store_byte("means_u.webp", 8);
+    store_byte("means_l.webp", effort_for_noise, 0);
+    store_byte("means_u.webp", effort, 8);
     meta_.at("means")["mins"] = {low.x, low.y, low.z};
     meta_.at("means")["maxs"] = {high.x, high.y, high.z};
   }
 
   /// The three smaller components as bytes; the fourth byte names the largest, which is positive.
   void rotations() {
-    store("quats.webp", [&](std::size_t i) {
+    store("quats.webp", effort_for_noise, [&](std::size_t i) {
       const glm::quat& q = cloud_.rotation[i];
       const std::array<float, 4> wxyz = {q.w, q.x, q.y, q.z};
       std::size_t largest = 0;
@@ -186,10 +198,10 @@ class Writer {
 
   void scales() {
     const auto log_scale = [&](std::size_t i, int k) { return std::log(cloud_.scale[i][k]); };
-    const Codebook book = codebook_of(3 * cloud_.size(), [&](std::size_t i) {
-      return log_scale(i / 3, static_cast<int>(i % 3));
+    const Codebook book = codebook_of(cloud_.size(), [&](std::size_t i) {
+      return glm::vec3(log_scale(i, 0), log_scale(i, 1), log_scale(i, 2));
     });
-    store("scales.webp", [&](std::size_t i) {
+    store("scales.webp", effort_for_noise, [&](std::size_t i) {
       return std::array<std::uint8_t, 4>{book.nearest(log_scale(i, 0)),
                                          book.nearest(log_scale(i, 1)),
                                          book.nearest(log_scale(i, 2)), 255};
@@ -198,10 +210,9 @@ class Writer {
   }
 
   void colours() {
-    const Codebook book = codebook_of(3 * cloud_.size(), [&](std::size_t i) {
-      return cloud_.sh_of(i / 3)[0][static_cast<int>(i % 3)];
-    });
-    store("sh0.webp", [&](std::size_t i) {
+    const Codebook book =
+        codebook_of(cloud_.size(), [&](std::size_t i) { return cloud_.sh_of(i)[0]; });
+    store("sh0.webp", effort_for_noise, [&](std::size_t i) {
       const glm::vec3& sh = cloud_.sh_of(i)[0];
       return std::array<std::uint8_t, 4>{book.nearest(sh.x), book.nearest(sh.y), book.nearest(sh.z),
                                          to_byte(255.0f * cloud_.opacity[i])};
@@ -214,16 +225,18 @@ class Writer {
     const VectorTable vectors{&cloud_.sh_of(0)[1].x, cloud_.size(), 3 * (coefficients + 1),
                               3 * coefficients};
     const Palette palette = make_palette(vectors, std::min(cloud_.size(), max_palette), pool_);
-    const Codebook book =
-        codebook_of(palette.entries.size(), [&](std::size_t i) { return palette.entries[i]; });
     const std::size_t texels = palette.entries.size() / 3, entries = texels / coefficients;
+    const Codebook book = codebook_of(texels, [&](std::size_t i) {
+      const float* v = &palette.entries[3 * i];
+      return glm::vec3(v[0], v[1], v[2]);
+    });
     Image centroids(palette_row * coefficients, (entries + palette_row - 1) / palette_row);
     for (std::size_t i = 0; i < texels; ++i) {
       const float* v = &palette.entries[3 * i];
       centroids.set(i, book.nearest(v[0]), book.nearest(v[1]), book.nearest(v[2]), 255);
     }
-    files_.at("shN_centroids.webp") = centroids.encoded();
-    store("shN_labels.webp", [&](std::size_t i) {
+    files_.at("shN_centroids.webp") = centroids.encoded(effort);
+    store("shN_labels.webp", effort, [&](std::size_t i) {
       const std::uint32_t label = palette.labels[i];
       return std::array<std::uint8_t, 4>{static_cast<std::uint8_t>(label & 255),
                                          static_cast<std::uint8_t>(label >> 8), 0, 255};
