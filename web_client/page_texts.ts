@@ -1,17 +1,20 @@
-// Puts the texts of src/text.ts into index.html, where {{page.view}} names one. The build does this, so
-// that the texts are readable without a script and the page does not change while it loads.
-import { text } from './src/text';
-
-function text_called(key: string): string {
-  const found = key
-    .split('.')
-    .reduce<unknown>((part, name) => (part as Record<string, unknown> | undefined)?.[name], text);
-  if (typeof found !== 'string') throw new Error(`src/text.ts has no text ${key}`);
-  return found;
-}
+// Puts the texts of src/text/en.ts into index.html, where {{page.view}} names one, and leaves the key beside
+// each, for other languages (src/text/page.ts). The build does this, so that the texts are readable without a
+// script and an English page does not change while it loads.
+import { text } from './src/text/en';
+import { text_called } from './src/text/key';
 
 const escaped = (plain: string): string =>
   plain.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 
-export const with_texts = (html: string): string =>
-  html.replace(/\{\{([\w.]+)\}\}/g, (_, key: string) => escaped(text_called(key)));
+const english = (key: string): string => escaped(text_called(text, key));
+
+/** Throws where a text is neither an attribute nor all that its element holds. */
+export function with_texts(html: string): string {
+  const done = html
+    .replace(/ ([\w-]+)="\{\{([\w.]+)\}\}"/g, (_, name: string, key: string) => ` ${name}="${english(key)}" data-${name}="${key}"`)
+    .replace(/>\{\{([\w.]+)\}\}<\//g, (_, key: string) => ` data-text="${key}">${english(key)}</`);
+  const left = /[^>]*\{\{[^}]*\}\}/.exec(done);
+  if (left) throw new Error(`index.html: ${left[0].trim()} is not the whole text of an element`);
+  return done;
+}

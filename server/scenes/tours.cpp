@@ -26,6 +26,7 @@ constexpr std::uint64_t max_bytes = 4 << 20;
 // them.
 constexpr std::size_t max_tours = 32;
 constexpr std::size_t max_stops = 256;
+constexpr std::size_t max_languages = 32;
 constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters
 constexpr float longest_stay_s = 3600;
 constexpr float longest_flight_s = 120;
@@ -80,11 +81,43 @@ void check_number(const std::optional<JsonField>& field, float low, float high) 
     field->fail(fmt::format("is not in {}…{}", low, high));
 }
 
+/// Whether a text has the form of a BCP 47 tag, such as "de" or "zh-Hans".
+bool is_language_tag(std::string_view tag) {
+  const auto is_alphanumeric = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  std::size_t length = 0;  // of the part so far
+  for (const char c : tag) {
+    const bool ends_part = c == '-';
+    if (ends_part ? length == 0 : !is_alphanumeric(c) || length == 8) return false;
+    length = ends_part ? 0 : length + 1;
+  }
+  return length > 0 && tag.size() >= 2 && tag.size() <= 35;
+}
+
+/// Checks the texts of a tour or a stop in other languages: {"de": {"title": …}}.
+void check_translations(const JsonField& item, std::initializer_list<std::string_view> texts) {
+  const auto translations = item.find("translations");
+  if (!translations) return;
+  static_cast<void>(translations->find("de"));  // throws if it is no object
+  const nlohmann::json& members = translations->value();
+  if (members.size() > max_languages)
+    translations->fail(fmt::format("has {} languages, at most {}", members.size(), max_languages));
+  for (const auto& [tag, value] : members.items()) {
+    if (!is_language_tag(tag))
+      translations->fail(fmt::format("'{}' is no language", tag), "a tag such as de or zh-Hans");
+    const JsonField words = translations->at(tag);
+    check_members(words, texts);
+    for (const std::string_view text : texts) check_text(words.find(text));
+  }
+}
+
 void check_stop(const JsonField& stop) {
-  check_members(stop, {"title", "caption", "position", "look_at", "orientation", "fov_deg",
-                       "marker", "stay_s", "fly_s"});
+  check_members(stop, {"title", "caption", "translations", "position", "look_at", "orientation",
+                       "fov_deg", "marker", "stay_s", "fly_s"});
   check_text(stop.find("title"));
   check_text(stop.find("caption"));
+  check_translations(stop, {"title", "caption"});
   static_cast<void>(stop.at("position").place());
   if (const auto target = stop.find("look_at"))
     static_cast<void>(target->place());
@@ -97,8 +130,9 @@ void check_stop(const JsonField& stop) {
 }
 
 void check_tour(const JsonField& tour) {
-  check_members(tour, {"title", "autoplay", "stops"});
+  check_members(tour, {"title", "translations", "autoplay", "stops"});
   check_text(tour.find("title"));
+  check_translations(tour, {"title"});
   if (const auto autoplay = tour.find("autoplay"); autoplay && !autoplay->value().is_boolean())
     autoplay->fail("is not true or false");
   const JsonField stops = tour.at("stops");

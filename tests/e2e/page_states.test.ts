@@ -3,6 +3,7 @@ import { readdir, readFile } from 'node:fs/promises';
 import path from 'node:path';
 import { gzipSync } from 'node:zlib';
 import { beforeAll, describe, expect, it } from 'vitest';
+import { languages } from '#client/text/language';
 import { Error_Code } from '#client/wire/wire';
 import { keep_screenshot, new_page, open } from './support/browser';
 import { settle } from './support/camera';
@@ -25,10 +26,17 @@ describe('files', () => {
     const folder = path.join(web_dist, 'assets');
     const files = (await readdir(folder)).map((name) => path.join(folder, name));
     const index = await readFile(path.join(web_dist, 'index.html'), 'utf8');
-    const packed = await Promise.all(files.map(async (file) => gzipSync(await readFile(file)).length));
-    const total = packed.reduce((sum, bytes) => sum + bytes, gzipSync(index).length);
-    console.log(`the whole client is ${(total / 1000).toFixed(1)} kB (gzip)`);
-    expect(total).toBeLessThanOrEqual(150_000);
+    const packed = await Promise.all(
+      files.map(async (file) => [path.basename(file), gzipSync(await readFile(file)).length] as const),
+    );
+    const is_language = (file: string): boolean => languages.some((language) => file.startsWith(`${language}-`));
+    const sizes = (of_languages: boolean): number[] =>
+      packed.flatMap(([file, bytes]) => (is_language(file) === of_languages ? [bytes] : []));
+    const total = sizes(false).reduce((sum, bytes) => sum + bytes, gzipSync(index).length);
+    console.log(`the client is ${(total / 1000).toFixed(1)} kB without languages (gzip); these: ${sizes(true).join(', ')}`);
+    expect(total).toBeLessThanOrEqual(130_000);
+    expect(sizes(true)).toHaveLength(languages.length - 1); // English is part of the page
+    expect(Math.max(...sizes(true))).toBeLessThanOrEqual(8_000);
     expect(index).not.toMatch(/<style|\sstyle=|\son[a-z]+=|<script(?![^>]*\ssrc=)/);
     expect(index).not.toMatch(/https?:\/\//);
   });

@@ -4,12 +4,14 @@ import { Picks } from '#client/session/picks';
 import { nothing_said, TourDraft } from '#client/tour/draft';
 import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/save';
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
+import { untranslated } from '#client/tour/words';
 import { scene } from './cameras';
 import { FakeTime } from './fakes';
 
 const stop = (title: string): Stop => ({
   title,
   caption: `about ${title}`,
+  ...untranslated,
   eye: { position: [1, 2, 3], orientation: identity, fov_y_rad: 1 },
   marker: [0, 0, 9],
   stay_s: undefined,
@@ -85,11 +87,12 @@ describe('a draft of a tour', () => {
   it('keeps the other tours, and is none without stops', () => {
     const film: Tour = {
       title: 'film',
+      ...untranslated,
       stops: [],
       way: { duration_s: 1, repeats: false, at: () => stop('x').eye },
       starts_itself: false,
     };
-    const second: Tour = { title: 'second', stops: [stop('s')], way: undefined, starts_itself: false };
+    const second: Tour = { title: 'second', ...untranslated, stops: [stop('s')], way: undefined, starts_itself: false };
     const draft = new TourDraft();
     draft.load([film, { ...second, title: 'first', starts_itself: true }, second], nothing_said);
     expect(draft.tour).toMatchObject({ title: 'first', starts_itself: true });
@@ -133,7 +136,7 @@ describe('saving to the server', () => {
   ): Promise<SaveResult> => {
     vi.stubGlobal('fetch', answer);
     const page = 'https://tours.example/?author';
-    return save_sidecar(page, 'secret', 'old hall', sidecar, made_from, 'no answer');
+    return save_sidecar(page, 'secret', 'old hall', sidecar, made_from);
   };
   const answered =
     (status: number, text: string, headers = {}) =>
@@ -172,7 +175,7 @@ describe('saving to the server', () => {
       refused('this link does not let you save'),
     );
     expect(await save(answered(502, '<html>Bad gateway</html>'))).toEqual(refused('status 502'));
-    expect(await save(() => Promise.reject(new TypeError('failed')))).toEqual(refused('no answer'));
+    expect(await save(() => Promise.reject(new TypeError('failed')))).toEqual(refused('the server does not answer'));
     const fetched = vi.fn(answered(200, ''));
     expect(await save(fetched, ' '.repeat(2 ** 20 + 1))).toEqual(
       refused(expect.stringMatching(/too many/)),

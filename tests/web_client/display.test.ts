@@ -18,7 +18,7 @@ let display: Display;
 let now_us = 0;
 
 const presenter = (can_warp: boolean): Presenter => ({
-  description: 'fake',
+  kind: 'webgl2',
   can_warp,
   draw: (_picture, placing) => {
     drawn.push(placing);

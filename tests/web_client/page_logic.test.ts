@@ -210,7 +210,7 @@ describe('wording', () => {
 
   it('tells what happened and when it tries again', () => {
     const card = card_for({ phase: 'waiting', cause: 'unreachable', retry_in_ms: 3000, message: '' }, true);
-    expect(card).toMatchObject({ time: expect.stringContaining('in 3 s') as unknown, action: { does: 'retry' } });
+    expect(card).toMatchObject({ time: expect.stringContaining('in 3 seconds') as unknown, action: { does: 'retry' } });
     expect(card?.title).toContain('does not answer');
   });
 
@@ -245,10 +245,10 @@ describe('wording', () => {
 describe('the texts of the page', () => {
   const index = readFileSync(new URL('../../web_client/index.html', import.meta.url), 'utf8');
 
-  it('are in one file, and index.html names them', () => {
+  it('are in files of their own, and index.html names them', () => {
     const body = index.slice(index.indexOf('<main'));
     const attributes = [...body.matchAll(/ (?:aria-label|title|placeholder|alt)="([^"]*)"/g)];
-    const between = [...body.replace(/<kbd[^]*?<\/kbd>/g, '').matchAll(/>([^<]+)</g)];
+    const between = [...body.matchAll(/>([^<]+)</g)];
     const texts = [...attributes, ...between].map(([, found]) => found!.trim());
     expect(texts.length).toBeGreaterThan(60);
     // Signs are no texts, such as the cross of a button or the comma between two keys.
@@ -258,10 +258,11 @@ describe('the texts of the page', () => {
 
   it('come into the page when it is built', () => {
     expect(with_texts('<p title="{{page.start_key}}">{{modes.orbit}}</p>')).toBe(
-      '<p title="Back to the start (R)">Orbit</p>',
+      '<p title="Back to the start (R)" data-title="page.start_key" data-text="modes.orbit">Orbit</p>',
     );
     expect(with_texts(index)).not.toContain('{{');
-    expect(() => with_texts('{{page.absent}}')).toThrow('src/text.ts has no text page.absent');
-    expect(() => with_texts('{{share}}')).toThrow('no text share');
+    expect(() => with_texts('<p>{{page.absent}}</p>')).toThrow('no text is called page.absent');
+    expect(() => with_texts('<p>{{share}}</p>')).toThrow('no text is called share');
+    expect(() => with_texts('<p>{{modes.orbit}} <b></b></p>')).toThrow('{{modes.orbit}} is not the whole text of an element');
   });
 });

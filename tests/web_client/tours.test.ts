@@ -10,6 +10,7 @@ import { TourPlayer, type TourState } from '#client/tour/player';
 import { embed_code, frame_sites, read_shared, share_address } from '#client/tour/share';
 import { read_supersplat } from '#client/tour/supersplat';
 import { default_stay_s, read_tours, write_tours, type Tour } from '#client/tour/tour';
+import { untranslated } from '#client/tour/words';
 import settings from '../support/supersplat_settings.json';
 import { expect_vec } from './cameras';
 import { FakeTime } from './fakes';
@@ -57,10 +58,9 @@ describe('tours of a sidecar', () => {
       if (!found) throw new Error(`server/scenes/tours.* have no ${name}`);
       return Number(found[1]!.replaceAll("'", '')) * 2 ** Number(found[2] ?? 0);
     };
-    expect(limits.max_tours).toBe(limit('max_tours'));
+    for (const name of ['max_tours', 'max_stops', 'max_languages'] as const) expect(limits[name]).toBe(limit(name));
     expect(limits.longest_stay_s).toBe(limit('longest_stay_s'));
     expect(limits.longest_flight_s).toBe(limit('longest_flight_s'));
-    expect(limits.max_stops).toBe(limit('max_stops'));
     expect(limits.max_sidecar_bytes).toBe(limit('max_sent_sidecar_bytes'));
     // The server counts bytes; a character of UTF-8 has at most four.
     expect(limits.max_text_characters * 4).toBe(limit('max_text_bytes'));
@@ -209,12 +209,11 @@ describe('the player', () => {
   const stop = (x: number, caption = ''): Tour['stops'][number] => ({
     title: `at ${x}`,
     caption,
+    ...untranslated,
     eye: { position: [x, 0, 0], orientation: identity, fov_y_rad: 1 },
-    marker: undefined,
-    stay_s: 2,
-    fly_s: undefined,
+    ...{ marker: undefined, stay_s: 2, fly_s: undefined },
   });
-  const tour: Tour = { title: 'a tour', stops: [1, 2, 3].map((x) => stop(x)), way: undefined, starts_itself: false };
+  const tour: Tour = { title: 'a tour', ...untranslated, stops: [1, 2, 3].map((x) => stop(x)), way: undefined, starts_itself: false };
 
   /** A camera that flies when it is told to, by hand. */
   function guided(reduced_motion = false) {
@@ -377,7 +376,7 @@ describe('the player', () => {
   it('shows a film: glides to its begin, and announces it piece by piece', () => {
     const { player, time, paths, arrive, state } = guided();
     const way = { duration_s: 30, repeats: false, at: (s: number): Eye => ({ ...stop(s).eye }) };
-    player.load([tour, { title: 'film', stops: [], way, starts_itself: true }]);
+    player.load([tour, { title: 'film', ...untranslated, stops: [], way, starts_itself: true }]);
     expect(state()).toMatchObject({ tour_index: 1, playing: true });
     arrive();
     const first = paths[paths.length - 1]!;

@@ -1,6 +1,7 @@
 import { browser_storage } from './base/browser_storage';
 import { leaves_scene_open, list_scenes } from './session/scenes';
 import { AccessToken } from './session/token';
+import { translate_page } from './text/page';
 import { CardView } from './ui/card';
 import { show_gallery } from './ui/gallery';
 import type { SessionStatus } from './ui/session_status';
@@ -8,6 +9,7 @@ import { mount_viewer } from './ui/viewer';
 import { broken_card, unsupported_card } from './ui/wording';
 
 async function main(): Promise<void> {
+  translate_page();
   const card = new CardView();
   const viewer: { status?: SessionStatus } = {};
   const broken = (message: string): void => {

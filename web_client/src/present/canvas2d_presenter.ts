@@ -4,7 +4,7 @@ import { size_of, type Pixels, type Presenter } from './presenter';
 
 /** For machines without a GPU. A 640x360 frame takes 11 ms of CPU, where software WebGL takes 19. */
 export class Canvas2dPresenter implements Presenter {
-  readonly description = '2D canvas (no hardware WebGL2)';
+  readonly kind = 'canvas_2d';
   readonly can_warp = false;
   private yuv_ = new Uint8Array(0);
   private image_: ImageData | undefined;

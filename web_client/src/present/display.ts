@@ -5,7 +5,7 @@ import type { Picture } from '../decode/picture';
 import type { Pixels, Placing, Presenter } from './presenter';
 import { TurnForecast } from './turn_forecast';
 import { reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
-import { WarpPolicy, type WarpMode } from './warp_policy';
+import { WarpPolicy, type WarpMode, type WarpState } from './warp_policy';
 
 interface DisplayEnvironment {
   now_us: () => number;
@@ -62,7 +62,7 @@ export class Display {
     return this.policy_.active;
   }
 
-  get warp_state(): string {
+  get warp_state(): WarpState {
     return this.policy_.state;
   }
 

@@ -17,13 +17,15 @@ export interface Placing {
   readonly height_px: number;
 }
 
+export type PresenterKind = 'webgl2' | 'canvas_2d';
+
 /**
  * Draws pictures on the canvas at their native size. CSS scales the canvas to the view, which is free
  * on a GPU and the cheapest way without one.
  */
 export interface Presenter {
-  /** How pictures get on the canvas, for people to read. */
-  readonly description: string;
+  /** How pictures get on the canvas. */
+  readonly kind: PresenterKind;
   /** Whether it uses placings and can redraw. */
   readonly can_warp: boolean;
   /** The promise resolves when the picture may be closed. Only one draw runs at a time. */

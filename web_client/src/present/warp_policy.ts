@@ -1,9 +1,10 @@
 // Decides whether warping helps, and how much overscan it needs. Pure.
 import { percentile, TimeWindow } from '../base/time_window';
-import { text } from '../text';
 import type { Sides } from './warp';
 
 export type WarpMode = 'auto' | 'on' | 'off';
+/** Whether pictures are warped, or why not. */
+export type WarpState = 'on' | 'off' | 'no_gpu' | 'too_slow';
 
 // There are few steps, because each change restarts the stream. Most turns are about the vertical axis.
 // They need width, and height for the corners only. Two factors reach half as far again as a single one
@@ -16,8 +17,6 @@ const span_us = 1e6;
 const least_samples = 12;
 const calm_before_less_us = 10e6; // a turn may soon need the overscan of the last one again
 const slow_draw_us = 8000; // half a refresh: slower drawing makes the picture late
-
-const percent = (factor: number): number => Math.round((factor - 1) * 100);
 
 export class WarpPolicy {
   private readonly widths_ = new TimeWindow(span_us);
@@ -45,13 +44,10 @@ export class WarpPolicy {
     return this.active && this.may_overscan ? this.overscan_ : none;
   }
 
-  /** Text for people. */
-  get state(): string {
-    if (!this.can_warp_) return text.warp.no_gpu;
-    if (this.mode_ === 'off') return text.warp.off;
-    if (!this.active) return text.warp.too_slow;
-    const { x, y } = this.overscan_;
-    return text.warp.on(percent(x), percent(y));
+  get state(): WarpState {
+    if (!this.can_warp_) return 'no_gpu';
+    if (this.mode_ === 'off') return 'off';
+    return this.active ? 'on' : 'too_slow';
   }
 
   /**

@@ -27,7 +27,7 @@ const unmoved: Matrix3 = new Float32Array([1, 0, 0, 0, 1, 0, 0, 0, 1]);
 
 /** The upload of a VideoFrame converts its YUV to RGB by the colour space of its bitstream. */
 export class WebGl2Presenter implements Presenter {
-  readonly description = 'WebGL2';
+  readonly kind = 'webgl2';
   readonly can_warp = true;
   private matrix_place_: WebGLUniformLocation | null = null;
 

@@ -3,6 +3,7 @@ import type { CameraMode } from '../camera/mode';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
+import { untranslated } from './words';
 
 /** What visitors are told of a scene. Texts are empty where nothing is said. */
 export interface SceneAbout {
@@ -26,7 +27,7 @@ interface DraftState {
   readonly start: Eye | undefined;
 }
 
-const empty_tour: Tour = { title: '', stops: [], way: undefined, starts_itself: false };
+const empty_tour: Tour = { title: '', ...untranslated, stops: [], way: undefined, starts_itself: false };
 const most_undone = 200;
 
 /** Keeps each state of the draft, so that an author can take back every edit. */

@@ -1,5 +1,8 @@
 import { unit, type Quat, type Vec3 } from '../base/vector';
+import { text } from '../text/text';
 import { max_text_characters } from './limits';
+
+const { mistakes } = text;
 
 /** A value of a document that people wrote. Its errors name its place: "tours[0].title: …". */
 export class JsonPlace {
@@ -14,44 +17,51 @@ export class JsonPlace {
 
   /** The member; undefined where it is missing or null. */
   find(key: string): JsonPlace | undefined {
-    if (typeof this.value_ !== 'object' || this.value_ === null) this.fail('is not an object');
+    if (typeof this.value_ !== 'object' || this.value_ === null) this.fail(mistakes.not_an_object);
     const value = (this.value_ as Record<string, unknown>)[key];
     if (value === undefined || value === null) return undefined;
     return new JsonPlace(`${this.place_}.${key}`, value);
   }
 
   at(key: string): JsonPlace {
-    return this.find(key) ?? this.fail(`'${key}' is missing`);
+    return this.find(key) ?? this.fail(mistakes.missing(key));
   }
 
   elements(most: number): JsonPlace[] {
-    if (!Array.isArray(this.value_)) this.fail('is not a list');
-    if (this.value_.length > most) this.fail(`has ${this.value_.length} entries, at most ${most}`);
+    if (!Array.isArray(this.value_)) this.fail(mistakes.not_a_list);
+    if (this.value_.length > most) this.fail(mistakes.too_many(this.value_.length, most));
     return this.value_.map((value, i) => new JsonPlace(`${this.place_}[${i}]`, value));
+  }
+
+  members(most: number): [name: string, value: JsonPlace][] {
+    if (typeof this.value_ !== 'object' || this.value_ === null) this.fail(mistakes.not_an_object);
+    const members = Object.entries(this.value_);
+    if (members.length > most) this.fail(mistakes.too_many(members.length, most));
+    return members.map(([name, value]) => [name, new JsonPlace(`${this.place_}.${name}`, value)]);
   }
 
   /** The text, cut off at the limit. */
   text(): string {
-    if (typeof this.value_ !== 'string') this.fail('is not a text');
+    if (typeof this.value_ !== 'string') this.fail(mistakes.not_a_text);
     return this.value_.slice(0, max_text_characters);
   }
 
   truth(): boolean {
-    if (typeof this.value_ !== 'boolean') this.fail('is not true or false');
+    if (typeof this.value_ !== 'boolean') this.fail(mistakes.not_a_truth);
     return this.value_;
   }
 
   number(low = -1e9, high = 1e9): number {
     const value = this.value_;
     if (typeof value !== 'number' || !(value >= low && value <= high)) {
-      this.fail(`is not a number in ${low}…${high}`);
+      this.fail(mistakes.not_in(low, high));
     }
     return value;
   }
 
   numbers(count: number): number[] {
     const values = this.elements(count).map((value) => value.number());
-    if (values.length !== count) this.fail(`is not ${count} numbers`);
+    if (values.length !== count) this.fail(mistakes.not_numbers(count));
     return values;
   }
 

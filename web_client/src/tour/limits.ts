@@ -1,6 +1,7 @@
 // Limits of a scene's tours. server/scenes/tours.cpp has the same; tests/web_client/tours.test.ts compares them.
 export const max_tours = 32;
 export const max_stops = 256;
+export const max_languages = 32;
 export const longest_stay_s = 3600;
 export const longest_flight_s = 120;
 export const max_text_characters = 4000;

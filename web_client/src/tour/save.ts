@@ -1,5 +1,7 @@
 // Saves a scene's sidecar to the server. The server accepts it from authors.
 import { ask_server, scene_path } from '../base/server';
+import { number } from '../text/number';
+import { text } from '../text/text';
 import { max_sidecar_bytes } from './limits';
 
 /** Tag (ETag) of a sidecar; null: there is none; undefined: the server did not say. */
@@ -18,11 +20,10 @@ export async function save_sidecar(
   scene_id: string,
   sidecar: string,
   made_from: SidecarTag,
-  unreachable: string,
 ): Promise<SaveResult> {
   const body = new Blob([sidecar], { type: 'application/json' });
   if (body.size > max_sidecar_bytes)
-    return { kind: 'refused', why: `${body.size} bytes are too many, ${max_sidecar_bytes} fit` };
+    return { kind: 'refused', why: text.author.too_large(number(body.size), number(max_sidecar_bytes)) };
   const headers: Record<string, string> = {};
   if (made_from === null) headers['if-none-match'] = '*';
   else if (made_from !== undefined) headers['if-match'] = made_from;
@@ -34,13 +35,13 @@ export async function save_sidecar(
     if (response.status === 412) return { kind: 'changed', tag };
     return { kind: 'refused', why: refusal(response.status, await response.text()) };
   } catch {
-    return { kind: 'refused', why: unreachable };
+    return { kind: 'refused', why: text.author.unreachable };
   }
 }
 
 /** The first line of the server's answer is "403: reason". A proxy may answer with a page instead. */
-function refusal(status: number, text: string): string {
-  const [line = ''] = text.split('\n');
+function refusal(status: number, answer: string): string {
+  const [line = ''] = answer.split('\n');
   const prefix = `${status}: `;
-  return line.startsWith(prefix) ? line.slice(prefix.length) : `status ${status}`;
+  return line.startsWith(prefix) ? line.slice(prefix.length) : text.author.status(status);
 }

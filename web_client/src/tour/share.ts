@@ -2,6 +2,7 @@
 import { unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
+import { text } from '../text/text';
 
 export interface SharedView {
   readonly eye: Eye | undefined;
@@ -41,8 +42,8 @@ export function presentation_address(page_url: string, scene_id: string, watch_t
 export function read_shared(page_url: string): SharedView {
   const fragment = new URLSearchParams(new URL(page_url).hash.slice(1));
   const ordinal = (key: string): number | undefined => {
-    const text = fragment.get(key) ?? '';
-    return /^[1-9]\d{0,3}$/.test(text) ? Number(text) - 1 : undefined;
+    const found = fragment.get(key) ?? '';
+    return /^[1-9]\d{0,3}$/.test(found) ? Number(found) - 1 : undefined;
   };
   const mode = camera_modes.find((name) => name === fragment.get('mode'));
   return {
@@ -53,8 +54,8 @@ export function read_shared(page_url: string): SharedView {
   };
 }
 
-function read_eye(text: string): Eye | undefined {
-  const parts = text.split(',');
+function read_eye(written: string): Eye | undefined {
+  const parts = written.split(',');
   const numbers = parts.map(Number);
   const [px, py, pz, x, y, z, w, fov_deg] = numbers as [
     number, number, number, number, number, number, number, number,
@@ -86,7 +87,7 @@ export function frame_sites(header: string | null): readonly string[] | undefine
 }
 
 function sites_of_policy(policy: string): readonly string[] | undefined {
-  const directives = policy.split(';').map((text) => text.trim().split(/\s+/));
+  const directives = policy.split(';').map((directive) => directive.trim().split(/\s+/));
   const sites = directives.find(([name]) => name === 'frame-ancestors')?.slice(1);
   return sites?.includes('*') ? undefined : sites?.filter((site) => site !== "'none'");
 }
@@ -96,5 +97,5 @@ export function embed_code(address: string): string {
   const url = new URL(address);
   url.searchParams.set('ui', '0');
   const source = url.href.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
-  return `<iframe src="${source}" style="width:100%;aspect-ratio:16/9;border:0" allow="fullscreen; gamepad" title="3D tour"></iframe>`;
+  return `<iframe src="${source}" style="width:100%;aspect-ratio:16/9;border:0" allow="fullscreen; gamepad" title="${text.share.frame_title}"></iframe>`;
 }

@@ -1,9 +1,11 @@
 // Reads the settings.json of the SuperSplat viewer, version 2: cameras, animTracks, annotations.
 import { look_at, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { text } from '../text/text';
 import { film_flight, type Shot } from './camera_spline';
 import { JsonPlace } from './json_place';
 import type { Stop, Tour } from './tour';
+import { untranslated } from './words';
 
 interface ImportedTours {
   readonly tours: readonly Tour[];
@@ -11,6 +13,7 @@ interface ImportedTours {
   readonly start: Eye | undefined;
 }
 
+const { mistakes } = text;
 const most_entries = 1024;
 const loops = ['none', 'repeat', 'pingpong'] as const;
 
@@ -38,6 +41,7 @@ function read_annotation(annotation: JsonPlace, aspect: number): Stop {
   return {
     title: annotation.at('title').text(),
     caption: annotation.find('text')?.text() ?? '',
+    ...untranslated,
     eye: read_camera(annotation.at('camera'), aspect),
     marker: to_scene(annotation.at('position').vec3()),
     stay_s: undefined,
@@ -51,16 +55,16 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
   if (frames.length === 0) return undefined;
   const times_s = frames.map((frame) => frame.number(0) / rate);
   if (times_s.some((time_s, i) => i > 0 && time_s <= times_s[i - 1]!)) {
-    track.at('keyframes').at('times').fail('are not increasing');
+    track.at('keyframes').at('times').fail(mistakes.not_increasing);
   }
   const values = track.at('keyframes').at('values');
   const positions = values.at('position').elements(3 * most_entries);
   const targets = values.at('target').elements(3 * most_entries);
   const fovs = values.at('fov').elements(most_entries);
   if (positions.length !== 3 * frames.length || targets.length !== 3 * frames.length) {
-    values.fail('position and target are not three numbers for each time');
+    values.fail(mistakes.not_three_each);
   }
-  if (fovs.length !== frames.length) values.fail('fov is not one number for each time');
+  if (fovs.length !== frames.length) values.fail(mistakes.not_one_each);
   const triple = (list: JsonPlace[], i: number): Vec3 =>
     to_scene([list[3 * i]!.number(), list[3 * i + 1]!.number(), list[3 * i + 2]!.number()]);
   const shots = frames.map(
@@ -82,14 +86,14 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
     },
     up,
   );
-  return { title: track.find('name')?.text() ?? '', stops: [], way, starts_itself };
+  return { title: track.find('name')?.text() ?? '', ...untranslated, stops: [], way, starts_itself };
 }
 
 /** Throws an error that names the place it cannot read. `aspect`: width over height of the view. */
 export function read_supersplat(document: unknown, aspect: number): ImportedTours {
   const settings = new JsonPlace('settings.json', document);
   const version = settings.find('version')?.number();
-  if (version !== 2) settings.fail(`version ${version ?? 1} is not read here, only version 2`);
+  if (version !== 2) settings.fail(mistakes.version(version ?? 1, 2));
   const mode = settings.find('startMode')?.text() ?? 'default';
   const list = (key: string): JsonPlace[] => settings.find(key)?.elements(most_entries) ?? [];
 
@@ -98,7 +102,7 @@ export function read_supersplat(document: unknown, aspect: number): ImportedTour
     return read_track(track, aspect, mode === 'animTrack' && i === 0) ?? [];
   });
   const annotated: Tour[] =
-    stops.length > 0 ? [{ title: '', stops, way: undefined, starts_itself: false }] : [];
+    stops.length > 0 ? [{ title: '', ...untranslated, stops, way: undefined, starts_itself: false }] : [];
   const camera = list('cameras')[0];
   const first = mode === 'annotation' ? stops[0]?.eye : undefined;
   return {

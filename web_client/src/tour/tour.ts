@@ -3,10 +3,10 @@ import { look_at, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { JsonPlace } from './json_place';
-import { longest_flight_s, longest_stay_s, max_stops, max_tours } from './limits';
+import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
+import { in_language, type Worded } from './words';
 
-export interface Stop {
-  readonly title: string;
+export interface Stop extends Worded {
   readonly caption: string;
   readonly eye: Eye;
   /** Place of its hotspot in the scene; undefined: it has none. */
@@ -17,8 +17,7 @@ export interface Stop {
   readonly fly_s: number | undefined;
 }
 
-export interface Tour {
-  readonly title: string;
+export interface Tour extends Worded {
   readonly stops: readonly Stop[];
   /** A film of the camera, instead of stops. */
   readonly way: (Flight & { readonly repeats: boolean }) | undefined;
@@ -38,6 +37,7 @@ export function default_stay_s(stop: Stop): number {
 export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
   return new JsonPlace('tours', document).elements(max_tours).map((tour) => ({
     title: tour.find('title')?.text() ?? '',
+    ...read_translations(tour),
     stops: tour
       .at('stops')
       .elements(max_stops)
@@ -54,6 +54,7 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   return {
     title: stop.find('title')?.text() ?? '',
     caption: stop.find('caption')?.text() ?? '',
+    ...read_translations(stop),
     eye: { position, orientation, fov_y_rad: stop.find('fov_deg')?.fov_rad() ?? fov_y_rad },
     marker: stop.find('marker')?.vec3(),
     stay_s: stop.find('stay_s')?.number(0, longest_stay_s),
@@ -61,17 +62,37 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   };
 }
 
+function read_translations(item: JsonPlace): Pick<Worded, 'translations' | 'language'> {
+  const written = item.find('translations')?.members(max_languages) ?? [];
+  const translations = new Map(
+    written.map(([tag, words]) => [
+      tag,
+      { title: words.find('title')?.text() ?? '', caption: words.find('caption')?.text() ?? '' },
+    ]),
+  );
+  return { translations, language: '' };
+}
+
+/** The tours as a visitor reads them, in the first of these languages that each text has. */
+export const tours_for = (tours: readonly Tour[], readers: readonly string[]): readonly Tour[] =>
+  tours.map((tour) => ({
+    ...in_language(tour, readers),
+    stops: tour.stops.map((stop) => in_language(stop, readers)),
+  }));
+
 /** Writes what read_tours() reads. Numbers keep seven digits, more than anybody can see. */
 export function write_tours(tours: readonly Tour[]): unknown[] {
   const short = (v: number): number => Number(v.toPrecision(7));
   return tours
     .filter(({ way }) => way === undefined)
-    .map(({ title, stops, starts_itself }) => ({
+    .map(({ title, translations, stops, starts_itself }) => ({
       title,
+      ...write_translations(translations),
       ...(starts_itself && { autoplay: true }),
       stops: stops.map((stop) => ({
         title: stop.title,
         ...(stop.caption && { caption: stop.caption }),
+        ...write_translations(stop.translations),
         position: stop.eye.position.map(short),
         orientation: stop.eye.orientation.map(short),
         fov_deg: short((stop.eye.fov_y_rad * 180) / Math.PI),
@@ -80,4 +101,11 @@ export function write_tours(tours: readonly Tour[]): unknown[] {
         ...(stop.fly_s !== undefined && { fly_s: stop.fly_s }),
       })),
     }));
+}
+
+function write_translations(translations: Worded['translations']): object {
+  const written = [...translations].flatMap(([tag, { title, caption }]) =>
+    title || caption ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const] : [],
+  );
+  return written.length > 0 ? { translations: Object.fromEntries(written) } : {};
 }

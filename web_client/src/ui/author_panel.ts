@@ -1,12 +1,15 @@
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
-import { text } from '../text';
+import { number } from '../text/number';
+import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
 import { max_tours } from '../tour/limits';
 import { save_sidecar, type SidecarTag } from '../tour/save';
-import type { Tour } from '../tour/tour';
+import { tours_for, type Tour } from '../tour/tour';
+import { untranslated, worded, words_for } from '../tour/words';
 import { AuthorAbout } from './author_about';
+import { AuthorLanguage } from './author_language';
 import { AuthorStops } from './author_stops';
 import { by_id, on_click, save_file } from './dom';
 
@@ -31,6 +34,7 @@ export class AuthorPanel {
   private readonly draft_ = new TourDraft();
   private readonly about_: AuthorAbout;
   private readonly stops_: AuthorStops;
+  private readonly language_ = new AuthorLanguage(() => this.edited());
   private readonly tour_ = by_id('author-tour', HTMLSelectElement);
   private readonly title_ = by_id('author-title', HTMLInputElement);
   private readonly autoplay_ = by_id('author-autoplay', HTMLInputElement);
@@ -51,7 +55,7 @@ export class AuthorPanel {
     });
     this.stops_ = new AuthorStops(by_id('author-stops', HTMLOListElement), {
       change: (i, change, field) => {
-        this.draft_.change(i, change, field);
+        this.draft_.change(i, worded(this.draft_.stops[i]!, this.language_.value, change), this.typed_in(field));
         // Typing does not rebuild the fields.
         if (field === undefined) this.edited();
         else this.told();
@@ -78,6 +82,7 @@ export class AuthorPanel {
     this.save_.hidden = token === undefined;
     this.replace_.hidden = true;
     this.draft_.load(tours, about);
+    this.language_.offer(tours);
     this.saved_ = this.draft_.state;
     this.start_ = undefined;
     this.show(0);
@@ -112,7 +117,7 @@ export class AuthorPanel {
       this.edited(0);
     });
     this.title_.addEventListener('input', () => {
-      draft.edit_tour({ title: this.title_.value }, 'tour');
+      draft.edit_tour(worded(draft.tour, this.language_.value, { title: this.title_.value }), this.typed_in('tour'));
       this.told();
     });
     on_click('author-add', () => void this.add());
@@ -139,8 +144,8 @@ export class AuthorPanel {
     const { edited } = this.draft_.state;
     const marker = await this.tools_.place_ahead();
     if (edited !== this.draft_.state.edited) return; // the author went on to another tour
-    const title = text.tour.stop_numbered(this.draft_.stops.length + 1);
-    this.draft_.add({ title, caption: '', eye, marker, stay_s: undefined, fly_s: undefined });
+    const title = text.tour.stop_numbered(number(this.draft_.stops.length + 1));
+    this.draft_.add({ title, caption: '', ...untranslated, eye, marker, stay_s: undefined, fly_s: undefined });
     this.edited(this.draft_.stops.length - 1);
     this.done_.textContent = marker ? '' : text.author.no_marker;
     const added = by_id('author-stops', HTMLOListElement).lastElementChild;
@@ -192,7 +197,6 @@ export class AuthorPanel {
       this.tools_.scene_id(),
       sidecar,
       made_from,
-      text.author.unreachable,
     );
     this.save_.disabled = this.replace_.disabled = false;
     if (result.kind === 'saved') {
@@ -230,20 +234,29 @@ export class AuthorPanel {
     const { shown, shown_index, state } = this.draft_;
     if (state.start !== this.start_) this.tools_.start_at(state.start);
     this.start_ = state.start;
-    this.tools_.changed(shown, shown_index);
+    const { value: language } = this.language_;
+    this.tools_.changed(tours_for(shown, language ? [language] : []), shown_index);
+  }
+
+  /** Typing in one language is one edit. */
+  private typed_in(field: string | undefined): string | undefined {
+    return field && `${field} ${this.language_.value}`;
   }
 
   private show(open_stop?: number): void {
     const { tour, editable, state } = this.draft_;
     const words = text.tour;
     this.tour_.replaceChildren(
-      ...editable.map((i, n) => new Option(state.tours[i]!.title || words.numbered(n + 1), String(i))),
+      ...editable.map((i, n) => new Option(state.tours[i]!.title || words.numbered(number(n + 1)), String(i))),
     );
     this.tour_.value = String(state.edited);
-    this.title_.value = tour.title;
+    const { value: language } = this.language_;
+    this.title_.value = words_for(tour, language).title;
+    this.title_.placeholder = language ? tour.title : text.author.tour_title;
+    this.title_.lang = language;
     this.autoplay_.checked = tour.starts_itself;
     this.about_.show(state.about);
-    this.stops_.show(tour.stops, open_stop);
+    this.stops_.show(tour.stops, language, open_stop);
     this.show_what_can_be_done();
   }
 

@@ -1,6 +1,8 @@
-import { text } from '../text';
+import { number } from '../text/number';
+import { text } from '../text/text';
 import { longest_flight_s, longest_stay_s, max_text_characters } from '../tour/limits';
 import { default_stay_s, type Stop } from '../tour/tour';
+import { words_for } from '../tour/words';
 import { make } from './dom';
 
 export interface StopActions {
@@ -17,14 +19,16 @@ export interface StopActions {
 /** The stops of a tour, with fields and buttons. The open one shows all of them. */
 export class AuthorStops {
   private open_ = 0;
+  private language_ = '';
 
   constructor(
     private readonly list_: HTMLElement,
     private readonly actions_: StopActions,
   ) {}
 
-  /** Shows the stops. The focus stays on the control where it is, in the row of stop `open`. */
-  show(stops: readonly Stop[], open = this.open_): void {
+  /** Shows the stops, with their texts for one language (words.ts). The focus stays on the control where it is, in the row of stop `open`. */
+  show(stops: readonly Stop[], language: string, open = this.open_): void {
+    this.language_ = language;
     const focused = document.activeElement;
     const control =
       focused instanceof HTMLElement && this.list_.contains(focused) ? focused.dataset['control'] : undefined;
@@ -50,15 +54,23 @@ export class AuthorStops {
 
   private fields_of(stop: Stop, i: number): HTMLElement[] {
     const words = text.author;
-    const title = make('input', { value: stop.title, maxLength: 200, 'aria-label': words.title(i + 1) });
+    const n = number(i + 1);
+    const written = words_for(stop, this.language_);
+    const in_its_own = { dir: 'auto', lang: this.language_ };
+    // A translation that is empty is replaced by what stands behind it.
+    const behind = this.language_ === '' ? { title: '', caption: words.caption_here } : stop;
+    const title = make('input', {
+      ...{ value: written.title, maxLength: 200, placeholder: behind.title, ...in_its_own },
+      'aria-label': words.title(n),
+    });
     const caption = make('textarea', {
-      ...{ value: stop.caption, rows: 2, maxLength: max_text_characters },
-      ...{ placeholder: words.caption_here, 'aria-label': words.caption(i + 1) },
+      ...{ value: written.caption, rows: 2, maxLength: max_text_characters, ...in_its_own },
+      ...{ placeholder: behind.caption || words.caption_here, 'aria-label': words.caption(n) },
     });
     const seconds = (label: string, value: number | undefined, usual: string, most: number): HTMLInputElement =>
       make('input', {
         ...{ type: 'number', min: '0', max: String(most), step: 'any', placeholder: usual },
-        ...{ value: value === undefined ? '' : String(value), 'aria-label': `${label} (${i + 1})` },
+        ...{ value: value === undefined ? '' : String(value), 'aria-label': words.of_stop(label, n) },
       });
     const stay = seconds(words.stay, stop.stay_s, String(Math.round(default_stay_s(stop))), longest_stay_s);
     const flight = seconds(words.flight, stop.fly_s, words.automatic, longest_flight_s);
@@ -80,6 +92,7 @@ export class AuthorStops {
 
   private buttons_of(stop: Stop, i: number, count: number): HTMLElement {
     const words = text.author;
+    const n = number(i + 1);
     const { actions_: actions } = this;
     const button = (control: string, name: string, onclick: () => void, sign = name, disabled = false): HTMLElement => {
       const said = sign === name ? {} : { 'aria-label': name, title: name };
@@ -96,9 +109,9 @@ export class AuthorStops {
       button('show', words.show, () => actions.go_to(i)),
       button('view', words.view_here, () => actions.take_view(i)),
       marker,
-      button('up', words.up(i + 1), () => actions.move(i, -1), '↑', i === 0),
-      button('down', words.down(i + 1), () => actions.move(i, 1), '↓', i === count - 1),
-      button('remove', words.remove(i + 1), () => actions.remove(i), '×'),
+      button('up', words.up(n), () => actions.move(i, -1), '↑', i === 0),
+      button('down', words.down(n), () => actions.move(i, 1), '↓', i === count - 1),
+      button('remove', words.remove(n), () => actions.remove(i), '×'),
     );
   }
 

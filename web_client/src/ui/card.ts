@@ -66,6 +66,6 @@ function show_links(list: HTMLElement, scenes: readonly SceneListing[]): void {
   list.hidden = scenes.length === 0;
   const labels = scene_labels(scenes);
   list.replaceChildren(
-    ...scenes.map(({ id }, i) => make('li', {}, make('a', { href: scene_address(location.href, id) }, labels[i] ?? id))),
+    ...scenes.map(({ id }, i) => make('li', {}, make('a', { dir: 'auto', href: scene_address(location.href, id) }, labels[i] ?? id))),
   );
 }

@@ -71,7 +71,7 @@ export class EmbedApi {
         this.target_[command]();
         break;
       default:
-        message.at('catgs').fail(`'${command}' is no command`);
+        throw new Error(`'${command}' is no command`);
     }
   }
 

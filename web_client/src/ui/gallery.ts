@@ -1,6 +1,6 @@
 // The first page of a server with several scenes: a picture of each.
 import { credit_line, fetch_poster, scene_address, scene_labels, type SceneListing } from '../session/scenes';
-import { text } from '../text';
+import { text } from '../text/text';
 import { by_id, make } from './dom';
 
 const next_try_ms = 5000;
@@ -26,7 +26,7 @@ export function show_gallery(scenes: readonly SceneListing[], token: string): vo
       const link = make(
         'a',
         { href: scene_address(location.href, scene.id) },
-        ...[picture, make('strong', {}, labels[i] ?? scene.id), make('small', {}, credit_line(scene))],
+        ...[picture, make('strong', { dir: 'auto' }, labels[i] ?? scene.id), make('small', { dir: 'auto' }, credit_line(scene))],
       );
       return make('li', {}, link);
     }),

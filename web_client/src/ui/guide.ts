@@ -4,11 +4,12 @@ import type { Eye } from '../camera/eye';
 import { start_mode } from '../session/camera_messages';
 import { scene_name } from '../session/scenes';
 import type { AccessToken } from '../session/token';
-import { text } from '../text';
+import { readers, text } from '../text/text';
 import { fetch_tours, read_document } from '../tour/load';
 import type { SceneAbout } from '../tour/draft';
 import { TourPlayer, type TourState } from '../tour/player';
 import { read_shared, share_address, type SharedView } from '../tour/share';
+import { tours_for } from '../tour/tour';
 import type { SceneFacts } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import { AuthorPanel } from './author_panel';
@@ -145,17 +146,19 @@ export class Guide {
       if (!shared.eye && !navigation.led) navigation.reset();
     }
     this.first_start_ = camera.start;
-    this.tour_view_.show_tours(tours);
+    // Authors see each text in the language that they edit.
+    const shown = tours_for(tours, this.author_ ? [] : readers);
+    this.tour_view_.show_tours(shown);
     this.author_?.load(tours, about_of(scene), may_save ? token : undefined, document.etag);
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined || navigation.led;
-    this.player_.load(tours, stays);
+    this.player_.load(shown, stays);
     if (load === 1 && this.author_) toolbar.open('author');
     this.show_stop(shared, true);
     this.embed_.say({
       catgs: 'ready',
       scene: scene_name(scene_id),
-      stops: (tours[0]?.stops ?? []).map(({ title }) => title),
+      stops: (shown[0]?.stops ?? []).map(({ title }) => title),
     });
   }
 

@@ -1,6 +1,7 @@
 import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
-import { text } from '../text';
+import { number } from '../text/number';
+import { language, text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import type { WorkerClient } from '../worker/client';
@@ -66,9 +67,9 @@ export class Hotspots {
     this.tour_ = tour;
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
-      const number = make('span', { 'aria-hidden': 'true' }, String(i + 1));
+      const sign = make('span', { 'aria-hidden': 'true' }, number(i + 1));
       // It is hidden until it is placed.
-      const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, number);
+      const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
       button.append(label_of(stop, i, button));
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
@@ -87,8 +88,8 @@ export class Hotspots {
 
 /** Title and caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
 function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLElement {
-  const title = stop.title || text.tour.stop_numbered(index + 1);
-  const label = make('span', { className: 'hotspot-label' }, make('span', { className: 'hotspot-name' }, title));
+  const title = stop.title || text.tour.stop_numbered(number(index + 1));
+  const label = make('span', { className: 'hotspot-label', dir: 'auto', lang: stop.title ? stop.language : language }, make('span', { className: 'hotspot-name' }, title));
   if (stop.caption) {
     // The title alone is the name of the button; the caption describes it.
     const id = `hotspot-caption-${index}`;

@@ -1,6 +1,7 @@
 import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
-import { text } from '../text';
+import { factor, number } from '../text/number';
+import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
 import { by_id, on_click } from './dom';
 import type { Navigation } from './navigation';
@@ -50,10 +51,10 @@ export class QualityPanel {
   private show(): void {
     const fov_y_deg = Math.round(this.navigation_.camera.fov_y_rad * degrees);
     this.fov_.value = String(fov_y_deg);
-    this.fov_value_.textContent = `${fov_y_deg}°`;
+    this.fov_value_.textContent = number(fov_y_deg, { style: 'unit', unit: 'degree', unitDisplay: 'narrow' });
     const { speed } = this.navigation_.camera;
     this.speed_.value = String(Math.log2(speed));
-    this.speed_value_.textContent = text.quality.times(speed);
+    this.speed_value_.textContent = factor(speed);
     this.storage_?.setItem(speed_key, String(speed));
   }
 }

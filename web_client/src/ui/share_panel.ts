@@ -1,4 +1,4 @@
-import { text as words } from '../text';
+import { text as words } from '../text/text';
 import { embed_code, frame_sites } from '../tour/share';
 import type { Snapshot } from '../worker/messages';
 import { by_id, make, on_click, save_file } from './dom';

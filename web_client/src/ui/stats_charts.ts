@@ -4,7 +4,8 @@ import 'uplot/dist/uPlot.min.css';
 import { sum } from '../base/time_window';
 import type { StatsHistory } from '../stats/history';
 import { stages, type Stage, type StatsSnapshot } from '../stats/metrics';
-import { text } from '../text';
+import { number } from '../text/number';
+import { text } from '../text/text';
 import { make } from './dom';
 
 /** For both light and dark pages. */
@@ -33,6 +34,7 @@ function axis(host: Element, label: string, more: Partial<uPlot.Axis> = {}): uPl
     ticks: { show: false },
     font: '11px system-ui, sans-serif',
     size: 34,
+    values: (_, ticks) => ticks.map((value) => number(value)),
     label,
     labelSize: 14,
     labelFont: '11px system-ui, sans-serif',
@@ -46,7 +48,7 @@ const time_axis = (host: Element): uPlot.Axis =>
     size: 18,
     gap: 2,
     labelSize: 0,
-    values: (_, ticks) => ticks.map((s) => `${s} s`),
+    values: (_, ticks) => ticks.map((s) => `${number(s)} ${text.units.seconds}`),
   });
 
 const line = (label: string, stroke: string, scale: string): uPlot.Series => ({
@@ -91,7 +93,7 @@ export class StatsCharts {
       plot: this.plot(
         text.plots.latency,
         drawn.map((stage) => ({ ...line(text.stages[stage].label, colours[stage], 'y'), fill: colours[stage] })),
-        [axis(this.host_, 'ms')],
+        [axis(this.host_, text.units.milliseconds)],
       ),
       data: (history) => drawn.map((stage) => history.column(up_to(stage))),
     };
@@ -103,7 +105,7 @@ export class StatsCharts {
       plot: this.plot(
         text.plots.rates,
         [line(text.plots.fps, '#4b7bd6', 'y'), line(text.plots.bitrate, '#e07a3f', 'bits')],
-        [axis(this.host_, 'fps'), axis(this.host_, 'Mb/s', { side: 1, scale: 'bits', grid: { show: false } })],
+        [axis(this.host_, text.units.fps), axis(this.host_, text.units.megabits, { side: 1, scale: 'bits', grid: { show: false } })],
       ),
       data: (history) => [history.column((s) => s.fps_shown), history.column((s) => s.bitrate_kbps / 1000)],
     };

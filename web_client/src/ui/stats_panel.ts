@@ -1,6 +1,8 @@
+import type { Sides } from '../present/warp';
 import { StatsHistory } from '../stats/history';
 import type { StatsReport } from '../stats/metrics';
-import { text } from '../text';
+import { number } from '../text/number';
+import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
 import { by_id, make, save_file } from './dom';
 import type { StatsCharts } from './stats_charts';
@@ -19,7 +21,7 @@ export class StatsPanel {
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
   private readonly history_ = new StatsHistory();
   private readonly rest_ = make('p', { hidden: true });
-  private readonly plots_ = make('div', { className: 'plots' });
+  private readonly plots_ = make('div', { className: 'plots', dir: 'ltr' });
   private readonly about_ = make('dl');
   private charts_: StatsCharts | undefined;
   private opened_ = false;
@@ -31,7 +33,7 @@ export class StatsPanel {
   ) {
     const list = make('dl');
     for (const { label, title } of stats_rows) {
-      const value = make('span');
+      const value = make('span', { dir: 'auto' });
       list.append(make('dt', { title: title ?? '' }, label), make('dd', {}, value));
       this.values_.push(value);
     }
@@ -41,7 +43,9 @@ export class StatsPanel {
       this.show_facts({ renderer: welcome.renderer, server_version: welcome.serverVersion });
     });
     worker_.on('config', ({ config }) => this.show_facts({ encoder: config.encoder }));
-    worker_.on('presenter', ({ description }) => this.show_facts({ presenter: description }));
+    worker_.on('presenter', ({ presenter, warp, overscan }) => {
+      this.show_facts({ presenter: `${text.presenters[presenter]} · ${text.warp[warp]}${overscan_text(overscan)}` });
+    });
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel === 'stats') this.watch(shown);
     });
@@ -52,7 +56,7 @@ export class StatsPanel {
     this.about_.replaceChildren(
       ...facts.flatMap((fact) => [
         make('dt', {}, text.stats[fact]),
-        make('dd', { className: 'reason' }, this.facts_[fact]),
+        make('dd', { className: 'reason', dir: 'auto' }, this.facts_[fact]),
       ]),
     );
   }
@@ -100,4 +104,10 @@ export class StatsPanel {
     const json = this.history_.to_json(this.facts_, new Date().toISOString());
     save_file(new Blob([json], { type: 'application/json' }), 'catgs-statistics.json');
   }
+}
+
+/** Shares of the view by which pictures are larger; empty where they are not. */
+function overscan_text({ x, y }: Sides): string {
+  const percent = (side: number): string => number(side - 1, { style: 'percent' });
+  return x === 1 && y === 1 ? '' : ` · ${text.warp.overscan(percent(x), percent(y))}`;
 }

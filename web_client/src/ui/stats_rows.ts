@@ -1,6 +1,7 @@
 // Texts of the statistics overlay. Pure.
-import { stages, type Stage, type StatsReport, type StatsSnapshot } from '../stats/metrics';
-import { text } from '../text';
+import { stages, type PagesDrawn, type Stage, type StatsReport, type StatsSnapshot } from '../stats/metrics';
+import { decimals, number } from '../text/number';
+import { text } from '../text/text';
 
 interface Row {
   readonly label: string;
@@ -9,18 +10,33 @@ interface Row {
   readonly stage?: Stage;
 }
 
+const { units } = text;
 const nothing = '–';
 
 /** Formats with `digits` decimals. Gives one dash for all values when one of them was not measured. */
 function measured(values: readonly number[], digits: number, unit: string): string {
   if (!values.every(Number.isFinite)) return nothing;
-  return `${values.map((v) => v.toFixed(digits)).join(' / ')} ${unit}`;
+  return `${values.map((v) => decimals(v, digits)).join(' / ')} ${unit}`;
+}
+
+const pixels = (count: number): string => number(count, { useGrouping: false });
+
+function detail({ detail_px, coarsest_px, gaussians, finest_level, coarsest_level, missing_pages }: PagesDrawn): string {
+  const words = text.stats;
+  const px = Math.max(detail_px, coarsest_px);
+  const [finest, coarsest] = [number(finest_level), number(coarsest_level)];
+  return [
+    `${px < 100 ? decimals(px, 1) : `> ${number(100)}`} ${units.pixels}`,
+    number(gaussians, { notation: 'compact', maximumFractionDigits: 2 }),
+    finest === coarsest ? words.level(finest) : words.levels(finest, coarsest),
+    ...(missing_pages === 0 ? [] : [words.pages_missing(missing_pages, number(missing_pages))]),
+  ].join(' · ');
 }
 
 const stage_row = (stage: Stage): Row => ({
   label: text.stages[stage].label,
   title: text.stats.stage_title + text.stages[stage].title,
-  text: ({ stages_ms }) => measured([stages_ms[stage]], 1, 'ms'),
+  text: ({ stages_ms }) => measured([stages_ms[stage]], 1, units.milliseconds),
   stage,
 });
 
@@ -36,40 +52,32 @@ const once_shown =
     stats.frames_shown > 0 ? value(stats) : nothing;
 
 export const stats_rows: readonly Row[] = [
-  { label: text.stats.shown, text: once_shown((s) => measured([s.fps_shown], 1, 'fps')) },
+  { label: text.stats.shown, text: once_shown((s) => measured([s.fps_shown], 1, units.fps)) },
   {
     label: text.stats.motion,
     title: text.stats.motion_title,
-    text: ({ motion_to_photon_ms: t }) => measured([t.p50, t.p95], 0, 'ms'),
+    text: ({ motion_to_photon_ms: t }) => measured([t.p50, t.p95], 0, units.milliseconds),
   },
   {
     label: text.stats.age,
     title: text.stats.age_title,
-    text: ({ pose_age_ms: t }) => measured([t.p50, t.p95], 0, 'ms'),
+    text: ({ pose_age_ms: t }) => measured([t.p50, t.p95], 0, units.milliseconds),
   },
   {
     label: text.stats.bitrate,
-    text: once_shown((s) => measured([s.bitrate_kbps / 1000], 2, 'Mb/s')),
+    text: once_shown((s) => measured([s.bitrate_kbps / 1000], 2, units.megabits)),
   },
   ...stages.map(stage_row),
-  { label: text.stats.picture, text: once_shown((s) => `${s.width_px} × ${s.height_px}`) },
+  { label: text.stats.picture, text: once_shown((s) => `${pixels(s.width_px)} × ${pixels(s.height_px)}`) },
   {
     label: text.stats.detail,
     title: text.stats.detail_title,
-    text: ({ pages: p }) =>
-      p === undefined
-        ? nothing
-        : text.stats.detail_value(
-            Math.max(p.detail_px, p.coarsest_px),
-            p.gaussians,
-            [p.finest_level, p.coarsest_level],
-            p.missing_pages,
-          ),
+    text: ({ pages }) => (pages === undefined ? nothing : detail(pages)),
   },
   {
     label: text.stats.drops,
     title: text.stats.drops_title,
-    text: once_shown((s) => text.stats.drops_value(s.frames_dropped, s.packets_dropped)),
+    text: once_shown((s) => text.stats.drops_value(number(s.frames_dropped), number(s.packets_dropped))),
   },
 ];
 

@@ -3,7 +3,8 @@
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, pursuit } from '../camera/flight';
 import { watch_token } from '../session/token';
-import { text } from '../text';
+import { number } from '../text/number';
+import { text } from '../text/text';
 import { presentation_address } from '../tour/share';
 import { Lead_State, type Lead, type Welcome } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
@@ -182,18 +183,19 @@ export class Together {
     const name = this.lead_?.name || words.somebody;
     const count = this.lead_?.company ?? 0;
     const away = this.lead_?.state === Lead_State.AWAY;
+    const leads = count > 1 ? words.leads_several(name, count, number(count)) : words.leads(name);
     const said: Readonly<Record<Role, string>> = {
       alone: '',
-      watching: this.leader_gone_ ? '' : away ? words.away(name) : words.leads(name, count),
-      following: away ? words.away(name) : words.leads(name, count),
-      left: words.leads(name, 0),
-      leading: words.you_lead(count),
+      watching: this.leader_gone_ ? '' : away ? words.away(name) : leads,
+      following: away ? words.away(name) : leads,
+      left: words.leads(name),
+      leading: words.you_lead(count, number(count)),
     };
     const action: Readonly<Record<Role, string>> = {
       alone: '',
       watching: this.may_leave_ ? words.leave : '',
       following: words.leave,
-      left: words.follow(this.lead_?.name ?? ''),
+      left: this.lead_?.name ? words.follow(name) : words.follow_somebody,
       leading: words.stop,
     };
     const line = by_id('company-text', HTMLElement);

@@ -1,7 +1,7 @@
 import { Signal } from '../base/signal';
 import type { CameraMode } from '../camera/mode';
 import { is_for_page } from '../input/view_input';
-import { text } from '../text';
+import { text } from '../text/text';
 import { by_id, hint_at_more, on_click } from './dom';
 import type { Navigation } from './navigation';
 

@@ -1,5 +1,6 @@
 import { is_for_page } from '../input/view_input';
-import { text } from '../text';
+import { number } from '../text/number';
+import { language, text } from '../text/text';
 import type { TourPlayer, TourState } from '../tour/player';
 import type { Tour } from '../tour/tour';
 import { by_id, hint_at_more, on_click } from './dom';
@@ -37,7 +38,7 @@ export class TourView {
     this.card_.hidden = !this.has_tours_;
     this.choice_.hidden = tours.length < 2;
     this.choice_.replaceChildren(
-      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered(i + 1), String(i))),
+      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered(number(i + 1)), String(i))),
     );
   }
 
@@ -46,18 +47,21 @@ export class TourView {
     const count = tour?.stops.length ?? 0;
     this.choice_.value = String(state.tour_index);
     const name = tour?.title ?? '';
-    by_id('tour-title', HTMLElement).textContent = stop ? stop.title : name || text.tour.untitled;
+    const title = by_id('tour-title', HTMLElement);
+    title.textContent = stop ? stop.title : name || text.tour.untitled;
+    title.lang = stop || name ? ((stop ?? tour)?.language ?? '') : language;
     this.text_.textContent = stop?.caption ?? '';
+    this.text_.lang = stop?.language ?? '';
     this.text_.scrollTop = 0;
     this.text_changed_();
     by_id('tour-place', HTMLElement).textContent =
-      count === 0 ? '' : stop_index === undefined ? text.tour.stops(count) : text.tour.place(stop_index + 1, count);
+      count === 0 ? '' : stop_index === undefined ? text.tour.stops(count, number(count)) : text.tour.place(number(stop_index + 1), number(count));
     for (const id of ['tour-previous', 'tour-next']) {
       by_id(id, HTMLButtonElement).hidden = count < 2;
     }
     const label = playing ? text.tour.pause : text.tour.play;
     this.play_.setAttribute('aria-label', label);
-    this.play_.title = `${label} (Space)`;
+    this.play_.title = playing ? text.tour.pause_key : text.tour.play_key;
     this.play_.setAttribute('aria-pressed', String(playing));
     this.play_.querySelector('use')?.setAttribute('href', playing ? '#icon-pause' : '#icon-play');
   }

@@ -1,5 +1,5 @@
 import type { SessionState } from '../session/state';
-import { text } from '../text';
+import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
 import type { CardView } from './card';
 import type { Notice } from './notice';

@@ -5,7 +5,8 @@ import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import type { PresenterChoice } from '../present/make_presenter';
 import { watch_token, type AccessToken } from '../session/token';
-import { text } from '../text';
+import { factor } from '../text/number';
+import { text } from '../text/text';
 import { WorkerClient } from '../worker/client';
 import { make_automation } from './automation';
 import type { CardView } from './card';
@@ -55,7 +56,7 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   });
   const poster = new Poster();
   worker.on('presented', () => poster.end());
-  navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(speed), 2));
+  navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(factor(speed)), 2));
   worker.on('notice', ({ message }) => notice.show(message, 20));
   // Visitors hear what it means to them, and the console has the reason.
   const tell_of_jpeg = (why: string): void => {

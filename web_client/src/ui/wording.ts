@@ -2,7 +2,8 @@
 import type { DecoderRung } from '../decode/ladder';
 import type { SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
-import { text } from '../text';
+import { duration, list, number } from '../text/number';
+import { text } from '../text/text';
 import { Error_Code } from '../wire/wire';
 
 const { cards, actions } = text;
@@ -42,7 +43,7 @@ export function card_for(
       return state.for_scene
         ? { title: loading_scene.title, text: loading_scene.text, time: loading_scene.time(time), busy: true }
         : {
-            title: queue.title(state.position),
+            title: queue.title(number(state.position)),
             text: queue.text,
             time: queue.time(time),
             busy: true,
@@ -120,8 +121,8 @@ export function unsupported_card(
 ): Card | undefined {
   const lacking = (['Worker', 'OffscreenCanvas', 'WebSocket'] as const).filter((f) => !scope[f]);
   if (lacking.length === 0) return undefined;
-  const { title, text, and } = cards.unsupported;
-  return { title, text: text(lacking.join(and)) };
+  const { title, text } = cards.unsupported;
+  return { title, text: text(list(lacking)) };
 }
 
 /** Says why pictures come as JPEG and not as video; undefined when they come as video. */
@@ -138,11 +139,5 @@ function sentence(said: string): string {
   const trimmed = said.trim();
   if (trimmed === '') return '';
   const capital = trimmed.charAt(0).toUpperCase() + trimmed.slice(1);
-  return /[.!?]$/.test(capital) ? `${capital} ` : `${capital}. `;
-}
-
-function duration(seconds: number): string {
-  const { moment, seconds: in_seconds, minutes } = text.times;
-  if (seconds < 1) return moment;
-  return seconds < 90 ? in_seconds(Math.round(seconds)) : minutes(Math.round(seconds / 60));
+  return /[.!?。！？؟]$/.test(capital) ? `${capital} ` : `${capital}. `;
 }

@@ -1,6 +1,7 @@
 // The page's end of the worker.
 import { Signal } from '../base/signal';
 import type { StatsReport } from '../stats/metrics';
+import { text } from '../text/text';
 import type { FromWorker, Snapshot, ToWorker } from './messages';
 
 type Answer = StatsReport | Snapshot | undefined;
@@ -24,7 +25,7 @@ export class WorkerClient {
     };
     this.worker_.onerror = (event) => {
       // The event has no message when the worker could not be loaded at all.
-      const message = event.message || 'the worker could not be loaded';
+      const message = event.message || text.cards.broken.no_worker;
       this.signals_.get('broken')?.emit({ kind: 'broken', message });
     };
   }

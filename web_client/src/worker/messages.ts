@@ -5,8 +5,9 @@ import type { Ray } from '../camera/ray';
 import type { DecoderRung } from '../decode/ladder';
 import type { ShownView } from '../present/display';
 import type { PresenterChoice } from '../present/make_presenter';
+import type { PresenterKind } from '../present/presenter';
 import type { Sides } from '../present/warp';
-import type { WarpMode } from '../present/warp_policy';
+import type { WarpMode, WarpState } from '../present/warp_policy';
 import type { Quality, View } from '../session/quality';
 import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
@@ -58,7 +59,7 @@ export type FromWorker =
   | { kind: 'state'; state: SessionState }
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
-  | { kind: 'presenter'; description: string; warps: boolean; overscan: Sides }
+  | { kind: 'presenter'; presenter: PresenterKind; warp: WarpState; warps: boolean; overscan: Sides }
   /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
   /** Answers a pick. `distance`: undefined where nothing is there. */

@@ -237,7 +237,7 @@ class Client {
 
   private tell_presenter(): void {
     const { warps, overscan, warp_state } = this.display_;
-    say({ kind: 'presenter', description: `${this.presenter_.description}, warp ${warp_state}`, warps, overscan });
+    say({ kind: 'presenter', presenter: this.presenter_.kind, warp: warp_state, warps, overscan });
   }
 
   /** Decoders that failed are not tried again. The next stream begins with the one that worked. */

@@ -1,6 +1,6 @@
-// All texts of the page in one language. Another language is another file of this shape. index.html names
-// its texts as {{page.view}}, and the build fills them in (page_texts.ts). wording.ts decides which text
-// the cards show when.
+// English, and the shape of all other languages: they are typed against this file. index.html names its
+// texts as {{page.view}}, and the build fills them in (page_texts.ts). Numbers come as number.ts writes them.
+// Where a plural depends on a number, the number comes too.
 export const text = {
   page: {
     view: '3D view. Drag to look around, scroll to move closer; press H for all controls.',
@@ -52,8 +52,7 @@ export const text = {
     off: 'Off',
     field_of_view: 'Field of view',
     speed: 'Speed',
-    times: (factor: number): string => `${Number(factor.toPrecision(2))}×`,
-    speed_now: (factor: number): string => `Speed ${Number(factor.toPrecision(2))}×`,
+    speed_now: (factor: string): string => `Speed ${factor}`,
     up: 'Which way is up',
     up_left: 'Turn left',
     up_right: 'Turn right',
@@ -89,6 +88,7 @@ export const text = {
     statistics_help: 'Statistics, help',
     in_quality: 'quality menu',
   },
+  keys: { shift: 'Shift', page_down: 'PgDn', space: 'Space' },
   modes: { orbit: 'Orbit', fly: 'Fly', walk: 'Walk' },
   cards: {
     no_picture: { title: 'Connected', text: 'Waiting for the first picture.' },
@@ -100,7 +100,7 @@ export const text = {
       time: (time: string): string => `That takes about ${time}.`,
     },
     queue: {
-      title: (position: number): string => `Number ${position} in the queue`,
+      title: (position: string): string => `Number ${position} in the queue`,
       text: 'The server is full. Leave this page open.',
       time: (time: string): string => `Your turn comes in about ${time}.`,
     },
@@ -135,12 +135,12 @@ export const text = {
     broken: {
       title: 'This page ran into an error',
       text: 'Reload it. If that does not help, please report the message.',
+      no_worker: 'the worker could not be loaded',
     },
     unsupported: {
       title: 'This browser is too old',
       text: (lacking: string): string =>
         `It lacks ${lacking}. Chrome 94, Edge 94, Firefox 113 and Safari 16.4 or newer work.`,
-      and: ' and ',
     },
   },
   actions: {
@@ -162,11 +162,14 @@ export const text = {
     stop: 'Stop presenting',
     copied: 'The link is in the clipboard.',
     somebody: 'Your guide',
-    you_lead: (count: number): string => (count === 0 ? 'You lead. Nobody follows yet.' : `You lead. ${count === 1 ? 'One person follows' : `${count} people follow`}.`),
-    leads: (name: string, count: number): string => (count > 1 ? `${name} leads, ${count} follow` : `${name} leads`),
+    you_lead: (count: number, written: string): string =>
+      count === 0 ? 'You lead. Nobody follows yet.' : `You lead. ${count === 1 ? 'One person follows' : `${written} people follow`}.`,
+    leads: (name: string): string => `${name} leads`,
+    leads_several: (name: string, _count: number, written: string): string => `${name} leads, ${written} follow`,
     away: (name: string): string => `${name} has lost the connection`,
     leave: 'Look around myself',
-    follow: (name: string): string => `Follow ${name || 'your guide'}`,
+    follow: (name: string): string => `Follow ${name}`,
+    follow_somebody: 'Follow your guide',
     over: 'The presentation is over. You can look around.',
     comes_by_itself: 'The picture comes when somebody presents.',
     view: (name: string): string => `3D view. ${name} moves the camera.`,
@@ -176,11 +179,9 @@ export const text = {
     now: 'It is your turn.',
     in_title: 'Your turn – ',
   },
-  times: {
-    moment: 'a moment',
-    seconds: (s: number): string => `${s} s`,
-    minutes: (min: number): string => `${min} min`,
-  },
+  moment: 'a moment', // in place of a time
+  units: { fps: 'fps', megabits: 'Mb/s', milliseconds: 'ms', pixels: 'px', seconds: 's' },
+  scene: { gaussians: (count: string): string => `${count} Gaussians` },
   jpeg: {
     slower: 'The picture may be slower here than elsewhere.',
     failed_lately:
@@ -192,11 +193,13 @@ export const text = {
     failed_now: (why: string): string =>
       `Video cannot be decoded here (${why}): pictures come as JPEG.`,
   },
+  presenters: { webgl2: 'WebGL2', canvas_2d: '2D canvas (no WebGL2 on a GPU)' },
   warp: {
-    no_gpu: 'off: needs WebGL2 on a GPU',
-    off: 'off',
-    too_slow: 'off: drawing is too slow here',
-    on: (width: number, height: number): string => `on, ${width} × ${height} % overscan`,
+    no_gpu: 'warp off: needs WebGL2 on a GPU',
+    off: 'warp off',
+    too_slow: 'warp off: drawing is too slow here',
+    on: 'warp on',
+    overscan: (width: string, height: string): string => `overscan ${width} × ${height}`,
   },
   stages: {
     wait: { label: 'Wait', title: 'the camera waits at the server for its turn' },
@@ -219,19 +222,12 @@ export const text = {
     detail: 'Detail',
     detail_title:
       'Scenes that the server reads in pages: the largest error it draws, the Gaussians in the picture, the finest and the coarsest level of the tree in it, and the pages that are still missing',
-    detail_value: (
-      px: number,
-      gaussians: number,
-      [finest, coarsest]: readonly [number, number],
-      missing_pages: number,
-    ): string => {
-      const levels = finest === coarsest ? `level ${finest}` : `levels ${finest} to ${coarsest}`;
-      const drawn = `${px < 100 ? px.toFixed(1) : '> 100'} px, ${(gaussians / 1e6).toFixed(2)} M, ${levels}`;
-      return missing_pages === 0 ? drawn : `${drawn}, ${missing_pages} pages missing`;
-    },
+    level: (level: string): string => `level ${level}`,
+    levels: (finest: string, coarsest: string): string => `levels ${finest} to ${coarsest}`,
+    pages_missing: (_count: number, written: string): string => `${written} pages missing`,
     drops: 'Drops',
     drops_title: 'Frames that arrived and were never shown; packets that the server never sent',
-    drops_value: (here: number, server: number): string => `${here} here, ${server} at the server`,
+    drops_value: (here: string, server: string): string => `${here} here, ${server} at the server`,
     at_rest: 'The camera rests. Paler values are from its last motion.',
     not_moved: 'The camera rests. Move it to see how long pictures take.',
     renderer: 'Renderer',
@@ -248,17 +244,21 @@ export const text = {
   },
   tour: {
     untitled: 'Tour',
-    numbered: (n: number): string => `Tour ${n}`,
-    stop_numbered: (n: number): string => `Stop ${n}`,
-    stops: (count: number): string => (count === 1 ? 'One stop' : `${count} stops`),
-    place: (n: number, count: number): string => `${n} of ${count}`,
+    numbered: (n: string): string => `Tour ${n}`,
+    stop_numbered: (n: string): string => `Stop ${n}`,
+    stops: (count: number, written: string): string => (count === 1 ? 'One stop' : `${written} stops`),
+    place: (n: string, count: string): string => `${n} of ${count}`,
     play: 'Play the tour',
+    play_key: 'Play the tour (Space)',
     pause: 'Pause the tour',
+    pause_key: 'Pause the tour (Space)',
     unreadable: (why: string): string => `A tour cannot be read: ${why}`,
   },
   author: {
     make: 'Make a tour',
     tour_title: 'Title of the tour',
+    language: 'Texts for',
+    all_visitors: 'all visitors',
     hint: 'Go where people should stop, then add the stop.',
     add: 'Add a stop here',
     start: 'Begin visits here',
@@ -277,8 +277,8 @@ export const text = {
     autoplay: 'Play when the scene opens',
     save: 'Save to the server',
     download: 'Download the file',
-    title: (n: number): string => `Title of stop ${n}`,
-    caption: (n: number): string => `Caption of stop ${n}`,
+    title: (n: string): string => `Title of stop ${n}`,
+    caption: (n: string): string => `Caption of stop ${n}`,
     caption_here: 'Caption',
     show: 'Show',
     view_here: 'Set to this view',
@@ -287,10 +287,11 @@ export const text = {
     flight: 'Flight, s',
     stay: 'Stay, s',
     automatic: 'auto',
+    of_stop: (field: string, n: string): string => `${field} (${n})`,
     nothing_there: 'Nothing is in the middle of the view, so the hotspot stays as it is.',
-    up: (n: number): string => `Move stop ${n} up`,
-    down: (n: number): string => `Move stop ${n} down`,
-    remove: (n: number): string => `Delete stop ${n}`,
+    up: (n: string): string => `Move stop ${n} up`,
+    down: (n: string): string => `Move stop ${n} down`,
+    remove: (n: string): string => `Delete stop ${n}`,
     no_marker: 'Nothing is in the middle of the view, so this stop has no hotspot.',
     start_set: 'Visits will begin here, once this is saved.',
     downloaded: (name: string): string =>
@@ -300,6 +301,8 @@ export const text = {
     saved: 'Saved. Visitors get it when they open or reload the page.',
     not_saved: (why: string): string => `Not saved: ${why}.`,
     unreachable: 'the server does not answer',
+    too_large: (bytes: string, most: string): string => `${bytes} bytes are too many, ${most} fit`,
+    status: (status: number): string => `status ${status}`,
     replace: 'Replace theirs',
     changed_meanwhile:
       'Not saved: someone else has saved this scene since you opened it. To see theirs, download your file, then reload. Or replace theirs with yours.',
@@ -318,5 +321,21 @@ export const text = {
       'Browsers show it in no other site yet. The server has to name that site with --embed-origin.',
     frames: (sites: string): string =>
       `Browsers show it in pages of ${sites} only. The server names them with --embed-origin.`,
+    frame_title: '3D tour',
+  },
+  /** What is wrong with a document that people wrote. The place of the mistake stands before it. */
+  mistakes: {
+    not_an_object: 'is not an object',
+    missing: (member: string): string => `'${member}' is missing`,
+    not_a_list: 'is not a list',
+    too_many: (count: number, most: number): string => `has ${count} entries, at most ${most}`,
+    not_a_text: 'is not a text',
+    not_a_truth: 'is not true or false',
+    not_in: (low: number, high: number): string => `is not a number in ${low}…${high}`,
+    not_numbers: (count: number): string => `is not ${count} numbers`,
+    not_increasing: 'are not increasing',
+    not_three_each: 'position and target are not three numbers for each time',
+    not_one_each: 'fov is not one number for each time',
+    version: (found: number, read: number): string => `version ${found} is not read here, only version ${read}`,
   },
 } as const;
