@@ -71,7 +71,7 @@ void add_bench_command(CLI::App& app) {
                         "Compare with the exact pipeline; compare exact with the reference");
   command
       ->add_option("--quality-every", options->quality_every,
-                   "Judge one frame in N, and one step to a key frame in N")
+                   "Judge one frame in N, and one step between frames in N; paper: to a key frame")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command

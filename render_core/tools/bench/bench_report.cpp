@@ -145,10 +145,10 @@ void print_groups(const Measurement& measurement) {
   fmt::print("; {} left early\n", measurement.windows_cut());
 }
 
-void print_quality(std::string_view kind, const QualityReport& report, const QualityTally& tally) {
+void print_quality(std::string_view name, const QualityReport& report, const QualityTally& tally) {
   if (tally.frames() == 0) return;
-  fmt::print("{:<14}{:.2f} dB mean, {:.2f} dB worst frame ({})", fmt::format("{} frames", kind),
-             tally.mean_psnr(), tally.min_psnr(), tally.worst_frame());
+  fmt::print("{:<14}{:.2f} dB mean, {:.2f} dB worst frame ({})", name, tally.mean_psnr(),
+             tally.min_psnr(), tally.worst_frame());
   if (report.whole_images) {
     fmt::print(
         ", {:.2f} dB worst block ({}), {:.2f} dB 0.1 % block; SSIM {:.5f} mean, {:.5f} worst",
@@ -158,20 +158,19 @@ void print_quality(std::string_view kind, const QualityReport& report, const Qua
   fmt::print("\n");
 }
 
-void print_quality(const QualityReport& quality) {
+/// `groups`: whether the pipeline has key frames and sub-frames.
+void print_quality(const QualityReport& quality, bool groups) {
   fmt::print("{:<14}against {}\n", "quality", quality.against);
-  print_quality("key", quality, quality.key);
-  print_quality("sub", quality, quality.sub);
+  print_quality(groups ? "key frames" : "frames", quality, quality.key);
+  print_quality("sub-frames", quality, quality.sub);
   if (quality.see_through.count > 0) {
     fmt::print("{:<14}{:.1f} % of the pixels on average, {:.1f} % at most\n", "see-through",
                100.0 * quality.see_through.mean(), 100.0 * quality.see_through.max);
   }
   if (quality.pop.count > 0) {
-    fmt::print(
-        "{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} steps to key frames (frame {}), {} over "
-        "1/255\n",
-        "pop", 255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
-        quality.worst_pop_frame, quality.pops);
+    fmt::print("{:<14}{:.2f}/255 mean, {:.2f}/255 worst of {} steps{} (frame {}), {} over 1/255\n",
+               "pop", 255.0 * quality.pop.mean(), 255.0 * quality.pop.max, quality.pop.count,
+               groups ? " to key frames" : "", quality.worst_pop_frame, quality.pops);
   }
 }
 
@@ -270,7 +269,7 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
     fmt::print("{:<14}{} list entries found no memory and were not drawn\n", "OVERFLOW",
                lists.overflowed);
   }
-  if (result.quality) print_quality(*result.quality);
+  if (result.quality) print_quality(*result.quality, groups);
 }
 
 }  // namespace catgs

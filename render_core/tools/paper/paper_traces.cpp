@@ -44,8 +44,9 @@ PaperTable traces_table(PaperCase& scene) {
                   "Mean dB", "Worst frame dB", "Worst block dB", "0.1 % block dB", "See-through"},
       .rows = {},
       .notes = {fmt::format(
-          "Quality of ours against Exact at the same poses, one frame in {}: PSNR; most pixels "
-          "that over half of the background shows through.",
+          "Quality is that of ours against Exact at the same poses, one frame in {}: PSNR. "
+          "See-through is the largest share of a picture's pixels that more than half of the "
+          "background shows through.",
           scene.options().every)}};
   const std::vector<Measurement>& exact = scene.runs(variants::exact);
   const std::vector<Measurement>& paper = scene.runs(variants::paper);
