@@ -293,6 +293,7 @@ export const text: Texts = {
     title: (n) => `عنوان المحطة ${n}`,
     caption: (n) => `نص المحطة ${n}`,
     caption_here: 'النص',
+    markdown: 'ماركداون: **غامق** و *مائل* و [نص](https://…) وقوائم تبدأ بـ -',
     show: 'اعرض',
     view_here: 'اعتمد هذا المنظر',
     hotspot_here: 'ضع العلامة هنا',

@@ -281,6 +281,7 @@ export const text: Texts = {
     title: (n) => `Titel der Station ${n}`,
     caption: (n) => `Text der Station ${n}`,
     caption_here: 'Text',
+    markdown: 'Markdown: **fett**, *kursiv*, [Wörter](https://…), Listen mit -',
     show: 'Zeigen',
     view_here: 'Diese Ansicht übernehmen',
     hotspot_here: 'Markierung hierher',

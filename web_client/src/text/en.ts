@@ -280,6 +280,7 @@ export const text = {
     title: (n: string): string => `Title of stop ${n}`,
     caption: (n: string): string => `Caption of stop ${n}`,
     caption_here: 'Caption',
+    markdown: 'Markdown: **bold**, *italic*, [words](https://…), lists with -',
     show: 'Show',
     view_here: 'Set to this view',
     hotspot_here: 'Hotspot here',

@@ -284,6 +284,7 @@ export const text: Texts = {
     title: (n) => `Título de la parada ${n}`,
     caption: (n) => `Texto de la parada ${n}`,
     caption_here: 'Texto',
+    markdown: 'Markdown: **negrita**, *cursiva*, [palabras](https://…), listas con -',
     show: 'Mostrar',
     view_here: 'Usar esta vista',
     hotspot_here: 'Marcador aquí',

@@ -284,6 +284,7 @@ export const text: Texts = {
     title: (n) => `Titre de l'étape ${n}`,
     caption: (n) => `Légende de l'étape ${n}`,
     caption_here: 'Légende',
+    markdown: 'Markdown : **gras**, *italique*, [mots](https://…), listes avec -',
     show: 'Montrer',
     view_here: 'Prendre cette vue',
     hotspot_here: 'Repère ici',

@@ -284,6 +284,7 @@ export const text: Texts = {
     title: (n) => `Titolo della tappa ${n}`,
     caption: (n) => `Testo della tappa ${n}`,
     caption_here: 'Testo',
+    markdown: 'Markdown: **grassetto**, *corsivo*, [parole](https://…), elenchi con -',
     show: 'Mostra',
     view_here: 'Usa questa vista',
     hotspot_here: 'Segnaposto qui',

@@ -282,6 +282,7 @@ export const text: Texts = {
     title: (n) => `スポット ${n} のタイトル`,
     caption: (n) => `スポット ${n} の説明`,
     caption_here: '説明',
+    markdown: 'Markdown：**太字**、*斜体*、[文字](https://…)、- で箇条書き',
     show: '表示',
     view_here: 'この視点にする',
     hotspot_here: 'ここに目印',

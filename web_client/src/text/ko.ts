@@ -281,6 +281,7 @@ export const text: Texts = {
     title: (n) => `지점 ${n}의 제목`,
     caption: (n) => `지점 ${n}의 설명`,
     caption_here: '설명',
+    markdown: 'Markdown: **굵게**, *기울임*, [글](https://…), - 로 목록',
     show: '보기',
     view_here: '이 시점으로 설정',
     hotspot_here: '여기에 표시',

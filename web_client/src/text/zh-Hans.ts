@@ -278,6 +278,7 @@ export const text: Texts = {
     title: (n) => `站点 ${n} 的标题`,
     caption: (n) => `站点 ${n} 的说明`,
     caption_here: '说明',
+    markdown: 'Markdown：**粗体**、*斜体*、[文字](https://…)、用 - 表示列表',
     show: '显示',
     view_here: '设为当前视图',
     hotspot_here: '在此设标记',

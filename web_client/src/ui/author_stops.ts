@@ -66,6 +66,7 @@ export class AuthorStops {
     const caption = make('textarea', {
       ...{ value: written.caption, rows: 2, maxLength: max_text_characters, ...in_its_own },
       ...{ placeholder: behind.caption || words.caption_here, 'aria-label': words.caption(n) },
+      title: words.markdown,
     });
     const seconds = (label: string, value: number | undefined, usual: string, most: number): HTMLInputElement =>
       make('input', {

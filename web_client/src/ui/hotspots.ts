@@ -1,3 +1,4 @@
+import { caption_words } from '../captions/caption';
 import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
 import { number } from '../text/number';
@@ -93,7 +94,9 @@ function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLEle
   if (stop.caption) {
     // The title alone is the name of the button; the caption describes it.
     const id = `hotspot-caption-${index}`;
-    label.append(make('span', { id, className: 'hotspot-caption', 'aria-hidden': 'true' }, stop.caption));
+    const caption = make('span', { id, className: 'hotspot-caption', 'aria-hidden': 'true' });
+    void caption_words(stop.caption).then((words) => (caption.textContent = words));
+    label.append(caption);
     button.setAttribute('aria-describedby', id);
   }
   return label;

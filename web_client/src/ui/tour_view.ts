@@ -1,3 +1,4 @@
+import { CaptionView, prepare } from '../captions/caption';
 import { is_for_page } from '../input/view_input';
 import { number } from '../text/number';
 import { language, text } from '../text/text';
@@ -11,7 +12,7 @@ export class TourView {
   private readonly choice_ = by_id('tour-choice', HTMLSelectElement);
   private readonly play_ = by_id('tour-play', HTMLButtonElement);
   private readonly text_ = by_id('tour-text', HTMLElement);
-  private readonly text_changed_ = hint_at_more(this.text_);
+  private readonly caption_ = new CaptionView(this.text_, hint_at_more(this.text_));
   private has_tours_ = false;
 
   constructor(player: TourPlayer) {
@@ -35,6 +36,7 @@ export class TourView {
 
   show_tours(tours: readonly Tour[]): void {
     this.has_tours_ = tours.length > 0;
+    void prepare(tours.flatMap(({ stops }) => stops.map(({ caption }) => caption)));
     this.card_.hidden = !this.has_tours_;
     this.choice_.hidden = tours.length < 2;
     this.choice_.replaceChildren(
@@ -50,10 +52,9 @@ export class TourView {
     const title = by_id('tour-title', HTMLElement);
     title.textContent = stop ? stop.title : name || text.tour.untitled;
     title.lang = stop || name ? ((stop ?? tour)?.language ?? '') : language;
-    this.text_.textContent = stop?.caption ?? '';
+    void this.caption_.show(stop?.caption ?? '');
     this.text_.lang = stop?.language ?? '';
     this.text_.scrollTop = 0;
-    this.text_changed_();
     by_id('tour-place', HTMLElement).textContent =
       count === 0 ? '' : stop_index === undefined ? text.tour.stops(count, number(count)) : text.tour.place(number(stop_index + 1), number(count));
     for (const id of ['tour-previous', 'tour-next']) {
