@@ -6,6 +6,10 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/image/host_image.h"
+#include "render_core/image/panorama.h"
+#include "render_core/image/png.h"
+#include "render_core/math/look_at.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/frame_feed.h"
@@ -24,7 +28,7 @@ struct FramesOptions {
   RenderOptions render;
   std::string out;
   std::string background = "black";
-  bool alpha = false, depth = false;
+  bool alpha = false, depth = false, panorama = false;
   std::size_t checked_pixels = 0;
 };
 
@@ -62,6 +66,37 @@ RenderSetup prepare_frames(const FramesOptions& options, bool quiet) {
   return setup;
 }
 
+/// The same place and direction, upright.
+Pose levelled(const Pose& pose, const glm::vec3& up) {
+  const glm::vec3 forward = pose.orientation * glm::vec3(0, 0, 1);
+  const glm::vec3 ahead = forward - glm::dot(forward, up) * up;
+  return look_at(pose.position, pose.position + ahead, up);
+}
+
+/// The panorama from where `request` looks, as a frame that `image` holds.
+FrameView draw_panorama(const RenderSetup& setup, FrameRequest request, View& view,
+                        HostImage& image) {
+  Pose& pose = request.camera.world_from_camera;
+  pose = levelled(pose, setup.scene.hints.up);
+  const Image panorama =
+      draw_panorama(request, request.camera.size_px, *setup.pool, [&](const FrameRequest& of_side) {
+        FrameView frame;
+        render_or_throw(view, of_side, frame);
+        return copy_image(frame);
+      });
+  image.resize(PixelFormat::rgb_f32, panorama.size_px);
+  for (int y = 0; y < panorama.size_px.y; ++y)
+    std::copy_n(panorama.row(y), 3 * panorama.size_px.x, image.rgb_row(y));
+  return {PixelFormat::rgb_f32, MemorySpace::host, panorama.size_px, image.planes(), {}};
+}
+
+void check_panorama(const FramesOptions& options, glm::ivec2 size_px) {
+  if (is_video(options.out))
+    throw InputError("--panorama", "", "makes pictures, no videos", "give a folder or a .png file");
+  if (size_px.x != 2 * size_px.y)
+    throw InputError("--size", "", "a panorama is twice as wide as high", "give --size 8192x4096");
+}
+
 std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderSetup& setup) {
   if (options.out.empty()) {
     if (options.checked_pixels > 0) return nullptr;
@@ -85,6 +120,7 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
 
 void render_frames(const FramesOptions& options, bool quiet) {
   const RenderSetup setup = prepare_frames(options, quiet);
+  if (options.panorama) check_panorama(options, setup.camera.size_px);
   const auto sink = make_sink(options, setup);
   ViewSettings settings = setup.view;
   settings.format = sink ? sink->format() : PixelFormat::rgb_f32;
@@ -97,12 +133,16 @@ void render_frames(const FramesOptions& options, bool quiet) {
     fmt::print(stderr, "{} ({})\n", setup.made.renderer->description(), setup.made.reason);
   }
   double error_sum = 0.0;
+  HostImage panorama;
   {
     Progress progress("rendering", quiet);
     for (std::size_t i = 0; i < setup.poses.size(); ++i) {
       FrameView frame;
       const FrameRequest request = feed.next();
-      render_or_throw(*view, request, frame);
+      if (options.panorama)
+        frame = draw_panorama(setup, request, *view, panorama);
+      else
+        render_or_throw(*view, request, frame);
       if (sink) sink->write(frame, layers ? layers->render(request.camera) : FrameLayers{});
       if (options.checked_pixels > 0) {
         const double error = reference_error(setup, i, frame, options.checked_pixels);
@@ -132,18 +172,28 @@ void add_frames_command(CLI::App& app) {
           ->add_option("--background", options->background,
                        "Colour behind the scene: black, white or six hexadecimal digits (RRGGBB)")
           ->capture_default_str();
-  command->add_flag("--alpha", options->alpha, "Pictures get an alpha channel")
-      ->excludes(background);
-  command->add_flag("--depth", options->depth,
-                    "Write a NumPy file beside each picture: mean depth along the view axis, world "
-                    "units, 0 where nothing is seen");
+  auto* alpha = command->add_flag("--alpha", options->alpha, "Pictures get an alpha channel")
+                    ->excludes(background);
+  auto* depth = command->add_flag(
+      "--depth", options->depth,
+      "Write a NumPy file beside each picture: mean depth along the view axis, world "
+      "units, 0 where nothing is seen");
+  command
+      ->add_flag("--panorama", options->panorama,
+                 "Upright pictures of all around, equirectangular: --size 8192x4096")
+      ->excludes(alpha)
+      ->excludes(depth)
+      ->excludes(command->get_option("--fov-deg"))
+      ->excludes(command->get_option("--focal-px"));
   command->get_option("--fps")->description(
       "Frames per second (default: 30 for a script, else the rate of the trace, of which a video "
       "gets 30 at most). The trace is resampled, but forecasts use its recorded samples only, and "
       "none of the future");
   command->footer("A path that stands still is one frame, unless --duration or --frames is given.");
-  command->add_option("--pixels", options->checked_pixels,
-                      "Also print the PSNR against the reference at this many random pixels");
+  command
+      ->add_option("--pixels", options->checked_pixels,
+                   "Also print the PSNR against the reference at this many random pixels")
+      ->excludes("--panorama");
   command->callback([options, command] { render_frames(*options, is_quiet(*command)); });
 }
 

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/image/image.h"
+#include "render_core/renderer.h"
+
+namespace catgs {
+
+/// Draws all that surrounds the camera of `request` as an equirectangular picture. The middle shows
+/// where the camera looks, the upper edge is above its picture, and longitudes grow to the right.
+/// Of the camera, only pose and near plane count. `size_px` is 2:1. `draw` renders a request and
+/// may throw.
+///
+/// Six pictures are drawn, one along each axis of the camera. They are wider than a right angle and
+/// fade into each other where they overlap. A splat is a projection that holds near its centre only
+/// (EWA), so pictures side by side would show seams.
+Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
+                    const std::function<Image(const FrameRequest&)>& draw);
+
+}  // namespace catgs
