@@ -28,6 +28,7 @@ struct ServerConfig {
   std::string bind = "127.0.0.1";
   int port = 8080;
   std::string admin_bind = "127.0.0.1:9090";  // address:port or "off"
+  std::string visit_counts = "memory";        // "off", "memory", or a folder that keeps them
   std::string client_dir;                     // empty: found beside the program
   RendererKind renderer = RendererKind::automatic;
   std::vector<int> devices;  // of the CUDA core; empty: all

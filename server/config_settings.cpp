@@ -137,8 +137,8 @@ Setting device() {
 
 Setting admin_bind() {
   Setting setting =
-      text("admin-bind", "ADDRESS:PORT", "Address of /metrics and /api/sessions; off: none",
-           &ServerConfig::admin_bind);
+      text("admin-bind", "ADDRESS:PORT",
+           "Address of /metrics, /visits and /api/sessions; off: none", &ServerConfig::admin_bind);
   setting.set = [](ServerConfig& c, const Values& v) {
     if (single(v) != "off") parse_endpoint(v.front());
     c.admin_bind = v.front();
@@ -196,6 +196,11 @@ std::vector<Setting> scene_settings() {
       text("bind", "ADDRESS", "Address to listen on; 0.0.0.0 or :: is every interface", &C::bind),
       number("port", "PORT", "Port to listen on; 0: the system chooses", &C::port, 0, 65535),
       admin_bind(),
+      text(
+          "visit-counts", "off|memory|DIR",
+          "Counts of visits by scene and day, at /visits of the admin port: none, until the server "
+          "ends, or kept in a folder",
+          &C::visit_counts),
       text("client-dir", "DIR", "Folder of the built browser client; by default beside the program",
            &C::client_dir),
   };

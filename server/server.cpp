@@ -27,6 +27,8 @@
 #include "server/base/scene_id.h"
 #include "server/base/stop_while_loading.h"
 #include "server/base/watchdog.h"
+#include "server/counts/visit_book.h"
+#include "server/counts/visits_page.h"
 #include "server/frame_path.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
@@ -108,6 +110,7 @@ struct Server::State {
   [[nodiscard]] std::optional<HttpResponse> respond_to_probe(const HttpRequest& request) const;
   HttpResponse respond(const HttpRequest& request);
   HttpResponse respond_admin(const HttpRequest& request);
+  void count_visits();
   void print_banner() const;
   void wait_for_signal();
   /// Ends readiness. Clients are told after `wait` and closed after a further `deadline`.
@@ -129,8 +132,11 @@ struct Server::State {
   boost::asio::io_context io{1};  // outlives the pool, whose tasks post to it
   std::shared_ptr<ThreadPool> pool;
   std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
+  std::optional<VisitCounts> counts;
+  std::optional<VisitBook> book;
   std::unique_ptr<SceneLibrary> scenes;
   std::unique_ptr<SceneApi> api;
+  std::optional<VisitsPage> visits_page;
   std::unique_ptr<SidecarSaver> saver;
   std::vector<EncoderChoice> encoders;
   std::unique_ptr<FramePath> frames;
@@ -208,12 +214,27 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
   if (request.path == "/api/sessions")
     return text_response(200, places->published_json(), "application/json");
-  return text_response(404, "404: /metrics and /api/sessions are here\n");
+  if (visits_page)
+    if (auto answer = visits_page->respond(request)) return *std::move(answer);
+  return text_response(404, "404: /metrics, /visits and /api/sessions are here\n");
+}
+
+void Server::State::count_visits() {
+  if (config.visit_counts == "off") return;
+  counts.emplace(unix_now_s);
+  if (config.visit_counts != "memory") book.emplace(config.visit_counts, *counts);
+  visits_page.emplace(*counts, unix_now_s, [this](const std::string& scene_id) {
+    const auto listing = scenes->listing();
+    const auto scene = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
+    return scene != listing->end() && scene->tours ? titles_of_tours(*scene->tours->for_viewers)
+                                                   : std::vector<TourTitles>();
+  });
 }
 
 Server::Server(const ServerConfig& config, const ServerParts& parts)
     : state_(std::make_unique<State>(config, parts)) {
   State& s = *state_;
+  s.count_visits();
   s.scenes = std::make_unique<SceneLibrary>(
       s.config, RendererOptions{.kind = s.config.renderer, .pool = s.pool, .devices = s.devices},
       s.io, s.metrics);
@@ -238,7 +259,8 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       [&s](const auto& why) { s.give_up("no device renders any more: " + why); }, s.metrics);
   s.places = std::make_unique<Places>(
       VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
-                   session_tokens(s.config), s.metrics, [&s] { return s.access.revoked_links(); }});
+                   session_tokens(s.config), s.metrics, s.counts ? &*s.counts : nullptr,
+                   [&s] { return s.access.revoked_links(); }});
 }
 
 Server::~Server() {

@@ -61,18 +61,6 @@ bool has_only(std::string_view text, std::string_view others) {
   });
 }
 
-/// RFC 3986, for a path or a part of a query.
-std::string percent_encoded(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (has_only({&c, 1}, "-._~/=:@,!"))
-      out += c;
-    else
-      out += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return out;
-}
-
 /// True for an address, or a name that no outsider can register.
 bool is_local(std::string_view name) {
   if (name.empty()) return false;
@@ -166,13 +154,27 @@ std::optional<std::string_view> scene_of(std::string_view path, std::string_view
 HttpResponse redirect_to_https(std::string_view host, const HttpRequest& request) {
   if (host.empty() || !has_only(host, ".-_:[]"))
     return text_response(400, "400: this port speaks https\n");
-  std::string location = fmt::format("https://{}{}", host, percent_encoded(request.path));
+  constexpr std::string_view of_addresses = "-._~/=:@,!";
+  std::string location =
+      fmt::format("https://{}{}", host, percent_encoded(request.path, of_addresses));
   for (std::size_t i = 0; i < request.arguments.size(); ++i)
-    location += fmt::format("{}{}", i == 0 ? '?' : '&', percent_encoded(request.arguments[i]));
+    location += fmt::format("{}{}", i == 0 ? '?' : '&',
+                            percent_encoded(request.arguments[i], of_addresses));
   HttpResponse response =
       text_response(308, fmt::format("308: this port speaks https: {}\n", location));
   response.location = std::move(location);
   return response;
+}
+
+std::string percent_encoded(std::string_view text, std::string_view others) {
+  std::string out;
+  for (const char c : text) {
+    if (has_only({&c, 1}, others))
+      out += c;
+    else
+      out += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return out;
 }
 
 std::string escape_html(std::string_view text) {

@@ -118,6 +118,9 @@ std::optional<std::string_view> scene_of(std::string_view path, std::string_view
 /// `host` is none. The browser keeps the fragment, which may be a token.
 HttpResponse redirect_to_https(std::string_view host, const HttpRequest& request);
 
+/// Percent-encodes text for an address (RFC 3986): all bytes but letters, digits and `others`.
+std::string percent_encoded(std::string_view text, std::string_view others = "-._~");
+
 /// Escapes text for HTML content or a quoted attribute.
 std::string escape_html(std::string_view text);
 

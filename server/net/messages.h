@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <iterator>
 #include <optional>
@@ -46,6 +48,12 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 
+/// What the visitor holds, as the page sees it.
+enum class DeviceKind { unknown, desktop, phone, tablet, headset };
+inline constexpr std::size_t device_kinds = 5;
+inline constexpr std::array<std::string_view, device_kinds> device_names = {
+    "unknown", "desktop", "phone", "tablet", "headset"};
+
 struct Hello {
   std::uint32_t version = 0;
   std::string scene_id;
@@ -57,6 +65,7 @@ struct Hello {
   PosePath resume_path;  // empty: no path
   std::string watch_token;
   bool follow = false;  // rather a session of its own than to watch
+  DeviceKind device = DeviceKind::unknown;
   Settings settings;
 };
 
@@ -89,11 +98,16 @@ struct Present {
 struct Follow {
   std::string watch_token;  // empty: follow nobody
 };
+/// The visitor has come to a stop of a tour. Both count from 0.
+struct Reached {
+  std::uint32_t tour = 0, stop = 0;
+};
 /// A message of a newer wire version. It is ignored, as the contract demands.
 struct UnknownMessage {};
 
-using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
-                                   SelectScene, RequestIdr, Pause, Bye, Pick, Present, Follow>;
+using ClientMessage =
+    std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings, SelectScene,
+                 RequestIdr, Pause, Bye, Pick, Present, Follow, Reached>;
 
 struct SceneFacts {
   std::string scene_id;

@@ -33,6 +33,7 @@ constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
 constexpr std::uint32_t max_pose_age_us = 10'000'000;
 constexpr int max_path_samples = 256;
 constexpr int max_decoders = 8;
+constexpr std::uint32_t most_tours = 32, most_stops = 256;
 
 /// Thrown and caught only in this file, to leave nested message parts.
 struct Invalid : std::runtime_error {
@@ -144,6 +145,8 @@ Hello parse(const v1::Hello& message) {
   hello.resume_path = parse(message.resume().path());
   hello.watch_token = checked_length("hello.watch", message.watch(), 512);
   hello.follow = message.follow();
+  if (v1::Hello::Device_IsValid(message.device()))
+    hello.device = static_cast<DeviceKind>(message.device());
   hello.settings = parse(message.settings());
   return hello;
 }
@@ -200,6 +203,9 @@ ClientMessage parse(const v1::ClientMessage& message) {
                      checked_length("present.name", message.present().name(), 64)};
     case v1::ClientMessage::kFollow:
       return Follow{checked_length("follow.watch", message.follow().watch(), 512)};
+    case v1::ClientMessage::kReached:
+      return Reached{checked("reached.tour", message.reached().tour(), 0u, most_tours - 1),
+                     checked("reached.stop", message.reached().stop(), 0u, most_stops - 1)};
     case v1::ClientMessage::BODY_NOT_SET:
       break;
   }

@@ -6,21 +6,6 @@
 #include "server/scenes/poster.h"
 
 namespace catgs {
-namespace {
-
-/// Percent-encodes a part of a path: all bytes but letters, digits and "-._~".
-std::string url_part(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                       std::string_view("-._~").find(c) != std::string_view::npos;
-    out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return out;
-}
-
-}  // namespace
-
 std::string preview_elements(const LinkPreview& preview) {
   std::string out;
   const auto add = [&](std::string_view kind, std::string_view name, std::string_view content) {
@@ -35,7 +20,7 @@ std::string preview_elements(const LinkPreview& preview) {
   add("property", "og:description", description);
   if (!preview.has_poster || preview.site.empty()) return out;
   add("property", "og:image",
-      fmt::format("{}/api/scenes/{}/poster.jpg", preview.site, url_part(preview.scene_id)));
+      fmt::format("{}/api/scenes/{}/poster.jpg", preview.site, percent_encoded(preview.scene_id)));
   add("property", "og:image:width", std::to_string(poster_size_px.x));
   add("property", "og:image:height", std::to_string(poster_size_px.y));
   add("name", "twitter:card", "summary_large_image");

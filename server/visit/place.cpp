@@ -52,7 +52,8 @@ Place::Place(const VisitContext& around, Admissions& admissions, std::string ses
       id_(std::move(session_id)),
       executor_(around.executor),
       visit_(around.options.policy, *this, Clock::now()),
-      audience_(around.options.max_spectators, std::move(address)) {}
+      audience_(around.options.max_spectators, std::move(address)),
+      tally_(around.counts) {}
 
 Place::~Place() { executor_->close(std::move(stream_)); }
 
@@ -61,12 +62,15 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   if (!audience_.is_visitor(from)) return audience_.on_message(from, message);
   visit_.on_link(link, received);
   const auto* hello = std::get_if<Hello>(&message);
+  if (hello) visitor_.device = hello->device;
   if (hello && visit_.life().state() == VisitState::awaiting_hello)
     return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
   if (visit_.life().state() == VisitState::live) {
     if (const auto* wish = std::get_if<Present>(&message)) return present(*this, *wish, received);
     if (const auto* wish = std::get_if<Follow>(&message))
       return admissions_.follow(*this, from, *wish, received);
+    if (const auto* reached = std::get_if<Reached>(&message))
+      return tally_.reached({reached->tour, reached->stop});
   }
   if (const auto* pose = std::get_if<PoseSample>(&message)) {
     audience_.presentation().moved(*pose, received);
@@ -184,6 +188,11 @@ void Place::on_tick(TimePoint now) {
   StreamControl& stream = visit_.stream();
   if (visit_.life().resumable() && !visit_.life().lost())
     if (auto newer = around_.scenes.newer_form(*stream.scene())) stream.redraw(std::move(newer));
+  if (visit_.life().on_show() && stream.scene())
+    tally_.on_show(stream.scene()->facts.scene_id, visitor_.device,
+                   visit_.statistics().bytes_sent(), now);
+  else
+    tally_.off_show();
   audience_.keep_talking(now);
   if (audience_.wants_idr(now)) visit_.stream().idr().request();
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/base/log_event.h"
+#include "server/counts/visit_tally.h"
 #include "server/visit/audience.h"
 #include "server/visit/session_usage.h"
 #include "server/visit/visit.h"
@@ -36,8 +37,9 @@ class Admissions {
 
 /// The visitor, as of the last hello, and what it was granted.
 struct Visitor {
-  std::string token;      // it may be valid for one scene only
-  std::string link_id;    // of the token; empty: it is no link
+  std::string token;    // it may be valid for one scene only
+  std::string link_id;  // of the token; empty: it is no link
+  DeviceKind device = DeviceKind::unknown;
   EncoderChoice encoder;  // of the streams that are opened from here on
   std::optional<TimePoint> admitted_at;
 
@@ -110,6 +112,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   Visit visit_;
   SessionUsage usage_;
   Audience audience_;
+  VisitTally tally_;
 };
 
 /// Returns null if no place has this id.

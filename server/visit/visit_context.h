@@ -12,6 +12,7 @@
 #include "server/access/session_tokens.h"
 #include "server/base/clock.h"
 #include "server/base/metrics.h"
+#include "server/counts/visit_counts.h"
 #include "server/encode/encoder_choices.h"
 #include "server/scenes/scene_source.h"
 #include "server/schedule/frame_executor.h"
@@ -47,6 +48,7 @@ struct VisitContext {
   Authorize authorize;
   SessionTokens tokens;
   Metrics& metrics;
+  VisitCounts* counts = nullptr;  // null: visits are not counted
   std::function<RevokedLinks()> revoked_links = [] { return std::make_shared<LinkIds>(); };
 };
 

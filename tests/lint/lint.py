@@ -52,7 +52,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "render_core/first_sight", "render_core/scene/files", "render_core/synth", "render_core/tools",
     "render_core/tools/bench render_core/tools/render render_core/tools/trace", "render_core/tools/paper",
     "server/base", "server/encode", "server/pipeline", "server/net", "server/config server/access server/flow",
-    "server/scenes server/schedule", "server/visit", "server/frame_path", "server",
+    "server/scenes server/schedule server/counts", "server/visit", "server/frame_path", "server",
     "web_client/src/base web_client/src/text web_client/src/wire",
     "web_client/src/camera web_client/src/decode web_client/src/transport",
     "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour",

@@ -2,13 +2,14 @@
 import { readFileSync } from 'node:fs';
 import { beforeEach, describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
+import { device_kind } from '#client/session/device';
 import { QualityChoice } from '#client/session/quality';
 import { leaves_scene_open, scene_address, scene_labels, scene_name, type SceneListing } from '#client/session/scenes';
 import { AccessToken, has_token } from '#client/session/token';
 import { endpoint_of } from '#client/transport/socket';
 import { Settling } from '#client/ui/automation';
 import { card_for, jpeg_reason, unsupported_card } from '#client/ui/wording';
-import { Error_Code } from '#client/wire/wire';
+import { Error_Code, Hello_Device } from '#client/wire/wire';
 import { with_texts } from '../../web_client/page_texts';
 import { FakeTime, fake_storage } from './fakes';
 
@@ -59,6 +60,17 @@ describe('access token', () => {
     const token_of = (href: string): string => new AccessToken({ href }, history, undefined).value;
     expect(token_of('http://host/')).toBe('');
     expect(token_of('http://host/#token=x')).toBe('x');
+  });
+});
+
+describe('device', () => {
+  it('is told by pointer, screen and headset browsers, and by nothing finer', () => {
+    const kind = (user_agent: string, coarse_pointer: boolean, screen_px: number): Hello_Device =>
+      device_kind({ user_agent, coarse_pointer, screen_px });
+    expect(kind('Mozilla/5.0 (X11; Linux x86_64)', false, 1080)).toBe(Hello_Device.DESKTOP);
+    expect(kind('Mozilla/5.0 (Linux; Android 15)', true, 390)).toBe(Hello_Device.PHONE);
+    expect(kind('Mozilla/5.0 (iPad)', true, 820)).toBe(Hello_Device.TABLET);
+    expect(kind('Mozilla/5.0 (Linux; Android 12; Quest 3) OculusBrowser/33', true, 600)).toBe(Hello_Device.HEADSET);
   });
 });
 

@@ -221,6 +221,7 @@ describe('the player', () => {
     let eye: Eye = { position: [0, 0, 0], orientation: identity, fov_y_rad: 1 };
     let flight: { way: Flight; ended: (arrived: boolean) => void } | undefined;
     const paths: (readonly PathSample[])[] = [];
+    const reached: [number, number][] = [];
     let state: TourState | undefined;
     const stop_flight = (): void => {
       const stopped = flight;
@@ -243,6 +244,7 @@ describe('the player', () => {
         timers: time,
         now_us: () => time.now_us(),
         announce: (path) => paths.push(path),
+        reached: (tour_index, stop_index) => reached.push([tour_index, stop_index]),
         reduced_motion,
       },
       (now) => (state = now),
@@ -251,6 +253,7 @@ describe('the player', () => {
       player,
       time,
       paths,
+      reached,
       stop_flight,
       state: () => state!,
       flying: () => flight?.way,
@@ -291,6 +294,22 @@ describe('the player', () => {
     time.advance(60_000);
     expect(flying()).toBeUndefined();
     expect(state()).toMatchObject({ stop_index: 1, playing: false });
+  });
+
+  it('tells which stops were reached, and of none that were left before', () => {
+    const { player, arrive, stop_flight, reached } = guided();
+    player.load([tour, tour]);
+    player.choose(1);
+    player.next();
+    expect(reached).toEqual([]);
+    arrive();
+    player.next();
+    stop_flight(); // the visitor takes over
+    player.show_stop(2);
+    expect(reached).toEqual([
+      [1, 0],
+      [1, 2],
+    ]);
   });
 
   it('flies as long as a stop says', () => {

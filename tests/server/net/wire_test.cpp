@@ -417,6 +417,17 @@ TEST(Wire, SaysWhichMessagesReplaceEachOther) {
   EXPECT_EQ(wire::serialize(Lead{}).topic, Topic::leader);
 }
 
+TEST(Wire, StopsAreThoseThatToursMayHave) {
+  v1::ClientMessage message;
+  message.mutable_reached()->set_tour(31);
+  message.mutable_reached()->set_stop(255);
+  EXPECT_EQ(complaint(message), "");
+  message.mutable_reached()->set_stop(256);
+  EXPECT_THAT(complaint(message), HasSubstr("reached.stop"));
+  message.mutable_reached()->set_tour(32);
+  EXPECT_THAT(complaint(message), HasSubstr("reached.tour"));
+}
+
 TEST(Wire, BoundsTheNameOfALeaderAndTheTokenOfAFollower) {
   v1::ClientMessage message;
   message.mutable_present()->set_name(std::string(65, 'a'));

@@ -17,6 +17,8 @@ interface TourEnvironment {
   now_us(): number;
   /** Tells the server the path, for its forecasts. */
   announce(path: readonly PathSample[]): void;
+  /** The visitor has come to a stop. */
+  reached(tour_index: number, stop_index: number): void;
   /** The camera jumps instead of gliding, and no tour starts by itself. */
   readonly reduced_motion: boolean;
 }
@@ -93,6 +95,7 @@ export class TourPlayer {
     this.pause();
     if (!this.state.tour?.stops[stop_index]) return;
     this.stop_index_ = stop_index;
+    this.env_.reached(this.tour_index_, stop_index);
     this.tell();
   }
 
@@ -158,7 +161,9 @@ export class TourPlayer {
     const way = glide(from, stop.eye, duration_s);
     const journey = this.set_out();
     camera.fly(way, (arrived) => {
-      if (journey === this.journey_) this.ended(arrived, stop);
+      if (journey !== this.journey_) return;
+      if (arrived) this.env_.reached(this.tour_index_, stop_index);
+      this.ended(arrived, stop);
     });
     this.announce(way, 0, duration_s);
     this.tell();

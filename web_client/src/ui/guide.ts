@@ -51,6 +51,7 @@ export class Guide {
         timers: browser_timers,
         now_us: () => clock.now_us(),
         announce: (samples) => worker.post({ kind: 'path', samples }),
+        reached: (tour, stop) => worker.post({ kind: 'reached', tour, stop }),
         reduced_motion,
       },
       (state) => this.tour_changed(state),

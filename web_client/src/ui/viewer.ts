@@ -4,6 +4,7 @@ import { clock_from } from '../base/clock';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import type { PresenterChoice } from '../present/make_presenter';
+import { device_kind } from '../session/device';
 import { watch_token, type AccessToken } from '../session/token';
 import { factor } from '../text/number';
 import { text } from '../text/text';
@@ -80,6 +81,11 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
       view: stream_size.view,
       quality: stream_size.quality,
       rung,
+      device: device_kind({
+        user_agent: navigator.userAgent,
+        coarse_pointer: matchMedia('(pointer: coarse)').matches,
+        screen_px: Math.min(screen.width, screen.height),
+      }),
       presenter: presenter_choice(wishes.get('presenter')),
     },
     [canvas],

@@ -11,7 +11,7 @@ import type { WarpMode, WarpState } from '../present/warp_policy';
 import type { Quality, View } from '../session/quality';
 import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
-import type { FrameHeader, Lead, StreamConfig, Welcome } from '../wire/wire';
+import type { FrameHeader, Hello_Device, Lead, StreamConfig, Welcome } from '../wire/wire';
 
 export interface Snapshot {
   /** Header of the newest picture. */
@@ -37,11 +37,13 @@ export type ToWorker =
       quality: Quality;
       rung: DecoderRung;
       presenter: PresenterChoice;
+      device: Hello_Device;
     }
   | { kind: 'camera'; sample: CameraSample }
   | { kind: 'view'; view: View; quality: Quality }
   | { kind: 'warp'; mode: WarpMode }
   | { kind: 'path'; samples: readonly PathSample[] }
+  | { kind: 'reached'; tour: number; stop: number }
   | { kind: 'pick'; id: number; ray: Ray }
   | { kind: 'hidden'; hidden: boolean }
   | { kind: 'retry' }

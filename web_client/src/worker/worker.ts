@@ -104,6 +104,9 @@ class Client {
           message.samples.map(({ time_us, eye }) => pose_message(0, time_us, this.widened(eye))),
         );
         break;
+      case 'reached':
+        this.session_.send({ case: 'reached', value: { tour: message.tour, stop: message.stop } });
+        break;
       case 'pick':
         this.pick(message.id, message.ray);
         break;
@@ -212,6 +215,7 @@ class Client {
         token: start.token,
         watch: start.watch,
         follow: start.watch !== '',
+        device: start.device,
         settings: settings(start.view, start.quality, this.display_.overscan),
       },
     );

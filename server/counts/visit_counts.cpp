@@ -1,0 +1,74 @@
+#include "server/counts/visit_counts.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace catgs {
+
+std::string date_of(std::int64_t unix_s) {
+  using namespace std::chrono;
+  const year_month_day date(floor<days>(sys_seconds(seconds(unix_s))));
+  return fmt::format("{:04}-{:02}-{:02}", static_cast<int>(date.year()),
+                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()));
+}
+
+bool is_date(std::string_view text) {
+  constexpr std::string_view form = "0000-00-00";
+  return text.size() == form.size() && std::ranges::equal(text, form, [](char c, char of_form) {
+           return of_form == '-' ? c == '-' : c >= '0' && c <= '9';
+         });
+}
+
+/// The lock is held.
+SceneCounts& VisitCounts::today(const std::string& scene_id) {
+  const std::string date = date_of(unix_s_());
+  DayCounts& day = days_[date];
+  changed_.insert(date);
+  while (days_.size() > most_days) days_.erase(days_.begin());
+  if (day.size() < most_scenes || day.contains(scene_id)) return day[scene_id];
+  return day[std::string(other_scenes)];
+}
+
+void VisitCounts::visit(const std::string& scene_id, DeviceKind device) {
+  const std::lock_guard lock(mutex_);
+  SceneCounts& counts = today(scene_id);
+  ++counts.visits;
+  ++counts.devices[static_cast<std::size_t>(device)];
+}
+
+void VisitCounts::spend(const std::string& scene_id, double seconds, std::uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  SceneCounts& counts = today(scene_id);
+  counts.seconds += seconds;
+  counts.bytes += bytes;
+}
+
+void VisitCounts::reach(const std::string& scene_id, StopId stop) {
+  const std::lock_guard lock(mutex_);
+  auto& stops = today(scene_id).stops;
+  if (stops.size() < most_stops || stops.contains(stop)) ++stops[stop];
+}
+
+void VisitCounts::restore(const std::string& date, DayCounts counts) {
+  const std::lock_guard lock(mutex_);
+  days_[date] = std::move(counts);
+  while (days_.size() > most_days) days_.erase(days_.begin());
+}
+
+CountsByDay VisitCounts::all() const {
+  const std::lock_guard lock(mutex_);
+  return days_;
+}
+
+CountsByDay VisitCounts::take_changed() {
+  const std::lock_guard lock(mutex_);
+  CountsByDay changed;
+  for (const std::string& date : std::exchange(changed_, {}))
+    if (const auto day = days_.find(date); day != days_.end()) changed.insert(*day);
+  return changed;
+}
+
+}  // namespace catgs

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/net/messages.h"
+
+namespace catgs {
+
+/// A stop of a tour, both counted from 0, as pages number them.
+struct StopId {
+  std::uint32_t tour = 0, stop = 0;
+
+  auto operator<=>(const StopId&) const = default;
+};
+
+/// What was counted of one scene on one day. Nothing in it tells visitors apart.
+struct SceneCounts {
+  std::uint64_t visits = 0;
+  double seconds = 0.0;     // on show: connected, and the page was not hidden
+  std::uint64_t bytes = 0;  // of pictures
+  std::array<std::uint64_t, device_kinds> devices{};  // visits, by DeviceKind
+  std::map<StopId, std::uint64_t> stops;              // visits that reached the stop
+};
+
+using DayCounts = std::map<std::string, SceneCounts>;               // by the scene's id
+using CountsByDay = std::map<std::string, DayCounts, std::less<>>;  // by date, "2026-11-25" in UTC
+
+/// Counts visits by scene and day. Thread-safe.
+class VisitCounts {
+ public:
+  static constexpr std::size_t most_days = 400;
+  /// Of a day. Further scenes are counted together, as `other_scenes`.
+  static constexpr std::size_t most_scenes = 1000;
+  /// Of a scene and day. Further stops are not counted.
+  static constexpr std::size_t most_stops = 2000;
+  static constexpr std::string_view other_scenes = "(others)";
+
+  /// `unix_s`: the time, which decides about the day.
+  explicit VisitCounts(std::function<std::int64_t()> unix_s) : unix_s_(std::move(unix_s)) {}
+
+  void visit(const std::string& scene_id, DeviceKind device);
+  void spend(const std::string& scene_id, double seconds, std::uint64_t bytes);
+  void reach(const std::string& scene_id, StopId stop);
+
+  /// Puts a day in place that was counted before.
+  void restore(const std::string& date, DayCounts counts);
+  [[nodiscard]] CountsByDay all() const;
+  /// The days that have changed since the last call.
+  [[nodiscard]] CountsByDay take_changed();
+
+ private:
+  SceneCounts& today(const std::string& scene_id);
+
+  const std::function<std::int64_t()> unix_s_;
+  mutable std::mutex mutex_;  // guards the rest
+  CountsByDay days_;
+  std::set<std::string> changed_;  // dates
+};
+
+/// The date in UTC of a Unix time.
+std::string date_of(std::int64_t unix_s);
+/// True for "2026-11-25".
+bool is_date(std::string_view text);
+
+}  // namespace catgs
