@@ -42,7 +42,7 @@ struct SceneHints {
   glm::vec3 focus{0.0f};            // the point that orbiting turns around
   float scale = 1.0f;               // to a visitor, world units: how far free sight is, about
   SceneAbout about;
-  std::string source;  // "sidecar scene.json", "cameras.json", "estimated"
+  std::string source;  // "sidecar scene.json", "cameras.json", "estimated"; "" not looked for
 };
 
 /// A scene ready to be rendered.

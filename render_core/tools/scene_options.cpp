@@ -70,9 +70,11 @@ LoadOptions load_options(const SceneOptions& options, int threads, Progress& pro
 
 }  // namespace
 
-Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
+Scene load_scene(const SceneOptions& options, int threads, bool quiet, bool first_view) {
   Progress progress("loading", quiet);
-  return load_scene(options.path, load_options(options, threads, progress));
+  LoadOptions load = load_options(options, threads, progress);
+  load.first_view = first_view;
+  return load_scene(options.path, load);
 }
 
 SceneInPages open_in_pages(const SceneOptions& options, int threads, bool quiet) {

@@ -30,8 +30,8 @@ std::optional<SplatModel> model_of(const SceneOptions& options);
 /// The direction that --up names. Throws InputError.
 std::optional<glm::vec3> up_of(const SceneOptions& options);
 
-/// Shows its progress on a terminal. Throws InputError.
-Scene load_scene(const SceneOptions& options, int threads, bool quiet);
+/// Shows its progress on a terminal. `first_view`: see LoadOptions. Throws InputError.
+Scene load_scene(const SceneOptions& options, int threads, bool quiet, bool first_view = true);
 
 /// The same for a scene in pages.
 SceneInPages open_in_pages(const SceneOptions& options, int threads, bool quiet);

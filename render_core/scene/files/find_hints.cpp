@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include <fmt/format.h>
@@ -64,6 +65,14 @@ std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+bool any_exists(const HintFiles& files) {
+  return std::ranges::any_of(
+      std::array{files.sidecar, files.cameras, files.transforms},
+      [error = std::error_code()](const std::filesystem::path& path) mutable {
+        return !path.empty() && std::filesystem::is_regular_file(path, error);
+      });
+}
 
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files) {
   const std::optional<Sidecar> sidecar = sidecar_at(files.sidecar);

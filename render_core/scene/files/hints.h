@@ -64,6 +64,9 @@ struct HintFiles {
   std::filesystem::path transforms;
 };
 
+/// Whether at least one of the files is there.
+bool any_exists(const HintFiles& files);
+
 /// The model that the sidecar names, if any. Throws InputError for a faulty sidecar.
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files);
 

@@ -126,7 +126,8 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   if (scene.cloud.empty())
     throw InputError(path.string(), "",
                      fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
-  scene.hints = find_hints(scene.cloud, location.hints, options.up, scene.notes, pool);
+  if (options.first_view || any_exists(location.hints))
+    scene.hints = find_hints(scene.cloud, location.hints, options.up, scene.notes, pool);
   context.report(1.0);
   return scene;
 }

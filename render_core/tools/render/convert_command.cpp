@@ -28,7 +28,7 @@ struct ConvertOptions {
 
 /// Estimated hints can be estimated again. Others would be lost with the files that they came from.
 void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
-  if (hints.source == "estimated") return;
+  if (hints.source.empty() || hints.source == "estimated") return;
   const auto sidecar = sidecar_of(out);
   if (std::error_code error; std::filesystem::exists(sidecar, error)) {
     fmt::print(stderr, "note: {} exists and was left as it is\n", sidecar.string());
@@ -82,7 +82,8 @@ void convert(const ConvertOptions& options, bool quiet) {
                      fmt::format("{} is not in (0, 1]", options.keep_fraction));
   check_output(options);
   if (convert_in_parts(options, quiet)) return;
-  Scene scene = load_scene(options.in, options.threads, quiet);
+  constexpr bool first_view = false;  // would be estimated anew from the file that is written
+  Scene scene = load_scene(options.in, options.threads, quiet, first_view);
   const std::size_t loaded = scene.cloud.size();
   keep_most_important(scene.cloud, options.keep_fraction);
   save(scene, options, quiet);

@@ -40,6 +40,15 @@ TEST_F(LoadScene, ReadsWhatSaveSceneWrote) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.ply.part"));
 }
 
+TEST_F(LoadScene, AFirstViewThatNobodyWantsIsLeftOutUnlessAFileTellsIt) {
+  save_scene(random_cloud(1000, 0), folder_ / "room.ply");
+  LoadOptions options;
+  options.first_view = false;
+  EXPECT_EQ(load_scene(folder_ / "room.ply", options).hints.source, "");
+  write("room.json", R"({"near": 0.125})");
+  EXPECT_EQ(load_scene(folder_ / "room.ply", options).hints.near_z, 0.125f);
+}
+
 TEST_F(LoadScene, TheModelIsThatOfTheOptionElseTheSidecarElseTheFile) {
   GaussianCloud cloud = random_cloud(1000, 0);
   cloud.model = SplatModel::antialiased;
