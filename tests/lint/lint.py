@@ -46,7 +46,7 @@ class IncludeRule(NamedTuple):
 # that no folders include each other in a cycle.
 LAYERS = {name: rank for rank, line in enumerate([
     "render_core/base", "render_core/math", "render_core/scene", "render_core/scene/analysis render_core/scene/formats",
-    "render_core/scene/tree",
+    "render_core/scene/edit render_core/scene/tree",
     "render_core/motion", "render_core/renderer", "render_core/device_error", "render_core/frame_driver", "render_core/paged_frame", "render_core/image",
     "render_core/metrics render_core/reference render_core/cpu render_core/cuda", "render_core/make_renderer",
     "render_core/first_sight", "render_core/scene/files", "render_core/synth", "render_core/tools",

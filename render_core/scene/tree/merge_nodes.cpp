@@ -15,6 +15,7 @@
 
 #include "render_core/math/constants.h"
 #include "render_core/scene/activations.h"
+#include "render_core/scene/covariance.h"
 
 namespace catgs {
 namespace {
@@ -22,59 +23,7 @@ namespace {
 using Factor = math::CovarianceFactor<double>;
 
 constexpr int most_members = 2 * static_cast<int>(cluster_size);
-// How far a full step of colour counts, in mean sizes. On the city of 1 M, 2 loses 1.3 dB at the
-// same number of Gaussians, and 24 gains nothing.
-constexpr float colour_reach = 12.0f;
 constexpr float too_far = 1e18f;  // for any partner, in mean sizes
-
-/// Covariance of a Gaussian: the upper triangle.
-struct Covariance {
-  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
-
-  void add(double weight, const Covariance& c) {
-    xx += weight * c.xx;
-    xy += weight * c.xy;
-    xz += weight * c.xz;
-    yy += weight * c.yy;
-    yz += weight * c.yz;
-    zz += weight * c.zz;
-  }
-  [[nodiscard]] double trace() const { return xx + yy + zz; }
-  /// RMS over all directions of the projected area, but for a factor of pi.
-  [[nodiscard]] double area() const {
-    const double minors =
-        xx * yy - xy * xy + (xx * zz - xz * xz) + (yy * zz - yz * yz);  // tr(adj Sigma)
-    return std::sqrt(std::max(minors, 0.0) / 3.0);
-  }
-};
-
-Covariance outer(const glm::dvec3& d) {
-  return {d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z};
-}
-
-Covariance covariance_of(const Factor& l) {
-  return {l.xx * l.xx,
-          l.xx * l.yx,
-          l.xx * l.zx,
-          l.yx * l.yx + l.yy * l.yy,
-          l.yx * l.zx + l.yy * l.zy,
-          l.zx * l.zx + l.zy * l.zy + l.zz * l.zz};
-}
-
-/// Cholesky factor. Sums of covariances are at least as round as their parts, so forming them costs
-/// no digits that count here.
-Factor factor_of(const Covariance& c) {
-  const auto root = [](double v) { return std::sqrt(std::max(v, 0.0)); };
-  const auto over = [](double v, double pivot) { return pivot > 0.0 ? v / pivot : 0.0; };
-  Factor l{};
-  l.xx = root(c.xx);
-  l.yx = over(c.xy, l.xx);
-  l.zx = over(c.xz, l.xx);
-  l.yy = root(c.yy - l.yx * l.yx);
-  l.zy = over(c.yz - l.yx * l.zx, l.yy);
-  l.zz = root(c.zz - l.zx * l.zx - l.zy * l.zy);
-  return l;
-}
 
 /// The Gaussians of the children.
 struct Members {
@@ -99,7 +48,7 @@ struct Members {
 
   GaussianCloud cloud;  // without rotations and scales
   std::vector<Factor> factors;
-  std::vector<Covariance> covariances;
+  std::vector<Covariance<double>> covariances;
   std::vector<double> weights;
 };
 
@@ -288,7 +237,7 @@ struct Sums {
   int last = 0;  // one of them
   double weight = 0.0;
   glm::dvec3 mean{0.0};
-  Covariance covariance;
+  Covariance<double> covariance;
   double squared_displacement = 0.0;
 };
 

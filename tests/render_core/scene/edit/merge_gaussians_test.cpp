@@ -1,0 +1,99 @@
+#include "render_core/scene/edit/merge_gaussians.h"
+
+#include <memory>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "render_core/reference/reference.h"
+#include "render_core/scene/prune.h"
+#include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/rendered.h"
+#include "tests/support/test_scenes.h"
+
+namespace catgs::test {
+namespace {
+
+GaussianCloud merged(GaussianCloud cloud, std::size_t wanted, int threads = 2) {
+  ThreadPool pool(threads);
+  merge_gaussians(cloud, wanted, pool, LoadContext(pool));
+  return cloud;
+}
+
+TEST(MergeGaussians, TheSameForAnyNumberOfThreads) {
+  const GaussianCloud cloud = random_cloud(20'000, 1);
+  const GaussianCloud one = merged(cloud, 5000, 1), three = merged(cloud, 5000, 3);
+  EXPECT_EQ(ply_bytes(one), ply_bytes(three));
+}
+
+TEST(MergeGaussians, LeavesFewerGaussiansAlone) {
+  const GaussianCloud cloud = random_cloud(10, 1);
+  EXPECT_EQ(ply_bytes(merged(cloud, 10)), ply_bytes(cloud));
+  EXPECT_EQ(ply_bytes(merged(cloud, 11)), ply_bytes(cloud));
+}
+
+TEST(MergeGaussians, JoinsWhatNoPictureTellsApart) {
+  GaussianCloud cloud = random_cloud(200, 0);
+  cloud.resize(400, 0);
+  for (std::size_t i = 0; i < 200; ++i) {
+    cloud.opacity[i] = 0.4f * cloud.opacity[i];
+    cloud.mean[200 + i] = cloud.mean[i];
+    cloud.scale[200 + i] = cloud.scale[i];
+    cloud.rotation[200 + i] = cloud.rotation[i];
+    cloud.opacity[200 + i] = cloud.opacity[i];
+    cloud.sh[200 + i] = cloud.sh[i];
+  }
+  const GaussianCloud after = merged(cloud, 200);
+  for (std::size_t i = 0; i < 200; ++i) {
+    EXPECT_LT(glm::distance(after.mean[i], cloud.mean[i]), 1e-5f);
+    EXPECT_NEAR(after.opacity[i], 2.0f * cloud.opacity[i], 1e-5f);
+  }
+}
+
+TEST(MergeGaussians, EndsWithWhateverTheValuesAre) {
+  GaussianCloud cloud = random_cloud(500, 0);
+  for (std::size_t i = 0; i < 500; ++i) {
+    cloud.mean[i] *= i % 3 == 0 ? 1e8f : 0.0f;
+    cloud.scale[i] = i % 2 == 0 ? glm::vec3(1e9f, 1e-10f, 1e-10f) : glm::vec3(1e-10f);
+  }
+  const GaussianCloud after = merged(cloud, 1);
+  ASSERT_EQ(after.size(), 1u);
+  EXPECT_TRUE(std::isfinite(after.mean[0].x) && std::isfinite(after.scale[0].x));
+  EXPECT_TRUE(std::isfinite(after.rotation[0].w) && after.scale[0].z > 0.0f);
+}
+
+/// A wall with a pattern, of small splats in the patterned half and of as many in the plain one.
+GaussianCloud wall() {
+  GaussianCloud cloud = random_cloud(6000, 0, 5u);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    glm::vec3& mean = cloud.mean[i];
+    mean = {std::remainder(mean.x, 2.0f), std::remainder(mean.y, 2.0f), 5.0f + 0.002f * mean.z};
+    cloud.scale[i] = glm::vec3(0.04f, 0.04f, 0.002f);
+    cloud.rotation[i] = glm::quat(1, 0, 0, 0);
+    cloud.sh[i] = mean.x > 0.0f ? glm::vec3(0.5f)
+                                : glm::vec3(std::sin(9.0f * mean.x), std::cos(7.0f * mean.y), 0);
+  }
+  return cloud;
+}
+
+TEST(MergeGaussians, BeatsDropping) {
+  const auto pool = std::make_shared<ThreadPool>(2);
+  const auto draw = [&](const GaussianCloud& cloud) {
+    const auto view =
+        make_reference_renderer(std::make_shared<const GaussianCloud>(cloud), pool)->make_view({});
+    return render_in(*view, {.camera = make_camera({glm::vec3(0.3f, 0.2f, 2.0f), {1, 0, 0, 0}},
+                                                   {64, 64}, 80.0f)})
+        .rgb;
+  };
+  const GaussianCloud cloud = wall();
+  const auto whole = draw(cloud);
+  for (const double share : {0.5, 0.25, 0.1}) {
+    GaussianCloud dropped = cloud;
+    keep_most_important(dropped, share);
+    const double by_merging = psnr_db(whole, draw(merged(cloud, dropped.size())));
+    EXPECT_GT(by_merging, psnr_db(whole, draw(dropped)) + 3.0) << share;
+  }
+}
+
+}  // namespace
+}  // namespace catgs::test
