@@ -20,7 +20,6 @@ namespace catgs {
 
 namespace {
 
-constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 constexpr std::size_t max_about_bytes = 800;  // of one text: 200 characters or more
 
 glm::vec3 parse_up(const JsonField& field) {
@@ -138,7 +137,8 @@ std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
   return std::filesystem::path(scene_file).replace_extension(".json");
 }
 
-void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
+void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
+                   const nlohmann::ordered_json* tours) {
   const auto triple = [](const glm::vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
   const glm::quat& q = hints.start_pose.orientation;
   nlohmann::ordered_json document = {
@@ -159,6 +159,7 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path) {
     document["mode"] = mode_names[static_cast<std::size_t>(about.mode) - 1];
   if (about.background_rgb != 0)
     document["background"] = fmt::format("#{:06x}", about.background_rgb);
+  if (tours && !tours->is_null()) document["tours"] = *tours;
   std::ofstream file(path);
   file << document.dump(2) << '\n';
   file.close();

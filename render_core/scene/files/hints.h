@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/math/camera.h"
@@ -13,6 +16,8 @@
 #include "render_core/scene/scene.h"
 
 namespace catgs {
+
+inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 
 /// Hints that the author of a scene wrote down in `<scene>.json`. All fields are optional:
 ///
@@ -54,8 +59,10 @@ void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hi
 /// The path of a scene file's sidecar: "city.ply" -> "city.json".
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
 
-/// Writes all hints as a sidecar. Throws InputError when that fails.
-void write_sidecar(const SceneHints& hints, const std::filesystem::path& path);
+/// Writes all hints as a sidecar, and the value of its "tours" if there is one. Throws InputError
+/// when that fails.
+void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
+                   const nlohmann::ordered_json* tours = nullptr);
 
 /// Files that may hold hints; empty paths are skipped.
 struct HintFiles {

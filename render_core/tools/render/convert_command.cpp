@@ -1,4 +1,4 @@
-// catgs-render convert: reads a scene and writes it in another format.
+// catgs-render convert: reads a scene, edits it, and writes it in another format.
 #include <filesystem>
 #include <memory>
 
@@ -6,12 +6,17 @@
 
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
+#include "render_core/scene/edit/edit_scene.h"
 #include "render_core/scene/files/hints.h"
+#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/scene/files/scene_parts.h"
-#include "render_core/scene/prune.h"
+#include "render_core/scene/files/tour_places.h"
+#include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/scene.h"
 #include "render_core/tools/commands.h"
+#include "render_core/tools/progress.h"
+#include "render_core/tools/render/edit_options.h"
 #include "render_core/tools/render/tree_output.h"
 #include "render_core/tools/scene_options.h"
 
@@ -21,37 +26,82 @@ namespace {
 struct ConvertOptions {
   SceneOptions in;
   std::string out;
-  double keep_fraction = 1.0;
+  EditOptions edit;
   int threads = 0;
   TreeOptions tree;
 };
 
+/// A conversion that has been checked.
+struct Conversion {
+  const ConvertOptions& options;
+  SceneEdit edit;
+  HintFiles hint_files;  // of the scene that is read
+};
+
 /// Estimated hints can be estimated again. Others would be lost with the files that they came from.
-void write_hints_beside(const SceneHints& hints, const std::filesystem::path& out) {
+void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
+  const Placement& placement = conversion.edit.placement;
   if (hints.source.empty() || hints.source == "estimated") return;
-  const auto sidecar = sidecar_of(out);
+  const auto sidecar = sidecar_of(conversion.options.out);
   if (std::error_code error; std::filesystem::exists(sidecar, error)) {
     fmt::print(stderr, "note: {} exists and was left as it is\n", sidecar.string());
     return;
   }
-  write_sidecar(hints, sidecar);
+  nlohmann::ordered_json tours = tours_in_sidecar(conversion.hint_files);
+  if (placement.moves()) place_tours(tours, placement);
+  write_sidecar(placement.moves() ? placed(hints, placement) : hints, sidecar, &tours);
   fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
 }
 
 /// Before the scene is loaded, which may take minutes.
-void check_output(const ConvertOptions& options) {
+Conversion check(const ConvertOptions& options) {
+  const SceneLocation in = locate_scene(options.in.path);
+  const Conversion conversion{options, edit_of(options.edit), in.hints};
   if (!is_tree_name(options.out)) check_can_be_saved(options.out);
-  if (std::error_code error; std::filesystem::equivalent(options.in.path, options.out, error))
-    throw InputError(options.out, "", "is the scene that is read", "give the output another name");
+  std::error_code error;
+  for (const std::filesystem::path& path : {std::filesystem::path(options.in.path), in.path})
+    if (std::filesystem::equivalent(path, options.out, error))
+      throw InputError(options.out, "", "is the scene that is read",
+                       "give the output another name");
+  const auto sidecar = sidecar_of(options.out);
+  if (conversion.edit.placement.moves() && std::filesystem::exists(sidecar, error))
+    throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
+                     "give the output another name, or move the file away");
+  return conversion;
 }
 
 void print_notes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", printable(note));
 }
 
-/// Writes a tree without holding the scene, if its format allows that.
-bool convert_in_parts(const ConvertOptions& options, bool quiet) {
-  if (!is_tree_name(options.out) || options.keep_fraction < 1.0) return false;
+void check_not_empty(std::size_t left) {
+  if (left == 0)
+    throw InputError("--crop", "", "no Gaussian's centre lies in the box",
+                     "it is in axes and units of the output; see catgs-render info");
+}
+
+/// The parts of a scene, each of them edited. Counts what the last reading has cropped.
+SceneParts edited(const SceneParts& parts, const SceneEdit& edit,
+                  const std::shared_ptr<ThreadPool>& pool, EditCounts& counts) {
+  SceneParts result = parts;
+  result.each = [each = parts.each, &edit, pool, &counts](const auto& take) {
+    std::size_t left = 0;
+    counts = {};
+    const std::uint64_t dropped = each([&](GaussianCloud part) {
+      counts.cropped += edit_cloud(part, edit, *pool, LoadContext(*pool)).cropped;
+      left += part.size();
+      if (!part.empty()) take(part);
+    });
+    check_not_empty(left);
+    return dropped;
+  };
+  return result;
+}
+
+/// Writes a tree without holding the scene, if its format and the edit allow that.
+bool convert_in_parts(const Conversion& conversion, bool quiet) {
+  const ConvertOptions& options = conversion.options;
+  if (!is_tree_name(options.out) || !conversion.edit.works_on_parts()) return false;
   if (options.in.lod || options.in.budget) return false;
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   LoadOptions load;
@@ -59,9 +109,12 @@ bool convert_in_parts(const ConvertOptions& options, bool quiet) {
   load.model = model_of(options.in);
   const auto scene = scene_in_parts(options.in.path, load, pool);
   if (!scene) return false;
-  write_tree(scene->parts, options.tree, options.out, *pool, quiet);
+  EditCounts counts;
+  write_tree(edited(scene->parts, conversion.edit, pool, counts), options.tree, options.out, *pool,
+             quiet);
+  print_counts(counts);
   print_notes(scene->notes);
-  write_hints_beside(scene->hints, options.out);
+  write_hints_beside(scene->hints, conversion);
   return true;
 }
 
@@ -76,16 +129,21 @@ void save(const Scene& scene, const ConvertOptions& options, bool quiet) {
   write_tree(whole, options.tree, options.out, pool, quiet);
 }
 
+EditCounts edit_whole(GaussianCloud& cloud, const Conversion& conversion, bool quiet) {
+  ThreadPool pool(conversion.options.threads);
+  Progress progress("editing", quiet);
+  const LoadContext context(pool, [&](double fraction) { progress.update(fraction); });
+  const EditCounts counts = edit_cloud(cloud, conversion.edit, pool, context);
+  check_not_empty(cloud.size());
+  return counts;
+}
+
 void convert(const ConvertOptions& options, bool quiet) {
-  if (!(options.keep_fraction > 0.0 && options.keep_fraction <= 1.0))
-    throw InputError("--keep-fraction", "",
-                     fmt::format("{} is not in (0, 1]", options.keep_fraction));
-  check_output(options);
-  if (convert_in_parts(options, quiet)) return;
+  const Conversion conversion = check(options);
+  if (convert_in_parts(conversion, quiet)) return;
   constexpr bool first_view = false;  // would be estimated anew from the file that is written
   Scene scene = load_scene(options.in, options.threads, quiet, first_view);
-  const std::size_t loaded = scene.cloud.size();
-  keep_most_important(scene.cloud, options.keep_fraction);
+  const EditCounts counts = edit_whole(scene.cloud, conversion, quiet);
   save(scene, options, quiet);
   fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
              scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),
@@ -93,13 +151,12 @@ void convert(const ConvertOptions& options, bool quiet) {
   if (scene.report.dropped > 0)
     fmt::print("{} could not be drawn and were dropped (catgs-render info says why)\n",
                scene.report.dropped);
-  if (scene.cloud.size() < loaded)
-    fmt::print("{} least important Gaussians were pruned\n", loaded - scene.cloud.size());
+  print_counts(counts);
   print_notes(scene.notes);
   if (!keeps_model(options.out, scene.cloud.model))
     fmt::print(stderr, "note: {} cannot tell its model; write \"model\": \"{}\" into {}\n",
                options.out, name_of(scene.cloud.model), sidecar_of(options.out).string());
-  write_hints_beside(scene.hints, options.out);
+  write_hints_beside(scene.hints, conversion);
 }
 
 }  // namespace
@@ -111,14 +168,10 @@ void add_convert_command(CLI::App& app) {
   add_scene_options(*command, options->in, "in");
   command->add_option("out", options->out, "File to write: .ply, .splat, .spz, .sog, .glb or .tree")
       ->required();
-  command
-      ->add_option(
-          "--keep-fraction", options->keep_fraction,
-          "Keep the most important share of the Gaussians, by opacity times mean projected area")
-      ->capture_default_str();
   command->add_option("--threads", options->threads, "Number of threads; 0: one per processor")
       ->capture_default_str();
   add_tree_options(*command, options->tree);
+  add_edit_options(*command, options->edit);
   command->callback([options, command] { convert(*options, is_quiet(*command)); });
 }
 

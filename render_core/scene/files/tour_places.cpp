@@ -1,0 +1,55 @@
+#include "render_core/scene/files/tour_places.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <system_error>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/json_field.h"
+
+namespace catgs {
+namespace {
+
+bool are_numbers(const nlohmann::ordered_json& value, std::size_t count) {
+  return value.is_array() && value.size() == count &&
+         std::all_of(value.begin(), value.end(), [](const auto& v) { return v.is_number(); });
+}
+
+void place_member(const std::string& name, nlohmann::ordered_json& value,
+                  const Placement& placement) {
+  const auto number = [&](std::size_t k) { return value[k].get<double>(); };
+  const bool is_place = name == "position" || name == "look_at" || name == "marker";
+  // As floats, which sidecars hold.
+  if (is_place && are_numbers(value, 3)) {
+    const glm::vec3 to(placement.map()({number(0), number(1), number(2)}));
+    value = {to.x, to.y, to.z};
+  } else if (name == "orientation" && are_numbers(value, 4)) {
+    const glm::quat to(placement.rotation * glm::dquat(number(3), number(0), number(1), number(2)));
+    value = {to.x, to.y, to.z, to.w};
+  } else {
+    place_tours(value, placement);
+  }
+}
+
+}  // namespace
+
+nlohmann::ordered_json tours_in_sidecar(const HintFiles& files) {
+  std::error_code error;
+  if (files.sidecar.empty() || !std::filesystem::is_regular_file(files.sidecar, error)) return {};
+  const nlohmann::json document = read_json(FileSource(files.sidecar), max_sidecar_bytes);
+  const auto tours = document.find("tours");
+  return tours == document.end() ? nlohmann::ordered_json() : nlohmann::ordered_json(*tours);
+}
+
+void place_tours(nlohmann::ordered_json& tours, const Placement& placement) {
+  if (tours.is_object()) {
+    for (auto&& [name, value] : tours.items()) place_member(name, value, placement);
+  } else if (tours.is_array()) {
+    for (auto& value : tours) place_tours(value, placement);
+  }
+}
+
+}  // namespace catgs

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "render_core/scene/edit/edit_scene.h"
+#include "render_core/scene/files/hints.h"
+
+namespace catgs {
+
+/// The "tours" of the sidecar as they stand there; null if there are none. Throws InputError for a
+/// file that is no JSON.
+nlohmann::ordered_json tours_in_sidecar(const HintFiles& files);
+
+/// Places all that lies in the scene: members "position", "look_at" and "marker" of three numbers,
+/// and "orientation" of four, at any depth. Everything else stays, known or not.
+void place_tours(nlohmann::ordered_json& tours, const Placement& placement);
+
+}  // namespace catgs
