@@ -18,29 +18,61 @@ constexpr int max_depth = 256;
 /// twice.
 constexpr std::size_t max_values = std::size_t{1} << 20;
 
+/// Walks through a document before anything is made of it. The library's own callback would do both
+/// at once, but looks at all entries of a list whenever one of them ends.
+class LimitCheck final : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  explicit LimitCheck(const std::string& file) : file_(file) {}
+
+  bool null() override { return count(1); }
+  bool boolean(bool) override { return count(1); }
+  bool number_integer(number_integer_t) override { return count(1); }
+  bool number_unsigned(number_unsigned_t) override { return count(1); }
+  bool number_float(number_float_t, const string_t&) override { return count(1); }
+  bool string(string_t&) override { return count(1); }
+  bool binary(binary_t&) override { return count(1); }
+  bool start_object(std::size_t) override { return open(); }
+  bool key(string_t&) override { return true; }
+  bool end_object() override { return close(); }
+  bool start_array(std::size_t) override { return open(); }
+  bool end_array() override { return close(); }
+  bool parse_error(std::size_t byte, const std::string&,
+                   const nlohmann::json::exception& error) override {
+    if (dynamic_cast<const nlohmann::json::out_of_range*>(&error) != nullptr)
+      throw InputError(file_, "", fmt::format("holds a number out of range: {}", error.what()));
+    throw InputError(file_, fmt::format("byte {}", byte), "is not valid JSON");
+  }
+
+ private:
+  bool count(std::size_t values) {
+    values_ += values;
+    if (values_ > max_values)
+      throw InputError(file_, "", fmt::format("has more than {} values", max_values));
+    return true;
+  }
+  bool open() {
+    if (depth_++ >= max_depth)
+      throw InputError(file_, "", fmt::format("is nested deeper than {}", max_depth));
+    return count(2);
+  }
+  bool close() {
+    --depth_;
+    return true;
+  }
+
+  const std::string& file_;
+  int depth_ = 0;
+  std::size_t values_ = 0;
+};
+
 }  // namespace
 
 nlohmann::json read_json(const ByteSource& file, std::uint64_t limit) {
   const std::vector<std::byte> bytes = file.read_all(limit);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  std::size_t values = 0;
-  const auto within_limits = [&](int depth, nlohmann::json::parse_event_t event, auto&) {
-    using Event = nlohmann::json::parse_event_t;
-    const bool opens = event == Event::object_start || event == Event::array_start;
-    if (opens && depth >= max_depth)
-      throw InputError(file.name(), "", fmt::format("is nested deeper than {}", max_depth));
-    if (opens || event == Event::value) values += opens ? 2 : 1;
-    if (values > max_values)
-      throw InputError(file.name(), "", fmt::format("has more than {} values", max_values));
-    return true;
-  };
-  try {
-    return nlohmann::json::parse(text, within_limits);
-  } catch (const nlohmann::json::parse_error& error) {
-    throw InputError(file.name(), fmt::format("byte {}", error.byte), "is not valid JSON");
-  } catch (const nlohmann::json::out_of_range& error) {
-    throw InputError(file.name(), "", fmt::format("holds a number out of range: {}", error.what()));
-  }
+  LimitCheck check(file.name());
+  nlohmann::json::sax_parse(text, &check);
+  return nlohmann::json::parse(text);
 }
 
 std::string to_utf8(const std::string& bytes) {

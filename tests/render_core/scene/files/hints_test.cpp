@@ -233,6 +233,14 @@ TEST_F(JsonFiles, OfMoreValuesThanFitIntoMemoryAreRefused) {
               AllOf(HasSubstr("many.json"), HasSubstr("more than 1048576 values")));
 }
 
+// In a time that grows as the square of their number, this would take minutes.
+TEST_F(JsonFiles, OfManyObjectsAreRead) {
+  std::string text = "[{}";
+  for (int i = 1; i < 500'000; ++i) text += ",{}";
+  text += "]";
+  EXPECT_EQ(read_json(MemorySource("many.json", bytes_of(text)), text.size()).size(), 500'000u);
+}
+
 TEST_F(JsonFiles, NestedDeeperThanTheStackMayTakeAreRefused) {
   const auto read = [](std::size_t depth) {
     const std::string text = std::string(depth, '[') + std::string(depth, ']');
