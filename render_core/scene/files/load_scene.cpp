@@ -40,12 +40,6 @@ struct Decoded {
   std::vector<std::string> notes{};
 };
 
-std::vector<std::string> notes_of_degree(int sh_degree) {
-  if (sh_degree <= max_sh_degree) return {};
-  return {fmt::format("its harmonics of degree {} are not shown, only those up to {}", sh_degree,
-                      max_sh_degree)};
-}
-
 Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
   const PlyHeader header = read_ply_header(file);
   if (is_compressed_ply(header))

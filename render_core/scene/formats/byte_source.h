@@ -84,6 +84,22 @@ class MemorySource final : public ByteSource {
   std::span<const std::byte> bytes_;
 };
 
+/// `size` bytes of another source from `offset` on. Borrows it.
+class SliceSource final : public ByteSource {
+ public:
+  /// The bytes must be there.
+  SliceSource(const ByteSource& whole, std::uint64_t offset, std::uint64_t size)
+      : ByteSource(whole.name(), size), whole_(whole), offset_(offset) {}
+
+ private:
+  void read_in_range(std::uint64_t offset, std::span<std::byte> to) const override {
+    whole_.read(offset_ + offset, to);
+  }
+
+  const ByteSource& whole_;
+  std::uint64_t offset_;
+};
+
 static_assert(std::endian::native == std::endian::little,
               "scene files are little-endian and are copied without swapping");
 

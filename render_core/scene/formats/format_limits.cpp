@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
 
@@ -30,6 +31,12 @@ int sh_degree_of_rest(std::size_t coefficients) {
   for (int degree = 0; degree <= 4; ++degree)
     if (coefficients + 1 == static_cast<std::size_t>((degree + 1) * (degree + 1))) return degree;
   return -1;
+}
+
+std::vector<std::string> notes_of_degree(int degree) {
+  if (degree <= max_sh_degree) return {};
+  return {fmt::format("its harmonics of degree {} are not shown, only those up to {}", degree,
+                      max_sh_degree)};
 }
 
 }  // namespace catgs

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "render_core/scene/formats/byte_source.h"
 
@@ -30,5 +32,8 @@ inline constexpr std::uint64_t max_compression = 256;
 /// SH degree with `coefficients` per channel beyond the constant one: 0, 3, 8, 15 or 24 (degree 4);
 /// -1 for any other number.
 int sh_degree_of_rest(std::size_t coefficients);
+
+/// For people: what is left out of harmonics up to `degree`.
+std::vector<std::string> notes_of_degree(int degree);
 
 }  // namespace catgs

@@ -14,9 +14,11 @@
 #include "render_core/base/error.h"
 #include "render_core/math/spherical_harmonics-inl.h"
 #include "render_core/scene/activations.h"
+#include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/directions.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf_document.h"
+#include "render_core/scene/formats/spz.h"
 #include "render_core/scene/transform.h"
 
 namespace catgs {
@@ -25,15 +27,17 @@ namespace {
 
 constexpr std::size_t max_parts = 4096, max_primitives = 65'536;
 constexpr std::string_view extension_name = "KHR_gaussian_splatting";
+constexpr std::string_view spz_extension_name = "KHR_gaussian_splatting_compression_spz_2";
 
 /// A primitive with Gaussians at a node.
 struct Part {
-  AffineMap map;  // to GaussianCloud's world
+  AffineMap map;            // to GaussianCloud's world
+  std::uint64_t count = 0;  // Gaussians
+  int sh_degree = 0;        // of the part as loaded
   GltfAccessor mean, rotation, scale, opacity;
   std::vector<GltfAccessor> sh;  // by coefficient
+  GltfBytes spz;                 // holds all of these, if it has a file
   bool linear_colours = false;
-
-  [[nodiscard]] int sh_degree() const { return sh_degree_of_rest(sh.size() - 1); }
 };
 
 struct Contents {
@@ -84,18 +88,17 @@ GltfAccessor attribute(GltfDocument& document, const JsonField& attributes, std:
 
 /// "ellipse" and the like: what we draw, whatever the file says.
 void check_words(const JsonField& extension, Contents& contents) {
-  const auto expect = [&](std::string_view key, std::string_view known, const JsonField& word) {
-    if (word.text() != known)
-      contents.note(fmt::format("{} '{}' is not known; drawn as '{}'", key, word.text(), known));
+  const auto expect = [&](std::string_view key, std::string_view known) {
+    const auto word = extension.find(key);
+    if (word && word->text() != known)
+      contents.note(fmt::format("{} '{}' is not known; drawn as '{}'", key, word->text(), known));
   };
-  expect("kernel", "ellipse", extension.at("kernel"));
-  if (const auto word = extension.find("projection")) expect("projection", "perspective", *word);
-  if (const auto word = extension.find("sortingMethod"))
-    expect("sortingMethod", "cameraDistance", *word);
+  expect("kernel", "ellipse");
+  expect("projection", "perspective");
+  expect("sortingMethod", "cameraDistance");
 }
 
-bool has_linear_colours(const JsonField& extension, Contents& contents) {
-  const JsonField space = extension.at("colorSpace");
+bool has_linear_colours(const JsonField& space, Contents& contents) {
   if (space.text() == "srgb_rec709_display") return false;
   if (space.text() == "lin_rec709_display") {
     contents.note("its colours are linear light: they were encoded as sRGB, and are blended so");
@@ -106,13 +109,32 @@ bool has_linear_colours(const JsonField& extension, Contents& contents) {
   return false;
 }
 
+/// Drafts of the extension for .spz need neither `kernel` nor `colorSpace`, and the attributes are
+/// those of the .spz.
+Part parse_spz_part(GltfDocument& document, const JsonField& spz, const JsonField& extension,
+                    Contents& contents) {
+  Part part;
+  part.spz = document.view(spz.at("bufferView"));
+  const SpzSize size = read_spz_size(SliceSource(*part.spz.file, part.spz.offset, part.spz.size));
+  part.count = size.count;
+  part.sh_degree = std::min(size.sh_degree, max_sh_degree);
+  for (std::string& note : notes_of_degree(size.sh_degree)) contents.note(std::move(note));
+  if (const auto space = extension.find("colorSpace"))
+    part.linear_colours = has_linear_colours(*space, contents);
+  return part;
+}
+
 Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonField& extension,
                 Contents& contents) {
   if (const auto mode = primitive.find("mode"); !mode || mode->count() != 0)
     primitive.fail("has Gaussians, but its 'mode' is not 0 (points)");
   check_words(extension, contents);
+  const auto further = extension.find("extensions");
+  if (const auto spz = further ? further->find(spz_extension_name) : std::nullopt)
+    return parse_spz_part(document, *spz, extension, contents);
+  static_cast<void>(extension.at("kernel"));
   Part part;
-  part.linear_colours = has_linear_colours(extension, contents);
+  part.linear_colours = has_linear_colours(extension.at("colorSpace"), contents);
   const JsonField attributes = primitive.at("attributes");
   const auto read = [&](std::string_view name, std::size_t columns, unsigned kinds) {
     const GltfAccessor accessor = attribute(document, attributes, name, columns, kinds);
@@ -133,40 +155,24 @@ Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonFi
       attributes.fail(fmt::format("has harmonics of degree {} and not of all below", degree));
     for (int k = 0; k <= 2 * degree; ++k) part.sh.push_back(read(sh_name(degree, k), 3, floats));
   }
+  part.count = part.mean.count;
+  part.sh_degree = sh_degree_of_rest(part.sh.size() - 1);
   return part;
-}
-
-template <std::size_t Size>
-std::array<double, Size> doubles(const JsonField& field) {
-  if (field.size() != Size) field.fail(fmt::format("is not an array of {} numbers", Size));
-  std::array<double, Size> numbers;
-  for (std::size_t i = 0; i < Size; ++i) {
-    static_cast<void>(field[i].number());  // checks it
-    numbers[i] = field[i].value().get<double>();
-  }
-  return numbers;
 }
 
 /// From the node's space to that of the node above.
 AffineMap map_of(const JsonField& node) {
+  if (const auto field = node.find("matrix")) return affine_map(*field);
   AffineMap map;
-  if (const auto field = node.find("matrix")) {
-    const auto m = doubles<16>(*field);  // by columns
-    if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] != 1.0)
-      field->fail("has a last row other than 0, 0, 0, 1");
-    map.linear = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
-    map.offset = {m[12], m[13], m[14]};
-    return map;
-  }
   if (const auto field = node.find("translation")) {
-    const auto v = doubles<3>(*field);
+    const auto v = field->doubles<3>();
     map.offset = {v[0], v[1], v[2]};
   }
   if (const auto field = node.find("rotation")) {
     map.linear = glm::mat3_cast(glm::normalize(glm::dquat(field->orientation())));
   }
   if (const auto field = node.find("scale")) {
-    const auto s = doubles<3>(*field);
+    const auto s = field->doubles<3>();
     for (int k = 0; k < 3; ++k) map.linear[k] *= s[static_cast<std::size_t>(k)];
   }
   return map;
@@ -193,14 +199,16 @@ void add_mesh(GltfDocument& document, const JsonField& node, const AffineMap& ma
     if (!map.usable()) node.fail("has a transform without an inverse");
     Part part = parse_part(document, primitive, *extension, contents);
     part.map = map;
-    contents.size.count += part.mean.count;
-    contents.size.sh_degree = std::max(contents.size.sh_degree, part.sh_degree());
+    contents.size.count += part.count;
+    contents.size.sh_degree = std::max(contents.size.sh_degree, part.sh_degree);
     contents.parts.push_back(std::move(part));
   }
 }
 
 void check_extensions(const JsonField& root) {
-  constexpr std::array<std::string_view, 2> known = {extension_name, "KHR_mesh_quantization"};
+  // Gaussians have no material.
+  constexpr std::array<std::string_view, 4> known = {
+      extension_name, spz_extension_name, "KHR_mesh_quantization", "KHR_materials_unlit"};
   const auto required = root.find("extensionsRequired");
   if (!required) return;
   for (std::size_t i = 0; i < required->size(); ++i)
@@ -209,7 +217,7 @@ void check_extensions(const JsonField& root) {
                           "export it without this extension");
 }
 
-Contents contents_of(const ByteSource& file, GltfDocument& document) {
+Contents contents_of(const ByteSource& file, GltfDocument& document, const AffineMap& world) {
   const JsonField root = document.root();
   check_extensions(root);
   struct Visit {
@@ -220,8 +228,6 @@ Contents contents_of(const ByteSource& file, GltfDocument& document) {
   const auto add = [&](const JsonField& indices, const AffineMap& map) {
     for (std::size_t i = indices.size(); i > 0; --i) open.push_back({indices[i - 1], map});
   };
-  AffineMap world;
-  world.linear = {-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0};
   const JsonField scenes = root.at("scenes");
   if (scenes.size() == 0) scenes.fail("is empty");
   const auto scene = root.find("scene");
@@ -246,6 +252,7 @@ Contents contents_of(const ByteSource& file, GltfDocument& document) {
   const auto coefficients = static_cast<std::size_t>(sh_coefficient_count(contents.size.sh_degree));
   require_plausible_count(file, "scene", contents.size.count,
                           sizeof(float) * (3 + 4 + 3 + 1 + 3 * coefficients), document.bytes());
+  contents.size.bytes = document.bytes();
   return contents;
 }
 
@@ -270,12 +277,36 @@ void encode_colours(glm::vec3* sh, int degree) {
   for (int k = 0; k < coefficients; ++k) sh[k] = glm::vec3(sums[static_cast<std::size_t>(k)]);
 }
 
+/// Takes a Gaussian from the numbers of its part to those of the cloud.
+void finish(const Part& part, const CloudTransform& transform, std::size_t i,
+            GaussianCloud& cloud) {
+  const auto stride = static_cast<std::size_t>(cloud.sh_count());
+  if (part.linear_colours) encode_colours(&cloud.sh[i * stride], part.sh_degree);
+  transform.apply(cloud, i);
+}
+
+/// Stores the Gaussians of a part's .spz from Gaussian `first` of the cloud on.
+void read_spz_part(const Part& part, std::size_t first, GaussianCloud& cloud,
+                   const LoadContext& context) {
+  const SliceSource file(*part.spz.file, part.spz.offset, part.spz.size);
+  const SpzFile spz = read_spz(file, context.part(0.0, 0.8), SpzAxes::as_stored);
+  if (spz.cloud.size() != part.count || spz.cloud.sh_degree != part.sh_degree)
+    throw InputError(file.name(), "", "was changed while it was read");
+  copy_gaussians(spz.cloud, first, cloud);
+  if (spz.cloud.model != SplatModel::standard) cloud.model = spz.cloud.model;
+  const CloudTransform transform(part.map);
+  context.part(0.8, 1.0).for_blocks(part.count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) finish(part, transform, first + i, cloud);
+  });
+}
+
 /// Stores a part from Gaussian `first` of the cloud on.
 void read_part(const Part& part, std::size_t first, GaussianCloud& cloud,
                const LoadContext& context) {
+  if (part.spz.file) return read_spz_part(part, first, cloud, context);
   const CloudTransform transform(part.map);
   const std::size_t stride = static_cast<std::size_t>(cloud.sh_count());
-  context.for_blocks(part.mean.count, 4096, [&](std::size_t begin, std::size_t end) {
+  context.for_blocks(part.count, 4096, [&](std::size_t begin, std::size_t end) {
     const std::vector<float> mean = part.mean.read(begin, end),
                              rotation = part.rotation.read(begin, end),
                              scale = part.scale.read(begin, end),
@@ -295,28 +326,37 @@ void read_part(const Part& part, std::size_t first, GaussianCloud& cloud,
       cloud.rotation[to] = unit(glm::quat(q[3], q[0], q[1], q[2]));
       cloud.scale[to] = vec3_at(scale, i);
       cloud.opacity[to] = opacity[i] == 1.0f ? max_opacity : opacity[i];
-      if (part.linear_colours) encode_colours(&cloud.sh[to * stride], part.sh_degree());
-      transform.apply(cloud, to);
+      finish(part, transform, to, cloud);
     }
   });
 }
 
 }  // namespace
 
-GltfSize read_gltf_size(const ByteSource& file, const FileSet& beside) {
-  GltfDocument document(file, beside);
-  return contents_of(file, document).size;
+AffineMap affine_map(const JsonField& matrix) {
+  const auto m = matrix.doubles<16>();  // by columns
+  if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] != 1.0)
+    matrix.fail("has a last row other than 0, 0, 0, 1");
+  return {{m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[12], m[13], m[14]}};
 }
 
-GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadContext& context) {
+GltfSize read_gltf_size(const ByteSource& file, const FileSet& beside) {
   GltfDocument document(file, beside);
-  const Contents contents = contents_of(file, document);
+  Contents contents = contents_of(file, document, left_up_front);
+  contents.size.notes = std::move(contents.notes);
+  return contents.size;
+}
+
+GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadContext& context,
+                   const AffineMap& world) {
+  GltfDocument document(file, beside);
+  const Contents contents = contents_of(file, document, world);
   GltfFile result{{}, contents.notes};
   result.cloud.resize(contents.size.count, contents.size.sh_degree);
   const auto total = static_cast<double>(contents.size.count);
   std::size_t first = 0;
   for (const Part& part : contents.parts) {
-    const std::size_t end = first + part.mean.count;
+    const std::size_t end = first + part.count;
     read_part(part, first, result.cloud,
               context.part(static_cast<double>(first) / total, static_cast<double>(end) / total));
     first = end;

@@ -108,23 +108,6 @@ std::vector<std::byte> decode_base64(const JsonField& uri, std::string_view text
   return bytes;
 }
 
-/// A file's name, without the escapes of a URI ("%20").
-std::string unescaped(std::string_view uri) {
-  std::string name;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    unsigned char value = 0;
-    const char* digits = uri.data() + i + 1;
-    if (uri[i] == '%' && i + 2 < uri.size() &&
-        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
-      name.push_back(static_cast<char>(value));
-      i += 2;
-    } else {
-      name.push_back(uri[i]);
-    }
-  }
-  return name;
-}
-
 template <class T>
 void convert(const std::byte* from, const GltfAccessor& rows, std::vector<float>& to) {
   float largest = 1.0f;
@@ -162,6 +145,22 @@ std::vector<float> GltfAccessor::read(std::size_t begin, std::size_t end) const 
       break;
   }
   return numbers;
+}
+
+std::string unescaped(std::string_view uri) {
+  std::string name;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    unsigned char value = 0;
+    const char* digits = uri.data() + i + 1;
+    if (uri[i] == '%' && i + 2 < uri.size() &&
+        std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2) {
+      name.push_back(static_cast<char>(value));
+      i += 2;
+    } else {
+      name.push_back(uri[i]);
+    }
+  }
+  return name;
 }
 
 bool is_glb(const ByteSource& file) {
@@ -228,7 +227,7 @@ const ByteSource& GltfDocument::open(const JsonField& uri) {
   return *file;
 }
 
-GltfDocument::Buffer GltfDocument::buffer(const JsonField& index) {
+GltfBytes GltfDocument::buffer(const JsonField& index) {
   const auto known = buffers_.find(index.count());
   if (known != buffers_.end()) return known->second;
   const JsonField field = at("buffers", index);
@@ -239,6 +238,14 @@ GltfDocument::Buffer GltfDocument::buffer(const JsonField& index) {
   if (!chunk_.file || index.count() != 0)
     field.fail("has no uri", "only the first buffer of a .glb lies in its own file");
   return chunk_;
+}
+
+GltfBytes GltfDocument::view(const JsonField& index) {
+  const JsonField view = at("bufferViews", index);
+  const GltfBytes whole = buffer(view.at("buffer"));
+  const std::uint64_t begin = count_or(view, "byteOffset", 0), size = view.at("byteLength").count();
+  require_inside(view, begin, size, whole.size);
+  return {whole.file, whole.offset + begin, size};
 }
 
 GltfAccessor GltfDocument::accessor(const JsonField& index) {
@@ -255,18 +262,16 @@ GltfAccessor GltfDocument::accessor(const JsonField& index) {
   if (accessor.count == 0 || accessor.count > max_gaussians)
     field.at("count").fail(fmt::format("is not in 1…{}", max_gaussians));
 
-  const JsonField view = at("bufferViews", field.at("bufferView"));
-  const Buffer buffer = this->buffer(view.at("buffer"));
-  const std::uint64_t begin = count_or(view, "byteOffset", 0), size = view.at("byteLength").count();
-  require_inside(view, begin, size, buffer.size);
+  const GltfBytes bytes = view(field.at("bufferView"));
+  const JsonField layout = at("bufferViews", field.at("bufferView"));
   const std::uint64_t row_bytes = accessor.columns * component_bytes(accessor.component);
-  const std::uint64_t stride = count_or(view, "byteStride", row_bytes);
+  const std::uint64_t stride = count_or(layout, "byteStride", row_bytes);
   if (stride < row_bytes || stride > max_stride)
-    view.at("byteStride").fail(fmt::format("is not in {}…{}", row_bytes, max_stride));
+    layout.at("byteStride").fail(fmt::format("is not in {}…{}", row_bytes, max_stride));
   const std::uint64_t first = count_or(field, "byteOffset", 0);
-  require_inside(field, first, (accessor.count - 1) * stride + row_bytes, size);
-  accessor.buffer = buffer.file;
-  accessor.offset = buffer.offset + begin + first;
+  require_inside(field, first, (accessor.count - 1) * stride + row_bytes, bytes.size);
+  accessor.buffer = bytes.file;
+  accessor.offset = bytes.offset + first;
   accessor.stride = stride;
   return accessor;
 }

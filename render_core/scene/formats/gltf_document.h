@@ -39,6 +39,15 @@ struct GltfAccessor {
   [[nodiscard]] std::vector<float> read(std::size_t begin, std::size_t end) const;
 };
 
+/// Some bytes of a buffer, checked to lie inside it.
+struct GltfBytes {
+  const ByteSource* file = nullptr;
+  std::uint64_t offset = 0, size = 0;
+};
+
+/// The name of a file that a URI names, without the URI's escapes ("%20").
+std::string unescaped(std::string_view uri);
+
 /// Whether the file begins as a .glb does.
 bool is_glb(const ByteSource& file);
 
@@ -54,24 +63,22 @@ class GltfDocument {
   [[nodiscard]] JsonField at(std::string_view list, const JsonField& index) const;
   /// The accessor that `index` names. Opens its buffer. Throws InputError naming the field.
   [[nodiscard]] GltfAccessor accessor(const JsonField& index);
+  /// The bytes of the buffer view that `index` names. Opens its buffer. Throws InputError.
+  [[nodiscard]] GltfBytes view(const JsonField& index);
   /// Bytes of the .glb's chunk and of the buffers that were opened.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  struct Buffer {
-    const ByteSource* file;
-    std::uint64_t offset, size;
-  };
   [[nodiscard]] nlohmann::json read_glb(const ByteSource& file);
-  [[nodiscard]] Buffer buffer(const JsonField& index);
+  [[nodiscard]] GltfBytes buffer(const JsonField& index);
   [[nodiscard]] const ByteSource& open(const JsonField& uri);
 
   std::string name_;
   const FileSet& beside_;
-  Buffer chunk_{nullptr, 0, 0};  // of a .glb
+  GltfBytes chunk_;  // of a .glb
   nlohmann::json json_;
   std::map<std::string, std::unique_ptr<ByteSource>> files_;  // by URI, or by name
-  std::map<std::uint64_t, Buffer> buffers_;                   // that are open, by index
+  std::map<std::uint64_t, GltfBytes> buffers_;                // that are open, by index
   std::vector<std::vector<std::byte>> data_;                  // of data: URIs
 };
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -47,6 +49,18 @@ class JsonField {
   /// A unit quaternion x, y, z, w, to one percent; normalised.
   [[nodiscard]] glm::quat orientation() const;
   [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
+
+  /// Numbers of double precision, each finite as a float too.
+  template <std::size_t Size>
+  [[nodiscard]] std::array<double, Size> doubles() const {
+    if (size() != Size) fail("is not an array of " + std::to_string(Size) + " numbers");
+    std::array<double, Size> numbers;
+    for (std::size_t i = 0; i < Size; ++i) {
+      static_cast<void>((*this)[i].number());  // checks it
+      numbers[i] = (*this)[i].value().template get<double>();
+    }
+    return numbers;
+  }
 
   [[nodiscard]] const nlohmann::json& value() const { return *value_; }
   [[noreturn]] void fail(std::string_view what, std::string_view remedy = {}) const;

@@ -216,7 +216,7 @@ SpzFile make_file(const Header& header) {
 }
 
 /// Versions 1 to 3: one gzip stream, which tells the axes only at its end.
-SpzFile read_gzip(const ByteSource& file, const LoadContext& context) {
+SpzFile read_gzip(const ByteSource& file, const LoadContext& context, SpzAxes axes) {
   const auto stream = open_gzip(file);
   std::array<std::byte, gzip_header_bytes> start;
   stream->read(start);
@@ -231,13 +231,14 @@ SpzFile read_gzip(const ByteSource& file, const LoadContext& context) {
     });
   std::vector<std::byte> extensions(header.has_extensions ? max_extension_bytes : 0);
   const auto stored = std::span(extensions).first(stream->read_up_to(extensions));
-  turn(system_of(file, stored), result.cloud, context.part(0.9, 1.0));
+  const std::uint32_t system = system_of(file, stored);
+  if (axes == SpzAxes::right_down_front) turn(system, result.cloud, context.part(0.9, 1.0));
   return result;
 }
 
 /// Version 4: header, extensions, a table of (compressed, plain) sizes, one zstd stream per
 /// attribute.
-SpzFile read_plain(const ByteSource& file, const LoadContext& context) {
+SpzFile read_plain(const ByteSource& file, const LoadContext& context, SpzAxes axes) {
   std::array<std::byte, plain_header_bytes> start;
   file.read(0, start);
   const Header header = parse_header(file, start);
@@ -273,13 +274,9 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context) {
   context.part(0.0, 0.9).for_blocks(all.size(), 1, [&](std::size_t a, std::size_t) {
     read_attribute(*open_zstd(file, offsets[a], sizes[a][0]), all[a], result.cloud, [] {});
   });
-  turn(system, result.cloud, context.part(0.9, 1.0));
+  if (axes == SpzAxes::right_down_front) turn(system, result.cloud, context.part(0.9, 1.0));
   return result;
 }
-
-}  // namespace
-
-namespace {
 
 bool is_gzip(const ByteSource& file) {
   std::array<std::byte, 2> start;
@@ -307,8 +304,8 @@ SpzSize read_spz_size(const ByteSource& file) {
   return {header.count, header.sh_degree};
 }
 
-SpzFile read_spz(const ByteSource& file, const LoadContext& context) {
-  return is_gzip(file) ? read_gzip(file, context) : read_plain(file, context);
+SpzFile read_spz(const ByteSource& file, const LoadContext& context, SpzAxes axes) {
+  return is_gzip(file) ? read_gzip(file, context, axes) : read_plain(file, context, axes);
 }
 
 }  // namespace catgs

@@ -33,8 +33,13 @@ struct SpzSize {
 };
 SpzSize read_spz_size(const ByteSource& file);
 
+/// Axes of a cloud that was read: those of GaussianCloud, or whatever the file has. glTF says
+/// by itself which axes an .spz inside it has.
+enum class SpzAxes { right_down_front, as_stored };
+
 /// Throws InputError.
-SpzFile read_spz(const ByteSource& file, const LoadContext& context);
+SpzFile read_spz(const ByteSource& file, const LoadContext& context,
+                 SpzAxes axes = SpzAxes::right_down_front);
 
 /// Writes version 3, which every reader in use knows. Positions get as many fractional bits as the
 /// largest coordinate leaves room for, at most 16. Errors: position 2^-(bits + 1); log scale 1/32

@@ -4,6 +4,7 @@
 
 #include "render_core/scene/formats/gltf_document.h"
 #include "tests/fuzz/target.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/random_cloud.h"
 
@@ -70,6 +71,8 @@ std::map<std::string, std::string> gltf_seeds() {
   nodes.json["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["colorSpace"] =
       "lin_rec709_display";
   seeds["linear"] = seed(nodes);
+  seeds["spz"] =
+      seed(test::gltf_with_spz(test::encode_spz(test::random_cloud(3, 1), {.version = 4})));
   seeds["whole"] = test::encode_gltf(test::random_cloud(1, 0)).glb();
   nodes.json["buffers"][0]["uri"] = "a.bin";
   seeds["beside"] = nodes.json.dump();
@@ -88,7 +91,8 @@ std::vector<Target> gltf_targets() {
                R"("accessors": "bufferViews": "buffers": "byteOffset": "byteStride": "byteLength":
                   "componentType": "normalized": "count": "type": "VEC3" "VEC4" "SCALAR" 5120 5121
                   5122 5123 5126 "nodes": "children": "matrix": "mesh": "scenes": "scene": "uri":
-                  "primitives": "attributes": "POSITION": "KHR_gaussian_splatting": "extensions":)"),
+                  "primitives": "attributes": "POSITION": "KHR_gaussian_splatting": "extensions":
+                  "KHR_gaussian_splatting_compression_spz_2": "bufferView":)"),
            .change = change_gltf,
            .max_bytes = 8192}};
 }

@@ -156,4 +156,19 @@ GltfParts encode_gltf(const GaussianCloud& cloud, const GltfStyle& style) {
   return parts;
 }
 
+GltfParts gltf_with_spz(const std::string& spz) {
+  GltfParts parts;
+  parts.json = nlohmann::json::parse(R"({"asset": {"version": "2.0"}, "scene": 0,
+    "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"mode": 0,
+    "attributes": {"POSITION": 0}, "extensions": {"KHR_gaussian_splatting": {"extensions": {
+    "KHR_gaussian_splatting_compression_spz_2": {"bufferView": 0}}}}}]}],
+    "accessors": [{"componentType": 5126, "type": "VEC3", "count": 1}],
+    "bufferViews": [{"buffer": 0}], "extensionsRequired": ["KHR_materials_unlit",
+    "KHR_gaussian_splatting", "KHR_gaussian_splatting_compression_spz_2"]})");
+  parts.binary = spz;
+  parts.json["buffers"][0]["byteLength"] = spz.size();
+  parts.json["bufferViews"][0]["byteLength"] = spz.size();
+  return parts;
+}
+
 }  // namespace catgs::test

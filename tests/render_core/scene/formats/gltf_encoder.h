@@ -28,4 +28,7 @@ struct GltfParts {
 /// The scene has one node.
 GltfParts encode_gltf(const GaussianCloud& cloud, const GltfStyle& style = {});
 
+/// The same with an .spz as KHR_gaussian_splatting_compression_spz_2 has it.
+GltfParts gltf_with_spz(const std::string& spz);
+
 }  // namespace catgs::test

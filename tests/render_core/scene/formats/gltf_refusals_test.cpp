@@ -1,6 +1,7 @@
 // What a .glb or .gltf may not be.
 #include <memory>
 
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_test_support.h"
 
 namespace catgs::test {
@@ -133,6 +134,24 @@ TEST(GltfRefusals, ASmallFileIsNoLargeScene) {
                 }
               }),
               HasSubstr("300000 Gaussians cannot be in"));
+}
+
+TEST(GltfRefusals, DamagedSpzInsideIsRefused) {
+  const std::string spz = encode_spz(random_cloud(300, 0), {.version = 3});
+  GltfParts parts = gltf_with_spz(spz);
+  parts.json["bufferViews"][0]["byteLength"] = spz.size() + 9;
+  EXPECT_THAT(input_error([&] { parse_gltf(parts.glb()); }), HasSubstr("bufferViews[0]: takes"));
+  parts.json["bufferViews"][0]["byteLength"] = spz.size() / 2;
+  EXPECT_THAT(input_error([&] { parse_gltf(parts.glb()); }), HasSubstr("scene.glb"));
+  EXPECT_THAT(input_error([&] { parse_gltf(gltf_with_spz("no spz at all").glb()); }),
+              HasSubstr("scene.glb"));
+  // Each use of a mesh is a copy of its Gaussians.
+  parts = gltf_with_spz(spz);
+  for (std::size_t i = 1; i < 3000; ++i) {
+    parts.json["nodes"].push_back({{"mesh", 0}});
+    parts.json["scenes"][0]["nodes"].push_back(i);
+  }
+  EXPECT_THAT(input_error([&] { parse_gltf(parts.glb()); }), HasSubstr("Gaussians cannot be in"));
 }
 
 TEST(GltfRefusals, LargeDocumentsAreRefused) {

@@ -1,6 +1,7 @@
 #include "render_core/scene/formats/gltf.h"
 
 #include <cmath>
+#include <sstream>
 
 #include <nlohmann/json.hpp>
 
@@ -8,7 +9,9 @@
 #include "render_core/scene/activations.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/scene_size.h"
+#include "render_core/scene/formats/spz.h"
 #include "render_core/scene/transform.h"
+#include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_test_support.h"
 
 namespace catgs::test {
@@ -229,6 +232,42 @@ std::string base64(const std::string& bytes) {
       text += i + k <= bytes.size() ? alphabet[bits >> (18 - 6 * k) & 63] : '=';
   }
   return text;
+}
+
+TEST(Gltf, AnSpzInsideHasTheAxesOfTheGltfAsStored) {
+  const GaussianCloud stored = storable_cloud(500, 2);
+  // Axes that the .spz names do not count: the number makes the encoder store the cloud as it is.
+  for (const std::uint32_t system : {4u, 7u}) {
+    const std::string spz = encode_spz(stored, {.version = 2, .coordinate_system = system});
+    GltfParts parts = gltf_with_spz(spz);
+    parts.json["nodes"][0]["translation"] = {1, 2, 3};
+    GaussianCloud wanted =
+        read_spz(MemorySource("a.spz", bytes_of(spz)), two_threads(), SpzAxes::as_stored).cloud;
+    ASSERT_EQ(wanted.mean[7].y, std::round(stored.mean[7].y * 4096.0f) / 4096.0f);
+    const CloudTransform to_right_down_front(
+        {{-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0}, {-1.0, -2.0, 3.0}});
+    for (std::size_t i = 0; i < wanted.size(); ++i) to_right_down_front.apply(wanted, i);
+    const GltfFile read = parse_gltf(parts.glb());
+    expect_near(wanted, read.cloud, {.rotation_rad = 1e-5f});
+    EXPECT_TRUE(read.notes.empty());
+    const std::string bytes = parts.glb();
+    const GltfSize size = read_gltf_size(MemorySource("a.glb", bytes_of(bytes)), NoFiles());
+    EXPECT_EQ(size.count, 500u);
+    EXPECT_EQ(size.sh_degree, 2);
+  }
+}
+
+TEST(Gltf, AnSpzInsideTellsTheModelAndWhatIsLeftOut) {
+  GaussianCloud cloud = storable_cloud(20, 0);
+  cloud.model = SplatModel::antialiased;
+  std::ostringstream spz;
+  write_spz(cloud, spz);
+  EXPECT_EQ(parse_gltf(gltf_with_spz(spz.str()).glb()).cloud.model, SplatModel::antialiased);
+  const std::string fourth =
+      encode_spz(storable_cloud(20, 3), {.version = 3, .extra_sh_degree = 4});
+  const GltfFile read = parse_gltf(gltf_with_spz(fourth).glb());
+  EXPECT_EQ(read.cloud.sh_degree, 3);
+  EXPECT_THAT(read.notes, ::testing::ElementsAre(HasSubstr("degree 4 are not shown")));
 }
 
 class GltfFiles : public FolderTest {};
