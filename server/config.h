@@ -33,8 +33,8 @@ struct ServerConfig {
   RendererKind renderer = RendererKind::automatic;
   std::vector<int> devices;  // of the CUDA core; empty: all
   int threads = 0;           // 0: one per processor
-  int lod = -1;              // of streamed SOG scenes; -1: by gaussian_budget
-  int gaussian_budget = 0;   // of streamed SOG scenes; 0: no bound
+  int lod = -1;              // of scenes with levels; -1: by gaussian_budget
+  int gaussian_budget = 0;   // of scenes with levels; 0: no bound
   std::string up = "auto";   // or the name of an axis
   EncoderKind encoder = EncoderKind::automatic;
   std::string x264_preset = "auto";  // or one of effort_presets

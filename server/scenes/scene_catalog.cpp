@@ -54,9 +54,8 @@ Scene synthesize(const std::string& spec) {
   return synthesize(parse_synth_kind(parts[1]), count, seed);
 }
 
-/// Only streamed SOGs have levels of detail to choose from.
 bool has_levels(const std::string& spec) {
-  return !is_synthetic(spec) && locate_scene(spec).is_streamed();
+  return !is_synthetic(spec) && locate_scene(spec).has_levels();
 }
 
 bool is_tree(const std::string& spec) {
@@ -129,7 +128,7 @@ void check_scenes(const ServerConfig& config) {
       std::ranges::none_of(config.scenes, has_levels))
     throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
                      "no scene has levels of detail to choose from",
-                     "levels and budgets are for streamed SOG folders");
+                     "levels and budgets are for streamed SOG and 3D Tiles");
 }
 
 std::shared_ptr<const SceneEntry> load_scene(

@@ -22,7 +22,7 @@ std::uint64_t tree_memory(const ServerConfig& config);
 /// The most memory that a scene of this size takes on each device, bytes.
 std::uint64_t most_bytes(const SceneSize& size, const ServerConfig& config);
 
-/// The levels of streamed SOGs that the configuration chooses.
+/// The levels of detail that the configuration chooses.
 LoadOptions chosen_levels(const ServerConfig& config);
 
 /// Checks that the scenes of --scene are there, and that one has levels where levels are chosen.
@@ -31,9 +31,8 @@ void check_scenes(const ServerConfig& config);
 
 /// The form in which a scene comes into memory.
 struct SceneForm {
-  std::filesystem::path tree{};  // of a cache, to be read instead of the scene
-  std::size_t most_gaussians =
-      0;  // of a streamed SOG: its finest levels that fit; 0: as configured
+  std::filesystem::path tree{};    // of a cache, to be read instead of the scene
+  std::size_t most_gaussians = 0;  // its finest levels that fit, if it has levels; 0: as configured
 };
 
 /// A tree of a cache is damaged, or of another version.

@@ -22,8 +22,7 @@ bool is_hidden(const fs::path& path) { return path.filename().string().starts_wi
 /// True if a folder looks like a scene. People keep other folders beside their scenes.
 bool is_scene_folder(const fs::path& path) {
   std::error_code error;
-  return fs::exists(path / "lod-meta.json", error) || fs::exists(path / "meta.json", error) ||
-         fs::is_directory(path / "point_cloud", error);
+  return has_scene_index(path) || fs::is_directory(path / "point_cloud", error);
 }
 
 /// Empty if the sidecar is missing. A faulty one is reported when the scene is loaded.
@@ -55,7 +54,7 @@ FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
   found.path = path;
   found.name = printable(to_utf8(location.name));
   found.id = look.ids.id_of(path.string(), found.name);
-  found.has_levels = location.is_streamed();
+  found.has_levels = location.has_levels();
   const LoadOptions levels = found.has_levels ? look.levels : LoadOptions();
   found.size = read_scene_size(path, levels);
   found.about = about_in(location.hints.sidecar);

@@ -23,7 +23,7 @@ struct FoundScene {
   /// Modification time of the file, or of the newest one directly in its folder. A new value means
   /// a new scene.
   std::filesystem::file_time_type changed;
-  bool has_levels = false;  // a streamed SOG, of which a coarser level may be loaded
+  bool has_levels = false;  // of detail, of which a coarser one may be loaded
   std::string tree{};       // tree_name(), for a scene that may get one; else empty
 };
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <system_error>
 
+#include "render_core/scene/files/locate_scene.h"
 #include "server/access/signed_token.h"
 #include "server/base/log_event.h"
 #include "server/base/scene_id.h"
@@ -18,11 +19,10 @@ fs::path whole_path(const fs::path& given) {
   return path.has_filename() ? path : path.parent_path();
 }
 
-/// The name of a file or folder. A SOG folder may be given by the file in it.
+/// The name of a file or folder. A folder may be given by the file in it.
 fs::path scene_path(const fs::path& given) {
   const fs::path path = whole_path(given);
-  const bool within = path.filename() == "lod-meta.json" || path.filename() == "meta.json";
-  return within ? path.parent_path() : path;
+  return is_scene_index(path) ? path.parent_path() : path;
 }
 
 std::string with_digest(std::string_view name, std::string_view path) {

@@ -10,7 +10,7 @@ namespace catgs {
 
 struct TreeBuild {
   std::filesystem::path scene;
-  LoadOptions levels;         // of a streamed SOG; only `lod` and `gaussian_budget` count
+  LoadOptions levels;         // of a scene that has some; only `lod` and `gaussian_budget` count
   std::filesystem::path out;  // appears when it is whole
   std::size_t memory_bytes = 0;
   int threads = 1;

@@ -70,12 +70,6 @@ std::string plain(std::string_view name) {
   return text.empty() ? "scene" : text;
 }
 
-/// A folder's sidecar may be saved at any time, and is read when the scene is loaded.
-bool belongs_to_content(const fs::path& file) {
-  return file.extension() != ".json" || file.filename() == "meta.json" ||
-         file.filename() == "lod-meta.json";
-}
-
 struct Content {
   std::uint64_t files = 0, bytes = 0;
   fs::file_time_type newest = fs::file_time_type::min();
@@ -87,14 +81,19 @@ struct Content {
   }
 };
 
-Content content_of(const fs::path& scene) {
+/// A sidecar may be saved at any time, and is read when the scene is loaded. Tilesets may have any
+/// names, so that all .json of a folder of tiles count.
+Content content_of(const SceneLocation& scene) {
   Content content;
-  if (!fs::is_directory(scene)) {
-    content.add(scene);
+  if (!fs::is_directory(scene.path)) {
+    content.add(scene.path);
     return content;
   }
-  for (const auto& entry : fs::recursive_directory_iterator(scene))
-    if (entry.is_regular_file() && belongs_to_content(entry.path())) content.add(entry.path());
+  const bool all = scene.kind == SceneLocation::Kind::tiles_folder;
+  for (const auto& entry : fs::recursive_directory_iterator(scene.path))
+    if (entry.is_regular_file() &&
+        (all || entry.path().extension() != ".json" || is_scene_index(entry.path())))
+      content.add(entry.path());
   return content;
 }
 
@@ -109,7 +108,7 @@ std::string tree_name(const fs::path& scene, const LoadOptions& levels) {
   const SceneLocation location = locate_scene(scene);
   const std::optional<SplatModel> model = model_in_sidecar(location.hints);
   try {
-    const Content content = content_of(location.path);
+    const Content content = content_of(location);
     const std::string facts =
         fmt::format("{}\n{} {} {}\n{} {}\n{} {}", location.path.string(), content.files,
                     content.bytes, content.newest.time_since_epoch().count(),

@@ -21,8 +21,9 @@ const std::vector<Target>& targets() {
   static const std::vector<Target> all = [] {
     std::vector<Target> joined;
     for (const auto& of_file :
-         {ply_targets(), splat_spz_targets(), gltf_targets(), sog_targets(), scene_json_targets(),
-          text_files_targets(), scene_size_targets(), tree_targets(), network_targets()})
+         {ply_targets(), splat_spz_targets(), gltf_targets(), levels_targets(), sog_targets(),
+          scene_json_targets(), text_files_targets(), scene_size_targets(), tree_targets(),
+          network_targets()})
       joined.insert(joined.end(), of_file.begin(), of_file.end());
     return joined;
   }();

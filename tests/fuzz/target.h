@@ -36,6 +36,7 @@ struct Target {
 
 // By the files of targets/.
 std::vector<Target> gltf_targets();
+std::vector<Target> levels_targets();
 std::vector<Target> network_targets();
 std::vector<Target> ply_targets();
 std::vector<Target> scene_json_targets();

@@ -11,6 +11,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/open_levels.h"
 #include "render_core/scene/files/sanitize.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
@@ -83,17 +84,17 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
 Decoded read_location(const SceneLocation& location, const LoadOptions& options,
                       const LoadContext& context) {
   if (location.kind == SceneLocation::Kind::file) return read_file(location.path, context);
-  const FolderFiles folder(location.path);
   if (location.kind == SceneLocation::Kind::sog_folder) {
-    SogFile sog = read_sog(folder, "meta.json", context);
+    SogFile sog = read_sog(FolderFiles(location.path), "meta.json", context);
     return {fmt::format("sog v{} (folder)", sog.version), std::move(sog.cloud)};
   }
-  const auto read = [&](const FileSet& files) -> Decoded {
-    StreamedSog sog = read_streamed_sog(files, options.lod, options.gaussian_budget, context);
+  const auto files = files_of_levels(location);
+  if (location.is_streamed_sog()) {
+    StreamedSog sog = read_streamed_sog(*files, options.lod, options.gaussian_budget, context);
     return {fmt::format("streamed sog ({})", sog.detail), std::move(sog.cloud)};
-  };
-  if (location.kind == SceneLocation::Kind::streamed_sog_folder) return read(folder);
-  return read(ZipFiles(FileSource(location.path)));
+  }
+  const OpenLevels scene = open_levels(location, files, options);
+  return {scene.format, read_levels(scene, context), scene.notes};
 }
 
 }  // namespace
@@ -102,9 +103,9 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const LoadContext context(*pool, options.progress);
   const SceneLocation location = locate_scene(path);
-  if (!location.is_streamed() && (options.lod || options.gaussian_budget))
+  if (!location.has_levels() && (options.lod || options.gaussian_budget))
     throw InputError(path.string(), "", "has no levels of detail to choose from",
-                     "levels and budgets are for streamed SOG");
+                     "levels and budgets are for streamed SOG and 3D Tiles");
 
   Scene scene;
   scene.name = to_utf8(location.name);

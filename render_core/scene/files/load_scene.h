@@ -13,8 +13,8 @@ namespace catgs {
 class TreeFile;
 
 struct LoadOptions {
-  std::optional<int> lod;                         // streamed SOG: fixed level, 0 is the finest
-  std::optional<std::size_t> gaussian_budget;     // streamed SOG: finest levels that fit
+  std::optional<int> lod;                         // of a scene with levels; 0 is the finest
+  std::optional<std::size_t> gaussian_budget;     // of a scene with levels: the finest that fit
   std::optional<glm::vec3> up;                    // unit; where no sidecar says which way is up
   std::optional<SplatModel> model;                // in place of what sidecar and file say
   bool first_view = true;  // false: it is not looked for where no file tells any of it
@@ -23,11 +23,11 @@ struct LoadOptions {
 };
 
 /// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .ksplat,
-/// .spz, .sog, .ssog, .glb, .gltf or .tree. It may be a streamed or unpacked SOG folder (or its
-/// lod-meta.json, meta.json), a training output folder (its newest iteration), or a folder with a
-/// single scene file. The content of a file decides its format before its name does. Throws
-/// InputError; the error for an unknown format lists the supported ones. Memory peaks at the cloud
-/// and a few bytes per Gaussian.
+/// .spz, .sog, .ssog, .glb, .gltf or .tree. It may be a folder of 3D Tiles, or a streamed or
+/// unpacked SOG folder (or its tileset.json, lod-meta.json, meta.json), a training output folder
+/// (its newest iteration), or a folder with a single scene file. The content of a file decides its
+/// format before its name does. Throws InputError; the error for an unknown format lists the
+/// supported ones. Memory peaks at the cloud and a few bytes per Gaussian.
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// A scene in pages, of which renderers read what they need.

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,6 +18,12 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view iteration_prefix = "iteration_";
+
+/// Files that stand for their folders. Where a folder has several, the first one counts.
+constexpr std::array<std::pair<std::string_view, SceneLocation::Kind>, 3> indices = {
+    {{"lod-meta.json", SceneLocation::Kind::streamed_sog_folder},
+     {"tileset.json", SceneLocation::Kind::tiles_folder},
+     {"meta.json", SceneLocation::Kind::sog_folder}}};
 
 std::optional<std::uint64_t> iteration_number(const fs::path& folder) {
   const std::string name = folder.filename().string();
@@ -74,6 +81,15 @@ fs::path single_scene_file(const fs::path& folder) {
   return folder / found.front();
 }
 
+SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
+  SceneLocation location;
+  location.kind = kind;
+  location.path = folder;
+  location.name = folder.filename().string();
+  location.hints.sidecar = folder.parent_path() / (location.name + ".json");
+  return location;
+}
+
 SceneLocation at_file(const fs::path& file) {
   SceneLocation location;
   if (file.extension() == ".ssog") location.kind = SceneLocation::Kind::streamed_sog_archive;
@@ -87,15 +103,6 @@ SceneLocation at_file(const fs::path& file) {
   return location;
 }
 
-SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
-  SceneLocation location;
-  location.kind = kind;
-  location.path = folder;
-  location.name = folder.filename().string();
-  location.hints.sidecar = folder.parent_path() / (location.name + ".json");
-  return location;
-}
-
 }  // namespace
 
 bool is_scene_name(const fs::path& path) {
@@ -105,19 +112,27 @@ bool is_scene_name(const fs::path& path) {
          extensions.end();
 }
 
+bool is_scene_index(const fs::path& file) {
+  return std::ranges::any_of(indices,
+                             [&](const auto& index) { return file.filename() == index.first; });
+}
+
+bool has_scene_index(const fs::path& folder) {
+  std::error_code error;
+  return std::ranges::any_of(
+      indices, [&](const auto& index) { return fs::exists(folder / index.first, error); });
+}
+
 SceneLocation locate_scene(const fs::path& given) {
   std::error_code error;
   fs::path path = fs::absolute(given, error).lexically_normal();  // so that "." has a name
   if (!path.has_filename()) path = path.parent_path();
   if (!fs::exists(path, error)) throw InputError(given.string(), "", "does not exist");
-  const std::string file_name = path.filename().string();
-  if (file_name == "lod-meta.json" || file_name == "meta.json") path = path.parent_path();
+  if (is_scene_index(path)) path = path.parent_path();
   if (!fs::is_directory(path, error)) return at_file(given);
 
-  if (fs::exists(path / "lod-meta.json", error))
-    return at_folder(SceneLocation::Kind::streamed_sog_folder, path);
-  if (fs::exists(path / "meta.json", error))
-    return at_folder(SceneLocation::Kind::sog_folder, path);
+  for (const auto& [name, kind] : indices)
+    if (fs::exists(path / name, error)) return at_folder(kind, path);
   if (const auto ply = newest_iteration(path)) {
     SceneLocation location = at_file(*ply);
     location.hints.sidecar = path.parent_path() / (location.name + ".json");

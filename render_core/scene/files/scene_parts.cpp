@@ -10,16 +10,16 @@
 #include <fmt/format.h>
 
 #include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/open_levels.h"
 #include "render_core/scene/files/sanitize.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
-#include "render_core/scene/formats/file_set.h"
+#include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf_document.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/formats/splat.h"
 #include "render_core/scene/formats/spz.h"
-#include "render_core/scene/formats/streamed_sog.h"
 #include "render_core/scene/keep_if.h"
 #include "render_core/scene/transform.h"
 #include "render_core/scene/tree/tree_file.h"
@@ -34,20 +34,22 @@ struct Parts {
   std::string format;  // as Scene::format
   std::uint64_t count = 0;
   std::function<GaussianCloud(std::uint64_t part, const LoadContext&)> read;
-  GaussianCloud sample;  // even
+  GaussianCloud sample;            // even
+  std::vector<std::string> notes;  // as Scene::notes
 };
 
 /// A file of which any rows can be read.
 template <class ReadRows>
 Parts parts_of_rows(std::string format, std::uint64_t rows, std::uint64_t part_rows,
-                    const ReadRows& read, const LoadContext& context) {
+                    const ReadRows& read, const LoadContext& context,
+                    std::vector<std::string> notes = {}) {
   const std::uint64_t step = (rows + sample_size - 1) / sample_size;
   const auto read_part = [=](std::uint64_t part, const LoadContext& reading) {
     const std::uint64_t first = part * part_rows;
     return read(FileRows{first, std::min(part_rows, rows - first)}, reading);
   };
   return {std::move(format), (rows + part_rows - 1) / part_rows, read_part,
-          read(FileRows{0, (rows + step - 1) / step, step}, context)};
+          read(FileRows{0, (rows + step - 1) / step, step}, context), std::move(notes)};
 }
 
 std::optional<Parts> ply_in_parts(const std::shared_ptr<const ByteSource>& file,
@@ -60,7 +62,8 @@ std::optional<Parts> ply_in_parts(const std::shared_ptr<const ByteSource>& file,
   const auto read = [=](const FileRows& rows, const LoadContext& reading) {
     return read_ply_rows(*file, *header, rows, reading);
   };
-  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context);
+  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context,
+                       notes_of_degree(sh_degree_of_rest(vertex->rest_count() / 3)));
 }
 
 Parts splat_in_parts(const std::shared_ptr<const ByteSource>& file, std::uint64_t part_rows,
@@ -89,17 +92,14 @@ std::optional<Parts> file_in_parts(const std::filesystem::path& path, std::uint6
 
 /// The sample is the coarsest level, which costs little to read. So a single level is no scene in
 /// parts.
-std::optional<Parts> streamed_sog_in_parts(const std::filesystem::path& path,
-                                           const LoadContext& context) {
-  const auto folder = std::make_shared<const FolderFiles>(path);
-  const auto scene = std::make_shared<const OpenStreamedSog>(
-      open_streamed_sog(*folder, {}, {}, TreeShape::max_gaussians));
-  if (scene->levels == 1) return std::nullopt;
-  Parts parts{fmt::format("streamed sog ({})", scene->detail), scene->parts.size(),
-              [=](std::uint64_t part, const LoadContext& reading) {
-                return read_streamed_sog_part(*folder, *scene, part, reading);
-              },
-              read_streamed_sog(*folder, scene->levels - 1, {}, context).cloud};
+std::optional<Parts> levels_in_parts(const SceneLocation& location, const LoadContext& context) {
+  const auto files = files_of_levels(location);
+  const OpenLevels scene = open_levels(location, files, {}, TreeShape::max_gaussians);
+  if (scene.levels == 1) return std::nullopt;
+  LoadOptions coarsest;
+  coarsest.lod = scene.levels - 1;
+  Parts parts{scene.format, scene.parts, scene.read,
+              read_levels(open_levels(location, files, coarsest), context), scene.notes};
   const std::size_t step = (parts.sample.size() + sample_size - 1) / sample_size;
   keep_if(parts.sample, [&](std::size_t i) { return i % step == 0; });
   return parts;
@@ -107,16 +107,9 @@ std::optional<Parts> streamed_sog_in_parts(const std::filesystem::path& path,
 
 std::optional<Parts> open_parts(const SceneLocation& location, std::uint64_t part_rows,
                                 const LoadContext& context) {
-  switch (location.kind) {
-    case SceneLocation::Kind::file:
-      return file_in_parts(location.path, part_rows, context);
-    case SceneLocation::Kind::streamed_sog_folder:
-      return streamed_sog_in_parts(location.path, context);
-    case SceneLocation::Kind::sog_folder:
-    case SceneLocation::Kind::streamed_sog_archive:  // unpacked in memory as a whole
-      break;
-  }
-  return std::nullopt;
+  if (location.has_levels()) return levels_in_parts(location, context);
+  if (location.kind != SceneLocation::Kind::file) return std::nullopt;
+  return file_in_parts(location.path, part_rows, context);
 }
 
 }  // namespace
@@ -130,6 +123,7 @@ std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
   std::optional<Parts> parts = open_parts(location, part_rows, context);
   if (!parts) return std::nullopt;
   PartedScene scene;
+  scene.notes = std::move(parts->notes);
   GaussianCloud& sample = parts->sample;
   use_model(location.hints, options.model, sample.model, scene.notes);
   if (sample.model == SplatModel::surfels) flatten(sample);

@@ -21,8 +21,8 @@ struct PartedScene {
   std::vector<std::string> notes;  // as Scene::notes
 };
 
-/// The scene at `path` if its format can be read in parts: a binary 3DGS .ply, a .splat, or a
-/// streamed SOG of several levels, of which each SOG of the finest is a part. It may have
+/// The scene at `path` if its format can be read in parts: a binary 3DGS .ply, a .splat, or a scene
+/// of several levels, of which each file of the finest is a part. It may have
 /// TreeShape::max_gaussians. Throws InputError when such a scene is wrong. Of
 /// `options`, `up` and `model` count; `part_rows`: Gaussians of a file's part before faulty ones
 /// are dropped.

@@ -6,6 +6,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/open_levels.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/compressed_ply.h"
 #include "render_core/scene/formats/file_set.h"
@@ -40,6 +41,8 @@ SceneSize size_of_sog(const FileSet& files) {
   const bool only_images_tell = !meta.centroids.empty() && meta.sh_degree == 0;
   return {meta.count, only_images_tell ? max_sh_degree : meta.sh_degree};
 }
+
+SceneSize size_of_levels(const OpenLevels& scene) { return {scene.count, scene.sh_degree}; }
 
 /// An archive is unpacked as a whole only where its environment counts, too.
 std::size_t count_in_archive(const ByteSource& file, const LoadOptions& options) {
@@ -91,9 +94,11 @@ SceneSize read_scene_size(const std::filesystem::path& path, const LoadOptions& 
     size = size_of_sog(FolderFiles(location.path));
   else if (location.kind == SceneLocation::Kind::streamed_sog_archive)
     size = {count_in_archive(FileSource(location.path), options), max_sh_degree};
-  else
+  else if (location.kind == SceneLocation::Kind::streamed_sog_folder)
     size = {count_streamed_sog(FolderFiles(location.path), options.lod, options.gaussian_budget),
             max_sh_degree};
+  else
+    size = size_of_levels(open_levels(location, files_of_levels(location), options));
   size.sh_degree = std::min(size.sh_degree, max_sh_degree);
   return size;
 }

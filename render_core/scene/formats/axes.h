@@ -5,11 +5,16 @@
 
 #include <glm/common.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
+
+/// (x, y, z) to (x, -z, y): from y up to z up, and also from z up (y to the front) to right, down,
+/// front.
+inline const glm::dmat3 quarter_turn_about_x(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
 
 /// Turns Gaussians from one choice of axis directions to another: every axis is kept (+1) or
 /// flipped (-1). Its own inverse. GaussianCloud has the axes of COLMAP captures: right, down,

@@ -89,6 +89,15 @@ std::unique_ptr<ByteSource> FolderFiles::open(const std::string& name) const {
   return std::make_unique<FileSource>(path_of(name));
 }
 
+std::unique_ptr<ByteSource> UnsharedFiles::open(const std::string& name) const {
+  if (!names_.insert(std::filesystem::path(name).lexically_normal().string()).second)
+    throw InputError(scene_, "file " + printable(name), "is used a second time",
+                     "give each part of the scene files of its own");
+  auto file = files_.open(name);
+  bytes_ += file->size();
+  return file;
+}
+
 ZipFiles::ZipFiles(const ByteSource& file, std::string_view only)
     : name_(file.name()), packed_bytes_(file.size()) {
   ArchiveInput input{file};

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
-#include <filesystem>
 #include <limits>
-#include <memory>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -80,31 +77,6 @@ LodChoice choose(const LodTree& tree, const std::vector<int>& wanted) {
   }
   return choice;
 }
-
-/// The files of a scene while its parts are opened. Each file may be opened once: many parts that
-/// share a few bytes could claim a scene of any size.
-class UnsharedFiles final : public FileSet {
- public:
-  UnsharedFiles(const FileSet& folder, std::string scene)
-      : folder_(folder), scene_(std::move(scene)) {}
-  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
-    if (!names_.insert(std::filesystem::path(name).lexically_normal().string()).second)
-      throw InputError(scene_, "file " + name, "is used a second time",
-                       "give each SOG files of its own");
-    auto file = folder_.open(name);
-    bytes_ += file->size();
-    return file;
-  }
-  [[nodiscard]] std::uint64_t packed_bytes() const override { return folder_.packed_bytes(); }
-  /// The bytes of the files, but no more than their archive has.
-  [[nodiscard]] std::uint64_t bytes() const { return std::min(bytes_, packed_bytes()); }
-
- private:
-  const FileSet& folder_;
-  const std::string scene_;
-  mutable std::set<std::string> names_;
-  mutable std::uint64_t bytes_ = 0;
-};
 
 StreamedSogPart open_part(const FileSet& folder, const std::string& name) {
   if (name.ends_with(".sog"))

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/prune.h"
 #include "render_core/tools/progress.h"
 
@@ -30,9 +31,7 @@ RenderOptions with_trace(RenderOptions options, const std::string& trace) {
 std::string stem(const std::string& file) {
   std::filesystem::path path(file);
   // A scene of many files is named by its folder.
-  if (path.filename() == "lod-meta.json" || path.filename() == "meta.json") {
-    path = path.parent_path();
-  }
+  if (is_scene_index(path)) path = path.parent_path();
   return (path.has_filename() ? path : path.parent_path()).stem().string();
 }
 

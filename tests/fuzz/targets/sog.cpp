@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <iterator>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -15,52 +13,12 @@
 #include "render_core/scene/formats/sog_image.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "tests/fuzz/target.h"
+#include "tests/fuzz/targets/packed_files.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/random_cloud.h"
 
 namespace catgs::fuzz {
 namespace {
-
-/// Files of a folder one after the other: name, 0, size (3 bytes), content. A zip archive's
-/// checksums would refuse nearly every mutant.
-std::string packed(const std::map<std::string, std::string>& files) {
-  std::string bytes;
-  for (const auto& [name, content] : files) {
-    const auto size = static_cast<std::uint32_t>(content.size());
-    bytes.append(name).push_back('\0');
-    bytes.append(reinterpret_cast<const char*>(&size), 3).append(content);
-  }
-  return bytes;
-}
-
-std::map<std::string, Bytes> unpacked(Bytes bytes) {
-  std::map<std::string, Bytes> files;
-  while (!bytes.empty()) {
-    const auto name_end = std::find(bytes.begin(), bytes.end(), std::byte{0});
-    const std::string name = text_of({bytes.begin(), name_end});
-    bytes = bytes.subspan(std::min(bytes.size(), name.size() + 1));
-    std::uint32_t size = 0;
-    const std::size_t prefix = std::min<std::size_t>(3, bytes.size());
-    std::memcpy(&size, bytes.data(), prefix);
-    bytes = bytes.subspan(prefix);
-    files[name] = bytes.first(std::min<std::size_t>(size, bytes.size()));
-    bytes = bytes.subspan(files[name].size());
-  }
-  return files;
-}
-
-class PackedFiles final : public FileSet {
- public:
-  explicit PackedFiles(Bytes bytes) : files_(unpacked(bytes)) {}
-  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
-    const auto found = files_.find(name);
-    if (found == files_.end()) throw InputError(name, "", "is missing");
-    return std::make_unique<MemorySource>(name, found->second);
-  }
-
- private:
-  std::map<std::string, Bytes> files_;
-};
 
 /// Of a few colours: with 252 to 255, which are tags of rotations in the fourth channel.
 std::string any_image(const Material& from) {

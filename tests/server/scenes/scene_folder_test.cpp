@@ -4,6 +4,7 @@
 
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
@@ -68,6 +69,15 @@ TEST_F(SceneFolderTest, SeesWhatIsNewChangedOrGone) {
   EXPECT_THAT(names(), ElementsAre("a", "b"));
   std::filesystem::remove(folder_ / "a.ply");
   EXPECT_THAT(names(), ElementsAre("b"));
+}
+
+TEST_F(SceneFolderTest, FindsFoldersWithLevels) {
+  write("tiles/a.glb", encode_gltf(random_cloud(10, 0)).glb());
+  write("tiles/tileset.json",
+        R"({"asset": {"version": "1.1"}, "root": {"content": {"uri": "a.glb"}}})");
+  EXPECT_THAT(names(), ElementsAre("tiles"));
+  EXPECT_EQ(folders_.scan()[0].size.gaussians, 10u);
+  EXPECT_TRUE(folders_.scan()[0].has_levels);
 }
 
 TEST_F(SceneFolderTest, LeavesOutWhatCannotBeReadUntilItChanges) {

@@ -54,6 +54,14 @@ TEST_F(TreeCacheTest, NamesFollowAllFilesOfAFolderButItsSidecar) {
   EXPECT_NE(name_of("sog"), name);
 }
 
+TEST_F(TreeCacheTest, NamesFollowAllTilesets) {
+  write("tiles/tileset.json", "{}");
+  write("tiles/more/0.json", "{}");
+  const std::string tiles = name_of("tiles");
+  write("tiles/more/0.json", "{ }");
+  EXPECT_NE(name_of("tiles"), tiles);
+}
+
 TEST_F(TreeCacheTest, RemovesWhatKilledBuildsHaveLeftAndNothingElse) {
   const std::string whole = "hall-3f0c91d2-9b1deb4d3b7d4bad.tree";
   tree(whole);

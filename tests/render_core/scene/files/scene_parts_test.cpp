@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/formats/splat.h"
 #include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
@@ -140,6 +142,47 @@ TEST_F(ScenePartsTest, AStreamedSogGivesTheTreeOfTheLoadedScene) {
   expect_same_tree(write_streamed_sog({{fine, random_cloud(700, 1, 2), random_cloud(300, 0, 3)},
                                        {random_cloud(90, 1, 4), random_cloud(80, 0, 5)}}),
                    150);
+}
+
+TEST_F(ScenePartsTest, TilesGiveTheTreeOfTheLoadedScene) {
+  GaussianCloud fine = random_cloud(1500, 2, 1);
+  for (std::size_t i = 0; i < fine.size(); i += 10) fine.opacity[i] = 1e-4f;
+  write("tiles/coarse.glb", encode_gltf(random_cloud(300, 0, 3)).glb());
+  write("tiles/fine.glb", encode_gltf(fine).glb());
+  write("tiles/rest.glb", encode_gltf(random_cloud(700, 0, 2)).glb());
+  write("tiles/tileset.json", R"({"asset": {"version": "1.1"}, "root": {"refine": "REPLACE",
+    "content": {"uri": "coarse.glb"}, "children": [{"content": {"uri": "fine.glb"}},
+    {"content": {"uri": "rest.glb"}}]}})");
+  expect_same_tree(folder_ / "tiles", 150);
+}
+
+TEST_F(ScenePartsTest, AStreamedSogInAnArchiveGivesTheTreeOfItsFolder) {
+  const auto folder = write_streamed_sog({{random_cloud(900, 1, 2)}, {random_cloud(90, 0, 5)}});
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    files[entry.path().lexically_relative(folder).string()] = {std::istreambuf_iterator<char>(in),
+                                                               {}};
+  }
+  expect_same_tree(write("a.ssog", zip(files)), 0);
+}
+
+TEST_F(ScenePartsTest, SayWhatIsLeftOut) {
+  GaussianCloud cloud = random_cloud(300, 3);
+  std::string bytes = ply_bytes(cloud);
+  // Harmonics of degree 4: 27 properties more, before those of the opacity.
+  std::string more;
+  for (int k = 45; k < 72; ++k) more += "property float f_rest_" + std::to_string(k) + "\n";
+  const std::size_t header_end = bytes.find("end_header\n") + 11;
+  const std::size_t row = (bytes.size() - header_end) / cloud.size();
+  std::string wider = bytes.substr(0, bytes.find("end_header")) + more + "end_header\n";
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    wider += bytes.substr(header_end + i * row, row) + std::string(27 * 4, '\0');
+  const auto path = write("a.ply", wider);
+  EXPECT_THAT(load_scene(path).notes, ::testing::Contains(HasSubstr("degree 4 are not shown")));
+  EXPECT_THAT(scene_in_parts(path, {}, pool_)->notes,
+              ::testing::Contains(HasSubstr("degree 4 are not shown")));
 }
 
 TEST_F(ScenePartsTest, AreNotOfOtherFormats) {

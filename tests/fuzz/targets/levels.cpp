@@ -1,0 +1,131 @@
+// Scenes of many files with levels of detail: 3D Tiles.
+#include <iterator>
+#include <optional>
+
+#include "render_core/scene/formats/tiles.h"
+#include "tests/fuzz/target.h"
+#include "tests/fuzz/targets/packed_files.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/formats/gltf_encoder.h"
+#include "tests/render_core/scene/random_cloud.h"
+
+namespace catgs::fuzz {
+namespace {
+
+/// Files whose .glb are stored as their JSON, a zero byte and their data. The sizes of chunks would
+/// refuse most mutants.
+class FilesWithGlb final : public PackedFiles {
+ public:
+  explicit FilesWithGlb(Bytes bytes) : PackedFiles(bytes) {}
+  [[nodiscard]] std::unique_ptr<ByteSource> open(const std::string& name) const override {
+    auto file = PackedFiles::open(name);
+    if (!name.ends_with(".glb")) return file;
+    const std::vector<std::byte> bytes = file->read_all(1 << 20);
+    const std::string text = text_of(bytes);
+    const std::size_t end = std::min(text.find('\0'), text.size());
+    std::string& glb = made_[name];
+    glb = test::glb(text.substr(0, end), text.substr(std::min(end + 1, text.size())));
+    return std::make_unique<MemorySource>(name, bytes_of(glb));
+  }
+
+ private:
+  mutable std::map<std::string, std::string> made_;
+};
+
+template <class Files, class Open>
+void parse_levels(Bytes input, const Open& open) {
+  const auto files = std::make_shared<const Files>(input);
+  bool read = false;
+  for (const std::optional<std::size_t> budget : {std::optional<std::size_t>(), {20}}) try {
+      const OpenLevels scene = open(files, budget);
+      require(!budget || scene.count <= *budget, "a budget is kept");
+      const GaussianCloud cloud = read_levels(scene, one_thread());
+      require(cloud.size() == scene.count && cloud.sh_degree == scene.sh_degree,
+              "as many are read as were counted");
+      require_sound(cloud);
+      read = true;
+    } catch (const InputError&) {
+    }
+  if (!read) throw InputError("input", "", "is no scene");
+}
+
+void parse_tiles(Bytes input) {
+  parse_levels<FilesWithGlb>(input, [](const auto& files, std::optional<std::size_t> budget) {
+    return open_tiles(files, "tileset.json", {}, budget);
+  });
+}
+
+/// One of the files, as its format has it.
+void change_levels(const Material& from, std::string& text) {
+  std::map<std::string, std::string> files;
+  for (const auto& [name, content] : unpacked(bytes_of(text))) files[name] = text_of(content);
+  const auto others = unpacked(bytes_of(from.any_of(from.inputs)));
+  if (files.empty() || others.empty()) return change_bytes(from, text);
+  const auto any = [&](auto& map) {
+    return std::next(map.begin(), static_cast<std::ptrdiff_t>(from.below(map.size())));
+  };
+  const auto changed = any(files);
+  const auto other = others.find(changed->first);
+  const std::string piece = text_of(other == others.end() ? any(others)->second : other->second);
+  std::string& content = changed->second;
+  const std::size_t end = std::min(content.find('\0'), content.size());
+  if (from.one_in(16)) {
+    files.erase(changed);
+  } else if (content.starts_with('{') && !from.one_in(4)) {
+    std::string json = content.substr(0, end);
+    const std::string json_piece = piece.substr(0, piece.find('\0'));
+    change_json({from.random, {&json_piece, 1}, from.words}, json);
+    content = json + content.substr(end);
+  } else {
+    change_bytes(from, content);
+  }
+  text = packed(files);
+}
+
+std::string spz(std::size_t count, int degree) {
+  return test::encode_spz(test::random_cloud(count, degree), {.version = 4});
+}
+
+std::string stored(const test::GltfParts& parts) {
+  return parts.json.dump().append(1, '\0') + parts.binary;
+}
+
+std::map<std::string, std::string> tiles_seeds() {
+  const std::map<std::string, std::string> tiles = {
+      {"a.glb", stored(test::encode_gltf(test::random_cloud(2, 0)))},
+      {"b.glb", stored(test::encode_gltf(test::random_cloud(3, 1)))},
+      {"c/d.glb", stored(test::gltf_with_spz(spz(4, 0)))}};
+  const auto folder = [&](const std::string& tileset, const std::string& inner) {
+    std::map<std::string, std::string> files = tiles;
+    files["tileset.json"] = tileset;
+    if (!inner.empty()) files["c/t.json"] = inner;
+    return packed(files);
+  };
+  return {{"replace", folder(R"({"asset":{"version":"1.1"},"root":{"refine":"REPLACE","content":
+             {"uri":"a.glb"},"boundingVolume":{"box":[0,0,0,1,0,0,0,1,0,0,0,1]},"transform":
+             [1,0,0,0,0,1,0,0,0,0,1,0,5,6,7,1],"children":[{"content":{"uri":"b.glb"}},
+             {"contents":[{"uri":"c/d.glb"}]}]}})",
+                             "")},
+          {"nested", folder(R"({"asset":{"version":"1.0"},"root":{"refine":"ADD","boundingVolume":
+             {"region":[1,0.5,1,0.5,0,9]},"content":{"url":"a.glb"},"children":[{"content":{"uri":
+             "c/t.json"}}]}})",
+                            R"({"asset":{"version":"1.1"},"root":{"content":{"uri":"../b.glb"},
+             "boundingVolume":{"sphere":[0,0,0,1]},"children":[{"content":{"uri":"d.glb"}}]}})")}};
+}
+
+}  // namespace
+
+std::vector<Target> levels_targets() {
+  return {{.name = "tiles",
+           .parse = parse_tiles,
+           .seeds = tiles_seeds,
+           .dictionary = words_of(
+               R"("asset": "version": "1.0" "1.1" "root": "children": "content": "contents": "uri":
+                  "url": "refine": "ADD" "REPLACE" "transform": "boundingVolume": "box": "sphere":
+                  "region": "extensionsRequired": "implicitTiling": "a.glb" "b.glb" "c/d.glb"
+                  "c/t.json" "../b.glb" "tileset.json" b3dm)"),
+           .change = change_levels,
+           .max_bytes = 16384}};
+}
+
+}  // namespace catgs::fuzz
