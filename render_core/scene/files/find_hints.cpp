@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -58,6 +60,42 @@ void use_cameras(const CameraFile& cameras, SceneHints& hints) {
   hints.source = cameras.source;
 }
 
+/// Narrows the limits to the heights that the orbit reaches, as far as a box with axes of the world
+/// can say that, and moves the start there. The box says nothing of the smallest radius.
+void use_orbit(const OrbitLimits& orbit, SceneHints& hints) {
+  const glm::vec3 reach = glm::max(hints.limits.max - hints.focus, hints.focus - hints.limits.min);
+  const float radius = std::max(glm::length(reach), orbit.min_radius);
+  const glm::vec3 from_focus = hints.start_pose.position - hints.focus;
+  const float distance = std::max({glm::length(from_focus), orbit.min_radius, hints.near_z});
+  const float elevation =
+      std::asin(std::clamp(glm::dot(from_focus, hints.up) / distance, -1.0f, 1.0f));
+  const float allowed = std::clamp(elevation, orbit.min_elevation, orbit.max_elevation);
+  const glm::vec3 level = from_focus - glm::dot(from_focus, hints.up) * hints.up;
+  if (distance > glm::length(from_focus) || allowed != elevation) {
+    const glm::vec3 away = glm::length(level) > 1e-6f * distance
+                               ? glm::normalize(level)
+                               : hints.start_pose.orientation * glm::vec3(0.0f, 1.0f, 0.0f);
+    hints.start_pose =
+        look_at(hints.focus + distance * (std::cos(allowed) * away + std::sin(allowed) * hints.up),
+                hints.focus, hints.up);
+  }
+  const auto height = [&](float angle, bool lower) {
+    const float sine = std::sin(angle);
+    return sine * ((sine < 0.0f) == lower ? radius : orbit.min_radius);
+  };
+  for (int k = 0; k < 3; ++k) {
+    if (std::abs(hints.up[k]) < 0.999f) continue;
+    float low = height(orbit.min_elevation, true), high = height(orbit.max_elevation, false);
+    if (hints.up[k] < 0.0f) std::tie(low, high) = std::pair(-high, -low);
+    const float start = hints.start_pose.position[k];
+    hints.limits.min[k] = std::min(start, std::max(hints.limits.min[k], hints.focus[k] + low));
+    hints.limits.max[k] = std::max(start, std::min(hints.limits.max[k], hints.focus[k] + high));
+  }
+  hints.limits.min = glm::min(hints.limits.min, hints.start_pose.position);
+  hints.limits.max = glm::max(hints.limits.max, hints.start_pose.position);
+  hints.source += ", with the orbit of its file";
+}
+
 std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
   std::error_code error;
   if (path.empty() || !std::filesystem::is_regular_file(path, error)) return std::nullopt;
@@ -99,7 +137,10 @@ SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
   if (!told) told = up;
   SceneHints hints =
       estimate_hints(cloud, told ? *told : find_up(cloud, cameras.poses), std::move(pool));
-  if (!cameras.poses.empty()) use_cameras(cameras, hints);
+  if (!cameras.poses.empty())
+    use_cameras(cameras, hints);
+  else if (files.orbit)
+    use_orbit(*files.orbit, hints);
   if (sidecar) use_sidecar(*sidecar, files.sidecar.filename().string(), hints);
   return hints;
 }

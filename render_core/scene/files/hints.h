@@ -13,6 +13,7 @@
 #include "render_core/math/camera.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/orbit_limits.h"
 #include "render_core/scene/scene.h"
 
 namespace catgs {
@@ -69,6 +70,7 @@ struct HintFiles {
   std::filesystem::path sidecar;
   std::filesystem::path cameras;
   std::filesystem::path transforms;
+  std::optional<OrbitLimits> orbit{};  // of the scene's file
 };
 
 /// Whether at least one of the files is there.
@@ -83,9 +85,10 @@ void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, 
                std::vector<std::string>& notes);
 
 /// Takes each hint from the first source that has it: the sidecar; the training cameras (first
-/// camera, levelled by find_up(), the box around them grown by half its diagonal);
-/// estimate_hints(). `up` (unit) is for a scene whose sidecar names none. A faulty sidecar throws
-/// InputError. Unusable camera files, which were not written for us, only add a note.
+/// camera, levelled by find_up(), the box around them grown by half its diagonal); the orbit in the
+/// scene's file, which narrows what estimate_hints() finds; estimate_hints(). `up` (unit) is for a
+/// scene whose sidecar names none. A faulty sidecar throws InputError. Unusable camera files, which
+/// were not written for us, only add a note.
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
                       const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
                       std::shared_ptr<ThreadPool> pool);

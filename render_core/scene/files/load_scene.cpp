@@ -39,6 +39,7 @@ struct Decoded {
   std::string format;
   GaussianCloud cloud;
   std::vector<std::string> notes{};
+  std::optional<OrbitLimits> orbit{};
 };
 
 Decoded read_any_ply(const ByteSource& file, const LoadContext& context) {
@@ -70,7 +71,7 @@ Decoded read_file(const std::filesystem::path& path, const LoadContext& context)
   if (is_spz(file)) {
     SpzFile spz = read_spz(file, context);
     return {fmt::format("spz v{}", spz.version), std::move(spz.cloud),
-            notes_of_degree(spz.sh_degree)};
+            notes_of_degree(spz.sh_degree), spz.orbit};
   }
   if (is_glb(file) || path.extension() == ".gltf") {
     GltfFile gltf = read_gltf(file, FolderFiles(path.parent_path()), context);
@@ -102,7 +103,7 @@ Decoded read_location(const SceneLocation& location, const LoadOptions& options,
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) {
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const LoadContext context(*pool, options.progress);
-  const SceneLocation location = locate_scene(path);
+  SceneLocation location = locate_scene(path);
   if (!location.has_levels() && (options.lod || options.gaussian_budget))
     throw InputError(path.string(), "", "has no levels of detail to choose from",
                      "levels and budgets are for streamed SOG and 3D Tiles");
@@ -113,6 +114,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   scene.format = std::move(decoded.format);
   scene.cloud = std::move(decoded.cloud);
   scene.notes = std::move(decoded.notes);
+  location.hints.orbit = decoded.orbit;
   // Surfels of a tree are flat already, and their axes are in another order.
   const bool is_flat = scene.format == "tree" && scene.cloud.model == SplatModel::surfels;
   use_model(location.hints, options.model, scene.cloud.model, scene.notes);

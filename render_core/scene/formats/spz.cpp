@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -168,24 +169,54 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
   return header;
 }
 
-/// The coordinate system named by the extension records (u32 type, u32 length, payload), or the
-/// usual one.
-std::uint32_t system_of(const ByteSource& file, std::span<const std::byte> extensions) {
-  while (extensions.size() >= 8) {
-    const auto type = load_as<std::uint32_t>(extensions.data());
-    const auto length = load_as<std::uint32_t>(extensions.data() + 4);
-    extensions = extensions.subspan(8);
-    if (length > extensions.size())
+/// What the extension records say.
+struct Extensions {
+  std::uint32_t system = right_up_back_system;
+  std::optional<OrbitLimits> orbit;
+};
+
+std::uint32_t parse_system(const ByteSource& file, std::span<const std::byte> payload) {
+  const auto system = payload.size() >= 4 ? load_as<std::uint32_t>(payload.data()) : 0;
+  if (system > last_system)
+    throw InputError(file.name(), "extension SPZ_ADOBE_coordinate_system",
+                     fmt::format("coordinate system {} is not in 1…{}", system, last_system));
+  return system == 0 ? right_up_back_system : system;  // 0: unspecified
+}
+
+/// Nothing for limits that leave no room, as zeros do.
+std::optional<OrbitLimits> parse_orbit(const ByteSource& file, std::span<const std::byte> payload) {
+  if (payload.size() < 3 * sizeof(float))
+    fail(file, "extension SPZ_ADOBE_safe_orbit_camera", "is cut off");
+  const auto number = [&](std::size_t i) { return load_as<float>(payload.data() + 4 * i); };
+  for (std::size_t i = 0; i < 3; ++i)
+    if (!std::isfinite(number(i)))
+      fail(file, "extension SPZ_ADOBE_safe_orbit_camera", "has a number that is not finite");
+  constexpr float quarter_turn = 1.57079633f;
+  const OrbitLimits orbit{std::clamp(number(0), -quarter_turn, quarter_turn),
+                          std::clamp(number(1), -quarter_turn, quarter_turn),
+                          std::clamp(number(2), 0.0f, 1e6f)};
+  if (!(orbit.min_elevation < orbit.max_elevation)) return std::nullopt;
+  return orbit;
+}
+
+/// `records`: u32 type, u32 length, payload. Of several of a type the first one counts.
+Extensions parse_extensions(const ByteSource& file, std::span<const std::byte> records) {
+  Extensions extensions;
+  std::optional<std::uint32_t> system;
+  while (records.size() >= 8) {
+    const auto type = load_as<std::uint32_t>(records.data());
+    const auto length = load_as<std::uint32_t>(records.data() + 4);
+    records = records.subspan(8);
+    if (length > records.size())
       fail(file, fmt::format("extension {:#x}", type), "is longer than the space for extensions");
-    const auto system = length >= 4 ? load_as<std::uint32_t>(extensions.data()) : 0;
-    extensions = extensions.subspan(length);
-    if (type != coordinate_system_extension || system == 0) continue;  // 0: unspecified
-    if (system > last_system)
-      throw InputError(file.name(), "extension SPZ_ADOBE_coordinate_system",
-                       fmt::format("coordinate system {} is not in 1…{}", system, last_system));
-    return system;
+    const auto payload = records.first(length);
+    records = records.subspan(length);
+    if (type == coordinate_system_extension && !system) system = parse_system(file, payload);
+    if (type == safe_orbit_extension && !extensions.orbit)
+      extensions.orbit = parse_orbit(file, payload);
   }
-  return right_up_back_system;
+  extensions.system = system.value_or(right_up_back_system);
+  return extensions;
 }
 
 /// Turns the cloud from a coordinate system to right, down, front.
@@ -209,7 +240,7 @@ void turn(std::uint32_t system, GaussianCloud& cloud, const LoadContext& context
 }
 
 SpzFile make_file(const Header& header) {
-  SpzFile file{static_cast<int>(header.version), header.sh_degree, {}};
+  SpzFile file{static_cast<int>(header.version), header.sh_degree, {}, {}};
   file.cloud.resize(header.count, std::min(header.sh_degree, max_sh_degree));
   if (header.antialiased) file.cloud.model = SplatModel::antialiased;
   return file;
@@ -231,8 +262,9 @@ SpzFile read_gzip(const ByteSource& file, const LoadContext& context, SpzAxes ax
     });
   std::vector<std::byte> extensions(header.has_extensions ? max_extension_bytes : 0);
   const auto stored = std::span(extensions).first(stream->read_up_to(extensions));
-  const std::uint32_t system = system_of(file, stored);
-  if (axes == SpzAxes::right_down_front) turn(system, result.cloud, context.part(0.9, 1.0));
+  const Extensions said = parse_extensions(file, stored);
+  result.orbit = said.orbit;
+  if (axes == SpzAxes::right_down_front) turn(said.system, result.cloud, context.part(0.9, 1.0));
   return result;
 }
 
@@ -254,8 +286,7 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context, SpzAxes a
 
   std::vector<std::byte> extensions(table_offset - plain_header_bytes);
   file.read(plain_header_bytes, extensions);
-  const std::uint32_t system =
-      header.has_extensions ? system_of(file, extensions) : right_up_back_system;
+  const Extensions said = header.has_extensions ? parse_extensions(file, extensions) : Extensions{};
 
   std::vector<std::array<std::uint64_t, 2>> sizes(all.size());
   file.read(table_offset, std::as_writable_bytes(std::span(sizes)));
@@ -274,7 +305,8 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context, SpzAxes a
   context.part(0.0, 0.9).for_blocks(all.size(), 1, [&](std::size_t a, std::size_t) {
     read_attribute(*open_zstd(file, offsets[a], sizes[a][0]), all[a], result.cloud, [] {});
   });
-  if (axes == SpzAxes::right_down_front) turn(system, result.cloud, context.part(0.9, 1.0));
+  result.orbit = said.orbit;
+  if (axes == SpzAxes::right_down_front) turn(said.system, result.cloud, context.part(0.9, 1.0));
   return result;
 }
 

@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <iosfwd>
+#include <optional>
 #include <string>
 
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/orbit_limits.h"
 
 namespace catgs {
 
@@ -19,8 +21,9 @@ namespace catgs {
 
 struct SpzFile {
   int version = 0;
-  int sh_degree = 0;    // of the file, up to 4
-  GaussianCloud cloud;  // not sanitized; SH above degree 3 is cut off
+  int sh_degree = 0;                   // of the file, up to 4
+  GaussianCloud cloud;                 // not sanitized; SH above degree 3 is cut off
+  std::optional<OrbitLimits> orbit{};  // of the extension SPZ_ADOBE_safe_orbit_camera
 };
 
 /// Whether the file begins like an .spz: gzip or the plain header of version 4.

@@ -15,6 +15,7 @@ inline constexpr std::uint32_t magic = 0x5053474e;     // "NGSP"
 inline constexpr std::size_t gzip_header_bytes = 16;   // versions 1 to 3, inside the gzip stream
 inline constexpr std::size_t plain_header_bytes = 32;  // version 4
 inline constexpr std::uint8_t antialiased_flag = 0x1, extensions_flag = 0x2;
+inline constexpr std::uint32_t safe_orbit_extension = 0xadbe0002;
 inline constexpr std::uint32_t coordinate_system_extension = 0xadbe0003;
 
 /// The constant SH coefficient is stored with less contrast than a colour, so that values slightly

@@ -97,15 +97,42 @@ TEST(Sidecar, ErrorsNameTheField) {
 class Hints : public FolderTest {
  protected:
   SceneHints find() {
-    return find_hints(cloud_,
-                      {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json"},
-                      up_, notes_, pool_);
+    return find_hints(
+        cloud_, {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json", orbit_},
+        up_, notes_, pool_);
   }
+  std::optional<OrbitLimits> orbit_;
   std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
   std::optional<glm::vec3> up_;
   GaussianCloud cloud_ = ball(1.0f);
   std::vector<std::string> notes_;
 };
+
+// With y down, heights above the focus are below it in y.
+TEST_F(Hints, AnOrbitNarrowsTheLimits) {
+  up_ = down_y;
+  const SceneHints free = find();
+  ASSERT_NE(free.limits.max.y, free.focus.y);
+  orbit_ = OrbitLimits{0.1f, 0.5f, 2.0f};
+  const SceneHints hints = find();
+  EXPECT_NEAR(hints.limits.max.y, hints.focus.y - 2.0f * std::sin(0.1f), 1e-4f);
+  const glm::vec3 from_focus = hints.start_pose.position - hints.focus;
+  const float distance = glm::length(from_focus);
+  EXPECT_GE(distance, 2.0f - 1e-4f);
+  const float elevation = std::asin(-from_focus.y / distance);
+  EXPECT_GE(elevation, 0.1f - 1e-4f);
+  EXPECT_LE(elevation, 0.5f + 1e-4f);
+  expect_near(forward(hints.start_pose), -from_focus / distance, 1e-4f);
+  EXPECT_EQ(hints.limits.min.x, std::min(free.limits.min.x, hints.start_pose.position.x));
+  EXPECT_THAT(hints.source, HasSubstr("with the orbit of its file"));
+
+  orbit_ = OrbitLimits{-1.570796f, 1.570796f, 0.0f};  // anywhere
+  EXPECT_EQ(find().start_pose.position, free.start_pose.position);
+
+  write("s.json", R"({"limits": {"min": [-9, -9, -9], "max": [9, 9, 9]}})");
+  orbit_ = OrbitLimits{0.1f, 0.5f, 2.0f};
+  EXPECT_EQ(find().limits.max.y, 9.0f);
+}
 
 // Two level cameras that look along +x and -z with y down, one of them rolled a little.
 constexpr const char* cameras_json = R"([

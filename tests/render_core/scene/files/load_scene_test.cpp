@@ -69,6 +69,14 @@ TEST_F(LoadScene, TheModelIsThatOfTheOptionElseTheSidecarElseTheFile) {
   }
 }
 
+TEST_F(LoadScene, AnOrbitInAnSpzCounts) {
+  const GaussianCloud cloud = random_cloud(1000, 0);
+  const SpzStyle style{.version = 4, .orbit = OrbitLimits{0.1f, 0.5f, 50.0f}};
+  const Scene scene = load_scene(write("room.spz", encode_spz(cloud, style)));
+  EXPECT_THAT(scene.hints.source, HasSubstr("with the orbit of its file"));
+  EXPECT_GE(glm::distance(scene.hints.start_pose.position, scene.hints.focus), 49.9f);
+}
+
 TEST_F(LoadScene, AFileThatIsCutOffWhileItIsReadIsRefused) {
   const auto cut_off_at_the_first_piece = [&](const std::filesystem::path& path) {
     LoadOptions options;

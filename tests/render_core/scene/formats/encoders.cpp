@@ -104,9 +104,16 @@ std::vector<std::string> spz_streams(const GaussianCloud& cloud, const SpzStyle&
 
 std::string spz_extensions(const SpzStyle& style) {
   std::string out;
-  if (style.coordinate_system == 0) return out;
-  for (const std::uint32_t word : {0x12340001u, 4u, 99u, 0xadbe0003u, 4u, style.coordinate_system})
-    put(out, word);
+  if (style.coordinate_system != 0)
+    for (const std::uint32_t word :
+         {0x12340001u, 4u, 99u, 0xadbe0003u, 4u, style.coordinate_system})
+      put(out, word);
+  if (style.orbit) {
+    for (const std::uint32_t word : {0xadbe0002u, 12u}) put(out, word);
+    for (const float number :
+         {style.orbit->min_elevation, style.orbit->max_elevation, style.orbit->min_radius})
+      put(out, number);
+  }
   return out;
 }
 

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/orbit_limits.h"
 
 // Writers of the formats that the product only reads, straight from the formats' descriptions and
 // independent of the readers' code.
@@ -21,6 +23,7 @@ struct SpzStyle {
   /// Number in the coordinate system extension; 0 writes no extension, and the cloud (right, down,
   /// front) is stored as right, up, back. Otherwise the cloud is stored as it is.
   std::uint32_t coordinate_system = 0;
+  std::optional<OrbitLimits> orbit{};  // in an extension
   int extra_sh_degree = 0;  // stores coefficients up to this degree, the additional ones nonsense
 };
 std::string encode_spz(const GaussianCloud& cloud, const SpzStyle& style);

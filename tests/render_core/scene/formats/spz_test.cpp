@@ -112,6 +112,29 @@ TEST(Spz, TheAxesExtensionIsObeyed) {
   }
 }
 
+TEST(Spz, TheOrbitExtensionIsRead) {
+  const GaussianCloud cloud = storable_cloud(30, 0);
+  for (const int version : {3, 4}) {
+    SpzStyle style{.version = version, .orbit = OrbitLimits{-0.25f, 1.5f, 2.0f}};
+    const auto orbit = parse(encode_spz(cloud, style)).orbit;
+    ASSERT_TRUE(orbit);
+    EXPECT_EQ(orbit->min_elevation, -0.25f);
+    EXPECT_EQ(orbit->max_elevation, 1.5f);
+    EXPECT_EQ(orbit->min_radius, 2.0f);
+    style.orbit = {-9.0f, 9.0f, -1.0f};
+    const auto clamped = parse(encode_spz(cloud, style)).orbit;
+    ASSERT_TRUE(clamped);
+    EXPECT_NEAR(clamped->min_elevation, -1.570796f, 1e-6f);
+    EXPECT_EQ(clamped->min_radius, 0.0f);
+    style.orbit = OrbitLimits{};  // zeros say nothing
+    EXPECT_FALSE(parse(encode_spz(cloud, style)).orbit);
+    style.orbit = {0.0f, NAN, 0.0f};
+    EXPECT_THAT(input_error([&] { parse(encode_spz(cloud, style)); }),
+                HasSubstr("SPZ_ADOBE_safe_orbit_camera: has a number that is not finite"));
+  }
+  EXPECT_FALSE(parse(encode_spz(cloud, {.version = 4})).orbit);
+}
+
 /// Right, down, front of a place whose axes are named by letters: "LUB" is left, up, back.
 glm::dvec3 by_letters(const glm::dvec3& place, std::string_view axes) {
   glm::dvec3 turned(0.0);
