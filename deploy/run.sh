@@ -10,7 +10,8 @@ usage: deploy/run.sh [SCENE...] [options] [catgs-server options]
 
 Installs what the build needs, builds the server and the browser client, and serves the scenes.
 Without a SCENE it makes a procedural city of 300,000 Gaussians and serves that.
-SCENE is a .ply, .splat, .spz, .sog or .glb file, a streamed SOG folder or a training output folder.
+SCENE is a .ply, .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf or .tree file, or a folder: SOG,
+streamed SOG, 3D Tiles, or a training output.
 
   --port N     listen on port N (default 8080)
   --lan        also serve other devices in this network: all interfaces, a token, TLS with a

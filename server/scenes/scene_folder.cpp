@@ -36,12 +36,13 @@ SceneAbout about_in(const fs::path& sidecar) {
 }
 
 /// The newest file counts, because the files of a folder may be replaced one by one or all at once.
-fs::file_time_type time_of(const fs::path& path) {
+fs::file_time_type time_of(const fs::path& path, const std::vector<fs::path>& beside) {
   std::error_code error;
   auto newest = fs::last_write_time(path, error);
   if (fs::is_directory(path, error))
     for (const auto& entry : fs::directory_iterator(path, error))
       newest = std::max(newest, fs::last_write_time(entry.path(), error));
+  for (const fs::path& file : beside) newest = std::max(newest, fs::last_write_time(file, error));
   return newest;
 }
 
@@ -49,7 +50,7 @@ fs::file_time_type time_of(const fs::path& path) {
 
 FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
   FoundScene found;
-  found.changed = time_of(path);
+  found.changed = time_of(path, files_beside(path));
   const SceneLocation location = locate_scene(path);
   found.path = path;
   found.name = printable(to_utf8(location.name));
@@ -58,9 +59,7 @@ FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
   const LoadOptions levels = found.has_levels ? look.levels : LoadOptions();
   found.size = read_scene_size(path, levels);
   found.about = about_in(location.hints.sidecar);
-  // A .gltf has its data in other files, whose changes would not be seen.
-  if (look.names_trees && !found.size.in_pages && path.extension() != ".gltf")
-    found.tree = tree_name(path, levels);
+  if (look.names_trees && !found.size.in_pages) found.tree = tree_name(path, levels);
   return found;
 }
 
@@ -97,13 +96,13 @@ std::vector<FoundScene> SceneFolders::scan() {
   std::vector<FoundScene> scenes;
   std::set<std::string> keys = elsewhere_;
   for (const fs::path& path : paths) {
-    const auto changed = time_of(path);
     const auto before = known_.find(path);
     Known& now = known[path];
-    if (before != known_.end() && before->second.changed == changed) {
+    if (before != known_.end() && before->second.changed == time_of(path, before->second.beside)) {
       now = std::move(before->second);
     } else {
-      now.changed = changed;
+      now.beside = files_beside(path);
+      now.changed = time_of(path, now.beside);
       try {
         now.scene = look_at_scene(path, look_);
         now.good = true;

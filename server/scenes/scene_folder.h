@@ -20,8 +20,8 @@ struct FoundScene {
   std::string id;
   SceneSize size;
   SceneAbout about;  // of its sidecar, when the scene was found
-  /// Modification time of the file, or of the newest one directly in its folder. A new value means
-  /// a new scene.
+  /// Modification time of the file, or of the newest one that it has beside it or directly in its
+  /// folder. A new value means a new scene.
   std::filesystem::file_time_type changed;
   bool has_levels = false;  // of detail, of which a coarser one may be loaded
   std::string tree{};       // tree_name(), for a scene that may get one; else empty
@@ -58,6 +58,7 @@ class SceneFolders {
  private:
   struct Known {
     std::filesystem::file_time_type changed;
+    std::vector<std::filesystem::path> beside;  // files_beside()
     bool good = false;
     FoundScene scene;
   };

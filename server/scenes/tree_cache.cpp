@@ -87,6 +87,7 @@ Content content_of(const SceneLocation& scene) {
   Content content;
   if (!fs::is_directory(scene.path)) {
     content.add(scene.path);
+    for (const fs::path& file : files_beside(scene.path)) content.add(file);
     return content;
   }
   const bool all = scene.kind == SceneLocation::Kind::tiles_folder;

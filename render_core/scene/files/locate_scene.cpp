@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/gltf.h"
 
 namespace catgs {
 
@@ -139,6 +141,16 @@ SceneLocation locate_scene(const fs::path& given) {
     return location;
   }
   return at_file(single_scene_file(path));
+}
+
+std::vector<fs::path> files_beside(const fs::path& scene) {
+  std::vector<fs::path> files;
+  if (scene.extension() == ".gltf") try {
+      for (const std::string& name : gltf_buffer_files(FileSource(scene)))
+        files.push_back(scene.parent_path() / name);
+    } catch (const InputError&) {
+    }
+  return files;
 }
 
 }  // namespace catgs

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render_core/scene/files/hints.h"
 
@@ -39,5 +40,8 @@ struct SceneLocation {
 /// Resolves files, folders with an index (also by that file), training output folders (newest
 /// iteration) and folders with a single scene file. Throws InputError.
 SceneLocation locate_scene(const std::filesystem::path& path);
+
+/// The files beside a .gltf that hold its data, as far as its JSON can be read; none for others.
+std::vector<std::filesystem::path> files_beside(const std::filesystem::path& scene);
 
 }  // namespace catgs

@@ -18,7 +18,7 @@ namespace catgs {
 
 namespace {
 
-constexpr std::string_view remedy = "use .ply, .splat, .spz, .sog or .glb";
+constexpr std::string_view remedy = "use .ply, .splat, .spz, .sog, .glb or .tree";
 
 using Writer = std::function<void(const GaussianCloud&, std::ostream&)>;
 

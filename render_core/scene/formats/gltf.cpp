@@ -347,6 +347,10 @@ GltfSize read_gltf_size(const ByteSource& file, const FileSet& beside) {
   return contents.size;
 }
 
+std::vector<std::string> gltf_buffer_files(const ByteSource& file) {
+  return GltfDocument(file, FolderFiles({})).buffer_files();
+}
+
 GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadContext& context,
                    const AffineMap& world) {
   GltfDocument document(file, beside);

@@ -49,6 +49,9 @@ inline const AffineMap left_up_front{{-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 
 GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadContext& context,
                    const AffineMap& world = left_up_front);
 
+/// The names of the files beside it that a .gltf has its data in. Throws InputError.
+std::vector<std::string> gltf_buffer_files(const ByteSource& file);
+
 /// The map of a 4x4 matrix by columns. Throws InputError when its last row is not 0, 0, 0, 1.
 AffineMap affine_map(const JsonField& matrix);
 

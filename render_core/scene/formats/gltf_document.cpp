@@ -163,6 +163,17 @@ std::string unescaped(std::string_view uri) {
   return name;
 }
 
+namespace {
+
+bool is_data(std::string_view uri) { return uri.starts_with("data:"); }
+
+/// A file has one name, whatever it is called.
+std::string file_named_by(std::string_view uri) {
+  return std::filesystem::path(unescaped(uri)).lexically_normal().string();
+}
+
+}  // namespace
+
 bool is_glb(const ByteSource& file) {
   std::uint32_t magic = 0;
   if (file.size() >= sizeof magic) file.read(0, std::as_writable_bytes(std::span(&magic, 1)));
@@ -206,16 +217,22 @@ JsonField GltfDocument::at(std::string_view list, const JsonField& index) const 
   return entries[index.count()];
 }
 
+std::vector<std::string> GltfDocument::buffer_files() const {
+  std::vector<std::string> names;
+  if (const auto buffers = root().find("buffers"))
+    for (std::size_t i = 0; i < buffers->size() && i < max_buffers; ++i)
+      if (const auto uri = (*buffers)[i].find("uri"); uri && !is_data(uri->text()))
+        names.push_back(file_named_by(uri->text()));
+  return names;
+}
+
 const ByteSource& GltfDocument::open(const JsonField& uri) {
   const std::string text = uri.text();
-  const bool is_data = text.starts_with("data:");
-  // A file counts once, whatever it is called.
-  const std::string name =
-      is_data ? text : std::filesystem::path(unescaped(text)).lexically_normal().string();
+  const std::string name = is_data(text) ? text : file_named_by(text);
   std::unique_ptr<ByteSource>& file = files_[name];
   if (file) return *file;
   if (files_.size() > max_buffers) uri.fail(fmt::format("is of more than {} buffers", max_buffers));
-  if (!is_data) {
+  if (!is_data(text)) {
     file = beside_.open(name);
     return *file;
   }

@@ -65,6 +65,8 @@ class GltfDocument {
   [[nodiscard]] GltfAccessor accessor(const JsonField& index);
   /// The bytes of the buffer view that `index` names. Opens its buffer. Throws InputError.
   [[nodiscard]] GltfBytes view(const JsonField& index);
+  /// The files that hold buffers, opened or not.
+  [[nodiscard]] std::vector<std::string> buffer_files() const;
   /// Bytes of the .glb's chunk and of the buffers that were opened.
   [[nodiscard]] std::uint64_t bytes() const;
 

@@ -47,6 +47,13 @@ void for_each_node(TreeFile& tree, std::span<const NodeId> nodes, const LoadCont
 
 }  // namespace
 
+void require_root(TreeFile& tree) {
+  if (!tree.page(0))
+    throw InputError(tree.name(), "page 0",
+                     "is damaged or missing, and nothing can be seen without it",
+                     "convert the scene again");
+}
+
 GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes,
                          const LoadContext& context) {
   std::vector<std::size_t> first(nodes.size() + 1, 0);
@@ -93,10 +100,7 @@ TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadCont
     return {page < wanted && sound[page] ? unseen.data() : nullptr};
   });
   const std::string first = tree.damage().first;
-  if (all.drawn.empty())
-    throw InputError(tree.name(), "page 0",
-                     "is damaged or missing, and nothing can be seen without it",
-                     "convert the scene again");
+  if (all.drawn.empty()) require_root(tree);
   std::vector<NodeId> nodes;
   for (const DrawnNode& drawn : all.drawn) nodes.push_back(drawn.node);
   TreeScene scene;

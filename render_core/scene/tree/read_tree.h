@@ -12,6 +12,9 @@
 
 namespace catgs {
 
+/// Throws InputError if the root's page is damaged or missing: nothing can be seen without it.
+void require_root(TreeFile& tree);
+
 /// The Gaussians of nodes, in their order, as packed. Rotations and scales are the axes of the
 /// packed covariances. Throws InputError if a page is damaged.
 GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes, const LoadContext& context);

@@ -14,6 +14,7 @@
 #include "render_core/scene/analysis/robust_bounds.h"
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/tree/read_tree.h"
 #include "render_core/scene/tree/tree_file.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
@@ -146,9 +147,10 @@ void print_text(const Json& info) {
 std::optional<TreeHeader> tree_at(const std::filesystem::path& path) {
   const SceneLocation location = locate_scene(path);
   if (location.kind != SceneLocation::Kind::file) return std::nullopt;
-  const FileSource file(location.path);
-  if (!is_tree(file)) return std::nullopt;
-  return read_tree_header(file);
+  if (!is_tree(FileSource(location.path))) return std::nullopt;
+  TreeFile tree(std::make_unique<FileSource>(location.path), 0);
+  require_root(tree);
+  return tree.header();
 }
 
 void info(const InfoOptions& options, bool quiet) {

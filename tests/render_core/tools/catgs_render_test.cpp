@@ -17,6 +17,7 @@
 #include "render_core/image/png.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/tree/tree_shape.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
@@ -325,6 +326,14 @@ TEST_F(CatgsRender, ConvertsToATreeAndBack) {
   const Outcome memory = run(fmt::format("convert {} {} --memory -1", scene(), path("other.tree")));
   EXPECT_EQ(memory.exit_code, 2);
   EXPECT_THAT(memory.out, HasSubstr("--memory"));
+}
+
+TEST_F(CatgsRender, InfoRefusesATreeWithoutItsRoot) {
+  ASSERT_EQ(run(fmt::format("convert {} {}", scene(), path("ball.tree"))).exit_code, 0);
+  std::filesystem::resize_file(path("ball.tree"), TreeShape::header_bytes + 100);
+  const Outcome info = run("info " + path("ball.tree"));
+  EXPECT_EQ(info.exit_code, 2);
+  EXPECT_THAT(info.out, HasSubstr("page 0: is damaged or missing"));
 }
 
 TEST_F(CatgsRender, DrawsATreeFromItsPages) {

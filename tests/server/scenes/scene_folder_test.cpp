@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include <nlohmann/json.hpp>
+
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
@@ -69,6 +71,19 @@ TEST_F(SceneFolderTest, SeesWhatIsNewChangedOrGone) {
   EXPECT_THAT(names(), ElementsAre("a", "b"));
   std::filesystem::remove(folder_ / "a.ply");
   EXPECT_THAT(names(), ElementsAre("b"));
+}
+
+TEST_F(SceneFolderTest, SeesThatTheDataBesideAGltfHasChanged) {
+  GltfParts parts = encode_gltf(random_cloud(10, 0));
+  parts.json["buffers"][0]["uri"] = "a%20b.bin";
+  write("a.gltf", parts.json.dump());
+  EXPECT_THAT(names(), IsEmpty());
+  const auto data = write("a b.bin", parts.binary);  // copied later
+  EXPECT_THAT(names(), ElementsAre("a"));
+  const auto before = folders_.scan()[0].changed;
+  EXPECT_EQ(folders_.scan()[0].changed, before);
+  std::filesystem::last_write_time(data, before + std::chrono::seconds(2));
+  EXPECT_NE(folders_.scan()[0].changed, before);
 }
 
 TEST_F(SceneFolderTest, FindsFoldersWithLevels) {

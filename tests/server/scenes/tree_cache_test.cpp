@@ -2,8 +2,11 @@
 
 #include <chrono>
 
+#include <nlohmann/json.hpp>
+
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
@@ -54,7 +57,17 @@ TEST_F(TreeCacheTest, NamesFollowAllFilesOfAFolderButItsSidecar) {
   EXPECT_NE(name_of("sog"), name);
 }
 
-TEST_F(TreeCacheTest, NamesFollowAllTilesets) {
+TEST_F(TreeCacheTest, NamesFollowTheDataBesideAGltfAndAllTilesets) {
+  GltfParts parts = encode_gltf(random_cloud(10, 0));
+  parts.json["buffers"][0]["uri"] = "a.bin";
+  write("a.gltf", parts.json.dump());
+  write("a.bin", parts.binary);
+  const std::string gltf = name_of("a.gltf");
+  age(folder_ / "a.gltf", 1h);
+  EXPECT_EQ(name_of("a.gltf"), gltf) << "the data is newer";
+  age(folder_ / "a.bin", 2h);
+  EXPECT_NE(name_of("a.gltf"), gltf);
+
   write("tiles/tileset.json", "{}");
   write("tiles/more/0.json", "{}");
   const std::string tiles = name_of("tiles");
