@@ -218,10 +218,10 @@ std::vector<Setting> picture_settings() {
       number("threads", "N", "Threads that render and encode; 0: one per processor", &C::threads, 0,
              1024),
       number("lod", "N",
-             "Streamed SOG, 3D Tiles: level of detail, 0 is the finest; -1: by --budget", &C::lod,
-             -1, 1000),
+             "Streamed SOG, 3D Tiles, LCC2: level of detail, 0 is the finest; -1: by --budget",
+             &C::lod, -1, 1000),
       number("budget", "N",
-             "Streamed SOG, 3D Tiles: the finest levels with at most so many Gaussians; 0: "
+             "Streamed SOG, 3D Tiles, LCC2: the finest levels with at most so many Gaussians; 0: "
              "no bound",
              &C::gaussian_budget, 0, 1'000'000'000),
       choice<EncoderKind>("encoder", "Video encoder", &C::encoder,

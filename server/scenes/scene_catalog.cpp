@@ -128,7 +128,7 @@ void check_scenes(const ServerConfig& config) {
       std::ranges::none_of(config.scenes, has_levels))
     throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
                      "no scene has levels of detail to choose from",
-                     "levels and budgets are for streamed SOG and 3D Tiles");
+                     "levels and budgets are for streamed SOG, 3D Tiles and LCC2");
 }
 
 std::shared_ptr<const SceneEntry> load_scene(

@@ -91,7 +91,12 @@ Content content_of(const SceneLocation& scene) {
     return content;
   }
   const bool all = scene.kind == SceneLocation::Kind::tiles_folder;
-  for (const auto& entry : fs::recursive_directory_iterator(scene.path))
+  // The folder of an .lcc2 may hold other scenes.
+  const bool lcc2 = scene.kind == SceneLocation::Kind::lcc2;
+  const fs::path folder = lcc2 ? scene.path / "data" : scene.path;
+  if (lcc2) content.add(scene.path / scene.index);
+  if (!fs::is_directory(folder)) return content;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
     if (entry.is_regular_file() &&
         (all || entry.path().extension() != ".json" || is_scene_index(entry.path())))
       content.add(entry.path());

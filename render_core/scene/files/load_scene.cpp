@@ -106,7 +106,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   SceneLocation location = locate_scene(path);
   if (!location.has_levels() && (options.lod || options.gaussian_budget))
     throw InputError(path.string(), "", "has no levels of detail to choose from",
-                     "levels and budgets are for streamed SOG and 3D Tiles");
+                     "levels and budgets are for streamed SOG, 3D Tiles and LCC2");
 
   Scene scene;
   scene.name = to_utf8(location.name);

@@ -23,7 +23,7 @@ struct LoadOptions {
 };
 
 /// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .ksplat,
-/// .spz, .sog, .ssog, .glb, .gltf or .tree. It may be a folder of 3D Tiles, or a streamed or
+/// .spz, .sog, .ssog, .glb, .gltf, .lcc2 or .tree. It may be a folder of 3D Tiles, or a streamed or
 /// unpacked SOG folder (or its tileset.json, lod-meta.json, meta.json), a training output folder
 /// (its newest iteration), or a folder with a single scene file. The content of a file decides its
 /// format before its name does. Throws InputError; the error for an unknown format lists the

@@ -92,7 +92,20 @@ SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
   return location;
 }
 
+/// Exporters call the file of a scene meta.lcc2, or as the scene is called.
+SceneLocation at_lcc2(const fs::path& file) {
+  std::error_code error;
+  const fs::path folder = fs::absolute(file, error).lexically_normal().parent_path();
+  SceneLocation location = at_folder(SceneLocation::Kind::lcc2, folder);
+  location.index = file.filename().string();
+  if (file.stem() == "meta") return location;
+  location.name = file.stem().string();
+  location.hints.sidecar = sidecar_of(file);
+  return location;
+}
+
 SceneLocation at_file(const fs::path& file) {
+  if (file.extension() == ".lcc2") return at_lcc2(file);
   SceneLocation location;
   if (file.extension() == ".ssog") location.kind = SceneLocation::Kind::streamed_sog_archive;
   location.path = file;
@@ -108,8 +121,8 @@ SceneLocation at_file(const fs::path& file) {
 }  // namespace
 
 bool is_scene_name(const fs::path& path) {
-  constexpr std::array extensions = {".ply",  ".splat", ".ksplat", ".spz", ".sog",
-                                     ".ssog", ".glb",   ".gltf",   ".tree"};
+  constexpr std::array extensions = {".ply",  ".splat", ".ksplat", ".spz",  ".sog",
+                                     ".ssog", ".glb",   ".gltf",   ".lcc2", ".tree"};
   return std::find(extensions.begin(), extensions.end(), path.extension().string()) !=
          extensions.end();
 }
@@ -121,8 +134,13 @@ bool is_scene_index(const fs::path& file) {
 
 bool has_scene_index(const fs::path& folder) {
   std::error_code error;
-  return std::ranges::any_of(
-      indices, [&](const auto& index) { return fs::exists(folder / index.first, error); });
+  if (std::ranges::any_of(
+          indices, [&](const auto& index) { return fs::exists(folder / index.first, error); }))
+    return true;
+  fs::directory_iterator entries(folder, error);
+  return std::any_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
+    return entry.path().extension() == ".lcc2";
+  });
 }
 
 SceneLocation locate_scene(const fs::path& given) {

@@ -11,8 +11,8 @@ namespace catgs {
 
 /// For error messages.
 inline constexpr std::string_view supported_scenes =
-    "supported: .ply (3DGS or compressed), .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf, .tree, "
-    "a folder with lod-meta.json (streamed SOG), meta.json (SOG) or tileset.json "
+    "supported: .ply (3DGS or compressed), .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf, .lcc2, "
+    ".tree, a folder with lod-meta.json (streamed SOG), meta.json (SOG) or tileset.json "
     "(3D Tiles), a training output folder";
 
 /// Whether a file has an extension of those formats.
@@ -20,12 +20,19 @@ bool is_scene_name(const std::filesystem::path& path);
 
 /// Whether a file stands for its folder as a scene: lod-meta.json, meta.json or tileset.json.
 bool is_scene_index(const std::filesystem::path& file);
-/// Whether a folder has such a file.
+/// Whether a folder has such a file, or one of LCC2.
 bool has_scene_index(const std::filesystem::path& folder);
 
 /// The scene that a path given by a user names.
 struct SceneLocation {
-  enum class Kind { file, sog_folder, streamed_sog_folder, streamed_sog_archive, tiles_folder };
+  enum class Kind {
+    file,
+    sog_folder,
+    streamed_sog_folder,
+    streamed_sog_archive,
+    tiles_folder,
+    lcc2
+  };
   Kind kind = Kind::file;
   std::filesystem::path path;  // of the file or the folder
   /// Whether there are levels of detail to choose from.
@@ -33,7 +40,8 @@ struct SceneLocation {
   [[nodiscard]] bool is_streamed_sog() const {
     return kind == Kind::streamed_sog_folder || kind == Kind::streamed_sog_archive;
   }
-  std::string name;  // for people
+  std::string index;  // the .lcc2 in the folder `path`
+  std::string name;   // for people
   HintFiles hints;
 };
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "render_core/scene/formats/lcc2.h"
 #include "render_core/scene/formats/streamed_sog.h"
 #include "render_core/scene/formats/tiles.h"
 
@@ -40,6 +41,8 @@ OpenLevels open_levels(const SceneLocation& location, const std::shared_ptr<cons
   assert(location.has_levels());
   if (location.kind == SceneLocation::Kind::tiles_folder)
     return open_tiles(files, "tileset.json", options.lod, options.gaussian_budget, most);
+  if (location.kind == SceneLocation::Kind::lcc2)
+    return open_lcc2(files, location.index, options.lod, options.gaussian_budget, most);
   return open_streamed(files, options, most);
 }
 

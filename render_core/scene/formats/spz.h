@@ -36,8 +36,8 @@ struct SpzSize {
 };
 SpzSize read_spz_size(const ByteSource& file);
 
-/// Axes of a cloud that was read: those of GaussianCloud, or whatever the file has. glTF says
-/// by itself which axes an .spz inside it has.
+/// Axes of a cloud that was read: those of GaussianCloud, or whatever the file has. glTF and LCC2
+/// say by themselves which axes the .spz inside them have.
 enum class SpzAxes { right_down_front, as_stored };
 
 /// Throws InputError.

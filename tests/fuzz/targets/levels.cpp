@@ -1,7 +1,8 @@
-// Scenes of many files with levels of detail: 3D Tiles.
+// Scenes of many files with levels of detail: 3D Tiles and LCC2.
 #include <iterator>
 #include <optional>
 
+#include "render_core/scene/formats/lcc2.h"
 #include "render_core/scene/formats/tiles.h"
 #include "tests/fuzz/target.h"
 #include "tests/fuzz/targets/packed_files.h"
@@ -52,6 +53,12 @@ void parse_levels(Bytes input, const Open& open) {
 void parse_tiles(Bytes input) {
   parse_levels<FilesWithGlb>(input, [](const auto& files, std::optional<std::size_t> budget) {
     return open_tiles(files, "tileset.json", {}, budget);
+  });
+}
+
+void parse_lcc2(Bytes input) {
+  parse_levels<PackedFiles>(input, [](const auto& files, std::optional<std::size_t> budget) {
+    return open_lcc2(files, "a.lcc2", {}, budget);
   });
 }
 
@@ -113,6 +120,27 @@ std::map<std::string, std::string> tiles_seeds() {
              "boundingVolume":{"sphere":[0,0,0,1]},"children":[{"content":{"uri":"d.glb"}}]}})")}};
 }
 
+std::map<std::string, std::string> lcc2_seeds() {
+  const auto folder = [](const std::string& index, const std::string& extension) {
+    std::map<std::string, std::string> files = {{"a.lcc2", index}};
+    for (const auto& [name, count] : {std::pair("0", 9), {"1", 4}, {"e", 2}})
+      files[name + extension] =
+          extension == ".spz" ? spz(static_cast<std::size_t>(count), 1)
+                              : test::zip(test::encode_sog(
+                                    test::random_cloud(static_cast<std::size_t>(count), 0), 1));
+    return packed(files);
+  };
+  return {{"spz", folder(R"({"version":"0.0.3","splatType":".spz","root":{"splatFiles":["0.spz",
+             "1.spz","e.spz"],"data":{"env":{"name":2}},"child":{"0":{"data":{"3dgs":{"name":1,
+             "start":0,"count":4}},"child":{"0":{"data":{"3dgs":{"name":0,"start":0,"count":5}}},
+             "1":{"data":{"3dgs":{"name":0,"start":5,"count":4}}}}}}}})",
+                         ".spz")},
+          {"sog", folder(R"({"splatType":".sog","root":{"files":["/0","1.sog"],"data":null,
+             "child":[{"data":{"3dgs":{"name":1,"count":3}},"child":null},{"data":{"3dgs":{"name":0,
+             "start":2,"count":6}}}]}})",
+                         ".sog")}};
+}
+
 }  // namespace
 
 std::vector<Target> levels_targets() {
@@ -124,6 +152,15 @@ std::vector<Target> levels_targets() {
                   "url": "refine": "ADD" "REPLACE" "transform": "boundingVolume": "box": "sphere":
                   "region": "extensionsRequired": "implicitTiling": "a.glb" "b.glb" "c/d.glb"
                   "c/t.json" "../b.glb" "tileset.json" b3dm)"),
+           .change = change_levels,
+           .max_bytes = 16384},
+          {.name = "lcc2",
+           .parse = parse_lcc2,
+           .seeds = lcc2_seeds,
+           .dictionary = words_of(
+               R"("version": "0.0.3" "splatType": ".spz" ".sog" "root": "splatFiles": "files":
+                  "data": "env": "name": "3dgs": "start": "count": "child": "0": "1": null
+                  "0.spz" "1.spz" "e.spz" "0.sog" "1.sog")"),
            .change = change_levels,
            .max_bytes = 16384}};
 }

@@ -90,9 +90,12 @@ TEST_F(SceneFolderTest, FindsFoldersWithLevels) {
   write("tiles/a.glb", encode_gltf(random_cloud(10, 0)).glb());
   write("tiles/tileset.json",
         R"({"asset": {"version": "1.1"}, "root": {"content": {"uri": "a.glb"}}})");
-  EXPECT_THAT(names(), ElementsAre("tiles"));
-  EXPECT_EQ(folders_.scan()[0].size.gaussians, 10u);
-  EXPECT_TRUE(folders_.scan()[0].has_levels);
+  write("lcc/meta.lcc2", R"({"splatType": ".spz", "root": {"splatFiles": ["0.spz"],
+    "data": {"3dgs": {"name": 0, "count": 20}}}})");
+  write("lcc/0.spz", encode_spz(random_cloud(20, 0), {.version = 4}));
+  EXPECT_THAT(names(), ElementsAre("lcc", "tiles"));
+  EXPECT_EQ(folders_.scan()[0].size.gaussians, 20u);
+  EXPECT_TRUE(folders_.scan()[1].has_levels);
 }
 
 TEST_F(SceneFolderTest, LeavesOutWhatCannotBeReadUntilItChanges) {

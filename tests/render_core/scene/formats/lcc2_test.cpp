@@ -1,0 +1,234 @@
+#include "render_core/scene/formats/lcc2.h"
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/scene/files/load_scene.h"
+#include "render_core/scene/files/scene_size.h"
+#include "render_core/scene/formats/sog.h"
+#include "render_core/scene/formats/spz.h"
+#include "render_core/scene/transform.h"
+#include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+using Json = nlohmann::json;
+
+Json node(std::size_t file, std::size_t start, std::size_t count, const Json& children = {}) {
+  Json node = {{"childNum", children.size()},
+               {"data", {{"3dgs", {{"name", file}, {"start", start}, {"count", count}}}}}};
+  for (std::size_t i = 0; i < children.size(); ++i) node["child"][std::to_string(i)] = children[i];
+  return node;
+}
+
+/// Right, down, front of a cloud with z up.
+void stand_up(GaussianCloud& cloud) {
+  const CloudTransform transform({{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0}, {}});
+  for (std::size_t i = 0; i < cloud.size(); ++i) transform.apply(cloud, i);
+}
+
+/// Two regions: the second one has two levels below its coarsest one.
+class Lcc2Test : public FolderTest {
+ protected:
+  void SetUp() override { use(".sog"); }
+
+  void use(const std::string& extension) {
+    extension_ = extension;
+    write_chunk("0", 90, 1);   // level 2 of both
+    write_chunk("1", 300, 2);  // level 1
+    write_chunk("2", 500, 1);  // level 0
+    write_chunk("env", 7, 0);
+    const Json fine = node(1, 100, 200, Json::array({node(2, 0, 400), node(2, 400, 100)}));
+    scene_ = {{"version", "0.0.3"}, {"splatType", extension}, {"totalLevels", 3}};
+    scene_["root"] = {{"splatFiles", Json::array()}, {"childNum", 2}};
+    for (const char* name : {"0", "1", "2", "env"})
+      scene_["root"]["splatFiles"].push_back("data/3dgs/" + std::string(name) + extension);
+    scene_["root"]["child"]["0"] = node(0, 0, 40, Json::array({node(1, 0, 100)}));
+    scene_["root"]["child"]["1"] = node(0, 40, 50, Json::array({fine}));
+  }
+
+  void write_chunk(const std::string& name, std::size_t count, int degree) {
+    GaussianCloud& cloud = clouds_[name];
+    const std::string path = "data/3dgs/" + name + extension_;
+    cloud = random_cloud(count, degree, static_cast<unsigned>(count));
+    if (extension_ == ".sog") {
+      write(path, zip(encode_sog(cloud, 2)));
+      cloud = read_sog(ZipFiles(FileSource(folder_ / path)), "meta.json", two_threads()).cloud;
+    } else {
+      write(path, encode_spz(cloud, {.version = 4, .coordinate_system = 4}));
+      cloud = read_spz(FileSource(folder_ / path), two_threads(), SpzAxes::as_stored).cloud;
+    }
+    stand_up(cloud);
+  }
+
+  OpenLevels open(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
+    write("hall.lcc2", scene_.dump());
+    return open_lcc2(std::make_shared<FolderFiles>(folder_.path()), "hall.lcc2", level, budget);
+  }
+  std::string error_of(const std::function<void(Json& scene)>& change) {
+    const Json before = scene_;
+    change(scene_);
+    const std::string error = input_error([&] { open(); });
+    scene_ = before;
+    return error;
+  }
+
+  std::string extension_;
+  std::map<std::string, GaussianCloud> clouds_;  // in right, down, front
+  Json scene_;
+};
+
+TEST_F(Lcc2Test, LeavesAreTheFinestLevel) {
+  for (const char* extension : {".sog", ".spz"}) {
+    use(extension);
+    EXPECT_EQ(open().levels, 3);
+    EXPECT_EQ(open().format, "LCC2 (level 0 of 0…2)");
+    EXPECT_EQ(open().count, 100u + 500);  // the first region ends at level 1
+    EXPECT_EQ(open(1).count, 300u);
+    EXPECT_EQ(open(2).count, 90u);
+    EXPECT_EQ(open({}, 599).count, 300u);
+    EXPECT_EQ(open({}, 250).count, 90u + 60);  // only the first region's next level fits
+    EXPECT_THAT(input_error([&] { open({}, 89); }), HasSubstr("89 is less than the 90"));
+    EXPECT_THAT(open().notes, Contains(HasSubstr("originated from XGRIDS")));
+  }
+}
+
+TEST_F(Lcc2Test, GaussiansStandUp) {
+  for (const char* extension : {".sog", ".spz"}) {
+    use(extension);
+    const GaussianCloud whole = read_levels(open(), two_threads());
+    ASSERT_EQ(whole.size(), 600u);
+    EXPECT_EQ(whole.sh_degree, 2);
+    const GaussianCloud &first = clouds_["1"], &fine = clouds_["2"];
+    for (std::size_t i = 0; i < 100; ++i) {
+      ASSERT_EQ(whole.mean[i], first.mean[i]);
+      ASSERT_EQ(whole.sh_of(i)[8], first.sh_of(i)[8]);
+    }
+    for (std::size_t i = 0; i < 500; ++i) {
+      ASSERT_EQ(whole.mean[100 + i], fine.mean[i]);
+      ASSERT_EQ(whole.sh_of(100 + i)[3], fine.sh_of(i)[3]);
+      ASSERT_EQ(whole.sh_of(100 + i)[8], glm::vec3(0.0f));
+    }
+    // Of a file's middle.
+    const GaussianCloud middle = read_levels(open({}, 250), two_threads());
+    EXPECT_EQ(middle.mean[0], clouds_["0"].mean[40]);
+    EXPECT_EQ(middle.mean[50], first.mean[0]);
+  }
+}
+
+TEST_F(Lcc2Test, SurroundingsBelongToEveryLevel) {
+  scene_["root"]["data"]["env"]["name"] = 3;
+  EXPECT_EQ(open().count, 607u);
+  EXPECT_EQ(open(2).count, 97u);
+  EXPECT_EQ(open({}, 306).count, 97u + 60);
+  EXPECT_THAT(input_error([&] { open({}, 96); }), HasSubstr("96 is less than the 97"));
+  const GaussianCloud whole = read_levels(open(), two_threads());
+  EXPECT_EQ(whole.mean[606], clouds_["env"].mean[6]);
+  scene_["root"]["data"] = nullptr;
+  EXPECT_EQ(open().count, 600u);
+}
+
+TEST_F(Lcc2Test, EarlierNamesOfFieldsAreKnown) {
+  Json& root = scene_["root"];
+  root.erase("splatFiles");
+  root["files"] = {"/data/3dgs/0", "/data/3dgs/1", "/data/3dgs/2.sog"};
+  root["child"] = Json::array({root["child"]["0"], root["child"]["1"]});
+  scene_.erase("splatType");
+  EXPECT_EQ(open().count, 600u);
+}
+
+TEST_F(Lcc2Test, IsFoundByItsFileAndItsFolder) {
+  open();
+  const Scene scene = load_scene(folder_ / "hall.lcc2");
+  EXPECT_EQ(scene.name, "hall");
+  EXPECT_EQ(scene.format, "LCC2 (level 0 of 0…2)");
+  write("hall.json", R"({"near": 0.125})");
+  LoadOptions coarse;
+  coarse.lod = 2;
+  EXPECT_EQ(load_scene(folder_.path(), coarse).hints.near_z, 0.125f);
+  EXPECT_EQ(read_scene_size(folder_ / "hall.lcc2", coarse).gaussians, 90u);
+  EXPECT_EQ(read_scene_size(folder_ / "hall.lcc2").sh_degree, 2);
+  std::filesystem::rename(folder_ / "hall.lcc2", folder_ / "meta.lcc2");
+  EXPECT_EQ(load_scene(folder_ / "meta.lcc2").name, folder_.path().filename().string());
+}
+
+TEST_F(Lcc2Test, ErrorsNameTheField) {
+  EXPECT_THAT(error_of([](Json& j) { j["version"] = "1.0"; }),
+              HasSubstr("hall.lcc2: version: is not supported"));
+  EXPECT_THAT(error_of([](Json& j) { j["splatType"] = ".ply"; }), HasSubstr("splatType"));
+  EXPECT_THAT(error_of([](Json& j) { j.erase("root"); }), HasSubstr("'root' is missing"));
+  EXPECT_THAT(error_of([](Json& j) { j["root"].erase("splatFiles"); }), HasSubstr("'files'"));
+  EXPECT_THAT(error_of([](Json& j) { j["root"].erase("child"); }),
+              HasSubstr("root: holds no Gaussians"));
+  EXPECT_THAT(error_of([](Json& j) { j["root"]["child"]["0"]["data"]["3dgs"]["name"] = 4; }),
+              HasSubstr("root.child.0.data.3dgs.name: is 4, and there are 4"));
+  EXPECT_THAT(error_of([](Json& j) { j["root"]["data"]["env"]["name"] = -1; }),
+              HasSubstr("root.data.env.name"));
+  EXPECT_THAT(
+      error_of([](Json& j) { j["root"]["child"]["0"]["data"]["3dgs"]["start"] = 1ull << 60; }),
+      HasSubstr("root.child.0.data.3dgs: is out of range"));
+}
+
+TEST_F(Lcc2Test, RangesAreThereAndDoNotOverlap) {
+  const auto fine = [](Json& j) -> Json& {
+    return j["root"]["child"]["1"]["child"]["0"]["child"]["1"]["data"]["3dgs"];
+  };
+  EXPECT_THAT(error_of([&](Json& j) { fine(j)["count"] = 101; }),
+              HasSubstr("Gaussians 400 to 501 of data/3dgs/2.sog overlap others or are not there"));
+  EXPECT_THAT(error_of([&](Json& j) { fine(j)["start"] = 399; }),
+              HasSubstr("Gaussians 399 to 499 of data/3dgs/2.sog overlap"));
+}
+
+TEST_F(Lcc2Test, NoNameLeadsOutAndNoFileIsUsedTwice) {
+  for (const char* name : {"../2.sog", "/etc/passwd", ""})
+    EXPECT_THAT(error_of([&](Json& j) { j["root"]["splatFiles"][2] = name; }),
+                HasSubstr("leads out of the folder"));
+  EXPECT_THAT(error_of([&](Json& j) { j["root"]["splatFiles"][2] = "data/3dgs/1.sog"; }),
+              HasSubstr("data/3dgs/1.sog: is used a second time"));
+  EXPECT_THAT(error_of([&](Json& j) { j["root"]["data"]["env"]["name"] = 2; }),
+              HasSubstr("is used a second time"));
+}
+
+TEST_F(Lcc2Test, DepthsAndNumbersHaveBounds) {
+  EXPECT_THAT(error_of([](Json& j) {
+                for (int i = 0; i < 70; ++i) {
+                  const Json inner = j["root"]["child"];
+                  j["root"]["child"] = Json::object();
+                  j["root"]["child"]["0"]["child"] = inner;
+                }
+              }),
+              HasSubstr("lies deeper than 64"));
+  EXPECT_THAT(
+      error_of([](Json& j) { j["root"]["child"] = std::vector<Json>(65'536, Json::object()); }),
+      HasSubstr("root.child[65535]: is one of more than 65536"));
+  EXPECT_THAT(error_of([](Json& j) {
+                j["root"]["splatFiles"] = std::vector<std::string>(65'537, "a.sog");
+              }),
+              HasSubstr("splatFiles: has more than 65536"));
+  EXPECT_THAT(error_of([](Json& j) { j["root"]["splatFiles"][0] = std::string(5000, 'a'); }),
+              HasSubstr("splatFiles[0]: has more than 4096 bytes"));
+  write("hall.lcc2", std::string((32 << 20) + 1, ' '));
+  EXPECT_THAT(input_error([&] {
+                open_lcc2(std::make_shared<FolderFiles>(folder_.path()), "hall.lcc2", {}, {});
+              }),
+              HasSubstr("hall.lcc2"));
+}
+
+TEST_F(Lcc2Test, AFileThatChangesWhileItIsReadIsRefused) {
+  use(".spz");
+  const OpenLevels scene = open();
+  write("data/3dgs/2.spz", encode_spz(random_cloud(501, 1), {.version = 4}));
+  EXPECT_THAT(input_error([&] { read_levels(scene, two_threads()); }), HasSubstr("was changed"));
+}
+
+}  // namespace
+}  // namespace catgs::test
