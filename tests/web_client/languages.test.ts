@@ -146,7 +146,7 @@ describe('texts for people', () => {
     }
     expect(files.length).toBeGreaterThan(60);
     expect(loose).toEqual([]);
-  });
+  }, 60_000); // it parses the whole client
 });
 
 // The compiler refuses a language that lacks a text, or has one too many.
