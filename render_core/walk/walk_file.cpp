@@ -1,0 +1,228 @@
+#include "render_core/walk/walk_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <zlib.h>
+
+#include "render_core/base/error.h"
+#include "render_core/base/part_file.h"
+#include "render_core/math/camera.h"
+
+namespace catgs::walk {
+namespace {
+
+struct Header {
+  static constexpr std::array<char, 8> right_magic = {'c', 'a', 't', 'g', 's', 'w', 'l', 'k'};
+  static constexpr std::uint32_t right_version = 1;
+
+  std::array<char, 8> magic = right_magic;
+  std::uint32_t version = right_version;
+  std::uint32_t checksum = 0;  // CRC-32 of all bytes behind it
+  std::array<float, 3> origin{};
+  std::array<float, 9> axes{};  // east, north, up
+  float cell = 0.0f;
+  std::array<float, 5> person{};  // radius, height, step, slope, chest: shares of the eye height
+  float cells_per_eye_height = walk::cells_per_eye_height;
+  std::array<float, 3> start{};  // east, north, height; cells
+  std::array<std::uint32_t, 2> size{};
+  std::uint32_t places = 0;
+  std::uint32_t unpacked_bytes = 0;
+  std::uint32_t packed_bytes = 0;  // the stream, up to the end of the file
+  std::uint32_t storeys = 0;
+  std::array<Storey, most_storeys> storey{};
+};
+static_assert(sizeof(Storey) == 12 && sizeof(Header) == 320);
+
+constexpr std::string_view damaged = "the file is damaged: compute it again";
+
+std::uint32_t checksum_of(std::span<const std::byte> bytes) {
+  constexpr std::size_t skipped = offsetof(Header, checksum) + sizeof(Header::checksum);
+  const std::span rest = bytes.subspan(skipped);
+  return static_cast<std::uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(rest.data()), rest.size()));
+}
+
+class Reader {
+ public:
+  explicit Reader(const ByteSource& file) : file_(file) {}
+
+  WalkMap read() {
+    constexpr std::uint64_t most_bytes = std::uint64_t{1} << 27;
+    const std::vector<std::byte> bytes = file_.read_all(most_bytes);
+    require(bytes.size() >= sizeof header_, "header", "is cut off");
+    header_ = load_as<Header>(bytes.data());
+    require(header_.magic == Header::right_magic, "magic", "is not that of a .walk file");
+    require(header_.version == Header::right_version, "version", "is not known");
+    require(header_.checksum == checksum_of(bytes), "checksum", "is wrong");
+    read_header();
+    constexpr std::size_t most_growth = 1032;  // of deflate
+    require(header_.packed_bytes == bytes.size() - sizeof header_ &&
+                header_.unpacked_bytes / most_growth <= header_.packed_bytes,
+            "packed bytes", "are not those of the stream");
+    read_places(unpacked(std::span(bytes).subspan(sizeof header_)));
+    const glm::ivec2 start(glm::floor(map_.start.place));
+    require(map_.clear_at(start, map_.start.height), "start", "is no clear ground");
+    return std::move(map_);
+  }
+
+ private:
+  void require(bool right, std::string_view field, std::string_view what) const {
+    if (!right) throw InputError(file_.name(), field, what, damaged);
+  }
+
+  void read_header() {
+    const Header& h = header_;
+    const auto in = [](const auto& values, float low, float high) {
+      return std::ranges::all_of(values, [&](float v) { return v >= low && v <= high; });
+    };
+    require(in(h.origin, -2 * max_coordinate, 2 * max_coordinate), "origin", "is out of range");
+    map_.grid.origin = glm::make_vec3(h.origin.data());
+    map_.grid.axes = glm::make_mat3(h.axes.data());
+    const glm::mat3 square = glm::transpose(map_.grid.axes) * map_.grid.axes;
+    bool turned = in(h.axes, -1.01f, 1.01f) && glm::determinant(map_.grid.axes) > 0.0f;
+    for (int k = 0; k < 9; ++k)
+      turned &= std::abs(square[k / 3][k % 3] - (k % 4 == 0 ? 1.0f : 0.0f)) < 1e-3f;
+    require(turned, "axes", "are no rotation");
+    require(h.cell > 0.0f && h.cell <= max_coordinate, "cell", "is out of range");
+    map_.grid.cell = h.cell;
+    require(in(h.person, 0.01f, 10.0f) && h.cells_per_eye_height == walk::cells_per_eye_height,
+            "person", "is out of range");
+    map_.person = {h.person[0], h.person[1], h.person[2], h.person[3], h.person[4]};
+    require(in(h.start, 0.0f, grid_side), "start", "is out of range");
+    map_.start = {{h.start[0], h.start[1]}, h.start[2]};
+    require(h.size[0] >= 1 && h.size[0] <= grid_side && h.size[1] >= 1 && h.size[1] <= grid_side,
+            "size", "is out of range");
+    map_.size = glm::ivec2(h.size[0], h.size[1]);
+    const std::size_t columns = std::size_t{h.size[0]} * h.size[1];
+    require(h.places <= std::min(most_places, columns * most_in_column), "places", "are too many");
+    require(h.unpacked_bytes >= columns + 2 * std::size_t{h.places} &&
+                h.unpacked_bytes <= columns + 4 * std::size_t{h.places},
+            "unpacked bytes", "are not those of the places");
+    require(h.storeys >= 1 && h.storeys <= most_storeys, "storeys", "are not 1 to 16");
+    for (std::uint32_t k = 0; k < h.storeys; ++k) {
+      const Storey& s = h.storey[k];
+      const float below = k > 0 ? h.storey[k - 1].low : 0.0f;
+      require(s.low >= below && s.low <= grid_levels && s.level >= 0.0f && s.level <= grid_levels,
+              "storeys", "are out of range");
+      map_.storeys.push_back(s);
+    }
+  }
+
+  [[nodiscard]] std::vector<std::byte> unpacked(std::span<const std::byte> packed) const {
+    std::vector<std::byte> bytes(header_.unpacked_bytes);
+    uLongf size = bytes.size();
+    const int result = uncompress(reinterpret_cast<Bytef*>(bytes.data()), &size,
+                                  reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+    require(result == Z_OK && size == bytes.size(), "stream", "cannot be unpacked");
+    return bytes;
+  }
+
+  void read_places(std::span<const std::byte> bytes) {
+    const std::size_t columns = std::size_t{header_.size[0]} * header_.size[1];
+    const std::span counts = bytes.first(columns), kinds = bytes.subspan(columns, header_.places);
+    bytes = bytes.subspan(columns + header_.places);
+    map_.first.reserve(columns + 1);
+    map_.first.push_back(0);
+    map_.places.reserve(header_.places);
+    std::array<int, most_in_column> last{};
+    for (const std::byte count : counts) {
+      const auto in_column = static_cast<std::size_t>(count);
+      require(in_column <= std::min(most_in_column, header_.places - map_.places.size()), "columns",
+              "have other places than the file");
+      for (std::size_t k = 0; k < in_column; ++k) {
+        const auto kind = static_cast<std::uint8_t>(kinds[map_.places.size()]);
+        last[k] += read_difference(bytes);
+        const bool right = kind <= static_cast<std::uint8_t>(Kind::obstacle) && last[k] >= 0 &&
+                           last[k] < grid_levels * static_cast<int>(Place::per_cell) &&
+                           (k == 0 || last[k] > last[k - 1]);
+        require(right, "a place", "is out of range");
+        map_.places.push_back({static_cast<std::uint16_t>(last[k]), static_cast<Kind>(kind)});
+      }
+      map_.first.push_back(static_cast<std::uint32_t>(map_.places.size()));
+    }
+    require(map_.places.size() == header_.places && bytes.empty(), "columns",
+            "have other places than the file");
+  }
+
+  /// Takes a zigzag varint of at most three bytes.
+  int read_difference(std::span<const std::byte>& bytes) const {
+    std::uint32_t code = 0;
+    for (int shift = 0; shift < 21; shift += 7) {
+      require(!bytes.empty(), "heights", "are cut off");
+      const auto byte = static_cast<std::uint32_t>(bytes.front());
+      bytes = bytes.subspan(1);
+      code |= (byte & 127u) << shift;
+      if (byte < 128u) return static_cast<int>(code >> 1) ^ -static_cast<int>(code & 1u);
+    }
+    throw InputError(file_.name(), "heights", "are out of range", damaged);
+  }
+
+  const ByteSource& file_;
+  Header header_;
+  WalkMap map_;
+};
+
+}  // namespace
+
+std::string stream_of(const WalkMap& map) {
+  std::string counts, kinds, heights;
+  std::array<int, most_in_column> last{};
+  for (std::size_t c = 0; c + 1 < map.first.size(); ++c) {
+    counts.push_back(static_cast<char>(map.first[c + 1] - map.first[c]));
+    for (std::uint32_t i = map.first[c]; i < map.first[c + 1]; ++i) {
+      kinds.push_back(static_cast<char>(map.places[i].kind));
+      const int height = map.places[i].height;
+      const int d = height - std::exchange(last[i - map.first[c]], height);
+      std::uint32_t code = static_cast<std::uint32_t>(d) << 1 ^ static_cast<std::uint32_t>(d >> 31);
+      for (; code >= 128; code >>= 7) heights.push_back(static_cast<char>(code | 128));
+      heights.push_back(static_cast<char>(code));
+    }
+  }
+  return counts + kinds + heights;
+}
+
+std::string pack(const WalkMap& map) {
+  const std::string stream = stream_of(map);
+  uLongf size = compressBound(stream.size());
+  std::string bytes(sizeof(Header) + size, '\0');
+  compress2(reinterpret_cast<Bytef*>(bytes.data() + sizeof(Header)), &size,
+            reinterpret_cast<const Bytef*>(stream.data()), stream.size(), Z_BEST_COMPRESSION);
+  bytes.resize(sizeof(Header) + size);
+  Header h;
+  std::memcpy(h.origin.data(), &map.grid.origin, sizeof h.origin);
+  std::memcpy(h.axes.data(), &map.grid.axes, sizeof h.axes);
+  h.cell = map.grid.cell;
+  const Person& p = map.person;
+  h.person = {p.radius, p.height, p.step, p.slope, p.chest};
+  h.start = {map.start.place.x, map.start.place.y, map.start.height};
+  h.size = {static_cast<std::uint32_t>(map.size.x), static_cast<std::uint32_t>(map.size.y)};
+  h.places = static_cast<std::uint32_t>(map.places.size());
+  h.unpacked_bytes = static_cast<std::uint32_t>(stream.size());
+  h.packed_bytes = static_cast<std::uint32_t>(size);
+  h.storeys = static_cast<std::uint32_t>(std::min(map.storeys.size(), most_storeys));
+  std::copy_n(map.storeys.begin(), h.storeys, h.storey.begin());
+  for (std::size_t k = h.storeys; k < map.storeys.size(); ++k)
+    h.storey[h.storeys - 1].area += map.storeys[k].area;
+  std::memcpy(bytes.data(), &h, sizeof h);
+  h.checksum = checksum_of(std::as_bytes(std::span(bytes)));
+  std::memcpy(bytes.data(), &h, sizeof h);
+  return bytes;
+}
+
+void write_walk_file(const WalkMap& map, const std::filesystem::path& path) {
+  const std::string bytes = pack(map);
+  PartFile file(path);
+  file.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.finish();
+}
+
+WalkMap read_walk_file(const ByteSource& file) { return Reader(file).read(); }
+
+}  // namespace catgs::walk

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/walk/walk_map.h"
+
+namespace catgs::walk {
+
+// A .walk file: a header of 320 bytes, then one zlib stream (RFC 1950). All is little-endian. The
+// stream has three parts:
+//
+//   1. The number of places of each column, a byte each, row by row: east first, then north
+//   2. The kind of each place, a byte each
+//   3. The height of each place: the difference to the last height of the same rank in a column
+//      (lowest, second…; 0 before the first), as a zigzag varint: (d << 1) ^ (d >> 31), seven bits
+//      a byte, low bits first, bit 7 where more follow
+
+inline constexpr std::size_t most_places = std::size_t{1} << 24, most_in_column = 64;
+inline constexpr std::size_t most_storeys = 16;
+
+/// The three parts of the stream, before it is packed.
+std::string stream_of(const WalkMap& map);
+
+/// The bytes of a file. Storeys beyond most_storeys join the highest one.
+std::string pack(const WalkMap& map);
+void write_walk_file(const WalkMap& map, const std::filesystem::path& path);
+
+/// Throws InputError that names the field that is wrong. All values of the map are in range, the
+/// places of a column ascend, and the start is clear ground.
+WalkMap read_walk_file(const ByteSource& file);
+
+}  // namespace catgs::walk

@@ -1,0 +1,101 @@
+#include "render_core/walk/find_ground.h"
+
+#include <gtest/gtest.h>
+
+#include "render_core/base/error.h"
+#include "render_core/walk/walk_file.h"
+#include "render_core/walk/walker.h"
+#include "tests/render_core/walk/worlds.h"
+
+namespace catgs::walk {
+namespace {
+
+Stand stand_at(const WalkMap& map, const glm::vec3& place) {
+  const auto stand = stand_below(map, place);
+  EXPECT_TRUE(stand) << place.x << " " << place.y;
+  return stand.value_or(Stand{});
+}
+
+TEST(FindGround, ADoorIsPassedAndANarrowGapIsNot) {
+  const glm::vec3 start(2, 2, 1.6f), beyond(6, 3, 1.6f);
+  const WalkMap wide = test::map_of(test::room(0.9f), start);
+  EXPECT_FALSE(find_path(wide, stand_at(wide, start), stand_at(wide, beyond)).empty());
+  const WalkMap narrow = test::map_of(test::room(0.4f), start);
+  EXPECT_TRUE(stand_below(narrow, start));
+  EXPECT_FALSE(stand_below(narrow, beyond));
+}
+
+TEST(FindGround, KeepsABodysRadiusFromWallsAndKnowsTablesFromWalls) {
+  const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
+  EXPECT_FALSE(stand_below(map, {0.15f, 2, 1}));
+  EXPECT_TRUE(stand_below(map, {0.45f, 2, 1}));
+  EXPECT_FALSE(stand_below(map, {1.5f, 4.5f, 1.6f}));  // under the table, and on it
+  const auto has = [&](const glm::vec3& place, Kind kind) {
+    for (const Place& p : map.at(glm::ivec2(map.grid.from_world(place))))
+      if (p.kind == kind) return true;
+    return false;
+  };
+  EXPECT_TRUE(has({1.05f, 4.5f, 0}, Kind::low));
+  EXPECT_TRUE(has({4.02f, 1, 0}, Kind::obstacle));
+  EXPECT_TRUE(has({2, 0.2f, 0}, Kind::near));
+  EXPECT_TRUE(has({2, 1, 0}, Kind::clear));
+}
+
+TEST(FindGround, TheRoofIsNotGroundThatIsReached) {
+  const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
+  ASSERT_EQ(map.storeys.size(), 1u);
+  for (const Place& place : map.places) EXPECT_NEAR(place.cells(), map.start.height, 1.0f);
+}
+
+TEST(FindGround, StairsAreClimbedToAnotherStorey) {
+  const WalkMap map = test::map_of(test::stairs(), {0, 3, 1.6f});
+  const Stand below = stand_at(map, {0, 3, 1.6f}), above = stand_at(map, {9, 3, 4.3f});
+  EXPECT_NEAR((above.height - below.height) * map.grid.cell, 2.72f, 0.05f);
+  Stand at = below;
+  float largest_rise = 0.0f;
+  for (const Stand& turn : find_path(map, below, above))
+    for (int k = 0; k < 400 && glm::distance(at.place, turn.place) > 0.01f; ++k) {
+      const glm::vec2 way = turn.place - at.place;
+      const Stand next = move(map, at, way * std::min(1.0f, 0.5f / glm::length(way)));
+      largest_rise = std::max(largest_rise, std::abs(next.height - at.height));
+      at = next;
+    }
+  EXPECT_NEAR(at.height, above.height, 0.5f);
+  EXPECT_LT(largest_rise, Person::in_cells(map.person.step));
+  ASSERT_EQ(map.storeys.size(), 2u);
+  EXPECT_EQ(map.storey_at(below.height), 0u);
+  EXPECT_EQ(map.storey_at(above.height), 1u);
+}
+
+TEST(FindGround, NobodyFallsFromAnEdge) {
+  const WalkMap map = test::map_of(test::stairs(), {9, 3, 4.3f});
+  Stand at = stand_at(map, {9, 3, 4.3f});
+  for (int k = 0; k < 200; ++k) at = move(map, at, {-0.5f, 0.0f});  // towards the edge at 6.48
+  const glm::vec3 eyes = eyes_of(map, at);
+  EXPECT_GT(eyes.x, 6.48f);
+  EXPECT_NEAR(eyes.z, 2.72f + test::eye_m, 0.1f);
+}
+
+TEST(FindGround, SteepSlopesAreNoGround) {
+  for (const float degrees : {30.0f, 60.0f}) {
+    GaussianCloud cloud;
+    test::add_plate(cloud, {0, 0, 0}, {4, 0, 0}, {0, 6, 0});
+    const float rise = 3.0f * std::tan(degrees * 0.0174533f);
+    test::add_plate(cloud, {4, 0, 0}, {3, 0, rise}, {0, 6, 0});
+    const WalkMap map = test::map_of(cloud, {2, 3, 1.6f});
+    EXPECT_EQ(stand_below(map, {5.5f, 3, 5}).has_value(), degrees < 45.0f) << degrees;
+  }
+}
+
+TEST(FindGround, DependsNotOnTheThreads) {
+  const GaussianCloud cloud = test::room(0.9f);
+  EXPECT_EQ(pack(test::map_of(cloud, {2, 2, 1.6f}, 1)), pack(test::map_of(cloud, {2, 2, 1.6f}, 3)));
+}
+
+TEST(FindGround, NoGroundIsAnError) {
+  EXPECT_THROW(test::map_of(test::room(0.9f), {2, 2, -5}), InputError);
+  EXPECT_THROW(test::map_of({}, {0, 0, 0}), InputError);
+}
+
+}  // namespace
+}  // namespace catgs::walk
