@@ -33,12 +33,14 @@ inline bool is_quiet(const CLI::App& command) {
 void add_bench_command(CLI::App& app);
 void add_compare_command(CLI::App& app);
 void add_convert_command(CLI::App& app);
+void add_floors_command(CLI::App& app);
 void add_formats_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
 void add_info_command(CLI::App& app);
 void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
+void add_walk_command(CLI::App& app);
 // Subcommands of `trace`, which adds them.
 void add_trace_forecast_command(CLI::App& trace);
 void add_trace_windows_command(CLI::App& trace);

@@ -30,12 +30,14 @@ int run(int argc, char** argv) {
   add_bench_command(app);
   add_compare_command(app);
   add_convert_command(app);
+  add_floors_command(app);
   add_formats_command(app);
   add_frames_command(app);
   add_info_command(app);
   add_paper_command(app);
   add_synth_command(app);
   add_trace_command(app);
+  add_walk_command(app);
 
   try {
     parse_command_line(app, argc, argv);

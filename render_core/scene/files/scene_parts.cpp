@@ -146,6 +146,7 @@ std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
     }
     return dropped;
   };
+  scene.sample = std::move(sample);
   return scene;
 }
 

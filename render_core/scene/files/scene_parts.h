@@ -17,7 +17,8 @@ namespace catgs {
 /// A scene that is read in parts.
 struct PartedScene {
   SceneParts parts;                // as load_scene() has them; they keep the file open
-  SceneHints hints;                // as load_scene() finds them, from an even sample; if wanted
+  GaussianCloud sample;            // an even sample of at most 2^16
+  SceneHints hints;                // as load_scene() finds them, from the sample; if wanted
   std::vector<std::string> notes;  // as Scene::notes
 };
 

@@ -1,0 +1,146 @@
+// catgs-render floors: where people can walk in a scene.
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include "render_core/base/error.h"
+#include "render_core/base/part_file.h"
+#include "render_core/image/png.h"
+#include "render_core/scene/files/scene_parts.h"
+#include "render_core/scene/tree/read_tree.h"
+#include "render_core/tools/commands.h"
+#include "render_core/tools/progress.h"
+#include "render_core/tools/render/tree_output.h"
+#include "render_core/tools/scene_options.h"
+#include "render_core/tools/walk/plan_files.h"
+#include "render_core/walk/eye_height.h"
+#include "render_core/walk/find_ground.h"
+#include "render_core/walk/walk_file.h"
+
+namespace catgs {
+namespace {
+
+struct FloorsOptions {
+  SceneOptions scene;
+  std::string out;
+  std::optional<float> eye_height;
+  std::string plan;
+  int threads = 0;
+};
+
+/// A scene whose Gaussians are taken part by part.
+struct Parts {
+  SceneHints hints;
+  GaussianCloud sample;
+  std::function<void(const std::function<void(const GaussianCloud&)>& take)> each;
+};
+
+/// The leaves of a tree, 256 K Gaussians at a time.
+Parts parts_of_tree(const SceneInPages& scene, const std::shared_ptr<ThreadPool>& pool) {
+  const auto each = [tree = scene.tree, pool](const auto& take) {
+    constexpr std::uint32_t leaves_of_part = 1024;
+    const std::uint32_t leaves = tree->shape().leaves();
+    for (std::uint32_t first = 0; first < leaves; first += leaves_of_part) {
+      std::vector<NodeId> nodes;
+      for (std::uint32_t k = first; k < std::min(leaves, first + leaves_of_part); ++k)
+        nodes.push_back({0, k});
+      take(read_nodes(*tree, nodes, LoadContext(*pool)));
+    }
+  };
+  return {scene.outline.hints, scene.outline.cloud, each};
+}
+
+Parts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>& pool,
+                 bool quiet) {
+  if (is_tree_name(options.scene.path))
+    return parts_of_tree(open_in_pages(options.scene, options.threads, quiet), pool);
+  LoadOptions load;
+  load.up = up_of(options.scene);
+  load.model = model_of(options.scene);
+  // A start that is estimated from a sample may lie beyond the walls.
+  if (!options.scene.lod && !options.scene.budget)
+    if (auto scene = scene_in_parts(options.scene.path, load, pool);
+        scene && scene->hints.source != "estimated")
+      return {scene->hints, std::move(scene->sample),
+              [each = scene->parts.each](const auto& take) { each(take); }};
+  auto scene = std::make_shared<Scene>(load_scene(options.scene, options.threads, quiet));
+  return {scene->hints, scene->cloud, [scene](const auto& take) { take(scene->cloud); }};
+}
+
+float eye_height_of(const FloorsOptions& options, const Parts& parts) {
+  if (options.eye_height) {
+    if (!(*options.eye_height > 0.0f && *options.eye_height <= 1e6f))
+      throw InputError("--eye-height", "", fmt::format("{} is no height", *options.eye_height),
+                       "in the scene's units, over 0");
+    return *options.eye_height;
+  }
+  const auto estimate = walk::estimate_eye_height(parts.sample, parts.hints);
+  if (!estimate)
+    throw InputError(options.scene.path, "",
+                     "has no floor and ceiling at its start that would tell how large a person is",
+                     "give --eye-height in the scene's units: 1.6 where these are metres");
+  return *estimate;
+}
+
+void floors(const FloorsOptions& options, bool quiet) {
+  using Clock = std::chrono::steady_clock;
+  const auto seconds_since = [](Clock::time_point t) {
+    return std::chrono::duration<double>(Clock::now() - t).count();
+  };
+  check_writable(options.out);
+  const auto pool = std::make_shared<ThreadPool>(options.threads);
+  const auto begin = Clock::now();
+  const Parts parts = open_parts(options, pool, quiet);
+  const float eye_height = eye_height_of(options, parts);
+  const glm::vec3& start = parts.hints.start_pose.position;
+  walk::Occupancy occupancy(walk::grid_around(start, parts.hints.up, eye_height));
+  const double opened_s = seconds_since(begin);
+  double adding_s = 0.0;
+  std::uint64_t gaussians = 0;
+  parts.each([&](const GaussianCloud& part) {
+    const auto adds = Clock::now();
+    occupancy.add(part, *pool);
+    gaussians += part.size();
+    adding_s += seconds_since(adds);
+  });
+  const auto searches = Clock::now();
+  const walk::WalkMap map = walk::find_ground(occupancy, {}, start, options.scene.path, *pool);
+  const double search_s = seconds_since(searches);
+  walk::write_walk_file(map, options.out);
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  fmt::print("{}: {} Gaussians, eye height {:.4g}{}, cells of {:.4g}\n", options.out, gaussians,
+             eye_height, options.eye_height ? "" : " (estimated)", occupancy.grid().cell);
+  print_map(map, std::filesystem::file_size(options.out));
+  fmt::print(
+      "opened in {:.1f} s, occupancy {:.1f} s of {:.1f} s with reading, ground {:.1f} s; "
+      "cells {:.0f} MB, peak memory {:.0f} MB\n",
+      opened_s, adding_s, seconds_since(begin) - opened_s - search_s, search_s,
+      1e-6 * static_cast<double>(occupancy.bytes()),
+      1e-3 * static_cast<double>(usage.ru_maxrss) * 1.024);
+  if (!options.plan.empty()) write_plans(map, options.plan);
+}
+
+}  // namespace
+
+void add_floors_command(CLI::App& app) {
+  auto options = std::make_shared<FloorsOptions>();
+  CLI::App* command = app.add_subcommand("floors", "Finds where people can walk in a scene");
+  add_scene_options(*command, options->scene);
+  command->add_option("out", options->out, "File to write, .walk")->required();
+  command->add_option("--eye-height", options->eye_height,
+                      "Of a person, in the scene's units [from the room's height at the start]");
+  command->add_option("--plan", options->plan,
+                      "Also write the floor plan as PNG; of several storeys, one each");
+  command->add_option("--threads", options->threads, "0: one per processor")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  command->callback([options, command] { floors(*options, is_quiet(*command)); });
+}
+
+}  // namespace catgs
