@@ -35,8 +35,9 @@ constexpr std::array<Side, 6> sides = {{
 /// The direction of pixel (x, y), in the camera's axes.
 glm::vec3 direction_of(int x, int y, glm::ivec2 size_px) {
   constexpr float pi = std::numbers::pi_v<float>;
-  const float longitude = 2.0f * pi * ((static_cast<float>(x) + 0.5f) / size_px.x - 0.5f);
-  const float latitude = pi * (0.5f - (static_cast<float>(y) + 0.5f) / size_px.y);  // up
+  const glm::vec2 size = size_px;
+  const float longitude = 2.0f * pi * ((static_cast<float>(x) + 0.5f) / size.x - 0.5f);
+  const float latitude = pi * (0.5f - (static_cast<float>(y) + 0.5f) / size.y);  // up
   return {std::cos(latitude) * std::sin(longitude), -std::sin(latitude),
           std::cos(latitude) * std::cos(longitude)};
 }
