@@ -20,6 +20,7 @@ struct SceneAbout {
   std::string licence{};
   CameraMode mode = CameraMode::unspecified;
   std::uint32_t background_rgb = 0;  // 0xRRGGBB, sRGB: shows where no Gaussian is
+  float metres_per_unit = 0.0f;      // of world units; 0: not said
 
   bool operator==(const SceneAbout&) const = default;
 };

@@ -232,6 +232,7 @@ struct QueuePlace {
 struct Picked {
   std::uint32_t id = 0;
   std::optional<float> distance;  // none: nothing was hit
+  float spread = 0.0f;            // of the distance
 };
 
 enum class LeadState { leads, away, ended };

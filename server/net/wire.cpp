@@ -254,6 +254,7 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
   out.set_licence(scene.about.licence);
   out.set_mode(static_cast<v1::CameraMode>(scene.about.mode));  // of the same order
   out.set_background_rgb(scene.about.background_rgb);
+  out.set_metres_per_unit(scene.about.metres_per_unit);
   if (scene.model != SplatModel::standard) out.set_model(std::string(name_of(scene.model)));
 }
 
@@ -323,6 +324,7 @@ void fill(const Picked& picked, v1::ServerMessage& out) {
   message.set_id(picked.id);
   message.set_hit(picked.distance.has_value());
   message.set_distance(picked.distance.value_or(0.0f));
+  message.set_spread(picked.spread);
 }
 
 void fill(const Lead& lead, v1::ServerMessage& out) {

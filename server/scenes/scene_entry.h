@@ -27,7 +27,9 @@ struct SceneEntry {
   std::shared_ptr<const std::string> poster{};  // a JPEG file; null: none
 
   [[nodiscard]] Picked seen_along(const Pick& ray) const {
-    return {ray.id, surface ? surface->distance_along(ray.origin, ray.direction) : std::nullopt};
+    const auto hit = surface ? surface->hit_along(ray.origin, ray.direction) : std::nullopt;
+    if (!hit) return {ray.id, std::nullopt};
+    return {ray.id, hit->distance, hit->spread};
   }
 };
 

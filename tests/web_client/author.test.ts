@@ -191,9 +191,9 @@ describe('asking what is seen', () => {
     const picks = new Picks((id) => asked.push(id), time);
     const ray = { origin: [1, 0, 0], direction: [0, 0, 1] } as const;
     const [first, second, third] = [picks.at(ray), picks.at(ray), picks.at(ray)];
-    picks.answered(asked[1]!, 4);
+    picks.answered(asked[1]!, { distance: 4, spread: 0.1 });
     picks.answered(asked[0]!, undefined);
-    picks.answered(99, 1);
+    picks.answered(99, { distance: 1, spread: 0 });
     expect(await second).toEqual([1, 0, 4]);
     expect(await first).toBeUndefined();
     time.advance(2000);

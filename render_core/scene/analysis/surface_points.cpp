@@ -81,8 +81,8 @@ SurfacePoints::Ball SurfacePoints::around(std::span<const Point> points) {
   return ball;
 }
 
-std::optional<float> SurfacePoints::distance_along(const glm::vec3& origin,
-                                                   const glm::vec3& direction) const {
+std::optional<SurfacePoints::Hit> SurfacePoints::hit_along(const glm::vec3& origin,
+                                                           const glm::vec3& direction) const {
   assert(std::abs(glm::length(direction) - 1.0f) < 1e-3f);
   std::vector<std::pair<float, float>> stops;  // distance, alpha
   for (std::size_t c = 0; c < clusters_.size(); ++c) {
@@ -98,12 +98,17 @@ std::optional<float> SurfacePoints::distance_along(const glm::vec3& origin,
     }
   }
   std::ranges::sort(stops);
-  float left = 1.0f;
+  std::optional<float> first, middle;
+  float last = 0.0f, left = 1.0f;
   for (const auto& [distance, alpha] : stops) {
     left *= 1.0f - alpha;
-    if (left <= 0.5f) return distance;
+    last = distance;
+    if (!first && left <= 0.84f) first = distance;
+    if (!middle && left <= 0.5f) middle = distance;
+    if (left <= 0.16f) break;
   }
-  return std::nullopt;
+  if (!middle) return std::nullopt;
+  return Hit{*middle, 0.5f * (last - *first)};
 }
 
 }  // namespace catgs

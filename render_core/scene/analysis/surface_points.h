@@ -21,11 +21,15 @@ class SurfacePoints {
   SurfacePoints(const GaussianCloud& cloud, ThreadPool& pool,
                 std::size_t max_points = std::size_t{1} << 20);
 
-  /// Distance from `origin` along the unit vector `direction` at which half of the light is
-  /// stopped; empty where less is stopped. Looks at one ball for each cluster_size points, and at
-  /// the points of the clusters that the ray meets.
-  [[nodiscard]] std::optional<float> distance_along(const glm::vec3& origin,
-                                                    const glm::vec3& direction) const;
+  struct Hit {
+    float distance;  // from the origin to where half of the light is stopped, world units
+    float spread;    // half of the way on which the middle 68 % of the light are stopped
+  };
+  /// What a ray from `origin` along the unit vector `direction` meets; empty where less than half
+  /// of the light is stopped. Looks at one ball for each cluster_size points, and at the points of
+  /// the clusters that the ray meets.
+  [[nodiscard]] std::optional<Hit> hit_along(const glm::vec3& origin,
+                                             const glm::vec3& direction) const;
 
  private:
   struct Ball {

@@ -83,6 +83,11 @@ SceneAbout parse_about(const JsonField& root) {
                    parse_line(root.find("licence"))};
   if (const auto mode = root.find("mode")) about.mode = parse_mode(*mode);
   if (const auto colour = root.find("background")) about.background_rgb = parse_colour(*colour);
+  if (const auto metres = root.find("metres_per_unit")) {
+    about.metres_per_unit = metres->number();
+    if (!(about.metres_per_unit >= 1e-6f && about.metres_per_unit <= 1e6f))
+      metres->fail("is not in 1e-6…1e6");
+  }
   return about;
 }
 
@@ -94,7 +99,8 @@ Sidecar read_sidecar(const ByteSource& file) {
   if (!document.is_object()) root.fail("is not a JSON object");
   static constexpr std::array known = {"up",    "start_pose", "near",    "limits",
                                        "focus", "title",      "credits", "licence",
-                                       "mode",  "background", "model",   "tours"};
+                                       "mode",  "background", "model",   "tours",
+                                       "metres_per_unit"};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())
@@ -159,6 +165,7 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
     document["mode"] = mode_names[static_cast<std::size_t>(about.mode) - 1];
   if (about.background_rgb != 0)
     document["background"] = fmt::format("#{:06x}", about.background_rgb);
+  if (about.metres_per_unit != 0.0f) document["metres_per_unit"] = about.metres_per_unit;
   if (tours && !tours->is_null()) document["tours"] = *tours;
   std::ofstream file(path);
   file << document.dump(2) << '\n';

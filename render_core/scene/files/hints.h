@@ -31,6 +31,7 @@ inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 ///   "title":      text of at most 800 bytes, as "credits" and "licence" are
 ///   "mode":       "orbit", "fly" or "walk": how a visitor moves at first
 ///   "background": "#rrggbb"
+///   "metres_per_unit": length of a world unit
 ///   "model":      "default", "antialiased" or "2dgs", in place of what the scene's file says
 ///   "tours":      for pages, see web_client/README.md
 struct Sidecar {

@@ -156,7 +156,7 @@ TEST(Wire, EveryServerMessageReadsBack) {
   welcome.scene.scene_id = "city";
   welcome.scene.focus = {1.0f, 2.0f, 3.0f};
   welcome.scene.model = SplatModel::antialiased;
-  welcome.scene.about = {"The city", "Ada", "MIT", CameraMode::walk, 0x0a10ff};
+  welcome.scene.about = {"The city", "Ada", "MIT", CameraMode::walk, 0x0a10ff, 0.25f};
   welcome.scene_ids = {"city", "garden"};
   const auto greeting = reread(welcome).welcome();
   EXPECT_EQ(greeting.version(), 1u);
@@ -167,6 +167,7 @@ TEST(Wire, EveryServerMessageReadsBack) {
   EXPECT_EQ(greeting.scene().mode(), v1::CAMERA_MODE_WALK);
   EXPECT_EQ(greeting.scene().model(), "antialiased");
   EXPECT_EQ(greeting.scene().background_rgb(), 0x0a10ffu);
+  EXPECT_EQ(greeting.scene().metres_per_unit(), 0.25f);
   EXPECT_EQ(greeting.scene_ids(1), "garden");
   EXPECT_EQ(reread(Stats{.fps = 12.5f, .sessions = 4}).stats().sessions(), 4u);
   EXPECT_EQ(reread(Heartbeat{77}).heartbeat().server_time_us(), 77);

@@ -12,10 +12,10 @@ interface ViewInputListener {
   /** No pointer is down any more, and nothing glides on. */
   let_go(): void;
   /**
-   * A double click or double tap, or a single tap of a finger. `x`, `y`: shares of the view's width and
-   * height, y down.
+   * The second of two clicks or taps, or a single one: by a finger, or by a mouse or pen. `x`, `y`: shares of
+   * the view's width and height, y down.
    */
-  pointed_at(x: number, y: number, is_double: boolean): void;
+  pointed_at(x: number, y: number, how: 'double tap' | 'touch' | 'click'): void;
 }
 
 export function bind_view_input(
@@ -56,10 +56,11 @@ function bind_pointers(
       const lifted = pointers.up(event.pointerId);
       if (end === 'pointerup') {
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
-        if (what === 'double tap' || (what === 'tap' && event.pointerType === 'touch')) {
+        if (what !== 'drag') {
           const { left, top, width, height } = view.getBoundingClientRect();
           const [x, y] = [(event.clientX - left) / width, (event.clientY - top) / height];
-          listener.pointed_at(x, y, what === 'double tap');
+          const single = event.pointerType === 'touch' ? 'touch' : 'click';
+          listener.pointed_at(x, y, what === 'tap' ? single : what);
         }
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {

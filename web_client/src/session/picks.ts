@@ -4,10 +4,16 @@ import type { Ray } from '../camera/ray';
 
 const patience_ms = 2000; // the server answers only a few a second
 
-/** Asks the server how far away the scene is along a ray. */
+/** What a ray meets: how far away it is, and how deep the surface is there. World units. */
+export interface Hit {
+  readonly distance: number;
+  readonly spread: number;
+}
+
+/** Asks the server what there is along a ray. */
 export class Picks {
   private asked_ = 0;
-  private readonly waiting_ = new Map<number, (distance: number | undefined) => void>();
+  private readonly waiting_ = new Map<number, (hit: Hit | undefined) => void>();
 
   constructor(
     private readonly ask_: (id: number, ray: Ray) => void,
@@ -16,8 +22,13 @@ export class Picks {
 
   /** The point that the ray meets; undefined where it meets nothing, or where no answer comes. */
   async at(ray: Ray): Promise<Vec3 | undefined> {
+    const hit = await this.hit(ray);
+    return hit && add(ray.origin, scale(ray.direction, hit.distance));
+  }
+
+  hit(ray: Ray): Promise<Hit | undefined> {
     const id = ++this.asked_;
-    const distance = await new Promise<number | undefined>((resolve) => {
+    return new Promise((resolve) => {
       const cancel = this.timers_.after(patience_ms, () => this.answered(id, undefined));
       this.waiting_.set(id, (answer) => {
         cancel();
@@ -25,11 +36,10 @@ export class Picks {
       });
       this.ask_(id, ray);
     });
-    return distance === undefined ? undefined : add(ray.origin, scale(ray.direction, distance));
   }
 
-  answered(id: number, distance: number | undefined): void {
-    this.waiting_.get(id)?.(distance);
+  answered(id: number, hit: Hit | undefined): void {
+    this.waiting_.get(id)?.(hit);
     this.waiting_.delete(id);
   }
 }

@@ -12,10 +12,11 @@ export interface SceneAbout {
   readonly licence: string;
   readonly mode: CameraMode | undefined;
   readonly background: string; // "#rrggbb"
+  readonly metres_per_unit: number; // 0: not said
 }
 
 export const nothing_said: SceneAbout = {
-  ...{ title: '', credits: '', licence: '', mode: undefined, background: '#000000' },
+  ...{ title: '', credits: '', licence: '', mode: undefined, background: '#000000', metres_per_unit: 0 },
 };
 
 interface DraftState {
@@ -133,7 +134,7 @@ export class TourDraft {
   /** The whole of `<scene>.json`: the facts of the scene and the tours. */
   sidecar(scene: SceneSetup): object {
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
-    const { title, credits, licence, mode, background } = this.state.about;
+    const { title, credits, licence, mode, background, metres_per_unit } = this.state.about;
     const { position, orientation } = scene.start_pose;
     return {
       ...(title && { title }),
@@ -141,6 +142,7 @@ export class TourDraft {
       ...(licence && { licence }),
       ...(mode && { mode }),
       ...(background !== nothing_said.background && { background }),
+      ...(metres_per_unit > 0 && { metres_per_unit }),
       up: scene.up,
       start_pose: { position, orientation },
       near: scene.near_z,

@@ -49,10 +49,7 @@ export class AuthorPanel {
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
-    this.about_ = new AuthorAbout((change, field) => {
-      this.draft_.edit_about(change, field);
-      this.told();
-    });
+    this.about_ = new AuthorAbout((change, field) => this.edit_about(change, field));
     this.stops_ = new AuthorStops(by_id('author-stops', HTMLOListElement), {
       change: (i, change, field) => {
         this.draft_.change(i, worded(this.draft_.stops[i]!, this.language_.value, change), this.typed_in(field));
@@ -86,6 +83,11 @@ export class AuthorPanel {
     this.saved_ = this.draft_.state;
     this.start_ = undefined;
     this.show(0);
+  }
+
+  edit_about(change: Partial<SceneAbout>, field?: string): void {
+    this.draft_.edit_about(change, field);
+    this.told();
   }
 
   /** Which way is up is no longer as it was saved. */

@@ -19,6 +19,7 @@ import type { Navigation } from './navigation';
 import type { Notice } from './notice';
 import { Preview } from './preview';
 import { css_colour } from './scene_title';
+import type { SeenCamera } from './seen_camera';
 import { SharePanel } from './share_panel';
 import type { Toolbar } from './toolbar';
 import { TourView } from './tour_view';
@@ -28,6 +29,7 @@ interface GuideParts {
   readonly clock: Clock;
   readonly worker: WorkerClient;
   readonly navigation: Navigation;
+  readonly seen: SeenCamera;
   readonly toolbar: Toolbar;
   readonly notice: Notice;
   readonly token: AccessToken;
@@ -57,7 +59,7 @@ export class Guide {
       (state) => this.tour_changed(state),
     );
     this.tour_view_ = new TourView(this.player_);
-    this.hotspots_ = new Hotspots(view, worker, navigation, (stop) => this.player_.go_to(stop));
+    this.hotspots_ = new Hotspots(view, parts_.seen, (stop) => this.player_.go_to(stop));
     this.embed_ = this.make_embed();
     const is_author = new URLSearchParams(location.search).has('author');
     this.author_ = is_author ? this.make_author() : undefined;
@@ -76,6 +78,12 @@ export class Guide {
       this.show_view(shared);
       this.show_stop(shared);
     });
+  }
+
+  /** Of authors: the scene has this scale from now on. Undefined for visitors. */
+  get set_scale(): ((metres_per_unit: number) => void) | undefined {
+    const { author_: author } = this;
+    return author && ((metres_per_unit) => author.edit_about({ metres_per_unit }));
   }
 
   private make_embed(): EmbedApi {
@@ -207,5 +215,6 @@ function about_of(scene: SceneFacts): SceneAbout {
     licence: scene.licence,
     mode: start_mode(scene),
     background: css_colour(scene.backgroundRgb),
+    metres_per_unit: scene.metresPerUnit,
   };
 }

@@ -5,39 +5,25 @@ import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import type { WorkerClient } from '../worker/client';
 import { by_id, make } from './dom';
-import type { Navigation } from './navigation';
+import type { SeenCamera } from './seen_camera';
 
 /** Shows the stops of a tour as buttons in the picture. */
 export class Hotspots {
   private readonly host_ = by_id('hotspots', HTMLElement);
   private tour_: Tour | undefined;
   private spots_: { readonly stop: Stop; readonly button: HTMLButtonElement }[] = [];
-  private warps_ = false;
-  private has_picture_ = false;
 
   constructor(
     private readonly view_: HTMLElement,
-    worker: WorkerClient,
-    navigation: Navigation,
+    seen: SeenCamera,
     private readonly go_to_: (stop_index: number) => void,
   ) {
     window.addEventListener('keydown', ({ code }) => {
       // A label may hide what is behind it (WCAG 1.4.13).
       if (code === 'Escape') this.host_.classList.add('labels-dismissed');
     });
-    // A warped picture shows the newest camera, any other picture its own pose. Hotspots follow that.
-    worker.on('presenter', ({ warps }) => {
-      this.warps_ = warps;
-    });
-    worker.on('presented', ({ pose, fov_y_rad }) => {
-      if (!this.warps_ || !this.has_picture_) this.place({ ...pose, fov_y_rad });
-      this.has_picture_ = true;
-    });
-    navigation.sampled.listen(({ eye }) => {
-      if (this.warps_) this.place(eye);
-    });
+    seen.moved.listen((eye) => this.place(eye));
   }
 
   /** `eye`: the camera of the view. */

@@ -1,7 +1,7 @@
 // Moves the visitor through the scene: by pointers, keys, sticks, places pointed at, and flights.
 import { browser_timers, type Clock } from '../base/clock';
 import { Signal } from '../base/signal';
-import { same, type Vec3 } from '../base/vector';
+import { add, same, scale, type Vec3 } from '../base/vector';
 import { CameraController } from '../camera/camera_controller';
 import { CameraLoop } from '../camera/camera_loop';
 import type { CameraSample, Eye } from '../camera/eye';
@@ -9,15 +9,17 @@ import type { Flight } from '../camera/flight';
 import { Inertia } from '../camera/inertia';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
-import { ray_through, surface_of } from '../camera/ray';
+import { ray_through, surface_of, type Ray } from '../camera/ray';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
 import { bind_view_input } from '../input/view_input';
+import type { Mark } from '../measure/measurement';
 import { scene_setup, start_mode } from '../session/camera_messages';
 import { Picks } from '../session/picks';
 import type { SceneFacts, Welcome } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 
 const speed_per_step = 2 ** 0.25;
+const pointing_px = 1; // standard deviation of a click
 
 export class Navigation {
   readonly camera = new CameraController();
@@ -36,6 +38,8 @@ export class Navigation {
   readonly speed_chosen = new Signal<number>();
   readonly sampled = new Signal<CameraSample>();
   readonly pad_pressed = new Signal<GamepadAction>();
+  /** Hears clicks and taps in place of the camera: `x`, `y` are shares of the view, y down. */
+  tapped: ((x: number, y: number) => void) | undefined;
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
   private readonly inertia_ = new Inertia();
@@ -61,7 +65,7 @@ export class Navigation {
       this.sampled.emit(sample);
     });
     worker.on('welcome', ({ welcome }) => this.welcomed(welcome));
-    worker.on('picked', ({ id, distance }) => this.picks_.answered(id, distance));
+    worker.on('picked', ({ id, hit }) => this.picks_.answered(id, hit));
     worker.on('presenter', ({ overscan }) => {
       // Pictures need another field of view from now on. A new sample makes the server render one.
       if (overscan.y !== this.overscan_.y || overscan.x !== this.overscan_.x) this.loop.changed();
@@ -161,6 +165,20 @@ export class Navigation {
     return this.place_at(0.5, 0.5);
   }
 
+  /** The place of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in `tapped`. */
+  async hit_at(x: number, y: number): Promise<Mark | undefined> {
+    const ray = this.ray_at(x, y);
+    const hit = await this.picks_.hit(ray);
+    if (!hit) return undefined;
+    const px_rad = this.eye.fov_y_rad / Math.max(1, this.view_.clientHeight);
+    return {
+      point: add(ray.origin, scale(ray.direction, hit.distance)),
+      direction: ray.direction,
+      along: hit.spread,
+      across: pointing_px * px_rad * hit.distance,
+    };
+  }
+
   private bind_input(): { axes: () => Axes; is_touched: () => boolean } {
     const { keys, pointers } = bind_view_input(this.view_, this.inertia_, {
       gesture: (gesture) => this.gesture(gesture),
@@ -170,8 +188,12 @@ export class Navigation {
       },
       keys_changed: () => this.take_over(),
       let_go: () => this.loop.wake(),
-      pointed_at: (x, y, is_double) => {
-        if (is_double || this.camera.mode === 'walk') void this.point_at(x, y);
+      pointed_at: (x, y, how) => {
+        if (this.tapped) {
+          if (how !== 'double tap') this.tapped(x, y);
+        } else if (how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk')) {
+          void this.point_at(x, y);
+        }
       },
     });
     const pads = new Gamepads({
@@ -231,7 +253,10 @@ export class Navigation {
 
   /** Point of the scene. `x`, `y`: shares of the view's width and height, y down. */
   private place_at(x: number, y: number): Promise<Vec3 | undefined> {
-    const aspect = this.view_.clientWidth / Math.max(1, this.view_.clientHeight);
-    return this.picks_.at(ray_through(this.eye, x, y, aspect));
+    return this.picks_.at(this.ray_at(x, y));
+  }
+
+  private ray_at(x: number, y: number): Ray {
+    return ray_through(this.eye, x, y, this.view_.clientWidth / Math.max(1, this.view_.clientHeight));
   }
 }

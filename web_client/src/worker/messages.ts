@@ -8,6 +8,7 @@ import type { PresenterChoice } from '../present/make_presenter';
 import type { PresenterKind } from '../present/presenter';
 import type { Sides } from '../present/warp';
 import type { WarpMode, WarpState } from '../present/warp_policy';
+import type { Hit } from '../session/picks';
 import type { Quality, View } from '../session/quality';
 import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
@@ -64,8 +65,8 @@ export type FromWorker =
   | { kind: 'presenter'; presenter: PresenterKind; warp: WarpState; warps: boolean; overscan: Sides }
   /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
-  /** Answers a pick. `distance`: undefined where nothing is there. */
-  | { kind: 'picked'; id: number; distance: number | undefined }
+  /** Answers a pick. `hit`: undefined where nothing is there. */
+  | { kind: 'picked'; id: number; hit: Hit | undefined }
   /** `eye`: where the leader's camera is, for those who follow. */
   | { kind: 'lead'; lead: Lead; eye: Eye | undefined }
   | { kind: 'notice'; message: string }

@@ -200,7 +200,8 @@ class Client {
         },
         stream_ended: () => this.pipeline_.end_stream(),
         stats: (stats) => this.metrics_.server_said(stats),
-        picked: ({ id, hit, distance }) => say({ kind: 'picked', id, distance: hit ? distance : undefined }),
+        picked: ({ id, hit, distance, spread }) =>
+          say({ kind: 'picked', id, hit: hit ? { distance, spread } : undefined }),
         lead: (lead) => {
           const { camera } = lead;
           say({ kind: 'lead', lead, eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad) });

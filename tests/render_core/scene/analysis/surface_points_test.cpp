@@ -36,19 +36,30 @@ TEST(SurfacePoints, FindsTheFirstThingThatStopsHalfOfTheLight) {
   add_wall(cloud, 20, 5.0f, 0.9f);
   add_wall(cloud, 20, 9.0f, 0.9f);
   const SurfacePoints surface(cloud, pool);
-  const auto distance = surface.distance_along(glm::vec3(0.1f, 0.0f, 0.0f), ahead);
-  ASSERT_TRUE(distance);
-  EXPECT_NEAR(*distance, 5.0f, 1e-3f);
-  EXPECT_NEAR(*surface.distance_along(glm::vec3(0.0f, 0.0f, 7.0f), -ahead), 2.0f, 1e-3f);
+  const auto hit = surface.hit_along(glm::vec3(0.1f, 0.0f, 0.0f), ahead);
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->distance, 5.0f, 1e-3f);
+  EXPECT_LT(hit->spread, 1e-3f);
+  EXPECT_NEAR(surface.hit_along(glm::vec3(0.0f, 0.0f, 7.0f), -ahead)->distance, 2.0f, 1e-3f);
+}
+
+// Ten thin veils of the same opacity, a unit from the first to the last.
+TEST(SurfacePoints, TellsHowDeepTheLightGoes) {
+  GaussianCloud cloud;
+  for (int i = 0; i < 10; ++i) add_wall(cloud, 20, 5.0f + static_cast<float>(i) / 9.0f, 0.05f);
+  const auto hit = SurfacePoints(cloud, pool).hit_along(glm::vec3(0.1f, 0.0f, 0.0f), ahead);
+  ASSERT_TRUE(hit);
+  EXPECT_GT(hit->spread, 0.2f);
+  EXPECT_LT(hit->spread, 0.5f);
 }
 
 TEST(SurfacePoints, SaysWhereNothingIs) {
   GaussianCloud cloud;
   add_wall(cloud, 20, 5.0f, 0.9f);
   const SurfacePoints surface(cloud, pool);
-  EXPECT_FALSE(surface.distance_along(glm::vec3(3.0f, 0.0f, 0.0f), ahead));
-  EXPECT_FALSE(surface.distance_along(glm::vec3(0.0f), -ahead));
-  EXPECT_FALSE(SurfacePoints(GaussianCloud{}, pool).distance_along(glm::vec3(0.0f), ahead));
+  EXPECT_FALSE(surface.hit_along(glm::vec3(3.0f, 0.0f, 0.0f), ahead));
+  EXPECT_FALSE(surface.hit_along(glm::vec3(0.0f), -ahead));
+  EXPECT_FALSE(SurfacePoints(GaussianCloud{}, pool).hit_along(glm::vec3(0.0f), ahead));
 }
 
 TEST(SurfacePoints, FindsTheSameInASampleOfALargeScene) {
@@ -56,9 +67,9 @@ TEST(SurfacePoints, FindsTheSameInASampleOfALargeScene) {
   add_wall(cloud, 100, 5.0f, 0.9f);
   const SurfacePoints sample(cloud, pool, 500);
   for (const float x : {-0.4f, -0.11f, 0.0f, 0.27f}) {
-    const auto distance = sample.distance_along(glm::vec3(x, 0.1f, 0.0f), ahead);
-    ASSERT_TRUE(distance) << x;
-    EXPECT_NEAR(*distance, 5.0f, 1e-3f);
+    const auto hit = sample.hit_along(glm::vec3(x, 0.1f, 0.0f), ahead);
+    ASSERT_TRUE(hit) << x;
+    EXPECT_NEAR(hit->distance, 5.0f, 1e-3f);
   }
 }
 
@@ -93,10 +104,10 @@ TEST(SurfacePoints, LooksWhereverTheRayPasses) {
         glm::normalize(glm::vec3(std::cos(angle), 0.3f * std::sin(3.0f * angle), std::sin(angle)));
     const glm::vec3 origin = cloud.mean[static_cast<std::size_t>(k)] - 2.0f * direction;
     const auto expected = brute_force(cloud, origin, direction);
-    const auto distance = surface.distance_along(origin, direction);
-    ASSERT_EQ(distance.has_value(), expected.has_value()) << k;
+    const auto hit = surface.hit_along(origin, direction);
+    ASSERT_EQ(hit.has_value(), expected.has_value()) << k;
     if (!expected) continue;
-    EXPECT_NEAR(*distance, *expected, 1e-4f) << k;
+    EXPECT_NEAR(hit->distance, *expected, 1e-4f) << k;
     ++met;
   }
   EXPECT_GT(met, 100);

@@ -57,13 +57,14 @@ TEST(Sidecar, NamesTheModel) {
 TEST(Sidecar, SaysWhatVisitorsAreTold) {
   const SceneAbout about = parse_sidecar(R"({
     "title": "The hall", "credits": "Ada\u202e", "licence": "CC-BY-4.0", "mode": "walk",
-    "background": "#0a10FF"})")
+    "background": "#0a10FF", "metres_per_unit": 0.25})")
                                .about;
   EXPECT_EQ(about.title, "The hall");
   EXPECT_EQ(about.credits, "Ada\\xe2\\x80\\xae") << "its direction does not turn";
   EXPECT_EQ(about.licence, "CC-BY-4.0");
   EXPECT_EQ(about.mode, CameraMode::walk);
   EXPECT_EQ(about.background_rgb, 0x0a10ffu);
+  EXPECT_EQ(about.metres_per_unit, 0.25f);
   EXPECT_EQ(colour_of(about.background_rgb), glm::vec3(10, 16, 255) / 255.0f);
   EXPECT_EQ(parse_sidecar("{}").about, SceneAbout());
 }
@@ -77,6 +78,9 @@ TEST(Sidecar, ErrorsNameTheField) {
   for (const char* colour : {"red", "#12345", "#12345g", "#-12345", "1234567"})
     EXPECT_THAT(error(fmt::format(R"({{"background": "{}"}})", colour).c_str()),
                 AllOf(HasSubstr("background:"), HasSubstr("#rrggbb")));
+  for (const char* metres : {"0", "-1", "1e7", "\"1 m\""})
+    EXPECT_THAT(error(fmt::format(R"({{"metres_per_unit": {}}})", metres).c_str()),
+                HasSubstr("metres_per_unit:"));
   EXPECT_THAT(error(R"({"up": )"), HasSubstr("city.json: byte"));
   EXPECT_THAT(error("[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
