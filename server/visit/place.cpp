@@ -184,8 +184,8 @@ LogFacts Place::facts() const {
 }
 
 void Place::on_tick(TimePoint now) {
-  visit_.on_tick(now);
   StreamControl& stream = visit_.stream();
+  visit_.on_tick(now, stream.ready() && stream_->view && stream_->view->outdated());
   if (visit_.life().resumable() && !visit_.life().lost())
     if (auto newer = around_.scenes.newer_form(*stream.scene())) stream.redraw(std::move(newer));
   if (visit_.life().on_show() && stream.scene())

@@ -81,9 +81,6 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   void send(const ServerMessage& message) override;
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;
   void close(CloseCode code, std::string_view reason) override { audience_.close(code, reason); }
-  [[nodiscard]] bool picture_is_outdated() const override {
-    return stream_->view && stream_->view->outdated();
-  }
   void open_stream(StreamSettings settings) override;
   std::optional<EncoderChoice> other_encoder(Fault why) override;
 

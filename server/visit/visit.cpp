@@ -207,7 +207,7 @@ void Visit::on_frame(FrameResult result, TimePoint now) {
   statistics_.frames_lost(dropped.size());
 }
 
-void Visit::on_tick(TimePoint now) {
+void Visit::on_tick(TimePoint now, bool outdated) {
   if (life_.hello_is_late(now))
     return fail(ErrorCode::bad_message, "no hello within the time limit");
   if (awaited_scene_ && !life_.lost()) {
@@ -222,7 +222,7 @@ void Visit::on_tick(TimePoint now) {
     return;
   }
   stream_.plan().on_tick(now);
-  if (stream_.ready() && host_.picture_is_outdated()) frames_.outdate();
+  if (outdated) frames_.outdate();
   if (const auto idle = life_.idle_message(now)) {
     if (idle->fatal) return fail(idle->code, idle->message);
     say(*idle, now);

@@ -33,7 +33,8 @@ class Visit {
   void on_link(const LinkState& link, TimePoint now) { flow_.observed(link, now); }
   void on_frame_sent(std::size_t bytes) { statistics_.frame_sent(bytes); }
   /// Call it at least four times a second. Handles timeouts, statistics and the heartbeat.
-  void on_tick(TimePoint now);
+  /// `outdated`: the last picture would look better now.
+  void on_tick(TimePoint now, bool outdated = false);
   /// Asks for admission again. Only while the visit waits for a place.
   void ask_again(TimePoint now);
   /// The connection was lost without a farewell. The visit closes after the grace period.

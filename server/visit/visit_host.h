@@ -43,8 +43,6 @@ class VisitHost {
   /// Returns the ids of the frames that were dropped to make room.
   virtual std::vector<std::uint64_t> send(OutgoingFrame frame) = 0;
   virtual void close(CloseCode code, std::string_view reason) = 0;
-  /// Whether the last picture would look better now. Asked between frames.
-  [[nodiscard]] virtual bool picture_is_outdated() const = 0;
   /// Visit::on_stream_opened() gets the result.
   virtual void open_stream(StreamSettings settings) = 0;
   /// Returns a replacement for an encoder that failed or cannot be opened, or nothing.

@@ -22,6 +22,8 @@ LARGER_CLASSES = {
 USED_ELSEWHERE = {
     "access_unit_delimiter", "sei", "si", "sp", "ref_idc",  # H.264's enumerations are whole
     "main", "clone", "flush_", "set_formatter_", "sink_it_",  # the system and spdlog call these
+    "boolean", "end_array", "end_object", "number_float", "number_integer", "number_unsigned",
+    "start_array", "start_object",  # nlohmann/json calls these
     "deadline_ns", "nice", "period_ns", "priority",  # the kernel reads these
     "about_nobody_", "former_log_handler",  # kept for what their constructors do
     "base_blue", "base_green", "base_red",  # read as one word

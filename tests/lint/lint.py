@@ -55,7 +55,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "server/base", "server/encode", "server/pipeline", "server/net", "server/config server/access server/flow",
     "server/scenes server/schedule server/counts", "server/visit", "server/frame_path", "server",
     "web_client/src/base web_client/src/text web_client/src/wire",
-    "web_client/src/camera web_client/src/decode web_client/src/transport",
+    "web_client/src/camera web_client/src/decode web_client/src/measure web_client/src/transport",
     "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour",
     "web_client/src/worker web_client/src/captions",
     "web_client/src/ui",

@@ -102,6 +102,7 @@ SceneHints placed(const SceneHints& hints, const Placement& placement) {
                    glm::normalize(turn * hints.start_pose.orientation)};
   to.near_z = scale * hints.near_z;
   to.scale = scale * hints.scale;
+  to.about.metres_per_unit = hints.about.metres_per_unit / scale;
   to.focus = place_in_range(map, hints.focus);
   to.limits = {glm::vec3(std::numeric_limits<float>::max()),
                glm::vec3(std::numeric_limits<float>::lowest())};

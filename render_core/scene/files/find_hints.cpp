@@ -104,12 +104,13 @@ std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
 
 }  // namespace
 
-bool any_exists(const HintFiles& files) {
-  return std::ranges::any_of(
-      std::array{files.sidecar, files.cameras, files.transforms},
-      [error = std::error_code()](const std::filesystem::path& path) mutable {
-        return !path.empty() && std::filesystem::is_regular_file(path, error);
-      });
+bool tell_anything(const HintFiles& files) {
+  return files.orbit.has_value() ||
+         std::ranges::any_of(
+             std::array{files.sidecar, files.cameras, files.transforms},
+             [error = std::error_code()](const std::filesystem::path& path) mutable {
+               return !path.empty() && std::filesystem::is_regular_file(path, error);
+             });
 }
 
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files) {

@@ -97,10 +97,9 @@ Sidecar read_sidecar(const ByteSource& file) {
   const nlohmann::json document = read_json(file, max_sidecar_bytes);
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
-  static constexpr std::array known = {"up",    "start_pose", "near",    "limits",
-                                       "focus", "title",      "credits", "licence",
-                                       "mode",  "background", "model",   "tours",
-                                       "metres_per_unit"};
+  static constexpr std::array known = {
+      "up",      "start_pose", "near",       "limits", "focus", "title",          "credits",
+      "licence", "mode",       "background", "model",  "tours", "metres_per_unit"};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())

@@ -74,8 +74,8 @@ struct HintFiles {
   std::optional<OrbitLimits> orbit{};  // of the scene's file
 };
 
-/// Whether at least one of the files is there.
-bool any_exists(const HintFiles& files);
+/// Whether they tell anything: a file is there, or an orbit.
+bool tell_anything(const HintFiles& files);
 
 /// The model that the sidecar names, if any. Throws InputError for a faulty sidecar.
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files);

@@ -123,7 +123,7 @@ Scene load_scene(const std::filesystem::path& path, const LoadOptions& options) 
   if (scene.cloud.empty())
     throw InputError(path.string(), "",
                      fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
-  if (options.first_view || any_exists(location.hints))
+  if (options.first_view || tell_anything(location.hints))
     scene.hints = find_hints(scene.cloud, location.hints, options.up, scene.notes, pool);
   context.report(1.0);
   return scene;

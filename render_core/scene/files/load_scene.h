@@ -13,10 +13,10 @@ namespace catgs {
 class TreeFile;
 
 struct LoadOptions {
-  std::optional<int> lod;                         // of a scene with levels; 0 is the finest
-  std::optional<std::size_t> gaussian_budget;     // of a scene with levels: the finest that fit
-  std::optional<glm::vec3> up;                    // unit; where no sidecar says which way is up
-  std::optional<SplatModel> model;                // in place of what sidecar and file say
+  std::optional<int> lod;                      // of a scene with levels; 0 is the finest
+  std::optional<std::size_t> gaussian_budget;  // of a scene with levels: the finest that fit
+  std::optional<glm::vec3> up;                 // unit; where no sidecar says which way is up
+  std::optional<SplatModel> model;             // in place of what sidecar and file say
   bool first_view = true;  // false: it is not looked for where no file tells any of it
   std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
   int threads = 0;                                // 0: one per processor

@@ -197,9 +197,9 @@ TEST_F(VisitCountsTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
 }
 
 TEST(TitlesOfTours, AreThoseOfTheSidecarOrNone) {
-  const auto titles = titles_of_tours(
-      R"({"may_save":false,"document":{"tours":[{"title":"Empty","stops":[]},)"
-      R"({"title":"House","stops":[{"title":"Gate"},{"caption":"no title"}]}]}})");
+  const auto titles =
+      titles_of_tours(R"({"may_save":false,"document":{"tours":[{"title":"Empty","stops":[]},)"
+                      R"({"title":"House","stops":[{"title":"Gate"},{"caption":"no title"}]}]}})");
   ASSERT_EQ(titles.size(), 1u) << "pages leave out tours without stops";
   EXPECT_EQ(titles[0].tour, "House");
   EXPECT_EQ(titles[0].stops, (std::vector<std::string>{"Gate", ""}));

@@ -109,15 +109,16 @@ TEST(SentSidecar, OfAWholeTourIsTaken) {
   EXPECT_NO_THROW(check_sent_sidecar("{}"));
 }
 
+std::string mistake(const std::string& json) {
+  try {
+    check_sent_sidecar(json);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
 TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
-  const auto mistake = [](const std::string& json) -> std::string {
-    try {
-      check_sent_sidecar(json);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  };
   EXPECT_THAT(mistake("{ broken"), HasSubstr("sidecar: byte "));
   EXPECT_THAT(mistake("[]"), HasSubstr("is not a JSON object"));
   EXPECT_THAT(mistake(R"({"near": -1})"), HasSubstr("near: is not positive"));
@@ -135,27 +136,6 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   EXPECT_THAT(mistake(with_stop(R"(, "marker": [0, 0])")), HasSubstr("marker"));
   EXPECT_THAT(mistake(with_stop(R"(, "captoin": "x")")), HasSubstr("unknown field 'captoin'"));
   EXPECT_THAT(mistake(with_stop(R"(, "caption": 7)")), HasSubstr("caption: is not a text"));
-  const auto translated = [&](const std::string& translations) {
-    return mistake(with_stop(fmt::format(R"(, "translations": {})", translations)));
-  };
-  EXPECT_EQ(translated(R"({"de": {"title": "Halle"}, "zh-Hans": {"caption": "x"}, "gsw": {}})"),
-            "");
-  EXPECT_THAT(translated("[]"), HasSubstr("tours[0].stops[0].translations: is not an object"));
-  EXPECT_THAT(translated(R"({"de": "Halle"})"), HasSubstr("translations.de: is not an object"));
-  EXPECT_THAT(translated(R"({"de": {"titel": ""}})"), HasSubstr("unknown field 'titel'"));
-  EXPECT_THAT(translated(R"({"de": {"title": 1}})"), HasSubstr("translations.de.title"));
-  for (const char* tag :
-       {"", "d", "de_CH", "-de", "de-", "de--CH", "deutschland", "<b>", "\u0000d"})
-    EXPECT_THAT(translated(fmt::format(R"({{"{}": {{}}}})", tag)), HasSubstr("is no language"));
-  EXPECT_THAT(mistake(R"({"tours": [{"stops": [], "translations": {"de": {"caption": ""}}}]})"),
-              HasSubstr("unknown field 'caption'"));
-  const auto languages = [](int count) {
-    std::vector<std::string> all;
-    for (int i = 0; i < count; ++i) all.push_back(fmt::format(R"("x{}": {{}})", i));
-    return fmt::format("{{{}}}", fmt::join(all, ","));
-  };
-  EXPECT_EQ(translated(languages(32)), "");
-  EXPECT_THAT(translated(languages(33)), HasSubstr("has 33 languages, at most 32"));
   const auto caption = [](std::size_t bytes) {
     return with_stop(fmt::format(R"(, "caption": "{}")", std::string(bytes, 'x')));
   };
@@ -185,6 +165,30 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   EXPECT_THAT(mistake(stops(257)), HasSubstr("tours[0].stops: has 257 entries, at most 256"));
   EXPECT_EQ(mistake(std::string((1 << 20) - 2, ' ') + "{}"), "");
   EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "") << "too large";
+}
+
+TEST(SentSidecar, TranslationsAreRefusedByTheFieldThatIsWrong) {
+  const auto translated = [](const std::string& translations) {
+    return mistake(with_stop(fmt::format(R"(, "translations": {})", translations)));
+  };
+  EXPECT_EQ(translated(R"({"de": {"title": "Halle"}, "zh-Hans": {"caption": "x"}, "gsw": {}})"),
+            "");
+  EXPECT_THAT(translated("[]"), HasSubstr("tours[0].stops[0].translations: is not an object"));
+  EXPECT_THAT(translated(R"({"de": "Halle"})"), HasSubstr("translations.de: is not an object"));
+  EXPECT_THAT(translated(R"({"de": {"titel": ""}})"), HasSubstr("unknown field 'titel'"));
+  EXPECT_THAT(translated(R"({"de": {"title": 1}})"), HasSubstr("translations.de.title"));
+  for (const char* tag :
+       {"", "d", "de_CH", "-de", "de-", "de--CH", "deutschland", "<b>", "\u0000d"})
+    EXPECT_THAT(translated(fmt::format(R"({{"{}": {{}}}})", tag)), HasSubstr("is no language"));
+  EXPECT_THAT(mistake(R"({"tours": [{"stops": [], "translations": {"de": {"caption": ""}}}]})"),
+              HasSubstr("unknown field 'caption'"));
+  const auto languages = [](int count) {
+    std::vector<std::string> all;
+    for (int i = 0; i < count; ++i) all.push_back(fmt::format(R"("x{}": {{}})", i));
+    return fmt::format("{{{}}}", fmt::join(all, ","));
+  };
+  EXPECT_EQ(translated(languages(32)), "");
+  EXPECT_THAT(translated(languages(33)), HasSubstr("has 33 languages, at most 32"));
 }
 
 }  // namespace

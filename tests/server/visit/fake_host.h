@@ -53,7 +53,6 @@ struct FakeHost final : VisitHost {
     return std::exchange(drop_next, {});
   }
   void close(CloseCode code, std::string_view) override { closed = code; }
-  [[nodiscard]] bool picture_is_outdated() const override { return false; }
   void open_stream(StreamSettings settings) override { opened.push_back(std::move(settings)); }
   std::optional<EncoderChoice> other_encoder(Fault) override { return std::exchange(other, {}); }
 
