@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
 
 #include "render_core/reference/reference.h"
 #include "render_core/scene/prune.h"
@@ -18,6 +19,57 @@ GaussianCloud merged(GaussianCloud cloud, std::size_t wanted, int threads = 2) {
   ThreadPool pool(threads);
   merge_gaussians(cloud, wanted, pool, LoadContext(pool));
   return cloud;
+}
+
+/// Sums over a scene of w = opacity x RMS projected area, of w mean, w SH, and of the second
+/// moments w (Sigma + mean mean^T).
+struct Moments {
+  double weight = 0.0;
+  glm::dvec3 mean{0.0}, base{0.0}, last{0.0};
+  glm::dmat3 second{0.0};
+};
+
+Moments moments_of(const GaussianCloud& cloud) {
+  Moments sums;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const glm::dvec3 s = glm::dvec3(cloud.scale[i]) * glm::dvec3(cloud.scale[i]);
+    const double weight = cloud.opacity[i] * std::sqrt((s.x * s.y + s.y * s.z + s.z * s.x) / 3.0);
+    const glm::dmat3 turn = glm::mat3_cast(glm::normalize(glm::dquat(cloud.rotation[i])));
+    const glm::dmat3 spread(turn[0] * s.x, turn[1] * s.y, turn[2] * s.z);
+    const glm::dvec3 mean(cloud.mean[i]);
+    sums.weight += weight;
+    sums.mean += weight * mean;
+    sums.base += weight * glm::dvec3(cloud.sh_of(i)[0]);
+    sums.last += weight * glm::dvec3(cloud.sh_of(i)[cloud.sh_count() - 1]);
+    sums.second += weight * (spread * glm::transpose(turn) + glm::outerProduct(mean, mean));
+  }
+  return sums;
+}
+
+TEST(MergeGaussians, KeepsTotalMomentsAndMakesAsManyAsWanted) {
+  GaussianCloud cloud = random_cloud(3000, 2);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {  // so that no opacity has to be clamped
+    cloud.mean[i] *= 0.3f;
+    cloud.scale[i] = {0.1f, 0.08f, 0.12f};
+    cloud.opacity[i] = 0.04f + 0.04f * cloud.opacity[i];
+  }
+  for (const std::size_t wanted : {2999u, 1500u, 300u}) {
+    const GaussianCloud after = merged(cloud, wanted);
+    ASSERT_EQ(after.size(), wanted);
+    ASSERT_TRUE(after.sizes_agree());
+    const Moments a = moments_of(cloud), b = moments_of(after);
+    EXPECT_NEAR(a.weight, b.weight, 1e-4 * a.weight);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(a.mean[k], b.mean[k], 1e-4 * a.weight);
+      EXPECT_NEAR(a.base[k], b.base[k], 1e-4 * a.weight);
+      EXPECT_NEAR(a.last[k], b.last[k], 1e-4 * a.weight);
+      for (int r = 0; r < 3; ++r) EXPECT_NEAR(a.second[k][r], b.second[k][r], 1e-3 * a.weight);
+    }
+    for (std::size_t i = 0; i < after.size(); ++i) {
+      EXPECT_NEAR(glm::length(after.rotation[i]), 1.0f, 1e-5f);
+      EXPECT_TRUE(after.opacity[i] > 0.0f && after.opacity[i] < 1.0f);
+    }
+  }
 }
 
 TEST(MergeGaussians, TheSameForAnyNumberOfThreads) {

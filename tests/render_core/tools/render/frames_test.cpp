@@ -1,11 +1,13 @@
 // catgs-render frames and compare: what pictures and videos hold, and what two folders of pictures
 // have in common.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -189,6 +191,27 @@ TEST_F(Frames, CompareTakesFolders) {
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_THAT(missing.out, HasSubstr("three: is missing"));
   EXPECT_EQ(run(fmt::format("compare {} {}", path("a"), path("b/one.png"))).exit_code, 2);
+}
+
+TEST_F(Frames, APanoramaShowsAllAround) {
+  std::ofstream(path("wall.json")) << R"({"up": "-y"})";
+  const auto panorama = [&](const std::string& size, const std::string& out) {
+    return run(fmt::format(
+        "--quiet frames {} --panorama --size {} --near 0.1 --renderer cpu --trace {} --out {}",
+        path("wall.ply"), size, path("still.tum"), path(out)));
+  };
+  ASSERT_EQ(panorama("128x64", "around.png").exit_code, 0);
+  const Image image = read_png(folder_ / "around.png");
+  ASSERT_EQ(image.size_px, glm::ivec2(128, 64));
+  EXPECT_GT(image.row(32)[3 * 74], 0.7f) << "the wall, to the right of the middle";
+  EXPECT_EQ(image.row(32)[3 * 54], 0.0f) << "nothing to the left";
+  EXPECT_EQ(image.row(32)[3 * 2], 0.0f) << "nothing behind";
+  for (const auto& [size, out, word] : std::initializer_list<std::array<const char*, 3>>{
+           {"64x64", "no.png", "--size"}, {"128x64", "no.mp4", "--panorama"}}) {
+    const Outcome refused = panorama(size, out);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.out, HasSubstr(word));
+  }
 }
 
 }  // namespace

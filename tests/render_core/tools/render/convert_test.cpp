@@ -1,0 +1,146 @@
+// catgs-render convert: how it edits a scene, and what becomes of the files beside it.
+#include <filesystem>
+#include <fstream>
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/scene/files/load_scene.h"
+#include "tests/render_core/tools/catgs_render.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class Convert : public CatgsRender {
+ protected:
+  Outcome convert(const std::string& out, const std::string& options) const {
+    return run(fmt::format("convert {} {} {}", scene(), path(out), options));
+  }
+  nlohmann::json info(const std::string& name) const {
+    return nlohmann::json::parse(run("info --json " + path(name)).out);
+  }
+};
+
+TEST_F(Convert, ScalesThenTurnsThenMovesThenCrops) {
+  // A ball of radius 1 becomes one of radius 2 around (0, 10, 0), of which the upper half stays.
+  const std::string moves = "--scale 2 --rotate=90,0,0 --translate=0,10,0";
+  const std::string box = "--crop=-5,10,-5,5,20,5";
+  ASSERT_EQ(convert("moved.ply", moves).exit_code, 0);
+  const Outcome outcome = convert("half.ply", moves + " " + box);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, HasSubstr("cropped"));
+  const GaussianCloud before = load_scene(scene()).cloud,
+                      moved = load_scene(path("moved.ply")).cloud;
+  const GaussianCloud half = load_scene(path("half.ply")).cloud;
+  ASSERT_EQ(moved.size(), 400u);
+  std::size_t above = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const glm::vec3& m = before.mean[i];
+    EXPECT_LT(glm::distance(moved.mean[i], glm::vec3(2 * m.x, 10 - 2 * m.z, 2 * m.y)), 1e-5f);
+    EXPECT_NEAR(moved.scale[i].x, 2.0f * before.scale[i].x, 1e-6f);
+    above += moved.mean[i].y >= 10.0f ? 1 : 0;
+  }
+  EXPECT_EQ(half.size(), above);
+  // Parts of a scene on their way into a tree are edited as the whole is.
+  const Outcome tree = convert("half.tree", moves + " " + box);
+  ASSERT_EQ(tree.exit_code, 0) << tree.out;
+  EXPECT_EQ(info("half.tree").at("gaussians"), above);
+}
+
+TEST_F(Convert, TurnsAboutXThenYThenZ) {
+  ASSERT_EQ(convert("turned.ply", "--rotate=90,90,0").exit_code, 0);
+  const GaussianCloud before = load_scene(scene()).cloud;
+  const GaussianCloud after = load_scene(path("turned.ply")).cloud;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const glm::vec3& m = before.mean[i];  // (x, y, z) to (x, -z, y) to (y, -z, -x)
+    EXPECT_LT(glm::distance(after.mean[i], glm::vec3(m.y, -m.z, -m.x)), 1e-5f);
+  }
+}
+
+TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
+  std::ofstream(path("ball.json")) << R"({
+    "start_pose": {"position": [0, 0, -4], "look_at": [0, 0, 0]}, "near": 0.125, "title": "Ball",
+    "tours": [{"title": "Way", "stops": [{"position": [1, 0, 0], "look_at": [0, 0, 0]}]}]})";
+  const std::string moves = "--scale 2 --translate=0,10,0";
+  ASSERT_EQ(convert("moved.spz", moves).exit_code, 0);
+  const auto sidecar = nlohmann::json::parse(std::ifstream(path("moved.json")));
+  EXPECT_EQ(sidecar.at("start_pose").at("position"), nlohmann::json({0.0, 10.0, -8.0}));
+  EXPECT_EQ(sidecar.at("near"), 0.25);
+  EXPECT_EQ(sidecar.at("title"), "Ball");
+  EXPECT_EQ(sidecar.at("tours")[0].at("stops")[0].at("position"), nlohmann::json({2.0, 10.0, 0.0}));
+  EXPECT_EQ(info("moved.spz").at("hints").at("near"), 0.25);
+  // The input's own sidecar would serve this output, too.
+  const Outcome shared = convert("ball.sog", moves);
+  EXPECT_EQ(shared.exit_code, 2);
+  EXPECT_THAT(shared.out, AllOf(HasSubstr("ball.json"), HasSubstr("another name")));
+  EXPECT_FALSE(std::filesystem::exists(path("ball.sog")));
+}
+
+TEST_F(Convert, MergesAndRemovesFloaters) {
+  for (const char* merge : {"100", "25%"}) {
+    const Outcome outcome = convert("merged.ply", fmt::format("--merge {}", merge));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+    EXPECT_THAT(outcome.out,
+                AllOf(HasSubstr("100 of 400"), HasSubstr("300 Gaussians were merged")));
+  }
+  GaussianCloud cloud = ball();
+  cloud.mean[7] = {3.0f, 4.0f, 5.0f};
+  save_scene(cloud, path("floater.ply"));
+  const Outcome outcome =
+      run(fmt::format("convert {} {} --remove-floaters", path("floater.ply"), path("clean.ply")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("399 of 400"), HasSubstr("1 floating")));
+  const Outcome tree = convert("merged.tree", "--merge 300");
+  ASSERT_EQ(tree.exit_code, 0) << tree.out;
+  EXPECT_EQ(info("merged.tree").at("gaussians"), 300);
+}
+
+TEST_F(Convert, RefusesEditsThatMakeNoSense) {
+  for (const auto& [options, word] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"--scale 0", "--scale"},
+           {"--scale=-1", "--scale"},
+           {"--scale nan", "--scale"},
+           {"--rotate 90", "--rotate"},
+           {"--rotate=1,2,x", "--rotate"},
+           {"--rotate=1,2,3,", "--rotate"},
+           {"--translate=1,2,inf", "--translate"},
+           {"--translate=1e10,0,0", "--translate"},
+           {"--crop=0,0,0,1,1", "--crop"},
+           {"--crop=0,0,0,1,0,1", "--crop: y"},
+           {"--crop=5,5,5,6,6,6", "--crop"},
+           {"--merge 0", "--merge"},
+           {"--merge 0%", "--merge"},
+           {"--merge 101%", "--merge"},
+           {"--merge 0.5", "--merge"},
+           {"--merge 9 --keep-fraction 0.5", "--merge"},
+           {"--keep-fraction 0", "--keep-fraction"}}) {
+    const Outcome outcome = convert("no.ply", options);
+    EXPECT_EQ(outcome.exit_code, 2) << options;
+    EXPECT_THAT(outcome.out, HasSubstr(word)) << options;
+    EXPECT_FALSE(std::filesystem::exists(path("no.ply"))) << options;
+  }
+  const Outcome tree = convert("no.tree", "--crop=5,5,5,6,6,6");
+  EXPECT_EQ(tree.exit_code, 2);
+  EXPECT_THAT(tree.out, HasSubstr("--crop"));
+  EXPECT_FALSE(std::filesystem::exists(path("no.tree")));
+}
+
+TEST_F(Convert, RefusesToWriteOverTheFileOfAFolder) {
+  std::filesystem::create_directory(path("hall"));
+  std::filesystem::rename(scene(), path("hall/hall.ply"));
+  const Outcome outcome =
+      run(fmt::format("convert {} {} --merge 10", path("hall"), path("hall/hall.ply")));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.out, HasSubstr("another name"));
+}
+
+}  // namespace
+}  // namespace catgs::test
