@@ -36,7 +36,7 @@ struct FloorsOptions {
 /// A scene whose Gaussians are taken part by part.
 struct Parts {
   SceneHints hints;
-  GaussianCloud sample;
+  std::shared_ptr<const GaussianCloud> sample;
   std::function<void(const std::function<void(const GaussianCloud&)>& take)> each;
 };
 
@@ -52,7 +52,7 @@ Parts parts_of_tree(const SceneInPages& scene, const std::shared_ptr<ThreadPool>
       take(read_nodes(*tree, nodes, LoadContext(*pool)));
     }
   };
-  return {scene.outline.hints, scene.outline.cloud, each};
+  return {scene.outline.hints, std::make_shared<GaussianCloud>(scene.outline.cloud), each};
 }
 
 Parts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>& pool,
@@ -66,10 +66,11 @@ Parts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>
   if (!options.scene.lod && !options.scene.budget)
     if (auto scene = scene_in_parts(options.scene.path, load, pool);
         scene && scene->hints.source != "estimated")
-      return {scene->hints, std::move(scene->sample),
+      return {scene->hints, std::make_shared<GaussianCloud>(std::move(scene->sample)),
               [each = scene->parts.each](const auto& take) { each(take); }};
   auto scene = std::make_shared<Scene>(load_scene(options.scene, options.threads, quiet));
-  return {scene->hints, scene->cloud, [scene](const auto& take) { take(scene->cloud); }};
+  return {scene->hints, std::shared_ptr<const GaussianCloud>(scene, &scene->cloud),
+          [scene](const auto& take) { take(scene->cloud); }};
 }
 
 float eye_height_of(const FloorsOptions& options, const Parts& parts) {
@@ -79,7 +80,7 @@ float eye_height_of(const FloorsOptions& options, const Parts& parts) {
                        "in the scene's units, over 0");
     return *options.eye_height;
   }
-  const auto estimate = walk::estimate_eye_height(parts.sample, parts.hints);
+  const auto estimate = walk::estimate_eye_height(*parts.sample, parts.hints);
   if (!estimate)
     throw InputError(options.scene.path, "",
                      "has no floor and ceiling at its start that would tell how large a person is",

@@ -9,16 +9,16 @@ namespace catgs::walk {
 namespace {
 
 TEST(Plan, NorthIsUpAndEastIsRight) {
-  const WalkMap map = test::hand_made_map({4, 2}, [](int x, int y) {
-    return x == 3 && y == 1 ? Kind::obstacle : x == 3 ? Kind::low : Kind::clear;
+  const WalkMap map = test::hand_made_map({16, 8}, [](int x, int y) {
+    return x == 15 && y == 7 ? Kind::obstacle : x == 15 ? Kind::low : Kind::clear;
   });
   const Image plan = draw_plan(map, 0);
   ASSERT_EQ(plan.size_px, glm::ivec2(1024, 512));
   const auto red = [&](int x, int y) { return plan.row(y)[3 * x]; };
-  EXPECT_LT(red(1000, 100), 0.3f);              // a wall in the north-east
-  EXPECT_NEAR(red(1000, 400), 0.6f, 0.1f);      // furniture in the south-east
-  EXPECT_EQ(red(400, 100), 1.0f);               // ground
-  EXPECT_LT(plan.row(384)[3 * 128 + 1], 0.3f);  // the start is red
+  EXPECT_LT(red(1000, 20), 0.3f);              // a wall in the north-east
+  EXPECT_NEAR(red(1000, 400), 0.6f, 0.1f);     // furniture in the south-east
+  EXPECT_EQ(red(400, 100), 1.0f);              // ground
+  EXPECT_LT(plan.row(480)[3 * 32 + 1], 0.3f);  // the start is red
 }
 
 TEST(Plan, AStoreyShowsItsOwnPlaces) {

@@ -79,7 +79,7 @@ TEST(WalkFile, ForgedFieldsAreNamed) {
   EXPECT_THAT(refusal(with(92, nan)), HasSubstr("start"));
   EXPECT_THAT(refusal(with(92, 2000.0f)), AllOf(HasSubstr("start"), HasSubstr("no clear ground")));
   EXPECT_THAT(refusal(with(104, 5000u)), HasSubstr("size"));
-  EXPECT_THAT(refusal(with(104, 2u)), HasSubstr("unpacked bytes"));
+  EXPECT_THAT(refusal(with(104, 2u)), HasSubstr("columns"));
   EXPECT_THAT(refusal(with(112, 0xffffffffu)), HasSubstr("places"));
   EXPECT_THAT(refusal(with(116, 20u)), HasSubstr("stream"));
   EXPECT_THAT(refusal(with(120, 7u)), HasSubstr("packed bytes"));
