@@ -26,7 +26,7 @@ std::shared_ptr<PagePool> host_pool(const TreeShape& shape, const RendererOption
       largest = std::max(largest, slot_bytes(TreeShape(1, degree)));
     const auto slots = static_cast<std::uint32_t>(
         std::max<std::uint64_t>(PageChoice::least_slots, options.pages->memory_bytes() / largest));
-    return std::make_shared<PagePool>(slots, slots * largest);
+    return std::make_shared<PagePool>(slots, slots * largest, PagePools::settling_turns);
   });
 }
 

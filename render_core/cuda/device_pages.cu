@@ -32,10 +32,11 @@ std::size_t chunk_bytes_for(std::size_t block_bytes) { return (block_bytes + 255
 
 std::size_t page_block_bytes(const TreeShape& shape) { return shape.slots() * shape.block_bytes(); }
 
-std::shared_ptr<DevicePool> make_pool(std::uint64_t slots, std::size_t block_bytes) {
+std::shared_ptr<DevicePool> make_pool(std::uint64_t slots, std::size_t block_bytes,
+                                      int settling_turns) {
   return std::make_shared<DevicePool>(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
                                           slots, PageChoice::least_slots, most_slots)),
-                                      block_bytes);
+                                      block_bytes, settling_turns);
 }
 
 /// The pool of the options for this device, or one for this tree alone.
@@ -43,13 +44,15 @@ std::shared_ptr<DevicePool> pool_for(const TreeShape& shape, const RendererOptio
                                      int device) {
   if (!options.pages) {
     const std::size_t blocks = page_block_bytes(shape);
-    return make_pool(slots_in(options.scene_memory, DevicePool::slot_bytes(blocks), shape), blocks);
+    return make_pool(slots_in(options.scene_memory, DevicePool::slot_bytes(blocks), shape), blocks,
+                     PagePool::all_turns);
   }
   const auto make = [&]() -> std::shared_ptr<PagePool> {
     std::size_t largest = 0;
     for (int degree = 0; degree <= max_sh_degree; ++degree)
       largest = std::max(largest, page_block_bytes(TreeShape(1, degree)));
-    return make_pool(options.pages->memory_bytes() / DevicePool::slot_bytes(largest), largest);
+    return make_pool(options.pages->memory_bytes() / DevicePool::slot_bytes(largest), largest,
+                     PagePools::settling_turns);
   };
   return std::static_pointer_cast<DevicePool>(options.pages->on(device, make));
 }
@@ -61,8 +64,8 @@ int rows_above_bottom(const TreeShape& shape, int band) {
 
 }  // namespace
 
-DevicePool::DevicePool(std::uint32_t slots, std::size_t block_bytes)
-    : PagePool(slots, slots * slot_bytes(block_bytes)),
+DevicePool::DevicePool(std::uint32_t slots, std::size_t block_bytes, int settling_turns)
+    : PagePool(slots, slots * slot_bytes(block_bytes), settling_turns),
       memory_(std::size_t{slots} * clusters_per_slot, slots * chunk_bytes_for(block_bytes)) {
   errors_.reserve(std::size_t{slots} * clusters_per_slot);
 }

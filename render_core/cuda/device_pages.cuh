@@ -18,7 +18,7 @@ class DevicePool final : public PagePool {
  public:
   /// Allocates on the current device. `block_bytes`: of all blocks of the largest page. Throws
   /// CudaError.
-  DevicePool(std::uint32_t slots, std::size_t block_bytes);
+  DevicePool(std::uint32_t slots, std::size_t block_bytes, int settling_turns);
 
   /// Bytes of a slot with so many bytes of blocks.
   [[nodiscard]] static std::size_t slot_bytes(std::size_t block_bytes);

@@ -25,6 +25,9 @@ struct SceneAbout {
   bool operator==(const SceneAbout&) const = default;
 };
 
+/// Whether a world unit may be so long.
+inline bool is_metres_per_unit(float metres) { return metres >= 1e-6f && metres <= 1e6f; }
+
 /// 0xRRGGBB of six hexadecimal digits; nothing for other texts.
 inline std::optional<std::uint32_t> parse_rgb(std::string_view digits) {
   std::uint32_t rgb = 0;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include <fmt/format.h>
@@ -189,11 +191,14 @@ std::string stream_of(const WalkMap& map) {
 }
 
 std::string pack(const WalkMap& map) {
+  assert(map.places.size() <= most_places);
   const std::string stream = stream_of(map);
   uLongf size = compressBound(stream.size());
   std::string bytes(sizeof(Header) + size, '\0');
-  compress2(reinterpret_cast<Bytef*>(bytes.data() + sizeof(Header)), &size,
-            reinterpret_cast<const Bytef*>(stream.data()), stream.size(), Z_BEST_COMPRESSION);
+  if (compress2(reinterpret_cast<Bytef*>(bytes.data() + sizeof(Header)), &size,
+                reinterpret_cast<const Bytef*>(stream.data()), stream.size(),
+                Z_BEST_COMPRESSION) != Z_OK)
+    throw std::bad_alloc();
   bytes.resize(sizeof(Header) + size);
   Header h;
   std::memcpy(h.origin.data(), &map.grid.origin, sizeof h.origin);
@@ -217,6 +222,14 @@ std::string pack(const WalkMap& map) {
 }
 
 void write_walk_file(const WalkMap& map, const std::filesystem::path& path) {
+  std::size_t in_column = 0;
+  for (std::size_t c = 0; c + 1 < map.first.size(); ++c)
+    in_column = std::max<std::size_t>(in_column, map.first[c + 1] - map.first[c]);
+  if (map.places.size() > most_places || in_column > most_in_column)
+    throw InputError(path.string(), "",
+                     fmt::format("{} places, {} of them above each other, are too many",
+                                 map.places.size(), in_column),
+                     "give a larger --eye-height");
   const std::string bytes = pack(map);
   PartFile file(path);
   file.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));

@@ -157,6 +157,7 @@ std::vector<Stand> find_path(const WalkMap& map, const Stand& from, const Stand&
       }
   }
   if (open.empty()) return {};
+  if (index(begin) == index(end)) return {from, to};
   std::vector<Stand> path = {to};
   for (std::uint32_t place = index(end); place != index(begin);) {
     place = nodes[place].before;

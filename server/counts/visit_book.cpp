@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::minutes save_interval{1};
-constexpr std::uint64_t max_bytes = 64 << 20;
+constexpr std::uint64_t max_bytes = 16 << 20;  // a day within all limits has less
 constexpr std::string_view prefix = "visits-", extension = ".json";
 
 /// The date in the name of a day's file; empty: it is none.
@@ -60,7 +60,10 @@ DayCounts read_counts(const ByteSource& file) {
     const JsonField scene = scenes.at(id);
     SceneCounts& counts = day[id];
     counts.visits = scene.at("visits").count();
-    counts.seconds = static_cast<double>(scene.at("seconds").number());
+    const JsonField seconds = scene.at("seconds");
+    if (!seconds.value().is_number() || !(seconds.value().get<double>() >= 0.0))
+      seconds.fail("is no time");
+    counts.seconds = seconds.value().get<double>();
     counts.bytes = scene.at("bytes").count();
     for (std::size_t i = 0; i < device_kinds; ++i)
       if (const auto devices = scene.at("devices").find(device_names[i]))
@@ -71,7 +74,7 @@ DayCounts read_counts(const ByteSource& file) {
                         static_cast<std::uint32_t>(stops[i].at("stop").count())};
       counts.stops[stop] = stops[i].at("visits").count();
     }
-    if (day.size() > VisitCounts::most_scenes) scenes.fail("has too many scenes");
+    if (day.size() > VisitCounts::most_scenes + 1) scenes.fail("has too many scenes");
   }
   return day;
 }
@@ -119,7 +122,7 @@ void VisitBook::restore() {
   }
 }
 
-/// A day that cannot be written is tried again when it has changed.
+/// A day that cannot be written is tried again the next time.
 void VisitBook::save() {
   for (const auto& [date, day] : counts_.take_changed()) {
     try {
@@ -127,6 +130,7 @@ void VisitBook::save() {
       file.stream() << counts_json(day);
       file.finish();
     } catch (const InputError& failure) {
+      counts_.mark_changed(date);
       log_warning({.event = "visit_counts_unwritten"}, "visits are not saved: {}", failure.what());
     }
   }

@@ -25,9 +25,9 @@ bool is_date(std::string_view text) {
 /// The lock is held.
 SceneCounts& VisitCounts::today(const std::string& scene_id) {
   const std::string date = date_of(unix_s_());
-  DayCounts& day = days_[date];
   changed_.insert(date);
-  while (days_.size() > most_days) days_.erase(days_.begin());
+  if (!days_.contains(date) && days_.size() >= most_days) days_.erase(days_.begin());
+  DayCounts& day = days_[date];  // the clock may be behind
   if (day.size() < most_scenes || day.contains(scene_id)) return day[scene_id];
   return day[std::string(other_scenes)];
 }
@@ -49,7 +49,13 @@ void VisitCounts::spend(const std::string& scene_id, double seconds, std::uint64
 void VisitCounts::reach(const std::string& scene_id, StopId stop) {
   const std::lock_guard lock(mutex_);
   auto& stops = today(scene_id).stops;
-  if (stops.size() < most_stops || stops.contains(stop)) ++stops[stop];
+  if (const auto known = stops.find(stop); known != stops.end()) {
+    ++known->second;
+    return;
+  }
+  std::size_t all = 0;
+  for (const auto& [id, counts] : days_.at(date_of(unix_s_()))) all += counts.stops.size();
+  if (all < most_stops) stops[stop] = 1;
 }
 
 void VisitCounts::restore(const std::string& date, DayCounts counts) {
@@ -58,9 +64,14 @@ void VisitCounts::restore(const std::string& date, DayCounts counts) {
   while (days_.size() > most_days) days_.erase(days_.begin());
 }
 
-CountsByDay VisitCounts::all() const {
+CountsByDay VisitCounts::since(std::string_view date) const {
   const std::lock_guard lock(mutex_);
-  return days_;
+  return {days_.lower_bound(date), days_.end()};
+}
+
+void VisitCounts::mark_changed(const std::string& date) {
+  const std::lock_guard lock(mutex_);
+  changed_.insert(date);
 }
 
 CountsByDay VisitCounts::take_changed() {

@@ -40,8 +40,8 @@ class VisitCounts {
   static constexpr std::size_t most_days = 400;
   /// Of a day. Further scenes are counted together, as `other_scenes`.
   static constexpr std::size_t most_scenes = 1000;
-  /// Of a scene and day. Further stops are not counted.
-  static constexpr std::size_t most_stops = 2000;
+  /// Of a day, in all scenes. Further stops are not counted.
+  static constexpr std::size_t most_stops = 20'000;
   static constexpr std::string_view other_scenes = "(others)";
 
   /// `unix_s`: the time, which decides about the day.
@@ -53,9 +53,12 @@ class VisitCounts {
 
   /// Puts a day in place that was counted before.
   void restore(const std::string& date, DayCounts counts);
-  [[nodiscard]] CountsByDay all() const;
+  /// The days from `date` on. Empty: all.
+  [[nodiscard]] CountsByDay since(std::string_view date = {}) const;
   /// The days that have changed since the last call.
   [[nodiscard]] CountsByDay take_changed();
+  /// The day is to be taken again.
+  void mark_changed(const std::string& date);
 
  private:
   SceneCounts& today(const std::string& scene_id);

@@ -22,10 +22,12 @@ class VisitTally {
                TimePoint now);
   /// The visitor sees nothing for a while.
   void off_show() { seen_at_.reset(); }
-  /// A stop counts once in a visit, however often it is reached.
-  void reached(StopId stop);
+  /// A stop of the scene counts once in a visit, however often it is reached.
+  void reached(const std::string& scene_id, DeviceKind device, StopId stop);
 
  private:
+  void enter(const std::string& scene_id, DeviceKind device);
+
   VisitCounts* const counts_;
   std::string scene_id_;
   std::optional<TimePoint> seen_at_;

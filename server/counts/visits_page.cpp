@@ -153,16 +153,16 @@ std::optional<HttpResponse> VisitsPage::respond(const HttpRequest& request) cons
     return text_response(200, html(request), "text/html; charset=utf-8");
   if (request.path == "/visits.css") return text_response(200, std::string(style), "text/css");
   if (request.path == "/visits.csv")
-    return text_response(200, counts_csv(counts_.all()), "text/csv; charset=utf-8");
+    return text_response(200, counts_csv(counts_.since()), "text/csv; charset=utf-8");
   if (request.path == "/visits/stops.csv")
     return text_response(200, stops_csv(), "text/csv; charset=utf-8");
   return std::nullopt;
 }
 
 std::string VisitsPage::html(const HttpRequest& request) const {
-  const CountsByDay all = counts_.all();
   const std::string only = argument(request, "scene");
   const int days = days_of(request);
+  const CountsByDay all = counts_.since(date_of(unix_s_() - (days - 1) * seconds_a_day));
   DayCounts scenes;
   SceneCounts sum;
   std::vector<std::pair<std::string, double>> visits, hours;
@@ -215,7 +215,7 @@ std::string VisitsPage::html(const HttpRequest& request) const {
 std::string VisitsPage::stops_csv() const {
   std::string out = "date,scene,tour,stop,tour title,stop title,visits\r\n";
   std::map<std::string, std::vector<TourTitles>> titles;
-  for (const auto& [date, day] : counts_.all())
+  for (const auto& [date, day] : counts_.since())
     for (const auto& [id, counts] : day) {
       if (!counts.stops.empty() && !titles.contains(id)) titles[id] = titles_(id);
       for (const auto& [stop, visits] : counts.stops) {

@@ -35,7 +35,8 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
       changed_ = true;
     }
     const FoundScene& found = book.found;
-    if (!book.entry || book.outdated || book.gone) continue;
+    // Where visitors still see the form before, another one waits.
+    if (!book.entry || book.former || book.outdated || book.gone) continue;
     if (!book.tree_lost && reads_damaged_tree(book)) {
       trees_.discard(found, "pages are damaged");
       book.tree_lost = true;  // what is left of it is drawn until there is another

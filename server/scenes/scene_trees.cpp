@@ -203,6 +203,9 @@ void SceneTrees::discard(const FoundScene& scene, const std::string& why) {
   log_warning({.event = "tree_unusable", .scene = scene.id}, "scene {}: its tree is removed: {}",
               scene.id, why);
   cache_->remove(scene.tree);
+  const auto [before, is_first] = discarded_.try_emplace(scene.tree, clock_());
+  if (!is_first && clock_() - before->second < retry_after_failure) give_up(scene, why);
+  before->second = clock_();
 }
 
 void SceneTrees::give_up(const FoundScene& scene, const std::string& why) {
@@ -221,6 +224,7 @@ void SceneTrees::keep(const std::set<std::string>& names) {
   if (!cache_) return;
   std::erase_if(waiting_, [&](const Order& order) { return !names.contains(order.scene.tree); });
   std::erase_if(given_up_, [&](const auto& of) { return !names.contains(of.first); });
+  std::erase_if(discarded_, [&](const auto& of) { return !names.contains(of.first); });
   if (running_ && !names.contains(running_->scene.tree)) running_->cancelled = true;
   cache_->keep(names);
 }

@@ -57,7 +57,8 @@ class SceneTrees {
   /// What is done for a scene at the moment, for people: "building tree 37 %". Often empty.
   [[nodiscard]] std::string state_of(const FoundScene& scene) const;
 
-  /// The scene's tree is damaged: removes it.
+  /// The scene's tree is damaged: removes it. Where that happens again soon, the disk is to blame,
+  /// and no tree is built for a while.
   void discard(const FoundScene& scene, const std::string& why);
   /// The scene's tree cannot be built or used: nothing is tried for a while.
   void give_up(const FoundScene& scene, const std::string& why);
@@ -99,10 +100,11 @@ class SceneTrees {
   std::optional<TreeCache> cache_;
   std::deque<Order> waiting_;  // urgent ones first
   std::shared_ptr<Build> running_;
-  int told_percent_ = 0;                       // of running_
-  bool changed_ = false;                       // a state_of(), since the last tick
-  std::optional<TimePoint> logged_;            // progress of running_
-  std::map<std::string, TimePoint> given_up_;  // when, by the tree's name
+  int told_percent_ = 0;                        // of running_
+  bool changed_ = false;                        // a state_of(), since the last tick
+  std::optional<TimePoint> logged_;             // progress of running_
+  std::map<std::string, TimePoint> given_up_;   // when, by the tree's name
+  std::map<std::string, TimePoint> discarded_;  // likewise
   std::optional<boost::asio::thread_pool> builder_;
 };
 

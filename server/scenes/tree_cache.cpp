@@ -85,18 +85,16 @@ struct Content {
 /// names, so that all .json of a folder of tiles count.
 Content content_of(const SceneLocation& scene) {
   Content content;
-  if (!fs::is_directory(scene.path)) {
-    content.add(scene.path);
-    for (const fs::path& file : files_beside(scene.path)) content.add(file);
+  // The folder of an .lcc2 may hold other scenes.
+  const bool is_lcc2 = scene.kind == SceneLocation::Kind::lcc2;
+  if (is_lcc2 || !fs::is_directory(scene.path)) {
+    const fs::path file = is_lcc2 ? scene.path / scene.index : scene.path;
+    content.add(file);
+    for (const fs::path& other : files_beside(file)) content.add(other);
     return content;
   }
   const bool all = scene.kind == SceneLocation::Kind::tiles_folder;
-  // The folder of an .lcc2 may hold other scenes.
-  const bool lcc2 = scene.kind == SceneLocation::Kind::lcc2;
-  const fs::path folder = lcc2 ? scene.path / "data" : scene.path;
-  if (lcc2) content.add(scene.path / scene.index);
-  if (!fs::is_directory(folder)) return content;
-  for (const auto& entry : fs::recursive_directory_iterator(folder))
+  for (const auto& entry : fs::recursive_directory_iterator(scene.path))
     if (entry.is_regular_file() &&
         (all || entry.path().extension() != ".json" || is_scene_index(entry.path())))
       content.add(entry.path());

@@ -62,7 +62,7 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   if (!audience_.is_visitor(from)) return audience_.on_message(from, message);
   visit_.on_link(link, received);
   const auto* hello = std::get_if<Hello>(&message);
-  if (hello) visitor_.device = hello->device;
+  if (hello && visit_.life().state() == VisitState::awaiting_hello) visitor_.device = hello->device;
   if (hello && visit_.life().state() == VisitState::awaiting_hello)
     return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
   if (visit_.life().state() == VisitState::live) {
@@ -70,7 +70,8 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
     if (const auto* wish = std::get_if<Follow>(&message))
       return admissions_.follow(*this, from, *wish, received);
     if (const auto* reached = std::get_if<Reached>(&message))
-      return tally_.reached({reached->tour, reached->stop});
+      return tally_.reached(visit_.stream().scene()->facts.scene_id, visitor_.device,
+                            {reached->tour, reached->stop});
   }
   if (const auto* pose = std::get_if<PoseSample>(&message)) {
     audience_.presentation().moved(*pose, received);

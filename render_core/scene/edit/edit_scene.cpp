@@ -103,6 +103,8 @@ SceneHints placed(const SceneHints& hints, const Placement& placement) {
   to.near_z = scale * hints.near_z;
   to.scale = scale * hints.scale;
   to.about.metres_per_unit = hints.about.metres_per_unit / scale;
+  if (hints.about.metres_per_unit > 0.0f && !is_metres_per_unit(to.about.metres_per_unit))
+    fail_out_of_range("metres_per_unit");
   to.focus = place_in_range(map, hints.focus);
   to.limits = {glm::vec3(std::numeric_limits<float>::max()),
                glm::vec3(std::numeric_limits<float>::lowest())};

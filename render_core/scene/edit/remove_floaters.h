@@ -18,10 +18,10 @@ namespace catgs {
 /// Occupied cells that touch, at a face, edge or corner, form a group. A group is a surface if it
 /// has at least a thousandth of the cells of the largest group. A Gaussian stays if it crosses a
 /// cell of a surface or a neighbour of one, or if it is large itself: wider than 16 half cells from
-/// -3 to 3 standard deviations. So the largest group always stays. If no cell is occupied, nothing
-/// is removed.
+/// -1.5 to 1.5 standard deviations. So the largest group always stays. If no cell is occupied,
+/// nothing is removed.
 ///
-/// Takes 67 MB and a bit per Gaussian. The result does not depend on threads.
+/// Takes about 200 MB, and a byte per Gaussian. The result does not depend on threads.
 std::size_t remove_floaters(GaussianCloud& cloud, ThreadPool& pool);
 
 }  // namespace catgs

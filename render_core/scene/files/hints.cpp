@@ -85,8 +85,7 @@ SceneAbout parse_about(const JsonField& root) {
   if (const auto colour = root.find("background")) about.background_rgb = parse_colour(*colour);
   if (const auto metres = root.find("metres_per_unit")) {
     about.metres_per_unit = metres->number();
-    if (!(about.metres_per_unit >= 1e-6f && about.metres_per_unit <= 1e6f))
-      metres->fail("is not in 1e-6…1e6");
+    if (!is_metres_per_unit(about.metres_per_unit)) metres->fail("is not in 1e-6…1e6");
   }
   return about;
 }

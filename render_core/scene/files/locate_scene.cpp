@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/gltf.h"
+#include "render_core/scene/formats/lcc2.h"
 
 namespace catgs {
 
@@ -66,6 +68,9 @@ fs::path single_scene_file(const fs::path& folder) {
       found.push_back(entry.path().filename().string());
   }
   if (found.empty()) throw InputError(folder.string(), "", "holds no scene", supported_scenes);
+  // The .sog or .spz files beside an .lcc2 are its parts.
+  const auto is_index = [](const std::string& name) { return name.ends_with(".lcc2"); };
+  if (std::ranges::any_of(found, is_index)) std::erase_if(found, std::not_fn(is_index));
   // A .glb or .gltf beside a scene is a mesh, most likely.
   const auto may_be_mesh = [](const std::string& name) {
     return name.ends_with(".glb") || name.ends_with(".gltf");
@@ -163,11 +168,14 @@ SceneLocation locate_scene(const fs::path& given) {
 
 std::vector<fs::path> files_beside(const fs::path& scene) {
   std::vector<fs::path> files;
-  if (scene.extension() == ".gltf") try {
-      for (const std::string& name : gltf_buffer_files(FileSource(scene)))
-        files.push_back(scene.parent_path() / name);
-    } catch (const InputError&) {
-    }
+  const bool is_gltf = scene.extension() == ".gltf", is_lcc2 = scene.extension() == ".lcc2";
+  if (!is_gltf && !is_lcc2) return files;
+  try {
+    const FileSource file(scene);
+    for (const std::string& name : is_gltf ? gltf_buffer_files(file) : lcc2_files(file))
+      files.push_back(scene.parent_path() / name);
+  } catch (const InputError&) {
+  }
   return files;
 }
 

@@ -1,12 +1,16 @@
 #include "render_core/scene/files/tour_places.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <system_error>
 
+#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 
+#include "render_core/base/error.h"
+#include "render_core/math/camera.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/json_field.h"
 
@@ -25,6 +29,11 @@ void place_member(const std::string& name, nlohmann::ordered_json& value,
   // As floats, which sidecars hold.
   if (is_place && are_numbers(value, 3)) {
     const glm::vec3 to(placement.map()({number(0), number(1), number(2)}));
+    for (int k = 0; k < 3; ++k)
+      if (!(std::abs(to[k]) <= max_coordinate))
+        throw InputError("placement", "",
+                         fmt::format("a place of a tour would lie beyond {} units", max_coordinate),
+                         "scale less, or move less far");
     value = {to.x, to.y, to.z};
   } else if (name == "orientation" && are_numbers(value, 4)) {
     const glm::quat to(placement.rotation * glm::dquat(number(3), number(0), number(1), number(2)));

@@ -7,7 +7,7 @@
 
 namespace catgs {
 
-/// The "tours" of the sidecar as they stand there; null if there are none. Throws InputError for a
+/// The "tours" of the sidecar; null if there are none. Throws InputError for a
 /// file that is no JSON.
 nlohmann::ordered_json tours_in_sidecar(const HintFiles& files);
 

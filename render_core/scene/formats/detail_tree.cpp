@@ -30,13 +30,6 @@ DetailChoice shown(const DetailTree& tree, const std::vector<bool>& refined) {
   return choice;
 }
 
-std::vector<bool> refined_at(const DetailTree& tree, int level) {
-  const int depth = tree.levels() - 1 - level;
-  std::vector<bool> refined(tree.nodes.size());
-  for (std::size_t n = 0; n < refined.size(); ++n) refined[n] = tree.nodes[n].depth < depth;
-  return refined;
-}
-
 /// For each node the Gaussians of the nearest ones below it.
 std::vector<std::size_t> counts_below(const DetailTree& tree) {
   std::vector<std::size_t> below(tree.nodes.size());
@@ -44,6 +37,16 @@ std::vector<std::size_t> counts_below(const DetailTree& tree) {
     for (const std::size_t child : tree.nodes[n].children)
       below[n] += tree.nodes[child].count > 0 ? tree.nodes[child].count : below[child];
   return below;
+}
+
+/// The nodes that give way to their children on a level: those above it that have Gaussians below.
+std::vector<bool> refined_at(const DetailTree& tree, int level) {
+  const int depth = tree.levels() - 1 - level;
+  const std::vector<std::size_t> below = counts_below(tree);
+  std::vector<bool> refined(tree.nodes.size());
+  for (std::size_t n = 0; n < refined.size(); ++n)
+    refined[n] = tree.nodes[n].depth < depth && below[n] > 0;
+  return refined;
 }
 
 /// Refines nodes of `choice` by one level more while the Gaussians fit into `budget`.
@@ -130,13 +133,14 @@ GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context) {
   GaussianCloud whole;
   whole.resize(scene.count, scene.sh_degree);
   const auto parts = static_cast<double>(scene.parts);
-  std::size_t done = 0;
+  std::size_t done = 0, largest = 0;
   for (std::size_t i = 0; i < scene.parts; ++i) {
     const auto part_number = static_cast<double>(i);
     const GaussianCloud part =
         scene.read(i, context.part(part_number / parts, (part_number + 1.0) / parts));
     copy_gaussians(part, done, whole);
-    whole.model = part.model;
+    if (part.size() > largest) whole.model = part.model;
+    largest = std::max(largest, part.size());
     done += part.size();
   }
   return whole;

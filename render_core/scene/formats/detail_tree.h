@@ -59,7 +59,7 @@ struct OpenLevels {
   std::function<GaussianCloud(std::size_t part, const LoadContext&)> read;
 };
 
-/// All parts, one after the other.
+/// All parts, one after the other. The model is that of the largest part.
 GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context);
 
 }  // namespace catgs

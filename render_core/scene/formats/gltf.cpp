@@ -46,8 +46,11 @@ struct Contents {
   GltfSize size;
   std::vector<std::string> notes;
 
+  /// Words of the file may be in it.
   void note(std::string text) {
-    if (std::find(notes.begin(), notes.end(), text) == notes.end())
+    constexpr std::size_t most_notes = 16, most_bytes = 200;
+    if (text.size() > most_bytes) text = to_utf8(text.substr(0, most_bytes)) + "…";
+    if (notes.size() < most_notes && std::find(notes.begin(), notes.end(), text) == notes.end())
       notes.push_back(std::move(text));
   }
 };

@@ -229,19 +229,15 @@ std::vector<std::string> GltfDocument::buffer_files() const {
 const ByteSource& GltfDocument::open(const JsonField& uri) {
   const std::string text = uri.text();
   const std::string name = is_data(text) ? text : file_named_by(text);
-  std::unique_ptr<ByteSource>& file = files_[name];
-  if (file) return *file;
-  if (files_.size() > max_buffers) uri.fail(fmt::format("is of more than {} buffers", max_buffers));
-  if (!is_data(text)) {
-    file = beside_.open(name);
-    return *file;
-  }
+  if (const auto known = files_.find(name); known != files_.end()) return *known->second;
+  if (files_.size() >= max_buffers)
+    uri.fail(fmt::format("is of more than {} buffers", max_buffers));
+  if (!is_data(text)) return *(files_[name] = beside_.open(name));
   constexpr std::string_view marker = ";base64,";
   const std::size_t found = text.find(marker);
   if (found == std::string::npos) uri.fail("is a data: URI without base64");
   data_.push_back(decode_base64(uri, std::string_view(text).substr(found + marker.size())));
-  file = std::make_unique<MemorySource>(name_ + ": data", data_.back());
-  return *file;
+  return *(files_[name] = std::make_unique<MemorySource>(name_ + ": data", data_.back()));
 }
 
 GltfBytes GltfDocument::buffer(const JsonField& index) {

@@ -24,6 +24,8 @@ namespace {
 constexpr std::uint64_t max_lcc2_bytes = 32 << 20;
 constexpr std::size_t max_files = std::size_t{1} << 16;
 constexpr std::size_t max_name_bytes = 4096;
+constexpr std::size_t max_key_bytes =
+    256;  // of a child: error messages repeat it for each node below
 constexpr std::size_t max_nodes = std::size_t{1} << 16;
 constexpr int max_node_depth = 64;
 
@@ -73,8 +75,11 @@ void parse_node(const JsonField& node, std::optional<std::size_t> above, int dep
   const auto children = node.find("child");
   if (!children) return;
   if (children->value().is_object())
-    for (const auto& [key, value] : children->value().items())
+    for (const auto& [key, value] : children->value().items()) {
+      if (key.size() > max_key_bytes)
+        children->fail(fmt::format("has a key of more than {} bytes", max_key_bytes));
       parse_node(children->at(key), index, depth + 1, scene);
+    }
   else
     for (std::size_t i = 0; i < children->size(); ++i)
       parse_node((*children)[i], index, depth + 1, scene);
@@ -204,6 +209,8 @@ GaussianCloud read_part(const FileSet& folder, const Part& part, int sh_degree,
 }
 
 }  // namespace
+
+std::vector<std::string> lcc2_files(const ByteSource& file) { return parse_scene(file).files; }
 
 OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::string& index,
                      std::optional<int> level, std::optional<std::size_t> budget,

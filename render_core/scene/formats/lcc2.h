@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render_core/scene/formats/detail_tree.h"
 #include "render_core/scene/formats/file_set.h"
@@ -17,10 +18,13 @@ namespace catgs {
 // show the same in more detail. The root may name a file of surroundings, which every level has.
 // Axes: z up, also inside an .spz, whatever axes that names. Meshes are not read.
 
+/// The files that hold the scene of an .lcc2, as paths from its folder. Throws InputError.
+std::vector<std::string> lcc2_files(const ByteSource& file);
+
 /// The scene `index` in `folder`; without `level` and `budget` the finest level. Reads the headers
-/// of the files that hold it. Throws InputError naming the field. Errors include: both are given,
-/// there is no such level, the coarsest level exceeds the budget, two nodes share Gaussians, there
-/// are more than `most` Gaussians.
+/// of the files that hold it, and each .sog as a whole, because it is packed. Throws InputError
+/// naming the field. Errors include: both are given, there is no such level, the coarsest level
+/// exceeds the budget, two nodes share Gaussians, there are more than `most` Gaussians.
 OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::string& index,
                      std::optional<int> level, std::optional<std::size_t> budget,
                      std::uint64_t most = max_gaussians);

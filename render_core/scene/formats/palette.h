@@ -42,8 +42,9 @@ struct Palette {
 };
 
 /// Finds at most `size` entries with a small squared error by a tree of k-means: each node divides
-/// its vectors among 16 children, and its entries by their squared errors. The time is linear in
-/// the number of vectors. The result depends neither on the number of threads nor on the machine.
+/// its vectors among 16 children, and its entries by their squared errors. The time is usually
+/// linear in the number of vectors. The result depends neither on the number of threads nor on the
+/// machine.
 Palette make_palette(const VectorTable& vectors, std::size_t size, ThreadPool& pool);
 
 }  // namespace catgs

@@ -183,14 +183,13 @@ std::uint32_t parse_system(const ByteSource& file, std::span<const std::byte> pa
   return system == 0 ? right_up_back_system : system;  // 0: unspecified
 }
 
-/// Nothing for limits that leave no room, as zeros do.
-std::optional<OrbitLimits> parse_orbit(const ByteSource& file, std::span<const std::byte> payload) {
-  if (payload.size() < 3 * sizeof(float))
-    fail(file, "extension SPZ_ADOBE_safe_orbit_camera", "is cut off");
+/// An orbit that makes no sense, or leaves no room as zeros do, is none. The scene does not need
+/// it.
+std::optional<OrbitLimits> parse_orbit(std::span<const std::byte> payload) {
+  if (payload.size() < 3 * sizeof(float)) return std::nullopt;
   const auto number = [&](std::size_t i) { return load_as<float>(payload.data() + 4 * i); };
   for (std::size_t i = 0; i < 3; ++i)
-    if (!std::isfinite(number(i)))
-      fail(file, "extension SPZ_ADOBE_safe_orbit_camera", "has a number that is not finite");
+    if (!std::isfinite(number(i))) return std::nullopt;
   constexpr float quarter_turn = 1.57079633f;
   const OrbitLimits orbit{std::clamp(number(0), -quarter_turn, quarter_turn),
                           std::clamp(number(1), -quarter_turn, quarter_turn),
@@ -212,8 +211,7 @@ Extensions parse_extensions(const ByteSource& file, std::span<const std::byte> r
     const auto payload = records.first(length);
     records = records.subspan(length);
     if (type == coordinate_system_extension && !system) system = parse_system(file, payload);
-    if (type == safe_orbit_extension && !extensions.orbit)
-      extensions.orbit = parse_orbit(file, payload);
+    if (type == safe_orbit_extension && !extensions.orbit) extensions.orbit = parse_orbit(payload);
   }
   extensions.system = system.value_or(right_up_back_system);
   return extensions;

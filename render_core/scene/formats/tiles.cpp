@@ -27,6 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t most_notes = 32;
 constexpr std::uint64_t max_tileset_bytes = 32 << 20;
 constexpr std::size_t max_tiles = std::size_t{1} << 16;
 constexpr int max_tile_depth = 64;  // in one file
@@ -180,9 +181,10 @@ void TilesetReader::read_content(const JsonField& content, std::size_t node, con
   const JsonField uri = named ? *named : content.at("url");  // before version 1.0
   const std::string text = uri.text();
   if (text.size() > max_uri_bytes) uri.fail(fmt::format("has more than {} bytes", max_uri_bytes));
-  if (text.find(':') != std::string::npos) uri.fail("names no file of the scene's folder");
-  const std::string name =
-      FilesBelow::name_of(folder_, unescaped(text.substr(0, text.find_first_of("?#"))));
+  const std::string path = text.substr(0, text.find_first_of("?#"));
+  if (path.find(':') < path.find('/'))  // a scheme
+    uri.fail("names no file of the scene's folder");
+  const std::string name = FilesBelow::name_of(folder_, unescaped(path));
   if (name.ends_with(".json")) {
     found.push_back({name, {node, map, tileset_.tree.nodes[node].adds}});
     return;
@@ -270,7 +272,8 @@ OpenLevels open_tiles(const std::shared_ptr<const FileSet>& folder, const std::s
       bytes += content.size.bytes;
       scene.sh_degree = std::max(scene.sh_degree, content.size.sh_degree);
       for (const std::string& note : content.size.notes)
-        if (std::find(scene.notes.begin(), scene.notes.end(), note) == scene.notes.end())
+        if (scene.notes.size() < most_notes &&
+            std::find(scene.notes.begin(), scene.notes.end(), note) == scene.notes.end())
           scene.notes.push_back(note);
       chosen->contents.push_back(std::move(content));
     }

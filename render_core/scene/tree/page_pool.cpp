@@ -20,9 +20,10 @@ int readers() { return std::clamp(processors() / 2, 1, most_readers); }
 
 }  // namespace
 
-PagePool::PagePool(std::uint32_t slots, std::uint64_t bytes)
+PagePool::PagePool(std::uint32_t slots, std::uint64_t bytes, int settling_turns)
     : slots_(slots),
       bytes_(bytes),
+      settling_turns_(settling_turns),
       free_(std::make_shared<FreeSlots>(slots)),
       choice_(slots),
       readers_(readers()),

@@ -22,8 +22,11 @@ class PagedTree;
 /// and makes room, so frames never wait. They are drawn from what is there.
 class PagePool {
  public:
+  /// More than any scene needs.
+  static constexpr int all_turns = 10'000;
   /// `slots`: at least PageChoice::least_slots. `bytes`: the memory of all slots, for reports.
-  PagePool(std::uint32_t slots, std::uint64_t bytes);
+  /// `settling_turns`: for which a frame may wait until its pages are there.
+  PagePool(std::uint32_t slots, std::uint64_t bytes, int settling_turns = all_turns);
   /// No tree may be left.
   virtual ~PagePool();
   PagePool(const PagePool&) = delete;
@@ -31,6 +34,7 @@ class PagePool {
 
   [[nodiscard]] std::uint32_t slots() const { return slots_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] int settling_turns() const { return settling_turns_; }
   [[nodiscard]] const std::shared_ptr<FreeSlots>& free() const { return free_; }
   /// The time of PageInSlot::shown_since_s.
   [[nodiscard]] double now_s() const;
@@ -53,6 +57,7 @@ class PagePool {
 
   const std::uint32_t slots_;
   const std::uint64_t bytes_;
+  const int settling_turns_;
   const std::shared_ptr<FreeSlots> free_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 

@@ -16,6 +16,8 @@ class PagePools {
  public:
   /// In place of a device: main memory.
   static constexpr int host = -1;
+  /// Others wait for frames that wait for pages. So many turns read about 0.5 GB.
+  static constexpr int settling_turns = 16;
 
   /// `memory_bytes`: of each pool.
   explicit PagePools(std::uint64_t memory_bytes) : memory_bytes_(memory_bytes) {}

@@ -64,8 +64,7 @@ std::vector<std::shared_ptr<Watch>> PagedTree::watches() const {
 }
 
 void PagedTree::settle(const Watch& watch) {
-  constexpr int most_turns = 10'000;
-  for (int i = 0; i < most_turns && watch.waits(now_s()) && pool_->turn(); ++i) {
+  for (int i = 0; i < pool_->settling_turns() && watch.waits(now_s()) && pool_->turn(); ++i) {
   }
 }
 

@@ -62,7 +62,8 @@ class PagedTree {
   /// The time of PageInSlot::shown_since_s.
   [[nodiscard]] double now_s() const { return pool_->now_s(); }
   [[nodiscard]] std::shared_ptr<Watch> watch();
-  /// Reads all that this View's lookout needs and memory has room for, beside the other Views.
+  /// Reads all that this View's lookout needs and memory has room for, beside the other Views: in
+  /// PagePool::settling_turns() turns, or as much as they bring.
   void settle(const Watch& watch);
   [[nodiscard]] PageFigures figures() const;
 

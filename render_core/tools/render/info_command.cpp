@@ -148,7 +148,7 @@ std::optional<TreeHeader> tree_at(const std::filesystem::path& path) {
   const SceneLocation location = locate_scene(path);
   if (location.kind != SceneLocation::Kind::file) return std::nullopt;
   if (!is_tree(FileSource(location.path))) return std::nullopt;
-  TreeFile tree(std::make_unique<FileSource>(location.path), 0);
+  TreeFile tree(std::make_unique<FileSource>(location.path));
   require_root(tree);
   return tree.header();
 }

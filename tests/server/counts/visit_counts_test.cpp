@@ -52,7 +52,7 @@ TEST_F(VisitCountsTest, AVisitIsCountedWithItsTimeAndBytes) {
   tally.off_show();
   tally.on_show("hall", DeviceKind::phone, 1500, now_ += 10min);
   tally.on_show("hall", DeviceKind::phone, 2500, now_ += 250ms);
-  const auto all = counts_.all();
+  const auto all = counts_.since();
   const SceneCounts& hall = all.at("2025-11-25").at("hall");
   EXPECT_EQ(hall.visits, 1u);
   EXPECT_DOUBLE_EQ(hall.seconds, 0.5) << "the page was hidden meanwhile";
@@ -65,7 +65,7 @@ TEST_F(VisitCountsTest, AnotherSceneIsAnotherVisit) {
   tally.on_show("hall", DeviceKind::desktop, 0, now_);
   tally.on_show("garden", DeviceKind::desktop, 100, now_ += 1s);
   tally.on_show("garden", DeviceKind::desktop, 300, now_ += 1s);
-  const DayCounts day = counts_.all().at("2025-11-25");
+  const DayCounts day = counts_.since().at("2025-11-25");
   EXPECT_EQ(day.at("hall").visits, 1u);
   EXPECT_EQ(day.at("garden").visits, 1u);
   EXPECT_EQ(day.at("garden").bytes, 300u);
@@ -73,21 +73,25 @@ TEST_F(VisitCountsTest, AnotherSceneIsAnotherVisit) {
 
 TEST_F(VisitCountsTest, AStopCountsOnceInAVisit) {
   VisitTally a(&counts_), b(&counts_);
-  a.reached({0, 1});  // nothing was shown yet
-  for (VisitTally* tally : {&a, &b}) {
-    tally->on_show("hall", DeviceKind::desktop, 0, now_);
-    for (int i = 0; i < 3; ++i) tally->reached({0, 1});
-  }
-  a.reached({0, 2});
-  const auto stops = counts_.all().at("2025-11-25").at("hall").stops;
+  const auto reach = [](VisitTally& tally, const char* scene, StopId stop) {
+    for (int i = 0; i < 3; ++i) tally.reached(scene, DeviceKind::desktop, stop);
+  };
+  reach(a, "hall", {0, 1});  // before its first tick
+  reach(b, "hall", {0, 1});
+  a.on_show("hall", DeviceKind::desktop, 0, now_);
+  reach(a, "hall", {0, 2});
+  reach(a, "garden", {0, 2});  // the next scene, before its first tick
+  EXPECT_EQ(counts_.since().at("2025-11-25").at("hall").visits, 2u);
+  EXPECT_EQ(counts_.since().at("2025-11-25").at("garden").stops.size(), 1u);
+  const auto stops = counts_.since().at("2025-11-25").at("hall").stops;
   EXPECT_EQ(stops, (std::map<StopId, std::uint64_t>{{{0, 1}, 2}, {{0, 2}, 1}}));
 }
 
 TEST_F(VisitCountsTest, WithoutTheSettingNothingIsCounted) {
   VisitTally tally(nullptr);
   tally.on_show("hall", DeviceKind::desktop, 0, now_);
-  tally.reached({0, 0});
-  EXPECT_TRUE(counts_.all().empty());
+  tally.reached("hall", DeviceKind::desktop, {0, 0});
+  EXPECT_TRUE(counts_.since().empty());
 }
 
 TEST_F(VisitCountsTest, DaysAreThoseOfUtcAndOldOnesGo) {
@@ -95,9 +99,13 @@ TEST_F(VisitCountsTest, DaysAreThoseOfUtcAndOldOnesGo) {
     counts_.visit("hall", DeviceKind::unknown);
     now_s_ += day_s;
   }
-  const auto all = counts_.all();
+  const auto all = counts_.since();
   EXPECT_EQ(all.size(), VisitCounts::most_days);
   EXPECT_EQ(all.begin()->first, "2025-11-28");
+  now_s_ = 0;  // a clock that is not set
+  counts_.visit("hall", DeviceKind::unknown);
+  EXPECT_EQ(counts_.since().size(), VisitCounts::most_days);
+  EXPECT_EQ(counts_.since().begin()->first, "1970-01-01");
   EXPECT_EQ(date_of(noon + day_s / 2 - 1), "2025-11-25");
   EXPECT_EQ(date_of(noon + day_s / 2), "2025-11-26");
 }
@@ -105,11 +113,9 @@ TEST_F(VisitCountsTest, DaysAreThoseOfUtcAndOldOnesGo) {
 TEST_F(VisitCountsTest, MoreScenesThanItTellsApartAreCountedTogether) {
   for (std::size_t i = 0; i < VisitCounts::most_scenes + 5; ++i)
     counts_.visit("scene " + std::to_string(i), DeviceKind::unknown);
-  const DayCounts day = counts_.all().at("2025-11-25");
+  const DayCounts day = counts_.since().at("2025-11-25");
   EXPECT_EQ(day.size(), VisitCounts::most_scenes + 1);
   EXPECT_EQ(day.at(std::string(VisitCounts::other_scenes)).visits, 5u);
-  for (std::uint32_t i = 0; i < VisitCounts::most_stops + 5; ++i) counts_.reach("scene 0", {0, i});
-  EXPECT_EQ(counts_.all().at("2025-11-25").at("scene 0").stops.size(), VisitCounts::most_stops);
 }
 
 class VisitBookTest : public VisitCountsTest {
@@ -134,7 +140,7 @@ TEST_F(VisitBookTest, KeepsCountsFromOneStartToTheNext) {
   }
   VisitCounts next([this] { return now_s_; });
   const VisitBook book(folder, next);
-  const auto all = next.all();
+  const auto all = next.since();
   ASSERT_EQ(all.size(), 2u);
   const SceneCounts& hall = all.at("2025-11-25").at("hall \"A\"");
   EXPECT_EQ(hall.visits, 1u);
@@ -143,6 +149,23 @@ TEST_F(VisitBookTest, KeepsCountsFromOneStartToTheNext) {
   EXPECT_EQ(hall.devices[static_cast<std::size_t>(DeviceKind::tablet)], 1u);
   EXPECT_EQ(hall.stops, (std::map<StopId, std::uint64_t>{{{1, 2}, 1}}));
   EXPECT_EQ(files_in(folder), 2u);
+}
+
+TEST_F(VisitBookTest, ADayWithinAllLimitsIsReadAgain) {
+  for (std::size_t i = 0; i < VisitCounts::most_scenes + 5; ++i)
+    counts_.visit(std::string(120, 'x') + std::to_string(i), DeviceKind::unknown);
+  const std::string first = counts_.since().begin()->second.begin()->first;
+  for (std::uint32_t i = 0; i < VisitCounts::most_stops + 5; ++i)
+    counts_.reach(first, {i / 256, i % 256});
+  {
+    const VisitBook book(folder_.path(), counts_);
+    counts_.visit("one more", DeviceKind::unknown);
+  }
+  VisitCounts next([this] { return now_s_; });
+  const VisitBook book(folder_.path(), next);
+  const DayCounts day = next.since().at("2025-11-25");
+  EXPECT_EQ(day.size(), VisitCounts::most_scenes + 1);
+  EXPECT_EQ(day.at(first).stops.size(), VisitCounts::most_stops);
 }
 
 TEST_F(VisitBookTest, SetsADamagedDayAsideAndKeepsTheOthers) {
@@ -155,7 +178,7 @@ TEST_F(VisitBookTest, SetsADamagedDayAsideAndKeepsTheOthers) {
   std::ofstream(folder / "visits-notes.json") << "of somebody else";
   VisitCounts next([this] { return now_s_; });
   { const VisitBook book(folder, next); }
-  EXPECT_EQ(next.all().size(), 1u);
+  EXPECT_EQ(next.since().size(), 1u);
   EXPECT_TRUE(fs::exists(folder / "visits-2025-11-24.json.damaged"));
   EXPECT_TRUE(fs::exists(folder / "visits-notes.json"));
 }

@@ -46,7 +46,7 @@ export function rise_of(marks: readonly Mark[], up: Vec3): Measured {
   return { value: dot(sub(last.point, first.point), up), error: error_of([first, last], [scale(up, -1), up]) };
 }
 
-/** Area of the polygon whose corners are the marks: of its projection onto the plane that fits it best. */
+/** Area of the polygon whose corners are the marks. Of one that is not flat, it is the largest projection. */
 export function area_of(marks: readonly Mark[]): Measured {
   const at = (i: number): Vec3 => marks[(i + marks.length) % marks.length]!.point;
   const origin = marks[0]?.point ?? none;

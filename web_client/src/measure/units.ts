@@ -31,7 +31,7 @@ export interface Scale {
   readonly system: System;
 }
 
-/** "3.42 m ± 0.05 m". Decimals follow the error, because further ones would mean nothing. */
+/** "3.421 m ± 0.050 m". Decimals follow the error, because further ones would mean nothing. */
 export function written({ value, error }: Measured, scale: Scale, power: 1 | 2 = 1): string {
   const metres = (scale.metres_per_unit ?? 1) ** power;
   const list = units[scale.system];

@@ -7,6 +7,7 @@ import type { AccessToken } from '../session/token';
 import { readers, text } from '../text/text';
 import { fetch_tours, read_document } from '../tour/load';
 import type { SceneAbout } from '../tour/draft';
+import { max_stops, max_tours } from '../tour/limits';
 import { TourPlayer, type TourState } from '../tour/player';
 import { read_shared, share_address, type SharedView } from '../tour/share';
 import { tours_for } from '../tour/tour';
@@ -53,7 +54,10 @@ export class Guide {
         timers: browser_timers,
         now_us: () => clock.now_us(),
         announce: (samples) => worker.post({ kind: 'path', samples }),
-        reached: (tour, stop) => worker.post({ kind: 'reached', tour, stop }),
+        reached: (tour, stop) => {
+          // Imported tours may be longer than those that the wire can tell of.
+          if (tour < max_tours && stop < max_stops) worker.post({ kind: 'reached', tour, stop });
+        },
         reduced_motion,
       },
       (state) => this.tour_changed(state),

@@ -31,7 +31,8 @@ export class MeasurePanel {
   private readonly known_ = by_id('measure-known', HTMLInputElement);
   private marks_: readonly Mark[] = [];
   private metres_per_unit_: number | undefined;
-  private asked_ = 0;
+  private asked_: Promise<unknown> = Promise.resolve();
+  private begun_ = 0;
 
   constructor(private readonly parts_: MeasureParts) {
     const { navigation, toolbar, seen, storage, set_scale } = parts_;
@@ -67,16 +68,22 @@ export class MeasurePanel {
 
   /** `x`, `y`: shares of the view. */
   private async mark(x: number, y: number): Promise<void> {
-    const asked = ++this.asked_;
-    const hit = await this.parts_.navigation.hit_at(x, y);
-    if (asked !== this.asked_ || this.marks_.length >= most_marks) return;
-    if (hit) this.set([...this.marks_, hit]);
-    else this.results_.replaceChildren(make('p', {}, text.measure.nothing_there));
+    const begun = this.begun_;
+    const asked = this.parts_.navigation.hit_at(x, y);
+    const earlier = this.asked_;
+    this.asked_ = asked;
+    await earlier; // marks come in the order of the clicks
+    const hit = await asked;
+    if (begun !== this.begun_ || this.marks_.length >= most_marks) return;
+    this.marks_ = hit ? [...this.marks_, hit] : this.marks_;
+    this.show();
+    if (!hit) this.results_.replaceChildren(make('p', {}, text.measure.nothing_there));
   }
 
+  /** Marks that are still asked for do not count any more. */
   private set(marks: readonly Mark[]): void {
     this.marks_ = marks;
-    this.asked_ += 1;
+    this.begun_ += 1;
     this.show();
   }
 

@@ -129,8 +129,7 @@ TEST(Spz, TheOrbitExtensionIsRead) {
     style.orbit = OrbitLimits{};  // zeros say nothing
     EXPECT_FALSE(parse(encode_spz(cloud, style)).orbit);
     style.orbit = {0.0f, NAN, 0.0f};
-    EXPECT_THAT(input_error([&] { parse(encode_spz(cloud, style)); }),
-                HasSubstr("SPZ_ADOBE_safe_orbit_camera: has a number that is not finite"));
+    EXPECT_FALSE(parse(encode_spz(cloud, style)).orbit) << "the scene can be seen anyway";
   }
   EXPECT_FALSE(parse(encode_spz(cloud, {.version = 4})).orbit);
 }
