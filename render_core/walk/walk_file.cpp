@@ -182,7 +182,7 @@ std::string stream_of(const WalkMap& map) {
       kinds.push_back(static_cast<char>(map.places[i].kind));
       const int height = map.places[i].height;
       const int d = height - std::exchange(last[i - map.first[c]], height);
-      std::uint32_t code = static_cast<std::uint32_t>(d) << 1 ^ static_cast<std::uint32_t>(d >> 31);
+      std::uint32_t code = static_cast<std::uint32_t>(d) << 1 ^ (d < 0 ? ~0u : 0u);
       for (; code >= 128; code >>= 7) heights.push_back(static_cast<char>(code | 128));
       heights.push_back(static_cast<char>(code));
     }

@@ -84,10 +84,10 @@ VisitBook::VisitBook(fs::path folder, VisitCounts& counts)
   restore();
   thread_ = std::jthread([this](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    while (!stop.stop_requested()) {
+    do {
       wake_.wait_for(lock, stop, save_interval, [] { return false; });
       save();
-    }
+    } while (!stop.stop_requested());
   });
 }
 

@@ -140,7 +140,9 @@ std::vector<TourTitles> titles_of_tours(const std::string& answer) {
   try {
     for (const auto& tour : document.at("document").at("tours")) {
       TourTitles of{title(tour), {}};
-      for (const auto& stop : tour.at("stops")) of.stops.push_back(title(stop));
+      const auto& stops = tour.at("stops");
+      if (!stops.is_array()) continue;
+      for (const auto& stop : stops) of.stops.push_back(title(stop));
       if (!of.stops.empty()) titles.push_back(std::move(of));
     }
   } catch (const nlohmann::json::exception&) {  // no tours, or some that pages cannot read either

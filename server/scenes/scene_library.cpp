@@ -11,6 +11,7 @@
 #include "render_core/base/device_set.h"
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
+#include "render_core/device_error.h"
 #include "render_core/scene/tree/page_pools.h"
 #include "server/base/log_event.h"
 #include "server/base/scene_id.h"
@@ -155,6 +156,8 @@ void SceneLibrary::open_folders() {
   for (const std::string& id : ids) {
     try {
       return begin_with(id);
+    } catch (const DevicesUnusable&) {
+      throw;  // no other scene helps
     } catch (const InputError& error) {
       on_loaded(id, {nullptr, error.what()}, clock_(), clock_());
       if (!first_error) first_error = error;

@@ -84,7 +84,7 @@ Codebook codebook_of(std::size_t count, const TripleOf& triple_of) {
     const glm::vec3 triple = triple_of(i * count / taken);
     values.insert(values.end(), {triple.x, triple.y, triple.z});
   }
-  float low = values.front(), high = low;
+  float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
   for (std::size_t i = 0; i < count; ++i) {
     const glm::vec3 triple = triple_of(i);
     low = std::min({low, triple.x, triple.y, triple.z});
