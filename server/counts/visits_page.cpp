@@ -93,7 +93,7 @@ std::string plot(const std::vector<std::pair<std::string, double>>& values,
         left + step * static_cast<double>(i), height - bottom - bar, std::max(1.0, 0.8 * step), bar,
         values[i].first, values[i].second);
   }
-  out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{:.4g}</text>\n", left - 6,
+  out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{:.2g}</text>\n", left - 6,
                      above + 8, top);
   out += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", left, height - 5, values.front().first);
   out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>\n", width, height - 5,
