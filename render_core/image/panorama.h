@@ -10,7 +10,7 @@ namespace catgs {
 
 /// Draws all that surrounds the camera of `request` as an equirectangular picture. The middle shows
 /// where the camera looks, the upper edge is above its picture, and longitudes grow to the right.
-/// Of the camera, only pose and near plane count. `size_px` is 2:1. `draw` renders a request and
+/// Only pose and near plane of the camera count. `size_px` is 2:1. `draw` renders a request and
 /// may throw.
 ///
 /// Six pictures are drawn, one along each axis of the camera. They are wider than a right angle and

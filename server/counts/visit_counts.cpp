@@ -22,39 +22,43 @@ bool is_date(std::string_view text) {
          });
 }
 
-/// The lock is held.
-SceneCounts& VisitCounts::today(const std::string& scene_id) {
+DayCounts& VisitCounts::today() {
   const std::string date = date_of(unix_s_());
   changed_.insert(date);
+  // The clock may be behind, so the oldest day may not be the one to make.
   if (!days_.contains(date) && days_.size() >= most_days) days_.erase(days_.begin());
-  DayCounts& day = days_[date];  // the clock may be behind
+  return days_[date];
+}
+
+SceneCounts& VisitCounts::counts_of(const std::string& scene_id, DayCounts& day) {
   if (day.size() < most_scenes || day.contains(scene_id)) return day[scene_id];
   return day[std::string(other_scenes)];
 }
 
 void VisitCounts::visit(const std::string& scene_id, DeviceKind device) {
   const std::lock_guard lock(mutex_);
-  SceneCounts& counts = today(scene_id);
+  SceneCounts& counts = counts_of(scene_id, today());
   ++counts.visits;
   ++counts.devices[static_cast<std::size_t>(device)];
 }
 
 void VisitCounts::spend(const std::string& scene_id, double seconds, std::uint64_t bytes) {
   const std::lock_guard lock(mutex_);
-  SceneCounts& counts = today(scene_id);
+  SceneCounts& counts = counts_of(scene_id, today());
   counts.seconds += seconds;
   counts.bytes += bytes;
 }
 
 void VisitCounts::reach(const std::string& scene_id, StopId stop) {
   const std::lock_guard lock(mutex_);
-  auto& stops = today(scene_id).stops;
+  DayCounts& day = today();  // one look at the clock, which may pass midnight
+  auto& stops = counts_of(scene_id, day).stops;
   if (const auto known = stops.find(stop); known != stops.end()) {
     ++known->second;
     return;
   }
   std::size_t all = 0;
-  for (const auto& [id, counts] : days_.at(date_of(unix_s_()))) all += counts.stops.size();
+  for (const auto& [id, counts] : day) all += counts.stops.size();
   if (all < most_stops) stops[stop] = 1;
 }
 

@@ -61,7 +61,9 @@ class VisitCounts {
   void mark_changed(const std::string& date);
 
  private:
-  SceneCounts& today(const std::string& scene_id);
+  // The lock is held.
+  DayCounts& today();
+  static SceneCounts& counts_of(const std::string& scene_id, DayCounts& day);
 
   const std::function<std::int64_t()> unix_s_;
   mutable std::mutex mutex_;  // guards the rest

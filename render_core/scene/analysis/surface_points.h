@@ -25,9 +25,9 @@ class SurfacePoints {
     float distance;  // from the origin to where half of the light is stopped, world units
     float spread;    // half of the way on which the middle 68 % of the light are stopped
   };
-  /// What a ray from `origin` along the unit vector `direction` meets; empty where less than half
-  /// of the light is stopped. Looks at one ball for each cluster_size points, and at the points of
-  /// the clusters that the ray meets.
+  /// Finds what a ray from `origin` along the unit vector `direction` meets; empty where less than
+  /// half of the light is stopped. Looks at one ball for each cluster_size points, and at the
+  /// points of the clusters that the ray meets.
   [[nodiscard]] std::optional<Hit> hit_along(const glm::vec3& origin,
                                              const glm::vec3& direction) const;
 

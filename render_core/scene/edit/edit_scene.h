@@ -24,7 +24,7 @@ struct Placement {
   [[nodiscard]] AffineMap map() const;
 };
 
-/// What is done to a scene, in this order. All members at their defaults: nothing.
+/// The steps that edit a scene, in this order. With its defaults it changes nothing.
 struct SceneEdit {
   Placement placement{};
   std::optional<Bounds> crop{};  // keeps the Gaussians whose means lie in it, after the placement

@@ -93,7 +93,7 @@ float error_of(const Splat& a, const Splat& b) {
   const auto cross = [&](const Splat& i, const Splat& j) { return likeness(i, j) * product(i, j); };
   const double error = likeness(a, a) * a.power + likeness(b, b) * b.power + cross(m, m) +
                        2.0 * (cross(a, b) - cross(a, m) - cross(b, m));
-  // What is no number counts as the largest one, so that every pair can be joined at last.
+  // A value that is no number counts as the largest one, so that every pair can be joined at last.
   constexpr double largest = std::numeric_limits<float>::max();
   return error < largest ? static_cast<float>(std::max(error, 0.0))
                          : std::numeric_limits<float>::max();

@@ -30,8 +30,8 @@ namespace {
 constexpr std::size_t max_palette = 65536, palette_row = 64;
 constexpr std::size_t codebook_sample = std::size_t{1} << 16;  // triples
 constexpr std::size_t max_texels_across = 16383;               // of a WebP image
-// Of WebP, 0…9. Bytes that look like noise become 6 % larger in a third of the time. The labels
-// would become half as large again.
+// WebP knows efforts of 0 to 9. Bytes that look like noise become 6 % larger in a third of the
+// time. The labels would become half as large again.
 constexpr int effort = 1, effort_for_noise = 0;
 
 /// A texel per Gaussian, or per coefficient of the palette.
@@ -75,7 +75,8 @@ std::string Image::encoded(int effort_of_webp) const {
   return bytes;
 }
 
-/// Of an even sample and the limits of the triples that `triple_of` has for [0, count).
+/// The codebook is found for an even sample and the limits of the triples that `triple_of` has for
+/// [0, count).
 template <class TripleOf>
 Codebook codebook_of(std::size_t count, const TripleOf& triple_of) {
   const std::size_t taken = std::min(count, codebook_sample);
