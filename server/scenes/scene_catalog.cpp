@@ -68,6 +68,8 @@ SceneInPages open_cached(const std::filesystem::path& path, const std::string& s
                          const LoadOptions& options) {
   const auto refuse = [&](std::string_view why) { throw UnusableTree(path.string(), {}, why); };
   constexpr std::string_view damaged = "pages are missing or damaged";
+  // A mistake in the sidecar is no fault of the tree: it throws InputError here.
+  (void)model_in_sidecar(locate_scene(spec).hints);
   try {
     TreeFile tree(std::make_unique<FileSource>(path));
     if (tree.pages_in_file() < tree.shape().pages() || !tree.page(0)) refuse(damaged);

@@ -38,8 +38,7 @@ SceneSize size_of_ply(const ByteSource& file) {
 
 SceneSize size_of_sog(const FileSet& files) {
   const SogMeta meta = parse_sog_meta(files, "meta.json");
-  const bool only_images_tell = !meta.centroids.empty() && meta.sh_degree == 0;
-  return {meta.count, only_images_tell ? max_sh_degree : meta.sh_degree};
+  return {meta.count, meta.hides_sh_degree() ? max_sh_degree : meta.sh_degree};
 }
 
 SceneSize size_of_levels(const OpenLevels& scene) { return {scene.count, scene.sh_degree}; }

@@ -127,8 +127,8 @@ Index parse_scene(const ByteSource& file) {
 /// A file with the Gaussians that are taken of it.
 struct Part {
   std::string name;
-  std::optional<SogMeta> sog;  // else it is an .spz
-  std::uint64_t held = 0;      // Gaussians in the file
+  bool is_spz = false;
+  std::uint64_t held = 0;  // Gaussians in the file
   int file_degree = 0;
   std::vector<SogRange> ranges;  // in order, and in the part one after the other
   std::size_t count = 0;
@@ -139,18 +139,22 @@ struct Part {
   }
 };
 
+/// Reads no more of the file than tells its size.
 Part open_part(const FileSet& files, const Index& scene, std::size_t file) {
+  constexpr const char* meta_name = "meta.json";
   Part part;
   part.name = scene.files[file];
+  part.is_spz = scene.is_spz;
   const auto source = files.open(part.name);
   if (scene.is_spz) {
     const SpzSize size = read_spz_size(*source);
     part.held = size.count;
     part.file_degree = size.sh_degree;
   } else {
-    part.sog = read_sog_meta(ZipFiles(*source), "meta.json");
-    part.held = part.sog->count;
-    part.file_degree = part.sog->sh_degree;
+    SogMeta meta = parse_sog_meta(ZipFiles(*source, meta_name), meta_name);
+    if (meta.hides_sh_degree()) meta = read_sog_meta(ZipFiles(*source), meta_name);
+    part.held = meta.count;
+    part.file_degree = meta.sh_degree;
   }
   return part;
 }
@@ -178,11 +182,14 @@ std::vector<Part> open_parts(const FileSet& files, const Index& scene, const Det
   return parts;
 }
 
+void require_unchanged(const ByteSource& file, bool same) {
+  if (!same) throw InputError(file.name(), "", "was changed while the scene was read");
+}
+
 GaussianCloud read_spz_ranges(const ByteSource& file, const Part& part,
                               const LoadContext& context) {
   GaussianCloud cloud = read_spz(file, context, SpzAxes::as_stored).cloud;
-  if (cloud.size() != part.held)
-    throw InputError(file.name(), "", "was changed while the scene was read");
+  require_unchanged(file, cloud.size() == part.held);
   auto range = part.ranges.begin();
   keep_if(cloud, [&](std::size_t i) {
     while (range != part.ranges.end() && i >= range->begin + range->count) ++range;
@@ -191,16 +198,24 @@ GaussianCloud read_spz_ranges(const ByteSource& file, const Part& part,
   return cloud;
 }
 
+GaussianCloud read_sog_ranges(const ByteSource& file, const Part& part, int sh_degree,
+                              const LoadContext& context) {
+  const ZipFiles files(file);
+  const SogMeta meta = read_sog_meta(files, "meta.json");
+  require_unchanged(file, meta.count == part.held && meta.sh_degree == part.file_degree);
+  GaussianCloud cloud;
+  cloud.resize(part.count, sh_degree);
+  decode_sog(files, meta, part.ranges, cloud, context);
+  return cloud;
+}
+
 GaussianCloud read_part(const FileSet& folder, const Part& part, int sh_degree,
                         const LoadContext& context) {
   const auto file = folder.open(part.name);
-  GaussianCloud cloud;
-  if (part.sog) {
-    cloud.resize(part.count, sh_degree);
-    decode_sog(ZipFiles(*file), *part.sog, part.ranges, cloud, context.part(0.0, 0.8));
-  } else {
-    cloud = with_sh_degree(read_spz_ranges(*file, part, context.part(0.0, 0.8)), sh_degree);
-  }
+  const LoadContext reading = context.part(0.0, 0.8);
+  GaussianCloud cloud = part.is_spz
+                            ? with_sh_degree(read_spz_ranges(*file, part, reading), sh_degree)
+                            : read_sog_ranges(*file, part, sh_degree, reading);
   const CloudTransform transform({quarter_turn_about_x, {}});
   context.part(0.8, 1.0).for_blocks(cloud.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) transform.apply(cloud, i);

@@ -39,6 +39,9 @@ struct SogMeta {
   Channel sh_rest{};
   std::uint64_t palette_size = 0;
   std::string means_low, means_high, quats, scales, sh0_image, centroids, labels;
+
+  /// Whether the file alone leaves the SH degree open: that of version 1 is in the images' sizes.
+  [[nodiscard]] bool hides_sh_degree() const { return !centroids.empty() && sh_degree == 0; }
 };
 
 /// Reads and checks `name` (…/meta.json) alone: no image is opened. Throws InputError naming the

@@ -24,6 +24,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/clusters.h"
+#include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/scene/keep_if.h"
@@ -202,18 +203,7 @@ Json try_format(const GaussianCloud& cloud, const std::filesystem::path& path, i
 GaussianCloud measured_cloud(GaussianCloud cloud, int threads) {
   keep_if(cloud, [&](std::size_t i) { return cloud.opacity[i] >= min_opacity; });
   ThreadPool pool(threads);
-  const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
-  GaussianCloud sorted;
-  sorted.resize(cloud.size(), cloud.sh_degree);
-  const auto stride = static_cast<std::size_t>(cloud.sh_count());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    sorted.mean[i] = cloud.mean[order[i]];
-    sorted.rotation[i] = cloud.rotation[order[i]];
-    sorted.scale[i] = cloud.scale[order[i]];
-    sorted.opacity[i] = cloud.opacity[order[i]];
-    std::copy_n(cloud.sh_of(order[i]), stride, &sorted.sh[i * stride]);
-  }
-  return sorted;
+  return reordered(cloud, morton_order(cloud.mean, pool));
 }
 
 PaperTable cost_table(const std::string& title, const GaussianCloud& cloud, const Json& trials) {

@@ -12,9 +12,13 @@
 namespace catgs::test {
 namespace {
 
+using ::testing::_;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Throws;
 using ::testing::ThrowsMessage;
+using ::testing::WhenDynamicCastTo;
 
 /// A streamed SOG folder with levels of 200 and 50 Gaussians, and a splat file without levels.
 class SceneCatalog : public FolderTest {
@@ -96,6 +100,10 @@ TEST_F(SceneCatalog, ReadsASceneFromATreeOfItsOwn) {
   EXPECT_EQ(entry->facts.gaussians, 300u);
   EXPECT_EQ(entry->name, "plain");
   EXPECT_EQ(entry->sidecar, folder_ / "plain.json");
+  write("plain.json", R"({"near": -1})");
+  EXPECT_THAT([&] { load(1, {.tree = tree}); },
+              Throws<InputError>(Not(WhenDynamicCastTo<const UnusableTree&>(_))));
+  std::filesystem::remove(folder_ / "plain.json");
   std::filesystem::resize_file(tree, std::filesystem::file_size(tree) - 1);
   EXPECT_THROW(load(1, {.tree = tree}), UnusableTree);
 }

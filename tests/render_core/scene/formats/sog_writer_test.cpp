@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "render_core/scene/clusters.h"
+#include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/scene/formats/sog.h"
@@ -27,18 +28,7 @@ GaussianCloud parse(const std::string& archive) {
 /// The Gaussians in the order of the file: along a Morton curve.
 GaussianCloud as_stored(const GaussianCloud& cloud) {
   ThreadPool pool(2);
-  const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
-  GaussianCloud sorted;
-  sorted.resize(cloud.size(), cloud.sh_degree);
-  const auto stride = static_cast<std::size_t>(cloud.sh_count());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    sorted.mean[i] = cloud.mean[order[i]];
-    sorted.rotation[i] = cloud.rotation[order[i]];
-    sorted.scale[i] = cloud.scale[order[i]];
-    sorted.opacity[i] = cloud.opacity[order[i]];
-    std::copy_n(cloud.sh.begin() + order[i] * stride, stride, sorted.sh.begin() + i * stride);
-  }
-  return sorted;
+  return reordered(cloud, morton_order(cloud.mean, pool));
 }
 
 class SogDegrees : public ::testing::TestWithParam<int> {};
