@@ -30,6 +30,8 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
   const glm::vec2 centre = camera.principal_point_px;
   if (!std::isfinite(centre.x) || !std::isfinite(centre.y)) return "principal point is not finite";
   if (!(camera.near_z > 0 && std::isfinite(camera.near_z))) return "near plane must be positive";
+  if (!finite(camera.clip.normal) || !std::isfinite(camera.clip.offset))
+    return "clip plane is not finite";
   if (!finite(request.background)) return "background is not finite";
   std::string mistake = find_mistake(camera.world_from_camera, "camera");
   if (mistake.empty() && request.forecast) {

@@ -103,7 +103,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     const Vec3<Floats> mean = load_mean(scene, i);
     Floats deepest = depth;
     if constexpr (sweeps) deepest = max(depth, view_depth(end_camera, mean));
-    const auto candidates = opaque & (deepest > context.near_z);
+    const auto candidates = opaque & (deepest > context.near_z) & is_kept(context.camera, mean);
     if (none(candidates)) continue;
 
     const CovarianceFactor<Floats> factor = load_factor(scene, i);

@@ -51,7 +51,8 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   float reach = math::reach_of(centre.log2_opacity);
   const bool in_front = out.depth > camera.near_z;
   const float end_depth = sweeps ? math::view_depth(camera.end, mean) : out.depth;
-  if (reach < 0.0f || fmaxf(out.depth, end_depth) <= now.near_z) return out;
+  if (reach < 0.0f || fmaxf(out.depth, end_depth) <= now.near_z || !math::is_kept(now, mean))
+    return out;
 
   const math::CovarianceFactor<float> factor = load_factor(scene, i);
   math::Sweep<float> s{};

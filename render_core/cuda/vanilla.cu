@@ -69,6 +69,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const float depth =
       static_cast<float>(math::view_depth(p.camera.precise, math::convert<double>(mean)));
   if (!(depth > camera.near_z) || math::reach_of(log2_opacity) < 0.0f) return;
+  if (!math::is_kept(camera, mean)) return;
   const auto g = math::project<float>(camera, mean, load_factor(p.scene, i), depth);
   if (p.scene.antialiased) log2_opacity = math::antialiased_log2_opacity(log2_opacity, g);
   if (math::reach_of(log2_opacity) < 0.0f) return;

@@ -104,6 +104,7 @@ Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool&
     of_side.camera =
         make_camera({pose.position, glm::normalize(pose.orientation * glm::quat_cast(axes))},
                     glm::ivec2(side_px), focal_px, request.camera.near_z);
+    of_side.camera.clip = request.camera.clip;
     const Image picture = draw(of_side);
     pool.parallel_for(static_cast<std::size_t>(size_px.y), [&](std::size_t y) {
       add_row(picture, side, focal_px, static_cast<int>(y), out, weights);

@@ -20,6 +20,8 @@ struct CameraModel {
   Vec3<T> right, down, forward;
   Vec2<T> focal_px, principal_point_px;
   T near_z;
+  Vec3<T> clip_normal;  // ClipPlane
+  T clip_offset;
   // Range of x/z and y/z in which the projection is linearised (fov_clamp).
   Vec2<T> slope_min, slope_max;
 };
@@ -43,6 +45,8 @@ inline CameraModel<double> make_camera_model(const Camera& camera) {
           {focal.x, focal.y},
           {centre.x, centre.y},
           static_cast<double>(camera.near_z),
+          vec3(glm::dvec3(camera.clip.normal)),
+          static_cast<double>(camera.clip.offset),
           {low.x, low.y},
           {high.x, high.y}};
 }
@@ -56,6 +60,8 @@ CATGS_HD_INLINE CameraModel<T> convert(const CameraModel<S>& c) {
           convert<T>(c.focal_px),
           convert<T>(c.principal_point_px),
           T(c.near_z),
+          convert<T>(c.clip_normal),
+          T(c.clip_offset),
           convert<T>(c.slope_min),
           convert<T>(c.slope_max)};
 }
@@ -65,6 +71,12 @@ CATGS_HD_INLINE CameraModel<T> convert(const CameraModel<S>& c) {
 template <class T>
 CATGS_HD_INLINE T view_depth(const CameraModel<T>& camera, const Vec3<T>& mean) {
   return dot(camera.forward, mean - camera.position);
+}
+
+/// Whether the clip plane leaves a Gaussian with this centre in.
+template <class T>
+CATGS_HD_INLINE auto is_kept(const CameraModel<T>& camera, const Vec3<T>& mean) {
+  return dot(camera.clip_normal, mean) <= camera.clip_offset;
 }
 
 /// A point of the world in camera space.

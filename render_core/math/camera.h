@@ -21,6 +21,15 @@ struct Pose {
   glm::quat orientation{1.0f, 0.0f, 0.0f, 0.0f};  // glm's constructor order: w, x, y, z
 };
 
+/// The part of the world that is drawn: Gaussians whose centre c has dot(normal, c) > offset are
+/// left out. A normal of 0 leaves out none.
+struct ClipPlane {
+  glm::vec3 normal{0.0f};  // of any length
+  float offset = 0.0f;     // world units, times that length
+
+  bool operator==(const ClipPlane&) const = default;
+};
+
 /// A pinhole camera at a pose. Pixel centres lie at integer + 0.5.
 struct Camera {
   Pose world_from_camera;
@@ -28,7 +37,14 @@ struct Camera {
   glm::vec2 focal_px{0.0f};
   glm::vec2 principal_point_px{0.0f};
   float near_z = 0.2f;  // world units along the view axis; Gaussians nearer than this are dropped
+  ClipPlane clip{};
 };
+
+/// Whether both draw the same where they are at the same pose.
+inline bool same_lens(const Camera& a, const Camera& b) {
+  return a.size_px == b.size_px && a.focal_px == b.focal_px &&
+         a.principal_point_px == b.principal_point_px && a.near_z == b.near_z && a.clip == b.clip;
+}
 
 /// Camera with square pixels and the principal point in the middle of the image.
 inline Camera make_camera(const Pose& world_from_camera, glm::ivec2 size_px, float focal_px,

@@ -34,11 +34,6 @@ std::optional<fs::path> colmap_folder(const fs::path& path) {
   return std::nullopt;
 }
 
-bool same_lens(const Camera& a, const Camera& b) {
-  return a.size_px == b.size_px && a.focal_px == b.focal_px &&
-         a.principal_point_px == b.principal_point_px;
-}
-
 CameraPath timed(const fs::path& path, const std::vector<ListedCamera>& cameras, double rate_hz) {
   constexpr double max_rate_hz = 1000.0;
   if (cameras.empty()) throw InputError(path.string(), "", "lists no camera");

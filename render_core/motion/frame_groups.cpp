@@ -16,12 +16,6 @@ namespace {
 
 constexpr int grid_steps = 4;  // per axis of the image, its edges included
 
-/// Image and near plane are the same, so the cached lists still apply.
-bool same_lens(const Camera& a, const Camera& b) {
-  return a.size_px == b.size_px && a.focal_px == b.focal_px &&
-         a.principal_point_px == b.principal_point_px && a.near_z == b.near_z;
-}
-
 Camera at_pose(const Camera& camera, const Pose& world_from_camera) {
   Camera moved = camera;
   moved.world_from_camera = world_from_camera;

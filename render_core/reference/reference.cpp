@@ -53,7 +53,7 @@ std::vector<Splat> project_all(const GaussianCloud& cloud, const Camera& request
     const double depth = math::view_depth(camera, mean);
     Splat splat;
     splat.depth = static_cast<float>(depth);
-    if (!(splat.depth > request_camera.near_z)) continue;
+    if (!(splat.depth > request_camera.near_z) || !math::is_kept(camera, mean)) continue;
     const glm::quat& q = cloud.rotation[i];
     const double rotation[4] = {q.x, q.y, q.z, q.w};
     const auto factor = math::covariance_factor(rotation, to_vec3(cloud.scale[i]));

@@ -107,6 +107,7 @@ ClusterCuller::ClusterCuller(const Camera& camera) {
   half_spaces_[2] = side(-right, f.x, size.x - c.x, slope_x);
   half_spaces_[3] = side(down, f.y, c.y, slope_y);
   half_spaces_[4] = side(-down, f.y, size.y - c.y, slope_y);
+  half_spaces_[5] = {-camera.clip.normal, camera.clip.offset, 0.0f};
 }
 
 }  // namespace catgs

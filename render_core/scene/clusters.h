@@ -86,7 +86,7 @@ class ClusterCuller {
   }
 
  private:
-  static constexpr int count = 5;
+  static constexpr int count = 6;
   struct HalfSpace {
     glm::vec3 normal;  // towards the image
     float offset;

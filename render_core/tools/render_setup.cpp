@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -15,16 +14,11 @@
 #include "render_core/motion/camera_path.h"
 #include "render_core/scene/tree/tree_file.h"
 #include "render_core/tools/parse_name.h"
+#include "render_core/tools/parse_numbers.h"
 #include "render_core/tools/scene_hash.h"
 
 namespace catgs {
 namespace {
-
-template <typename T>
-bool parse_whole(std::string_view text, T& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
-}
 
 /// The recorded or scripted path. Only a file may name a lens.
 CameraPath make_path(const RenderOptions& options, const SceneHints& hints) {
@@ -173,6 +167,7 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
                        "choose one with --size and --fov-deg or --focal-px");
     if (path.lens) {
       path.lens->near_z = setup.camera.near_z;
+      path.lens->clip = setup.camera.clip;
       setup.camera = *path.lens;
     }
   }

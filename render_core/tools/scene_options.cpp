@@ -1,7 +1,6 @@
 #include "render_core/tools/scene_options.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
@@ -11,18 +10,13 @@
 #include "render_core/math/axis_name.h"
 #include "render_core/renderer.h"
 #include "render_core/scene/files/load_scene.h"
+#include "render_core/tools/parse_numbers.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
 namespace {
 
 constexpr float default_fov_y_deg = 60.0f;
-
-bool parse_side(std::string_view text, int& side) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), side);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 }  // namespace
 
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name) {
@@ -95,6 +89,9 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
       ->excludes(focal);
   command.add_option("--near", options.near_z,
                      "Near plane, world units (default: the scene's hint)");
+  command.add_option("--clip", options.clip,
+                     "Leave out Gaussians whose centre c has dot(N, c) > D, given as NX,NY,NZ,D. "
+                     "It takes the roof off a house");
 }
 
 Camera make_lens(const LensOptions& options, float hinted_near_z) {
@@ -111,14 +108,19 @@ Camera make_lens(const LensOptions& options, float hinted_near_z) {
                      fmt::format("{} is not a positive, finite distance", *options.near_z),
                      "world units; without it, the scene's hint");
   }
-  return make_camera({}, size_px, focal_px, options.near_z.value_or(hinted_near_z));
+  Camera camera = make_camera({}, size_px, focal_px, options.near_z.value_or(hinted_near_z));
+  if (!options.clip.empty()) {
+    const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
+    camera.clip = {glm::vec3(plane[0], plane[1], plane[2]), static_cast<float>(plane[3])};
+  }
+  return camera;
 }
 
 glm::ivec2 parse_size(std::string_view flag, std::string_view text) {
   const std::size_t cross = std::min(text.find('x'), text.size());
   glm::ivec2 size_px{0};
-  const bool whole = cross < text.size() && parse_side(text.substr(0, cross), size_px.x) &&
-                     parse_side(text.substr(cross + 1), size_px.y);
+  const bool whole = cross < text.size() && parse_whole(text.substr(0, cross), size_px.x) &&
+                     parse_whole(text.substr(cross + 1), size_px.y);
   if (!whole || std::min(size_px.x, size_px.y) < 1 ||
       std::max(size_px.x, size_px.y) > max_image_side_px) {
     throw InputError(flag, "", fmt::format("\"{}\" is not a picture size", text),

@@ -42,6 +42,7 @@ struct LensOptions {
   std::optional<float> focal_px;
   std::optional<float> fov_y_deg;
   std::optional<float> near_z;
+  std::string clip{};  // "nx,ny,nz,offset"; empty: no clip plane
   bool size_given = false;
 
   /// Whether the user has said anything about the picture's size or field of view.

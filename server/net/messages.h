@@ -107,7 +107,7 @@ struct UnknownMessage {};
 
 using ClientMessage =
     std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings, SelectScene,
-                 RequestIdr, Pause, Bye, Pick, Present, Follow, Reached>;
+                 RequestIdr, Pause, Bye, Pick, Present, Follow, Reached, ClipPlane>;
 
 struct SceneFacts {
   std::string scene_id;

@@ -33,6 +33,7 @@ constexpr std::int64_t max_time_us = std::int64_t{1} << 53;
 constexpr std::uint32_t max_pose_age_us = 10'000'000;
 constexpr int max_path_samples = 256;
 constexpr int max_decoders = 8;
+constexpr float max_clip_offset = 1e30f;  // sums with it stay finite
 constexpr std::uint32_t most_tours = 32, most_stops = 256;
 
 /// Thrown and caught only in this file, to leave nested message parts.
@@ -175,6 +176,11 @@ Pick parse(const v1::Pick& message) {
   return pick;
 }
 
+ClipPlane parse(const v1::Clip& message) {
+  return {parse("clip.normal", message.normal()),
+          checked("clip.offset", message.offset(), -max_clip_offset, max_clip_offset)};
+}
+
 ClientMessage parse(const v1::ClientMessage& message) {
   switch (message.body_case()) {
     case v1::ClientMessage::kHello:
@@ -206,6 +212,8 @@ ClientMessage parse(const v1::ClientMessage& message) {
     case v1::ClientMessage::kReached:
       return Reached{checked("reached.tour", message.reached().tour(), 0u, most_tours - 1),
                      checked("reached.stop", message.reached().stop(), 0u, most_stops - 1)};
+    case v1::ClientMessage::kClip:
+      return parse(message.clip());
     case v1::ClientMessage::BODY_NOT_SET:
       break;
   }

@@ -33,8 +33,16 @@ constexpr double still_bits_per_pixel = 1.5;
 void FrameLoop::enter_scene(const SceneFacts& scene) {
   near_z_ = scene.near_z;
   background_ = colour_of(scene.about.background_rgb);
+  clip_ = {};
   track_ = CameraTrack(near_z_);
   settled_ = true;
+}
+
+void FrameLoop::clip(const ClipPlane& plane, TimePoint now) {
+  if (plane == clip_) return;
+  clip_ = plane;
+  shown_.reset();
+  rest_.moved(now);
 }
 
 bool FrameLoop::pose_arrived(const PoseSample& sample, TimePoint now) {
@@ -114,6 +122,7 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   ticket.pose_received = *pose_received_;
   order.request.camera = make_camera(aim.world_from_camera, ticket.size_px,
                                      focal_from_fov_y(aim.fov_y_rad, ticket.size_px.y), near_z_);
+  order.request.camera.clip = clip_;
   order.request.background = background_;
   order.request.detail_px = ticket.still ? policy_.detail_px : detail_.detail_px();
   order.request.soon = track_.ahead(pages_ahead);

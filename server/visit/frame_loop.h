@@ -35,6 +35,8 @@ class FrameLoop {
   /// True: the camera has moved.
   bool pose_arrived(const PoseSample& sample, TimePoint now);
   void follow(const PosePath& path) { track_.follow(path); }
+  /// From the next picture on, until the scene changes.
+  void clip(const ClipPlane& plane, TimePoint now);
   /// Continues from the pose of a resumed client, and from the tour that led it.
   void go_on_from(const Hello& hello, TimePoint now);
   /// False: the frame is not in flight.
@@ -75,6 +77,7 @@ class FrameLoop {
   FlowControl& flow_;
   float near_z_ = 0.0f;
   glm::vec3 background_{0.0f};
+  ClipPlane clip_;
   CameraTrack track_;
   std::optional<TimePoint> pose_received_;
   FramePace pace_;

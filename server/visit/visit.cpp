@@ -87,6 +87,8 @@ void Visit::on_live_message(const ClientMessage& message, TimePoint now) {
       stream_.idr().missed();
     }
     life_.pause(pause->paused);
+  } else if (const auto* plane = std::get_if<ClipPlane>(&message)) {
+    frames_.clip(*plane, now);
   } else if (const auto* pick = std::get_if<Pick>(&message)) {
     if (picks_.take(now)) say(stream_.scene()->seen_along(*pick), now);
   }

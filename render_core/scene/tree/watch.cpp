@@ -8,9 +8,7 @@ namespace {
 
 bool same(const Camera& a, const Camera& b) {
   const Pose &at = a.world_from_camera, &bt = b.world_from_camera;
-  return at.position == bt.position && at.orientation == bt.orientation && a.size_px == b.size_px &&
-         a.focal_px == b.focal_px && a.principal_point_px == b.principal_point_px &&
-         a.near_z == b.near_z;
+  return at.position == bt.position && at.orientation == bt.orientation && same_lens(a, b);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <regex>
 #include <variant>
 
@@ -90,6 +91,11 @@ void require_sound(const Pick& pick) {
   require(in(glm::length(pick.direction), 0.999f, 1.001f), "directions have length 1");
 }
 
+void require_sound(const ClipPlane& plane) {
+  require_place(plane.normal);
+  require(std::isfinite(plane.offset), "planes are somewhere");
+}
+
 template <class Message>
 void require_sound(const Message&) {}  // nothing in it has a limit
 
@@ -151,6 +157,7 @@ std::map<std::string, std::string> client_message_seeds() {
   add("pause", [](auto& m) { m.mutable_pause()->set_paused(true); });
   add("bye", [](auto& m) { m.mutable_bye(); });
   add("pick", [](auto& m) { m.mutable_pick()->mutable_direction()->set_z(2.0f); });
+  add("clip", [](auto& m) { m.mutable_clip()->mutable_normal()->set_y(1.0f); });
   return seeds;
 }
 

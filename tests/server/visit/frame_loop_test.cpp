@@ -388,5 +388,25 @@ TEST_F(RestTest, JpegsGrowUntilTheyAreSharp) {
   EXPECT_FALSE(has_next());
 }
 
+TEST_F(FrameLoopTest, AnotherClipPlaneIsAnotherPicture) {
+  moved();
+  rested();
+  while (has_next()) rested();
+  const ClipPlane plane{{0, 1, 0}, 2};
+  loop.clip(plane, now);
+  now += 17ms;
+  ASSERT_TRUE(is_due());
+  EXPECT_EQ(run().request.camera.clip, plane);
+  const FrameOrder still = rested();
+  EXPECT_TRUE(still.ticket.still);
+  EXPECT_EQ(still.request.camera.clip, plane);
+  while (has_next()) rested();
+  loop.clip(plane, now);
+  EXPECT_FALSE(has_next()) << "the same one";
+  loop.enter_scene({});
+  pose(++poses, 1.0f);
+  EXPECT_EQ(run().request.camera.clip, ClipPlane{});
+}
+
 }  // namespace
 }  // namespace catgs
