@@ -58,6 +58,7 @@ struct ServerConfig {
   std::string tls_key;
   std::vector<std::string> allow_origins;
   std::vector<std::string> embed_origins;
+  std::vector<std::string> media_origins;
   std::vector<std::string> trusted_proxies;
   std::string log_format = "human";
   std::string log_level = "info";

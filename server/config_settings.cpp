@@ -170,6 +170,22 @@ Setting origins(std::string name, std::string help, std::vector<std::string> Ser
   return setting;
 }
 
+Setting media_origin() {
+  Setting setting = list("media-origin", "ORIGIN",
+                         "Sites whose pictures, films and sounds tours may show, such as "
+                         "https://media.example",
+                         &ServerConfig::media_origins);
+  setting.set = [](ServerConfig& c, const Values& v) {
+    for (const auto& origin : v) {
+      check_origin(origin, false);
+      if (!origin.starts_with("https://"))
+        throw std::invalid_argument("\"" + origin + "\" is no https site");
+    }
+    c.media_origins = v;
+  };
+  return setting;
+}
+
 std::vector<Setting> scene_settings() {
   using C = ServerConfig;
   return {
@@ -287,6 +303,7 @@ std::vector<Setting> access_settings() {
               &C::allow_origins, false),
       origins("embed-origin", "Sites that may show the client in a frame; *: all",
               &C::embed_origins, true),
+      media_origin(),
       trusted_proxy(),
       choice<std::string>("log-format", "Format of the log on standard error", &C::log_format,
                           words({"human", "json"})),

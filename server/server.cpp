@@ -33,6 +33,7 @@
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
 #include "server/net/visitor_address.h"
+#include "server/scenes/media_api.h"
 #include "server/scenes/scene_api.h"
 #include "server/scenes/scene_library.h"
 #include "server/scenes/sidecar_saver.h"
@@ -83,12 +84,13 @@ VisitOptions visit_options(const ServerConfig& config) {
   return options;
 }
 
-SessionTokens session_tokens(const ServerConfig& config) {
+/// The key of what this server signs for its own clients. Servers of a fleet have it in common.
+std::string own_key(const ServerConfig& config) {
   if (!config.resume_key_file.empty())
-    return SessionTokens(read_key_file("--resume-key-file", config.resume_key_file));
+    return read_key_file("--resume-key-file", config.resume_key_file);
   if (!config.token_key_file.empty())
-    return SessionTokens(read_key_file("--token-key-file", config.token_key_file));
-  return SessionTokens(random_key());
+    return read_key_file("--token-key-file", config.token_key_file);
+  return random_key();
 }
 
 }  // namespace
@@ -135,7 +137,10 @@ struct Server::State {
   std::optional<VisitCounts> counts;
   std::optional<VisitBook> book;
   std::unique_ptr<SceneLibrary> scenes;
-  std::unique_ptr<SceneApi> api;
+  struct {
+    std::unique_ptr<SceneApi> scenes;
+    std::unique_ptr<MediaApi> media;
+  } api;
   std::optional<VisitsPage> visits_page;
   std::unique_ptr<SidecarSaver> saver;
   std::vector<EncoderChoice> encoders;
@@ -155,11 +160,17 @@ NetOptions Server::State::net_options() {
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return respond(request); };
   options.uploads.refusal = [this](const HttpRequest& request) {
-    return api->refuse_upload(request);
+    return MediaApi::is_file(request.path) ? api.media->refuse_upload(request)
+                                           : api.scenes->refuse_upload(request);
+  };
+  options.uploads.most_bytes = [](std::string_view path) {
+    return MediaApi::is_file(path) ? max_media_bytes : max_upload_bytes;
   };
   options.uploads.take = [this](const HttpRequest& request, std::string body,
                                 std::shared_ptr<const UploadPlace> place) {
-    return saver->save(api->saved_scene(request), std::move(body),
+    if (MediaApi::is_file(request.path))
+      return api.media->save(request, std::move(body), std::move(place));
+    return saver->save(api.scenes->saved_scene(request), std::move(body),
                        {std::string(request.if_match), std::string(request.if_none_match)},
                        std::move(place));
   };
@@ -177,6 +188,7 @@ NetOptions Server::State::net_options() {
   options.asks_for_tokens = config.asks_for_tokens();
   options.allowed_origins = config.allow_origins;
   options.embed_origins = config.embed_origins;
+  options.media_origins = config.media_origins;
   options.trusted_proxies = config.trusted_proxies;
   options.tls_certificate = config.tls_cert;
   options.tls_key = config.tls_key;
@@ -198,10 +210,11 @@ std::optional<HttpResponse> Server::State::respond_to_probe(const HttpRequest& r
 
 HttpResponse Server::State::respond(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
-  if (auto answer = api->respond(request)) return *std::move(answer);
+  if (auto answer = api.media->respond(request)) return *std::move(answer);
+  if (auto answer = api.scenes->respond(request)) return *std::move(answer);
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   if (!client.empty() && (request.path == "/" || request.path == "/index.html"))
-    return client.respond_with_head(request, api->preview(request));
+    return client.respond_with_head(request, api.scenes->preview(request));
   return client.respond(request);
 }
 
@@ -238,13 +251,16 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   s.scenes = std::make_unique<SceneLibrary>(
       s.config, RendererOptions{.kind = s.config.renderer, .pool = s.pool, .devices = s.devices},
       s.io, s.metrics);
-  s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io);
+  s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io, s.config.media_origins);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) {
     const auto resolve = [&s](auto wish) { return s.scenes->resolve(wish); };
     return s.access.permit(token, unix_now_s(), resolve);
   };
-  s.api = std::make_unique<SceneApi>(*s.scenes, authorize);
+  s.api.scenes = std::make_unique<SceneApi>(*s.scenes, authorize);
+  const std::string key = own_key(s.config);
+  s.api.media = std::make_unique<MediaApi>(MediaApi::Parts{
+      *s.scenes, authorize, [&s] { return s.access.revoked_links(); }, key, unix_now_s});
   VisitOptions options = visit_options(s.config);
   PoolExecutor::Pools pools{s.pool};
   for (const auto& [device, views] : s.devices->views())
@@ -259,7 +275,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       [&s](const auto& why) { s.give_up("no device renders any more: " + why); }, s.metrics);
   s.places = std::make_unique<Places>(
       VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
-                   session_tokens(s.config), s.metrics, s.counts ? &*s.counts : nullptr,
+                   SessionTokens(key), s.metrics, s.counts ? &*s.counts : nullptr,
                    [&s] { return s.access.revoked_links(); }});
 }
 

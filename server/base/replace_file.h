@@ -10,4 +10,8 @@ namespace catgs {
 /// one. On failure throws InputError with the remedy, and nothing has changed.
 void replace_file(const std::filesystem::path& file, std::string_view text);
 
+/// The same, but keeps no old file. `remedy`: of its errors.
+void overwrite_file(const std::filesystem::path& file, std::string_view content,
+                    std::string_view remedy);
+
 }  // namespace catgs

@@ -200,11 +200,15 @@ std::string escape_html(std::string_view text) {
   return out;
 }
 
-std::string content_security_policy(const std::vector<std::string>& embed_origins) {
-  std::string policy =
+std::string content_security_policy(const std::vector<std::string>& embed_origins,
+                                    const std::vector<std::string>& media_origins) {
+  std::string media;
+  for (const auto& origin : media_origins) media.append(" ").append(origin);
+  std::string policy = fmt::format(
       "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; "
-      "img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'; "
-      "frame-ancestors";
+      "img-src 'self' blob: data:{0}; media-src 'self'{0}; style-src 'self'; base-uri 'none'; "
+      "form-action 'none'; frame-ancestors",
+      media);
   if (embed_origins.empty()) policy += " 'none'";
   for (const auto& origin : embed_origins) policy.append(" ").append(origin);
   return policy;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <future>
 #include <memory>
@@ -23,6 +24,16 @@ struct HttpRequest {
   std::string_view site = {};            // "https://tours.example:8443": how the client came here
   std::vector<std::string> arguments{};  // of the query: "name=value", decoded
   std::string_view if_match = {};
+  std::string_view range = {};
+  std::string_view if_range = {};
+};
+
+/// A body that is read from the disk piece by piece while it is sent.
+struct DiskBody {
+  std::uint64_t length = 0;
+  /// Returns so many bytes of the body from `offset` on; fewer: the body cannot be had, and the
+  /// connection is closed. May block. Called on any thread, by one at a time.
+  std::function<std::string(std::uint64_t offset, std::size_t bytes)> read;
 };
 
 struct HttpResponse {
@@ -34,6 +45,13 @@ struct HttpResponse {
   int retry_after_s = 0;  // 0: no header Retry-After
   std::string location;   // empty: no header Location
   std::shared_ptr<const std::string> body;
+  std::shared_ptr<const DiskBody> disk_body{};  // in place of `body`
+  bool accepts_ranges = false;                  // says so, in a header Accept-Ranges
+  std::string content_range{};                  // empty: no header Content-Range
+  std::string policy{};  // its Content-Security-Policy; empty: that of the pages
+  /// Makes the real answer where that takes a look at the disk; the other members then mean
+  /// nothing. May block. Called on another thread.
+  std::function<HttpResponse()> on_disk{};
 };
 
 inline HttpResponse text_response(int status, std::string body,
@@ -68,6 +86,9 @@ struct Precondition {
 /// Called on the network thread; must not block.
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
 
+/// Longer uploads, where they are allowed, have places of their own.
+inline constexpr std::size_t max_upload_bytes = 1 << 20;
+
 /// Handles PUT requests. None are accepted if `take` is null. All functions are called on the
 /// network thread.
 struct HttpUploads {
@@ -80,8 +101,11 @@ struct HttpUploads {
       take;
   /// Called when an upload finds no free place.
   std::function<void()> on_full = [] {};
+  /// The longest body for a path.
+  std::function<std::size_t(std::string_view path)> most_bytes = [](std::string_view) {
+    return max_upload_bytes;
+  };
 };
-inline constexpr std::size_t max_upload_bytes = 1 << 20;
 
 /// True if a page of `origin` may open a websocket here. `origin` looks like
 /// "https://a.example:8443" and is empty if the client is no browser. The host that served the page
@@ -124,7 +148,9 @@ std::string percent_encoded(std::string_view text, std::string_view others = "-.
 /// Escapes text for HTML content or a quoted attribute.
 std::string escape_html(std::string_view text);
 
-/// The Content-Security-Policy of every page. `embed_origins` may show it in a frame.
-std::string content_security_policy(const std::vector<std::string>& embed_origins);
+/// The Content-Security-Policy of every page. `embed_origins` may show it in a frame. It shows
+/// pictures and plays films and sounds of `media_origins`, besides those of this server.
+std::string content_security_policy(const std::vector<std::string>& embed_origins,
+                                    const std::vector<std::string>& media_origins = {});
 
 }  // namespace catgs

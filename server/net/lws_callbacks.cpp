@@ -30,6 +30,10 @@ Service& service_of(lws* wsi) {
   return *static_cast<Service*>(lws_context_user(lws_get_context(wsi)));
 }
 
+LwsHttpExchange* new_exchange(lws* wsi) {
+  return new LwsHttpExchange(service_of(wsi).answered, service_of(wsi).disk);
+}
+
 void forget(lws* wsi, HttpSlot& slot) {
   service_of(wsi).answered.remove(wsi);
   delete std::exchange(slot.exchange, nullptr);
@@ -40,22 +44,37 @@ bool is_get_or_head(lws* wsi) {
          lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
 }
 
-const std::string upload_length_rule =
-    fmt::format("a Content-Length of 1 to {} is needed", max_upload_bytes);
-
 // Results of callbacks.
 constexpr int keep_reading = 0;
 constexpr int close_connection = -1;
 
 /// Keeps an upload's body if a place is free.
-int on_upload(lws* wsi, LwsHttpExchange& exchange) {
-  if (auto refusal = refuse_upload(wsi)) return exchange.begin_refused_upload(wsi, *refusal);
+int on_upload(lws* wsi, LwsHttpExchange& exchange, std::size_t bytes) {
+  Service& service = service_of(wsi);
+  const bool large = bytes > max_upload_bytes;
+  if (auto refusal = refuse_upload(wsi))
+    return large ? exchange.refuse_body(wsi, *std::move(refusal), service.scratch)
+                 : exchange.begin_refused_upload(wsi, *std::move(refusal));
+  UploadPlaces& places = large ? service.large_uploads : service.uploads;
   const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  if (auto place = service_of(wsi).uploads.take(link)) return exchange.begin_upload(wsi, place);
+  if (auto place = places.take(link)) return exchange.begin_upload(wsi, place, bytes);
   site_of(wsi).uploads.on_full();
   return exchange.refuse_body(
       wsi, busy_response("503: others are saving at the moment: try again in a second\n"),
-      service_of(wsi).scratch);
+      service.scratch);
+}
+
+int on_put(lws* wsi, LwsHttpExchange& exchange) {
+  const std::uint64_t bytes = body_length(wsi).value_or(0);
+  const std::size_t most = site_of(wsi).uploads.most_bytes(request_header(wsi, WSI_TOKEN_PUT_URI));
+  if (bytes >= 1 && bytes <= most) return on_upload(wsi, exchange, static_cast<std::size_t>(bytes));
+  const int status = bytes < 1 ? 411 : 413;
+  const std::string why = fmt::format("{}: a Content-Length of 1 to {} is needed", status, most);
+  note_refused(wsi, static_cast<unsigned>(status), "upload refused: " + why);
+  if (exchange.refuse_body(wsi, text_response(status, why + "\n"), service_of(wsi).scratch) != 0)
+    return close_connection;
+  const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
+  return body_follows ? keep_reading : close_connection;
 }
 
 /// A connection answers one request, and every answer says so. libwebsockets does not show the raw
@@ -70,24 +89,15 @@ int on_request(lws* wsi, HttpSlot& slot) {
   if (lws_hdr_total_length(wsi, WSI_TOKEN_HTTP_TRANSFER_ENCODING) > 0)
     return refuse_request(wsi, 411, "Content-Length is needed, not Transfer-Encoding");
   if (site.uploads.take && lws_hdr_total_length(wsi, WSI_TOKEN_PUT_URI) > 0) {
-    slot.exchange = new LwsHttpExchange(service_of(wsi).answered);
-    const std::uint64_t bytes = body_length(wsi).value_or(0);
-    if (bytes >= 1 && bytes <= max_upload_bytes) return on_upload(wsi, *slot.exchange);
-    const int status = bytes < 1 ? 411 : 413;
-    const std::string why = fmt::format("{}: {}", status, upload_length_rule);
-    note_refused(wsi, static_cast<unsigned>(status), "upload refused: " + why);
-    if (slot.exchange->refuse_body(wsi, text_response(status, why + "\n"),
-                                   service_of(wsi).scratch) != 0)
-      return close_connection;
-    const bool body_follows = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH) != "0";
-    return body_follows ? keep_reading : close_connection;
+    slot.exchange = new_exchange(wsi);
+    return on_put(wsi, *slot.exchange);
   }
   if (!is_get_or_head(wsi)) return refuse_request(wsi, 405, "only GET and HEAD are served here");
   // The body of a GET has no meaning, and libwebsockets would report it while the answer is being
   // sent.
   if (const auto bytes = body_length(wsi); bytes != 0)
     return refuse_request(wsi, bytes ? 413 : 400, "a GET needs no body");
-  slot.exchange = new LwsHttpExchange(service_of(wsi).answered);
+  slot.exchange = new_exchange(wsi);
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
   const HttpHandler handler = [&](const HttpRequest& request) {
     return lacks_tls(wsi) ? redirect_to_https(host, request) : respond(wsi, host, request);

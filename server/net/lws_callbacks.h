@@ -11,6 +11,7 @@
 #include "server/base/rate_limit.h"
 #include "server/net/accept_gate.h"
 #include "server/net/answered_connections.h"
+#include "server/net/disk_threads.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/upload_places.h"
 
@@ -29,6 +30,8 @@ struct Service {
   RateLimit idle_rounds{idle_rounds_per_second, idle_round_burst,
                         Clock::now()};  // rounds without a callback
   UploadPlaces uploads;
+  UploadPlaces large_uploads{UploadPlaces::large_places, UploadPlaces::large_places_of_a_link};
+  DiskThreads disk{waker};
 };
 
 /// Call it between rounds of the service loop. libwebsockets 4.1.6 does not block while a socket

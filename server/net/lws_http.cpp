@@ -18,17 +18,19 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t chunk_bytes = 64 * 1024;
-constexpr int answer_timeout_s = 30;  // until an upload is answered
+constexpr int answer_timeout_s = 30;  // until an answer is ready
 constexpr int piece_timeout_s = 30;   // until the client has taken a piece of an answer
-// The limit for a whole body. libwebsockets' own timeout restarts with each piece.
+// The limit for a whole body: a time, and more for each byte of those that are long. libwebsockets'
+// own timeout restarts with each piece.
 constexpr lws_usec_t body_time_us = 30 * LWS_US_PER_SEC;
+constexpr std::size_t slowest_bytes_per_s = 128 * 1024;
 constexpr std::size_t max_dropped_bytes = 16 << 20;
 constexpr lws_usec_t answer_poll_us = 10'000;  // saves are rare
 
 /// Appends response headers to a fixed buffer; remembers whether everything found room.
 class HeaderWriter {
  public:
-  HeaderWriter(lws* wsi, int status, std::string_view content_type, std::size_t length)
+  HeaderWriter(lws* wsi, int status, std::string_view content_type, std::uint64_t length)
       : wsi_(wsi) {
     ok_ = lws_add_http_common_headers(wsi, static_cast<unsigned>(status),
                                       std::string(content_type).c_str(), length, &at_, end()) == 0;
@@ -64,6 +66,11 @@ std::vector<std::string> query_arguments(lws* wsi) {
     arguments.emplace_back(text.data(), static_cast<std::size_t>(length));
   }
   return arguments;
+}
+
+template <typename Result>
+bool is_ready(const std::future<Result>& result) {
+  return result.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
 /// libwebsockets does not report a client that closes while its answer is prepared. TCP does not
@@ -110,29 +117,39 @@ std::optional<std::uint64_t> body_length(lws* wsi) {
 }
 
 int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site) {
-  const bool head_only = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
-  const std::string path = request_header(wsi, head_only ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
+  head_only_ = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
+  const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  HttpResponse response = handler({path, if_none_match, encodings.find("gzip") != std::string::npos,
-                                   authorization, site, query_arguments(wsi)});
-  const int failed = answer(wsi, std::move(response));
-  if (head_only) unwritten_ = 0;
-  return failed;
+  const std::string range = request_header(wsi, WSI_TOKEN_HTTP_RANGE);
+  const std::string if_range = request_header(wsi, WSI_TOKEN_HTTP_IF_RANGE);
+  HttpRequest request{path,          if_none_match, encodings.find("gzip") != std::string::npos,
+                      authorization, site,          query_arguments(wsi)};
+  request.range = range;
+  request.if_range = if_range;
+  HttpResponse response = handler(request);
+  serve(wsi);
+  if (!response.on_disk) return answer(wsi, std::move(response));
+  lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);
+  answer_ = disk_.run(std::move(response.on_disk), waiter_);
+  return 0;
 }
 
 LwsHttpExchange::~LwsHttpExchange() {
+  waiter_->wsi = nullptr;
   if (place_) place_->abandon();
 }
 
-int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place) {
+int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place, std::size_t bytes) {
   path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
   authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   precondition_ = {request_header(wsi, WSI_TOKEN_HTTP_IF_MATCH),
                    request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH)};
   place_ = std::move(place);
-  await_body(wsi);
+  announced_bytes_ = bytes;
+  body_.reserve(bytes);
+  await_body(wsi, bytes);
   return 0;
 }
 
@@ -149,15 +166,16 @@ int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, std::vector<st
   return write_headers(wsi) == 0 ? write_piece(wsi, scratch) : -1;
 }
 
-void LwsHttpExchange::await_body(lws* wsi) {
+void LwsHttpExchange::await_body(lws* wsi, std::size_t bytes) {
   body_due_ = true;
-  lws_set_timer_usecs(wsi, body_time_us);
+  const auto more_s = static_cast<lws_usec_t>(bytes / slowest_bytes_per_s);
+  lws_set_timer_usecs(wsi, body_time_us + more_s * LWS_US_PER_SEC);
 }
 
 int LwsHttpExchange::take_body(lws* wsi, std::string_view bytes) {
   if (has_gone(wsi)) return -1;
   if (body_due_ && place_) {
-    if (body_.size() + bytes.size() > max_upload_bytes) return -1;  // more than announced
+    if (body_.size() + bytes.size() > announced_bytes_) return -1;
     body_.append(bytes);
     return 0;
   }
@@ -168,7 +186,10 @@ int LwsHttpExchange::take_body(lws* wsi, std::string_view bytes) {
 int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
   if (!body_due_ || answered_) return -1;
   body_due_ = false;
-  if (refusal_) return answer(wsi, *std::move(refusal_));
+  if (refusal_) {
+    serve(wsi);
+    return answer(wsi, *std::move(refusal_));
+  }
   HttpRequest request{path_, precondition_.if_none_match, false, authorization_};
   request.if_match = precondition_.if_match;
   lws_rx_flow_control(wsi, 0);  // see AnsweredConnections
@@ -181,11 +202,16 @@ int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
 int LwsHttpExchange::on_timer(lws* wsi) {
   if (body_due_) return -1;
   if (!answer_.valid()) return 0;
-  if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+  if (!is_ready(answer_)) {
     if (has_gone(wsi)) return -1;
     lws_set_timer_usecs(wsi, answer_poll_us);
     return 0;
   }
+  serve(wsi);
+  return answer_now(wsi);
+}
+
+int LwsHttpExchange::answer_now(lws* wsi) {
   try {
     return answer(wsi, answer_.get());
   } catch (const std::future_error&) {
@@ -193,21 +219,40 @@ int LwsHttpExchange::on_timer(lws* wsi) {
   }
 }
 
+/// From here on nothing is read.
+void LwsHttpExchange::serve(lws* wsi) {
+  waiter_->wsi = wsi;
+  served_.add(wsi);
+}
+
 int LwsHttpExchange::answer(lws* wsi, HttpResponse response) {
   response_ = std::move(response);
   answering_ = true;
-  served_.add(wsi);
   // Counts a socket as writable only when little is unsent. Progress of a slow client is then
   // visible.
   const int unsent_bytes = 16 * 1024;
   ::setsockopt(lws_get_socket_fd(wsi), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes,
                sizeof unsent_bytes);
   lws_callback_on_writable(wsi);
-  return write_headers(wsi);
+  const int failed = write_headers(wsi);
+  if (head_only_) unwritten_ = 0;
+  read_ahead();
+  return failed;
+}
+
+/// Two pieces of a body are in memory at most: this one, and the one that is being written.
+void LwsHttpExchange::read_ahead() {
+  if (!response_.disk_body || unwritten_ == 0) return;
+  const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(chunk_bytes, unwritten_));
+  const std::uint64_t offset = response_.disk_body->length - unwritten_;
+  piece_ = disk_.run<std::string>(
+      [body = response_.disk_body, offset, size] { return body->read(offset, size); }, waiter_);
 }
 
 int LwsHttpExchange::write_headers(lws* wsi) {
-  unwritten_ = response_.body ? response_.body->size() : 0;
+  unwritten_ = response_.disk_body ? response_.disk_body->length
+               : response_.body    ? response_.body->size()
+                                   : 0;
   HeaderWriter headers(wsi, response_.status, response_.content_type, unwritten_);
   headers.add("cache-control:", response_.cache_control);
   if (!response_.etag.empty()) headers.add("etag:", response_.etag);
@@ -215,24 +260,35 @@ int LwsHttpExchange::write_headers(lws* wsi) {
   if (response_.retry_after_s > 0)
     headers.add("retry-after:", std::to_string(response_.retry_after_s));
   if (response_.gzip) headers.add("content-encoding:", "gzip");
-  headers.add("content-security-policy:", site_of(wsi).policy);
+  if (response_.accepts_ranges) headers.add("accept-ranges:", "bytes");
+  if (!response_.content_range.empty()) headers.add("content-range:", response_.content_range);
+  headers.add("content-security-policy:",
+              response_.policy.empty() ? site_of(wsi).policy : response_.policy);
   return headers.finish();
 }
 
 int LwsHttpExchange::on_writable(lws* wsi, std::vector<std::byte>& scratch) {
-  if (!answering_) return 0;
+  if (!answering_) return answer_.valid() && is_ready(answer_) ? answer_now(wsi) : 0;
   if (unwritten_ == 0) return -1;
+  if (piece_.valid() && !is_ready(piece_)) return 0;  // its thread wakes this one
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, piece_timeout_s);
   lws_callback_on_writable(wsi);
   return write_piece(wsi, scratch);
 }
 
 int LwsHttpExchange::write_piece(lws* wsi, std::vector<std::byte>& scratch) {
-  const std::string& body = *response_.body;
-  const std::size_t size = std::min(chunk_bytes, unwritten_);
+  const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(chunk_bytes, unwritten_));
   scratch.resize(LWS_PRE + size);
-  std::memcpy(scratch.data() + LWS_PRE, body.data() + body.size() - unwritten_, size);
+  if (piece_.valid()) {
+    const std::string piece = piece_.get();
+    if (piece.size() != size) return -1;
+    std::memcpy(scratch.data() + LWS_PRE, piece.data(), size);
+  } else {
+    const std::string& body = *response_.body;
+    std::memcpy(scratch.data() + LWS_PRE, body.data() + body.size() - unwritten_, size);
+  }
   unwritten_ -= size;
+  read_ahead();
   auto* payload = reinterpret_cast<unsigned char*>(scratch.data()) + LWS_PRE;
   const auto protocol = unwritten_ == 0 ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP;
   return lws_write(wsi, payload, size, protocol) == static_cast<int>(size) ? 0 : -1;

@@ -11,6 +11,7 @@
 #include <libwebsockets.h>
 
 #include "server/net/answered_connections.h"
+#include "server/net/disk_threads.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
 
@@ -20,16 +21,17 @@ namespace catgs {
 /// libwebsockets callbacks: nonzero closes the connection.
 class LwsHttpExchange {
  public:
-  /// The connection is added to `served` when its answer begins.
-  explicit LwsHttpExchange(AnsweredConnections& served) : served_(served) {}
+  /// The connection is added to `served` when its answer begins. Both outlive the exchange.
+  LwsHttpExchange(AnsweredConnections& served, DiskThreads& disk) : served_(served), disk_(disk) {}
   ~LwsHttpExchange();  // the connection is closed
   LwsHttpExchange(const LwsHttpExchange&) = delete;
   LwsHttpExchange& operator=(const LwsHttpExchange&) = delete;
 
-  /// Reads the request, asks `handler` and begins to answer. `site`: HttpRequest::site.
+  /// Reads the request, asks `handler` and begins to answer, or to prepare the answer on the disk's
+  /// threads. `site`: HttpRequest::site.
   int begin(lws* wsi, const HttpHandler& handler, const std::string& site);
-  /// Accepts a PUT request. Its body, of a known small length, is kept in `place`.
-  int begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place);
+  /// Accepts a PUT request. Its body of so many bytes is kept in `place`.
+  int begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place, std::size_t bytes);
   /// Refuses a PUT request after its body has arrived. The body is dropped.
   int begin_refused_upload(lws* wsi, HttpResponse refusal);
   /// Refuses a PUT request at once. The rest of the body is read and dropped, within bounds:
@@ -44,25 +46,42 @@ class LwsHttpExchange {
   int end_body(lws* wsi, const HttpUploads& uploads);
   /// Checks whether the answer is ready or the body is overdue.
   int on_timer(lws* wsi);
-  /// Writes the next piece of the answer. The connection closes when all are written.
+  /// Begins an answer that has become ready, or writes the next piece of it. The connection closes
+  /// when all are written.
   int on_writable(lws* wsi, std::vector<std::byte>& scratch);
 
  private:
-  void await_body(lws* wsi);
+  /// The connection, for the disk's threads; null once it is closed.
+  struct Waiter : Wakeable {
+    lws* wsi = nullptr;
+    void service_woken() override {
+      if (wsi) lws_callback_on_writable(wsi);
+    }
+  };
+
+  void await_body(lws* wsi, std::size_t bytes = 0);
+  int answer_now(lws* wsi);
   int answer(lws* wsi, HttpResponse response);
+  void serve(lws* wsi);
+  void read_ahead();
   int write_headers(lws* wsi);
   int write_piece(lws* wsi, std::vector<std::byte>& scratch);
 
   AnsweredConnections& served_;
+  DiskThreads& disk_;
+  const std::shared_ptr<Waiter> waiter_ = std::make_shared<Waiter>();
   HttpResponse response_;
+  bool head_only_ = false;
   bool answering_ = false;
-  std::size_t unwritten_ = 0;  // bytes of the body
+  std::uint64_t unwritten_ = 0;     // bytes of the body
+  std::future<std::string> piece_;  // of a body on the disk: the next one
 
   // Uploads only. The request's head is gone by the time its body is complete.
   std::string path_;
   std::string authorization_;
   Precondition precondition_;
   std::shared_ptr<UploadPlace> place_;
+  std::size_t announced_bytes_ = 0;
   std::string body_;
   std::optional<HttpResponse> refusal_;
   bool answered_ = false;          // before its body arrived

@@ -50,35 +50,6 @@ void tune_for_frames(int socket) {
                congestion_control.size());
 }
 
-void LwsWaker::attach(lws_context* context) {
-  const std::lock_guard lock(mutex_);
-  context_ = context;
-}
-
-void LwsWaker::detach() {
-  const std::lock_guard lock(mutex_);
-  context_ = nullptr;
-  pending_.clear();
-}
-
-void LwsWaker::wake(std::shared_ptr<LwsWebsocket> connection) {
-  const std::lock_guard lock(mutex_);
-  if (!context_) return;
-  pending_.push_back(std::move(connection));
-  if (pending_.size() == 1)
-    lws_cancel_service(context_);  // otherwise a wake-up is already under way
-}
-
-void LwsWaker::wake() {
-  const std::lock_guard lock(mutex_);
-  if (context_) lws_cancel_service(context_);
-}
-
-std::vector<std::shared_ptr<LwsWebsocket>> LwsWaker::take() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(pending_, {});
-}
-
 LwsWebsocket::LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address)
     : waker_(std::move(waker)),
       peer_address_(std::move(peer_address)),

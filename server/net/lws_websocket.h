@@ -10,27 +10,10 @@
 
 #include "server/base/rate_limit.h"
 #include "server/net/connection.h"
+#include "server/net/waker.h"
 #include "server/pipeline/packet_ring.h"
 
 namespace catgs {
-
-class LwsWebsocket;
-
-/// Lets other threads reach the network thread. They list the connection that has work and wake the
-/// poll loop. Waking is the only libwebsockets call allowed from outside.
-class LwsWaker {
- public:
-  void attach(lws_context* context);
-  void detach();  // later calls of wake() do nothing
-  void wake(std::shared_ptr<LwsWebsocket> connection);
-  void wake();
-  std::vector<std::shared_ptr<LwsWebsocket>> take();
-
- private:
-  std::mutex mutex_;
-  lws_context* context_ = nullptr;
-  std::vector<std::shared_ptr<LwsWebsocket>> pending_;
-};
 
 /// Sets up a TCP socket for a stream of frames. Small writes leave at once. The next packet leaves
 /// the ring only when hardly anything is unsent, so that waiting packets are counted and can be
@@ -40,7 +23,9 @@ void tune_for_frames(int socket);
 
 /// One libwebsockets websocket. Functions that begin with `service_` run on the network thread.
 /// Only they touch `wsi_`.
-class LwsWebsocket final : public Connection, public std::enable_shared_from_this<LwsWebsocket> {
+class LwsWebsocket final : public Connection,
+                           public Wakeable,
+                           public std::enable_shared_from_this<LwsWebsocket> {
  public:
   LwsWebsocket(lws* wsi, std::shared_ptr<LwsWaker> waker, std::string peer_address);
 
@@ -51,7 +36,7 @@ class LwsWebsocket final : public Connection, public std::enable_shared_from_thi
   [[nodiscard]] std::size_t queued_frames() const override;
 
   void service_listen(std::shared_ptr<ConnectionListener> listener);
-  void service_woken();
+  void service_woken() override;
   /// As in all callbacks, nonzero tells libwebsockets to close the socket.
   int service_receive(std::span<const std::byte> fragment);
   int service_writeable(std::vector<std::byte>& scratch);

@@ -140,7 +140,7 @@ NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
             std::move(options.uploads),
             std::move(options.accept),
             options.allowed_origins,
-            content_security_policy(options.embed_origins),
+            content_security_policy(options.embed_origins, options.media_origins),
             names_of(options.listen, options.asks_for_tokens),
             tls,
             TrustedProxies(options.trusted_proxies),
@@ -219,6 +219,8 @@ int NetServer::port() const { return state_->port; }
 
 int NetServer::admin_port() const { return state_->admin_port; }
 
-std::size_t NetServer::uploads() const { return state_->service.uploads.taken(); }
+std::size_t NetServer::uploads() const {
+  return state_->service.uploads.taken() + state_->service.large_uploads.taken();
+}
 
 }  // namespace catgs

@@ -27,6 +27,7 @@ struct NetOptions {
   bool asks_for_tokens = false;  // scenes are shown only with a token
   std::vector<std::string> allowed_origins;
   std::vector<std::string> embed_origins;
+  std::vector<std::string> media_origins;
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
   /// Reports each request refused before admission: whose it was, and why. Errors that
   /// libwebsockets itself reports name no client. Called on the network thread.

@@ -9,7 +9,7 @@ std::shared_ptr<UploadPlace> UploadPlaces::take(const std::string& link) {
   std::erase_if(taken_, [](const Taken& one) { return one.place.expired(); });
   const auto of_this_link =
       static_cast<std::size_t>(std::ranges::count(taken_, link, &Taken::link));
-  if (taken_.size() >= places || of_this_link >= places_of_a_link) return nullptr;
+  if (taken_.size() >= most_ || of_this_link >= most_of_a_link_) return nullptr;
   auto place = std::make_shared<UploadPlace>();
   taken_.push_back({link, place});
   return place;

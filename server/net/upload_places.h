@@ -25,6 +25,12 @@ class UploadPlaces {
  public:
   static constexpr std::size_t places = 4;
   static constexpr std::size_t places_of_a_link = 2;  // so that one link cannot block the others
+  // For bodies of more than max_upload_bytes.
+  static constexpr std::size_t large_places = 2;
+  static constexpr std::size_t large_places_of_a_link = 1;
+
+  explicit UploadPlaces(std::size_t most = places, std::size_t most_of_a_link = places_of_a_link)
+      : most_(most), most_of_a_link_(most_of_a_link) {}
 
   /// Returns null if no place is free. `link` is the sender's Authorization header.
   std::shared_ptr<UploadPlace> take(const std::string& link);
@@ -36,6 +42,8 @@ class UploadPlaces {
     std::weak_ptr<const UploadPlace> place;
   };
 
+  const std::size_t most_;
+  const std::size_t most_of_a_link_;
   mutable std::mutex mutex_;
   std::vector<Taken> taken_;  // may hold freed places; take() removes them
 };

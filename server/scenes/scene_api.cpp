@@ -8,6 +8,7 @@
 
 #include "server/base/scene_id.h"
 #include "server/scenes/link_preview.h"
+#include "server/scenes/scene_requests.h"
 
 namespace catgs {
 namespace {
@@ -15,19 +16,6 @@ namespace {
 constexpr std::string_view sidecar_part = "/sidecar";
 
 constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
-
-/// The token of "Authorization: Bearer TOKEN"; empty: none.
-std::string_view bearer_token(std::string_view authorization) {
-  constexpr std::string_view scheme = "Bearer ";
-  return authorization.starts_with(scheme) ? authorization.substr(scheme.size()) : "";
-}
-
-HttpResponse json_response(std::shared_ptr<const std::string> body) {
-  HttpResponse response;
-  response.content_type = "application/json";
-  response.body = std::move(body);
-  return response;
-}
 
 /// Builds the answer to "GET /api/scenes".
 std::shared_ptr<const std::string> scene_list(
@@ -45,17 +33,13 @@ std::shared_ptr<const std::string> scene_list(
   return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
 }
 
-HttpResponse unauthorized(std::string_view why) {
-  return text_response(401, fmt::format("401: {}\nSend it as Authorization: Bearer TOKEN\n", why));
-}
-
 }  // namespace
 
 std::optional<HttpResponse> SceneApi::respond(const HttpRequest& request) {
-  if (request.path == "/api/scenes") return list_scenes(permit_of(request));
+  if (request.path == "/api/scenes") return list_scenes(permit_of(authorize_, request));
   for (const Part part : {Part::tours, Part::poster})
     if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
-      return part_of_scene(scenes_.resolve(*id), part, permit_of(request));
+      return part_of_scene(scenes_.resolve(*id), part, permit_of(authorize_, request));
   return std::nullopt;
 }
 
@@ -124,19 +108,9 @@ HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part, const
 
 std::optional<HttpResponse> SceneApi::refuse_upload(const HttpRequest& request) {
   const auto wish = scene_of(request.path, sidecar_part);
-  if (!wish) return text_response(405, "405: only the sidecars of scenes are saved here\n");
-  const std::string scene_id = scenes_.resolve(*wish);
-  const Permit permit = permit_of(request);
-  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
-  if (const auto refused = permit(scene_id, Use::save))
-    return text_response(403, "403: " + *refused + "\n");
-  if (std::ranges::count(*scenes_.listing(), scene_id, &SceneLibrary::Listing::id) == 0)
-    return text_response(404, "404: " + no_such_scene(scene_id) + "\n");
-  return std::nullopt;
-}
-
-Permit SceneApi::permit_of(const HttpRequest& request) {
-  return authorize_(std::string(bearer_token(request.authorization)));
+  if (!wish)
+    return text_response(405, "405: only the sidecars and media of scenes are saved here\n");
+  return refuse_change(scenes_, permit_of(authorize_, request), scenes_.resolve(*wish));
 }
 
 std::string SceneApi::saved_scene(const HttpRequest& request) const {

@@ -32,8 +32,6 @@ class SceneApi {
 
  private:
   enum class Part { tours, poster };
-  /// The permit of the request's token.
-  Permit permit_of(const HttpRequest& request);
   HttpResponse list_scenes(const Permit& permit);
   HttpResponse part_of_scene(std::string_view scene_id, Part part, const Permit& permit);
 

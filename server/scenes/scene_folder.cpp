@@ -10,6 +10,7 @@
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
+#include "server/media/media_folder.h"
 #include "server/scenes/tree_cache.h"
 
 namespace catgs {
@@ -22,6 +23,7 @@ bool is_hidden(const fs::path& path) { return path.filename().string().starts_wi
 /// True if a folder looks like a scene. People keep other folders beside their scenes.
 bool is_scene_folder(const fs::path& path) {
   std::error_code error;
+  if (path.extension() == media_folder_extension) return false;
   return has_scene_index(path) || fs::is_directory(path / "point_cloud", error);
 }
 

@@ -93,7 +93,9 @@ void SceneShelf::publish(const std::function<std::string(const FoundScene&)>& st
                         .loaded = book.entry != nullptr,
                         .state = state_of(found),
                         .poster = book.poster});
-    if (book.entry) listing->back().tours = book.entry->tours;
+    if (!book.entry) continue;
+    listing->back().tours = book.entry->tours;
+    listing->back().sidecar = book.entry->sidecar;
   }
   const std::lock_guard lock(published_mutex_);
   published_ = std::move(listing);

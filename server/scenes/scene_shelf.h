@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -25,6 +26,7 @@ struct SceneListing {
   bool loaded = false;
   std::string state{};                          // for people: "building tree 37 %"; often empty
   std::optional<ToursAnswers> tours{};          // of a loaded one
+  std::filesystem::path sidecar{};              // of a loaded one; empty: it is no file
   std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
 };
 

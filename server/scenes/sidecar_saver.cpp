@@ -98,12 +98,12 @@ void SidecarSaver::start_save(const SharedRequest& request) {
   });
 }
 
-SidecarSaver::Outcome SidecarSaver::write(const Request& request) {
+SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
   const SceneEntry& scene = *request.entry;
   const std::filesystem::path& file = scene.sidecar;
   Sidecar sidecar;
   try {
-    sidecar = check_sent_sidecar(request.json);
+    sidecar = check_sent_sidecar(request.json, media_origins_);
   } catch (const InputError& mistake) {
     return {text_response(400, fmt::format("400: {}\n", mistake.what()))};
   }

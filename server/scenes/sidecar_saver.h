@@ -5,6 +5,8 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/thread_pool.hpp>
@@ -20,8 +22,11 @@ namespace catgs {
 /// again when no save waits. Values that a sidecar leaves out stay as they are until a restart.
 class SidecarSaver {
  public:
-  /// `io` runs the session thread and outlives this object.
-  SidecarSaver(SceneLibrary& scenes, boost::asio::io_context& io) : scenes_(scenes), io_(io) {}
+  /// `io` runs the session thread and outlives this object. `media_origins`: sites that tours may
+  /// show media of.
+  SidecarSaver(SceneLibrary& scenes, boost::asio::io_context& io,
+               std::vector<std::string> media_origins = {})
+      : scenes_(scenes), io_(io), media_origins_(std::move(media_origins)) {}
   ~SidecarSaver() { writer_.join(); }
   SidecarSaver(const SidecarSaver&) = delete;
   SidecarSaver& operator=(const SidecarSaver&) = delete;
@@ -59,10 +64,11 @@ class SidecarSaver {
   void start_poster(const std::string& scene_id);
   void finish(Request& request, const Outcome& outcome);
   // Writer thread.
-  static Outcome write(const Request& request);
+  [[nodiscard]] Outcome write(const Request& request) const;
 
   SceneLibrary& scenes_;
   boost::asio::io_context& io_;
+  const std::vector<std::string> media_origins_;
   // Session thread.
   std::deque<SharedRequest> waiting_;
   std::set<std::string> posters_due_;  // ids of scenes

@@ -16,6 +16,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
+#include "server/media/media_type.h"
 #include "server/net/http.h"
 
 namespace catgs {
@@ -28,6 +29,8 @@ constexpr std::size_t max_tours = 32;
 constexpr std::size_t max_stops = 256;
 constexpr std::size_t max_languages = 32;
 constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters
+constexpr std::size_t max_media = 8;
+constexpr std::size_t max_address_bytes = 2000;
 constexpr float longest_stay_s = 3600;
 constexpr float longest_flight_s = 120;
 
@@ -112,9 +115,68 @@ void check_translations(const JsonField& item, std::initializer_list<std::string
   }
 }
 
-void check_stop(const JsonField& stop) {
+using Origins = std::vector<std::string>;
+
+/// The kind of a medium: that of its `type`, or of the extension of its `src`.
+MediaKind check_source(const JsonField& medium, const Origins& origins) {
+  const JsonField source = medium.at("src");
+  const std::string src = source.text();
+  const bool is_address = src.find(':') != src.npos;
+  if (!is_address && !is_media_name(src))
+    source.fail("is no name of a file", "letters, digits, . - and _ alone, or an https address");
+  const auto at_origin = [&](const std::string& origin) { return src.starts_with(origin + "/"); };
+  if (is_address && (src.size() > max_address_bytes || std::ranges::none_of(origins, at_origin)))
+    source.fail("is at no site that this server shows media of",
+                "the operator names sites by --media-origin");
+  const auto named = media_kind_named(src.substr(0, src.find_first_of("?#")));
+  if (const auto type = medium.find("type")) {
+    constexpr std::array<std::string_view, 3> kinds = {"image", "video", "audio"};
+    const auto kind = std::ranges::find(kinds, type->text());
+    if (kind == kinds.end()) type->fail("is not image, video or audio");
+    const auto meant = static_cast<MediaKind>(kind - kinds.begin());
+    if (!is_address && named != meant) type->fail("is not what the extension of src says");
+    return meant;
+  }
+  if (!named) source.fail("has no extension that tells its kind", "give it a type: image");
+  return *named;
+}
+
+void check_captions_of(const JsonField& medium) {
+  const auto captions = medium.find("captions");
+  if (!captions) return;
+  const std::string name = captions->text();
+  if (!is_media_name(name) || media_kind_named(name) != MediaKind::captions)
+    captions->fail("is no name of a .vtt file");
+}
+
+void check_medium(const JsonField& medium, const Origins& origins) {
+  check_members(medium, {"src", "type", "alt", "captions", "translations"});
+  const MediaKind kind = check_source(medium, origins);
+  if (kind == MediaKind::captions) medium.at("src").fail("is a file of captions");
+  if (kind == MediaKind::image && medium.at("alt").text().empty())
+    medium.at("alt").fail("is empty", "say what the picture shows, for those who do not see it");
+  check_text(medium.find("alt"));
+  check_translations(medium, {"alt"});
+  check_captions_of(medium);
+}
+
+void check_sound(const JsonField& sound, const Origins& origins) {
+  if (check_source(sound, origins) != MediaKind::audio) sound.at("src").fail("is no sound");
+}
+
+void check_stop(const JsonField& stop, const Origins& origins) {
   check_members(stop, {"title", "caption", "translations", "position", "look_at", "orientation",
-                       "fov_deg", "marker", "stay_s", "fly_s"});
+                       "fov_deg", "marker", "stay_s", "fly_s", "media", "narration"});
+  if (const auto media = stop.find("media")) {
+    if (media->size() > max_media)
+      media->fail(fmt::format("has {} entries, at most {}", media->size(), max_media));
+    for (std::size_t i = 0; i < media->size(); ++i) check_medium((*media)[i], origins);
+  }
+  if (const auto narration = stop.find("narration")) {
+    check_members(*narration, {"src", "type", "captions"});
+    check_sound(*narration, origins);
+    check_captions_of(*narration);
+  }
   check_text(stop.find("title"));
   check_text(stop.find("caption"));
   check_translations(stop, {"title", "caption"});
@@ -129,8 +191,13 @@ void check_stop(const JsonField& stop) {
   check_number(stop.find("fly_s"), 0.0f, longest_flight_s);
 }
 
-void check_tour(const JsonField& tour) {
-  check_members(tour, {"title", "translations", "autoplay", "stops"});
+void check_tour(const JsonField& tour, const Origins& origins) {
+  check_members(tour, {"title", "translations", "autoplay", "sound", "stops"});
+  if (const auto sound = tour.find("sound")) {
+    check_members(*sound, {"src", "type", "volume"});
+    check_sound(*sound, origins);
+    check_number(sound->find("volume"), 0.0f, 1.0f);
+  }
   check_text(tour.find("title"));
   check_translations(tour, {"title"});
   if (const auto autoplay = tour.find("autoplay"); autoplay && !autoplay->value().is_boolean())
@@ -138,12 +205,12 @@ void check_tour(const JsonField& tour) {
   const JsonField stops = tour.at("stops");
   if (stops.size() > max_stops)
     stops.fail(fmt::format("has {} entries, at most {}", stops.size(), max_stops));
-  for (std::size_t i = 0; i < stops.size(); ++i) check_stop(stops[i]);
+  for (std::size_t i = 0; i < stops.size(); ++i) check_stop(stops[i], origins);
 }
 
 }  // namespace
 
-Sidecar check_sent_sidecar(std::string_view json) {
+Sidecar check_sent_sidecar(std::string_view json, const Origins& media_origins) {
   const MemorySource source("sidecar", std::as_bytes(std::span(json)));
   const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
   Sidecar sidecar = read_sidecar(source);
@@ -151,7 +218,7 @@ Sidecar check_sent_sidecar(std::string_view json) {
   if (const auto tours = JsonField(source.name(), document).find("tours")) {
     if (tours->size() > max_tours)
       tours->fail(fmt::format("has {} entries, at most {}", tours->size(), max_tours));
-    for (std::size_t i = 0; i < tours->size(); ++i) check_tour((*tours)[i]);
+    for (std::size_t i = 0; i < tours->size(); ++i) check_tour((*tours)[i], media_origins);
   }
   return sidecar;
 }

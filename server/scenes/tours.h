@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render_core/scene/files/hints.h"
 
@@ -35,9 +36,10 @@ struct ToursAnswers {
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);
 
 /// Checks a sidecar sent by an author. It is stricter than for operators' files: every field of its
-/// tours must be known, of the right type and within bounds. Throws InputError that names the
-/// field.
-Sidecar check_sent_sidecar(std::string_view json);
+/// tours must be known, of the right type and within bounds. Media are files of the scene's folder,
+/// or addresses at `media_origins`. Throws InputError that names the field.
+Sidecar check_sent_sidecar(std::string_view json,
+                           const std::vector<std::string>& media_origins = {});
 
 /// The size limit of check_sent_sidecar(): 32 tours of 256 stops with short captions.
 inline constexpr std::size_t max_sent_sidecar_bytes = 1 << 20;

@@ -139,6 +139,15 @@ TEST_F(ConfigTest, OriginsAreAsBrowsersWriteThem) {
               ThrowsMessage<InputError>(HasSubstr("is no origin")));
 }
 
+TEST_F(ConfigTest, SitesOfMediaSpeakHttps) {
+  read_flag("media-origin", {"https://media.example", "https://a.example:8443"});
+  EXPECT_THAT(config.media_origins, ElementsAre("https://media.example", "https://a.example:8443"));
+  EXPECT_THAT([&] { read_flag("media-origin", {"http://media.example"}); },
+              ThrowsMessage<InputError>(HasSubstr("is no https site")));
+  for (const char* other : {"*", "https://*.example", "https://a.example/", "data:", "'self'"})
+    EXPECT_THROW(read_flag("media-origin", {other}), InputError) << other;
+}
+
 TEST_F(ConfigTest, RefusesAnOpenDoor) {
   config.scenes = {"synth:city:1000"};
   EXPECT_NO_THROW(validate(config));

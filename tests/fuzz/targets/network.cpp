@@ -8,12 +8,14 @@
 #include "server/access/access.h"
 #include "server/access/session_tokens.h"
 #include "server/access/signed_token.h"
+#include "server/media/media_type.h"
 #include "server/net/http.h"
 #include "server/net/static_files.h"
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
 #include "server/scenes/link_preview.h"
 #include "tests/fuzz/target.h"
+#include "tests/server/media/sample_media.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::fuzz {
@@ -292,6 +294,42 @@ std::map<std::string, std::string> token_seeds() {
           {"all", make_link_token({"", "spectator", 1}, link_key)}};
 }
 
+/// The first line is the name under which an author sends the rest.
+void parse_media(Bytes input) {
+  const std::string text = text_of(input);
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  const std::string name = text.substr(0, end);
+  const std::string content = text.substr(std::min(end + 1, text.size()));
+  const MediaType* type = media_type_of(content);
+  const auto size = image_size(content);
+  require(!size || (type && type->kind == MediaKind::image), "pictures alone have sides");
+  check_media(name, content);
+  require(is_media_name(name) && name.find('/') == name.npos && name.front() != '.',
+          "a name is a plain one");
+  require(type && media_kind_named(name).has_value(), "what is kept is of a known type");
+  if (type->kind == MediaKind::image)
+    require(size && in(size->width, 1u, max_picture_side_px) &&
+                in(size->height, 1u, max_picture_side_px),
+            "pictures that are kept have sides within the limit");
+  for (const char* other : {"<", "%PDF", "#!", "{"})
+    require(!content.starts_with(other), "neither pages nor programs are kept");
+}
+
+std::map<std::string, std::string> media_seeds() {
+  return {
+      {"png", "a.png\n" + test::png_file(640, 480)},
+      {"jpeg", "a.jpg\n" + test::jpeg_file(640, 480)},
+      {"webp", "a.webp\n" + std::string("RIFF....WEBPVP8X....\0\0\0\0\x7f\x02\0\xdf\x01\0", 30)},
+      {"lossless", "a.webp\n" + std::string("RIFF....WEBPVP8L....\x2f\x7f\xc2\x77\0.....", 30)},
+      {"lossy",
+       "a.webp\n" + std::string("RIFF....WEBPVP8 ....\0\0\0\x9d\x01\x2a\x80\x02\xe0\x01", 30)},
+      {"mp4", "a.mp4\n" + test::mp4_file()},
+      {"m4a", "a.m4a\n" + test::mp4_file("M4A ")},
+      {"webm", "a.webm\n\x1a\x45\xdf\xa3\x9f\x42\x86\x81\x01\x42\x82\x84webm"},
+      {"mp3", "a.mp3\nID3" + std::string(20, '\0')},
+      {"vtt", "a.vtt\n" + std::string(test::vtt_file)}};
+}
+
 }  // namespace
 
 std::vector<Target> network_targets() {
@@ -308,6 +346,14 @@ std::vector<Target> network_targets() {
                           "::ffff:", "10.0.0.1", "2001:db8::", "https://friend.example", ", ",
                           "/api/scenes/", "/tours", "\"", "*", "W/", "&quot;"},
            .max_bytes = 512},
+          {.name = "media",
+           .parse = parse_media,
+           .seeds = media_seeds,
+           .dictionary = {".png",     ".jpeg",    ".webp",       ".ogg", ".wav",         "IHDR",
+                          "VP8X",     "VP8L",     "VP8 ",        "ftyp", "OggS",         "OpusHead",
+                          "RIFF",     "WAVE",     "WEBVTT",      "ID3",  "\xff\xd8\xff", "\xff\xc0",
+                          "\xff\xda", "\xff\xfb", "\x9d\x01\x2a"},
+           .max_bytes = 1024},
           {.name = "token",
            .parse = parse_token,
            .seeds = token_seeds,

@@ -25,7 +25,8 @@ using testing::StartsWith;
 
 constexpr std::string_view page_policy =
     "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; img-src 'self' "
-    "blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    "blob: data:; media-src 'self'; style-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'";
 
 /// Descriptors of this process, which is the server too.
 std::size_t open_descriptors() {

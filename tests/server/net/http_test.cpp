@@ -95,6 +95,15 @@ TEST(ContentSecurityPolicy, NamesWhoMayEmbed) {
               HasSubstr("frame-ancestors https://museum.example"));
 }
 
+TEST(ContentSecurityPolicy, NamesWhoseMediaToursShow) {
+  EXPECT_THAT(content_security_policy({}),
+              HasSubstr("img-src 'self' blob: data:; media-src 'self';"));
+  const std::string policy =
+      content_security_policy({}, {"https://a.example", "https://b.example"});
+  EXPECT_THAT(policy, HasSubstr("img-src 'self' blob: data: https://a.example https://b.example;"));
+  EXPECT_THAT(policy, HasSubstr("media-src 'self' https://a.example https://b.example;"));
+}
+
 TEST(StaticFiles, CompressesTextAndKeepsTypes) {
   const test::TemporaryFolder folder;
   folder.write("index.html", std::string(5000, 'a'));

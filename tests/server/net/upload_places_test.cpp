@@ -37,5 +37,15 @@ TEST(UploadPlaces, OneLinkLeavesSomeToOthers) {
   EXPECT_TRUE(places.take("greedy"));
 }
 
+TEST(UploadPlaces, ForLargeBodiesAreFewer) {
+  UploadPlaces places(UploadPlaces::large_places, UploadPlaces::large_places_of_a_link);
+  const auto first = places.take("greedy");
+  EXPECT_TRUE(first);
+  EXPECT_FALSE(places.take("greedy"));
+  const auto second = places.take("another");
+  EXPECT_TRUE(second);
+  EXPECT_FALSE(places.take("one more"));
+}
+
 }  // namespace
 }  // namespace catgs

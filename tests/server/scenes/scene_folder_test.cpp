@@ -50,6 +50,13 @@ TEST_F(SceneFolderTest, FindsFilesAndFoldersThatAreScenes) {
   EXPECT_EQ(folders_.scan()[3].size.sh_degree, 1);
 }
 
+TEST_F(SceneFolderTest, MediaOfASceneAreNoScene) {
+  save_scene(random_cloud(10, 0), folder_ / "hall.ply");
+  write("hall.media/meta.json", "{}");
+  write("hall.media/point_cloud/iteration_7/point_cloud.ply", ply_bytes(random_cloud(30, 1)));
+  EXPECT_THAT(names(), ElementsAre("hall"));
+}
+
 TEST_F(SceneFolderTest, NamedTwiceHoldsEachSceneOnce) {
   save_scene(random_cloud(10, 0), folder_ / "a.ply");
   const std::string path = folder_.path().string();

@@ -167,6 +167,70 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "") << "too large";
 }
 
+TEST(SentSidecar, MediaAreRefusedByTheFieldThatIsWrong) {
+  const auto media = [](const std::string& list) {
+    return mistake(with_stop(fmt::format(R"(, "media": [{}])", list)));
+  };
+  EXPECT_EQ(media(R"({"src": "a.jpg", "alt": "A door", "translations": {"de": {"alt": "Tür"}}},
+                     {"src": "b.mp4", "captions": "b.vtt"}, {"src": "c.mp3"})"),
+            "");
+  EXPECT_THAT(media(R"({"alt": "x"})"), HasSubstr("media[0]: 'src' is missing"));
+  EXPECT_THAT(media(R"({"src": "a.jpg"})"), HasSubstr("media[0]: 'alt' is missing"));
+  EXPECT_THAT(media(R"({"src": "a.jpg", "alt": ""})"), HasSubstr("media[0].alt: is empty"));
+  EXPECT_THAT(media(R"({"src": "a.svg", "alt": "x"})"),
+              HasSubstr("media[0].src: has no extension"));
+  EXPECT_THAT(media(R"({"src": "a.vtt"})"), HasSubstr("is a file of captions"));
+  EXPECT_THAT(media(R"({"src": "a.mp4", "captions": "a.txt"})"), HasSubstr("no name of a .vtt"));
+  EXPECT_THAT(media(R"({"src": "a.mp4", "captions": "../a.vtt"})"), HasSubstr("no name of a .vtt"));
+  EXPECT_THAT(media(R"({"src": "a.mp4", "autoplay": true})"), HasSubstr("unknown field"));
+  EXPECT_THAT(media(R"({"src": "a.mp4", "type": "image", "alt": "x"})"),
+              HasSubstr("media[0].type"));
+  for (const char* src : {"../a.jpg", "/a.jpg", "a/b.jpg", ".a.jpg", ""})
+    EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
+                HasSubstr("src: is no name of a file"));
+  for (const char* src : {"http://media.example/a.jpg", "javascript:alert(1)", "data:image/png,x",
+                          "https://media.example.evil.example/a.jpg", "https://evil.example/a.jpg"})
+    EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
+                HasSubstr("src: is at no site"));
+  const auto entries = [&](std::size_t count) {
+    return media(
+        fmt::format("{}", fmt::join(std::vector<std::string>(count, R"({"src": "a.mp3"})"), ",")));
+  };
+  EXPECT_EQ(entries(8), "");
+  EXPECT_THAT(entries(9), HasSubstr("media: has 9 entries, at most 8"));
+}
+
+TEST(SentSidecar, ForeignMediaHaveAKind) {
+  const auto at = [](const std::string& medium) {
+    try {
+      check_sent_sidecar(with_stop(fmt::format(R"(, "media": [{}])", medium)),
+                         {"https://media.example"});
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(at(R"({"src": "https://media.example/a.mp4?x=1"})"), "");
+  EXPECT_EQ(at(R"({"src": "https://media.example/film", "type": "video"})"), "");
+  EXPECT_THAT(at(R"({"src": "https://media.example/film"})"), HasSubstr("give it a type"));
+  EXPECT_THAT(at(R"({"src": "https://media.example/film", "type": "page"})"),
+              HasSubstr("type: is"));
+}
+
+TEST(SentSidecar, NarrationAndSoundAreSounds) {
+  EXPECT_EQ(mistake(with_stop(R"(, "narration": {"src": "a.mp3", "captions": "a.vtt"})")), "");
+  EXPECT_THAT(mistake(with_stop(R"(, "narration": {"src": "a.mp4"})")),
+              HasSubstr("narration.src: is no sound"));
+  EXPECT_THAT(mistake(with_stop(R"(, "narration": {"src": "a.mp3", "volume": 1})")),
+              HasSubstr("unknown field 'volume'"));
+  const auto sound = [](const std::string& fields) {
+    return mistake(fmt::format(R"({{"tours": [{{"stops": [], "sound": {}}}]}})", fields));
+  };
+  EXPECT_EQ(sound(R"({"src": "sea.ogg", "volume": 0.5})"), "");
+  EXPECT_THAT(sound(R"({"src": "sea.jpg"})"), HasSubstr("tours[0].sound.src: is no sound"));
+  EXPECT_THAT(sound(R"({"src": "sea.ogg", "volume": 2})"), HasSubstr("volume: is not in 0"));
+}
+
 TEST(SentSidecar, TranslationsAreRefusedByTheFieldThatIsWrong) {
   const auto translated = [](const std::string& translations) {
     return mistake(with_stop(fmt::format(R"(, "translations": {})", translations)));

@@ -1,0 +1,236 @@
+#include "server/scenes/media_api.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/error.h"
+#include "server/access/signed_token.h"
+#include "server/base/log_event.h"
+#include "server/net/byte_range.h"
+#include "server/scenes/scene_requests.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::string_view pass_purpose = "catgs-media-v1";
+constexpr std::int64_t pass_valid_s = 4 * 3600;
+/// Of a file that somebody opens by its address: it can do nothing at all.
+constexpr std::string_view file_policy = "default-src 'none'; sandbox";
+
+struct FilePath {
+  std::string_view scene;
+  std::string_view name;
+};
+
+/// Names have no slash, so the last one ends the folder.
+std::optional<FilePath> file_in(std::string_view path) {
+  const auto slash = path.rfind('/');
+  if (slash == path.npos) return std::nullopt;
+  const auto scene = scene_of(path.substr(0, slash), "/media");
+  return scene ? std::optional(FilePath{*scene, path.substr(slash + 1)}) : std::nullopt;
+}
+
+HttpResponse not_there(std::string_view name) {
+  return text_response(404, fmt::format("404: this scene has no picture, film or sound \"{}\"\n",
+                                        is_media_name(name) ? name : ""));
+}
+
+/// The headers that all answers about a file have.
+HttpResponse about_file(const MediaFile& file) {
+  HttpResponse response;
+  response.content_type = file.type->content_type;
+  response.cache_control = "private, no-cache";
+  response.etag = file.etag;
+  response.accepts_ranges = true;
+  response.policy = file_policy;
+  return response;
+}
+
+/// What a request wants of a file, kept until the disk was asked.
+struct Wanted {
+  std::string name, if_none_match, range, if_range;
+};
+
+/// May block.
+HttpResponse answer_with(const MediaFolder& folder, const Wanted& wanted) {
+  const std::optional<MediaFile> file = folder.find(wanted.name);
+  if (!file) return not_there(wanted.name);
+  HttpResponse response = about_file(*file);
+  if (wanted.if_none_match == file->etag) {
+    response.status = 304;
+    return response;
+  }
+  std::optional<ByteRange> range;
+  if (wanted.if_range.empty() || wanted.if_range == file->etag)
+    range = requested_range(wanted.range, file->bytes);
+  if (range && range->length == 0) {
+    response.status = 416;
+    response.content_range = fmt::format("bytes */{}", file->bytes);
+    return response;
+  }
+  if (range) {
+    response.status = 206;
+    response.content_range = fmt::format("bytes {}-{}/{}", range->offset,
+                                         range->offset + range->length - 1, file->bytes);
+  }
+  const auto [offset, length] = range.value_or(ByteRange{0, file->bytes});
+  response.disk_body = std::make_shared<const DiskBody>(
+      DiskBody{length, [folder, file = *file, begin = offset](std::uint64_t at, std::size_t bytes) {
+                 return folder.read(file.name, file.etag, begin + at, bytes);
+               }});
+  return response;
+}
+
+/// May block.
+HttpResponse listing_of(const MediaFolder& folder) {
+  auto list = nlohmann::json::array();
+  for (const MediaFile& file : folder.list())
+    list.push_back({{"name", file.name}, {"type", file.type->content_type}, {"bytes", file.bytes}});
+  return json_response(std::make_shared<const std::string>(nlohmann::json{{"media", list}}.dump()));
+}
+
+}  // namespace
+
+bool MediaApi::is_file(std::string_view path) { return file_in(path).has_value(); }
+
+std::optional<HttpResponse> MediaApi::respond(const HttpRequest& request) {
+  const SceneLibrary& scenes = parts_.scenes;
+  if (const auto wish = scene_of(request.path, "/media"))
+    return list(request, scenes.resolve(*wish));
+  if (const auto wish = scene_of(request.path, "/media-pass"))
+    return make_pass(request, scenes.resolve(*wish));
+  if (const auto path = file_in(request.path))
+    return file(request, scenes.resolve(path->scene), std::string(path->name));
+  return std::nullopt;
+}
+
+std::optional<MediaFolder> MediaApi::folder_of(std::string_view scene_id) const {
+  const auto listing = parts_.scenes.listing();
+  const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
+  if (found == listing->end() || found->sidecar.empty()) return std::nullopt;
+  return MediaFolder(found->sidecar);
+}
+
+Refusal MediaApi::refusal(const HttpRequest& request, std::string_view scene_id) const {
+  if (has_pass(request, scene_id)) return std::nullopt;
+  return permit_of(parts_.authorize, request)(scene_id, Use::list);
+}
+
+/// A pass says: the scene, when it ends, and the link that it was made for.
+bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) const {
+  constexpr std::string_view argument = "pass=";
+  for (const std::string& text : request.arguments) {
+    if (!text.starts_with(argument)) continue;
+    const auto pass =
+        read_signed_token(pass_purpose, std::string_view(text).substr(argument.size()), parts_.key);
+    if (!pass || !pass->starts_with(std::string(scene_id) + "\n")) return false;
+    const std::string_view rest = std::string_view(*pass).substr(scene_id.size() + 1);
+    std::int64_t end_s = 0;
+    const auto [stop, error] = std::from_chars(rest.data(), rest.data() + rest.size(), end_s);
+    const std::string_view link = rest.substr(static_cast<std::size_t>(stop - rest.data()));
+    if (error != std::errc() || !link.starts_with('\n') || parts_.now_unix_s() >= end_s)
+      return false;
+    return !parts_.revoked_links()->contains(link.substr(1));
+  }
+  return false;
+}
+
+HttpResponse MediaApi::make_pass(const HttpRequest& request, const std::string& scene_id) const {
+  const Permit permit = permit_of(parts_.authorize, request);
+  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
+  return text_response(
+      200, sign_token(pass_purpose,
+                      fmt::format("{}\n{}\n{}", scene_id, parts_.now_unix_s() + pass_valid_s,
+                                  permit.link_id),
+                      parts_.key));
+}
+
+HttpResponse MediaApi::list(const HttpRequest& request, const std::string& scene_id) const {
+  const Permit permit = permit_of(parts_.authorize, request);
+  if (auto refused = refuse_change(parts_.scenes, permit, scene_id)) return *std::move(refused);
+  const auto folder = folder_of(scene_id);
+  HttpResponse response;
+  if (!folder)
+    response = json_response(std::make_shared<const std::string>(R"({"media":[]})"));
+  else
+    response.on_disk = [folder = *folder] { return listing_of(folder); };
+  return response;
+}
+
+HttpResponse MediaApi::file(const HttpRequest& request, const std::string& scene_id,
+                            const std::string& name) const {
+  if (const auto refused = refusal(request, scene_id)) return unauthorized(*refused);
+  const auto folder = folder_of(scene_id);
+  if (!folder || !is_media_name(name)) return not_there(name);
+  HttpResponse response;
+  response.on_disk = [folder = *folder,
+                      wanted = Wanted{name, std::string(request.if_none_match),
+                                      std::string(request.range), std::string(request.if_range)}] {
+    return answer_with(folder, wanted);
+  };
+  return response;
+}
+
+std::optional<HttpResponse> MediaApi::refuse_upload(const HttpRequest& request) {
+  const auto path = file_in(request.path).value();
+  const std::string scene_id = parts_.scenes.resolve(path.scene);
+  const Permit permit = permit_of(parts_.authorize, request);
+  if (auto refused = refuse_change(parts_.scenes, permit, scene_id)) return refused;
+  if (!is_media_name(path.name) || !media_kind_named(path.name))
+    return text_response(400,
+                         "400: this is no name of a picture, film or sound: use letters, digits, "
+                         ". - and _, and an extension such as .jpg, .mp4, .mp3 or .vtt\n");
+  if (!folder_of(scene_id))
+    return text_response(409, "409: the scene is no file in memory: open it, then try again\n");
+  return std::nullopt;
+}
+
+std::future<HttpResponse> MediaApi::save(const HttpRequest& request, std::string content,
+                                         std::shared_ptr<const UploadPlace> place) {
+  const auto path = file_in(request.path).value();
+  auto answer = std::make_shared<std::promise<HttpResponse>>();
+  auto future = answer->get_future();
+  const std::string scene_id = parts_.scenes.resolve(path.scene);
+  const auto folder = folder_of(scene_id);
+  if (!folder) {
+    answer->set_value(text_response(409, "409: the scene left the memory: open it again\n"));
+    return future;
+  }
+  const auto write =
+      [folder = *folder, scene_id, name = std::string(path.name),
+       precondition = Precondition{std::string(request.if_match),
+                                   std::string(request.if_none_match)}](std::string_view bytes) {
+        try {
+          const std::optional<MediaFile> there = folder.find(name);
+          if (!precondition.holds(there ? there->etag : ""))
+            return text_response(412, "412: another file has this name\n");
+          folder.save(name, bytes);
+        } catch (const InputError& error) {
+          log_warning({.event = "media_refused", .scene = scene_id},
+                      "scene {}: an author's file was not kept: {}", scene_id, error.what());
+          return text_response(409, fmt::format("409: {}\n", error.what()));
+        } catch (const std::exception& failure) {  // memory, say: it costs this file only
+          log_error({.event = "save_failed", .scene = scene_id},
+                    "scene {}: a file was not saved: {}", scene_id, failure.what());
+          return text_response(500, "500: the server failed to save: try again\n");
+        }
+        log_info({.event = "media_saved", .scene = scene_id},
+                 "scene {}: an author saved {} ({} bytes)", scene_id, name, bytes.size());
+        return text_response(200, "saved\n");
+      };
+  boost::asio::post(
+      writer_, [write, answer, content = std::move(content), place = std::move(place)]() mutable {
+        HttpResponse response = busy_response("503: the connection is closed\n");
+        if (!place->abandoned()) response = write(content);
+        content = {};  // the place is free before the answer comes
+        place.reset();
+        answer->set_value(std::move(response));
+      });
+  return future;
+}
+
+}  // namespace catgs

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "server/access/authorize.h"
+#include "server/net/http.h"
+#include "server/scenes/scene_library.h"
+
+namespace catgs {
+
+/// The permit of the token in "Authorization: Bearer TOKEN"; that of no token if there is none.
+Permit permit_of(const Authorize& authorize, const HttpRequest& request);
+
+HttpResponse json_response(std::shared_ptr<const std::string> body);
+
+/// Status 401. `why`: the refusal of a permit.
+HttpResponse unauthorized(std::string_view why);
+
+/// The answer to a request to change files of a scene that is not there, or by somebody who may not
+/// save; nothing: go on.
+std::optional<HttpResponse> refuse_change(const SceneLibrary& scenes, const Permit& permit,
+                                          std::string_view scene_id);
+
+}  // namespace catgs
