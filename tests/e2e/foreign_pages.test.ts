@@ -197,7 +197,7 @@ it('what gets into the page all the same is stopped by the policy, and the page 
     const add = (html: string): void => {
       document.body.insertAdjacentHTML('beforeend', html);
     };
-    add(`<img src="x" onerror="document.body.dataset.taken=1"><img src="${url}/image">`);
+    add(`<img src="x" onerror="document.body.dataset.taken=1"><img src="${url}/image"><video src="${url}/film"></video>`);
     add(`<iframe src="${url}/frame"></iframe><object data="${url}/object"></object><base href="${url}">`);
     add(`<form action="${url}/form"><input name="a"></form><p style="color: red">`);
     for (const [name, value] of [['textContent', 'document.body.dataset.taken=1'], ['src', `${url}/script`]] as const) {
@@ -210,7 +210,7 @@ it('what gets into the page all the same is stopped by the policy, and the page 
     return [...new Set(directives)].sort();
   }, foreign.origin);
   expect(violated).toEqual([
-    ...['base-uri', 'connect-src', 'form-action', 'frame-src', 'img-src', 'object-src'],
+    ...['base-uri', 'connect-src', 'form-action', 'frame-src', 'img-src', 'media-src', 'object-src'],
     ...['script-src-attr', 'script-src-elem', 'style-src-attr'],
   ]);
   expect(errors.some((error) => error.includes('Content Security Policy'))).toBe(true);

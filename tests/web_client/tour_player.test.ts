@@ -27,6 +27,8 @@ describe('the player', () => {
     const paths: (readonly PathSample[])[] = [];
     const reached: [number, number][] = [];
     let state: TourState | undefined;
+    let speaks = false;
+    let heard: (() => void) | undefined;
     const stop_flight = (): void => {
       const stopped = flight;
       flight = undefined;
@@ -49,6 +51,11 @@ describe('the player', () => {
         now_us: () => time.now_us(),
         announce: (path) => paths.push(path),
         reached: (tour_index, stop_index) => reached.push([tour_index, stop_index]),
+        when_heard: (then) => {
+          heard = then;
+          if (!speaks) then();
+          return () => (heard = undefined);
+        },
         reduced_motion,
       },
       (now) => (state = now),
@@ -60,6 +67,11 @@ describe('the player', () => {
       reached,
       stop_flight,
       state: () => state!,
+      speak: () => void (speaks = true),
+      fall_silent: () => {
+        speaks = false;
+        heard?.();
+      },
       flying: () => flight?.way,
       arrive: () => {
         const arrived = flight!;
@@ -71,6 +83,25 @@ describe('the player', () => {
       },
     };
   }
+
+  it('stays while a voice speaks, however short the stay is', () => {
+    const { player, time, arrive, flying, speak, fall_silent, state } = guided();
+    player.load([tour]);
+    player.play();
+    speak();
+    arrive();
+    time.advance(60_000);
+    expect(flying()).toBeUndefined();
+    fall_silent();
+    expect(flying()).toBeDefined();
+    arrive();
+    speak();
+    time.advance(2000);
+    player.pause();
+    fall_silent(); // nobody waits for it any more
+    expect(flying()).toBeUndefined();
+    expect(state()).toMatchObject({ stop_index: 1, playing: false });
+  });
 
   it('goes from stop to stop and around', () => {
     const { player, arrive, state } = guided();

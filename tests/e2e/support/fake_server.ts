@@ -23,7 +23,7 @@ export const web_dist = path.join(build_dir, 'web_client/dist');
 
 const policy =
   "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; " +
-  "img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+  "img-src 'self' blob: data:; media-src 'self'; style-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 const content_types: Readonly<Record<string, string>> = {
   '.html': 'text/html; charset=utf-8',

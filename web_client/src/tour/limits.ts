@@ -2,6 +2,8 @@
 export const max_tours = 32;
 export const max_stops = 256;
 export const max_languages = 32;
+export const max_media = 8; // of a stop
+export const max_media_bytes = 64 << 20; // of a file
 export const longest_stay_s = 3600;
 export const longest_flight_s = 120;
 export const max_text_characters = 4000;

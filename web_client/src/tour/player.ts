@@ -19,6 +19,8 @@ interface TourEnvironment {
   announce(path: readonly PathSample[]): void;
   /** The visitor has come to a stop. */
   reached(tour_index: number, stop_index: number): void;
+  /** Calls `then` when nothing speaks at this stop any more, if that is not so now. The result cancels it. */
+  when_heard(then: () => void): () => void;
   /** The camera jumps instead of gliding, and no tour starts by itself. */
   readonly reduced_motion: boolean;
 }
@@ -177,7 +179,9 @@ export class TourPlayer {
       return;
     }
     if (!this.playing_) return;
-    this.cancel_ = this.env_.timers.after((stop.stay_s ?? default_stay_s(stop)) * 1000, () => this.go_on());
+    this.cancel_ = this.env_.timers.after((stop.stay_s ?? default_stay_s(stop)) * 1000, () => {
+      this.cancel_ = this.env_.when_heard(() => this.go_on());
+    });
   }
 
   private go_on(): void {

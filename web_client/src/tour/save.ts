@@ -40,7 +40,7 @@ export async function save_sidecar(
 }
 
 /** The first line of the server's answer is "403: reason". A proxy may answer with a page instead. */
-function refusal(status: number, answer: string): string {
+export function refusal(status: number, answer: string): string {
   const [line = ''] = answer.split('\n');
   const prefix = `${status}: `;
   return line.startsWith(prefix) ? line.slice(prefix.length) : text.author.status(status);

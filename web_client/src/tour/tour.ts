@@ -4,6 +4,18 @@ import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { JsonPlace } from './json_place';
 import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
+import {
+  media_for,
+  read_media,
+  read_narration,
+  read_tour_sound,
+  write_media,
+  write_narration,
+  write_tour_sound,
+  type Medium,
+  type Narration,
+  type TourSound,
+} from './media';
 import { in_language, type Worded } from './words';
 
 export interface Stop extends Worded {
@@ -15,6 +27,8 @@ export interface Stop extends Worded {
   readonly stay_s: number | undefined;
   /** Time of the flight to it; undefined: a comfortable one. */
   readonly fly_s: number | undefined;
+  readonly media?: readonly Medium[] | undefined;
+  readonly narration?: Narration | undefined;
 }
 
 export interface Tour extends Worded {
@@ -23,7 +37,12 @@ export interface Tour extends Worded {
   readonly way: (Flight & { readonly repeats: boolean }) | undefined;
   /** Plays by itself when the scene opens. */
   readonly starts_itself: boolean;
+  readonly sound?: TourSound | undefined;
 }
+
+/** Whether a tour shows or plays more than words. */
+export const has_media = ({ sound, stops }: Tour): boolean =>
+  sound !== undefined || stops.some(({ media, narration }) => narration !== undefined || (media ?? []).length > 0);
 
 /** Time that a visitor needs to look around and to read. */
 export function default_stay_s(stop: Stop): number {
@@ -44,6 +63,7 @@ export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour
       .map((stop) => read_stop(stop, up, fov_y_rad)),
     way: undefined,
     starts_itself: tour.find('autoplay')?.truth() ?? false,
+    sound: read_tour_sound(tour.find('sound')),
   }));
 }
 
@@ -59,6 +79,8 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
     marker: stop.find('marker')?.vec3(),
     stay_s: stop.find('stay_s')?.number(0, longest_stay_s),
     fly_s: stop.find('fly_s')?.number(0, longest_flight_s),
+    media: read_media(stop.find('media')),
+    narration: read_narration(stop.find('narration')),
   };
 }
 
@@ -77,7 +99,7 @@ function read_translations(item: JsonPlace): Pick<Worded, 'translations' | 'lang
 export const tours_for = (tours: readonly Tour[], readers: readonly string[]): readonly Tour[] =>
   tours.map((tour) => ({
     ...in_language(tour, readers),
-    stops: tour.stops.map((stop) => in_language(stop, readers)),
+    stops: tour.stops.map((stop) => ({ ...in_language(stop, readers), media: stop.media && media_for(stop.media, readers) })),
   }));
 
 /** Writes what read_tours() reads. Numbers keep seven digits, more than anybody can see. */
@@ -85,10 +107,11 @@ export function write_tours(tours: readonly Tour[]): unknown[] {
   const short = (v: number): number => Number(v.toPrecision(7));
   return tours
     .filter(({ way }) => way === undefined)
-    .map(({ title, translations, stops, starts_itself }) => ({
+    .map(({ title, translations, stops, starts_itself, sound }) => ({
       title,
       ...write_translations(translations),
       ...(starts_itself && { autoplay: true }),
+      ...(sound && { sound: write_tour_sound(sound) }),
       stops: stops.map((stop) => ({
         title: stop.title,
         ...(stop.caption && { caption: stop.caption }),
@@ -99,6 +122,8 @@ export function write_tours(tours: readonly Tour[]): unknown[] {
         ...(stop.marker && { marker: stop.marker.map(short) }),
         ...(stop.stay_s !== undefined && { stay_s: stop.stay_s }),
         ...(stop.fly_s !== undefined && { fly_s: stop.fly_s }),
+        ...(stop.media && stop.media.length > 0 && { media: write_media(stop.media) }),
+        ...(stop.narration && { narration: write_narration(stop.narration) }),
       })),
     }));
 }

@@ -18,18 +18,23 @@ export interface Worded extends Partial<Words> {
 /** Of a tour or a stop in one language that nobody named. */
 export const untranslated: Pick<Worded, 'translations' | 'language'> = { translations: new Map(), language: '' };
 
-/** The same in the first language of `readers` that it has a translation for. */
-export function in_language<T extends Worded>(item: T, readers: readonly string[]): T {
-  const tags = [...item.translations.keys()];
+/** The tag for the first of `readers` that has one; undefined: none has. */
+export function tag_for(tags: readonly string[], readers: readonly string[]): string | undefined {
   for (const reader of readers) {
-    const language =
+    const found =
       tags.find((tag) => tag.toLowerCase() === reader.toLowerCase()) ??
       tags.find((tag) => primary(tag) === primary(reader));
-    if (language === undefined) continue;
-    const { title, caption } = item.translations.get(language)!;
-    return { ...item, language, ...(title && { title }), ...(caption && { caption }) };
+    if (found !== undefined) return found;
   }
-  return item;
+  return undefined;
+}
+
+/** The same in the first language of `readers` that it has a translation for. */
+export function in_language<T extends Worded>(item: T, readers: readonly string[]): T {
+  const language = tag_for([...item.translations.keys()], readers);
+  if (language === undefined) return item;
+  const { title, caption } = item.translations.get(language)!;
+  return { ...item, language, ...(title && { title }), ...(caption && { caption }) };
 }
 
 /** What an author has written for this language; '' for the words that all others get. */

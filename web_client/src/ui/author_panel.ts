@@ -10,7 +10,7 @@ import { tours_for, type Tour } from '../tour/tour';
 import { untranslated, worded, words_for } from '../tour/words';
 import { AuthorAbout } from './author_about';
 import { AuthorLanguage } from './author_language';
-import { AuthorStops } from './author_stops';
+import { AuthorStops, type MediaFields, type StopActions } from './author_stops';
 import { by_id, on_click, save_file } from './dom';
 
 interface AuthorTools {
@@ -25,6 +25,7 @@ interface AuthorTools {
   go_to(stop_index: number): void;
   /** Plays the edited tour as it is so far. */
   preview(): void;
+  readonly media: MediaFields;
   /** Sets where visits begin, for this page; undefined: where they began before. */
   start_at(eye: Eye | undefined): void;
 }
@@ -50,14 +51,21 @@ export class AuthorPanel {
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
     this.about_ = new AuthorAbout((change, field) => this.edit_about(change, field));
-    this.stops_ = new AuthorStops(by_id('author-stops', HTMLOListElement), {
+    this.stops_ = new AuthorStops(by_id('author-stops', HTMLOListElement), this.stop_actions(), tools_.media);
+    this.bind();
+  }
+
+  private stop_actions(): StopActions {
+    const { tools_: tools } = this;
+    return {
+      stop: (i) => this.draft_.stops[i]!,
       change: (i, change, field) => {
         this.draft_.change(i, worded(this.draft_.stops[i]!, this.language_.value, change), this.typed_in(field));
         // Typing does not rebuild the fields.
         if (field === undefined) this.edited();
         else this.told();
       },
-      go_to: (i) => tools_.go_to(i),
+      go_to: (i) => tools.go_to(i),
       take_view: (i) => void this.take_view(i),
       take_marker: (i) => void this.take_marker(i),
       move: (i, by) => {
@@ -65,8 +73,7 @@ export class AuthorPanel {
         this.edited(i + by);
       },
       remove: (i) => this.remove(i),
-    });
-    this.bind();
+    };
   }
 
   /**
@@ -78,6 +85,7 @@ export class AuthorPanel {
     this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
     this.replace_.hidden = true;
+    this.tools_.media.use(this.tools_.scene_id(), token);
     this.draft_.load(tours, about);
     this.language_.offer(tours);
     this.saved_ = this.draft_.state;
@@ -259,6 +267,12 @@ export class AuthorPanel {
     this.autoplay_.checked = tour.starts_itself;
     this.about_.show(state.about);
     this.stops_.show(tour.stops, language, open_stop);
+    const change = (sound: Partial<Tour>, field?: string): void => {
+      this.draft_.edit_tour(sound, field);
+      if (field === undefined) this.edited();
+      else this.told();
+    };
+    by_id('author-sound', HTMLElement).replaceChildren(this.tools_.media.of_tour(tour, change));
     this.show_what_can_be_done();
   }
 

@@ -1,11 +1,21 @@
 import { number } from '../text/number';
 import { text } from '../text/text';
 import { longest_flight_s, longest_stay_s, max_text_characters } from '../tour/limits';
-import { default_stay_s, type Stop } from '../tour/tour';
+import { default_stay_s, type Stop, type Tour } from '../tour/tour';
 import { words_for } from '../tour/words';
 import { make } from './dom';
 
+/** The fields for pictures, films and sounds (media/author_media.ts). */
+export interface MediaFields {
+  /** Another scene is edited. `token`: lets its holder add files; undefined: nobody may. */
+  use(scene_id: string, token: string | undefined): void;
+  /** `n`: its number, as people write it. */
+  of_stop(stop: () => Stop, n: string, language: string, change: (change: Partial<Stop>, field?: string) => void): HTMLElement;
+  of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement;
+}
+
 export interface StopActions {
+  stop(index: number): Stop;
   /** `field`: where the author types. */
   change(index: number, change: Partial<Stop>, field?: string): void;
   go_to(index: number): void;
@@ -24,6 +34,7 @@ export class AuthorStops {
   constructor(
     private readonly list_: HTMLElement,
     private readonly actions_: StopActions,
+    private readonly media_: MediaFields,
   ) {}
 
   /** Shows the stops, with their texts for one language (words.ts). The focus stays on the control where it is, in the row of stop `open`. */
@@ -46,7 +57,11 @@ export class AuthorStops {
   }
 
   private row_of(stop: Stop, i: number, count: number): HTMLElement {
-    const item = make('li', {}, ...this.fields_of(stop, i), this.buttons_of(stop, i, count));
+    const { actions_: actions } = this;
+    const media = this.media_.of_stop(() => actions.stop(i), number(i + 1), this.language_, (change, field) =>
+      actions.change(i, change, field && `${field} ${i}`),
+    );
+    const item = make('li', {}, ...this.fields_of(stop, i), media, this.buttons_of(stop, i, count));
     item.classList.toggle('open', i === this.open_);
     item.addEventListener('focusin', () => this.open(i));
     return item;

@@ -10,10 +10,11 @@ import type { SceneAbout } from '../tour/draft';
 import { max_stops, max_tours } from '../tour/limits';
 import { TourPlayer, type TourState } from '../tour/player';
 import { read_shared, share_address, type SharedView } from '../tour/share';
-import { tours_for } from '../tour/tour';
+import { tours_for, type Tour } from '../tour/tour';
 import type { SceneFacts } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import { AuthorPanel } from './author_panel';
+import type { MediaFields } from './author_stops';
 import { EmbedApi } from './embed';
 import { Hotspots } from './hotspots';
 import type { Navigation } from './navigation';
@@ -35,6 +36,18 @@ interface GuideParts {
   readonly notice: Notice;
   readonly token: AccessToken;
   readonly reduced_motion: boolean;
+  readonly media: GuideMedia;
+  readonly media_fields: MediaFields;
+}
+
+/** Shows and plays what stops have besides words (media/). */
+export interface GuideMedia {
+  show_tours(scene_id: string, tours: readonly Tour[]): void;
+  show(state: TourState): void;
+  /** The visitor has come to the stop that is shown. */
+  arrived(): void;
+  /** See TourEnvironment. */
+  when_heard(then: () => void): () => void;
 }
 
 export class Guide {
@@ -57,7 +70,9 @@ export class Guide {
         reached: (tour, stop) => {
           // Imported tours may be longer than those that the wire can tell of.
           if (tour < max_tours && stop < max_stops) worker.post({ kind: 'reached', tour, stop });
+          parts_.media.arrived();
         },
+        when_heard: (then) => parts_.media.when_heard(then),
         reduced_motion,
       },
       (state) => this.tour_changed(state),
@@ -117,12 +132,13 @@ export class Guide {
       place_ahead: () => navigation.place_ahead(),
       changed: (tours, edited) => {
         preview.forget();
-        this.tour_view_.show_tours(tours);
+        this.show_tours(tours);
         this.player_.load(tours, true);
         this.player_.choose(edited);
       },
       go_to: (stop_index) => this.player_.go_to(stop_index),
       preview: () => preview.begin(),
+      media: this.parts_.media_fields,
       start_at: (eye) => camera.start_at(eye ?? this.first_start_),
     });
   }
@@ -161,7 +177,7 @@ export class Guide {
     this.first_start_ = camera.start;
     // Authors see each text in the language that they edit.
     const shown = tours_for(tours, this.author_ ? [] : readers);
-    this.tour_view_.show_tours(shown);
+    this.show_tours(shown);
     this.author_?.load(tours, about_of(scene), may_save ? token : undefined, document.etag);
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const stays = shared.eye !== undefined || shared.stop_index !== undefined || this.author_ !== undefined || navigation.led;
@@ -193,8 +209,14 @@ export class Guide {
     if (!this.parts_.navigation.put(eye)) this.parts_.notice.show(text.share.outside, 10);
   }
 
+  private show_tours(tours: readonly Tour[]): void {
+    this.tour_view_.show_tours(tours);
+    this.parts_.media.show_tours(this.parts_.navigation.scene_id, tours);
+  }
+
   private tour_changed(state: TourState): void {
     this.tour_view_.show(state);
+    this.parts_.media.show(state);
     this.hotspots_.show(state, this.parts_.navigation.eye);
     this.embed_.say({ catgs: 'stop', stop: state.stop_index ?? null, playing: state.playing });
   }

@@ -5,6 +5,7 @@ import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import type { PresenterChoice } from '../present/make_presenter';
 import { device_kind } from '../session/device';
+import { TourMedia, TourMediaFields } from '../media/tour_media';
 import { watch_token, type AccessToken } from '../session/token';
 import { factor } from '../text/number';
 import { text } from '../text/text';
@@ -50,7 +51,8 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
   const seen = new SeenCamera(worker, navigation);
-  const guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion });
+  const media = { media: new TourMedia(() => token.value), media_fields: new TourMediaFields() };
+  const guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion, ...media });
   new MeasurePanel({ view, navigation, toolbar, seen, storage, set_scale: guide.set_scale });
   new Together(worker, navigation, toolbar, notice, reduced_motion);
   bind_page_events(worker);

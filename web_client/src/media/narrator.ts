@@ -1,0 +1,71 @@
+// The voice of a stop in the card of the tour: its button, and its words as text.
+import { text } from '../text/text';
+import type { Narration } from '../tour/media';
+import { by_id, make } from '../ui/dom';
+import type { MediaAddresses } from './addresses';
+import type { Sounds } from './sounds';
+import { captions_track } from './stop_media';
+
+export class Narrator {
+  private readonly button_ = make('button', { id: 'tour-voice', type: 'button', hidden: true });
+  private readonly words_ = make('p', { id: 'tour-words', dir: 'auto', hidden: true });
+  private narration_: Narration | undefined;
+
+  /** `voice` is the element that `sounds` plays. */
+  constructor(
+    private readonly voice_: HTMLAudioElement,
+    private readonly sounds_: Sounds,
+  ) {
+    by_id('tour-place', HTMLElement).before(this.button_);
+    by_id('tour-controls', HTMLElement).before(this.words_);
+    this.button_.append(icon('icon-voice'));
+    this.button_.addEventListener('click', () => {
+      if (sounds_.speaks) sounds_.hush(true);
+      else sounds_.resume();
+    });
+    for (const end of ['ended', 'error']) voice_.addEventListener(end, () => sounds_.voice_ended());
+  }
+
+  /** Another stop is shown: nothing speaks any more. */
+  show(narration: Narration | undefined): void {
+    this.narration_ = narration;
+    this.words_.textContent = '';
+    this.words_.hidden = !narration?.captions;
+    this.sounds_.hush();
+  }
+
+  /** The visitor is there. */
+  async speak(addresses: MediaAddresses): Promise<void> {
+    const narration = this.narration_;
+    if (!narration) return;
+    const address = await addresses.of(narration.src);
+    if (narration !== this.narration_) return; // the visitor went on meanwhile
+    this.voice_.replaceChildren();
+    this.sounds_.speak(address);
+    if (!narration.captions) return;
+    const { track } = this.voice_.appendChild(captions_track(narration.captions, addresses, false));
+    track.addEventListener('cuechange', () => {
+      const cues = [...(track.activeCues ?? [])] as VTTCue[];
+      this.words_.textContent = cues.map((cue) => cue.getCueAsHTML().textContent).join('\n');
+    });
+  }
+
+  /** Shows the state of the sounds. */
+  update(): void {
+    const { speaks } = this.sounds_;
+    const label = speaks ? text.media.pause_voice : text.media.hear;
+    this.button_.hidden = this.sounds_.voice === 'none';
+    this.button_.setAttribute('aria-label', label);
+    this.button_.title = label;
+    this.button_.setAttribute('aria-pressed', String(speaks));
+  }
+}
+
+/** An icon of index.html. */
+export function icon(id: string): SVGElement {
+  const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+  const use = document.createElementNS('http://www.w3.org/2000/svg', 'use');
+  use.setAttribute('href', `#${id}`);
+  svg.append(use);
+  return svg;
+}

@@ -1,0 +1,131 @@
+// What stops show and play besides words: pictures, films and sounds. Pure.
+import { text } from '../text/text';
+import type { JsonPlace } from './json_place';
+import { max_languages, max_media } from './limits';
+import { tag_for } from './words';
+
+export const media_kinds = ['image', 'video', 'audio'] as const;
+export type MediaKind = (typeof media_kinds)[number];
+
+/** A picture, film or sound that a stop shows. */
+export interface Medium {
+  /** Name of a file in the scene's media folder, or an https address. */
+  readonly src: string;
+  readonly kind: MediaKind;
+  /** What it shows, for those who do not see it. Pictures always have one. */
+  readonly alt: string;
+  /** The same by BCP 47 tag. */
+  readonly alt_in: ReadonlyMap<string, string>;
+  /** Tag of `alt`; '': its author did not say. */
+  readonly language: string;
+  /** Name of a .vtt file; '': none. */
+  readonly captions: string;
+}
+
+/** A voice that is heard when a visitor comes to a stop. */
+export interface Narration {
+  readonly src: string;
+  readonly captions: string;
+}
+
+/** What is heard during a tour. `volume`: 0…1. */
+export interface TourSound {
+  readonly src: string;
+  readonly volume: number;
+}
+
+export const usual_volume = 0.5;
+
+// server/media/media_type.cpp knows the same extensions; tests/web_client/media.test.ts compares them.
+const extensions: Readonly<Record<MediaKind | 'captions', readonly string[]>> = {
+  image: ['jpg', 'jpeg', 'png', 'webp'],
+  video: ['mp4', 'webm'],
+  audio: ['mp3', 'm4a', 'ogg', 'wav'],
+  captions: ['vtt'],
+};
+
+/** What the extension of a name or an address promises; undefined: nothing that is known. */
+export function kind_of(src: string): MediaKind | 'captions' | undefined {
+  const extension = /\.(\w+)(?:[?#].*)?$/.exec(src)?.[1]?.toLowerCase() ?? '';
+  return ([...media_kinds, 'captions'] as const).find((kind) => extensions[kind].includes(extension));
+}
+
+/** For file choosers: ".jpg,.jpeg,…". */
+export const accepted = (kinds: readonly (MediaKind | 'captions')[]): string =>
+  kinds.flatMap((kind) => extensions[kind].map((extension) => `.${extension}`)).join(',');
+
+/** Whether a source lies on another server. */
+export const is_foreign = (src: string): boolean => src.startsWith('https://');
+
+const { mistakes } = text.media;
+
+/** Reads `src`, and `type` where the extension does not tell the kind. */
+function read_source(place: JsonPlace): { src: string; kind: MediaKind } {
+  const source = place.at('src');
+  const src = source.text();
+  if (!is_foreign(src) && !/^[\w-][\w.-]{0,99}$/.test(src)) source.fail(mistakes.no_media_name);
+  const written = place.find('type');
+  const kind = written === undefined ? kind_of(src) : media_kinds.find((name) => name === written.text());
+  if (kind !== undefined && kind !== 'captions') return { src, kind };
+  return (written ?? source).fail(mistakes.no_media_kind);
+}
+
+function read_captions(place: JsonPlace): string {
+  const captions = place.find('captions');
+  const name = captions?.text() ?? '';
+  if (captions && (is_foreign(name) || kind_of(name) !== 'captions')) captions.fail(mistakes.no_captions);
+  return name;
+}
+
+export const read_media = (media: JsonPlace | undefined): readonly Medium[] | undefined =>
+  media?.elements(max_media).map((place) => {
+    const { src, kind } = read_source(place);
+    const alt = (kind === 'image' ? place.at('alt') : place.find('alt'))?.text() ?? '';
+    const translations = place.find('translations')?.members(max_languages) ?? [];
+    const alt_in = new Map(translations.map(([tag, words]) => [tag, words.find('alt')?.text() ?? '']));
+    return { src, kind, alt, alt_in, language: '', captions: read_captions(place) };
+  });
+
+function read_sound(place: JsonPlace): string {
+  const { src, kind } = read_source(place);
+  if (kind !== 'audio') place.at('src').fail(mistakes.no_sound);
+  return src;
+}
+
+export const read_narration = (place: JsonPlace | undefined): Narration | undefined =>
+  place && { src: read_sound(place), captions: read_captions(place) };
+
+export const read_tour_sound = (place: JsonPlace | undefined): TourSound | undefined =>
+  place && { src: read_sound(place), volume: place.find('volume')?.number(0, 1) ?? usual_volume };
+
+/** The media as a visitor reads of them, in the first of these languages that each has. */
+export const media_for = (media: readonly Medium[], readers: readonly string[]): readonly Medium[] =>
+  media.map((medium) => {
+    const language = tag_for([...medium.alt_in.keys()], readers);
+    const alt = language === undefined ? '' : medium.alt_in.get(language);
+    return language !== undefined && alt ? { ...medium, alt, language } : medium;
+  });
+
+const write_source = (src: string, kind: MediaKind): object => ({ src, ...(kind_of(src) !== kind && { type: kind }) });
+
+/** Writes what read_media() reads. */
+export const write_media = (media: readonly Medium[]): unknown[] =>
+  media.map(({ src, kind, alt, alt_in, captions }) => {
+    const translations = [...alt_in].flatMap(([tag, words]) => (words ? [[tag, { alt: words }] as const] : []));
+    return {
+      ...write_source(src, kind),
+      ...(alt && { alt }),
+      ...(captions && { captions }),
+      ...(translations.length > 0 && { translations: Object.fromEntries(translations) }),
+    };
+  });
+
+export const write_narration = ({ src, captions }: Narration): object => ({
+  ...write_source(src, 'audio'),
+  ...(captions && { captions }),
+});
+
+export const write_tour_sound = ({ src, volume }: TourSound): object => ({
+  ...write_source(src, 'audio'),
+  ...(volume !== usual_volume && { volume }),
+});
