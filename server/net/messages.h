@@ -94,6 +94,8 @@ struct Pick {
 struct Present {
   bool on = false;
   std::string name;
+  bool pings = false;         // followers may point at places
+  bool tells_places = false;  // the company hears where all in it are
 };
 struct Follow {
   std::string watch_token;  // empty: follow nobody
@@ -102,12 +104,20 @@ struct Follow {
 struct Reached {
   std::uint32_t tour = 0, stop = 0;
 };
+/// The visitor may go to this scene soon.
+struct Prepare {
+  std::string scene_id;
+};
+/// Somebody in a company points at a place of the scene.
+struct Ping {
+  glm::vec3 place{0.0f};
+};
 /// A message of a newer wire version. It is ignored, as the contract demands.
 struct UnknownMessage {};
 
 using ClientMessage =
     std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings, SelectScene,
-                 RequestIdr, Pause, Bye, Pick, Present, Follow, Reached, ClipPlane>;
+                 RequestIdr, Pause, Bye, Pick, Present, Follow, Reached, Prepare, Ping, ClipPlane>;
 
 struct SceneFacts {
   std::string scene_id;
@@ -242,9 +252,22 @@ struct Lead {
   std::string name;
   std::size_t company = 0;           // who watch or follow
   std::optional<PoseSample> camera;  // to followers
+  bool may_ping = false;             // followers may
 };
 
+struct Pinged {
+  glm::vec3 place{0.0f};
+  bool by_leader = false;
+};
+
+/// Where a leader, who is the first, and its followers are.
+struct Company {
+  std::vector<glm::vec3> places;
+  bool operator==(const Company&) const = default;
+};
+inline constexpr std::size_t most_told_places = 64;
+
 using ServerMessage = std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat,
-                                   ErrorMessage, Drain, Picked, Lead>;
+                                   ErrorMessage, Drain, Picked, Lead, Pinged, Company>;
 
 }  // namespace catgs

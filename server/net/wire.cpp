@@ -206,12 +206,18 @@ ClientMessage parse(const v1::ClientMessage& message) {
       return parse(message.pick());
     case v1::ClientMessage::kPresent:
       return Present{message.present().on(),
-                     checked_length("present.name", message.present().name(), 64)};
+                     checked_length("present.name", message.present().name(), 64),
+                     message.present().pings(), message.present().tells_places()};
     case v1::ClientMessage::kFollow:
       return Follow{checked_length("follow.watch", message.follow().watch(), 512)};
     case v1::ClientMessage::kReached:
       return Reached{checked("reached.tour", message.reached().tour(), 0u, most_tours - 1),
                      checked("reached.stop", message.reached().stop(), 0u, most_stops - 1)};
+    case v1::ClientMessage::kPrepare:
+      return Prepare{
+          checked_length("prepare.scene_id", message.prepare().scene_id(), max_scene_id_bytes)};
+    case v1::ClientMessage::kPing:
+      return Ping{parse("ping.place", message.ping().place())};
     case v1::ClientMessage::kClip:
       return parse(message.clip());
     case v1::ClientMessage::BODY_NOT_SET:
@@ -340,6 +346,7 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   message.set_state(static_cast<v1::Lead::State>(lead.state));
   message.set_name(lead.name);
   message.set_company(static_cast<std::uint32_t>(lead.company));
+  message.set_may_ping(lead.may_ping);
   if (!lead.camera) return;
   auto& camera = *message.mutable_camera();
   camera.set_pose_id(lead.camera->pose_id);
@@ -347,6 +354,16 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   fill(lead.camera->world_from_camera, *camera.mutable_world_from_camera());
   camera.set_fov_y_rad(lead.camera->fov_y_rad);
   camera.set_at_rest(lead.camera->at_rest);
+}
+
+void fill(const Pinged& pinged, v1::ServerMessage& out) {
+  fill(pinged.place, *out.mutable_pinged()->mutable_place());
+  out.mutable_pinged()->set_by_leader(pinged.by_leader);
+}
+
+void fill(const Company& company, v1::ServerMessage& out) {
+  auto& message = *out.mutable_company();
+  for (const glm::vec3& place : company.places) fill(place, *message.add_places());
 }
 
 template <typename Body>
@@ -363,6 +380,10 @@ template <>
 constexpr Topic topic_of<Heartbeat> = Topic::clock;
 template <>
 constexpr Topic topic_of<Lead> = Topic::leader;
+template <>
+constexpr Topic topic_of<Pinged> = Topic::ping;
+template <>
+constexpr Topic topic_of<Company> = Topic::company;
 
 std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();

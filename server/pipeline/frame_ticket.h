@@ -48,7 +48,17 @@ struct OutgoingFrame {
 };
 
 /// A message's topic. A newer message replaces one on the same topic, except for events.
-enum class Topic : std::uint8_t { event, session, stream, place, statistics, clock, leader };
+enum class Topic : std::uint8_t {
+  event,
+  session,
+  stream,
+  place,
+  statistics,
+  clock,
+  leader,
+  ping,
+  company
+};
 
 /// A serialised message on its way to the socket.
 struct OutgoingMessage {

@@ -24,6 +24,7 @@ using namespace std::chrono_literals;
 
 constexpr auto scan_interval = 30s;
 constexpr auto retry_after_failure = 30s;
+constexpr std::size_t most_prepared = 2;
 
 std::vector<std::filesystem::path> paths(const std::vector<std::string>& names) {
   return {names.begin(), names.end()};
@@ -205,6 +206,7 @@ std::shared_ptr<const SceneEntry> SceneLibrary::load_now(const FoundScene& found
 }
 
 SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
+  std::erase_if(prepared_, [&](const Prepared& prepared) { return prepared.id == id; });
   const SceneBook& book = shelf_.books().at(id);
   if (book.entry) {
     residency_.note_use(id, now);
@@ -225,6 +227,21 @@ SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
   start_next(now);
   const double seconds = static_cast<double>(bytes) / bytes_per_second_;
   return SceneAwaited{std::chrono::seconds(1 + static_cast<std::int64_t>(seconds))};
+}
+
+void SceneLibrary::prepare(const std::string& id, TimePoint now) {
+  const SceneBook* const book = shelf_.find(id);
+  if (!book || book->gone || book->entry || residency_.busy() || making_poster_) return;
+  if (!trees_.form_of(book->found)) return;
+  std::erase_if(prepared_, [&](const Prepared& other) { return !residency_.resident(other.id); });
+  if (prepared_.size() >= most_prepared) {
+    const auto [oldest, since] = prepared_.front();
+    if (in_use_(oldest) || now - since < std::chrono::seconds(config_.scene_residency_s)) return;
+    release(oldest);
+    prepared_.erase(prepared_.begin());
+  }
+  if (!residency_.has_room(trees_.need_of(book->found))) return;
+  if (std::holds_alternative<SceneAwaited>(want(id, now))) prepared_.push_back({id, now});
 }
 
 void SceneLibrary::want_poster(const std::string& id) {

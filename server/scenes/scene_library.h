@@ -46,6 +46,10 @@ class SceneLibrary final : public SceneSource {
     return shelf_.books().contains(id);
   }
   SceneAnswer want(const std::string& id, TimePoint now) override;
+  /// Does nothing while a scene is being loaded, or where the scene would not fit beside those in
+  /// memory. Two scenes at a time are loaded so and not entered; the older one is released for
+  /// another when it has stayed as long as any scene does.
+  void prepare(const std::string& id, TimePoint now) override;
   [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) override {
     return redrawing_.newer_form(seen);
   }
@@ -100,6 +104,11 @@ class SceneLibrary final : public SceneSource {
   std::optional<TimePoint> next_scan_;  // nothing without folders
   bool scanning_ = false;
   bool making_poster_ = false;
+  struct Prepared {
+    std::string id;
+    TimePoint since;
+  };
+  std::vector<Prepared> prepared_;  // and not entered since, oldest first
 
   std::atomic<bool> stopping_{false};
   boost::asio::thread_pool loader_{1};

@@ -37,6 +37,8 @@ class SceneSource {
   /// Requests a scene for a client that may see it. The scene stays in memory as long as its entry
   /// is held.
   virtual SceneAnswer want(const std::string& id, TimePoint now) = 0;
+  /// Somebody may want the scene soon. It is loaded where that costs nobody another scene.
+  virtual void prepare(const std::string& /*id*/, TimePoint /*now*/) {}
   /// The entry that replaces one that a visitor sees, of the same scene in another form; null: it
   /// stays.
   [[nodiscard]] virtual std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& /*seen*/) {

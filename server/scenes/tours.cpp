@@ -16,6 +16,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
+#include "server/base/scene_id.h"
 #include "server/media/media_type.h"
 #include "server/net/http.h"
 
@@ -164,9 +165,39 @@ void check_sound(const JsonField& sound, const Origins& origins) {
   if (check_source(sound, origins) != MediaKind::audio) sound.at("src").fail("is no sound");
 }
 
+void check_view(const JsonField& view) {
+  static_cast<void>(view.at("position").place());
+  if (const auto target = view.find("look_at"))
+    static_cast<void>(target->place());
+  else
+    static_cast<void>(view.at("orientation").orientation());
+  check_number(view.find("fov_deg"), 5.0f, 160.0f);
+}
+
+/// Checks a number that counts from 1.
+void check_ordinal(const std::optional<JsonField>& field, std::size_t most) {
+  check_number(field, 1.0f, static_cast<float>(most));
+  if (field && !field->value().is_number_integer()) field->fail("is no whole number");
+}
+
+/// Checks a way into another scene: to a view of it, to a stop of one of its tours, or to its
+/// start.
+void check_portal(const JsonField& portal) {
+  check_members(portal, {"scene", "position", "look_at", "orientation", "fov_deg", "tour", "stop"});
+  const JsonField scene = portal.at("scene");
+  if (const std::size_t bytes = scene.text().size(); bytes == 0 || bytes > max_scene_id_bytes)
+    scene.fail(fmt::format("is not 1 to {} bytes", max_scene_id_bytes));
+  const bool to_stop = portal.find("tour") || portal.find("stop");
+  if (to_stop && portal.find("position"))
+    portal.fail("leads to a view and to a stop", "give position or stop");
+  if (portal.find("position")) check_view(portal);
+  check_ordinal(portal.find("tour"), max_tours);
+  check_ordinal(portal.find("stop"), max_stops);
+}
+
 void check_stop(const JsonField& stop, const Origins& origins) {
   check_members(stop, {"title", "caption", "translations", "position", "look_at", "orientation",
-                       "fov_deg", "marker", "stay_s", "fly_s", "media", "narration"});
+                       "fov_deg", "marker", "stay_s", "fly_s", "media", "narration", "portal"});
   if (const auto media = stop.find("media")) {
     if (media->size() > max_media)
       media->fail(fmt::format("has {} entries, at most {}", media->size(), max_media));
@@ -180,13 +211,9 @@ void check_stop(const JsonField& stop, const Origins& origins) {
   check_text(stop.find("title"));
   check_text(stop.find("caption"));
   check_translations(stop, {"title", "caption"});
-  static_cast<void>(stop.at("position").place());
-  if (const auto target = stop.find("look_at"))
-    static_cast<void>(target->place());
-  else
-    static_cast<void>(stop.at("orientation").orientation());
+  check_view(stop);
   if (const auto marker = stop.find("marker")) static_cast<void>(marker->place());
-  check_number(stop.find("fov_deg"), 5.0f, 160.0f);
+  if (const auto portal = stop.find("portal")) check_portal(*portal);
   check_number(stop.find("stay_s"), 0.0f, longest_stay_s);
   check_number(stop.find("fly_s"), 0.0f, longest_flight_s);
 }

@@ -119,6 +119,18 @@ void Audience::keep_talking(TimePoint now) {
   tell_spectators(heartbeat_at(now), now);
 }
 
+void Audience::ping(const Pinged& pinged, TimePoint now) {
+  if (!presentation_.ping(pinged, now)) return;
+  if (visitor_) visitor_->connection().send(wire::serialize(pinged));
+  tell_spectators(pinged, now);
+}
+
+void Audience::tell_places(const Company& company, TimePoint now) {
+  if (!presentation_.tell(company, now)) return;
+  if (visitor_) visitor_->connection().send(wire::serialize(company));
+  tell_spectators(company, now);
+}
+
 void Audience::end_presentation() {
   presentation_.end();
   for (const Spectator& s : std::exchange(spectators_, {})) {

@@ -42,6 +42,14 @@ class Audience {
   std::vector<std::uint64_t> send(OutgoingFrame frame, TimePoint now);
 
   [[nodiscard]] Presentation& presentation() { return presentation_; }
+  /// True if the visitor follows the leader of that presentation.
+  [[nodiscard]] bool follows(const Presentation& leader) const {
+    return visitor_ && leader.has(*visitor_);
+  }
+  /// Somebody in the company points at a place. All in it hear of it, unless that is refused.
+  void ping(const Pinged& pinged, TimePoint now);
+  /// Where the company is now; empty: it is not told.
+  void tell_places(const Company& company, TimePoint now);
   [[nodiscard]] bool full() const { return company() >= max_spectators_; }
   /// Spectators and followers.
   [[nodiscard]] std::size_t company() const {

@@ -40,7 +40,20 @@ void present(Place& place, const Present& wish, TimePoint now) {
     const LogScope about(place.facts());
     log_info({.event = "presents"}, "{} presents", audience.address());
   }
-  audience.presentation().begin(wish.name, now);
+  audience.presentation().begin(wish, now);
+}
+
+void ping(Place& place, const ClientConnection& from, Admissions& admissions, const Ping& ping,
+          TimePoint now) {
+  const bool leads = place.audience().presentation().since().has_value();
+  if (Place* const host = leads ? &place : admissions.leader_of(from))
+    host->audience().ping({ping.place, leads}, now);
+}
+
+void prepare(const VisitContext& around, const std::string& token, const Prepare& wish,
+             TimePoint now) {
+  const std::string scene_id = around.scenes.resolve(wish.scene_id);
+  if (!around.authorize(token)(scene_id, Use::own_session)) around.scenes.prepare(scene_id, now);
 }
 
 }  // namespace
@@ -53,7 +66,9 @@ Place::Place(const VisitContext& around, Admissions& admissions, std::string ses
       executor_(around.executor),
       visit_(around.options.policy, *this, Clock::now()),
       audience_(around.options.max_spectators, std::move(address)),
-      tally_(around.counts) {}
+      tally_(around.counts),
+      pings_(2.0, 2.0, Clock::now()),
+      preparations_(0.1, 3.0, Clock::now()) {}
 
 Place::~Place() { executor_->close(std::move(stream_)); }
 
@@ -69,6 +84,11 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
     if (const auto* wish = std::get_if<Present>(&message)) return present(*this, *wish, received);
     if (const auto* wish = std::get_if<Follow>(&message))
       return admissions_.follow(*this, from, *wish, received);
+    if (const auto* pinged = std::get_if<Ping>(&message))
+      return pings_.take(received) ? ping(*this, from, admissions_, *pinged, received) : void();
+    if (const auto* wish = std::get_if<Prepare>(&message))
+      return preparations_.take(received) ? prepare(around_, visitor_.token, *wish, received)
+                                          : void();
     if (const auto* reached = std::get_if<Reached>(&message))
       return tally_.reached(visit_.stream().scene()->facts.scene_id, visitor_.device,
                             {reached->tour, reached->stop});

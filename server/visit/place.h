@@ -30,6 +30,8 @@ class Admissions {
   virtual SceneAnswer find_scene(const std::string& scene_id, TimePoint now) = 0;
   /// `from`, the place's visitor, follows another session from now on, or none.
   virtual void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) = 0;
+  /// The place that leads this follower; null: none does.
+  virtual Place* leader_of(const ClientConnection& follower) = 0;
   [[nodiscard]] virtual std::uint32_t admitted() const = 0;
   /// The place's visit has ended.
   virtual void leave(Place& place) = 0;
@@ -110,6 +112,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   SessionUsage usage_;
   Audience audience_;
   VisitTally tally_;
+  RateLimit pings_, preparations_;
 };
 
 /// Returns null if no place has this id.

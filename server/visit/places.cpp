@@ -236,6 +236,29 @@ void Places::follow(Place& place, ClientConnection& from, const Follow& wish, Ti
   host.audience().presentation().add(from.shared_from_this());
 }
 
+Place* Places::leader_of(const ClientConnection& follower) {
+  const auto leader = std::ranges::find_if(
+      places_, [&](const auto& place) { return place->audience().presentation().has(follower); });
+  return leader == places_.end() ? nullptr : leader->get();
+}
+
+void Places::tell_places(Place& host, TimePoint now) {
+  Presentation& presentation = host.audience().presentation();
+  if (!presentation.since()) return;
+  Company company;
+  const auto add = [&](Place& place) {
+    if (const auto& camera = place.audience().presentation().camera();
+        camera && company.places.size() < most_told_places)
+      company.places.push_back(camera->world_from_camera.position);
+  };
+  if (presentation.tells_places()) {
+    add(host);
+    for (const auto& place : places_)
+      if (place->audience().follows(presentation)) add(*place);
+  }
+  host.audience().tell_places(company, now);
+}
+
 void Places::leave(Place& place) {
   const auto it = std::ranges::find(places_, &place, [](const auto& p) { return p.get(); });
   if (it == places_.end()) return;
@@ -271,10 +294,13 @@ void Places::tick() {
   for (const auto& place : places_) {
     if (!revoked->empty()) end_revoked(*place, *revoked);
     place->on_tick(now);
+    tell_places(*place, now);
     if (!place->audience().connected() && place->visit().life().state() == VisitState::closed)
       gone.push_back(place);
   }
   for (const auto& place : gone) leave(*place);
+  anybody_looks_ = std::ranges::any_of(
+      places_, [](const auto& place) { return place->visit().life().on_show(); });
   machine_.on_tick(places_, desk_.admitted(), now);
   desk_.on_tick(now);
   for (const auto& place : places_) around_.frames.changed(*place);

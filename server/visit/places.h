@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,6 +34,8 @@ class Places final : public Admissions {
   void close_all();
   void stop_timer();
   [[nodiscard]] int connections() const { return connections_; }
+  /// Any thread. True if a visitor looked at a scene at the last tick.
+  [[nodiscard]] bool anybody_looks() const { return anybody_looks_; }
 
   // Admissions
   void on_hello(const std::shared_ptr<ClientConnection>& from, std::shared_ptr<Place> newcomer,
@@ -47,6 +50,7 @@ class Places final : public Admissions {
     return static_cast<std::uint32_t>(desk_.admitted());
   }
   void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) override;
+  Place* leader_of(const ClientConnection& follower) override;
   void leave(Place& place) override;
 
  private:
@@ -68,6 +72,8 @@ class Places final : public Admissions {
   /// Continues the session of a resume token. False: the session cannot continue.
   bool resume(const std::shared_ptr<ClientConnection>& connection, Place& newcomer, Place& known,
               const Hello& hello, TimePoint now);
+  /// Tells the company of a place where it is, if its leader wants that.
+  void tell_places(Place& host, TimePoint now);
   /// Ends a visit whose link was revoked, and dismisses spectators whose links were.
   void end_revoked(Place& place, const LinkIds& revoked);
   void tick();
@@ -79,6 +85,7 @@ class Places final : public Admissions {
   SessionReports reports_;
   boost::asio::steady_timer tick_timer_;
   bool stopped_ = false;
+  std::atomic<bool> anybody_looks_{false};
   int connections_ = 0;
   std::unordered_map<std::string, int> connections_by_address_;  // by limited_as()
 };

@@ -11,30 +11,38 @@ namespace {
 
 // Enough for a smooth way between two of them. Followers draw at their own rate.
 constexpr std::chrono::milliseconds between_cameras{33};
+constexpr std::chrono::milliseconds between_places{500};
+// Of all in the company. Each may send two a second (Place).
+constexpr double pings_per_second = 10.0;
 
 bool same_but_for_camera(const Lead& a, const Lead& b) {
-  return a.state == b.state && a.name == b.name && a.company == b.company;
+  return a.state == b.state && a.name == b.name && a.company == b.company &&
+         a.may_ping == b.may_ping;
 }
 
 }  // namespace
 
-void Presentation::begin(std::string name, TimePoint now) {
-  if (!since_) since_ = now;
-  name_ = std::move(name);
+void Presentation::begin(const Present& wish, TimePoint now) {
+  if (!since_) {
+    since_ = now;
+    pings_.emplace(pings_per_second, pings_per_second, now);
+  }
+  wish_ = wish;
 }
 
 void Presentation::end() {
   if (!std::exchange(since_, {})) return;
-  tell({LeadState::ended, name_, 0, {}});
+  tell_followers(Lead{LeadState::ended, wish_.name, 0, {}});
   followers_.clear();
   told_.reset();
   camera_.reset();
+  places_told_ = {};
 }
 
 void Presentation::add(const std::shared_ptr<ClientConnection>& follower) {
   remove(*follower);
   followers_.push_back(follower);
-  Lead now = told_.value_or(Lead{LeadState::leads, name_, followers_.size(), {}});
+  Lead now = told_.value_or(Lead{LeadState::leads, wish_.name, followers_.size(), {}, wish_.pings});
   now.camera = camera_;
   follower->connection().send(wire::serialize(now));
 }
@@ -51,6 +59,11 @@ std::size_t Presentation::followers() const {
       std::ranges::count_if(followers_, [](const auto& follower) { return !follower.expired(); }));
 }
 
+bool Presentation::has(const ClientConnection& follower) const {
+  return std::ranges::any_of(followers_,
+                             [&](const auto& known) { return known.lock().get() == &follower; });
+}
+
 void Presentation::moved(const PoseSample& camera, TimePoint now) {
   const bool stops = camera.at_rest && !(camera_ && camera_->at_rest);
   camera_ = camera;
@@ -60,7 +73,11 @@ void Presentation::moved(const PoseSample& camera, TimePoint now) {
 
 std::optional<Lead> Presentation::news(std::size_t spectators, bool away, TimePoint now) {
   if (!since_) return std::nullopt;
-  Lead lead{away ? LeadState::away : LeadState::leads, name_, spectators + followers(), {}};
+  Lead lead{away ? LeadState::away : LeadState::leads,
+            wish_.name,
+            spectators + followers(),
+            {},
+            wish_.pings};
   if (told_ && same_but_for_camera(*told_, lead)) {
     if (camera_is_new_) tell_camera(now);
     return std::nullopt;
@@ -70,19 +87,34 @@ std::optional<Lead> Presentation::news(std::size_t spectators, bool away, TimePo
   return lead;
 }
 
-void Presentation::tell(const Lead& lead) const {
-  const OutgoingMessage message = wire::serialize(lead);
+bool Presentation::ping(const Pinged& pinged, TimePoint now) {
+  if (!since_ || !(pinged.by_leader || wish_.pings) || !pings_->take(now)) return false;
+  tell_followers(pinged);
+  return true;
+}
+
+bool Presentation::tell(const Company& company, TimePoint now) {
+  if (company == places_told_) return false;
+  if (places_told_at_ && now - *places_told_at_ < between_places) return false;
+  places_told_ = company;
+  places_told_at_ = now;
+  tell_followers(company);
+  return true;
+}
+
+void Presentation::tell_followers(const ServerMessage& message) const {
+  const OutgoingMessage outgoing = wire::serialize(message);
   for (const auto& known : followers_)
-    if (const auto follower = known.lock()) follower->connection().send(message);
+    if (const auto follower = known.lock()) follower->connection().send(outgoing);
 }
 
 void Presentation::tell_camera(TimePoint now) {
   camera_told_ = now;
   camera_is_new_ = false;
   if (!since_ || followers_.empty()) return;
-  Lead lead = told_.value_or(Lead{LeadState::leads, name_, followers(), {}});
+  Lead lead = told_.value_or(Lead{LeadState::leads, wish_.name, followers(), {}, wish_.pings});
   lead.camera = camera_;
-  tell(lead);
+  tell_followers(lead);
 }
 
 }  // namespace catgs

@@ -2,9 +2,9 @@
 
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "server/base/rate_limit.h"
 #include "server/visit/client_connection.h"
 
 namespace catgs {
@@ -13,7 +13,7 @@ namespace catgs {
 /// own and get the leader's camera. Session thread only.
 class Presentation {
  public:
-  void begin(std::string name, TimePoint now);
+  void begin(const Present& wish, TimePoint now);
   /// Tells the followers that it is over.
   void end();
   /// When it began; nothing: the visit leads nobody.
@@ -23,6 +23,7 @@ class Presentation {
   void remove(const ClientConnection& follower);
   /// Followers whose connection has ended do not count.
   [[nodiscard]] std::size_t followers() const;
+  [[nodiscard]] bool has(const ClientConnection& follower) const;
 
   /// The leader's camera has moved or has come to rest. Followers hear of it, or of a newer one,
   /// within 33 ms or by the next news().
@@ -30,18 +31,32 @@ class Presentation {
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
   /// nothing: all know it.
   std::optional<Lead> news(std::size_t spectators, bool away, TimePoint now);
+  /// The newest camera of the visit, whether it leads or not.
+  [[nodiscard]] const std::optional<PoseSample>& camera() const { return camera_; }
+
+  /// False: whoever points at a place may not, or there were too many pings lately. Tells the
+  /// followers otherwise.
+  bool ping(const Pinged& pinged, TimePoint now);
+  /// Whether the company hears where all in it are.
+  [[nodiscard]] bool tells_places() const { return since_ && wish_.tells_places; }
+  /// Where the company is now. Tells the followers, and returns true for all others, if that is
+  /// new and they heard of it half a second ago or more.
+  bool tell(const Company& company, TimePoint now);
 
  private:
-  void tell(const Lead& lead) const;
+  void tell_followers(const ServerMessage& message) const;
   void tell_camera(TimePoint now);
 
   std::optional<TimePoint> since_;
-  std::string name_;
+  Present wish_;
   std::optional<Lead> told_;
   std::vector<std::weak_ptr<ClientConnection>> followers_;
   std::optional<PoseSample> camera_;
   std::optional<TimePoint> camera_told_;
   bool camera_is_new_ = false;
+  std::optional<RateLimit> pings_;
+  Company places_told_;
+  std::optional<TimePoint> places_told_at_;
 };
 
 }  // namespace catgs

@@ -70,6 +70,44 @@ describe('a presentation', () => {
     expect([...errors, ...more]).toEqual([]);
   });
 
+  it('points at places, for all to see', async () => {
+    const server = await start_server(scene, counted);
+    const { page: leader } = await open(server.url, windows.desktop);
+    const link = await present(leader);
+    await leader.keyboard.press('Escape');
+    const { page: follower, errors } = await open(link, windows.phone);
+    await follower.getByText('Ada leads').waitFor();
+    const rings = (page: Page): Promise<number> => page.locator('.ping').count();
+    // By Alt and a click.
+    await leader.locator('#view').click({ position: { x: 640, y: 500 }, modifiers: ['Alt'] });
+    await follower.getByText('Ada points at a place').waitFor({ state: 'attached' });
+    await expect.poll(() => rings(leader)).toBe(1);
+    expect(await rings(follower)).toBe(1);
+    await keep_screenshot(leader, 'together-ping');
+    await keep_screenshot(follower, 'together-ping-phone');
+    expect(await barriers(leader)).toEqual([]);
+    // By a long press; a follower may not.
+    await expect.poll(() => rings(leader)).toBe(0);
+    await leader.mouse.move(600, 480);
+    await leader.mouse.down();
+    await expect.poll(() => rings(follower)).toBe(1);
+    await leader.mouse.up();
+    expect(await follower.locator('#company-point').isHidden()).toBe(true);
+    // The leader lets followers point, and hears where all are.
+    await leader.getByRole('button', { name: 'Share' }).click();
+    await leader.getByLabel('Those who follow may point at places').check();
+    await leader.getByLabel('Those who follow see where everybody is').check();
+    await keep_screenshot(leader, 'together-allowed');
+    const point = follower.getByRole('button', { name: 'Point at the middle' });
+    await point.waitFor();
+    await expect.poll(() => rings(leader)).toBe(0);
+    await point.tap();
+    await leader.getByText('Somebody points at a place').waitFor({ state: 'attached' });
+    await keep_screenshot(follower, 'together-may-point');
+    expect(await barriers(follower)).toEqual([]);
+    expect(errors).toEqual([]);
+  });
+
   it('is watched where no place is free, and left for a visit from where the leader stood', async () => {
     const server = await start_server(scene, [...counted, '--max-sessions', '1']);
     const { page: leader } = await open(server.url, windows.desktop);

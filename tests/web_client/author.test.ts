@@ -16,6 +16,7 @@ const stop = (title: string): Stop => ({
   marker: [0, 0, 9],
   stay_s: undefined,
   fly_s: undefined,
+  portal: undefined,
 });
 
 const titles = (draft: TourDraft): string[] => draft.stops.map(({ title }) => title);

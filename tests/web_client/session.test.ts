@@ -21,6 +21,7 @@ let states: SessionState[];
 let frames: bigint[];
 let configs: string[];
 let notices: string[];
+let stayed: string[];
 let leaders: string[];
 let streams_ended: number;
 
@@ -32,6 +33,7 @@ beforeEach(() => {
   frames = [];
   configs = [];
   notices = [];
+  stayed = [];
   leaders = [];
   streams_ended = 0;
   session = new Session(
@@ -47,8 +49,11 @@ beforeEach(() => {
       },
       stats: () => undefined,
       picked: () => undefined,
+      pinged: () => undefined,
+      company: () => undefined,
       lead: ({ name }) => leaders.push(name),
       notice: (message) => notices.push(message),
+      stayed: (message) => stayed.push(message),
     },
     {
       sceneId: 'city',
@@ -388,5 +393,36 @@ describe('backoff', () => {
     expect(backoff_ms(1, () => 0)).toBe(250);
     expect(backoff_ms(1, () => 1)).toBe(500);
     expect(backoff_ms(1000, () => 1)).toBe(10_000);
+  });
+});
+
+describe('another scene', () => {
+  it('is selected without a new connection, and greeted again after a loss', () => {
+    const first = go_live();
+    session.send_pose(pose(1n));
+    session.select_scene('attic');
+    expect(first.sent('selectScene')).toMatchObject([{ sceneId: 'attic' }]);
+    first.say({ case: 'welcome', value: { config: { encoder: 'x264' } } });
+    expect(first.sent('pose').length).toBe(1); // no pose of the scene that was left
+    first.events.closed(1006, '');
+    time.advance(10_000);
+    socket(1).events.opened();
+    const [hello] = socket(1).sent('hello');
+    expect(hello).toMatchObject({ sceneId: 'attic' });
+    expect(hello!.resume?.pose).toBeUndefined();
+  });
+
+  it('is not entered where the server refuses it', () => {
+    const first = go_live();
+    session.select_scene('vault');
+    first.say({ case: 'error', value: { code: Error_Code.UNAUTHORIZED, message: 'not yours' } });
+    expect(stayed).toEqual(['not yours']);
+    expect(notices).toEqual([]);
+    first.say({ case: 'error', value: { code: Error_Code.UNAUTHORIZED, message: 'something else' } });
+    expect(notices).toEqual(['something else']);
+    first.events.closed(1006, '');
+    time.advance(10_000);
+    socket(1).events.opened();
+    expect(socket(1).sent('hello')[0]).toMatchObject({ sceneId: 'city' });
   });
 });

@@ -65,7 +65,7 @@ TEST_F(AudienceTest, APresentationEndsWithItsScene) {
     audience.send(welcome, now);
   };
   enter("hall");
-  audience.presentation().begin("Ada", now);
+  audience.presentation().begin({true, "Ada"}, now);
   const auto spectator = join();
   enter("hall");  // the leader comes back
   EXPECT_TRUE(audience.presentation().since());
@@ -78,7 +78,7 @@ TEST_F(AudienceTest, APresentationEndsWithItsScene) {
 TEST_F(AudienceTest, FollowersHearOfACameraThirtyTimesASecondAtMost) {
   const auto connection = std::make_shared<FakeConnection>();
   const auto follower = std::make_shared<ClientConnection>(io, metrics, connection, [] {});
-  audience.presentation().begin("Ada", now);
+  audience.presentation().begin({true, "Ada"}, now);
   audience.presentation().add(follower);
   const auto told = [&](bool at_rest) {
     const int before = connection->messages;

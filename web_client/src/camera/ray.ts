@@ -22,6 +22,13 @@ export function place_of(point: Vec3, eye: Eye, aspect: number): readonly [numbe
   return [0.5 + x / z / tan / aspect / 2, 0.5 + y / z / tan / 2];
 }
 
+/** Which way a point is from the middle of the view: right and down, of length 1 (or 0: straight ahead). */
+export function direction_to(point: Vec3, eye: Eye): readonly [right: number, down: number] {
+  const [x, y] = rotate(conjugate(eye.orientation), sub(point, eye.position));
+  const n = Math.hypot(x, y);
+  return n > 0 ? [x / n, y / n] : [0, 0];
+}
+
 /** The middle of a surface and its normal (unit, towards the eye). */
 interface Surface {
   readonly point: Vec3;

@@ -25,12 +25,12 @@ export function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest
 export const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
 
 // Fields that a server leaves out read as zeros. The defaults here make a usable pose and scene of them.
-const vec3 = (v: WireVector | undefined): Vec3 => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
+export const vector_of = (v: WireVector | undefined): Vec3 => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
 
 export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {
   const q = pose?.orientation;
   return {
-    position: vec3(pose?.position),
+    position: vector_of(pose?.position),
     orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
     fov_y_rad,
   };
@@ -39,11 +39,11 @@ export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {
 export function scene_setup(scene: SceneFacts): SceneSetup {
   const { position, orientation } = eye_of(scene.startPose, 0);
   return {
-    up: vec3(scene.up),
+    up: vector_of(scene.up),
     start_pose: { position, orientation },
-    focus: vec3(scene.focus),
-    limits_min: vec3(scene.limitsMin),
-    limits_max: vec3(scene.limitsMax),
+    focus: vector_of(scene.focus),
+    limits_min: vector_of(scene.limitsMin),
+    limits_max: vector_of(scene.limitsMax),
     near_z: scene.nearZ,
     scale: scene.scale,
   };

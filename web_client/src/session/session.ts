@@ -6,10 +6,12 @@ import {
   Error_Code,
   wire_version,
   type ClientBody,
+  type Company,
   type FrameHeader,
   type HelloInit,
   type Lead,
   type Picked,
+  type Pinged,
   type PoseInit,
   type ServerBody,
   type Incoming,
@@ -38,8 +40,13 @@ interface SessionListener {
   picked(picked: Picked): void;
   /** Of the session that this one leads, watches or follows. */
   lead(lead: Lead): void;
+  pinged(pinged: Pinged): void;
+  /** Where all in the company are. */
+  company(company: Company): void;
   /** The server sent a message for people. The session goes on. */
   notice(message: string): void;
+  /** The selected scene cannot be entered: the server says why. The session goes on where it was. */
+  stayed(message: string): void;
 }
 
 interface SessionEnvironment {
@@ -68,6 +75,7 @@ export class Session {
   private last_pose_: PoseInit | undefined;
   private path_: readonly PoseInit[] = [];
   private paused_ = false;
+  private left_scene_: string | undefined; // as the greeting named it; until the selected one is there
   private readonly kept_ = new Map<ClientBody['case'], ClientBody>();
 
   constructor(
@@ -112,6 +120,15 @@ export class Session {
   send_settings(settings: SettingsInit): void {
     this.greeting_ = { ...this.greeting_, settings };
     this.send({ case: 'settings', value: settings });
+  }
+
+  /** Goes to another scene. A welcome follows, or `stayed`. */
+  select_scene(scene_id: string): void {
+    this.left_scene_ ??= this.greeting_.sceneId ?? '';
+    this.greeting_ = { ...this.greeting_, sceneId: scene_id };
+    this.last_pose_ = undefined; // it is of the other scene
+    this.path_ = [];
+    this.send({ case: 'selectScene', value: { sceneId: scene_id } });
   }
 
   /** Tells where the camera will go, for the forecasts of the server. */
@@ -233,6 +250,12 @@ export class Session {
       case 'lead':
         if (link === this.link_) this.listener_.lead(body.value);
         break;
+      case 'pinged':
+        if (link === this.link_) this.listener_.pinged(body.value);
+        break;
+      case 'company':
+        if (link === this.link_) this.listener_.company(body.value);
+        break;
       case 'error':
         this.refused(link, body.value);
         break;
@@ -251,6 +274,7 @@ export class Session {
     if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
     // A session of its own stays one.
     if (!welcome.watching) this.greeting_ = { ...this.greeting_, watch: '', follow: false };
+    this.left_scene_ = undefined;
     if (link === this.link_) this.go_live(link);
     else if (this.last_pose_) link.send({ case: 'pose', value: this.last_pose_ });
   }
@@ -280,7 +304,11 @@ export class Session {
   }
 
   private refused(link: Link, error: ServerError): void {
-    if (!error.fatal) {
+    if (!error.fatal && this.left_scene_ !== undefined && shuts_out(error.code)) {
+      this.greeting_ = { ...this.greeting_, sceneId: this.left_scene_ };
+      this.left_scene_ = undefined;
+      this.listener_.stayed(error.message);
+    } else if (!error.fatal) {
       this.listener_.notice(error.message);
     } else if (link === this.successor_) {
       this.lost(link, 'refused', error.message);
@@ -332,6 +360,10 @@ function path_ahead(path: readonly PoseInit[], now_us: number): { path?: { sampl
   const next = path.findIndex(({ clientTimeUs }) => Number(clientTimeUs ?? 0n) > now_us);
   return next < 0 ? {} : { path: { samples: path.slice(Math.max(0, next - 1)) } };
 }
+
+/** Whether an error refuses a scene. */
+const shuts_out = (code: Error_Code): boolean =>
+  code === Error_Code.UNKNOWN_SCENE || code === Error_Code.UNAUTHORIZED || code === Error_Code.SERVER_FULL;
 
 /** Whether time may cure a refusal. All others need another link, token, scene or program. */
 function is_temporary(code: Error_Code): boolean {

@@ -59,6 +59,13 @@ export class JsonPlace {
     return value;
   }
 
+  /** A whole number that counts from 1, as an index. */
+  ordinal(most: number): number {
+    const value = this.number(1, most);
+    if (!Number.isInteger(value)) this.fail(mistakes.not_in(1, most));
+    return value - 1;
+  }
+
   numbers(count: number): number[] {
     const values = this.elements(count).map((value) => value.number());
     if (values.length !== count) this.fail(mistakes.not_numbers(count));

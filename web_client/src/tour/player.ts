@@ -2,7 +2,7 @@
 import type { Timers } from '../base/clock';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight, type PathSample } from '../camera/flight';
-import { default_stay_s, type Stop, type Tour } from './tour';
+import { default_stay_s, flight_to, type Stop, type Tour } from './tour';
 
 interface Guided {
   readonly eye: Eye;
@@ -159,15 +159,14 @@ export class TourPlayer {
     const { camera } = this.env_;
     const from = camera.eye;
     this.stop_index_ = stop_index;
-    const duration_s = at_once ? 0 : (stop.fly_s ?? glide_time_s(from, stop.eye, camera.reach));
-    const way = glide(from, stop.eye, duration_s);
+    const way = at_once ? glide(from, stop.eye, 0) : flight_to(stop, from, camera.reach);
     const journey = this.set_out();
     camera.fly(way, (arrived) => {
       if (journey !== this.journey_) return;
       if (arrived) this.env_.reached(this.tour_index_, stop_index);
       this.ended(arrived, stop);
     });
-    this.announce(way, 0, duration_s);
+    this.announce(way, 0, way.duration_s);
     this.tell();
   }
 

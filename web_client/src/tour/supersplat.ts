@@ -46,6 +46,7 @@ function read_annotation(annotation: JsonPlace, aspect: number): Stop {
     marker: to_scene(annotation.at('position').vec3()),
     stay_s: undefined,
     fly_s: undefined,
+    portal: undefined,
   };
 }
 

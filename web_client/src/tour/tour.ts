@@ -1,7 +1,7 @@
 // Tours through a scene: stops to visit, or a film of the camera. Pure.
-import { look_at, type Vec3 } from '../base/vector';
+import { look_at, type Quat, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import type { Flight } from '../camera/flight';
+import { glide, glide_time_s, type Flight } from '../camera/flight';
 import { JsonPlace } from './json_place';
 import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
 import {
@@ -18,6 +18,23 @@ import {
 } from './media';
 import { in_language, type Worded } from './words';
 
+/** A way into another scene: to a view of it, to a stop of one of its tours, or to where visits begin there. */
+export interface Portal {
+  /** Its id or name. */
+  readonly scene: string;
+  readonly view:
+    | {
+        readonly position: Vec3;
+        /** The place that is looked at with the up of that scene, or an orientation. */
+        readonly look_at: Vec3 | undefined;
+        readonly orientation: Quat | undefined;
+        readonly fov_y_rad: number | undefined;
+      }
+    | undefined;
+  readonly tour_index: number | undefined;
+  readonly stop_index: number | undefined;
+}
+
 export interface Stop extends Worded {
   readonly caption: string;
   readonly eye: Eye;
@@ -29,6 +46,7 @@ export interface Stop extends Worded {
   readonly fly_s: number | undefined;
   readonly media?: readonly Medium[] | undefined;
   readonly narration?: Narration | undefined;
+  readonly portal: Portal | undefined;
 }
 
 export interface Tour extends Worded {
@@ -48,6 +66,10 @@ export const has_media = ({ sound, stops }: Tour): boolean =>
 export function default_stay_s(stop: Stop): number {
   return 3 + 0.06 * (stop.caption.length + stop.title.length);
 }
+
+/** The flight to a stop. `reach`: the scene's scale to a visitor, world units. */
+export const flight_to = (stop: Stop, from: Eye, reach: number): Flight =>
+  glide(from, stop.eye, stop.fly_s ?? glide_time_s(from, stop.eye, reach));
 
 /**
  * Reads `tours` of a sidecar (README.md). Throws an error that names the wrong place. `up`: that of the
@@ -81,6 +103,24 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
     fly_s: stop.find('fly_s')?.number(0, longest_flight_s),
     media: read_media(stop.find('media')),
     narration: read_narration(stop.find('narration')),
+    portal: read_portal(stop.find('portal')),
+  };
+}
+
+function read_portal(portal: JsonPlace | undefined): Portal | undefined {
+  if (!portal) return undefined;
+  const position = portal.find('position')?.vec3();
+  const target = portal.find('look_at')?.vec3();
+  return {
+    scene: portal.at('scene').text(),
+    view: position && {
+      position,
+      look_at: target,
+      orientation: target ? undefined : portal.at('orientation').orientation(),
+      fov_y_rad: portal.find('fov_deg')?.fov_rad(),
+    },
+    tour_index: portal.find('tour')?.ordinal(max_tours),
+    stop_index: portal.find('stop')?.ordinal(max_stops),
   };
 }
 
@@ -102,9 +142,11 @@ export const tours_for = (tours: readonly Tour[], readers: readonly string[]): r
     stops: tour.stops.map((stop) => ({ ...in_language(stop, readers), media: stop.media && media_for(stop.media, readers) })),
   }));
 
+const short = (v: number): number => Number(v.toPrecision(7));
+const degrees = (angle_rad: number): number => short((angle_rad * 180) / Math.PI);
+
 /** Writes what read_tours() reads. Numbers keep seven digits, more than anybody can see. */
 export function write_tours(tours: readonly Tour[]): unknown[] {
-  const short = (v: number): number => Number(v.toPrecision(7));
   return tours
     .filter(({ way }) => way === undefined)
     .map(({ title, translations, stops, starts_itself, sound }) => ({
@@ -118,14 +160,29 @@ export function write_tours(tours: readonly Tour[]): unknown[] {
         ...write_translations(stop.translations),
         position: stop.eye.position.map(short),
         orientation: stop.eye.orientation.map(short),
-        fov_deg: short((stop.eye.fov_y_rad * 180) / Math.PI),
+        fov_deg: degrees(stop.eye.fov_y_rad),
         ...(stop.marker && { marker: stop.marker.map(short) }),
         ...(stop.stay_s !== undefined && { stay_s: stop.stay_s }),
         ...(stop.fly_s !== undefined && { fly_s: stop.fly_s }),
         ...(stop.media && stop.media.length > 0 && { media: write_media(stop.media) }),
         ...(stop.narration && { narration: write_narration(stop.narration) }),
+        ...(stop.portal && { portal: write_portal(stop.portal) }),
       })),
     }));
+}
+
+function write_portal({ scene, view, tour_index, stop_index }: Portal): object {
+  return {
+    scene,
+    ...(view && {
+      position: view.position.map(short),
+      ...(view.look_at && { look_at: view.look_at.map(short) }),
+      ...(view.orientation && { orientation: view.orientation.map(short) }),
+      ...(view.fov_y_rad !== undefined && { fov_deg: degrees(view.fov_y_rad) }),
+    }),
+    ...(tour_index !== undefined && { tour: tour_index + 1 }),
+    ...(stop_index !== undefined && { stop: stop_index + 1 }),
+  };
 }
 
 function write_translations(translations: Worded['translations']): object {

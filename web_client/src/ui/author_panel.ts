@@ -1,6 +1,7 @@
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
+import type { SceneListing } from '../session/scenes';
 import { number } from '../text/number';
 import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
@@ -17,6 +18,8 @@ interface AuthorTools {
   eye(): Eye;
   scene(): SceneSetup | undefined;
   scene_id(): string;
+  /** The scenes that this author may see. */
+  scenes(): Promise<readonly SceneListing[]>;
   file_name(): string; // of the scene, without extension
   /** The point in the middle of the view; undefined: nothing is there. */
   place_ahead(): Promise<Vec3 | undefined>;
@@ -91,6 +94,10 @@ export class AuthorPanel {
     this.saved_ = this.draft_.state;
     this.start_ = undefined;
     this.show(0);
+    void this.tools_.scenes().then((scenes) => {
+      this.stops_.offer(scenes, this.tools_.scene_id());
+      this.show();
+    });
   }
 
   edit_about(change: Partial<SceneAbout>, field?: string): void {
@@ -155,7 +162,7 @@ export class AuthorPanel {
     const marker = await this.tools_.place_ahead();
     if (edited !== this.draft_.state.edited) return; // the author went on to another tour
     const title = text.tour.stop_numbered(number(this.draft_.stops.length + 1));
-    this.draft_.add({ title, caption: '', ...untranslated, eye, marker, stay_s: undefined, fly_s: undefined });
+    this.draft_.add({ title, caption: '', ...untranslated, eye, marker, stay_s: undefined, fly_s: undefined, portal: undefined });
     this.edited(this.draft_.stops.length - 1);
     this.done_.textContent = marker ? '' : text.author.no_marker;
     const added = by_id('author-stops', HTMLOListElement).lastElementChild;

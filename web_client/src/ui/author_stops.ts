@@ -1,3 +1,5 @@
+import { lasting_name } from '../portals/portals';
+import { scene_labels, type SceneListing } from '../session/scenes';
 import { number } from '../text/number';
 import { text } from '../text/text';
 import { longest_flight_s, longest_stay_s, max_text_characters } from '../tour/limits';
@@ -30,6 +32,8 @@ export interface StopActions {
 export class AuthorStops {
   private open_ = 0;
   private language_ = '';
+  private scenes_: readonly SceneListing[] = []; // that a stop may lead to
+  private names_: readonly string[] = []; // by which stops name them
 
   constructor(
     private readonly list_: HTMLElement,
@@ -46,6 +50,12 @@ export class AuthorStops {
     this.open_ = Math.min(open, Math.max(0, stops.length - 1));
     this.list_.replaceChildren(...stops.map((stop, i) => this.row_of(stop, i, stops.length)));
     if (control !== undefined) this.focus(control);
+  }
+
+  /** Other scenes that stops may lead to. */
+  offer(scenes: readonly SceneListing[], present_id: string): void {
+    this.scenes_ = scenes.filter(({ id }) => id !== present_id);
+    this.names_ = this.scenes_.map(({ id }) => lasting_name(id, scenes));
   }
 
   /** Focuses a control of the open stop, or its title where the control can do nothing. */
@@ -103,7 +113,32 @@ export class AuthorStops {
     bind(flight, 'flight', () => ({ fly_s: number_in(flight) }));
     const times = make('div', {}, make('label', {}, words.flight, flight), make('label', {}, words.stay, stay));
     times.className = 'times';
-    return [title, caption, times];
+    return [title, caption, times, ...this.portal_of(stop, i, n)];
+  }
+
+  /** The scene that the stop leads to, where there is another one. */
+  private portal_of(stop: Stop, i: number, n: string): HTMLElement[] {
+    const { portals: words } = text;
+    const now = stop.portal?.scene ?? '';
+    if (this.scenes_.length === 0 && now === '') return [];
+    const labels = scene_labels(this.scenes_);
+    const options = this.scenes_.map(({ id }, k) => ({ name: this.names_[k]!, id, label: labels[k] ?? id }));
+    const known = options.find(({ name, id }) => now === name || now === id)?.name;
+    const choice = make(
+      'select',
+      { 'aria-label': words.of_stop(n) },
+      new Option(words.nowhere, ''),
+      ...(now !== '' && known === undefined ? [new Option(now, now)] : []), // a scene that is not here
+      ...options.map(({ name, label }) => new Option(label, name)),
+    );
+    choice.value = known ?? now;
+    choice.dataset['control'] = 'portal';
+    choice.addEventListener('change', () => {
+      const { value: scene } = choice;
+      const portal = scene === '' ? undefined : { scene, view: undefined, tour_index: undefined, stop_index: undefined };
+      this.actions_.change(i, { portal });
+    });
+    return [make('label', { className: 'leads-to' }, words.leads_to, choice)];
   }
 
   private buttons_of(stop: Stop, i: number, count: number): HTMLElement {

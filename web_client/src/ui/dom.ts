@@ -22,6 +22,17 @@ export function make<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
+/** A drawing of index.html's `#icons`. */
+export function icon(name: string): SVGSVGElement {
+  const namespace = 'http://www.w3.org/2000/svg';
+  const drawing = document.createElementNS(namespace, 'svg');
+  const use = document.createElementNS(namespace, 'use');
+  use.setAttribute('href', `#icon-${name}`);
+  drawing.setAttribute('aria-hidden', 'true');
+  drawing.append(use);
+  return drawing;
+}
+
 export function on_click(id: string, action: () => void): void {
   by_id(id, HTMLButtonElement).addEventListener('click', action);
 }

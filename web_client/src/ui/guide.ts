@@ -15,6 +15,7 @@ import type { SceneFacts } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import { AuthorPanel } from './author_panel';
 import type { MediaFields } from './author_stops';
+import { Doors } from './doors';
 import { EmbedApi } from './embed';
 import { Hotspots } from './hotspots';
 import type { Navigation } from './navigation';
@@ -52,6 +53,7 @@ export interface GuideMedia {
 
 export class Guide {
   private readonly player_: TourPlayer;
+  private readonly doors_: Doors;
   private readonly tour_view_: TourView;
   private readonly hotspots_: Hotspots;
   private readonly embed_: EmbedApi;
@@ -77,8 +79,9 @@ export class Guide {
       },
       (state) => this.tour_changed(state),
     );
-    this.tour_view_ = new TourView(this.player_);
-    this.hotspots_ = new Hotspots(view, parts_.seen, (stop) => this.player_.go_to(stop));
+    this.doors_ = new Doors(parts_, () => this.view);
+    this.tour_view_ = new TourView(this.player_, this.doors_);
+    this.hotspots_ = new Hotspots(view, parts_.seen, this.doors_, (stop) => this.player_.go_to(stop));
     this.embed_ = this.make_embed();
     const is_author = new URLSearchParams(location.search).has('author');
     this.author_ = is_author ? this.make_author() : undefined;
@@ -93,6 +96,7 @@ export class Guide {
       else if (action === 'play') this.player_.toggle();
     });
     window.addEventListener('hashchange', () => {
+      if (this.doors_.leads_elsewhere) return;
       const shared = read_shared(location.href);
       this.show_view(shared);
       this.show_stop(shared);
@@ -128,6 +132,7 @@ export class Guide {
       eye: () => camera.eye,
       scene: () => camera.scene,
       scene_id: () => navigation.scene_id,
+      scenes: () => this.doors_.scenes(),
       file_name: () => this.file_name(),
       place_ahead: () => navigation.place_ahead(),
       changed: (tours, edited) => {
@@ -162,13 +167,15 @@ export class Guide {
     const { navigation, view, notice, toolbar } = this.parts_;
     const token = this.parts_.token.value;
     const load = ++this.loads_;
-    const shared = read_shared(location.href);
+    const shared = this.doors_.arrive(scene_id) ?? read_shared(location.href);
     this.show_view(shared);
     const { document, may_save } = await fetch_tours(location.href, token, scene_id);
     if (load !== this.loads_) return; // the visitor entered another scene meanwhile
     const { camera } = navigation;
     const aspect = view.clientWidth / Math.max(1, view.clientHeight);
     const { tours, start, problems } = read_document(document, camera.up, camera.fov_y_rad, aspect);
+    await this.doors_.learn(tours);
+    if (load !== this.loads_) return;
     for (const problem of problems) notice.show(text.tour.unreadable(problem));
     if (start) {
       camera.start_at(start);
@@ -184,6 +191,7 @@ export class Guide {
     this.player_.load(shown, stays);
     if (load === 1 && this.author_) toolbar.open('author');
     this.show_stop(shared, true);
+    this.doors_.arrived();
     this.embed_.say({
       catgs: 'ready',
       scene: scene_name(scene_id),
@@ -218,14 +226,18 @@ export class Guide {
     this.tour_view_.show(state);
     this.parts_.media.show(state);
     this.hotspots_.show(state, this.parts_.navigation.eye);
+    if (state.stop?.portal) this.doors_.prepare(state.stop.portal);
     this.embed_.say({ catgs: 'stop', stop: state.stop_index ?? null, playing: state.playing });
   }
 
-  private address(): string {
-    const { camera, scene_id } = this.parts_.navigation;
+  private get view(): SharedView {
+    const { eye, mode } = this.parts_.navigation.camera;
     const { tour_index, stop_index } = this.player_.state;
-    const { eye, mode } = camera;
-    return share_address(location.href, scene_id, { eye, mode, tour_index, stop_index });
+    return { eye, mode, tour_index, stop_index };
+  }
+
+  private address(): string {
+    return share_address(location.href, this.parts_.navigation.scene_id, this.view);
   }
 
   private file_name(): string {

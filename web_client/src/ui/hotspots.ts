@@ -5,7 +5,8 @@ import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import { by_id, make } from './dom';
+import { by_id, icon, make } from './dom';
+import type { Doors } from './doors';
 import type { SeenCamera } from './seen_camera';
 
 /** Shows the stops of a tour as buttons in the picture. */
@@ -17,6 +18,7 @@ export class Hotspots {
   constructor(
     private readonly view_: HTMLElement,
     seen: SeenCamera,
+    private readonly doors_: Doors,
     private readonly go_to_: (stop_index: number) => void,
   ) {
     window.addEventListener('keydown', ({ code }) => {
@@ -54,10 +56,12 @@ export class Hotspots {
     this.tour_ = tour;
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
-      const sign = make('span', { 'aria-hidden': 'true' }, number(i + 1));
+      const door = stop.portal && this.doors_.behind(stop.portal);
+      const sign = door ? icon('door') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
       // It is hidden until it is placed.
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
-      button.append(label_of(stop, i, button));
+      button.classList.toggle('door', door !== undefined);
+      button.append(label_of(stop, i, button, door && text.portals.to(door.title)));
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
       button.addEventListener('wheel', (event) => {
@@ -73,10 +77,11 @@ export class Hotspots {
   }
 }
 
-/** Title and caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
-function label_of(stop: Stop, index: number, button: HTMLButtonElement): HTMLElement {
-  const title = stop.title || text.tour.stop_numbered(number(index + 1));
-  const label = make('span', { className: 'hotspot-label', dir: 'auto', lang: stop.title ? stop.language : language }, make('span', { className: 'hotspot-name' }, title));
+/** Where it leads or its title, and its caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
+function label_of(stop: Stop, index: number, button: HTMLButtonElement, leads_to: string | undefined): HTMLElement {
+  const title = leads_to ?? (stop.title || text.tour.stop_numbered(number(index + 1)));
+  const lang = stop.title && !leads_to ? stop.language : language;
+  const label = make('span', { className: 'hotspot-label', dir: 'auto', lang }, make('span', { className: 'hotspot-name' }, title));
   if (stop.caption) {
     // The title alone is the name of the button; the caption describes it.
     const id = `hotspot-caption-${index}`;

@@ -11,6 +11,7 @@ import type { WorkerClient } from '../worker/client';
 import { by_id, on_click } from './dom';
 import type { Navigation } from './navigation';
 import type { Notice } from './notice';
+import type { Pointing } from './pointing';
 import type { Toolbar } from './toolbar';
 
 const { together: words } = text;
@@ -38,12 +39,15 @@ export class Together {
   private readonly own_label_ = this.view_.getAttribute('aria-label') ?? '';
   private readonly name_ = by_id('present-name', HTMLInputElement);
   private readonly link_ = by_id('present-link', HTMLInputElement);
+  private readonly pings_ = by_id('present-pings', HTMLInputElement);
+  private readonly places_ = by_id('present-places', HTMLInputElement);
 
   constructor(
     private readonly worker_: WorkerClient,
     private readonly navigation_: Navigation,
     private readonly toolbar_: Toolbar,
     private readonly notice_: Notice,
+    private readonly pointing_: Pointing,
     private readonly reduced_motion_: boolean,
   ) {
     navigation_.led = this.token_ !== '';
@@ -65,6 +69,11 @@ export class Together {
     this.action_.addEventListener('click', () => this.act());
     on_click('present-start', () => this.present());
     on_click('present-stop', () => this.stop());
+    for (const box of [this.pings_, this.places_]) {
+      box.addEventListener('change', () => {
+        if (this.role_ === 'leading') this.tell_present();
+      });
+    }
     on_click('present-copy', () => void this.copy());
     this.link_.addEventListener('focus', () => this.link_.select());
   }
@@ -78,11 +87,13 @@ export class Together {
   }
 
   private heard(lead: Lead, eye: Eye | undefined): void {
+    const before = this.lead_;
     this.lead_ = lead;
     if (eye) this.leader_eye_ = eye;
     if (this.role_ === 'leading' || this.role_ === 'watching') this.show();
     else if (lead.state === Lead_State.ENDED) this.ended();
     else if (eye && this.wants_) this.follow(eye);
+    if (this.role_ === 'following' && differ(before, lead)) this.show();
   }
 
   private ended(): void {
@@ -140,15 +151,21 @@ export class Together {
     this.navigation_.stop_flight();
   }
 
+  private tell_present(): void {
+    const name = within_bytes(this.name_.value.trim());
+    const allowed = { pings: this.pings_.checked, tells_places: this.places_.checked };
+    this.worker_.post({ kind: 'present', on: true, name, ...allowed });
+  }
+
   private present(): void {
-    this.worker_.post({ kind: 'present', on: true, name: within_bytes(this.name_.value.trim()) });
+    this.tell_present();
     this.lead_ = undefined;
     this.become('leading');
     by_id('present-copy', HTMLButtonElement).focus();
   }
 
   private stop(): void {
-    this.worker_.post({ kind: 'present', on: false, name: '' });
+    this.worker_.post({ kind: 'present', on: false, name: '', pings: false, tells_places: false });
     this.become('alone');
   }
 
@@ -198,6 +215,7 @@ export class Together {
       left: this.lead_?.name ? words.follow(name) : words.follow_somebody,
       leading: words.stop,
     };
+    this.pointing_.allowed = this.role_ === 'leading' || (this.role_ === 'following' && this.lead_?.mayPing === true);
     const line = by_id('company-text', HTMLElement);
     if (line.textContent !== said[this.role_]) line.textContent = said[this.role_];
     this.bar_.hidden = said[this.role_] === '' && action[this.role_] === '';
@@ -206,6 +224,10 @@ export class Together {
     this.view_.setAttribute('aria-label', this.role_ === 'watching' ? words.view(name) : this.own_label_);
   }
 }
+
+/** Whether more than the camera is new. */
+const differ = (a: Lead | undefined, b: Lead): boolean =>
+  a?.state !== b.state || a.name !== b.name || a.company !== b.company || a.mayPing !== b.mayPing;
 
 /** As much of the name as the wire takes. */
 function within_bytes(name: string): string {

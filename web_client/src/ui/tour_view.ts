@@ -3,8 +3,9 @@ import { is_for_page } from '../input/view_input';
 import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourPlayer, TourState } from '../tour/player';
-import type { Tour } from '../tour/tour';
+import type { Stop, Tour } from '../tour/tour';
 import { by_id, hint_at_more, on_click } from './dom';
+import type { Doors } from './doors';
 
 /** The card of a tour: caption, buttons and keys. */
 export class TourView {
@@ -13,9 +14,17 @@ export class TourView {
   private readonly play_ = by_id('tour-play', HTMLButtonElement);
   private readonly text_ = by_id('tour-text', HTMLElement);
   private readonly caption_ = new CaptionView(this.text_, hint_at_more(this.text_));
+  private readonly portal_ = by_id('tour-portal', HTMLButtonElement);
   private has_tours_ = false;
 
-  constructor(player: TourPlayer) {
+  constructor(
+    player: TourPlayer,
+    private readonly doors_: Doors,
+  ) {
+    this.portal_.addEventListener('click', () => {
+      const { stop } = player.state;
+      if (stop?.portal) doors_.enter(stop.portal);
+    });
     on_click('tour-previous', () => player.previous());
     on_click('tour-next', () => player.next());
     on_click('tour-play', () => player.toggle());
@@ -55,6 +64,7 @@ export class TourView {
     void this.caption_.show(stop?.caption ?? '');
     this.text_.lang = stop?.language ?? '';
     this.text_.scrollTop = 0;
+    this.show_portal(stop);
     by_id('tour-place', HTMLElement).textContent =
       count === 0 ? '' : stop_index === undefined ? text.tour.stops(count, number(count)) : text.tour.place(number(stop_index + 1), number(count));
     for (const id of ['tour-previous', 'tour-next']) {
@@ -65,5 +75,16 @@ export class TourView {
     this.play_.title = playing ? text.tour.pause_key : text.tour.play_key;
     this.play_.setAttribute('aria-pressed', String(playing));
     this.play_.querySelector('use')?.setAttribute('href', playing ? '#icon-pause' : '#icon-play');
+  }
+
+  private show_portal(stop: Stop | undefined): void {
+    const door = stop?.portal && this.doors_.behind(stop.portal);
+    const is_closed = door !== undefined && door.scene_id === undefined;
+    this.portal_.hidden = door === undefined;
+    this.portal_.disabled = is_closed;
+    by_id('tour-portal-text', HTMLElement).textContent = door ? text.portals.to(door.title) : '';
+    const closed = by_id('tour-closed', HTMLElement);
+    closed.hidden = !is_closed;
+    closed.textContent = is_closed ? text.portals.closed(door.title) : '';
   }
 }

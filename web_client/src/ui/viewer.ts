@@ -18,6 +18,7 @@ import { MeasurePanel } from './measure_panel';
 import { Navigation } from './navigation';
 import { Notice } from './notice';
 import { bind_page_events } from './page_events';
+import { Pointing } from './pointing';
 import { Poster } from './poster';
 import { QualityPanel } from './quality_panel';
 import { show_scene_title } from './scene_title';
@@ -54,7 +55,8 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   const media = { media: new TourMedia(() => token.value), media_fields: new TourMediaFields() };
   const guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion, ...media });
   new MeasurePanel({ view, navigation, toolbar, seen, storage, set_scale: guide.set_scale });
-  new Together(worker, navigation, toolbar, notice, reduced_motion);
+  const pointing = new Pointing(view, worker, navigation, notice, seen);
+  new Together(worker, navigation, toolbar, notice, pointing, reduced_motion);
   bind_page_events(worker);
   window.catgs = make_automation(worker, navigation, clock);
 

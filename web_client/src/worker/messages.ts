@@ -1,4 +1,5 @@
 // Messages between page and worker. They are structured clones, so they hold plain data only.
+import type { Vec3 } from '../base/vector';
 import type { Pose, CameraSample, Eye } from '../camera/eye';
 import type { PathSample } from '../camera/flight';
 import type { Ray } from '../camera/ray';
@@ -46,6 +47,10 @@ export type ToWorker =
   | { kind: 'path'; samples: readonly PathSample[] }
   | { kind: 'reached'; tour: number; stop: number }
   | { kind: 'pick'; id: number; ray: Ray }
+  /** Goes to another scene in this session. A welcome follows, or 'stayed'. */
+  | { kind: 'select'; scene_id: string }
+  /** The visitor may go to this scene soon. */
+  | { kind: 'prepare'; scene_id: string }
   | { kind: 'hidden'; hidden: boolean }
   | { kind: 'retry' }
   | { kind: 'token'; token: string }
@@ -53,7 +58,9 @@ export type ToWorker =
   | { kind: 'watch'; watch: string }
   /** Of a visit of one's own: wants the camera of that session; '': no more. */
   | { kind: 'follow'; watch: string }
-  | { kind: 'present'; on: boolean; name: string }
+  /** `pings`: followers may point at places. `tells_places`: the company hears where all in it are. */
+  | { kind: 'present'; on: boolean; name: string; pings: boolean; tells_places: boolean }
+  | { kind: 'ping'; place: Vec3 }
   | { kind: 'stop' }
   | { kind: 'get_stats'; request: number }
   | { kind: 'get_snapshot'; request: number };
@@ -69,7 +76,13 @@ export type FromWorker =
   | { kind: 'picked'; id: number; hit: Hit | undefined }
   /** `eye`: where the leader's camera is, for those who follow. */
   | { kind: 'lead'; lead: Lead; eye: Eye | undefined }
+  /** Somebody in the company points at a place. `name`: of who leads. */
+  | { kind: 'pinged'; place: Vec3; by_leader: boolean; name: string }
+  /** Where all in the company are, the leader first; empty: that is not told any more. */
+  | { kind: 'company_moved'; places: readonly Vec3[] }
   | { kind: 'notice'; message: string }
+  /** The server did not let the visitor into the scene that was selected. */
+  | { kind: 'stayed'; message: string }
   /** No video decoder is left. The worker asks for JPEG pictures instead. */
   | { kind: 'fallback'; message: string }
   | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }

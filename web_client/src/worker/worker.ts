@@ -9,12 +9,12 @@ import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
 import { widened_fov, type Sides } from '../present/warp';
-import { eye_of, pose_message, wire_vector } from '../session/camera_messages';
+import { eye_of, pose_message, vector_of, wire_vector } from '../session/camera_messages';
 import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
+import { Codec, type FrameHeader, type PresentInit, type SettingsInit, type StreamConfig } from '../wire/wire';
 import type { FromWorker, ToWorker } from './messages';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
@@ -58,6 +58,7 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
+  private leader_ = ''; // the name of who leads
   private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
 
@@ -110,6 +111,12 @@ class Client {
       case 'pick':
         this.pick(message.id, message.ray);
         break;
+      case 'select':
+        this.session_.select_scene(message.scene_id);
+        break;
+      case 'prepare':
+        this.session_.send({ case: 'prepare', value: { sceneId: message.scene_id } });
+        break;
       case 'hidden':
         this.session_.set_paused(message.hidden);
         if (message.hidden) this.pipeline_.discard_pending();
@@ -130,7 +137,10 @@ class Client {
       case 'present':
         // The leader's pictures and field of view are also those of others, who see no warped view.
         this.display_.may_overscan = !message.on;
-        this.session_.keep({ case: 'present', value: { on: message.on, name: message.name } });
+        this.session_.keep({ case: 'present', value: present_message(message) });
+        break;
+      case 'ping':
+        this.session_.send({ case: 'ping', value: { place: wire_vector(message.place) } });
         break;
       case 'stop':
         this.session_.stop();
@@ -203,10 +213,16 @@ class Client {
         picked: ({ id, hit, distance, spread }) =>
           say({ kind: 'picked', id, hit: hit ? { distance, spread } : undefined }),
         lead: (lead) => {
+          this.leader_ = lead.name;
           const { camera } = lead;
           say({ kind: 'lead', lead, eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad) });
         },
+        pinged: ({ place, byLeader }) => {
+          if (place) say({ kind: 'pinged', place: vector_of(place), by_leader: byLeader, name: this.leader_ });
+        },
+        company: ({ places }) => say({ kind: 'company_moved', places: places.map(vector_of) }),
         notice: (message) => say({ kind: 'notice', message }),
+        stayed: (message) => say({ kind: 'stayed', message }),
       },
       {
         sceneId: start.scene_id,
@@ -275,6 +291,10 @@ class Client {
     say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
   }
 }
+
+const present_message = ({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): PresentInit => ({
+  ...{ on, name, pings, tellsPlaces: tells_places },
+});
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
 

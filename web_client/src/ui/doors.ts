@@ -1,0 +1,148 @@
+// Leads visitors through portals. The old picture covers the new scene until that has one from where they arrive.
+import { same_view } from '../camera/same_view';
+import { address_in, arrival, door_of, type Door } from '../portals/portals';
+import { list_scenes, scene_name, type SceneListing } from '../session/scenes';
+import type { AccessToken } from '../session/token';
+import type { SharedView } from '../tour/share';
+import type { Portal, Tour } from '../tour/tour';
+import type { WorkerClient } from '../worker/client';
+import { make } from './dom';
+import type { Navigation } from './navigation';
+import type { Notice } from './notice';
+
+interface DoorParts {
+  readonly view: HTMLElement;
+  readonly worker: WorkerClient;
+  readonly navigation: Navigation;
+  readonly notice: Notice;
+  readonly token: AccessToken;
+}
+
+const prepare_again_ms = 60_000;
+const longest_cover_ms = 5000; // after the arrival
+const fade_ms = 400; // and a little
+
+export class Doors {
+  private scenes_: readonly SceneListing[] | undefined;
+  /** `by`: the portal; undefined: the browser's history. */
+  private going_: { readonly by: Portal | undefined } | undefined;
+  private awaited_: number | undefined; // the pose whose picture uncovers it, or a later one
+  private cover_: HTMLCanvasElement | undefined;
+  private readonly prepared_ms_ = new Map<string, number>();
+
+  /** `present`: the view that the visitor has now. */
+  constructor(
+    private readonly parts_: DoorParts,
+    private readonly present_: () => SharedView,
+  ) {
+    const { worker, navigation } = parts_;
+    worker.on('stayed', ({ message }) => this.stay(message));
+    worker.on('state', ({ state }) => {
+      if (state.phase === 'failed') this.stay();
+    });
+    worker.on('presented', ({ pose_id, pose }) => {
+      if (this.awaited_ === undefined) return;
+      // The server does not draw a pose again that gives the same picture.
+      const { camera } = navigation;
+      if (pose_id >= this.awaited_ || same_view(pose, camera.pose, camera.scene?.near_z ?? 0)) this.uncover();
+    });
+    window.addEventListener('popstate', () => {
+      if (this.leads_elsewhere) void this.go(undefined, this.address_scene);
+    });
+  }
+
+  /** The address is that of another scene. */
+  get leads_elsewhere(): boolean {
+    const { scene_id } = this.parts_.navigation;
+    return ![scene_id, scene_name(scene_id), ''].includes(this.address_scene);
+  }
+
+  /** Learns which scenes this visitor may enter, where a tour leads to one. */
+  async learn(tours: readonly Tour[]): Promise<void> {
+    if (tours.some(({ stops }) => stops.some(({ portal }) => portal))) await this.scenes();
+  }
+
+  async scenes(): Promise<readonly SceneListing[]> {
+    this.scenes_ ??= await list_scenes(location.href, this.parts_.token.value);
+    return this.scenes_;
+  }
+
+  behind(portal: Portal): Door {
+    return door_of(portal, this.scenes_ ?? []);
+  }
+
+  /** The visitor is near: asks the server to have the scene ready. */
+  prepare(portal: Portal): void {
+    const { scene_id } = this.behind(portal);
+    const now_ms = performance.now();
+    if (!scene_id || now_ms - (this.prepared_ms_.get(scene_id) ?? -Infinity) < prepare_again_ms) return;
+    this.prepared_ms_.set(scene_id, now_ms);
+    this.parts_.worker.post({ kind: 'prepare', scene_id });
+  }
+
+  enter(portal: Portal): void {
+    const { scene_id } = this.behind(portal);
+    if (!scene_id || this.going_) return;
+    const { navigation } = this.parts_;
+    navigation.taken_over.emit();
+    // The way back leads to this view.
+    history.replaceState(null, '', address_in(location.href, navigation.scene_id, this.present_()));
+    void this.go(portal, scene_id);
+  }
+
+  /** The other scene is there. Returns where the visitor arrives; undefined: as the address says. */
+  arrive(scene_id: string): SharedView | undefined {
+    const by = this.going_?.by;
+    if (!by) return undefined;
+    const { camera } = this.parts_.navigation;
+    const view = arrival(by, camera.up, camera.fov_y_rad);
+    history.pushState(null, '', address_in(location.href, scene_id, view));
+    return view;
+  }
+
+  /** The camera is where the visitor arrives. */
+  arrived(): void {
+    if (!this.going_) return;
+    this.going_ = undefined;
+    this.awaited_ = this.parts_.navigation.loop.sample();
+    setTimeout(() => this.uncover(), longest_cover_ms);
+  }
+
+  private get address_scene(): string {
+    return new URLSearchParams(location.search).get('scene') ?? '';
+  }
+
+  private async go(by: Portal | undefined, scene_id: string): Promise<void> {
+    this.going_ = { by };
+    this.awaited_ = undefined;
+    await this.cover();
+    this.parts_.worker.post({ kind: 'select', scene_id });
+  }
+
+  /** The server does not let the visitor in. */
+  private stay(why?: string): void {
+    const { navigation, notice } = this.parts_;
+    if (why) notice.show(why, 20);
+    if (this.going_ && !this.going_.by)
+      history.replaceState(null, '', address_in(location.href, navigation.scene_id, this.present_()));
+    this.going_ = undefined;
+    this.uncover();
+  }
+
+  private async cover(): Promise<void> {
+    const snapshot = await this.parts_.worker.snapshot();
+    if (!snapshot || this.cover_) return;
+    const { width_px: width, height_px: height, rgba } = snapshot;
+    this.cover_ = make('canvas', { width, height, className: 'cover', 'aria-hidden': 'true' });
+    this.cover_.getContext('2d')?.putImageData(new ImageData(rgba, width, height), 0, 0);
+    this.parts_.view.append(this.cover_);
+  }
+
+  private uncover(): void {
+    const { cover_: cover } = this;
+    this.awaited_ = undefined;
+    this.cover_ = undefined;
+    cover?.classList.add('over'); // fades
+    setTimeout(() => cover?.remove(), fade_ms);
+  }
+}
