@@ -23,7 +23,7 @@ const std::vector<Target>& targets() {
     for (const auto& of_file :
          {ply_targets(), splat_spz_targets(), gltf_targets(), levels_targets(), sog_targets(),
           scene_json_targets(), text_files_targets(), scene_size_targets(), tree_targets(),
-          network_targets()})
+          walk_targets(), network_targets()})
       joined.insert(joined.end(), of_file.begin(), of_file.end());
     return joined;
   }();

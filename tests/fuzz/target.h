@@ -45,6 +45,7 @@ std::vector<Target> sog_targets();
 std::vector<Target> splat_spz_targets();
 std::vector<Target> text_files_targets();
 std::vector<Target> tree_targets();
+std::vector<Target> walk_targets();
 
 /// All of them.
 const std::vector<Target>& targets();

@@ -1,0 +1,66 @@
+#include <algorithm>
+#include <cstring>
+
+#include "render_core/walk/walk_file.h"
+#include "render_core/walk/walker.h"
+#include "tests/fuzz/target.h"
+#include "tests/render_core/walk/hand_made_map.h"
+#include "tests/render_core/walk/seal.h"
+
+namespace catgs::fuzz {
+namespace {
+
+void require_clear(const walk::WalkMap& map, const walk::Stand& stand) {
+  require(map.clear_at(glm::ivec2(glm::floor(stand.place)), stand.height) != nullptr,
+          "a walker stands on clear ground");
+}
+
+/// An input is the header and then the stream as it is before it is packed. Sizes and checksum are
+/// written here.
+void parse_walk(Bytes input) {
+  std::string header = text_of(input.first(std::min(input.size(), test::walk_header_bytes)));
+  header.resize(test::walk_header_bytes);
+  const std::string bytes =
+      test::packed(header, text_of(input.subspan(std::min(input.size(), header.size()))));
+  const walk::WalkMap map =
+      walk::read_walk_file(MemorySource("input", std::as_bytes(std::span(bytes))));
+  walk::Stand at = map.start;
+  for (const glm::vec2 way : {glm::vec2(3, 1), glm::vec2(-7, 2), glm::vec2(1, -9)}) {
+    at = walk::move(map, at, way);
+    require_clear(map, at);
+  }
+  for (const walk::Stand& turn : walk::find_path(map, map.start, at)) require_clear(map, turn);
+  const std::string again = walk::pack(map);
+  require(walk::read_walk_file(MemorySource("again", std::as_bytes(std::span(again)))).places ==
+              map.places,
+          "what is read can be written");
+}
+
+std::map<std::string, std::string> walk_seeds() {
+  using walk::Kind;
+  const auto seed = [](const walk::WalkMap& map) {
+    return walk::pack(map).substr(0, test::walk_header_bytes) + walk::stream_of(map);
+  };
+  walk::WalkMap storeys = test::hand_made_map({4, 3}, [](int, int) { return Kind::clear; });
+  storeys.places.push_back({800, Kind::clear});
+  ++storeys.first.back();
+  storeys.storeys = {{0.0f, 10.0f, 12}, {40.0f, 50.0f, 1}};
+  return {
+      {"yard",
+       seed(test::hand_made_map(
+           {8, 5}, [](int x, int y) { return x == 5 && y < 3 ? Kind::obstacle : Kind::clear; }))},
+      {"storeys", seed(storeys)}};
+}
+
+}  // namespace
+
+std::vector<Target> walk_targets() {
+  return {{.name = "walk",
+           .parse = parse_walk,
+           .seeds = walk_seeds,
+           .dictionary = {"catgswlk", std::string("\0\0\x80\x7f", 4), std::string("\1\0\0\0", 4),
+                          std::string("\xff\xff\x7f", 3)},
+           .max_bytes = 2048}};
+}
+
+}  // namespace catgs::fuzz
