@@ -56,9 +56,9 @@ LAYERS = {name: rank for rank, line in enumerate([
     "server/scenes server/schedule server/counts", "server/visit server/films", "server/frame_path", "server",
     "web_client/src/base web_client/src/text web_client/src/wire",
     "web_client/src/camera web_client/src/decode web_client/src/measure web_client/src/transport",
-    "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour",
+    "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour web_client/src/walk",
     "web_client/src/worker web_client/src/captions web_client/src/portals web_client/src/film",
-    "web_client/src/ui", "web_client/src/media",
+    "web_client/src/ui", "web_client/src/media web_client/src/ground",
     "web_client/src/ui/viewer",
     "web_client/src/main",
 ]) for name in line.split()}

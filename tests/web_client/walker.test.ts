@@ -1,0 +1,196 @@
+// The client's reader, walker and paths against those of render_core/walk (walk_golden_test.cpp).
+import { deflateSync, inflateSync } from 'node:zlib';
+import { describe, expect, it } from 'vitest';
+import { find_path } from '#client/walk/path';
+import { clear_at, eyes_of, read_walk_file, storey_at, type Stand, type WalkMap } from '#client/walk/walk_map';
+import { move, stand_below, straight } from '#client/walk/walker';
+import golden from '../support/walk_golden.json';
+import { expect_vec } from './cameras';
+
+const file = Uint8Array.from(Buffer.from(golden.file, 'hex'));
+const map = await read_walk_file(file.buffer);
+const header_bytes = 320;
+
+const stand = ([east, north, height]: number[]): Stand => ({ east: east!, north: north!, height: height! });
+
+const is_clear = (on: WalkMap, { east, north, height }: Stand): boolean =>
+  clear_at(on, Math.floor(east), Math.floor(north), height) >= 0;
+
+const distance = (a: Stand, b: Stand): number => Math.hypot(a.east - b.east, a.north - b.north);
+
+/** Marsaglia's xorshift, 0…1. */
+function random_from(seed: number): () => number {
+  let state = seed;
+  return () => {
+    state ^= state << 13;
+    state ^= state >>> 17;
+    state ^= state << 5;
+    return (state >>> 0) / 2 ** 32;
+  };
+}
+
+/** A map in the world as it is read of a file: all at one height, where `clear` says so. */
+function flat_map(width: number, depth: number, clear: (x: number, y: number) => boolean): WalkMap {
+  const first = new Uint32Array(width * depth + 1);
+  const heights: number[] = [];
+  for (let c = 0; c < width * depth; ++c) {
+    if (clear(c % width, Math.floor(c / width))) heights.push(160);
+    first[c + 1] = heights.length;
+  }
+  const kinds = new Uint8Array(heights.length);
+  return { ...map, width, depth, first, heights: Uint16Array.from(heights), kinds };
+}
+
+function seal(bytes: Uint8Array<ArrayBuffer>): ArrayBuffer {
+  let crc = 0xffffffff;
+  for (const byte of bytes.subarray(16)) {
+    crc ^= byte;
+    for (let k = 0; k < 8; ++k) crc = crc & 1 ? (crc >>> 1) ^ 0xedb88320 : crc >>> 1;
+  }
+  new DataView(bytes.buffer).setUint32(12, ~crc >>> 0, true);
+  return bytes.buffer;
+}
+
+describe('a walk file', () => {
+  it('has the ground of its scene', () => {
+    expect(map.cell).toBeCloseTo(0.1, 6);
+    expect(map.storeys).toHaveLength(2);
+    expect(storey_at(map, stand(golden.below[1]!.stand).height)).toBe(1);
+    expect(is_clear(map, map.start)).toBe(true);
+  });
+
+  it('is refused where it is cut off or changed', async () => {
+    for (let size = 0; size < file.length; size += size < 330 ? 1 : 29)
+      await expect(read_walk_file(file.slice(0, size).buffer)).rejects.toThrow('walk file');
+    for (let k = 0; k < file.length; k += 3) {
+      const changed = file.slice();
+      changed[k]! ^= 16;
+      await expect(read_walk_file(changed.buffer), String(k)).rejects.toThrow('walk file');
+    }
+  });
+
+  it('is refused where its header is forged', async () => {
+    const forged = async (field: string, write: (view: DataView) => void): Promise<void> => {
+      const changed = file.slice();
+      write(new DataView(changed.buffer));
+      await expect(read_walk_file(seal(changed)), field).rejects.toThrow(field);
+    };
+    await forged('version', (view) => view.setUint32(8, 2, true));
+    await forged('origin', (view) => view.setFloat32(16, NaN, true));
+    await forged('axes', (view) => view.setFloat32(28, 0.5, true));
+    await forged('cell', (view) => view.setFloat32(64, 0, true));
+    await forged('person', (view) => view.setFloat32(76, -1, true));
+    await forged('start', (view) => view.setFloat32(92, 2000, true));
+    await forged('size', (view) => view.setUint32(104, 5000, true));
+    await forged('a place', (view) => view.setUint32(104, 2, true));
+    await forged('places', (view) => view.setUint32(112, 0xffffffff, true));
+    await forged('stream', (view) => view.setUint32(116, view.getUint32(116, true) - 1, true));
+    await forged('storeys', (view) => view.setUint32(124, 17, true));
+    await forged('storeys', (view) => view.setFloat32(128, NaN, true));
+  });
+
+  it('is refused where its stream is forged', async () => {
+    const stream = inflateSync(file.subarray(header_bytes));
+    const refused = async (change: (bytes: Uint8Array) => void): Promise<void> => {
+      const changed = Uint8Array.from(stream);
+      change(changed);
+      const packed = Uint8Array.from([...file.subarray(0, header_bytes), ...deflateSync(changed)]);
+      await expect(read_walk_file(seal(packed))).rejects.toThrow(/walk file: (columns|a place|heights) is/);
+    };
+    const columns = map.width * map.depth;
+    await refused((bytes) => (bytes[0] = 65));
+    await refused((bytes) => (bytes[columns] = 4));
+    await refused((bytes) => bytes.fill(128, columns + map.heights.length));
+    await refused((bytes) => bytes.fill(1, columns + map.heights.length));
+    // A stream that is no zlib stream at all.
+    await expect(read_walk_file(seal(file.slice(0, header_bytes + 9)))).rejects.toThrow();
+  });
+
+  it('costs no memory where its header names more than its stream can hold', async () => {
+    const changed = file.slice();
+    const view = new DataView(changed.buffer);
+    [104, 108].forEach((at) => view.setUint32(at, 2048, true));
+    view.setUint32(112, 2 ** 24, true);
+    view.setUint32(116, 2 ** 22 + 2 ** 25, true);
+    await expect(read_walk_file(seal(changed))).rejects.toThrow('unpacked bytes');
+  });
+});
+
+describe('a walker', () => {
+  it('goes where the one of render_core goes', () => {
+    expect(golden.moves.length).toBeGreaterThan(100);
+    for (const { from, way, to } of golden.moves) {
+      const { east, north, height } = move(map, stand(from), way[0]!, way[1]!);
+      expect_vec([east, north, height], [to[0]!, to[1]!, to[2]!], 3);
+    }
+  });
+
+  it('comes to stand where the one of render_core does', () => {
+    for (const { place, stand: below, eyes } of golden.below) {
+      const found = stand_below(map, [place[0]!, place[1]!, place[2]!])!;
+      expect_vec([found.east, found.north, found.height], [below[0]!, below[1]!, below[2]!], 3);
+      expect_vec(eyes_of(map, found), [eyes[0]!, eyes[1]!, eyes[2]!], 4);
+    }
+    expect(stand_below(map, [100, 0, 5])).toBeUndefined();
+    expect(stand_below(map, [-1, 1, -5])).toBeUndefined();
+  });
+
+  it('slides along a wall and does not pass it', () => {
+    const yard = flat_map(40, 40, (x, y) => x !== 20 || y >= 35);
+    const head_on = move(yard, { east: 15.5, north: 5.5, height: 10 }, 10, 0);
+    expect(head_on.east).toBeGreaterThan(19);
+    expect(head_on.east).toBeLessThan(20);
+    const aslant = move(yard, { east: 15.5, north: 5.5, height: 10 }, 10, 10);
+    expect(aslant.east).toBeLessThan(20);
+    expect(aslant.north).toBeGreaterThan(13);
+  });
+
+  it('never leaves clear ground in ten minutes', () => {
+    const random = random_from(1);
+    const debris = flat_map(60, 60, (x, y) => x + y < 5 || random() > 0.25);
+    for (const ground of [map, debris]) {
+      let at: Stand = ground === map ? map.start : { east: 0.5, north: 0.5, height: 10 };
+      let [x, y] = [0, 0];
+      let way = 0;
+      for (let frame = 0; frame < 10 * 60 * 60; ++frame) {
+        if (frame % 90 === 0) [x, y] = [random() - 0.5, random() - 0.5];
+        const before = at;
+        at = move(ground, at, x, y);
+        way += distance(before, at);
+        if (!is_clear(ground, at)) throw new Error(`frame ${frame}: off the ground at ${JSON.stringify(at)}`);
+        if (Math.abs(at.height - before.height) > ground.step) throw new Error(`frame ${frame}: fell`);
+      }
+      expect(way).toBeGreaterThan(500);
+    }
+  });
+});
+
+describe('a path', () => {
+  it('is as long as that of render_core', () => {
+    for (const { from, to, length } of golden.paths) {
+      const path = find_path(map, stand(from), stand(to));
+      expect(path[0]).toEqual(stand(from));
+      expect(path.at(-1)).toEqual(stand(to));
+      const steps = path.slice(1).map((at, k) => [path[k]!, at] as const);
+      for (const [a, b] of steps) expect(straight(map, a, b)).toBe(true);
+      const total = steps.reduce((sum, [a, b]) => sum + distance(a, b), 0);
+      // Of ways that are as short over the grid, the straight pieces may differ.
+      expect(Math.abs(total - length)).toBeLessThan(0.02 * length);
+    }
+  });
+
+  it('leads around a wall', () => {
+    const yard = flat_map(40, 40, (x, y) => x !== 20 || y >= 35);
+    const path = find_path(yard, { east: 15.5, north: 5.5, height: 10 }, { east: 25.5, north: 5.5, height: 10 });
+    const total = path.slice(1).reduce((sum, at, k) => sum + distance(path[k]!, at), 0);
+    expect(total).toBeGreaterThan(59.5);
+    expect(total).toBeLessThan(64);
+  });
+
+  it('is none where there is no way', () => {
+    const parted = flat_map(40, 10, (x) => x !== 20);
+    const at = (east: number): Stand => ({ east, north: 5.5, height: 10 });
+    for (const [from, to] of [[5.5, 30.5], [5.5, 20.5], [-5.5, 5.5]] as const)
+      expect(find_path(parted, at(from), at(to))).toEqual([]);
+  });
+});

@@ -1,0 +1,83 @@
+// A body that walks on a WalkMap: the same steps as render_core/walk/walker.h, which is its oracle.
+import type { Vec3 } from '../base/vector';
+import { clear_at, height_of, Kind, places_at, to_grid, type Stand, type WalkMap } from './walk_map';
+
+const piece = 0.4; // cells; a body moves by at most this much at a time
+const most_pieces = 25_000;
+const aside = [0, 1, -1, 2, -2, 3, -3].map((k) => (k * Math.PI) / 8);
+
+/** Height of the ground at a place, bilinear between the middles of cells; undefined off clear ground. */
+export function ground_at(map: WalkMap, east: number, north: number, height: number): number | undefined {
+  const here = clear_at(map, Math.floor(east), Math.floor(north), height);
+  if (here < 0) return undefined;
+  const own = height_of(map, here);
+  const column = Math.floor(east - 0.5);
+  const row = Math.floor(north - 0.5);
+  const at = (x: number, y: number): number => {
+    const found = clear_at(map, column + x, row + y, own);
+    return found < 0 ? own : height_of(map, found);
+  };
+  const mix = (a: number, b: number, share: number): number => a + (b - a) * share;
+  const x = east - 0.5 - column;
+  return mix(mix(at(0, 0), at(1, 0), x), mix(at(0, 1), at(1, 1), x), north - 0.5 - row);
+}
+
+function try_piece(map: WalkMap, from: Stand, x: number, y: number): Stand | undefined {
+  const east = from.east + x;
+  const north = from.north + y;
+  const here = [Math.floor(from.east), Math.floor(from.north)] as const;
+  const there = [Math.floor(east), Math.floor(north)] as const;
+  let ground = clear_at(map, ...here, from.height);
+  if (ground < 0) return undefined;
+  if (here[0] !== there[0] && here[1] !== there[1]) {
+    // Two cells that touch in a corner alone: the body passes through one of those beside them.
+    const height = height_of(map, ground);
+    ground = clear_at(map, there[0], here[1], height);
+    if (ground < 0) ground = clear_at(map, here[0], there[1], height);
+    if (ground < 0) return undefined;
+  }
+  const height = ground_at(map, east, north, height_of(map, ground));
+  return height === undefined ? undefined : { east, north, height };
+}
+
+/** The clear ground below a place of the world, where a visitor would come to stand. */
+export function stand_below(map: WalkMap, place: Vec3): Stand | undefined {
+  const [east, north, height] = to_grid(map, place);
+  const [first, end] = places_at(map, Math.floor(east), Math.floor(north));
+  let stand: Stand | undefined;
+  for (let i = first; i < end; ++i)
+    if (map.kinds[i] === Kind.clear && height_of(map, i) <= height + map.step)
+      stand = { east, north, height: height_of(map, i) };
+  return stand;
+}
+
+/** Where a walker comes that wants to move by (x, y) cells to the east and north; it slides along walls. */
+export function move(map: WalkMap, from: Stand, x: number, y: number): Stand {
+  const pieces = Math.min(Math.ceil(Math.hypot(x, y) / piece), most_pieces);
+  let at = from;
+  for (let k = 0; k < pieces; ++k) {
+    let next: Stand | undefined;
+    for (const angle of aside) {
+      const c = Math.cos(angle);
+      const s = Math.sin(angle);
+      next = try_piece(map, at, (c * (c * x - s * y)) / pieces, (c * (s * x + c * y)) / pieces);
+      if (next) break;
+    }
+    if (!next) break;
+    at = next;
+  }
+  return at;
+}
+
+/** Whether a walker gets from `from` to `to` on the straight line. */
+export function straight(map: WalkMap, from: Stand, to: Stand): boolean {
+  const [x, y] = [to.east - from.east, to.north - from.north];
+  const pieces = Math.ceil(Math.hypot(x, y) / piece);
+  let at = from;
+  for (let k = 0; k < pieces; ++k) {
+    const next = try_piece(map, at, x / pieces, y / pieces);
+    if (!next) return false;
+    at = next;
+  }
+  return Math.abs(at.height - to.height) <= map.step;
+}
