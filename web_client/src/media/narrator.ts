@@ -23,7 +23,12 @@ export class Narrator {
       if (sounds_.speaks) sounds_.hush(true);
       else sounds_.resume();
     });
-    for (const end of ['ended', 'error']) voice_.addEventListener(end, () => sounds_.voice_ended());
+    voice_.addEventListener('ended', () => sounds_.voice_ended());
+    voice_.addEventListener('error', () => {
+      this.words_.textContent = `${text.media.missing} ${text.media.narration}`;
+      this.words_.hidden = false;
+      sounds_.voice_ended();
+    });
   }
 
   /** Another stop is shown: nothing speaks any more. */

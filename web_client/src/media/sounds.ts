@@ -29,7 +29,8 @@ export class Sounds {
   private hidden_ = false;
   private voice_: 'none' | 'speaks' | 'paused' = 'none';
   private films_ = 0; // that play
-  private background_volume_ = 0; // 0: the tour has no sound
+  private background_ = ''; // the address of the tour's sound
+  private background_volume_ = 0; // 0: it has none
   private background_plays_ = false;
   private waiting_: (() => void)[] = [];
 
@@ -86,11 +87,12 @@ export class Sounds {
   set_background(address: string, volume: number): void {
     const { background } = this.env_;
     this.background_volume_ = address ? volume : 0;
-    if (background.src !== address) {
+    if (address !== this.background_) {
       background.pause();
       this.background_plays_ = false;
-      background.src = address;
+      if (address) background.src = address;
     }
+    this.background_ = address;
     this.update();
   }
 

@@ -11,16 +11,16 @@ interface FilmListener {
 }
 
 export class StopMedia {
-  private readonly host_ = make('div', { id: 'tour-media' });
+  private readonly host_ = make('div', { id: 'tour-media', role: 'group', 'aria-label': text.media.of_stop });
   private shown_: readonly Medium[] = [];
   private films_: HTMLMediaElement[] = [];
   private muted_ = false;
 
   constructor(private readonly listener_: FilmListener) {
     by_id('tour', HTMLElement).prepend(this.host_);
-    // The keys of a film are not those of the page.
+    // The keys of a film, and those that scroll, are not those of the page.
     this.host_.addEventListener('keydown', (event) => {
-      if (event.target instanceof HTMLMediaElement) event.stopPropagation();
+      if (event.target instanceof HTMLMediaElement || event.target === this.host_) event.stopPropagation();
     });
   }
 
@@ -31,6 +31,7 @@ export class StopMedia {
     this.films_ = [];
     this.host_.replaceChildren(...media.map((medium) => this.figure_of(medium, addresses)));
     this.host_.classList.toggle('several', media.length > 1);
+    this.host_.removeAttribute('tabindex');
     this.host_.scrollLeft = 0;
   }
 
@@ -44,6 +45,7 @@ export class StopMedia {
     const fail = (): void => {
       const said = make('span', { dir: 'auto', lang: medium.language }, medium.alt || medium.src);
       figure.replaceChildren(make('p', { className: 'missing' }, text.media.missing, make('br'), said));
+      this.host_.tabIndex = 0; // what is left may hold nothing to reach by Tab
     };
     if (medium.kind === 'image') figure.append(this.picture_of(medium, addresses, fail));
     else figure.append(this.film_of(medium, addresses, fail));
