@@ -9,7 +9,7 @@ usage() {
 usage: deploy/run.sh [SCENE...] [options] [catgs-server options]
 
 Installs what the build needs, builds the server and the browser client, and serves the scenes.
-Without a SCENE it makes a procedural city of 300,000 Gaussians and serves that.
+Without a SCENE it makes a procedural city of 300,000 Gaussians and a garden, and serves these with tours.
 SCENE is a .ply, .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf, .lcc2 or .tree file, or a folder: SOG,
 streamed SOG, 3D Tiles, or a training output.
 
@@ -37,7 +37,8 @@ port=8080
 lan=0
 allow_cuda=1
 log=$build_dir/run.log
-demo_scene=$build_dir/scenes/city.ply
+readonly demo_dir=$build_dir/scenes
+readonly demo_scenes=("$demo_dir/city.ply" "$demo_dir/garden.ply")
 
 parse_arguments() {
   while (($# > 0)); do
@@ -112,9 +113,11 @@ check_system() {
   grep -E "^Mem(Total|Available):" /proc/meminfo
 }
 
-make_demo_scene() {
-  mkdir -p "$(dirname "$demo_scene")"
-  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$demo_scene"
+make_demo_scenes() {
+  mkdir -p "$demo_dir"
+  "$bin_dir/catgs-render" synth garden --gaussians 150000 --seed 1 "$demo_dir/garden.ply"
+  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$demo_dir/city.ply"
+  cp -r "$SOURCE_DIR"/deploy/demo/{city,garden}.* "$demo_dir"
 }
 
 ensure_scene() {
@@ -123,10 +126,10 @@ ensure_scene() {
     return
   fi
   # Like make: a newer generator may draw another city.
-  if [[ $demo_scene -nt $bin_dir/catgs-render ]]; then
-    step_done "Demo scene: city, 300,000 Gaussians, already made"
+  if [[ ${demo_scenes[0]} -nt $bin_dir/catgs-render && ${demo_scenes[0]} -nt $SOURCE_DIR/deploy/demo/city.json ]]; then
+    step_done "Demo scenes: city, 300,000 Gaussians, and garden, already made"
   else
-    step "Make the demo scene: city, 300,000 Gaussians" make_demo_scene
+    step "Make the demo scenes: city, 300,000 Gaussians, and garden" make_demo_scenes
   fi
 }
 
@@ -172,8 +175,10 @@ server_log=""
 metrics_note=""
 
 compose_server_command() {
+  local served=("${scenes[@]}")
+  ((${#served[@]} > 0)) || served=("${demo_scenes[@]}")
   server_log=$build_dir/server-$port.log  # one each: several may serve from here
-  server_command=("$bin_dir/catgs-server" --scene "${scenes[@]:-$demo_scene}" --port "$port"
+  server_command=("$bin_dir/catgs-server" --scene "${served[@]}" --port "$port"
     --log-level info)
   if ((lan)); then
     server_command+=(--bind 0.0.0.0 --token-file "$lan_dir/token"

@@ -135,6 +135,11 @@ export class CameraController {
     this.fly_to(this.controller.approach(point), point, at_once);
   }
 
+  /** Whether the camera may leave the scene's limits, until another scene. */
+  set unlimited(unlimited: boolean) {
+    this.rig_.unlimited = unlimited;
+  }
+
   /** The place nearest to this one that the scene's limits allow. */
   within(position: Vec3): Vec3 {
     return this.rig_.within(position);

@@ -34,6 +34,8 @@ export class CameraRig {
   reach = 1;
   /** The camera comes no nearer to its focus. World units. */
   nearest = 0.1;
+  /** The camera may leave the scene's limits, to look at it from outside. */
+  unlimited = false;
   private fov_y_rad_ = default_fov_y_rad;
   private min_: Vec3 = [0, 0, 0];
   private max_: Vec3 = [0, 0, 0];
@@ -65,6 +67,7 @@ export class CameraRig {
     const unlimited = scene.limits_max.every((v, i) => v <= scene.limits_min[i]!);
     this.min_ = unlimited ? scale(nowhere, -1) : min(scene.limits_min, start.position);
     this.max_ = unlimited ? nowhere : max(scene.limits_max, start.position);
+    this.unlimited = false;
   }
 
   /** From the eye to the focus; the scene's scale where the focus is too near to pan by. */
@@ -79,11 +82,11 @@ export class CameraRig {
   }
 
   within(position: Vec3): Vec3 {
-    return min(max(position, this.min_), this.max_);
+    return this.unlimited ? position : min(max(position, this.min_), this.max_);
   }
 
   contains(p: Vec3): boolean {
-    return p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9);
+    return this.unlimited || p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9);
   }
 
   /** Removes the part along up. */

@@ -12,6 +12,12 @@ export interface Eye extends Pose {
   readonly fov_y_rad: number;
 }
 
+/** Leaves out Gaussians whose centre c has dot(normal, c) > offset. World axes and units. */
+export interface ClipPlane {
+  readonly normal: Vec3;
+  readonly offset: number;
+}
+
 /** This page's camera at one time. */
 export interface CameraSample {
   readonly pose_id: number;

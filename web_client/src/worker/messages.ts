@@ -1,6 +1,6 @@
 // Messages between page and worker. They are structured clones, so they hold plain data only.
 import type { Vec3 } from '../base/vector';
-import type { Pose, CameraSample, Eye } from '../camera/eye';
+import type { CameraSample, ClipPlane, Eye, Pose } from '../camera/eye';
 import type { PathSample } from '../camera/flight';
 import type { Ray } from '../camera/ray';
 import type { DecoderRung } from '../decode/ladder';
@@ -51,6 +51,8 @@ export type ToWorker =
   | { kind: 'select'; scene_id: string }
   /** The visitor may go to this scene soon. */
   | { kind: 'prepare'; scene_id: string }
+  /** Undefined: nothing is left out. */
+  | { kind: 'clip'; plane: ClipPlane | undefined }
   | { kind: 'hidden'; hidden: boolean }
   | { kind: 'retry' }
   | { kind: 'token'; token: string }

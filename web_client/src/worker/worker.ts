@@ -1,6 +1,6 @@
 // The worker does everything between socket and canvas, so that a busy page delays no picture.
 import { browser_timers, clock_from } from '../base/clock';
-import type { CameraSample, Eye } from '../camera/eye';
+import type { CameraSample, ClipPlane, Eye } from '../camera/eye';
 import type { Ray } from '../camera/ray';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
@@ -110,6 +110,9 @@ class Client {
         break;
       case 'pick':
         this.pick(message.id, message.ray);
+        break;
+      case 'clip':
+        this.session_.keep({ case: 'clip', value: clip_message(message.plane) });
         break;
       case 'select':
         this.session_.select_scene(message.scene_id);
@@ -295,6 +298,9 @@ class Client {
 const present_message = ({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): PresentInit => ({
   ...{ on, name, pings, tellsPlaces: tells_places },
 });
+
+const clip_message = (plane: ClipPlane | undefined): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
+  plane ? { normal: wire_vector(plane.normal), offset: plane.offset } : {};
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
 
