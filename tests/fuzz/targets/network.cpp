@@ -97,6 +97,9 @@ void require_sound(const ClipPlane& plane) {
   require_place(plane.normal);
   require(std::isfinite(plane.offset), "planes are somewhere");
 }
+void require_sound(const Ping& ping) { require_place(ping.place); }
+
+void require_sound(const Prepare& wish) { require_text(wish.scene_id, 128); }
 
 template <class Message>
 void require_sound(const Message&) {}  // nothing in it has a limit
@@ -144,6 +147,8 @@ std::map<std::string, std::string> client_message_seeds() {
   add("path", [](auto& m) {
     for (std::uint64_t id = 1; id < 4; ++id) fill(*m.mutable_path()->add_samples(), id);
   });
+  add("ping", [](auto& m) { m.mutable_ping()->mutable_place()->set_y(-1.5f); });
+  add("prepare", [](auto& m) { m.mutable_prepare()->set_scene_id("hall"); });
   add("ack", [](auto& m) {
     m.mutable_ack()->set_frame_id(9);
     m.mutable_ack()->set_received_us(10);

@@ -120,6 +120,43 @@ TEST_F(SceneLibraryTime, APosterStaysWhenItsSceneGoes) {
   run_until([&] { return shown("b").poster == nullptr; });
 }
 
+TEST_F(SceneLibraryTime, APreparedSceneIsThereWhenItsVisitorComes) {
+  library_->prepare(id("a"), now_);
+  run_until([&] { return in_memory("a"); });
+  EXPECT_TRUE(std::holds_alternative<Entry>(library_->want(id("a"), now_)));
+  library_->prepare("nowhere", now_);
+}
+
+TEST_F(SceneLibraryTime, PreparingReleasesNoSceneButOneThatWasPrepared) {
+  config_.scene_memory_mb = 0;
+  start();
+  for (const char* name : {"a", "b"}) {
+    library_->prepare(id(name), now_);
+    run_until([&] { return in_memory(name); });
+  }
+  library_->prepare(id("c"), now_);
+  tick(1s);
+  EXPECT_FALSE(in_memory("c")) << "two wait for visitors already";
+  tick(30s);
+  library_->prepare(id("c"), now_);
+  run_until([&] { return in_memory("c"); });
+  EXPECT_FALSE(in_memory("a"));
+  EXPECT_TRUE(in_memory("b"));
+}
+
+TEST_F(SceneLibraryTime, PreparingMakesNoRoom) {
+  load("a");
+  load("b");
+  tick(60s);  // nobody looks at them
+  library_->prepare(id("c"), now_);
+  tick(1s);
+  EXPECT_TRUE(in_memory("a") && in_memory("b"));
+  EXPECT_FALSE(in_memory("c"));
+  EXPECT_TRUE(awaited("c")) << "a visitor may still ask";
+  library_->prepare(id("c"), now_);
+  run_until([&] { return in_memory("c"); });
+}
+
 TEST_F(SceneLibraryTime, NobodyWaitsForAPoster) {
   const auto has_poster = [&](const std::string& name) {
     const auto listing = library_->listing();

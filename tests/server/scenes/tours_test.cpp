@@ -109,6 +109,15 @@ TEST(SentSidecar, OfAWholeTourIsTaken) {
   EXPECT_NO_THROW(check_sent_sidecar("{}"));
 }
 
+TEST(SentSidecar, PortalsLeadToAViewAStopOrTheStartOfAScene) {
+  for (const char* portal :
+       {R"({"scene": "hall"})", R"({"scene": "hall-kdfmqrtv", "tour": 2, "stop": 256})",
+        R"({"scene": "hall", "position": [1, 2, 3], "look_at": [0, 0, 0], "fov_deg": 50})",
+        R"({"scene": "hall", "position": [1, 2, 3], "orientation": [0, 0, 0, 1]})"})
+    EXPECT_NO_THROW(check_sent_sidecar(with_stop(fmt::format(R"(, "portal": {})", portal))))
+        << portal;
+}
+
 std::string mistake(const std::string& json) {
   try {
     check_sent_sidecar(json);
@@ -116,6 +125,24 @@ std::string mistake(const std::string& json) {
     return error.what();
   }
   return "";
+}
+
+TEST(SentSidecar, OfAPortalIsRefusedByTheFieldThatIsWrong) {
+  const auto of = [](std::string_view portal) {
+    return mistake(with_stop(fmt::format(R"(, "portal": {})", portal)));
+  };
+  EXPECT_THAT(of("7"), HasSubstr("portal: is not an object"));
+  EXPECT_THAT(of("{}"), HasSubstr("'scene' is missing"));
+  EXPECT_THAT(of(R"({"scene": ""})"), HasSubstr("portal.scene: is not 1 to 128 bytes"));
+  EXPECT_THAT(of(fmt::format(R"({{"scene": "{}"}})", std::string(129, 'a'))),
+              HasSubstr("portal.scene: is not 1 to 128 bytes"));
+  EXPECT_THAT(of(R"({"scene": "hall", "where": 1})"), HasSubstr("unknown field 'where'"));
+  EXPECT_THAT(of(R"({"scene": "hall", "stop": 0})"), HasSubstr("portal.stop: is not in 1"));
+  EXPECT_THAT(of(R"({"scene": "hall", "stop": 257})"), HasSubstr("portal.stop: is not in 1"));
+  EXPECT_THAT(of(R"({"scene": "hall", "tour": 1.5})"), HasSubstr("tour: is no whole number"));
+  EXPECT_THAT(of(R"({"scene": "hall", "position": [0, 0, 0]})"), HasSubstr("orientation"));
+  EXPECT_THAT(of(R"({"scene": "hall", "stop": 1, "position": [0, 0, 0], "look_at": [0, 0, 1]})"),
+              HasSubstr("leads to a view and to a stop"));
 }
 
 TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {

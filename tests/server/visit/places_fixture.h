@@ -42,6 +42,9 @@ class OpenConnection final : public Connection {
     if (parsed.has_config()) config = parsed.config();
     if (parsed.has_error()) error = parsed.error();
     if (parsed.has_heartbeat()) ++heartbeats;
+    if (parsed.has_lead()) lead = parsed.lead();
+    if (parsed.has_pinged()) pinged.push_back(parsed.pinged());
+    if (parsed.has_company()) companies.push_back(parsed.company());
     waits = parsed.has_queue();
     if (waits) estimate_s = parsed.queue().estimate_s();
   }
@@ -61,6 +64,9 @@ class OpenConnection final : public Connection {
   bool waits = false;
   std::uint32_t estimate_s = 0;  // of a wait
   int heartbeats = 0;
+  std::optional<v1::Lead> lead;
+  std::vector<v1::Pinged> pinged;
+  std::vector<v1::Company> companies;
   std::vector<std::uint64_t> frames;
   int idrs = 0;
 
@@ -138,8 +144,10 @@ class OneScene final : public SceneSource {
   SceneAnswer want(const std::string&, TimePoint) override {
     return std::shared_ptr<const SceneEntry>(scene_);
   }
+  void prepare(const std::string& id, TimePoint) override { prepared.push_back(id); }
   void on_tick(TimePoint) override {}
 
+  std::vector<std::string> prepared;
   std::vector<std::string> ids = {"scene"};
 
  private:

@@ -138,5 +138,105 @@ TEST_F(PlacesTest, RefusesConnectionsBeyondAllPlaces) {
   EXPECT_FALSE(connections[connections.size() - 2]->closed);
 }
 
+/// A leader and one who follows.
+class CompanyTest : public PlacesTest {
+ protected:
+  void begin(bool pings, bool tells_places) {
+    start();
+    leader = &join();
+    present(pings, tells_places);
+    follower = &join();
+    v1::ClientMessage message;
+    message.mutable_follow()->set_watch(leader->connection->welcome->watch_token());
+    say(*follower, message);
+    run_until([&] { return follower->connection->lead.has_value(); });
+  }
+  void present(bool pings, bool tells_places) {
+    v1::ClientMessage message;
+    message.mutable_present()->set_on(true);
+    message.mutable_present()->set_pings(pings);
+    message.mutable_present()->set_tells_places(tells_places);
+    say(*leader, message);
+    run_until(
+        [&] { return leader->connection->lead && leader->connection->lead->may_ping() == pings; });
+  }
+  /// How many pings both of them hear of `count` that this visitor sends.
+  std::size_t heard_of(Visitor& from, int count) {
+    const std::size_t before = leader->connection->pinged.size();
+    v1::ClientMessage message;
+    message.mutable_ping()->mutable_place()->set_x(7.0f);
+    for (int i = 0; i < count; ++i) say(from, message);
+    run_for(100ms);
+    EXPECT_EQ(leader->connection->pinged.size(), follower->connection->pinged.size());
+    return leader->connection->pinged.size() - before;
+  }
+
+  Visitor* leader = nullptr;
+  Visitor* follower = nullptr;
+};
+
+TEST_F(CompanyTest, AllSeeWhereTheLeaderPointsTwiceASecondAtMost) {
+  begin(false, false);
+  EXPECT_EQ(heard_of(*leader, 20), 2u);
+  const v1::Pinged& last = follower->connection->pinged.back();
+  EXPECT_EQ(last.place().x(), 7.0f);
+  EXPECT_TRUE(last.by_leader());
+}
+
+TEST_F(CompanyTest, FollowersPointWhereTheLeaderLetsThem) {
+  begin(false, false);
+  EXPECT_FALSE(follower->connection->lead->may_ping());
+  EXPECT_EQ(heard_of(*follower, 1), 0u);
+  present(true, false);
+  run_until([&] { return follower->connection->lead->may_ping(); });
+  EXPECT_EQ(heard_of(*follower, 1), 1u);
+  EXPECT_FALSE(leader->connection->pinged.back().by_leader());
+  Visitor& stranger = join();
+  EXPECT_EQ(heard_of(stranger, 1), 0u) << "who follows nobody points at nothing";
+}
+
+TEST_F(CompanyTest, NobodyIsToldWhereOthersAreUnlessTheLeaderWantsIt) {
+  begin(false, false);
+  move(*leader);
+  move(*follower);
+  run_for(700ms);
+  EXPECT_TRUE(leader->connection->companies.empty());
+  EXPECT_TRUE(follower->connection->companies.empty());
+}
+
+TEST_F(CompanyTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
+  begin(false, true);
+  const auto& told = follower->connection->companies;
+  move(*leader);
+  move(*follower);
+  move(*follower);
+  run_until([&] { return !told.empty() && told.back().places_size() == 2; });
+  EXPECT_EQ(told.back().places(0).x(), 1.0f) << "the leader first";
+  EXPECT_EQ(told.back().places(1).x(), 2.0f);
+  const std::size_t before = told.size();
+  run_for(1200ms);
+  EXPECT_EQ(told.size(), before) << "nobody moves";
+  present(false, false);
+  run_until([&] { return told.back().places_size() == 0; });
+  EXPECT_EQ(leader->connection->companies.size(), told.size());
+}
+
+TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
+  authorize = [](const auto&) {
+    return [](std::string_view scene_id, Use) -> Refusal {
+      return scene_id == "vault" ? Refusal("not yours") : std::nullopt;
+    };
+  };
+  start();
+  Visitor& visitor = join();
+  for (const char* id : {"vault", "hall", "attic", "barn", "garden"}) {
+    v1::ClientMessage message;
+    message.mutable_prepare()->set_scene_id(id);
+    say(visitor, message);
+  }
+  run_for(100ms);
+  EXPECT_THAT(scenes.prepared, testing::ElementsAre("hall", "attic"));
+}
+
 }  // namespace
 }  // namespace catgs::test

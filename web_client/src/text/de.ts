@@ -199,7 +199,7 @@ export const text: Texts = {
     closed: (scene) => `Zu ${scene} führt für Sie kein Weg. Die Szene fehlt hier, oder Ihr Link öffnet sie nicht.`,
     leads_to: 'Führt zu',
     nowhere: 'keiner anderen Szene',
-    of_stop: (n) => `Szene, zu der Halt ${n} führt`,
+    of_stop: (n) => `Szene, zu der Station ${n} führt`,
   },
   film: {
     title: 'Bilder und Film',
@@ -219,7 +219,7 @@ export const text: Texts = {
     cancelled: 'Abgebrochen.',
     failed: (why) => `Es ist nicht entstanden: ${why}`,
     not_author: 'Um hier etwas zu erstellen, öffnen Sie einen Link mit der Rolle author. Die Kamerafahrt eines Films können alle speichern.',
-    no_stops: 'Diese Tour hat noch keine Halte.',
+    no_stops: 'Diese Tour hat noch keine Stationen.',
     too_long: (most, length) => `Ein Film dauert höchstens ${most}. Diese Tour dauert ${length}.`,
     path_saved: (command) => `Die Kamerafahrt ist gespeichert. So entsteht der Film: ${command}`,
   },

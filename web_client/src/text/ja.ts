@@ -200,7 +200,7 @@ export const text: Texts = {
     closed: (scene) => `${scene}へは進めません。シーンがここにないか、このリンクでは開けません。`,
     leads_to: '行き先',
     nowhere: 'ほかのシーンなし',
-    of_stop: (n) => `${n}番目の地点の行き先のシーン`,
+    of_stop: (n) => `${n}番目のスポットの行き先のシーン`,
   },
   film: {
     title: '画像と動画',
@@ -220,7 +220,7 @@ export const text: Texts = {
     cancelled: 'キャンセルしました。',
     failed: (why) => `作成できませんでした: ${why}`,
     not_author: 'ここで作成するには、authorロールのリンクを開いてください。動画のカメラの経路は誰でも保存できます。',
-    no_stops: 'このツアーにはまだ地点がありません。',
+    no_stops: 'このツアーにはまだスポットがありません。',
     too_long: (most, length) => `動画は最長${most}です。このツアーは${length}かかります。`,
     path_saved: (command) => `経路を保存しました。動画の作り方: ${command}`,
   },

@@ -1,0 +1,72 @@
+// Messages of companies and of portals.
+#include <limits>
+#include <span>
+#include <string>
+#include <variant>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/catgs.pb.h"
+#include "server/net/wire.h"
+
+namespace catgs {
+namespace {
+
+using testing::HasSubstr;
+
+std::variant<ClientMessage, wire::ParseError> parse(const v1::ClientMessage& message) {
+  const std::string text = message.SerializeAsString();
+  return wire::parse_client_message(std::as_bytes(std::span(text)));
+}
+
+template <typename T>
+T parsed(const v1::ClientMessage& message) {
+  return std::get<T>(std::get<ClientMessage>(parse(message)));
+}
+
+std::string complaint(const v1::ClientMessage& message) {
+  const auto result = parse(message);
+  const auto* error = std::get_if<wire::ParseError>(&result);
+  return error ? error->what : "";
+}
+
+std::string hex(const std::vector<std::byte>& bytes) {
+  std::string text;
+  for (const std::byte b : bytes) text += fmt::format("{:02x}", std::to_integer<unsigned>(b));
+  return text;
+}
+
+TEST(WireCompany, BoundsThePlaceOfAPingAndTheNameOfAScene) {
+  v1::ClientMessage message;
+  message.mutable_ping()->mutable_place()->set_z(-4.0f);
+  EXPECT_EQ(parsed<Ping>(message).place.z, -4.0f);
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 2e9f}) {
+    message.mutable_ping()->mutable_place()->set_z(bad);
+    EXPECT_THAT(complaint(message), HasSubstr("ping.place.z"));
+  }
+  message.mutable_prepare()->set_scene_id(std::string(129, 'a'));
+  EXPECT_THAT(complaint(message), HasSubstr("prepare.scene_id"));
+  message.mutable_prepare()->set_scene_id("hall");
+  EXPECT_EQ(parsed<Prepare>(message).scene_id, "hall");
+}
+
+TEST(WireCompany, TellsWhereACompanyIs) {
+  EXPECT_EQ(wire::serialize(Pinged{}).topic, Topic::ping);
+  EXPECT_EQ(wire::serialize(Company{}).topic, Topic::company);
+  EXPECT_EQ(hex(wire::serialize(Pinged{{1.0f, 0.0f, 0.0f}, true}).bytes),
+            "01"
+            "5209"
+            "0a050d0000803f"
+            "1001");
+  EXPECT_EQ(hex(wire::serialize(Company{{{1.0f, 0.0f, 0.0f}, {}}}).bytes),
+            "01"
+            "5a09"
+            "0a050d0000803f"
+            "0a00");
+}
+
+}  // namespace
+}  // namespace catgs
