@@ -202,6 +202,7 @@ SceneHints City::hints() const {
                   at(city_centre.x + radius_, 0.5f, city_centre.y + radius_)};
   // On the view axis, over the middle of the crossing: an orbit stays between the houses.
   hints.focus = at(-0.4f, 7.0f, -2.7f);
+  hints.about.metres_per_unit = 1.0f;
   hints.source = "procedural";
   return hints;
 }

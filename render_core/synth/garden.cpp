@@ -191,6 +191,7 @@ Scene make_garden(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   scene.hints.scale = 3.0f;
   scene.hints.limits = {at(-half_m, 3.0f, -half_m), at(half_m, 0.15f, half_m)};
   scene.hints.focus = at(0, 0.6f, 0);
+  scene.hints.about.metres_per_unit = 1.0f;
   scene.hints.source = "procedural";
   return scene;
 }

@@ -177,6 +177,7 @@ Scene make_stress(std::size_t count, std::uint64_t seed, ThreadPool& pool) {
   scene.hints.scale = 5.0f;
   scene.hints.limits = {at(-room_m, 5.0f, -room_m), at(room_m, 0.2f, room_m)};
   scene.hints.focus = at(0, 1.2f, 0);
+  scene.hints.about.metres_per_unit = 1.0f;
   scene.hints.source = "procedural";
   return scene;
 }

@@ -6,6 +6,8 @@
 #include <glm/common.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "render_core/base/error.h"
+
 namespace catgs::walk {
 namespace {
 
@@ -75,11 +77,12 @@ std::size_t Occupancy::spread(const GaussianCloud& part, std::size_t i, Shares& 
   return count;
 }
 
-void Occupancy::take(const std::vector<Share>& from) {
+void Occupancy::take(const std::vector<Share>& from, std::size_t& blocks_taken) {
   for (const Share& share : from) {
     std::vector<Block>& column = columns_[share.column];
     auto block = std::ranges::lower_bound(column, share.level, {}, &Block::level);
     if (block == column.end() || block->level != share.level) {
+      if (++blocks_taken > most_blocks_of_shard_) return;
       const auto at = block - column.begin();
       if (column.size() == column.capacity()) column.reserve(column.size() + column.size() / 4 + 1);
       block = column.insert(column.begin() + at, Block{share.level});
@@ -111,8 +114,11 @@ void Occupancy::add(const GaussianCloud& part, ThreadPool& pool) {
         count += spread(part, chunk.next, chunk.shares);
     });
     pool.parallel_for(shards, [&](std::size_t shard) {
-      for (const Chunk& chunk : chunks) take(chunk.shares[shard]);
+      for (const Chunk& chunk : chunks) take(chunk.shares[shard], blocks_of_shard_[shard]);
     });
+    if (std::ranges::max(blocks_of_shard_) > most_blocks_of_shard_)
+      throw InputError("the scene", "", "fills too many cells for one to find ground in it",
+                       "with a larger --eye-height, cells are larger");
   }
 }
 

@@ -21,10 +21,14 @@ struct Run {
 };
 
 /// Where the scene stops light, in the cells of a grid. Only blocks of 4 x 4 x 4 cells that some
-/// Gaussian meets take memory: 516 bytes each. Gaussians beyond the grid are ignored.
+/// Gaussian meets take memory: 516 bytes each, and up to a quarter more for growth. Gaussians
+/// beyond the grid are ignored.
 class Occupancy {
  public:
-  explicit Occupancy(const Grid& grid) : grid_(grid), columns_(std::size_t{blocks} * blocks) {}
+  explicit Occupancy(const Grid& grid, std::size_t most_blocks = std::size_t{1} << 24)
+      : grid_(grid),
+        most_blocks_of_shard_(most_blocks / shards),
+        columns_(std::size_t{blocks} * blocks) {}
 
   [[nodiscard]] const Grid& grid() const { return grid_; }
 
@@ -32,7 +36,8 @@ class Occupancy {
   /// opacity * 2 pi s t of the light, its integral over the plane of its two larger standard
   /// deviations (as VoxelGrid has it). That is spread over points up to 1.5 standard
   /// deviations away, a cell apart, but no more than 2^16 of them. The result depends on the order
-  /// of the Gaussians and not on the threads. Takes up to 100 MB while it runs.
+  /// of the Gaussians and not on the threads. Takes up to 100 MB while it runs. Throws InputError
+  /// where a sixteenth of the columns meets more than a sixteenth of the most blocks.
   void add(const GaussianCloud& part, ThreadPool& pool);
 
   struct Rect {
@@ -68,9 +73,11 @@ class Occupancy {
 
   std::size_t spread(const GaussianCloud& part, std::size_t i, Shares& to) const;
   bool share_of(const glm::vec3& place, float depth, Shares& to) const;
-  void take(const std::vector<Share>& from);
+  void take(const std::vector<Share>& from, std::size_t& blocks_taken);
 
   Grid grid_;
+  std::size_t most_blocks_of_shard_;
+  std::array<std::size_t, shards> blocks_of_shard_{};
   std::vector<std::vector<Block>> columns_;  // by north * blocks + east; each sorted by level
 };
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view sidecar_part = "/sidecar";
 
-constexpr std::array<std::string_view, 2> part_names = {"/tours", "/poster.jpg"};
+constexpr std::array<std::string_view, 3> part_names = {"/tours", "/poster.jpg", "/walk"};
 
 /// Builds the answer to "GET /api/scenes".
 std::shared_ptr<const std::string> scene_list(
@@ -37,9 +37,9 @@ std::shared_ptr<const std::string> scene_list(
 
 std::optional<HttpResponse> SceneApi::respond(const HttpRequest& request) {
   if (request.path == "/api/scenes") return list_scenes(permit_of(authorize_, request));
-  for (const Part part : {Part::tours, Part::poster})
+  for (const Part part : {Part::tours, Part::poster, Part::walk})
     if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
-      return part_of_scene(scenes_.resolve(*id), part, permit_of(authorize_, request));
+      return part_of_scene(scenes_.resolve(*id), part, request);
   return std::nullopt;
 }
 
@@ -81,7 +81,9 @@ HttpResponse SceneApi::list_scenes(const Permit& permit) {
   return json_response(whole_list_);
 }
 
-HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part, const Permit& permit) {
+HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part,
+                                     const HttpRequest& request) {
+  const Permit permit = permit_of(authorize_, request);
   if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
   const auto listing = scenes_.listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
@@ -91,6 +93,7 @@ HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part, const
     const ToursAnswers& tours = found->tours ? *found->tours : none;
     return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
   }
+  if (part == Part::walk) return ground_of(*found, request.if_none_match);
   if (!found->poster) {
     HttpResponse none = text_response(404, "404: the scene has no poster\n");
     if (found->loaded) return none;
@@ -103,6 +106,32 @@ HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part, const
   response.content_type = "image/jpeg";
   response.cache_control = "private, max-age=60";
   response.body = found->poster;
+  return response;
+}
+
+/// Neither a search that goes on nor a scene without ground is an error, which browsers would
+/// report to visitors who look at the console.
+HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
+                                 std::string_view if_none_match) {
+  constexpr int retry_after_s = 3;
+  HttpResponse response;
+  if (!scene.ground) {
+    scenes_.want_ground(scene.id);
+    response = text_response(202, "202: where people can walk here is being found out\n");
+    response.retry_after_s = retry_after_s;
+    return response;
+  }
+  if (!scene.ground->file) {
+    response.status = 204;
+    return response;
+  }
+  response.content_type = "application/octet-stream";
+  response.cache_control = "private, no-cache";  // kept, and asked for again by its tag
+  response.etag = scene.ground->etag;
+  if (if_none_match == response.etag)
+    response.status = 304;
+  else
+    response.body = scene.ground->file;
   return response;
 }
 

@@ -31,9 +31,10 @@ class SceneApi {
   [[nodiscard]] std::string saved_scene(const HttpRequest& request) const;
 
  private:
-  enum class Part { tours, poster };
+  enum class Part { tours, poster, walk };
   HttpResponse list_scenes(const Permit& permit);
-  HttpResponse part_of_scene(std::string_view scene_id, Part part, const Permit& permit);
+  HttpResponse part_of_scene(std::string_view scene_id, Part part, const HttpRequest& request);
+  HttpResponse ground_of(const SceneLibrary::Listing& scene, std::string_view if_none_match);
 
   SceneLibrary& scenes_;
   const Authorize authorize_;

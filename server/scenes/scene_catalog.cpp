@@ -40,7 +40,13 @@ T parse_number(const std::string& spec, std::string_view text) {
 }
 
 /// synth:KIND:COUNT[:SEED]
-Scene synthesize(const std::string& spec) {
+struct SynthSpec {
+  SynthKind kind;
+  std::size_t count;
+  std::uint64_t seed;
+};
+
+SynthSpec parse_synth(const std::string& spec) {
   std::vector<std::string_view> parts;
   for (std::string_view rest = spec; !rest.empty();) {
     const auto colon = std::min(rest.find(':'), rest.size());
@@ -51,7 +57,12 @@ Scene synthesize(const std::string& spec) {
     throw InputError("--scene " + spec, {}, "is incomplete", "give synth:city:300000");
   const auto count = parse_number<std::size_t>(spec, parts[2]);
   const std::uint64_t seed = parts.size() == 4 ? parse_number<std::uint64_t>(spec, parts[3]) : 1;
-  return synthesize(parse_synth_kind(parts[1]), count, seed);
+  return {parse_synth_kind(parts[1]), count, seed};
+}
+
+Scene synthesize(const std::string& spec) {
+  const auto [kind, count, seed] = parse_synth(spec);
+  return catgs::synthesize(kind, count, seed);
 }
 
 bool has_levels(const std::string& spec) {
@@ -102,6 +113,12 @@ SceneInPages load(const std::string& spec, const SceneForm& form, const ServerCo
 }
 
 }  // namespace
+
+void synthesize_parts(const std::string& spec, ThreadPool& pool,
+                      const std::function<void(const GaussianCloud&)>& take) {
+  const auto [kind, count, seed] = parse_synth(spec);
+  catgs::synthesize_parts(kind, count, seed, pool, take);
+}
 
 std::uint64_t tree_memory(const ServerConfig& config) {
   constexpr std::uint64_t megabyte = 1'000'000;

@@ -29,6 +29,11 @@ LoadOptions chosen_levels(const ServerConfig& config);
 /// Throws InputError.
 void check_scenes(const ServerConfig& config);
 
+/// The Gaussians of synth:KIND:COUNT[:SEED], in parts that are let go once `take` returns. Throws
+/// InputError.
+void synthesize_parts(const std::string& spec, ThreadPool& pool,
+                      const std::function<void(const GaussianCloud&)>& take);
+
 /// The form in which a scene comes into memory.
 struct SceneForm {
   std::filesystem::path tree{};    // of a cache, to be read instead of the scene

@@ -15,6 +15,7 @@
 #include "render_core/scene/tree/page_pools.h"
 #include "server/base/log_event.h"
 #include "server/base/scene_id.h"
+#include "server/scenes/ground_of_scene.h"
 #include "server/scenes/scene_catalog.h"
 
 namespace catgs {
@@ -94,7 +95,8 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
         return book && book->in_use();
       }),
       redrawing_(shelf_, trees_, residency_, io, loader_,
-                 [this](const auto& found, const auto& form) { return load(found, form); }) {
+                 [this](const auto& found, const auto& form) { return load(found, form); }),
+      grounds_(config.cache_dir, builder_threads(core_), io) {
   core_.pages = std::make_shared<PagePools>(tree_memory(config));
   pin_scenes();
   if (config_.scene_folders.empty())
@@ -268,6 +270,34 @@ void SceneLibrary::want_poster(const std::string& id) {
   });
 }
 
+GroundSource SceneLibrary::ground_source_of(const SceneBook& book) const {
+  GroundSource source = ground_source(book.found.path.string(), book.entry->facts);
+  if (is_synthetic(source.spec)) return source;
+  if (trees_.ready(book.found)) source.tree = trees_.form_of(book.found)->tree;
+  source.levels = chosen_levels(config_);
+  source.beside = book.entry->sidecar;
+  source.beside.replace_extension(".walk");
+  return source;
+}
+
+void SceneLibrary::want_ground(const std::string& id) {
+  boost::asio::post(io_, [this, id] {
+    SceneBook* const book = shelf_.find(id);
+    if (!book || !book->entry || book->ground || book->outdated || grounds_.busy()) return;
+    const GroundSource source = ground_source_of(*book);
+    grounds_.find(id, source,
+                  [this, id, source, changed = book->found.changed](const auto& ground) {
+                    SceneBook* const found_for = shelf_.find(id);
+                    if (!found_for || !found_for->entry || found_for->ground ||
+                        found_for->found.changed != changed ||
+                        !same_ground(source, ground_source_of(*found_for)))
+                      return;
+                    found_for->ground = ground;
+                    publish();
+                  });
+  });
+}
+
 void SceneLibrary::on_tick(TimePoint now) {
   std::vector<std::string> outdated;
   for (const auto& [id, book] : shelf_.books()) {
@@ -307,6 +337,7 @@ void SceneLibrary::release(const std::string& id) {
   metrics_.scenes_released.Increment();
   residency_.drop(id);
   auto entry = std::exchange(book.entry, nullptr);
+  book.ground.reset();
   book.outdated = book.tree_lost = false;
   if (book.gone) shelf_.books().erase(id);
   publish();
@@ -352,6 +383,7 @@ void SceneLibrary::on_loaded(const std::string& id, LoadedScene loaded, TimePoin
   metrics_.scenes_loaded.Increment();
   residency_.loaded(id, need, now);
   book->entry = std::move(loaded.entry);
+  book->ground.reset();
   publish();
   start_next(now);
 }
@@ -367,7 +399,9 @@ void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntr
   if (book->former && book->former->renderer == entry->renderer)
     entry = redrawn(*entry, *book->entry);
   if (book->entry->renderer != entry->renderer) return;
+  const GroundSource before = ground_source_of(*book);
   book->entry = std::move(entry);
+  if (!book->outdated && !same_ground(before, ground_source_of(*book))) book->ground.reset();
   publish();
 }
 

@@ -15,6 +15,7 @@
 #include "server/base/metrics.h"
 #include "server/config.h"
 #include "server/scenes/scene_folder.h"
+#include "server/scenes/scene_grounds.h"
 #include "server/scenes/scene_redrawing.h"
 #include "server/scenes/scene_residency.h"
 #include "server/scenes/scene_shelf.h"
@@ -71,6 +72,9 @@ class SceneLibrary final : public SceneSource {
   /// nothing while a visitor waits for a scene, or where it would not fit beside the scenes in
   /// memory.
   void want_poster(const std::string& id);
+  /// Any thread. Finds where people can walk in a scene in memory, one scene at a time. Does
+  /// nothing where that is known or under way.
+  void want_ground(const std::string& id);
 
  private:
   void pin_scenes();
@@ -86,6 +90,7 @@ class SceneLibrary final : public SceneSource {
   void release(const std::string& id);
   void start_scan(TimePoint now);
   void merge(std::vector<FoundScene> found);
+  [[nodiscard]] GroundSource ground_source_of(const SceneBook& book) const;
   /// Updates listing() and the metrics.
   void publish();
 
@@ -113,6 +118,7 @@ class SceneLibrary final : public SceneSource {
   std::atomic<bool> stopping_{false};
   boost::asio::thread_pool loader_{1};
   SceneRedrawing redrawing_;
+  SceneGrounds grounds_;
 };
 
 }  // namespace catgs

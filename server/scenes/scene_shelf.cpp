@@ -34,6 +34,8 @@ void SceneShelf::merge(std::vector<FoundScene> found,
       book.outdated = book.entry != nullptr;
       book.poster.reset();
       book.poster_tried = false;
+      // What visitors still see has no file any more that tells its ground.
+      book.ground = book.entry ? std::make_shared<const SceneGround>() : nullptr;
       book.retry_at.reset();
     }
     book.found = std::move(scene);
@@ -93,6 +95,7 @@ void SceneShelf::publish(const std::function<std::string(const FoundScene&)>& st
                         .loaded = book.entry != nullptr,
                         .state = state_of(found),
                         .poster = book.poster});
+    listing->back().ground = book.ground;
     if (!book.entry) continue;
     listing->back().tours = book.entry->tours;
     listing->back().sidecar = book.entry->sidecar;

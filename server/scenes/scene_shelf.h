@@ -14,6 +14,7 @@
 #include "server/base/clock.h"
 #include "server/scenes/scene_entry.h"
 #include "server/scenes/scene_folder.h"
+#include "server/scenes/scene_grounds.h"
 
 namespace catgs {
 
@@ -28,6 +29,7 @@ struct SceneListing {
   std::optional<ToursAnswers> tours{};          // of a loaded one
   std::filesystem::path sidecar{};              // of a loaded one; empty: it is no file
   std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
+  std::shared_ptr<const SceneGround> ground{};  // of a loaded one; null: not known yet
 };
 
 /// What the server knows of a scene that it offers.
@@ -37,6 +39,7 @@ struct SceneBook {
   std::shared_ptr<const SceneEntry> former{};   // drawn before `entry`; while visitors still see it
   std::shared_ptr<const std::string> poster{};  // stays when the entry goes
   bool poster_tried = false;                    // for this content of the file
+  std::shared_ptr<const SceneGround> ground{};  // of the entry; null: not known yet
   bool pinned = false;
   bool outdated = false;                // the file has changed since
   bool tree_lost = false;               // the entry reads a tree with damage: another is built

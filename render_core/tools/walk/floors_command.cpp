@@ -1,7 +1,6 @@
 // catgs-render floors: where people can walk in a scene.
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 
@@ -11,8 +10,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/part_file.h"
 #include "render_core/image/png.h"
-#include "render_core/scene/files/scene_parts.h"
-#include "render_core/scene/tree/read_tree.h"
+#include "render_core/scene/files/scene_by_parts.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/progress.h"
 #include "render_core/tools/render/tree_output.h"
@@ -33,32 +31,10 @@ struct FloorsOptions {
   int threads = 0;
 };
 
-/// A scene whose Gaussians are taken part by part.
-struct Parts {
-  SceneHints hints;
-  std::shared_ptr<const GaussianCloud> sample;
-  std::function<void(const std::function<void(const GaussianCloud&)>& take)> each;
-};
-
-/// The leaves of a tree, 256 K Gaussians at a time.
-Parts parts_of_tree(const SceneInPages& scene, const std::shared_ptr<ThreadPool>& pool) {
-  const auto each = [tree = scene.tree, pool](const auto& take) {
-    constexpr std::uint32_t leaves_of_part = 1024;
-    const std::uint32_t leaves = tree->shape().leaves();
-    for (std::uint32_t first = 0; first < leaves; first += leaves_of_part) {
-      std::vector<NodeId> nodes;
-      for (std::uint32_t k = first; k < std::min(leaves, first + leaves_of_part); ++k)
-        nodes.push_back({0, k});
-      take(read_nodes(*tree, nodes, LoadContext(*pool)));
-    }
-  };
-  return {scene.outline.hints, std::make_shared<GaussianCloud>(scene.outline.cloud), each};
-}
-
-Parts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>& pool,
-                 bool quiet) {
+SceneByParts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>& pool,
+                        bool quiet) {
   if (is_tree_name(options.scene.path))
-    return parts_of_tree(open_in_pages(options.scene, options.threads, quiet), pool);
+    return by_parts(open_in_pages(options.scene, options.threads, quiet), pool);
   LoadOptions load;
   load.up = up_of(options.scene);
   load.model = model_of(options.scene);
@@ -66,14 +42,11 @@ Parts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>
   if (!options.scene.lod && !options.scene.budget)
     if (auto scene = scene_in_parts(options.scene.path, load, pool);
         scene && scene->hints.source != "estimated")
-      return {scene->hints, std::make_shared<GaussianCloud>(std::move(scene->sample)),
-              [each = scene->parts.each](const auto& take) { each(take); }};
-  auto scene = std::make_shared<Scene>(load_scene(options.scene, options.threads, quiet));
-  return {scene->hints, std::shared_ptr<const GaussianCloud>(scene, &scene->cloud),
-          [scene](const auto& take) { take(scene->cloud); }};
+      return by_parts(*std::move(scene));
+  return by_parts(load_scene(options.scene, options.threads, quiet));
 }
 
-float eye_height_of(const FloorsOptions& options, const Parts& parts) {
+float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
   if (options.eye_height) {
     if (!(*options.eye_height > 0.0f && *options.eye_height <= 1e6f))
       throw InputError("--eye-height", "", fmt::format("{} is no height", *options.eye_height),
@@ -96,7 +69,7 @@ void floors(const FloorsOptions& options, bool quiet) {
   check_writable(options.out);
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const auto begin = Clock::now();
-  const Parts parts = open_parts(options, pool, quiet);
+  const SceneByParts parts = open_parts(options, pool, quiet);
   const float eye_height = eye_height_of(options, parts);
   const glm::vec3& start = parts.hints.start_pose.position;
   walk::Occupancy occupancy(walk::grid_around(start, parts.hints.up, eye_height));

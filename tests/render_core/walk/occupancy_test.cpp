@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render_core/base/error.h"
 #include "tests/render_core/walk/worlds.h"
 
 namespace catgs::walk {
@@ -24,6 +25,17 @@ TEST(WalkGrid, EastNorthAndUpAreRightHanded) {
   EXPECT_NEAR(there.x, 10.0f, 1e-2f);
   EXPECT_NEAR(glm::distance(capture.to_world(capture.from_world({5, 6, 7})), {5, 6, 7}), 0.0f,
               1e-3f);
+}
+
+TEST(Occupancy, TakesNoMoreBlocksThanAllowed) {
+  GaussianCloud cloud;
+  test::add_plate(cloud, {-2, -2, 0.43f}, {4, 0, 0}, {0, 4, 0});
+  ThreadPool pool(2);
+  Occupancy enough(grid, 4096);
+  enough.add(cloud, pool);
+  Occupancy small(grid, 64);
+  EXPECT_THROW(small.add(cloud, pool), InputError);
+  EXPECT_LE(small.bytes(), enough.bytes());
 }
 
 TEST(Occupancy, APlateIsARunAtItsHeight) {

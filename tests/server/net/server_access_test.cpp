@@ -299,7 +299,8 @@ TEST(ServerAccess, PreviewsTellWhatStrangersMaySee) {
   for (const char* page : {"/", "/index.html", "/?scene=city"})
     EXPECT_THAT(http_get(guarded.port(), page).body,
                 AllOf(Not(HasSubstr("og:")), Not(HasSubstr("city"))));
-  EXPECT_EQ(http_get(guarded.port(), "/api/scenes/city/poster.jpg").status, 401);
+  for (const char* part : {"poster.jpg", "tours", "walk"})
+    EXPECT_EQ(http_get(guarded.port(), std::string("/api/scenes/city/") + part).status, 401);
 }
 
 TEST(ServerAccess, ServesTlsWithTheGivenCertificate) {

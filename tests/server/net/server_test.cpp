@@ -3,7 +3,9 @@
 #include "server/server.h"
 
 #include <algorithm>
+#include <chrono>
 #include <set>
+#include <thread>
 
 #include <boost/system/system_error.hpp>
 #include <gmock/gmock.h>
@@ -362,9 +364,28 @@ TEST(Server, HasAPosterAndToursOfEachScene) {
   const HttpReply tours = http_get(server.port(), "/api/scenes/city/tours");
   EXPECT_EQ(tours.status, 200);
   EXPECT_TRUE(nlohmann::json::parse(tours.body).is_object());
-  for (const char* path : {"/api/scenes/atlantis/tours", "/api/scenes/atlantis/poster.jpg",
-                           "/api/scenes//tours", "/api/scenes/city/secrets"})
+  for (const char* path :
+       {"/api/scenes/atlantis/tours", "/api/scenes/atlantis/poster.jpg",
+        "/api/scenes/atlantis/walk", "/api/scenes//tours", "/api/scenes/city/secrets"})
     EXPECT_EQ(http_get(server.port(), path).status, 404) << path;
+}
+
+TEST(Server, FindsWherePeopleWalkWhenAPageAsks) {
+  RunningServer server;
+  const auto ask = [&](const std::map<std::string, std::string>& headers = {}) {
+    return http_get(server.port(), "/api/scenes/city/walk", headers);
+  };
+  HttpReply ground = ask();
+  EXPECT_EQ(ground.status, 202);
+  EXPECT_EQ(ground.headers.at("retry-after"), "3");
+  for (int i = 0; i < 1200 && ground.status == 202; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    ground = ask();
+  }
+  ASSERT_EQ(ground.status, 200);
+  EXPECT_THAT(ground.body, testing::StartsWith("catgswlk"));
+  EXPECT_EQ(ground.headers.at("content-type"), "application/octet-stream");
+  EXPECT_EQ(ask({{"if-none-match", ground.headers.at("etag")}}).status, 304);
 }
 
 }  // namespace

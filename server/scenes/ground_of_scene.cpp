@@ -1,0 +1,136 @@
+#include "server/scenes/ground_of_scene.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "render_core/base/error.h"
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/scene_by_parts.h"
+#include "render_core/scene/tree/tree_file.h"
+#include "render_core/walk/eye_height.h"
+#include "render_core/walk/find_ground.h"
+#include "render_core/walk/walk_file.h"
+#include "server/access/signed_token.h"
+#include "server/scenes/scene_catalog.h"
+#include "server/scenes/scene_ids.h"
+#include "server/scenes/tree_cache.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::uint64_t most_whole_gaussians = 16'000'000;  // of a scene that is read as a whole
+constexpr float eye_height_m = 1.6f;
+
+bool is_tree(const std::filesystem::path& path) {
+  return std::filesystem::is_regular_file(path) && is_tree(FileSource(path));
+}
+
+SceneByParts open(const GroundSource& source, const std::shared_ptr<ThreadPool>& pool,
+                  const std::function<void()>& progress) {
+  LoadOptions options;
+  options.threads = pool->threads();
+  options.progress = [&](double) { progress(); };
+  if (!source.tree.empty()) return by_parts(open_in_pages(source.tree, options, source.spec), pool);
+  const SceneLocation location = locate_scene(source.spec);
+  if (is_tree(location.path)) return by_parts(open_in_pages(source.spec, options), pool);
+  constexpr std::uint64_t part_rows = 1'000'000;
+  if (location.has_levels()) {
+    options.lod = source.levels.lod;
+    options.gaussian_budget = source.levels.gaussian_budget;
+  }
+  if (!options.lod && !options.gaussian_budget)
+    if (auto parted = scene_in_parts(source.spec, options, pool, part_rows, false))
+      return by_parts(*std::move(parted));
+  if (read_scene_size(source.spec, options).gaussians > most_whole_gaussians)
+    throw InputError(source.spec, "", "has too many Gaussians to be read as a whole",
+                     "with --cache-dir it gets a tree");
+  options.first_view = false;
+  return by_parts(load_scene(source.spec, options));
+}
+
+SceneHints hints_of(const GroundSource& source) {
+  SceneHints hints;
+  hints.start_pose.position = source.start;
+  hints.up = source.up;
+  return hints;
+}
+
+/// What is wrong then is so whenever the scene is asked for its ground.
+template <class Body>
+auto known_of_scene(const Body& body) {
+  try {
+    return body();
+  } catch (const InputError& error) {
+    throw NoGround(error);
+  }
+}
+
+float eye_height_of(const GroundSource& source, const GaussianCloud& sample) {
+  if (source.metres_per_unit > 0.0f) return eye_height_m / source.metres_per_unit;
+  const auto estimate = walk::estimate_eye_height(sample, hints_of(source));
+  if (estimate) return *estimate;
+  throw InputError(source.spec, "", "has no floor and ceiling that tell how large people are",
+                   "its sidecar can name metres_per_unit");
+}
+
+}  // namespace
+
+GroundSource ground_source(const std::string& spec, const SceneFacts& facts) {
+  GroundSource source;
+  source.spec = spec;
+  source.start = facts.start_pose.position;
+  source.up = facts.up;
+  source.metres_per_unit = facts.about.metres_per_unit;
+  return source;
+}
+
+bool same_ground(const GroundSource& one, const GroundSource& other) {
+  return one.spec == other.spec && one.start == other.start && one.up == other.up &&
+         one.metres_per_unit == other.metres_per_unit;
+}
+
+std::string compute_ground(const GroundSource& source, int threads,
+                           const std::function<void()>& progress) {
+  constexpr std::size_t most_blocks = std::size_t{1} << 21;
+  const auto pool = std::make_shared<ThreadPool>(threads);
+  std::optional<walk::Occupancy> occupancy;
+  const auto begin = [&](float eye_height) {
+    occupancy.emplace(walk::grid_around(source.start, source.up, eye_height), most_blocks);
+  };
+  const auto take = [&](const GaussianCloud& part) {
+    progress();
+    known_of_scene([&] { occupancy->add(part, *pool); });
+  };
+  if (is_synthetic(source.spec)) {
+    begin(eye_height_m / source.metres_per_unit);
+    synthesize_parts(source.spec, *pool, take);
+  } else {
+    const SceneByParts scene = open(source, pool, progress);
+    begin(known_of_scene([&] { return eye_height_of(source, *scene.sample); }));
+    scene.each(take);
+  }
+  progress();
+  return walk::pack(known_of_scene(
+      [&] { return walk::find_ground(*occupancy, {}, source.start, source.spec, *pool); }));
+}
+
+std::string ground_name(const GroundSource& source) {
+  constexpr int version = 1;  // of what is found in a scene
+  const std::string scene =
+      is_synthetic(source.spec) ? source.spec : tree_name(source.spec, source.levels);
+  const TokenDigest digest = digest_of(fmt::format(
+      "{}\n{} {} {}\n{} {} {}\n{} {}", scene, source.start.x, source.start.y, source.start.z,
+      source.up.x, source.up.y, source.up.z, source.metres_per_unit, version));
+  constexpr std::size_t digest_bytes = 16;
+  return fmt::format("{:02x}.walk", fmt::join(std::span(digest).first(digest_bytes), ""));
+}
+
+}  // namespace catgs

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include <glm/vec3.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/files/load_scene.h"
+#include "server/net/messages.h"
+
+namespace catgs {
+
+/// All that the ground of a scene depends on.
+struct GroundSource {
+  std::string spec;              // a path, or synth:KIND:COUNT[:SEED]
+  std::filesystem::path tree;    // of a cache, read in place of the scene; empty: none
+  LoadOptions levels;            // of a scene that has some; only `lod` and `gaussian_budget` count
+  std::filesystem::path beside;  // a .walk file of the author's; empty: nowhere
+  glm::vec3 start, up;           // of the scene as it is shown
+  float metres_per_unit = 0.0f;  // 0: not said
+};
+GroundSource ground_source(const std::string& spec, const SceneFacts& facts);
+/// True if both have the same ground as long as the scene's files are the same.
+bool same_ground(const GroundSource& one, const GroundSource& other);
+
+/// Nobody can walk in the scene.
+struct NoGround : InputError {
+  explicit NoGround(const InputError& why) : InputError(why) {}
+};
+
+/// The bytes of a .walk file of the scene, for people of 1.6 m. Where the scene has no unit, the
+/// room around the start tells their size. Takes up to 1.4 GB for cells and 0.5 GB for what is
+/// found, beside the scene: that is read part by part where its format allows it, and else as a
+/// whole, with 16 M Gaussians at most. `progress` is called often and may throw to cancel. Throws
+/// NoGround, or InputError where the scene cannot be read.
+std::string compute_ground(const GroundSource& source, int threads,
+                           const std::function<void()>& progress);
+
+/// A name for that: it changes with the scene's files and with what else `source` says. Throws
+/// InputError.
+std::string ground_name(const GroundSource& source);
+
+}  // namespace catgs

@@ -1,0 +1,235 @@
+// Scenes of a real library, and where people can walk in them.
+#include "server/scenes/scene_grounds.h"
+
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <thread>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/files/save_scene.h"
+#include "render_core/walk/walk_file.h"
+#include "render_core/walk/walker.h"
+#include "server/scenes/scene_library.h"
+#include "tests/render_core/scene/scene_test_support.h"
+#include "tests/render_core/walk/worlds.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+using Ground = std::shared_ptr<const SceneGround>;
+using Entry = std::shared_ptr<const SceneEntry>;
+
+constexpr auto sidecar =
+    R"({"up": [0, 0, 1], "start_pose": {"position": [2, 2, 1.6], "look_at": [2, 5, 1.6]}, "metres_per_unit": 1})";
+
+std::string bytes_in(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+walk::WalkMap map_in(const std::string& bytes) {
+  return walk::read_walk_file(MemorySource("served", std::as_bytes(std::span(bytes))));
+}
+
+class SceneGroundsTest : public FolderTest {
+ protected:
+  void SetUp() override {
+    fs::create_directory(folder_ / "scenes");
+    save_scene(room(0.9f), folder_ / "scenes/a.ply");
+    write("scenes/a.json", sidecar);
+    config_.scenes = {"synth:stress:1000"};
+    config_.scene_folders = {folder_ / "scenes"};
+    config_.cache_dir = folder_ / "cache";
+  }
+  void start() {
+    library_.reset();  // which takes the cache with it
+    io_.emplace();     // and what the library has asked of it
+    library_ = std::make_unique<SceneLibrary>(
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, *io_,
+        metrics_, [this] { return now_; });
+  }
+  void run_until(const std::function<bool()>& holds) {
+    for (int i = 0; i < 20'000 && !holds(); ++i) {
+      io_->restart();
+      io_->poll();
+      library_->on_tick(now_);
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_TRUE(holds());
+  }
+  std::string id() const { return library_->resolve("a"); }
+  Entry load() {
+    run_until([&] { return std::holds_alternative<Entry>(library_->want(id(), now_)); });
+    return library_->in_memory(id());
+  }
+  Ground listed() const {
+    const auto listing = library_->listing();
+    return std::ranges::find(*listing, id(), &SceneLibrary::Listing::id)->ground;
+  }
+  /// As a page does that asks again and again.
+  Ground found() {
+    run_until([&] {
+      library_->want_ground(id());
+      return listed() != nullptr;
+    });
+    return listed();
+  }
+  std::vector<fs::path> kept() const {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder_ / "cache"))
+      if (entry.path().extension() == ".walk") files.push_back(entry.path());
+    return files;
+  }
+
+  std::optional<boost::asio::io_context> io_;
+  Metrics metrics_;
+  ServerConfig config_;
+  std::unique_ptr<SceneLibrary> library_;
+  TimePoint now_ = TimePoint{} + 1h;
+};
+
+TEST_F(SceneGroundsTest, AScenesGroundIsFoundWhenAPageAsks) {
+  start();
+  library_->want_ground(id());  // not in memory
+  const Entry seen = load();
+  EXPECT_EQ(listed(), nullptr);
+  const Ground ground = found();
+  ASSERT_NE(ground->file, nullptr);
+  EXPECT_EQ(ground->etag, etag_of(*ground->file));
+  const walk::WalkMap map = map_in(*ground->file);
+  EXPECT_FLOAT_EQ(map.grid.cell, 0.1f);
+  EXPECT_TRUE(walk::stand_below(map, {6, 3, 2}));
+  ASSERT_EQ(kept().size(), 1u);
+  EXPECT_EQ(bytes_in(kept()[0]), *ground->file);
+}
+
+TEST_F(SceneGroundsTest, TheNextStartReadsWhatWasFound) {
+  start();
+  load();
+  found();
+  ASSERT_EQ(kept().size(), 1u);
+  const std::string other = walk::pack(map_of(stairs(), {0, 3, 1.6f}));
+  std::ofstream(kept()[0], std::ios::binary) << other;
+  start();
+  load();
+  EXPECT_EQ(*found()->file, other);
+  // One that is damaged is computed again.
+  std::ofstream(kept()[0], std::ios::binary) << other.substr(0, 900);
+  start();
+  load();
+  EXPECT_TRUE(walk::stand_below(map_in(*found()->file), {6, 3, 2}));
+  EXPECT_EQ(bytes_in(kept().at(0)), *listed()->file);
+}
+
+TEST_F(SceneGroundsTest, TheAuthorsFileComesFirst) {
+  const std::string own = walk::pack(map_of(stairs(), {0, 3, 1.6f}));
+  write("scenes/a.walk", own);
+  start();
+  load();
+  EXPECT_EQ(*found()->file, own);
+  EXPECT_TRUE(kept().empty());
+}
+
+TEST_F(SceneGroundsTest, ABadFileOfTheAuthorsIsNoHarm) {
+  for (const std::string& bad : {std::string("no walk file"), std::string()}) {
+    write("scenes/a.walk", bad);
+    start();
+    load();
+    EXPECT_TRUE(walk::stand_below(map_in(*found()->file), {6, 3, 2}));
+  }
+}
+
+TEST_F(SceneGroundsTest, ASceneWithoutGroundIsLookedThroughOnce) {
+  save_scene(random_cloud(300, 0), folder_ / "scenes/a.ply");
+  start();
+  load();
+  EXPECT_EQ(found()->file, nullptr);
+  ASSERT_EQ(kept().size(), 1u);
+  EXPECT_EQ(fs::file_size(kept()[0]), 0u);
+  start();
+  load();
+  EXPECT_EQ(found()->file, nullptr);
+}
+
+TEST_F(SceneGroundsTest, WithoutAFolderItStaysWhileTheSceneDoes) {
+  config_.cache_dir.clear();
+  start();
+  load();
+  EXPECT_NE(found()->file, nullptr);
+}
+
+TEST_F(SceneGroundsTest, AnotherStartHasAnotherGround) {
+  start();
+  const Entry seen = load();
+  const Ground before = found();
+  auto turned = std::make_shared<SceneEntry>(*seen);
+  turned->facts.about.title = "Another title";
+  library_->revise(id(), turned);
+  EXPECT_EQ(listed(), before) << "the ground stays where a title changes";
+  turned = std::make_shared<SceneEntry>(*turned);
+  turned->facts.about.metres_per_unit = 2.0f;
+  library_->revise(id(), turned);
+  EXPECT_EQ(listed(), nullptr);
+  EXPECT_FLOAT_EQ(map_in(*found()->file).grid.cell, 0.05f);
+  EXPECT_EQ(kept().size(), 2u);
+}
+
+TEST_F(SceneGroundsTest, AChangedSceneGetsItsOwnGround) {
+  start();
+  Entry seen = load();
+  found();
+  save_scene(room(1.2f), folder_ / "scenes/a.ply");
+  now_ += 31s;
+  run_until([&] { return listed() && !listed()->file; });
+  seen.reset();  // the last visitor of the old one leaves
+  run_until([&] { return !library_->in_memory(id()); });
+  EXPECT_EQ(listed(), nullptr);
+  load();
+  EXPECT_NE(found()->file, nullptr);
+  EXPECT_EQ(kept().size(), 2u);
+}
+
+TEST_F(SceneGroundsTest, ATreeIsReadPartByPart) {
+  config_.gaussians_of_a_tree = 1000;
+  start();
+  load();
+  run_until([&] { return library_->in_memory(id())->in_pages; });
+  const Ground ground = found();
+  ASSERT_NE(ground->file, nullptr);
+  EXPECT_TRUE(walk::stand_below(map_in(*ground->file), {6, 3, 2}));
+}
+
+TEST_F(SceneGroundsTest, TheLibraryEndsWhileAGroundIsSought) {
+  start();
+  load();
+  library_->want_ground(id());
+  io_->poll();
+  library_.reset();
+}
+
+/// The public demo: its ground is found without its file.
+TEST(GroundOfScene, OfAProceduralScene) {
+  GroundSource source;
+  source.spec = "synth:stress:100000";
+  source.start = {0, -1.6f, -5};
+  source.up = {0, -1, 0};
+  source.metres_per_unit = 1.0f;
+  int parts = 0;
+  const std::string bytes = compute_ground(source, 2, [&] { ++parts; });
+  EXPECT_GT(parts, 0);
+  EXPECT_GT(map_in(bytes).places.size(), 1000u);
+  struct Stop {};
+  EXPECT_THROW(compute_ground(source, 2, [] { throw Stop(); }), Stop);
+  source.start = {0, -1e5f, 0};
+  EXPECT_THROW(compute_ground(source, 2, [] {}), NoGround);
+}
+
+}  // namespace
+}  // namespace catgs::test
