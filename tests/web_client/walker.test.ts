@@ -2,13 +2,12 @@
 import { deflateSync, inflateSync } from 'node:zlib';
 import { describe, expect, it } from 'vitest';
 import { find_path } from '#client/walk/path';
-import { clear_at, eyes_of, read_walk_file, storey_at, type Stand, type WalkMap } from '#client/walk/walk_map';
+import { clear_at, eyes_of, read_walk_file, storey_at, storey_heights, type Stand, type WalkMap } from '#client/walk/walk_map';
 import { move, stand_below, straight } from '#client/walk/walker';
 import golden from '../support/walk_golden.json';
 import { expect_vec } from './cameras';
+import { file, flat_map, map, random_from } from './walk_maps';
 
-const file = Uint8Array.from(Buffer.from(golden.file, 'hex'));
-const map = await read_walk_file(file.buffer);
 const header_bytes = 320;
 
 const stand = ([east, north, height]: number[]): Stand => ({ east: east!, north: north!, height: height! });
@@ -17,29 +16,6 @@ const is_clear = (on: WalkMap, { east, north, height }: Stand): boolean =>
   clear_at(on, Math.floor(east), Math.floor(north), height) >= 0;
 
 const distance = (a: Stand, b: Stand): number => Math.hypot(a.east - b.east, a.north - b.north);
-
-/** Marsaglia's xorshift, 0…1. */
-function random_from(seed: number): () => number {
-  let state = seed;
-  return () => {
-    state ^= state << 13;
-    state ^= state >>> 17;
-    state ^= state << 5;
-    return (state >>> 0) / 2 ** 32;
-  };
-}
-
-/** A map in the world as it is read of a file: all at one height, where `clear` says so. */
-function flat_map(width: number, depth: number, clear: (x: number, y: number) => boolean): WalkMap {
-  const first = new Uint32Array(width * depth + 1);
-  const heights: number[] = [];
-  for (let c = 0; c < width * depth; ++c) {
-    if (clear(c % width, Math.floor(c / width))) heights.push(160);
-    first[c + 1] = heights.length;
-  }
-  const kinds = new Uint8Array(heights.length);
-  return { ...map, width, depth, first, heights: Uint16Array.from(heights), kinds };
-}
 
 function seal(bytes: Uint8Array<ArrayBuffer>): ArrayBuffer {
   let crc = 0xffffffff;
@@ -57,6 +33,9 @@ describe('a walk file', () => {
     expect(map.storeys).toHaveLength(2);
     expect(storey_at(map, stand(golden.below[1]!.stand).height)).toBe(1);
     expect(is_clear(map, map.start)).toBe(true);
+    const [ground, upper] = storey_heights(map);
+    expect(ground).toBeCloseTo(0, 0);
+    expect(upper).toBeCloseTo(2.72, 0);
   });
 
   it('is refused where it is cut off or changed', async () => {
@@ -67,7 +46,7 @@ describe('a walk file', () => {
       changed[k]! ^= 16;
       await expect(read_walk_file(changed.buffer), String(k)).rejects.toThrow('walk file');
     }
-  });
+  }, 60_000);
 
   it('is refused where its header is forged', async () => {
     const forged = async (field: string, write: (view: DataView) => void): Promise<void> => {
@@ -100,8 +79,8 @@ describe('a walk file', () => {
     const columns = map.width * map.depth;
     await refused((bytes) => (bytes[0] = 65));
     await refused((bytes) => (bytes[columns] = 4));
-    await refused((bytes) => bytes.fill(128, columns + map.heights.length));
-    await refused((bytes) => bytes.fill(1, columns + map.heights.length));
+    await refused((bytes) => bytes.fill(128, columns + map.places.length));
+    await refused((bytes) => bytes.fill(1, columns + map.places.length));
     // A stream that is no zlib stream at all.
     await expect(read_walk_file(seal(file.slice(0, header_bytes + 9)))).rejects.toThrow();
   });
@@ -112,7 +91,7 @@ describe('a walk file', () => {
     [104, 108].forEach((at) => view.setUint32(at, 2048, true));
     view.setUint32(112, 2 ** 24, true);
     view.setUint32(116, 2 ** 22 + 2 ** 25, true);
-    await expect(read_walk_file(seal(changed))).rejects.toThrow('unpacked bytes');
+    await expect(read_walk_file(seal(changed))).rejects.toThrow('unpacked');
   });
 });
 
@@ -162,7 +141,7 @@ describe('a walker', () => {
       }
       expect(way).toBeGreaterThan(500);
     }
-  });
+  }, 60_000);
 });
 
 describe('a path', () => {
@@ -177,7 +156,7 @@ describe('a path', () => {
       // Of ways that are as short over the grid, the straight pieces may differ.
       expect(Math.abs(total - length)).toBeLessThan(0.02 * length);
     }
-  });
+  }, 60_000);
 
   it('leads around a wall', () => {
     const yard = flat_map(40, 40, (x, y) => x !== 20 || y >= 35);

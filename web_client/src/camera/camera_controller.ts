@@ -16,6 +16,7 @@ import { CameraRig, default_fov_y_rad } from './camera_rig';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';
 import { FlyController } from './fly_controller';
+import type { Ground } from './ground';
 import type { CameraMode, ModeController } from './mode';
 import { is_held, no_axes, type Axes, type Gesture } from './movement';
 import { OrbitController } from './orbit_controller';
@@ -31,15 +32,17 @@ const level_time_s = 0.25;
 
 export class CameraController {
   private readonly rig_ = new CameraRig();
+  private readonly walk_ = new WalkController(this.rig_);
   private readonly modes_: Readonly<Record<CameraMode, ModeController>> = {
     orbit: new OrbitController(this.rig_),
     fly: new FlyController(this.rig_),
-    walk: new WalkController(this.rig_),
+    walk: this.walk_,
   };
   private readonly smoothing_ = new Smoothing();
   private mode_: CameraMode = 'orbit';
   private scene_: SceneSetup | undefined;
   private speed_ = 1;
+  private settled_ = true;
   private flight_: { way: Flight; time_s: number; ended: (arrived: boolean) => void } | undefined;
 
   /** Time constant of the glide after a gesture. 0 turns it off, for people who asked for reduced motion. */
@@ -92,6 +95,11 @@ export class CameraController {
 
   set fov_y_rad(value: number) {
     this.rig_.fov_y_rad = value;
+  }
+
+  /** On which visitors walk; undefined: not known, or there is none. */
+  set ground(ground: Ground | undefined) {
+    this.walk_.ground = ground;
   }
 
   load(scene: SceneSetup): void {
@@ -153,10 +161,16 @@ export class CameraController {
     this.rig_.refocus();
   }
 
-  set_mode(mode: CameraMode): void {
+  set_mode(mode: CameraMode, at_once = false): void {
     if (mode === this.mode_) return;
     this.mode_ = mode;
-    this.controller.begin();
+    this.begin_mode(at_once);
+  }
+
+  /** Flies to where the mode begins, if that is elsewhere. */
+  begin_mode(at_once = false): void {
+    const to = this.controller.begin();
+    if (to) this.fly_to(to, add(to.position, scale(rotate(to.orientation, forward), this.rig_.distance())), at_once);
   }
 
   /** Turns the scene in the picture, for captures that lie on their side or stand on their head. */
@@ -195,7 +209,7 @@ export class CameraController {
 
   /** No movement is left to make. */
   get at_rest(): boolean {
-    return this.smoothing_.at_rest && !this.flight_;
+    return this.smoothing_.at_rest && this.settled_ && !this.flight_;
   }
 
   /** Moves by `dt_s`. Returns whether the camera moved. */
@@ -207,9 +221,9 @@ export class CameraController {
     const due = this.smoothing_.take(dt_s, this.reach);
     this.turn(due.yaw, due.pitch);
     if (due.yaw !== 0 || due.pitch !== 0) this.rig_.level(1 - Math.exp(-dt_s / level_time_s));
-    const pan = this.controller.allowed(rotate(this.pose.orientation, due.pan));
-    this.rig_.translate(add(pan, scale(this.up, due.climb)));
+    this.controller.move(rotate(this.pose.orientation, due.pan), due.climb);
     if (due.dolly !== 0) this.controller.dolly(due.dolly);
+    this.settled_ = this.controller.settle?.(dt_s) ?? true;
     return before !== this.pose;
   }
 

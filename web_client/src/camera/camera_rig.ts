@@ -104,6 +104,12 @@ export class CameraRig {
     this.pose = { ...this.pose, position };
   }
 
+  /** Moves camera and focus together to a place that the limits do not bind. */
+  put(position: Vec3): void {
+    this.focus = add(this.focus, sub(position, this.pose.position));
+    this.pose = { ...this.pose, position };
+  }
+
   /** Rolls the picture towards a level horizon by `share`. */
   level(share: number): void {
     const { position, orientation } = this.pose;

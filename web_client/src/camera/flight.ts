@@ -14,6 +14,20 @@ export interface PathSample {
   readonly eye: Eye;
 }
 
+const announced_samples = 64;
+const held_us = 1_000_000; // at the end of a flight the camera stays
+
+/** The part of a flight that begins now, at `from_s`, as the server is told of it. */
+export function path_of(way: Flight, from_s: number, length_s: number, now_us: number): PathSample[] {
+  const samples = Array.from({ length: announced_samples + 1 }, (_, i): PathSample => {
+    const offset_s = (length_s * i) / announced_samples;
+    return { time_us: now_us + offset_s * 1e6, eye: way.at(from_s + offset_s) };
+  });
+  const last = samples[announced_samples]!;
+  const stays = from_s + length_s >= way.duration_s - 1e-6;
+  return stays ? [...samples, { ...last, time_us: last.time_us + held_us }] : samples;
+}
+
 /** Maps 0…1 to 0…1 with zero velocity and acceleration at both ends (Perlin's smootherstep). */
 function eased(share: number): number {
   const s = Math.min(1, Math.max(0, share));

@@ -1,4 +1,4 @@
-import { multiply, scale, type Quat, type Vec3 } from '../base/vector';
+import { add, multiply, scale, type Quat, type Vec3 } from '../base/vector';
 import type { CameraRig } from './camera_rig';
 import type { Eye } from './eye';
 import type { ModeController } from './mode';
@@ -7,10 +7,13 @@ const dolly_share = 0.08; // of the scene's scale, a step
 
 /** The camera turns about itself, and the scene stays under the pointer. */
 export class FlyController implements ModeController {
-  readonly speed: number = 0.6;
   readonly sight_distance = Infinity;
 
   constructor(protected readonly rig: CameraRig) {}
+
+  get speed(): number {
+    return 0.6;
+  }
 
   get drag_rad(): number {
     return this.rig.fov_y_rad;
@@ -20,8 +23,8 @@ export class FlyController implements ModeController {
     return this.rig.view;
   }
 
-  begin(): void {
-    // Nothing to prepare: the camera flies on from where it is.
+  begin(): Eye | undefined {
+    return undefined; // the camera flies on from where it is
   }
 
   turn(by: Quat): void {
@@ -29,8 +32,8 @@ export class FlyController implements ModeController {
     this.rig.pose = { position, orientation: multiply(by, orientation) };
   }
 
-  allowed(movement: Vec3): Vec3 {
-    return movement;
+  move(movement: Vec3, climb: number): void {
+    this.rig.translate(add(movement, scale(this.rig.up, climb)));
   }
 
   dolly(steps: number): void {

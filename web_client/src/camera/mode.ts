@@ -14,11 +14,13 @@ export interface ModeController {
   readonly sight_distance: number;
   /** Unit direction of "forward". */
   readonly heading: Vec3;
-  /** The visitor chose this mode. */
-  begin(): void;
+  /** The visitor chose this mode. Returns where the camera has to fly for it, if it has to. */
+  begin(): Eye | undefined;
   turn(by: Quat): void;
-  /** The part of a movement that the mode allows; climbing is added after it. World axes and units. */
-  allowed(movement: Vec3): Vec3;
+  /** Moves the camera as far as the mode allows. `climb`: along up. World axes and units. */
+  move(movement: Vec3, climb: number): void;
+  /** Called after each step of the camera; false: it goes on without the visitor. */
+  settle?(dt_s: number): boolean;
   /** `steps`: notches of a wheel, > 0 towards the scene. */
   dolly(steps: number): void;
   /** Where the camera goes when the visitor points at a place. */

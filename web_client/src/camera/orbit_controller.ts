@@ -20,7 +20,7 @@ export class OrbitController implements ModeController {
     return this.rig_.view;
   }
 
-  begin(): void {
+  begin(): undefined {
     this.rig_.refocus();
   }
 
@@ -31,8 +31,8 @@ export class OrbitController implements ModeController {
     this.rig_.pose = { position, orientation: multiply(by, pose.orientation) };
   }
 
-  allowed(movement: Vec3): Vec3 {
-    return movement;
+  move(movement: Vec3, climb: number): void {
+    this.rig_.translate(add(movement, scale(this.rig_.up, climb)));
   }
 
   /** Moves towards the focus, never through it. */

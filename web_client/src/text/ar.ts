@@ -86,7 +86,7 @@ export const text: Texts = {
     speed_fly: 'السرعة',
     wheel_fly: 'العجلة عند الطيران',
     turn_to: 'الالتفات أو المشي إلى مكان',
-    double_click: 'نقر مزدوج',
+    double_click: 'نقر مزدوج، ونقرة عند المشي',
     double_tap: 'لمستان، وواحدة عند المشي',
     modes: 'دوران أو طيران أو مشي',
     button: 'الزر',
@@ -179,6 +179,14 @@ export const text: Texts = {
     scale: 'مقياس المشهد',
     known: 'هذا الطول بالأمتار',
     set: 'ضبط المقياس',
+  },
+  ground: {
+    plan: 'مخطط الطابق',
+    storey: 'الطابق',
+    storey_numbered: (n) => `الطابق ${n}`,
+    view_up: 'يدور مع اتجاه النظر',
+    larger: 'تكبير',
+    smaller: 'تصغير',
   },
   together: {
     present: 'قيادة جولة',

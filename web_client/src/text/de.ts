@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: 'Tempo',
     wheel_fly: 'Mausrad im Flug',
     turn_to: 'Zu einer Stelle drehen oder gehen',
-    double_click: 'Doppelklick',
+    double_click: 'Doppelklick; beim Gehen ein Klick',
     double_tap: 'zweimal tippen; beim Gehen einmal',
     modes: 'Kreisen, fliegen oder gehen',
     button: 'der Knopf',
@@ -171,6 +171,14 @@ export const text: Texts = {
     scale: 'Maßstab der Szene',
     known: 'Diese Länge in Metern',
     set: 'Maßstab festlegen',
+  },
+  ground: {
+    plan: 'Grundriss',
+    storey: 'Stockwerk',
+    storey_numbered: (n) => `Stockwerk ${n}`,
+    view_up: 'Mit dem Blick drehen',
+    larger: 'Größer',
+    smaller: 'Kleiner',
   },
   together: {
     present: 'Vorführen',

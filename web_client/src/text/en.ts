@@ -78,7 +78,7 @@ export const text = {
     speed_fly: 'Speed',
     wheel_fly: 'wheel in Fly',
     turn_to: 'Turn, or walk, to a place',
-    double_click: 'double click',
+    double_click: 'double click; one in Walk',
     double_tap: 'double tap; one in Walk',
     modes: 'Orbit, fly or walk',
     button: 'the button',
@@ -169,6 +169,14 @@ export const text = {
     scale: 'Scale of the scene',
     known: 'This length in metres',
     set: 'Set the scale',
+  },
+  ground: {
+    plan: 'Floor plan',
+    storey: 'Floor',
+    storey_numbered: (n: string): string => `Floor ${n}`,
+    view_up: 'Turn with the view',
+    larger: 'Larger',
+    smaller: 'Smaller',
   },
   together: {
     present: 'Present',

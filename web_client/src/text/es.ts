@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: 'Velocidad',
     wheel_fly: 'rueda al volar',
     turn_to: 'Girar o caminar hacia un lugar',
-    double_click: 'doble clic',
+    double_click: 'doble clic; uno al caminar',
     double_tap: 'doble toque; uno al caminar',
     modes: 'Orbitar, volar o caminar',
     button: 'el botón',
@@ -172,6 +172,14 @@ export const text: Texts = {
     scale: 'Escala de la escena',
     known: 'Esta longitud en metros',
     set: 'Fijar la escala',
+  },
+  ground: {
+    plan: 'Plano',
+    storey: 'Planta',
+    storey_numbered: (n) => `Planta ${n}`,
+    view_up: 'Girar con la vista',
+    larger: 'Ampliar',
+    smaller: 'Reducir',
   },
   together: {
     present: 'Presentar',

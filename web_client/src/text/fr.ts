@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: 'Vitesse',
     wheel_fly: 'molette en vol',
     turn_to: 'Se tourner ou marcher vers un point',
-    double_click: 'double-clic',
+    double_click: 'double-clic ; un seul clic en marche',
     double_tap: 'deux touchers ; un seul en marche',
     modes: 'Orbite, vol ou marche',
     button: 'le bouton',
@@ -172,6 +172,14 @@ export const text: Texts = {
     scale: 'Échelle de la scène',
     known: 'Cette longueur en mètres',
     set: 'Définir l’échelle',
+  },
+  ground: {
+    plan: 'Plan',
+    storey: 'Niveau',
+    storey_numbered: (n) => `Niveau ${n}`,
+    view_up: 'Tourner avec le regard',
+    larger: 'Agrandir',
+    smaller: 'Réduire',
   },
   together: {
     present: 'Présenter',

@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: 'Velocità',
     wheel_fly: 'rotella in volo',
     turn_to: 'Girati o cammina verso un punto',
-    double_click: 'doppio clic',
+    double_click: 'doppio clic; uno solo se cammini',
     double_tap: 'doppio tocco; uno solo se cammini',
     modes: 'Orbita, vola o cammina',
     button: 'il pulsante',
@@ -172,6 +172,14 @@ export const text: Texts = {
     scale: 'Scala della scena',
     known: 'Questa lunghezza in metri',
     set: 'Imposta la scala',
+  },
+  ground: {
+    plan: 'Pianta',
+    storey: 'Piano',
+    storey_numbered: (n) => `Piano ${n}`,
+    view_up: 'Ruota con lo sguardo',
+    larger: 'Ingrandisci',
+    smaller: 'Riduci',
   },
   together: {
     present: 'Presenta',

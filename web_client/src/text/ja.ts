@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: '速さ',
     wheel_fly: '飛行中のホイール',
     turn_to: 'その場所を向く・歩いて行く',
-    double_click: 'ダブルクリック',
+    double_click: 'ダブルクリック（歩行中はクリック）',
     double_tap: 'ダブルタップ（歩行中はタップ）',
     modes: '周回・飛行・歩行',
     button: 'ボタン',
@@ -172,6 +172,14 @@ export const text: Texts = {
     scale: 'シーンの縮尺',
     known: 'この長さ（メートル）',
     set: '縮尺を設定',
+  },
+  ground: {
+    plan: '間取り図',
+    storey: '階',
+    storey_numbered: (n) => `${n} 階`,
+    view_up: '視線に合わせて回転',
+    larger: '拡大',
+    smaller: '縮小',
   },
   together: {
     present: '案内する',

@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: '속도',
     wheel_fly: '비행 중 휠',
     turn_to: '한 곳을 보거나 걸어가기',
-    double_click: '두 번 클릭',
+    double_click: '두 번 클릭, 걷기에서는 한 번',
     double_tap: '두 번 탭, 걷기에서는 한 번',
     modes: '궤도, 비행, 걷기',
     button: '버튼',
@@ -171,6 +171,14 @@ export const text: Texts = {
     scale: '장면의 축척',
     known: '이 길이(미터)',
     set: '축척 설정',
+  },
+  ground: {
+    plan: '평면도',
+    storey: '층',
+    storey_numbered: (n) => `${n}층`,
+    view_up: '시선을 따라 회전',
+    larger: '크게',
+    smaller: '작게',
   },
   together: {
     present: '안내하기',

@@ -78,7 +78,7 @@ export const text: Texts = {
     speed_fly: '速度',
     wheel_fly: '飞行时滚轮',
     turn_to: '转向或走到某处',
-    double_click: '双击',
+    double_click: '双击；步行时单击',
     double_tap: '轻点两下；步行时一下',
     modes: '环绕、飞行或步行',
     button: '按钮',
@@ -168,6 +168,14 @@ export const text: Texts = {
     scale: '场景比例',
     known: '该长度（米）',
     set: '设定比例',
+  },
+  ground: {
+    plan: '平面图',
+    storey: '楼层',
+    storey_numbered: (n) => `第 ${n} 层`,
+    view_up: '随视线旋转',
+    larger: '放大',
+    smaller: '缩小',
   },
   together: {
     present: '讲解',

@@ -1,7 +1,7 @@
 // Leads a visitor through a tour. It uses neither page nor clock, so that tests can drive it with fakes.
 import type { Timers } from '../base/clock';
 import type { Eye } from '../camera/eye';
-import { glide, glide_time_s, type Flight, type PathSample } from '../camera/flight';
+import { glide, glide_time_s, path_of, type Flight, type PathSample } from '../camera/flight';
 import { default_stay_s, flight_to, type Stop, type Tour } from './tour';
 
 interface Guided {
@@ -34,10 +34,8 @@ export interface TourState {
   readonly playing: boolean;
 }
 
-const announced_samples = 64;
 const announced_s = 4; // part of a film told at a time: the wire takes 256 samples
 const announce_again_s = 2;
-const held_us = 1_000_000; // at the end of a flight the camera stays
 
 export class TourPlayer {
   private tours_: readonly Tour[] = [];
@@ -234,14 +232,7 @@ export class TourPlayer {
   /** Tells the server the part of a flight that begins now, at `from_s`. */
   private announce(way: Flight, from_s: number, length_s: number): void {
     if (!(length_s > 0)) return;
-    const now_us = this.env_.now_us();
-    const samples = Array.from({ length: announced_samples + 1 }, (_, i): PathSample => {
-      const offset_s = (length_s * i) / announced_samples;
-      return { time_us: now_us + offset_s * 1e6, eye: way.at(from_s + offset_s) };
-    });
-    const last = samples[announced_samples]!;
-    const stays = from_s + length_s >= way.duration_s - 1e-6;
-    this.env_.announce(stays ? [...samples, { ...last, time_us: last.time_us + held_us }] : samples);
+    this.env_.announce(path_of(way, from_s, length_s, this.env_.now_us()));
   }
 
   private tell(): void {

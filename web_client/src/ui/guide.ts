@@ -1,5 +1,6 @@
 // Leads visitors through a scene: tours, shared views, and the page around this one.
 import { browser_timers, type Clock } from '../base/clock';
+import { Signal } from '../base/signal';
 import type { Eye } from '../camera/eye';
 import { start_mode } from '../session/camera_messages';
 import { scene_name } from '../session/scenes';
@@ -52,6 +53,8 @@ export interface GuideMedia {
 }
 
 export class Guide {
+  /** The tour or its stop has changed. */
+  readonly tour_shown = new Signal<TourState>();
   private readonly player_: TourPlayer;
   private readonly doors_: Doors;
   private readonly tour_view_: TourView;
@@ -101,6 +104,10 @@ export class Guide {
       this.show_view(shared);
       this.show_stop(shared);
     });
+  }
+
+  go_to_stop(index: number): void {
+    this.player_.go_to(index);
   }
 
   /** Of authors: the scene has this scale from now on. Undefined for visitors. */
@@ -227,6 +234,7 @@ export class Guide {
     this.parts_.media.show(state);
     this.hotspots_.show(state, this.parts_.navigation.eye);
     if (state.stop?.portal) this.doors_.prepare(state.stop.portal);
+    this.tour_shown.emit(state);
     this.embed_.say({ catgs: 'stop', stop: state.stop_index ?? null, playing: state.playing });
   }
 

@@ -6,6 +6,7 @@ import { CameraController } from '../camera/camera_controller';
 import { CameraLoop } from '../camera/camera_loop';
 import type { CameraSample, Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
+import type { Ground } from '../camera/ground';
 import { Inertia } from '../camera/inertia';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
@@ -30,6 +31,8 @@ export class Navigation {
   readonly taken_over = new Signal();
   /** The mode or the field of view may have changed. */
   readonly changed = new Signal();
+  /** The visitor has chosen another mode. */
+  readonly mode_chosen = new Signal();
   /** The camera went back to where visits begin. */
   readonly went_back = new Signal();
   /** The visitor has said which way is up. */
@@ -40,6 +43,8 @@ export class Navigation {
   readonly pad_pressed = new Signal<GamepadAction>();
   /** Hears clicks and taps in place of the camera: `x`, `y` are shares of the view, y down. */
   tapped: ((x: number, y: number) => void) | undefined;
+  /** Hears clicks and taps of visitors who walk, as `tapped` does; false: they mean something else. */
+  walk_to: ((x: number, y: number) => boolean) | undefined;
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
   private readonly inertia_ = new Inertia();
@@ -151,13 +156,23 @@ export class Navigation {
   }
 
   set_mode(mode: CameraMode): void {
-    this.camera.set_mode(mode);
+    this.camera.set_mode(mode, this.reduced_motion_);
+    this.loop.wake();
     this.changed.emit();
+  }
+
+  /** What visitors walk on from now on. `comes_down`: those who walk already come down to it. */
+  set_ground(ground: Ground, comes_down: boolean): void {
+    this.camera.ground = ground;
+    if (!comes_down || this.camera.mode !== 'walk') return;
+    this.camera.begin_mode(this.reduced_motion_);
+    this.loop.wake();
   }
 
   next_mode(): void {
     const next = camera_modes.indexOf(this.camera.mode) + 1;
     this.set_mode(camera_modes[next % camera_modes.length]!);
+    this.mode_chosen.emit();
   }
 
   /** The point in the middle of the view; undefined: nothing is there. */
@@ -191,6 +206,8 @@ export class Navigation {
       pointed_at: (x, y, how) => {
         if (this.tapped) {
           if (how !== 'double tap') this.tapped(x, y);
+        } else if (this.camera.mode === 'walk' && this.walk_to?.(x, y)) {
+          return;
         } else if (how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk')) {
           void this.point_at(x, y);
         }
@@ -234,6 +251,7 @@ export class Navigation {
     // After a reconnect the visitor stays where they were.
     if (!scene || scene.sceneId === this.scene_id_) return;
     this.scene_id_ = scene.sceneId;
+    this.camera.ground = undefined;
     this.camera.load(scene_setup(scene));
     const mode = start_mode(scene);
     if (mode) this.set_mode(mode);
@@ -256,7 +274,8 @@ export class Navigation {
     return this.picks_.at(this.ray_at(x, y));
   }
 
-  private ray_at(x: number, y: number): Ray {
+  /** `x`, `y`: as in `tapped`. */
+  ray_at(x: number, y: number): Ray {
     return ray_through(this.eye, x, y, this.view_.clientWidth / Math.max(1, this.view_.clientHeight));
   }
 }

@@ -3,6 +3,7 @@ import { browser_storage } from '../base/browser_storage';
 import { clock_from } from '../base/clock';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
+import { GroundUse } from '../ground/mount';
 import type { PresenterChoice } from '../present/make_presenter';
 import { device_kind } from '../session/device';
 import { TourMedia, TourMediaFields } from '../media/tour_media';
@@ -55,6 +56,12 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   const media = { media: new TourMedia(() => token.value), media_fields: new TourMediaFields() };
   const guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion, ...media });
   new MeasurePanel({ view, navigation, toolbar, seen, storage, set_scale: guide.set_scale });
+  const ground = new GroundUse({
+    ...{ view, clock, worker, navigation, seen, toolbar, token, storage, reduced_motion },
+    tour_shown: guide.tour_shown,
+    go_to_stop: (index) => guide.go_to_stop(index),
+  });
+  worker.on('company_moved', ({ places }) => ground.show_people(places));
   const pointing = new Pointing(view, worker, navigation, notice, seen);
   new Together(worker, navigation, toolbar, notice, pointing, reduced_motion);
   bind_page_events(worker);

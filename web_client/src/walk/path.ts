@@ -59,9 +59,9 @@ export function find_path(map: WalkMap, from: Stand, to: Stand): Stand[] {
   const end = clear_at(map, ...goal, to.height);
   if (begin < 0 || end < 0) return [];
   if (begin === end) return [from, to];
-  const cost = new Float32Array(map.heights.length).fill(Infinity);
-  const before = new Uint32Array(map.heights.length);
-  const column_of = new Uint32Array(map.heights.length);
+  const cost = new Float32Array(map.places.length).fill(Infinity);
+  const before = new Uint32Array(map.places.length);
+  const column_of = new Uint32Array(map.places.length);
   const open = new Heap();
   const reach = (place: number, x: number, y: number, gone: number, last: number): void => {
     if (!(gone < cost[place]!)) return;
@@ -70,10 +70,10 @@ export function find_path(map: WalkMap, from: Stand, to: Stand): Stand[] {
     column_of[place] = y * map.width + x;
     const [dx, dy] = [Math.abs(goal[0] - x), Math.abs(goal[1] - y)];
     const left = Math.max(dx, dy) + (diagonal - 1) * Math.min(dx, dy);
-    open.push(cost[place]! + left, place);
+    open.push(cost[place] + left, place);
   };
   reach(begin, Math.floor(from.east), Math.floor(from.north), 0, begin);
-  const done = new Uint8Array(map.heights.length);
+  const done = new Uint8Array(map.places.length);
   while (!open.empty && !done[end]) {
     const place = open.pop();
     if (done[place]) continue;

@@ -1,4 +1,5 @@
 // The ground of a scene on which a visitor can walk: a `.walk` file (render_core/walk/walk_file.h).
+import { Breaths } from '../base/breaths';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
 
 const header_bytes = 320;
@@ -41,9 +42,22 @@ export interface WalkMap {
   readonly storeys: readonly Storey[]; // from below
   readonly width: number; // columns to the east
   readonly depth: number; // rows to the north
-  readonly first: Uint32Array; // width * depth + 1 indices of places, row by row
-  readonly heights: Uint16Array; // of each place; the places of a column ascend
-  readonly kinds: Uint8Array;
+  readonly counts: Uint8Array; // places of each column, row by row
+  readonly first: Uint32Array; // index of the first place of each block of columns
+  readonly places: Uint16Array; // height << 2 | kind; the places of a column ascend
+}
+
+const block = 16; // columns
+
+/** The index of columns with so many places. */
+export function first_of(counts: Uint8Array): Uint32Array {
+  const first = new Uint32Array(Math.ceil(counts.length / block));
+  let sum = 0;
+  for (let c = 0; c < counts.length; ++c) {
+    if (c % block === 0) first[c / block] = sum;
+    sum += counts[c]!;
+  }
+  return first;
 }
 
 export const to_grid = (map: WalkMap, place: Vec3): Vec3 => {
@@ -64,6 +78,10 @@ export function to_world(map: WalkMap, { east, north, height }: Stand): Vec3 {
 export const eyes_of = (map: WalkMap, at: Stand): Vec3 =>
   to_world(map, { ...at, height: at.height + cells_per_eye_height });
 
+/** The heights along up of the storeys' floors, from below, in the world. */
+export const storey_heights = ({ storeys, origin, axes, cell }: WalkMap): readonly number[] =>
+  storeys.map(({ level }) => dot(origin, axes[2]) + level * cell);
+
 /** The index in `storeys` of a height. */
 export function storey_at(map: WalkMap, height: number): number {
   let storey = 0;
@@ -71,22 +89,28 @@ export function storey_at(map: WalkMap, height: number): number {
   return storey;
 }
 
-export const height_of = (map: WalkMap, place: number): number => map.heights[place]! / per_cell;
+export const height_of = (map: WalkMap, place: number): number => (map.places[place]! >> 2) / per_cell;
+export const kind_of = (map: WalkMap, place: number): number => map.places[place]! & 3;
 
-/** The places of a column, as [first, end); none outside of the map. */
-export function places_at(map: WalkMap, column: number, row: number): readonly [first: number, end: number] {
-  if (!(column >= 0 && row >= 0 && column < map.width && row < map.depth)) return [0, 0];
-  const i = row * map.width + column;
-  return [map.first[i]!, map.first[i + 1]!];
+/** The first place of a column; -1 outside of the map. Further ones follow, `count_at` in all. */
+export function first_at(map: WalkMap, column: number, row: number): number {
+  if (!(column >= 0 && row >= 0 && column < map.width && row < map.depth)) return -1;
+  const c = row * map.width + column;
+  let place = map.first[(c / block) | 0]!;
+  for (let k = c - (c % block); k < c; ++k) place += map.counts[k]!;
+  return place;
 }
+
+export const count_at = (map: WalkMap, column: number, row: number): number =>
+  column >= 0 && column < map.width ? (map.counts[row * map.width + column] ?? 0) : 0;
 
 /** The clear ground of a column within a step of `height`; -1 where there is none. */
 export function clear_at(map: WalkMap, column: number, row: number, height: number): number {
-  if (!(column >= 0 && row >= 0 && column < map.width && row < map.depth)) return -1;
-  const c = row * map.width + column;
-  const end = map.first[c + 1]!;
-  for (let i = map.first[c]!; i < end; ++i)
-    if (map.kinds[i] === Kind.clear && Math.abs(map.heights[i]! / per_cell - height) <= map.step) return i;
+  const first = first_at(map, column, row);
+  if (first < 0) return -1;
+  const end = first + map.counts[row * map.width + column]!;
+  for (let i = first; i < end; ++i)
+    if (kind_of(map, i) === Kind.clear && Math.abs(height_of(map, i) - height) <= map.step) return i;
   return -1;
 }
 
@@ -125,7 +149,7 @@ async function unpacked(packed: Uint8Array<ArrayBuffer>, bytes: number): Promise
 
 /** Throws an Error that names the field that is wrong. */
 export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
-  require(file.byteLength > header_bytes && file.byteLength <= most_bytes, 'size of the file');
+  require(file.byteLength > header_bytes && file.byteLength <= most_bytes, 'length');
   const view = new DataView(file);
   const word = (at: number): number => view.getUint32(at, true);
   const float = (at: number): number => view.getFloat32(at, true);
@@ -136,8 +160,8 @@ export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
   const [width, depth, count, bytes] = [word(104), word(108), word(112), word(116)];
   require(width >= 1 && width <= most_side && depth >= 1 && depth <= most_side, 'size');
   require(count <= most_places, 'places');
-  require(bytes <= most_growth * file.byteLength && bytes <= width * depth + 4 * count, 'unpacked bytes');
-  require(bytes >= width * depth + 2 * count, 'unpacked bytes');
+  require(bytes <= most_growth * file.byteLength && bytes <= width * depth + 4 * count, 'unpacked');
+  require(bytes >= width * depth + 2 * count, 'unpacked');
   const map: WalkMap = {
     origin: triple(16),
     axes: [triple(28), triple(40), triple(52)],
@@ -149,7 +173,7 @@ export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
     storeys: read_storeys(word(124), (k) => triple(128 + 12 * k), word),
     width,
     depth,
-    ...read_places(await unpacked(new Uint8Array(file, header_bytes), bytes), width * depth, count),
+    ...(await read_places(await unpacked(new Uint8Array(file, header_bytes), bytes), width * depth, count)),
   };
   require_sound(map);
   return map;
@@ -183,19 +207,20 @@ function require_sound(map: WalkMap): void {
   require(clear_at(map, Math.floor(start.east), Math.floor(start.north), start.height) >= 0, 'start');
 }
 
-function read_places(
+async function read_places(
   bytes: Uint8Array,
   columns: number,
   count: number,
-): Pick<WalkMap, 'first' | 'heights' | 'kinds'> {
-  const first = new Uint32Array(columns + 1);
-  const heights = new Uint16Array(count);
-  const kinds = bytes.slice(columns, columns + count);
+): Promise<Pick<WalkMap, 'counts' | 'first' | 'places'>> {
+  const counts = bytes.slice(0, columns);
+  const places = new Uint16Array(count);
   const last = new Int32Array(most_in_column); // by rank in a column
   let at = columns + count;
   let place = 0;
+  const breaths = new Breaths();
   for (let c = 0; c < columns; ++c) {
-    const in_column = bytes[c]!;
+    if (c % 4096 === 0) await breaths.take();
+    const in_column = counts[c]!;
     require(in_column <= most_in_column && place + in_column <= count, 'columns');
     for (let k = 0; k < in_column; ++k, ++place) {
       let code = 0;
@@ -206,13 +231,13 @@ function read_places(
         more = byte >= 128;
       }
       const height = last[k]! + ((code >> 1) ^ -(code & 1));
-      require(height >= 0 && height < most_levels * per_cell && kinds[place]! <= 3, 'a place');
+      const kind = bytes[columns + place]!;
+      require(height >= 0 && height < most_levels * per_cell && kind <= 3, 'a place');
       require(k === 0 || height > last[k - 1]!, 'a place');
-      heights[place] = height;
+      places[place] = (height << 2) | kind;
       last[k] = height;
     }
-    first[c + 1] = place;
   }
   require(place === count && at === bytes.length, 'columns');
-  return { first, heights, kinds };
+  return { counts, first: first_of(counts), places };
 }

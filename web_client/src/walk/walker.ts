@@ -1,6 +1,6 @@
 // A body that walks on a WalkMap: the same steps as render_core/walk/walker.h, which is its oracle.
 import type { Vec3 } from '../base/vector';
-import { clear_at, height_of, Kind, places_at, to_grid, type Stand, type WalkMap } from './walk_map';
+import { clear_at, count_at, first_at, height_of, Kind, kind_of, to_grid, type Stand, type WalkMap } from './walk_map';
 
 const piece = 0.4; // cells; a body moves by at most this much at a time
 const most_pieces = 25_000;
@@ -43,10 +43,11 @@ function try_piece(map: WalkMap, from: Stand, x: number, y: number): Stand | und
 /** The clear ground below a place of the world, where a visitor would come to stand. */
 export function stand_below(map: WalkMap, place: Vec3): Stand | undefined {
   const [east, north, height] = to_grid(map, place);
-  const [first, end] = places_at(map, Math.floor(east), Math.floor(north));
+  const [column, row] = [Math.floor(east), Math.floor(north)];
+  const first = first_at(map, column, row);
   let stand: Stand | undefined;
-  for (let i = first; i < end; ++i)
-    if (map.kinds[i] === Kind.clear && height_of(map, i) <= height + map.step)
+  for (let i = first; first >= 0 && i < first + count_at(map, column, row); ++i)
+    if (kind_of(map, i) === Kind.clear && height_of(map, i) <= height + map.step)
       stand = { east, north, height: height_of(map, i) };
   return stand;
 }

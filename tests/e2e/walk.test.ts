@@ -1,0 +1,162 @@
+// Walking on the ground of a scene, and its floor plan, against the real server.
+import { writeFileSync } from 'node:fs';
+import path from 'node:path';
+import type { Page } from 'playwright-core';
+import { beforeAll, describe, expect, it } from 'vitest';
+import { dot, rotate, type Vec3 } from '#client/base/vector';
+import type { Pose } from '#client/camera/eye';
+import { barriers } from './support/axe';
+import { keep_screenshot, open, windows } from './support/browser';
+import { distance, pose_of, settle } from './support/camera';
+import { catgs_render, start_server, type RunningServer } from './support/programs';
+import { scratch_folder } from './support/scenes';
+
+const folder = scratch_folder();
+const scene = path.join(folder, 'city.ply');
+const eye_m = 1.6; // y points down, and the ground lies at 0
+const street: Vec3 = [0, -eye_m, -8];
+
+let server: RunningServer;
+
+beforeAll(async () => {
+  catgs_render('synth', 'city', scene, '--gaussians', '300000');
+  const stop = (title: string, position: Vec3) => ({ title, position, look_at: [0, -1.6, 60] });
+  writeFileSync(
+    path.join(folder, 'city.json'),
+    JSON.stringify({
+      ...{ up: [0, -1, 0], metres_per_unit: 1, start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] } },
+      tours: [{ title: 'The streets', stops: [stop('The crossing', street), stop('Up the street', [0, -eye_m, 4])] }],
+    }),
+  );
+  catgs_render('floors', scene, path.join(folder, 'city.walk'), '--eye-height', String(eye_m));
+  server = await start_server(scene, ['--min-fps', '0']);
+});
+
+/** Presses M until the visitor walks, and waits until they stand on the ground. */
+async function walk(page: Page): Promise<Pose> {
+  await page.locator('#button-plan').waitFor({ state: 'visible' });
+  await page.locator('#view').focus();
+  for (let k = 0; k < 3 && (await page.locator('#mode-label').innerText()) !== 'Walk'; ++k) await page.keyboard.press('KeyM');
+  await page.locator('#floor-ring').waitFor({ state: 'attached' });
+  await expect.poll(async () => (await pose_of(page)).position[1]).toBeGreaterThan(-eye_m - 0.3);
+  await settle(page);
+  return pose_of(page);
+}
+
+const height = ({ position }: Pose): number => -position[1];
+
+describe('a visitor who walks', () => {
+  it('comes down to the street, and passes no house', async () => {
+    const { page, errors } = await open(server.url, windows.desktop);
+    const begin = await walk(page);
+    expect(height(begin)).toBeGreaterThan(eye_m - 0.3);
+    await keep_screenshot(page, 'walk-street');
+    // Sideways there are houses. Whoever flies passes them.
+    await page.keyboard.down('ShiftLeft');
+    await page.keyboard.down('KeyD');
+    let before = begin;
+    for (let k = 0; k < 12; ++k) {
+      await page.waitForTimeout(500);
+      const now = await pose_of(page);
+      expect(Math.abs(height(now) - eye_m)).toBeLessThan(0.8);
+      if (distance(before, now) < 1e-3 && k > 2) break;
+      before = now;
+    }
+    await page.keyboard.up('KeyD');
+    await page.keyboard.up('ShiftLeft');
+    await settle(page);
+    const at_wall = await pose_of(page);
+    await page.keyboard.down('KeyD');
+    await page.waitForTimeout(800);
+    await page.keyboard.up('KeyD');
+    await settle(page);
+    const across = (a: Pose, b: Pose): number => {
+      const right = rotate(a.orientation, [1, 0, 0]);
+      return dot(right, [b.position[0] - a.position[0], 0, b.position[2] - a.position[2]]);
+    };
+    expect(across(begin, at_wall)).toBeGreaterThan(1);
+    expect(across(at_wall, await pose_of(page))).toBeLessThan(0.6);
+    expect(errors).toEqual([]);
+  });
+
+  it('walks to where they click, and stops for a key', async () => {
+    const { page } = await open(server.url, windows.desktop);
+    const begin = await walk(page);
+    await page.mouse.move(640, 560);
+    await page.locator('#floor-ring.shown').waitFor();
+    await keep_screenshot(page, 'walk-ring');
+    await page.mouse.click(640, 560);
+    await expect.poll(async () => distance(begin, await pose_of(page))).toBeGreaterThan(0.5);
+    await settle(page);
+    const there = await pose_of(page);
+    expect(Math.abs(height(there) - eye_m)).toBeLessThan(0.5);
+    await page.mouse.click(640, 480);
+    await expect.poll(async () => distance(there, await pose_of(page))).toBeGreaterThan(0.3);
+    await page.keyboard.press('ArrowLeft');
+    await settle(page);
+    const stopped = await pose_of(page);
+    await page.waitForTimeout(500);
+    expect(distance(stopped, await pose_of(page))).toBeLessThan(0.05);
+  });
+});
+
+describe('the floor plan', () => {
+  it('leads to the stops of the tour, by mouse and by keys', async () => {
+    const { page, errors } = await open(server.url, windows.desktop);
+    const begin = await walk(page);
+    await page.getByRole('button', { name: 'Floor plan' }).click();
+    const plan = page.locator('#plan-panel');
+    await plan.getByRole('button', { name: 'Larger' }).click();
+    await plan.locator('[aria-busy=false]').waitFor();
+    await plan.getByRole('button', { name: 'Up the street' }).waitFor();
+    await settle(page);
+    await keep_screenshot(page, 'plan-large');
+    expect(await barriers(page)).toEqual([]);
+    await plan.getByRole('button', { name: 'Up the street' }).press('Enter');
+    await expect.poll(async () => (await pose_of(page)).position[2]).toBeCloseTo(4, 1);
+    await page.locator('#tour-title', { hasText: 'Up the street' }).waitFor();
+    await plan.getByRole('button', { name: 'Smaller' }).click();
+    // A place beside the middle, where the visitor is.
+    const picture = (await plan.locator('canvas').boundingBox())!;
+    const at_stop = await pose_of(page);
+    await page.mouse.click(picture.x + picture.width / 2, picture.y + picture.height / 2 - 24);
+    await expect.poll(async () => distance(at_stop, await pose_of(page))).toBeGreaterThan(1);
+    expect(distance(begin, at_stop)).toBeGreaterThan(1);
+    expect(errors).toEqual([]);
+  });
+
+  it('turns with the view, and remembers it', async () => {
+    const { page } = await open(server.url, windows.desktop);
+    await page.locator('#button-plan').click();
+    const turn = page.getByRole('button', { name: 'Turn with the view' });
+    await turn.click();
+    await page.reload();
+    await settle(page);
+    await page.locator('#button-plan').click();
+    expect(await turn.getAttribute('aria-pressed')).toBe('true');
+  });
+
+  it.each([
+    ['en', windows.desktop],
+    ['de', windows.phone],
+    ['ar', windows.phone],
+    ['ar', windows.desktop],
+  ] as const)('fits in %s', async (language, window) => {
+    const { page } = await open(`${server.url}?lang=${language}`, window);
+    await page.locator('#button-plan').click();
+    await page.locator('#plan-panel [aria-busy=false]').waitFor();
+    await settle(page);
+    const { width, height: view_height } = window.viewport;
+    await keep_screenshot(page, `plan-${language}-${width}`);
+    const box = (await page.locator('#plan-panel').boundingBox())!;
+    expect(box.x).toBeGreaterThanOrEqual(0);
+    expect(box.x + box.width).toBeLessThanOrEqual(width);
+    // The middle of the picture stays free.
+    const covers = box.x < width / 2 && box.x + box.width > width / 2 && box.y < view_height / 2 && box.y + box.height > view_height / 2;
+    expect(covers).toBe(false);
+    const bar = (await page.locator('#toolbar').boundingBox())!;
+    expect(bar.x).toBeGreaterThanOrEqual(0);
+    expect(bar.x + bar.width).toBeLessThanOrEqual(width);
+    expect(await barriers(page)).toEqual([]);
+  });
+});

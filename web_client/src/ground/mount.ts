@@ -1,0 +1,143 @@
+// Walking on the scene's ground, and its floor plan. Both load when somebody needs them.
+import { browser_timers, type Clock } from '../base/clock';
+import type { Signal } from '../base/signal';
+import type { Vec3 } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import type { AccessToken } from '../session/token';
+import type { TourState } from '../tour/player';
+import { by_id } from '../ui/dom';
+import type { Navigation } from '../ui/navigation';
+import type { SeenCamera } from '../ui/seen_camera';
+import type { Toolbar } from '../ui/toolbar';
+import type { WalkMap } from '../walk/walk_map';
+import type { WorkerClient } from '../worker/client';
+import type { PlanPanel } from './plan_panel';
+import { SceneGround } from './scene_ground';
+import type { Walking } from './walking';
+
+interface GroundParts {
+  readonly view: HTMLElement;
+  readonly clock: Clock;
+  readonly worker: WorkerClient;
+  readonly navigation: Navigation;
+  readonly seen: SeenCamera;
+  readonly toolbar: Toolbar;
+  readonly token: AccessToken;
+  readonly storage: Storage | undefined;
+  readonly reduced_motion: boolean;
+  readonly tour_shown: Signal<TourState>;
+  readonly go_to_stop: (index: number) => void;
+}
+
+const idle_after_ms = 2000; // the first picture
+
+export class GroundUse {
+  private readonly ground_: SceneGround;
+  private readonly button_ = by_id('button-plan', HTMLButtonElement);
+  private readonly panel_ = by_id('plan-panel', HTMLElement);
+  private map_: WalkMap | undefined;
+  private walking_: Walking | undefined;
+  private plan_: PlanPanel | undefined;
+  private tour_: TourState | undefined;
+  private eye_: Eye;
+  private people_: readonly Vec3[] = [];
+  private chose_walk_ = false; // in this scene
+  private idle_ = false;
+
+  constructor(private readonly parts_: GroundParts) {
+    const { navigation, worker, toolbar, seen, token, tour_shown } = parts_;
+    this.ground_ = new SceneGround(token);
+    this.eye_ = navigation.eye;
+    navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
+    navigation.mode_chosen.listen(() => {
+      if (navigation.camera.mode !== 'walk') return;
+      this.chose_walk_ = true;
+      void this.walk();
+    });
+    toolbar.panel_shown.listen(({ panel, shown }) => {
+      if (panel === 'plan' && shown) void this.open_plan();
+    });
+    seen.moved.listen((eye) => {
+      this.eye_ = eye;
+      this.plan_?.move(eye);
+    });
+    tour_shown.listen((state) => {
+      this.tour_ = state;
+      this.show_stops();
+    });
+    worker.on('presented', () => this.presented());
+    this.ground_.known.listen((map) => {
+      this.map_ = map;
+      this.button_.hidden = !map;
+      if (navigation.camera.mode === 'walk') void this.walk();
+    });
+  }
+
+  /** Where the eyes of other visitors are, for the plan. */
+  show_people(places: readonly Vec3[]): void {
+    this.people_ = places;
+    this.plan_?.show_people(places);
+  }
+
+  private enter(scene_id: string): void {
+    this.ground_.enter(scene_id);
+    this.map_ = undefined;
+    this.walking_?.end();
+    this.walking_ = this.plan_ = undefined;
+    this.panel_.hidden = this.button_.hidden = true;
+    this.chose_walk_ = this.idle_ = false;
+    if (this.parts_.navigation.camera.mode === 'walk') void this.ground_.want();
+  }
+
+  private presented(): void {
+    if (this.idle_) return;
+    this.idle_ = true;
+    setTimeout(() => void this.ground_.want(true), idle_after_ms);
+  }
+
+  private async walk(): Promise<void> {
+    const { map_: map } = this;
+    if (map) await this.make_walking(map);
+    else void this.ground_.want();
+  }
+
+  private async make_walking(map: WalkMap): Promise<Walking | undefined> {
+    const { Walking } = await import('./walking');
+    if (map !== this.map_ || this.walking_) return this.walking_;
+    const { worker, navigation } = this.parts_;
+    this.walking_ = new Walking(
+      { ...this.parts_, timers: browser_timers, announce: (samples) => worker.post({ kind: 'path', samples }) },
+      map,
+    );
+    // Where the scene or a link begins with walking, visitors first see what its author has chosen.
+    navigation.set_ground(this.walking_.walker, this.chose_walk_);
+    return this.walking_;
+  }
+
+  private async open_plan(): Promise<void> {
+    const { map_: map, parts_: parts } = this;
+    if (!map) return;
+    const [{ PlanPanel }, walking] = await Promise.all([import('./plan_panel'), this.make_walking(map)]);
+    if (!walking) return;
+    this.plan_ ??= new PlanPanel(
+      {
+        storage: parts.storage,
+        go_to: (stand) => {
+          parts.navigation.taken_over.emit();
+          walking.go_to(stand);
+        },
+        go_to_stop: parts.go_to_stop,
+        stand_at: (position) => walking.walker.stand_at(position),
+      },
+      map,
+      this.eye_,
+    );
+    this.plan_.move(this.eye_);
+    this.plan_.show_people(this.people_);
+    this.show_stops();
+  }
+
+  private show_stops(): void {
+    this.plan_?.show_stops(this.tour_?.tour?.stops ?? [], this.tour_?.stop_index);
+  }
+}

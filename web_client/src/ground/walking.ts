@@ -1,0 +1,158 @@
+// Leads a walking visitor to where they point on the floor, and shows where that is.
+import type { Timers, Clock } from '../base/clock';
+import { length, sub, type Vec3 } from '../base/vector';
+import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
+import type { Eye } from '../camera/eye';
+import { place_of } from '../camera/ray';
+import type { Navigation } from '../ui/navigation';
+import type { SeenCamera } from '../ui/seen_camera';
+import { floor_along } from '../walk/floor';
+import { MapWalker } from '../walk/map_walker';
+import { find_path } from '../walk/path';
+import { stroll } from '../walk/stroll';
+import { cells_per_eye_height, eyes_of, to_world, type Stand, type WalkMap } from '../walk/walk_map';
+import './ground.css';
+
+const svg = 'http://www.w3.org/2000/svg';
+const ring_corners = 40;
+const ring_cells = 0.28 * cells_per_eye_height;
+const announced_s = 4; // the wire takes 256 samples
+const announce_again_s = 2;
+const flight_s = 2.5;
+
+interface WalkingParts {
+  readonly view: HTMLElement;
+  readonly navigation: Navigation;
+  readonly seen: SeenCamera;
+  readonly clock: Clock;
+  readonly timers: Timers;
+  /** Tells the server the path, for its forecasts. */
+  readonly announce: (path: PathSample[]) => void;
+  readonly reduced_motion: boolean;
+}
+
+export class Walking {
+  readonly walker: MapWalker;
+  private readonly ring_ = document.createElementNS(svg, 'polygon');
+  private readonly picture_ = document.createElementNS(svg, 'svg');
+  private shown_: Stand | undefined; // in the ring
+  private walks_ = false;
+  private eye_: Eye;
+  private cancel_announcing_ = (): void => undefined;
+  private readonly stop_ = new AbortController();
+
+  constructor(
+    private readonly parts_: WalkingParts,
+    readonly map: WalkMap,
+  ) {
+    const { view, navigation, seen } = parts_;
+    this.walker = new MapWalker(map);
+    this.eye_ = navigation.eye;
+    this.picture_.id = 'floor-ring';
+    this.picture_.setAttribute('aria-hidden', 'true');
+    this.picture_.append(this.ring_);
+    view.append(this.picture_);
+    navigation.walk_to = (x, y) => this.walk_to(x, y);
+    const while_here = (action: () => void): void => {
+      if (!this.stop_.signal.aborted) action();
+    };
+    seen.moved.listen((eye) => while_here(() => this.move(eye)));
+    navigation.changed.listen(() => while_here(() => this.draw()));
+    const { signal } = this.stop_;
+    view.addEventListener('pointermove', (event) => this.pointed(event), { signal });
+    view.addEventListener('pointerleave', () => this.show(undefined), { signal });
+  }
+
+  /** The visitor has left the scene. */
+  end(): void {
+    this.stop_.abort();
+    this.cancel_announcing_();
+    this.parts_.navigation.walk_to = undefined;
+    this.picture_.remove();
+  }
+
+  /** Walks to a place, or flies where the visitor does not walk. Returns whether there is a way. */
+  go_to(to: Stand): boolean {
+    const { navigation, reduced_motion } = this.parts_;
+    const eye = navigation.eye;
+    if (navigation.camera.mode !== 'walk') {
+      const position = eyes_of(this.map, to);
+      const duration_s = reduced_motion ? 0 : Math.min(flight_s, length(sub(position, eye.position)) / this.walker.eye_height);
+      this.travel(glide(eye, { ...eye, position }, duration_s));
+      return true;
+    }
+    const path = find_path(this.map, this.walker.stand_at(eye.position), to);
+    if (path.length === 0) return false;
+    const way = stroll(this.map, path, eye);
+    this.travel(reduced_motion ? { duration_s: 0, at: () => way.at(way.duration_s) } : way);
+    return true;
+  }
+
+  private walk_to(x: number, y: number): boolean {
+    const to = floor_along(this.map, this.parts_.navigation.ray_at(x, y));
+    if (!to) return false;
+    this.parts_.navigation.taken_over.emit();
+    if (!this.go_to(to)) return true; // there is no way, and no flight through walls either
+    this.walks_ = !this.parts_.reduced_motion;
+    this.show(to);
+    return true;
+  }
+
+  private travel(way: Flight): void {
+    const { navigation, clock, timers, announce } = this.parts_;
+    this.cancel_announcing_();
+    const begin_us = clock.now_us();
+    navigation.fly(way, (arrived) => {
+      this.cancel_announcing_();
+      this.walks_ = false;
+      this.show(undefined);
+      if (!arrived) announce([]);
+    });
+    const tell = (): void => {
+      const time_s = (clock.now_us() - begin_us) / 1e6;
+      const rest_s = Math.min(announced_s, way.duration_s - time_s);
+      if (!(rest_s > 0)) return;
+      announce(path_of(way, time_s, rest_s, clock.now_us()));
+      this.cancel_announcing_ = timers.after(announce_again_s * 1000, tell);
+    };
+    tell();
+  }
+
+  private move(eye: Eye): void {
+    this.eye_ = eye;
+    this.draw();
+  }
+
+  /** A mouse that rests or moves shows where a click would lead. */
+  private pointed({ pointerType, buttons, offsetX, offsetY }: PointerEvent): void {
+    const { view, navigation } = this.parts_;
+    if (this.walks_ || pointerType !== 'mouse') return;
+    const shows = buttons === 0 && navigation.camera.mode === 'walk' && !navigation.tapped;
+    const ray = navigation.ray_at(offsetX / view.clientWidth, offsetY / view.clientHeight);
+    this.show(shows ? floor_along(this.map, ray) : undefined);
+  }
+
+  private show(stand: Stand | undefined): void {
+    this.shown_ = stand;
+    this.draw();
+  }
+
+  private draw(): void {
+    const corners = this.shown_ ? this.corners(this.shown_) : [];
+    const inside = corners.every((corner) => corner !== undefined);
+    this.picture_.classList.toggle('shown', corners.length > 0 && inside && this.parts_.navigation.camera.mode === 'walk');
+    if (inside) this.ring_.setAttribute('points', corners.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(' '));
+  }
+
+  private corners(stand: Stand): (readonly [number, number] | undefined)[] {
+    const { clientWidth: width, clientHeight: height } = this.parts_.view;
+    return Array.from({ length: ring_corners }, (_, k) => {
+      const angle = (2 * Math.PI * k) / ring_corners;
+      const east = stand.east + ring_cells * Math.cos(angle);
+      const north = stand.north + ring_cells * Math.sin(angle);
+      const corner: Vec3 = to_world(this.map, { east, north, height: stand.height });
+      const place = place_of(corner, this.eye_, width / Math.max(1, height));
+      return place && ([place[0] * width, place[1] * height] as const);
+    });
+  }
+}

@@ -1,0 +1,73 @@
+// A visitor who walks on a WalkMap.
+import { dot, scale, add, type Vec3 } from '../base/vector';
+import type { Ground } from '../camera/ground';
+import { cells_per_eye_height, clear_at, eyes_of, height_of, type Stand, type WalkMap } from './walk_map';
+import { move, stand_below } from './walker';
+
+const farthest_cells = 96;
+
+/** The clear ground nearest to a column, below `place`; undefined where none is near. World units. */
+function stand_around(map: WalkMap, place: Vec3): Stand | undefined {
+  const here = stand_below(map, place);
+  if (here) return here;
+  const [east, north] = map.axes;
+  for (let r = 1; r <= farthest_cells; ++r) {
+    let best: Stand | undefined;
+    let nearest = Infinity;
+    for (let k = -r; k < r; ++k)
+      for (const [x, y] of [[k, -r], [r, k], [-k, r], [-r, -k]] as const) {
+        const distance = Math.hypot(x, y);
+        if (distance >= nearest) continue;
+        const beside = add(place, add(scale(east, x * map.cell), scale(north, y * map.cell)));
+        const stand = stand_below(map, beside);
+        if (stand) [best, nearest] = [stand, distance];
+      }
+    if (best) return best;
+  }
+  return undefined;
+}
+
+/** The clear ground nearest to ground that has no room for a body, or to itself; undefined where none is near. */
+export function clear_near(map: WalkMap, stand: Stand, most_cells = 8): Stand | undefined {
+  const [column, row] = [Math.floor(stand.east), Math.floor(stand.north)];
+  let best: Stand | undefined;
+  let nearest = Infinity;
+  for (let y = -most_cells; y <= most_cells; ++y)
+    for (let x = -most_cells; x <= most_cells; ++x) {
+      const distance = Math.hypot(x, y);
+      if (distance >= nearest) continue;
+      const place = clear_at(map, column + x, row + y, stand.height);
+      if (place < 0) continue;
+      nearest = distance;
+      const height = height_of(map, place);
+      best = distance === 0 ? { ...stand, height } : { east: column + x + 0.5, north: row + y + 0.5, height };
+    }
+  return best;
+}
+
+export class MapWalker implements Ground {
+  readonly eye_height: number;
+  private stand_: Stand;
+
+  constructor(readonly map: WalkMap) {
+    this.eye_height = cells_per_eye_height * map.cell;
+    this.stand_ = map.start;
+  }
+
+  stand_near(position: Vec3): Vec3 {
+    this.stand_ = this.stand_at(position);
+    return eyes_of(this.map, this.stand_);
+  }
+
+  /** Where somebody would stand whose eyes are here: below, or nearby; else at the start of the map. */
+  stand_at(position: Vec3): Stand {
+    return stand_around(this.map, position) ?? this.map.start;
+  }
+
+  walk(movement: Vec3): Vec3 {
+    const [east, north] = this.map.axes;
+    const { cell } = this.map;
+    this.stand_ = move(this.map, this.stand_, dot(movement, east) / cell, dot(movement, north) / cell);
+    return eyes_of(this.map, this.stand_);
+  }
+}
