@@ -29,6 +29,7 @@
 #include "server/base/watchdog.h"
 #include "server/counts/visit_book.h"
 #include "server/counts/visits_page.h"
+#include "server/films/film_studio.h"
 #include "server/frame_path.h"
 #include "server/net/net_server.h"
 #include "server/net/static_files.h"
@@ -142,10 +143,13 @@ struct Server::State {
     std::unique_ptr<MediaApi> media;
   } api;
   std::optional<VisitsPage> visits_page;
-  std::unique_ptr<SidecarSaver> saver;
   std::vector<EncoderChoice> encoders;
   std::unique_ptr<FramePath> frames;
   std::unique_ptr<Places> places;
+  struct {
+    std::unique_ptr<SidecarSaver> saver;
+    std::unique_ptr<FilmStudio> films;
+  } authors;  // their threads use what is above
   struct {
     std::optional<StopWhileLoading> while_loading{std::in_place};
     boost::asio::signal_set signals;
@@ -160,6 +164,7 @@ NetOptions Server::State::net_options() {
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return respond(request); };
   options.uploads.refusal = [this](const HttpRequest& request) {
+    if (FilmStudio::cancels(request)) return std::optional<HttpResponse>();
     return MediaApi::is_file(request.path) ? api.media->refuse_upload(request)
                                            : api.scenes->refuse_upload(request);
   };
@@ -168,11 +173,16 @@ NetOptions Server::State::net_options() {
   };
   options.uploads.take = [this](const HttpRequest& request, std::string body,
                                 std::shared_ptr<const UploadPlace> place) {
+    if (FilmStudio::cancels(request)) return authors.films->cancel(request);
     if (MediaApi::is_file(request.path))
       return api.media->save(request, std::move(body), std::move(place));
-    return saver->save(api.scenes->saved_scene(request), std::move(body),
-                       {std::string(request.if_match), std::string(request.if_none_match)},
-                       std::move(place));
+    if (SceneApi::orders_film(request))
+      return authors.films->order(api.scenes->saved_scene(request),
+                                  std::string(request.authorization), std::move(body),
+                                  std::move(place));
+    return authors.saver->save(api.scenes->saved_scene(request), std::move(body),
+                               {std::string(request.if_match), std::string(request.if_none_match)},
+                               std::move(place));
   };
   options.uploads.on_full = [this] { metrics.uploads_refused.Increment(); };
   options.accept = [this](std::shared_ptr<Connection> connection) {
@@ -212,6 +222,7 @@ HttpResponse Server::State::respond(const HttpRequest& request) {
   if (auto answer = respond_to_probe(request)) return *std::move(answer);
   if (auto answer = api.media->respond(request)) return *std::move(answer);
   if (auto answer = api.scenes->respond(request)) return *std::move(answer);
+  if (auto answer = authors.films->respond(request)) return *std::move(answer);
   if (client.empty() && request.path == "/") return text_response(200, std::string(no_client_page));
   if (!client.empty() && (request.path == "/" || request.path == "/index.html"))
     return client.respond_with_head(request, api.scenes->preview(request));
@@ -251,7 +262,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   s.scenes = std::make_unique<SceneLibrary>(
       s.config, RendererOptions{.kind = s.config.renderer, .pool = s.pool, .devices = s.devices},
       s.io, s.metrics);
-  s.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io, s.config.media_origins);
+  s.authors.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io, s.config.media_origins);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) {
     const auto resolve = [&s](auto wish) { return s.scenes->resolve(wish); };
@@ -277,6 +288,9 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
                    SessionTokens(key), s.metrics, s.counts ? &*s.counts : nullptr,
                    [&s] { return s.access.revoked_links(); }});
+  s.authors.films = std::make_unique<FilmStudio>(
+      FilmStudio::Surroundings{s.io, [&s](const auto& id) { return s.scenes->in_memory(id); },
+                               [&s] { return s.places->anybody_looks(); }});
 }
 
 Server::~Server() {
@@ -367,7 +381,7 @@ void Server::State::give_up(const std::string& why) {
 void Server::State::drain(std::chrono::milliseconds deadline) {
   log_info({.event = "drain"}, "stopping: {} connections are told", places->connections());
   places->drain(deadline);
-  saver->stop();
+  authors.saver->stop();
   when_empty(Clock::now() + deadline, [this] {
     places->close_all();
     when_empty(Clock::now() + farewell_time, [this] { finish_stop(); });

@@ -12,6 +12,8 @@
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "render_core/math/look_at.h"
+
 namespace catgs {
 namespace {
 
@@ -86,6 +88,12 @@ void add_row(const Image& picture, const Side& side, float focal_px, int y, Imag
 }
 
 }  // namespace
+
+Pose levelled(const Pose& pose, const glm::vec3& up) {
+  const glm::vec3 forward = pose.orientation * glm::vec3(0, 0, 1);
+  const glm::vec3 ahead = forward - glm::dot(forward, up) * up;
+  return look_at(pose.position, pose.position + ahead, up);
+}
 
 Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
                     const std::function<Image(const FrameRequest&)>& draw) {

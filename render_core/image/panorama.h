@@ -8,6 +8,9 @@
 
 namespace catgs {
 
+/// The pose at the same place and of the same direction, upright. `up` is unit.
+Pose levelled(const Pose& pose, const glm::vec3& up);
+
 /// Draws all that surrounds the camera of `request` as an equirectangular picture. The middle shows
 /// where the camera looks, the upper edge is above its picture, and longitudes grow to the right.
 /// Only pose and near plane of the camera count. `size_px` is 2:1. `draw` renders a request and

@@ -23,6 +23,17 @@ struct PngImage : png_image {
   PngImage& operator=(const PngImage&) = delete;
 };
 
+void write_bytes(const std::filesystem::path& path, glm::ivec2 size_px, png_uint_32 format,
+                 const std::uint8_t* bytes) {
+  PngImage png;
+  png.width = static_cast<png_uint_32>(size_px.x);
+  png.height = static_cast<png_uint_32>(size_px.y);
+  png.format = format;
+  if (png_image_write_to_file(&png, path.c_str(), 0, bytes, 0, nullptr) == 0) {
+    throw InputError(path.string(), "", png.message, "does the folder exist, is there room?");
+  }
+}
+
 }  // namespace
 
 Image read_png(const std::filesystem::path& path) {
@@ -63,13 +74,14 @@ void write_png(const std::filesystem::path& path, const Image& image,
     for (std::size_t c = 0; c < 3; ++c) bytes.push_back(byte(image.rgb[3 * i + c] / share));
     if (!alpha.empty()) bytes.push_back(byte(alpha[i]));
   }
-  PngImage png;
-  png.width = static_cast<png_uint_32>(image.size_px.x);
-  png.height = static_cast<png_uint_32>(image.size_px.y);
-  png.format = alpha.empty() ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA;
-  if (png_image_write_to_file(&png, path.c_str(), 0, bytes.data(), 0, nullptr) == 0) {
-    throw InputError(path.string(), "", png.message, "does the folder exist, is there room?");
-  }
+  write_bytes(path, image.size_px, alpha.empty() ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA, bytes.data());
+}
+
+void write_png(const std::filesystem::path& path, glm::ivec2 size_px,
+               std::span<const std::uint8_t> rgb) {
+  assert(rgb.size() ==
+         3 * static_cast<std::size_t>(size_px.x) * static_cast<std::size_t>(size_px.y));
+  write_bytes(path, size_px, PNG_FORMAT_RGB, rgb.data());
 }
 
 Image copy_image(const FrameView& frame) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 
@@ -17,6 +18,10 @@ Image read_png(const std::filesystem::path& path);
 /// be written.
 void write_png(const std::filesystem::path& path, const Image& image,
                std::span<const float> alpha = {});
+
+/// The same of bytes: three a pixel, row by row from the top.
+void write_png(const std::filesystem::path& path, glm::ivec2 size_px,
+               std::span<const std::uint8_t> rgb);
 
 /// Copies a finished rgb_f32 frame out of its View.
 Image copy_image(const FrameView& frame);

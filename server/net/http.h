@@ -87,7 +87,7 @@ struct Precondition {
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
 
 /// Longer uploads, where they are allowed, have places of their own.
-inline constexpr std::size_t max_upload_bytes = 1 << 20;
+inline constexpr std::size_t max_upload_bytes = 2 << 20;  // the camera of a film of ten minutes
 
 /// Handles PUT requests. None are accepted if `take` is null. All functions are called on the
 /// network thread.

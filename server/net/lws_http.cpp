@@ -5,6 +5,7 @@
 #include <charconv>
 #include <chrono>
 #include <cstring>
+#include <span>
 #include <string_view>
 
 #include <netinet/in.h>

@@ -13,7 +13,13 @@
 namespace catgs {
 namespace {
 
-constexpr std::string_view sidecar_part = "/sidecar";
+constexpr std::string_view sidecar_part = "/sidecar", films_part = "/films";
+
+/// The scene whose sidecar a PUT saves, or of which it orders a film.
+std::optional<std::string_view> author_scene_of(std::string_view path) {
+  const auto saved = scene_of(path, sidecar_part);
+  return saved ? saved : scene_of(path, films_part);
+}
 
 constexpr std::array<std::string_view, 3> part_names = {"/tours", "/poster.jpg", "/walk"};
 
@@ -136,14 +142,18 @@ HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
 }
 
 std::optional<HttpResponse> SceneApi::refuse_upload(const HttpRequest& request) {
-  const auto wish = scene_of(request.path, sidecar_part);
+  const auto wish = author_scene_of(request.path);
   if (!wish)
     return text_response(405, "405: only the sidecars and media of scenes are saved here\n");
   return refuse_change(scenes_, permit_of(authorize_, request), scenes_.resolve(*wish));
 }
 
 std::string SceneApi::saved_scene(const HttpRequest& request) const {
-  return scenes_.resolve(scene_of(request.path, sidecar_part).value());
+  return scenes_.resolve(author_scene_of(request.path).value());
+}
+
+bool SceneApi::orders_film(const HttpRequest& request) {
+  return scene_of(request.path, films_part).has_value();
 }
 
 }  // namespace catgs

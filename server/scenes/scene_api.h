@@ -24,11 +24,13 @@ class SceneApi {
   std::optional<HttpResponse> respond(const HttpRequest& request);
   /// The elements of the page's head that messengers show for a link; empty: none.
   std::string preview(const HttpRequest& request);
-  /// Returns the refusal of a request "PUT /api/scenes/ID/sidecar", or nothing if its sender may
-  /// save.
+  /// Returns the refusal of a request "PUT /api/scenes/ID/sidecar" or "…/films", or nothing if its
+  /// sender may save.
   std::optional<HttpResponse> refuse_upload(const HttpRequest& request);
-  /// The id of the scene that an accepted request saves.
+  /// The id of the scene that an accepted request saves, or orders a film of.
   [[nodiscard]] std::string saved_scene(const HttpRequest& request) const;
+  /// True if the request orders a film.
+  [[nodiscard]] static bool orders_film(const HttpRequest& request);
 
  private:
   enum class Part { tours, poster, walk };

@@ -9,6 +9,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/part_file.h"
 #include "render_core/image/png.h"
+#include "render_core/video/video_file.h"
 
 namespace catgs {
 namespace {
@@ -110,6 +111,19 @@ class Y4mSink final : public FrameSink {
   std::ofstream file_;
 };
 
+class Mp4Sink final : public FrameSink {
+ public:
+  explicit Mp4Sink(const FrameSinkSettings& settings)
+      : file_(make_mp4_file({settings.path.string(), settings.size_px, settings.fps})) {}
+
+  PixelFormat format() const override { return PixelFormat::i420; }
+  void write(const FrameView& frame, const FrameLayers&) override { file_->write(frame); }
+  void finish() override { file_->finish(); }
+
+ private:
+  std::unique_ptr<VideoFile> file_;
+};
+
 }  // namespace
 
 bool is_video(const std::filesystem::path& path) {
@@ -127,7 +141,7 @@ std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings) {
     if (settings.size_px.x % 2 != 0 || settings.size_px.y % 2 != 0) {
       throw InputError("--size", "", "a video needs even sides");
     }
-    if (extension == ".mp4") return make_mp4_sink(settings);
+    if (extension == ".mp4") return std::make_unique<Mp4Sink>(settings);
     return std::make_unique<Y4mSink>(settings);
   }
   if (!extension.empty() && !std::filesystem::is_directory(settings.path)) {

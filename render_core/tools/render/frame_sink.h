@@ -38,7 +38,4 @@ bool is_video(const std::filesystem::path& path);
 /// alpha; its depth goes into a NumPy file beside it: float32, height x width. Throws InputError.
 std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings);
 
-/// H.264 in MP4 through libavformat and libx264; InputError where the build has no libav.
-std::unique_ptr<FrameSink> make_mp4_sink(const FrameSinkSettings& settings);
-
 }  // namespace catgs

@@ -9,7 +9,6 @@
 #include "render_core/image/host_image.h"
 #include "render_core/image/panorama.h"
 #include "render_core/image/png.h"
-#include "render_core/math/look_at.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/frame_feed.h"
@@ -64,13 +63,6 @@ RenderSetup prepare_frames(const FramesOptions& options, bool quiet) {
   // One picture shows all that a camera at rest sees, unless a length was asked for.
   if (render.frames.empty() && !render.duration_s && is_still(setup.poses)) setup.poses.resize(1);
   return setup;
-}
-
-/// The same place and direction, upright.
-Pose levelled(const Pose& pose, const glm::vec3& up) {
-  const glm::vec3 forward = pose.orientation * glm::vec3(0, 0, 1);
-  const glm::vec3 ahead = forward - glm::dot(forward, up) * up;
-  return look_at(pose.position, pose.position + ahead, up);
 }
 
 /// The panorama from where `request` looks, as a frame that `image` holds.

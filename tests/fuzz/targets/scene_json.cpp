@@ -9,6 +9,7 @@
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/formats/camera_list.h"
 #include "render_core/scene/formats/streamed_sog.h"
+#include "server/films/film_wish.h"
 #include "server/scenes/tours.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
@@ -135,8 +136,26 @@ void parse_sent_sidecar(Bytes input) {
 std::map<std::string, std::string> sent_sidecar_seeds() {
   return {{"sent", R"({"up":"-y","near":0.1,"tours":[{"title":"Hall","autoplay":true,"stops":[{
                        "title":"Door","caption":"Oak.","position":[1,2,3],"orientation":[0,0,0,1],
-                       "fov_deg":60,"marker":[1,2,4],"stay_s":8,"fly_s":2},
+                       "fov_deg":60,"marker":[1,2,4],"stay_s":8,"fly_s":2,
+                       "portal":{"scene":"attic","stop":2}},
                        {"position":[0,1,2],"look_at":[0,0,0]}]}]})"}};
+}
+
+void parse_film(Bytes input) {
+  const FilmWish wish = parse_film_wish(text_of(input));
+  require(!wish.views.empty() && wish.views.size() <= most_film_frames, "films begin and end");
+  require(wish.size_px.x >= 16 && wish.size_px.x <= 8192, "pictures have a width");
+  require(wish.size_px.y >= 16 && wish.size_px.y <= 4320, "pictures have a height");
+  for (const FilmView& view : wish.views) {
+    require_sound(view.world_from_camera);
+    require(view.fov_y_rad > 0.08f && view.fov_y_rad < 2.8f, "fields of view are sane");
+  }
+}
+
+std::map<std::string, std::string> film_seeds() {
+  return {{"film", R"({"kind":"film","size":[1280,720],"views":[[1,2,3,0,0,0,1,60],30,
+                       [4,5,6,0,0.6,0,0.8],2]})"},
+          {"panorama", R"({"kind":"panorama","size":[4096,2048],"views":[[0,0,0,0,0,0,1,90]]})"}};
 }
 
 std::map<std::string, std::string> tours_seeds() {
@@ -162,41 +181,47 @@ std::vector<std::string> json_words(std::string_view keys) {
 }  // namespace
 
 std::vector<Target> scene_json_targets() {
-  return {
-      {.name = "lod_tree",
-       .parse = parse_lod_tree,
-       .seeds = lod_tree_seeds,
-       .dictionary = json_words(
-           "lodLevels filenames tree children lods file offset count environment version"),
-       .change = change_json,
-       .max_bytes = 8192},
-      {.name = "sidecar",
-       .parse = parse_sidecar,
-       .seeds = sidecar_seeds,
-       .dictionary = json_words(
-           "up near focus start_pose position look_at orientation limits min max tours title "
-           "credits licence mode walk background #0a10ff -y +z"),
-       .change = change_json},
-      {.name = "cameras",
-       .parse = parse_cameras,
-       .seeds = cameras_seeds,
-       .dictionary =
-           json_words("position rotation frames transform_matrix camera_path camera_to_world fov "
-                      "fl_x camera_angle_x w h cx transform fps seconds"),
-       .change = change_json},
-      {.name = "tours",
-       .parse = parse_tours,
-       .seeds = tours_seeds,
-       .dictionary = json_words("tours animTracks annotations cameras"),
-       .change = change_json,
-       .max_bytes = 65536},
-      {.name = "sent_sidecar",
-       .parse = parse_sent_sidecar,
-       .seeds = sent_sidecar_seeds,
-       .dictionary = json_words("tours stops title caption autoplay fov_deg marker stay_s fly_s "
-                                "position look_at orientation up"),
-       .change = change_json,
-       .max_bytes = 65536}};
+  return {{.name = "lod_tree",
+           .parse = parse_lod_tree,
+           .seeds = lod_tree_seeds,
+           .dictionary = json_words(
+               "lodLevels filenames tree children lods file offset count environment version"),
+           .change = change_json,
+           .max_bytes = 8192},
+          {.name = "sidecar",
+           .parse = parse_sidecar,
+           .seeds = sidecar_seeds,
+           .dictionary = json_words(
+               "up near focus start_pose position look_at orientation limits min max tours title "
+               "credits licence mode walk background #0a10ff -y +z"),
+           .change = change_json},
+          {.name = "cameras",
+           .parse = parse_cameras,
+           .seeds = cameras_seeds,
+           .dictionary = json_words(
+               "position rotation frames transform_matrix camera_path camera_to_world fov "
+               "fl_x camera_angle_x w h cx transform fps seconds"),
+           .change = change_json},
+          {.name = "tours",
+           .parse = parse_tours,
+           .seeds = tours_seeds,
+           .dictionary = json_words("tours animTracks annotations cameras"),
+           .change = change_json,
+           .max_bytes = 65536},
+          {.name = "film_wish",
+           .parse = parse_film,
+           .seeds = film_seeds,
+           .dictionary = json_words("kind size views film picture panorama"),
+           .change = change_json,
+           .max_bytes = 65536},
+          {.name = "sent_sidecar",
+           .parse = parse_sent_sidecar,
+           .seeds = sent_sidecar_seeds,
+           .dictionary = json_words(
+               "tours stops title caption autoplay fov_deg marker stay_s fly_s portal scene "
+               "position look_at orientation up"),
+           .change = change_json,
+           .max_bytes = 65536}};
 }
 
 }  // namespace catgs::fuzz

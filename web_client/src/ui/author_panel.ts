@@ -16,6 +16,7 @@ import { by_id, on_click, save_file } from './dom';
 
 interface AuthorTools {
   eye(): Eye;
+  reach(): number;
   scene(): SceneSetup | undefined;
   scene_id(): string;
   /** The scenes that this author may see. */
@@ -148,12 +149,20 @@ export class AuthorPanel {
       draft.edit_tour({ starts_itself: this.autoplay_.checked });
       this.told();
     });
+    by_id('author-film', HTMLDetailsElement).addEventListener('toggle', () => void this.open_film());
     on_click('author-save', () => void this.save(this.made_from_));
     on_click('author-replace', () => void this.save(this.theirs_));
     on_click('author-download', () => this.download());
     window.addEventListener('beforeunload', (event) => {
       if (this.saved_ !== draft.state) event.preventDefault();
     });
+  }
+
+  private async open_film(): Promise<void> {
+    const place = by_id('author-film-fields', HTMLElement);
+    const { FilmPanel } = await import('./film_panel');
+    if (place.childElementCount > 0) return;
+    new FilmPanel(place, { ...this.tools_, tour: () => this.draft_.tour, token: () => this.token_ });
   }
 
   private async add(): Promise<void> {

@@ -137,6 +137,7 @@ export class Guide {
     navigation.taken_over.listen(() => preview.forget());
     return new AuthorPanel({
       eye: () => camera.eye,
+      reach: () => navigation.reach,
       scene: () => camera.scene,
       scene_id: () => navigation.scene_id,
       scenes: () => this.doors_.scenes(),

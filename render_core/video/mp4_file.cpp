@@ -10,7 +10,7 @@ extern "C" {
 }
 
 #include "render_core/base/error.h"
-#include "render_core/tools/render/frame_sink.h"
+#include "render_core/video/video_file.h"
 
 namespace catgs {
 namespace {
@@ -34,10 +34,10 @@ struct CloseOutput {
 };
 using Output = std::unique_ptr<AVFormatContext, CloseOutput>;
 
-class Mp4Sink final : public FrameSink {
+class Mp4File final : public VideoFile {
  public:
-  explicit Mp4Sink(const FrameSinkSettings& settings)
-      : path_(settings.path.string()), frame_(av_frame_alloc()), packet_(av_packet_alloc()) {
+  explicit Mp4File(const VideoSettings& settings)
+      : path_(settings.path), frame_(av_frame_alloc()), packet_(av_packet_alloc()) {
     AVFormatContext* output = nullptr;
     check(avformat_alloc_output_context2(&output, nullptr, "mp4", path_.c_str()), "open");
     output_.reset(output);
@@ -55,9 +55,7 @@ class Mp4Sink final : public FrameSink {
     check(result, "start");
   }
 
-  PixelFormat format() const override { return PixelFormat::i420; }
-
-  void write(const FrameView& frame, const FrameLayers&) override {
+  void write(const FrameView& frame) override {
     frame_->format = encoder_->pix_fmt;
     frame_->width = frame.size_px.x;
     frame_->height = frame.size_px.y;
@@ -78,7 +76,7 @@ class Mp4Sink final : public FrameSink {
   }
 
  private:
-  void open_encoder(const FrameSinkSettings& settings) {
+  void open_encoder(const VideoSettings& settings) {
     const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
     if (codec == nullptr) {
       throw InputError(path_, "", "this machine's libavcodec has no libx264", "write .y4m instead");
@@ -95,6 +93,7 @@ class Mp4Sink final : public FrameSink {
     encoder_->color_trc = AVCOL_TRC_BT709;
     encoder_->chroma_sample_location = AVCHROMA_LOC_CENTER;
     encoder_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+    encoder_->thread_count = settings.threads;
     av_opt_set(encoder_->priv_data, "preset", "medium", 0);
     av_opt_set(encoder_->priv_data, "crf", "18", 0);
     check(avcodec_open2(encoder_.get(), codec, nullptr), "open libx264 for");
@@ -130,9 +129,9 @@ class Mp4Sink final : public FrameSink {
 
 }  // namespace
 
-std::unique_ptr<FrameSink> make_mp4_sink(const FrameSinkSettings& settings) {
+std::unique_ptr<VideoFile> make_mp4_file(const VideoSettings& settings) {
   av_log_set_level(AV_LOG_ERROR);
-  return std::make_unique<Mp4Sink>(settings);
+  return std::make_unique<Mp4File>(settings);
 }
 
 }  // namespace catgs

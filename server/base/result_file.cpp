@@ -1,0 +1,46 @@
+#include "server/base/result_file.h"
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "render_core/base/error.h"
+
+namespace catgs {
+
+ResultFile::ResultFile() {
+  std::error_code error;
+  std::string name = (std::filesystem::temp_directory_path(error) / "catgs-XXXXXX").string();
+  descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor_ < 0)
+    throw InputError(name, {}, std::strerror(errno), "give TMPDIR a folder that can be written");
+  ::unlink(name.c_str());
+}
+
+ResultFile::~ResultFile() { ::close(descriptor_); }
+
+std::string ResultFile::path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
+
+std::uint64_t ResultFile::size() const {
+  struct stat status {};
+  return ::fstat(descriptor_, &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
+}
+
+bool ResultFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t count =
+        ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (count <= 0) return false;
+    offset += static_cast<std::uint64_t>(count);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return true;
+}
+
+}  // namespace catgs

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace catgs {
+
+/// A file without a name in the folder for temporary files (TMPDIR). It takes no place any more
+/// when this object or the process is gone.
+class ResultFile {
+ public:
+  /// Throws InputError where that folder cannot be written.
+  ResultFile();
+  ~ResultFile();
+  ResultFile(const ResultFile&) = delete;
+  ResultFile& operator=(const ResultFile&) = delete;
+
+  /// By which this process can open it.
+  [[nodiscard]] std::string path() const;
+  [[nodiscard]] std::uint64_t size() const;
+  /// Fills `bytes` from that offset. False: they are not there. Any thread.
+  bool read(std::uint64_t offset, std::span<std::byte> bytes) const;
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace catgs

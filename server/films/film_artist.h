@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "server/base/clock.h"
+#include "server/base/result_file.h"
+#include "server/films/film_wish.h"
+#include "server/scenes/scene_entry.h"
+
+namespace catgs {
+
+/// Called after each part of a picture and each frame of a film, with the share that is drawn and
+/// the time that this part took. It may wait, for others to have the machine, and may throw to
+/// cancel.
+using OnDrawn = std::function<void(double share, Clock::duration took)>;
+
+/// The largest result, bytes.
+inline constexpr std::uint64_t most_film_bytes = std::uint64_t{512} << 20;
+
+/// Draws a picture (PNG) or a film (MP4, 30 frames a second) of the scene into `file`, on this
+/// thread. Large pictures are drawn in parts. Throws std::exception.
+void draw_film(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
+               const OnDrawn& on_drawn);
+
+}  // namespace catgs

@@ -1,0 +1,117 @@
+#include "server/films/film_queue.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/access/signed_token.h"
+
+namespace catgs {
+namespace {
+
+bool has_ended(const FilmJob& job) {
+  return job.state != FilmState::waiting && job.state != FilmState::drawing;
+}
+
+}  // namespace
+
+std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_id,
+                                                             std::string owner, FilmWish wish) {
+  const std::lock_guard lock(mutex_);
+  drop_old();
+  if (std::ranges::any_of(
+          jobs_, [&](const FilmJob& job) { return job.owner == owner && !has_ended(job); }))
+    return Refused{true};
+  if (std::ranges::count(jobs_, FilmState::waiting, &FilmJob::state) >=
+      static_cast<std::ptrdiff_t>(most_waiting))
+    return Refused{false};
+  jobs_.push_back({random_id(), std::move(scene_id), std::move(owner), std::move(wish)});
+  jobs_.back().changed = clock_();
+  return jobs_.back().id;
+}
+
+std::optional<FilmJob> FilmQueue::start_next() {
+  const std::lock_guard lock(mutex_);
+  const auto next = std::ranges::find(jobs_, FilmState::waiting, &FilmJob::state);
+  if (next == jobs_.end()) return std::nullopt;
+  next->state = FilmState::drawing;
+  next->changed = clock_();
+  FilmJob started = *next;
+  next->wish.views = {};  // whoever draws has them
+  return started;
+}
+
+bool FilmQueue::drawn(const std::string& id, double share) {
+  const std::lock_guard lock(mutex_);
+  FilmJob* const job = known(id);
+  if (!job || job->state != FilmState::drawing) return false;
+  job->share = share;
+  return true;
+}
+
+void FilmQueue::finish(const std::string& id, std::shared_ptr<const ResultFile> result) {
+  const std::lock_guard lock(mutex_);
+  FilmJob* const job = known(id);
+  if (!job || job->state != FilmState::drawing) return;
+  job->result = std::move(result);
+  job->share = 1.0;
+  end(*job, FilmState::done);
+  drop_old();
+}
+
+void FilmQueue::fail(const std::string& id, std::string why) {
+  const std::lock_guard lock(mutex_);
+  FilmJob* const job = known(id);
+  if (!job || job->state != FilmState::drawing) return;
+  job->error = std::move(why);
+  end(*job, FilmState::failed);
+}
+
+bool FilmQueue::cancel(std::string_view id) {
+  const std::lock_guard lock(mutex_);
+  FilmJob* const job = known(id);
+  if (!job || has_ended(*job)) return false;
+  end(*job, FilmState::cancelled);
+  return true;
+}
+
+std::optional<FilmJob> FilmQueue::find(std::string_view id) {
+  const std::lock_guard lock(mutex_);
+  drop_old();
+  const FilmJob* const job = known(id);
+  return job ? std::optional(*job) : std::nullopt;
+}
+
+std::optional<std::chrono::seconds> FilmQueue::left(const FilmJob& job) const {
+  if (job.state != FilmState::drawing || job.share <= 0.0) return std::nullopt;
+  const double so_far_s = std::chrono::duration<double>(clock_() - job.changed).count();
+  return std::chrono::seconds(
+      static_cast<std::int64_t>(so_far_s * (1.0 - job.share) / job.share + 0.5));
+}
+
+FilmJob* FilmQueue::known(std::string_view id) {
+  const auto found = std::ranges::find(jobs_, id, &FilmJob::id);
+  return found == jobs_.end() ? nullptr : &*found;
+}
+
+void FilmQueue::end(FilmJob& job, FilmState state) {
+  job.state = state;
+  job.wish.views = {};
+  job.changed = clock_();
+}
+
+void FilmQueue::drop_old() {
+  const TimePoint now = clock_();
+  std::size_t kept = 0;
+  std::uint64_t bytes = 0;
+  for (auto job = jobs_.rbegin(); job != jobs_.rend(); ++job) {  // the newest first
+    if (!has_ended(*job)) continue;
+    bytes += job->result ? job->result->size() : 0;
+    // The newest one is kept in any case.
+    if (now - job->changed > kept_for || ++kept > most_kept ||
+        (kept > 1 && bytes > most_kept_bytes))
+      job->id.clear();
+  }
+  std::erase_if(jobs_, [](const FilmJob& job) { return job.id.empty(); });
+}
+
+}  // namespace catgs

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "server/base/clock.h"
+#include "server/base/result_file.h"
+#include "server/films/film_wish.h"
+
+namespace catgs {
+
+enum class FilmState { waiting, drawing, done, failed, cancelled };
+
+/// One order of a picture or a film.
+struct FilmJob {
+  std::string id;  // whoever knows it may ask for the result
+  std::string scene_id;
+  std::string owner;  // who ordered it: one job at a time for each
+  FilmWish wish;
+  FilmState state = FilmState::waiting;
+  double share = 0.0;  // drawn
+  std::string error{};
+  TimePoint changed{};  // when it began or ended
+  std::shared_ptr<const ResultFile> result{};
+};
+
+/// The orders of authors: one is drawn at a time, and a few wait. Results are kept for an hour
+/// within bounds of number and bytes, the oldest go first. Thread-safe.
+class FilmQueue {
+ public:
+  static constexpr std::size_t most_waiting = 4;
+  static constexpr std::size_t most_kept = 8;  // that have ended
+  static constexpr std::uint64_t most_kept_bytes = std::uint64_t{1} << 30;
+  static constexpr std::chrono::hours kept_for{1};
+
+  explicit FilmQueue(std::function<TimePoint()> clock = Clock::now) : clock_(std::move(clock)) {}
+
+  struct Refused {
+    bool has_one;  // its owner has a job that has not ended; else too many wait
+  };
+  /// Returns the id of the job.
+  std::variant<std::string, Refused> add(std::string scene_id, std::string owner, FilmWish wish);
+  /// The job to be drawn now; nothing: none waits.
+  std::optional<FilmJob> start_next();
+  /// So much of the job is drawn. False: it was cancelled.
+  bool drawn(const std::string& id, double share);
+  /// Ends a job that was started.
+  void finish(const std::string& id, std::shared_ptr<const ResultFile> result);
+  void fail(const std::string& id, std::string why);
+  /// False: there is no such job, or it has ended.
+  bool cancel(std::string_view id);
+  /// Nothing: there is no such job, or it ended too long ago.
+  [[nodiscard]] std::optional<FilmJob> find(std::string_view id);
+  /// The time that the rest of a job takes, by what was drawn so far; nothing: not known.
+  [[nodiscard]] std::optional<std::chrono::seconds> left(const FilmJob& job) const;
+
+ private:
+  FilmJob* known(std::string_view id);
+  void end(FilmJob& job, FilmState state);
+  void drop_old();
+
+  const std::function<TimePoint()> clock_;
+  std::mutex mutex_;
+  std::vector<FilmJob> jobs_;  // by time of order
+};
+
+}  // namespace catgs

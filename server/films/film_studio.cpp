@@ -1,0 +1,175 @@
+#include "server/films/film_studio.h"
+
+#include <array>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/error.h"
+#include "server/base/log_event.h"
+#include "server/base/prompt_thread.h"
+#include "server/films/film_artist.h"
+
+namespace catgs {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto longest_job = 2h;
+constexpr auto look_again = 20ms;
+constexpr std::string_view folder = "/api/films/", file_part = "/file", cancel_part = "/cancel";
+
+/// Thrown by the artist's callback.
+struct Cancelled {};
+
+/// Returns JOB of "/api/films/JOB<what>".
+std::optional<std::string_view> job_of(std::string_view path, std::string_view what) {
+  if (!path.starts_with(folder) || !path.ends_with(what)) return std::nullopt;
+  path.remove_prefix(folder.size());
+  path.remove_suffix(std::min(what.size(), path.size()));
+  if (path.empty() || path.find('/') != path.npos) return std::nullopt;
+  return path;
+}
+
+HttpResponse json_response(int status, const nlohmann::json& document) {
+  return text_response(status,
+                       document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
+                       "application/json");
+}
+
+HttpResponse no_such_job() {
+  return text_response(404, "404: there is no such picture or film, or not any more\n");
+}
+
+}  // namespace
+
+FilmStudio::FilmStudio(Surroundings around)
+    : around_(std::move(around)), artist_([this](const std::stop_token& stop) { work(stop); }) {}
+
+FilmStudio::~FilmStudio() {
+  clerk_.join();
+  artist_.request_stop();
+  artist_.join();
+}
+
+std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
+  if (const auto id = job_of(request.path, file_part)) {
+    const auto job = queue_.find(*id);
+    if (!job || !job->result) return no_such_job();
+    HttpResponse response;
+    response.content_type = job->wish.kind == FilmKind::film ? "video/mp4" : "image/png";
+    response.disk_body = std::make_shared<const DiskBody>(DiskBody{
+        job->result->size(), [file = job->result](std::uint64_t offset, std::size_t bytes) {
+          std::string piece(bytes, '\0');
+          if (!file->read(offset, std::as_writable_bytes(std::span(piece)))) piece.clear();
+          return piece;
+        }});
+    return response;
+  }
+  const auto id = job_of(request.path, "");
+  if (!id) return std::nullopt;
+  const auto job = queue_.find(*id);
+  if (!job) return no_such_job();
+  constexpr std::array names = {"waiting", "drawing", "done", "failed", "cancelled"};
+  nlohmann::json report = {{"state", names[static_cast<std::size_t>(job->state)]},
+                           {"share", job->share}};
+  if (const auto left = queue_.left(*job)) report["seconds_left"] = left->count();
+  if (job->result) report["bytes"] = job->result->size();
+  if (!job->error.empty()) report["error"] = job->error;
+  return json_response(200, report);
+}
+
+bool FilmStudio::cancels(const HttpRequest& request) {
+  return job_of(request.path, cancel_part).has_value();
+}
+
+std::future<HttpResponse> FilmStudio::cancel(const HttpRequest& request) {
+  std::promise<HttpResponse> answer;
+  const bool cancelled = queue_.cancel(*job_of(request.path, cancel_part));
+  answer.set_value(cancelled ? text_response(200, "cancelled\n") : no_such_job());
+  return answer.get_future();
+}
+
+std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string owner,
+                                            std::string json,
+                                            std::shared_ptr<const UploadPlace> place) {
+  auto answer = std::make_shared<std::promise<HttpResponse>>();
+  auto future = answer->get_future();
+  boost::asio::post(clerk_, [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
+                             json = std::move(json), place = std::move(place)]() mutable {
+    if (!place->abandoned()) answer->set_value(take(std::move(scene_id), std::move(owner), json));
+  });
+  return future;
+}
+
+HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std::string& json) {
+  FilmWish wish;
+  try {
+    wish = parse_film_wish(json);
+  } catch (const InputError& mistake) {
+    return text_response(400, fmt::format("400: {}\n", mistake.what()));
+  }
+  const auto added = queue_.add(scene_id, std::move(owner), std::move(wish));
+  if (const auto* refused = std::get_if<FilmQueue::Refused>(&added))
+    return refused->has_one
+               ? text_response(409, "409: you have ordered one already: wait for it or cancel it\n")
+               : busy_response("503: others wait for theirs: try again in a few minutes\n");
+  log_info({.event = "film_ordered", .scene = scene_id},
+           "scene {}: an author ordered a film or picture", scene_id);
+  {
+    const std::lock_guard lock(mutex_);  // so that the artist does not miss it
+  }
+  wake_.notify_all();
+  return json_response(202, {{"id", std::get<std::string>(added)}});
+}
+
+void FilmStudio::work(const std::stop_token& stop) {
+  run_in_background();
+  while (!stop.stop_requested()) {
+    std::optional<FilmJob> job;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait(lock, stop, [&] { return (job = queue_.start_next()).has_value(); });
+    }
+    if (job) draw(*job, stop);
+  }
+}
+
+void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
+  const TimePoint started = Clock::now();
+  try {
+    const auto scene = scene_of(job.scene_id, stop);
+    if (!scene) throw std::runtime_error("the scene is not in memory: open it, and order again");
+    const auto file = std::make_shared<ResultFile>();
+    draw_film(job.wish, *scene, *file, [&](double share, Clock::duration took) {
+      if (stop.stop_requested() || !queue_.drawn(job.id, share)) throw Cancelled();
+      if (Clock::now() - started > longest_job)
+        throw std::runtime_error("it takes longer than two hours");
+      std::unique_lock lock(mutex_);
+      if (around_.visitors_look()) wake_.wait_for(lock, stop, took, [] { return false; });
+    });
+    queue_.finish(job.id, file);
+  } catch (const Cancelled&) {
+    return;
+  } catch (const std::exception& failure) {
+    log_warning({.event = "film_failed", .scene = job.scene_id}, "scene {}: no film: {}",
+                job.scene_id, failure.what());
+    queue_.fail(job.id, failure.what());
+  }
+}
+
+std::shared_ptr<const SceneEntry> FilmStudio::scene_of(const std::string& id,
+                                                       const std::stop_token& stop) {
+  auto answer = std::make_shared<std::promise<std::shared_ptr<const SceneEntry>>>();
+  auto future = answer->get_future();
+  boost::asio::post(around_.io, [this, id, answer] { answer->set_value(around_.in_memory(id)); });
+  while (future.wait_for(look_again) != std::future_status::ready)
+    if (stop.stop_requested()) return nullptr;
+  return future.get();
+}
+
+}  // namespace catgs

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/thread_pool.hpp>
+
+#include "server/films/film_queue.h"
+#include "server/net/http.h"
+#include "server/net/upload_places.h"
+#include "server/scenes/scene_entry.h"
+
+namespace catgs {
+
+/// Takes authors' orders of pictures and films, draws them one after the other on a thread of low
+/// priority, and hands out the results:
+///   PUT /api/scenes/ID/films     an order (film_wish.h); answers 202 with {"id": JOB}
+///   GET /api/films/JOB           {"state", "share", "seconds_left", "bytes", "error"}
+///   GET /api/films/JOB/file      the result
+///   PUT /api/films/JOB/cancel
+/// A JOB is 128 random bits: whoever knows it may ask for it. While visitors look at scenes, at
+/// most half of the time is spent on drawing.
+class FilmStudio {
+ public:
+  struct Surroundings {
+    boost::asio::io_context& io;  // runs the session thread
+    /// The scene, if it is in memory. Session thread.
+    std::function<std::shared_ptr<const SceneEntry>(const std::string& scene_id)> in_memory;
+    std::function<bool()> visitors_look;  // any thread
+  };
+  explicit FilmStudio(Surroundings around);
+  ~FilmStudio();  // ends the present job after its current part
+  FilmStudio(const FilmStudio&) = delete;
+  FilmStudio& operator=(const FilmStudio&) = delete;
+
+  // Network thread.
+  /// Answers a GET; nothing: the path is none of these.
+  std::optional<HttpResponse> respond(const HttpRequest& request);
+  /// True if this PUT cancels a job.
+  [[nodiscard]] static bool cancels(const HttpRequest& request);
+  std::future<HttpResponse> cancel(const HttpRequest& request);
+  /// The caller has checked that the sender may save the scene. One whose place is abandoned
+  /// meanwhile orders nothing.
+  std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
+                                  std::shared_ptr<const UploadPlace> place);
+
+ private:
+  HttpResponse take(std::string scene_id, std::string owner, const std::string& json);
+  void work(const std::stop_token& stop);
+  void draw(const FilmJob& job, const std::stop_token& stop);
+  /// Null: it is not in memory, or the server stops.
+  std::shared_ptr<const SceneEntry> scene_of(const std::string& id, const std::stop_token& stop);
+
+  const Surroundings around_;
+  FilmQueue queue_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::jthread artist_;
+  boost::asio::thread_pool clerk_{1};  // orders are too long to be read on the network thread
+};
+
+}  // namespace catgs

@@ -1,0 +1,97 @@
+#include "server/films/film_wish.h"
+
+#include <array>
+#include <span>
+#include <string>
+
+#include <fmt/format.h>
+#include <glm/trigonometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/byte_source.h"
+#include "render_core/scene/formats/json_field.h"
+#include "server/net/http.h"
+
+namespace catgs {
+namespace {
+
+constexpr std::array<std::string_view, 3> kind_names = {"picture", "panorama", "film"};
+constexpr std::array<glm::ivec2, 3> largest_px = {{{7680, 4320}, {8192, 4096}, {1920, 1080}}};
+constexpr int least_side_px = 16;
+
+FilmKind read_kind(const JsonField& field) {
+  const std::string name = field.text();
+  for (std::size_t i = 0; i < kind_names.size(); ++i)
+    if (kind_names[i] == name) return static_cast<FilmKind>(i);
+  field.fail("is no kind", fmt::format("known are {}", fmt::join(kind_names, ", ")));
+}
+
+glm::ivec2 read_size(const JsonField& field, FilmKind kind) {
+  if (field.size() != 2) field.fail("is not width and height");
+  const glm::ivec2 most = largest_px[static_cast<std::size_t>(kind)];
+  glm::ivec2 size_px{0};
+  for (int i = 0; i < 2; ++i) {
+    const std::uint64_t side = field[static_cast<std::size_t>(i)].count();
+    if (side < least_side_px || side > static_cast<std::uint64_t>(most[i]))
+      field.fail(
+          fmt::format("is not in {}x{}…{}x{}", least_side_px, least_side_px, most.x, most.y));
+    size_px[i] = static_cast<int>(side);
+  }
+  if (kind == FilmKind::panorama && size_px.x != 2 * size_px.y)
+    field.fail("is not twice as wide as high");
+  if (kind == FilmKind::film && (size_px.x % 2 != 0 || size_px.y % 2 != 0))
+    field.fail("has an odd side");
+  return size_px;
+}
+
+FilmView read_view(const JsonField& field, const FilmView* before) {
+  const std::size_t count = field.size();
+  if (count != 8 && !(count == 7 && before)) field.fail("is not x, y, z, qx, qy, qz, qw, fov_deg");
+  const auto number = [&](std::size_t i) { return field[i].number(); };
+  FilmView view;
+  view.world_from_camera.position = field.as_place({number(0), number(1), number(2)});
+  const glm::quat orientation(number(6), number(3), number(4), number(5));
+  const float norm = glm::length(orientation);
+  if (!(norm > 0.9f && norm < 1.1f)) field.fail("has no unit quaternion");
+  view.world_from_camera.orientation = orientation / norm;
+  if (count == 7) {
+    view.fov_y_rad = before->fov_y_rad;
+  } else {
+    if (!(number(7) >= 5.0f && number(7) <= 160.0f)) field.fail("has a field of view beyond 5…160");
+    view.fov_y_rad = glm::radians(number(7));
+  }
+  return view;
+}
+
+}  // namespace
+
+FilmWish parse_film_wish(std::string_view json) {
+  const MemorySource source("film", std::as_bytes(std::span(json)));
+  const nlohmann::json document = read_json(source, max_upload_bytes);
+  const JsonField root(source.name(), document);
+  FilmWish wish;
+  wish.kind = read_kind(root.at("kind"));
+  wish.size_px = read_size(root.at("size"), wish.kind);
+  const JsonField views = root.at("views");
+  const std::size_t most = wish.kind == FilmKind::film ? most_film_frames : 1;
+  const auto check_count = [&](std::size_t more) {
+    if (more > most - wish.views.size()) views.fail(fmt::format("has more than {} views", most));
+  };
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const JsonField entry = views[i];
+    const FilmView* const before = wish.views.empty() ? nullptr : &wish.views.back();
+    if (before && entry.value().is_number()) {
+      const std::uint64_t times = entry.count();
+      check_count(times);
+      wish.views.insert(wish.views.end(), times, FilmView(*before));
+    } else {
+      check_count(1);
+      wish.views.push_back(read_view(entry, before));
+    }
+  }
+  if (wish.views.empty()) views.fail("is empty");
+  return wish;
+}
+
+}  // namespace catgs

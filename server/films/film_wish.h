@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "render_core/math/camera.h"
+
+namespace catgs {
+
+enum class FilmKind { picture, panorama, film };
+
+struct FilmView {
+  Pose world_from_camera;
+  float fov_y_rad = 1.0f;
+};
+
+/// A picture or a film that an author wants of a scene.
+struct FilmWish {
+  FilmKind kind = FilmKind::picture;
+  glm::ivec2 size_px{0};
+  std::vector<FilmView> views;  // one, or one for each frame of a film
+};
+
+inline constexpr int film_fps = 30;
+inline constexpr std::size_t most_film_frames = 18'000;  // ten minutes
+
+/// Reads {"kind": "film", "size": [1280, 720], "views": [[x, y, z, qx, qy, qz, qw, fov_deg], 30,
+/// …]}. A view without its last number keeps the field of view before. A whole number in place of a
+/// view repeats the view before so many times. Sizes: a picture at most 7680x4320, a panorama 2:1
+/// and at most 8192x4096, a film even and at most 1920x1080. Throws InputError that names the
+/// field.
+FilmWish parse_film_wish(std::string_view json);
+
+}  // namespace catgs

@@ -1,0 +1,88 @@
+#include "server/films/film_artist.h"
+
+#include <array>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "render_core/base/thread_pool.h"
+#include "render_core/image/png.h"
+#include "render_core/metrics/image_quality.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+class FilmArtist : public testing::Test {
+ protected:
+  FilmArtist() {
+    auto cloud = std::make_shared<GaussianCloud>(random_cloud(300, 0));
+    scene.renderer = make_renderer(std::move(cloud), {.kind = RendererKind::cpu,
+                                                      .pool = std::make_shared<ThreadPool>(2)})
+                         .renderer;
+    scene.facts.near_z = 0.2f;
+    view.world_from_camera.position = {0, 0, -6};
+  }
+  Image drawn(FilmKind kind, glm::ivec2 size_px) {
+    parts = 0;
+    ResultFile file;
+    draw_film({kind, size_px, {view}}, scene, file, [&](double share, Clock::duration) {
+      EXPECT_GT(share, last_share);
+      last_share = share;
+      ++parts;
+    });
+    last_share = 0.0;
+    return read_png(file.path());
+  }
+
+  SceneEntry scene;
+  FilmView view;
+  int parts = 0;
+  double last_share = 0.0;
+};
+
+TEST_F(FilmArtist, APictureInPartsIsThePicture) {
+  const glm::ivec2 size_px{2200, 1100};
+  const Image picture = drawn(FilmKind::picture, size_px);
+  EXPECT_EQ(parts, 6);
+  FrameRequest request;
+  request.camera = make_camera(view.world_from_camera, size_px,
+                               focal_from_fov_y(view.fov_y_rad, size_px.y), 0.2f);
+  const auto whole_view = scene.renderer->make_view({Pipeline::exact, PixelFormat::rgb_f32});
+  FrameView frame;
+  ASSERT_TRUE(whole_view->render(request, frame).ok());
+  EXPECT_GT(compare_images(copy_image(frame), picture).psnr(), 45.0);
+}
+
+TEST_F(FilmArtist, APanoramaShowsAllAround) {
+  const Image around = drawn(FilmKind::panorama, {256, 128});
+  EXPECT_EQ(around.size_px, glm::ivec2(256, 128));
+  EXPECT_EQ(parts, 6) << "a side is one part";
+}
+
+TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
+  FilmWish wish{FilmKind::film, {64, 48}, {view, view}};
+  for (int i = 0; i < 6; ++i) {
+    view.world_from_camera.position.x += 0.1f;
+    wish.views.push_back(view);
+  }
+  ResultFile file;
+  int frames = 0;
+  draw_film(wish, scene, file, [&](double, Clock::duration) { ++frames; });
+  EXPECT_EQ(frames, 8);
+  std::array<std::byte, 8> head{};
+  ASSERT_TRUE(file.read(0, head));
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(head.data()) + 4, 4), "ftyp");
+  frames = 0;
+  ResultFile other;
+  EXPECT_THROW(draw_film(wish, scene, other,
+                         [&](double, Clock::duration) {
+                           if (++frames == 3) throw std::runtime_error("cancelled");
+                         }),
+               std::runtime_error);
+  EXPECT_EQ(frames, 3);
+}
+
+}  // namespace
+}  // namespace catgs::test

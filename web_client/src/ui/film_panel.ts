@@ -1,0 +1,148 @@
+// Pictures and films for authors. It loads when an author opens it.
+import type { Eye } from '../camera/eye';
+import { cancel_film, film_address, film_state, order_film, type FilmWish } from '../film/jobs';
+import { film_eyes, film_fps, film_length_s, most_film_frames, write_tum, write_views } from '../film/path';
+import { duration, number } from '../text/number';
+import { text } from '../text/text';
+import type { Tour } from '../tour/tour';
+import { make, save_file } from './dom';
+
+export interface FilmTools {
+  eye(): Eye;
+  /** The scene's scale to a visitor, world units. */
+  reach(): number;
+  scene_id(): string;
+  file_name(): string; // of the scene, without extension
+  /** The tour that is edited. */
+  tour(): Tour;
+  /** Lets its holder order; undefined: this visitor may not. */
+  token(): string | undefined;
+}
+
+type Kind = FilmWish['kind'];
+
+const { film: words } = text;
+const sizes: Readonly<Record<Kind, readonly (readonly [number, number])[]>> = {
+  picture: [[1920, 1080], [3840, 2160], [7680, 4320]],
+  panorama: [[4096, 2048], [8192, 4096]],
+  film: [[1280, 720], [1920, 1080]],
+};
+const look_again_ms = 500;
+
+export class FilmPanel {
+  private readonly kind_ = make('select', {});
+  private readonly size_ = make('select', {});
+  private readonly make_ = make('button', { type: 'button', className: 'primary' }, words.make);
+  private readonly path_ = make('button', { type: 'button' }, words.path);
+  private readonly cancel_ = make('button', { type: 'button', hidden: true }, words.cancel);
+  private readonly bar_ = make('progress', { max: 1, hidden: true, 'aria-label': words.title });
+  private readonly save_ = make('a', { hidden: true }, words.save);
+  private readonly said_ = make('output', { 'aria-live': 'polite' });
+  private readonly left_ = make('p', { hidden: true }); // changes all the time, so it is not read out
+  private job_: string | undefined;
+
+  constructor(
+    place: HTMLElement,
+    private readonly tools_: FilmTools,
+  ) {
+    this.kind_.append(...(['picture', 'panorama', 'film'] as const).map((kind) => new Option(words[kind], kind)));
+    this.kind_.addEventListener('change', () => this.choose());
+    this.make_.addEventListener('click', () => void this.order());
+    this.path_.addEventListener('click', () => this.save_path());
+    this.cancel_.addEventListener('click', () => {
+      if (this.job_) void cancel_film(location.href, this.job_);
+    });
+    const row = make('div', {}, this.make_, this.path_, this.cancel_);
+    row.classList.add('row');
+    place.append(
+      make('label', {}, make('span', {}, words.kind), this.kind_),
+      make('label', {}, make('span', {}, words.size), this.size_),
+      row,
+      ...[this.bar_, this.left_, this.said_, this.save_],
+    );
+    this.choose();
+  }
+
+  private get kind(): Kind {
+    return this.kind_.value as Kind;
+  }
+
+  private choose(): void {
+    const { kind } = this;
+    this.size_.replaceChildren(...sizes[kind].map(([x, y], i) => new Option(`${x} × ${y}`, String(i))));
+    this.path_.hidden = kind !== 'film';
+    const may_order = this.tools_.token() !== undefined;
+    this.make_.hidden = !may_order;
+    this.say(may_order ? '' : words.not_author);
+  }
+
+  private say(what: string): void {
+    this.said_.textContent = what;
+  }
+
+  /** The frames of the film; undefined, and the panel says why: there is none. */
+  private eyes(): readonly Eye[] | undefined {
+    if (this.kind !== 'film') return [this.tools_.eye()];
+    const tour = this.tools_.tour();
+    const length_s = film_length_s(tour, this.tools_.reach());
+    const most_s = most_film_frames / film_fps;
+    if (length_s === 0) this.say(words.no_stops);
+    else if (length_s > most_s) this.say(words.too_long(duration(most_s), duration(length_s)));
+    else return film_eyes(tour, this.tools_.reach());
+    return undefined;
+  }
+
+  private save_path(): void {
+    const eyes = this.eyes();
+    if (!eyes) return;
+    save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), `${this.tools_.file_name()}.tum`);
+    const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
+    this.say(words.path_saved(`catgs-render frames … --trace ${this.tools_.file_name()}.tum --fov-deg ${fov_deg.toFixed(1)} --out film.mp4`));
+  }
+
+  private async order(): Promise<void> {
+    const eyes = this.eyes();
+    const token = this.tools_.token();
+    if (!eyes || token === undefined) return;
+    const { kind } = this;
+    const size = sizes[kind][Number(this.size_.value)]!;
+    const name = `${this.tools_.file_name()}.${kind === 'film' ? 'mp4' : 'png'}`;
+    this.save_.hidden = true;
+    this.say('');
+    this.make_.disabled = true;
+    const ordered = await order_film(location.href, token, this.tools_.scene_id(), { kind, size, views: write_views(eyes) });
+    if ('id' in ordered) await this.watch(ordered.id, name);
+    else this.say(words.failed(ordered.why || text.author.unreachable));
+    this.make_.disabled = false;
+  }
+
+  /** Shows how far the job is, until it ends. */
+  private async watch(id: string, name: string): Promise<void> {
+    this.job_ = id;
+    this.cancel_.hidden = this.bar_.hidden = this.left_.hidden = false;
+    for (;;) {
+      const now = await film_state(location.href, id);
+      if (now) this.show(now.state, now.share, now.seconds_left);
+      if (now?.state === 'failed') this.say(words.failed(now.error ?? ''));
+      if (now?.state === 'cancelled') this.say(words.cancelled);
+      if (now?.state === 'done') {
+        this.say(words.done);
+        Object.assign(this.save_, { href: film_address(location.href, id), download: name, hidden: false });
+      }
+      if (now && now.state !== 'waiting' && now.state !== 'drawing') break;
+      await new Promise((resolve) => setTimeout(resolve, look_again_ms));
+    }
+    this.cancel_.hidden = this.bar_.hidden = this.left_.hidden = true;
+    this.job_ = undefined;
+  }
+
+  private show(state: string, share: number, seconds_left: number | undefined): void {
+    this.bar_.value = share;
+    this.left_.textContent =
+      state === 'waiting'
+        ? words.waiting
+        : seconds_left === undefined
+          ? words.drawing
+          : words.drawn(number(share, { style: 'percent' }), duration(seconds_left));
+  }
+}
