@@ -161,6 +161,14 @@ export class CameraController {
     this.rig_.refocus();
   }
 
+  /** Flies there. From then on an orbiting camera circles `focus`. */
+  fly_to(to: Eye, focus: Vec3, at_once: boolean): void {
+    const ended = (arrived: boolean): void => {
+      if (arrived) this.rig_.focus = focus;
+    };
+    this.fly(glide(this.eye, to, at_once ? 0 : glide_time_s(this.eye, to, this.reach)), ended);
+  }
+
   set_mode(mode: CameraMode, at_once = false): void {
     if (mode === this.mode_) return;
     this.mode_ = mode;
@@ -229,13 +237,6 @@ export class CameraController {
 
   private get controller(): ModeController {
     return this.modes_[this.mode_];
-  }
-
-  private fly_to(to: Eye, focus: Vec3, at_once: boolean): void {
-    const ended = (arrived: boolean): void => {
-      if (arrived) this.rig_.focus = focus;
-    };
-    this.fly(glide(this.eye, to, at_once ? 0 : glide_time_s(this.eye, to, this.reach)), ended);
   }
 
   /** The scene keeps this up, and its start is upright in it. */

@@ -9,9 +9,10 @@ import { by_id } from '../ui/dom';
 import type { Navigation } from '../ui/navigation';
 import type { SeenCamera } from '../ui/seen_camera';
 import type { Toolbar } from '../ui/toolbar';
-import type { WalkMap } from '../walk/walk_map';
+import type { Stand, WalkMap } from '../walk/walk_map';
 import type { WorkerClient } from '../worker/client';
 import type { PlanPanel } from './plan_panel';
+import type { Dollhouse } from './dollhouse';
 import { SceneGround } from './scene_ground';
 import type { Walking } from './walking';
 
@@ -38,6 +39,7 @@ export class GroundUse {
   private map_: WalkMap | undefined;
   private walking_: Walking | undefined;
   private plan_: PlanPanel | undefined;
+  private house_: Dollhouse | undefined;
   private tour_: TourState | undefined;
   private eye_: Eye;
   private people_: readonly Vec3[] = [];
@@ -49,7 +51,9 @@ export class GroundUse {
     this.ground_ = new SceneGround(token);
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
+    navigation.went_back.listen(() => this.house_?.end());
     navigation.mode_chosen.listen(() => {
+      if (navigation.camera.mode !== 'orbit') this.house_?.end();
       if (navigation.camera.mode !== 'walk') return;
       this.chose_walk_ = true;
       void this.walk();
@@ -62,6 +66,7 @@ export class GroundUse {
       this.plan_?.move(eye);
     });
     tour_shown.listen((state) => {
+      if (state.playing || state.stop_index !== this.tour_?.stop_index) this.house_?.end();
       this.tour_ = state;
       this.show_stops();
     });
@@ -81,6 +86,8 @@ export class GroundUse {
 
   private enter(scene_id: string): void {
     this.ground_.enter(scene_id);
+    this.house_?.end();
+    this.house_ = undefined;
     this.map_ = undefined;
     this.walking_?.end();
     this.walking_ = this.plan_ = undefined;
@@ -117,16 +124,28 @@ export class GroundUse {
   private async open_plan(): Promise<void> {
     const { map_: map, parts_: parts } = this;
     if (!map) return;
-    const [{ PlanPanel }, walking] = await Promise.all([import('./plan_panel'), this.make_walking(map)]);
+    const [{ PlanPanel }, { Dollhouse }, { is_house }, walking] = await Promise.all([
+      import('./plan_panel'),
+      import('./dollhouse'),
+      import('../walk/dollhouse'),
+      this.make_walking(map),
+    ]);
     if (!walking) return;
+    const go_to = (stand: Stand): void => {
+      this.house_?.end();
+      parts.navigation.taken_over.emit();
+      walking.go_to(stand);
+    };
+    this.house_ ??= is_house(map) ? new Dollhouse({ ...parts, go_to }, map) : undefined;
     this.plan_ ??= new PlanPanel(
       {
         storage: parts.storage,
-        go_to: (stand) => {
-          parts.navigation.taken_over.emit();
-          walking.go_to(stand);
+        go_to,
+        go_to_stop: (index) => {
+          this.house_?.end();
+          parts.go_to_stop(index);
         },
-        go_to_stop: parts.go_to_stop,
+        dollhouse: this.house_,
         stand_at: (position) => walking.walker.stand_at(position),
       },
       map,

@@ -7,6 +7,7 @@ import type { Stop } from '../tour/tour';
 import { by_id, make } from '../ui/dom';
 import { clear_near } from '../walk/map_walker';
 import { cells_per_eye_height, count_at, first_at, height_of, storey_at, to_grid, type Stand, type WalkMap } from '../walk/walk_map';
+import type { Dollhouse } from './dollhouse';
 import { plan_picture, type PlanPicture } from './plan_picture';
 import { cells_of, px_of, type PlanView } from './plan_view';
 import './ground.css';
@@ -35,6 +36,8 @@ interface PlanParts {
   /** The visitor has chosen a place. */
   readonly go_to: (stand: Stand) => void;
   readonly go_to_stop: (index: number) => void;
+  /** Undefined: the scene is no house. */
+  readonly dollhouse: Dollhouse | undefined;
   /** Where somebody would stand whose eyes are here. */
   readonly stand_at: (position: Vec3) => Stand;
 }
@@ -51,6 +54,7 @@ export class PlanPanel {
   private readonly spots_ = make('div', { className: 'plan-stops', role: 'group', 'aria-label': text.page.stops });
   private readonly storeys_ = make('select', { 'aria-label': text.ground.storey });
   private readonly view_up_ = make('button', { type: 'button', title: text.ground.view_up, 'aria-label': text.ground.view_up }, icon('compass'));
+  private readonly house_ = make('button', { type: 'button', title: text.ground.dollhouse, 'aria-label': text.ground.dollhouse }, icon('dollhouse'));
   private readonly size_ = make('button', { type: 'button' }, icon('full'));
   private readonly pictures_ = new Map<number, DrawnPlan | 'comes'>();
   private storey_ = 0;
@@ -68,12 +72,15 @@ export class PlanPanel {
   ) {
     this.eye_ = eye;
     this.picture_.append(this.canvas_, this.spots_);
-    this.host_.replaceChildren(this.picture_, make('div', { className: 'row' }, this.storeys_, this.view_up_, this.size_));
+    this.host_.replaceChildren(this.picture_, make('div', { className: 'row' }, this.storeys_, this.house_, this.view_up_, this.size_));
     this.storeys_.hidden = map_.storeys.length < 2;
     this.storeys_.append(
       ...map_.storeys.map((_, k) => new Option(text.ground.storey_numbered(number(k + 1)), String(k))).reverse(),
     );
-    this.storeys_.addEventListener('change', () => this.choose_storey(Number(this.storeys_.value)));
+    this.storeys_.addEventListener('change', () => {
+      this.choose_storey(Number(this.storeys_.value));
+      if (parts_.dollhouse?.shown) parts_.dollhouse.show(this.storey_);
+    });
     this.view_up_.setAttribute('aria-pressed', String(parts_.storage?.getItem(up_key) === 'view'));
     this.view_up_.addEventListener('click', () => {
       const view_up = this.view_up_.getAttribute('aria-pressed') !== 'true';
@@ -82,6 +89,7 @@ export class PlanPanel {
       this.draw_soon();
     });
     this.size_.addEventListener('click', () => this.set_large(!this.is_large));
+    this.bind_dollhouse(parts_.dollhouse);
     this.canvas_.addEventListener('click', ({ offsetX, offsetY }) => this.clicked(offsetX, offsetY));
     new ResizeObserver(() => this.draw_soon()).observe(this.picture_);
     this.set_large(false);
@@ -93,6 +101,7 @@ export class PlanPanel {
   move(eye: Eye): void {
     this.eye_ = eye;
     if (this.host_.hidden) return;
+    if (this.parts_.dollhouse?.shown) return this.draw_soon(); // the storey is the one that is shown
     const storey = storey_at(this.map_, this.parts_.stand_at(eye.position).height);
     if (storey !== this.visitors_storey_) {
       this.visitors_storey_ = storey;
@@ -117,6 +126,17 @@ export class PlanPanel {
   show_people(places: readonly Vec3[]): void {
     this.people_ = places;
     this.draw_soon();
+  }
+
+  private bind_dollhouse(house: Dollhouse | undefined): void {
+    this.house_.hidden = !house;
+    this.house_.setAttribute('aria-pressed', String(house?.shown ?? false));
+    if (!house) return;
+    this.house_.addEventListener('click', () => {
+      if (house.shown) house.leave();
+      else house.show(this.storey_);
+    });
+    house.changed.listen((shown) => this.house_.setAttribute('aria-pressed', String(shown)));
   }
 
   private get is_large(): boolean {

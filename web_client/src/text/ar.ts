@@ -185,6 +185,7 @@ export const text: Texts = {
     storey: 'الطابق',
     storey_numbered: (n) => `الطابق ${n}`,
     view_up: 'يدور مع اتجاه النظر',
+    dollhouse: 'بيت الدمية',
     larger: 'تكبير',
     smaller: 'تصغير',
   },

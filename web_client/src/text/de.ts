@@ -177,6 +177,7 @@ export const text: Texts = {
     storey: 'Stockwerk',
     storey_numbered: (n) => `Stockwerk ${n}`,
     view_up: 'Mit dem Blick drehen',
+    dollhouse: 'Puppenhaus',
     larger: 'Größer',
     smaller: 'Kleiner',
   },

@@ -175,6 +175,7 @@ export const text = {
     storey: 'Floor',
     storey_numbered: (n: string): string => `Floor ${n}`,
     view_up: 'Turn with the view',
+    dollhouse: 'Dollhouse',
     larger: 'Larger',
     smaller: 'Smaller',
   },

@@ -178,6 +178,7 @@ export const text: Texts = {
     storey: 'Planta',
     storey_numbered: (n) => `Planta ${n}`,
     view_up: 'Girar con la vista',
+    dollhouse: 'Casa de muñecas',
     larger: 'Ampliar',
     smaller: 'Reducir',
   },

@@ -178,6 +178,7 @@ export const text: Texts = {
     storey: 'Niveau',
     storey_numbered: (n) => `Niveau ${n}`,
     view_up: 'Tourner avec le regard',
+    dollhouse: 'Maison de poupée',
     larger: 'Agrandir',
     smaller: 'Réduire',
   },

@@ -178,6 +178,7 @@ export const text: Texts = {
     storey: 'Piano',
     storey_numbered: (n) => `Piano ${n}`,
     view_up: 'Ruota con lo sguardo',
+    dollhouse: 'Casa delle bambole',
     larger: 'Ingrandisci',
     smaller: 'Riduci',
   },

@@ -178,6 +178,7 @@ export const text: Texts = {
     storey: '階',
     storey_numbered: (n) => `${n} 階`,
     view_up: '視線に合わせて回転',
+    dollhouse: 'ドールハウス',
     larger: '拡大',
     smaller: '縮小',
   },

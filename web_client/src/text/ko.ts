@@ -177,6 +177,7 @@ export const text: Texts = {
     storey: '층',
     storey_numbered: (n) => `${n}층`,
     view_up: '시선을 따라 회전',
+    dollhouse: '인형의 집',
     larger: '크게',
     smaller: '작게',
   },

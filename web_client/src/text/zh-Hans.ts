@@ -174,6 +174,7 @@ export const text: Texts = {
     storey: '楼层',
     storey_numbered: (n) => `第 ${n} 层`,
     view_up: '随视线旋转',
+    dollhouse: '娃娃屋',
     larger: '放大',
     smaller: '缩小',
   },

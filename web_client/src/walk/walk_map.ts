@@ -78,10 +78,6 @@ export function to_world(map: WalkMap, { east, north, height }: Stand): Vec3 {
 export const eyes_of = (map: WalkMap, at: Stand): Vec3 =>
   to_world(map, { ...at, height: at.height + cells_per_eye_height });
 
-/** The heights along up of the storeys' floors, from below, in the world. */
-export const storey_heights = ({ storeys, origin, axes, cell }: WalkMap): readonly number[] =>
-  storeys.map(({ level }) => dot(origin, axes[2]) + level * cell);
-
 /** The index in `storeys` of a height. */
 export function storey_at(map: WalkMap, height: number): number {
   let storey = 0;

@@ -1,0 +1,78 @@
+// Shows a storey from outside, without its ceiling, and leads back in.
+import { Signal } from '../base/signal';
+import { add, forward, rotate, scale } from '../base/vector';
+import type { Eye } from '../camera/eye';
+import type { CameraMode } from '../camera/mode';
+import type { Navigation } from '../ui/navigation';
+import { ceiling_cut, dollhouse_eye } from '../walk/dollhouse';
+import { floor_along } from '../walk/floor';
+import type { Stand, WalkMap } from '../walk/walk_map';
+import type { WorkerClient } from '../worker/client';
+
+interface DollhouseParts {
+  readonly view: HTMLElement;
+  readonly worker: WorkerClient;
+  readonly navigation: Navigation;
+  readonly reduced_motion: boolean;
+  /** The visitor has pointed at a place on the floor. */
+  readonly go_to: (stand: Stand) => void;
+}
+
+export class Dollhouse {
+  readonly changed = new Signal<boolean>();
+  private before_: { eye: Eye; mode: CameraMode } | undefined; // where the visitor was
+
+  constructor(
+    private readonly parts_: DollhouseParts,
+    private readonly map_: WalkMap,
+  ) {}
+
+  get shown(): boolean {
+    return this.before_ !== undefined;
+  }
+
+  show(storey: number): void {
+    const { navigation, view, worker, reduced_motion } = this.parts_;
+    const { camera } = navigation;
+    worker.post({ kind: 'clip', plane: ceiling_cut(this.map_, storey) });
+    if (!this.before_) {
+      this.before_ = { eye: navigation.eye, mode: camera.mode };
+      navigation.taken_over.emit();
+      navigation.set_mode('orbit');
+      camera.unlimited = true;
+      navigation.tapped = this.tapped;
+      this.changed.emit(true);
+    }
+    const { eye, focus } = dollhouse_eye(this.map_, storey, navigation.eye.fov_y_rad, view.clientWidth / Math.max(1, view.clientHeight));
+    camera.fly_to(eye, focus, reduced_motion);
+    navigation.loop.wake();
+  }
+
+  /** Back to where the visitor was. */
+  leave(): void {
+    const { before_: before } = this;
+    if (!before) return;
+    const { navigation, reduced_motion } = this.parts_;
+    this.end();
+    navigation.set_mode(before.mode);
+    const ahead = add(before.eye.position, scale(rotate(before.eye.orientation, forward), navigation.reach));
+    navigation.camera.fly_to(before.eye, ahead, reduced_motion);
+    navigation.loop.wake();
+  }
+
+  /** The whole scene again. The caller moves the camera. */
+  end(): void {
+    if (!this.before_) return;
+    this.before_ = undefined;
+    const { navigation, worker } = this.parts_;
+    worker.post({ kind: 'clip', plane: undefined });
+    navigation.camera.unlimited = false;
+    if (navigation.tapped === this.tapped) navigation.tapped = undefined;
+    this.changed.emit(false);
+  }
+
+  private readonly tapped = (x: number, y: number): void => {
+    const stand = floor_along(this.map_, this.parts_.navigation.ray_at(x, y));
+    if (stand) this.parts_.go_to(stand);
+  };
+}
