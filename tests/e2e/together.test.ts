@@ -121,6 +121,16 @@ describe('a presentation', () => {
     await keep_screenshot(watcher, 'together-watch');
     expect(await barriers(watcher)).toEqual([]);
     expect(await watcher.getByRole('button', { name: 'Quality and view' }).isHidden()).toBe(true);
+    // The ring is where the leader points, though this picture has another shape.
+    await leader.locator('#view').click({ position: { x: 640, y: 500 }, modifiers: ['Alt'] });
+    await watcher.locator('.ping').waitFor({ state: 'attached' });
+    const at = await watcher.locator('.ping').evaluate((ring) => {
+      const { x, y } = ring.getBoundingClientRect();
+      return [x / innerWidth - 0.5, (y - innerHeight / 2) / innerWidth];
+    });
+    expect(at[0]).toBeCloseTo(0, 1);
+    expect(at[1]).toBeCloseTo((500 - 360) / 1280, 1);
+    await keep_screenshot(watcher, 'together-ping-watched');
     await watcher.keyboard.press('KeyM');
     expect(await watcher.evaluate(() => document.querySelector('#mode-label')!.textContent)).toBe('Orbit');
     await leader.goto('about:blank'); // its place is free

@@ -27,6 +27,8 @@ export class Pointing {
   private allowed_ = false;
   private press_: { readonly x: number; readonly y: number; readonly timer: ReturnType<typeof setTimeout> } | undefined;
   private shown_: readonly Shown[] = [];
+  private eye_: Eye | undefined; // of the picture that the visitor sees
+  private picture_aspect_ = 0;
 
   constructor(
     private readonly view_: HTMLElement,
@@ -36,9 +38,8 @@ export class Pointing {
     seen: SeenCamera,
   ) {
     worker_.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader(name) : words.by_other));
-    seen.moved.listen((eye) => {
-      for (const shown of this.shown_) this.put(shown, eye);
-    });
+    worker_.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
+    seen.moved.listen((eye) => this.see(eye));
     on_click('company-point', () => void this.point_at(0.5, 0.5));
     this.bind_presses();
   }
@@ -48,6 +49,18 @@ export class Pointing {
     this.allowed_ = allowed;
     this.button_.hidden = !allowed;
     if (!allowed) this.end_press();
+  }
+
+  /** The camera of the leader's picture, which this visitor watches. It has its own shape, and is all in the view. */
+  watch(eye: Eye): void {
+    const { clientWidth, clientHeight } = this.view_;
+    const taller = Math.max(1, (this.picture_aspect_ * clientHeight) / Math.max(1, clientWidth));
+    this.see({ ...eye, fov_y_rad: 2 * Math.atan(Math.tan(eye.fov_y_rad / 2) * taller) });
+  }
+
+  private see(eye: Eye): void {
+    this.eye_ = eye;
+    for (const shown of this.shown_) this.put(shown, eye);
   }
 
   private bind_presses(): void {
@@ -108,7 +121,7 @@ export class Pointing {
     for (const { ring: old } of this.shown_.slice(0, -most_shown)) old.remove();
     this.shown_ = this.shown_.slice(-most_shown);
     this.host_.append(ring);
-    const inside = this.put(shown, this.navigation_.eye);
+    const inside = this.put(shown, this.eye_ ?? this.navigation_.eye);
     // The ring tells all others.
     by_id('company-said', HTMLElement).textContent = inside ? said : `${said}. ${words.aside}`;
     setTimeout(() => {

@@ -58,7 +58,9 @@ export class Together {
     });
     worker_.on('lead', ({ lead, eye }) => this.heard(lead, eye));
     worker_.on('presented', ({ pose, fov_y_rad }) => {
-      if (this.role_ === 'watching') this.leader_eye_ = { ...pose, fov_y_rad };
+      if (this.role_ !== 'watching') return;
+      this.leader_eye_ = { ...pose, fov_y_rad };
+      pointing_.watch(this.leader_eye_);
     });
     navigation_.entered.listen(() => {
       if (this.leader_eye_) navigation_.put(this.leader_eye_);
