@@ -88,8 +88,8 @@ describe('a portal', () => {
     await page.getByText('1 of 3').waitFor();
     expect(await scene_of(page)).toBe('town');
     await page.getByRole('button', { name: 'Pause the tour' }).tap();
-    await page.getByRole('button', { name: 'Previous stop' }).tap();
-    await page.getByText('3 of 3').waitFor();
+    const place = page.locator('#tour-place');
+    while ((await place.innerText()) !== '3 of 3') await page.getByRole('button', { name: 'Next stop' }).tap();
     await keep_screenshot(page, 'portal-phone');
     expect(await barriers(page)).toEqual([]);
     await page.locator('#tour').getByRole('button', { name: 'To park' }).tap();

@@ -9,7 +9,6 @@ import {
   type FrameHeader,
   type HelloSchema,
   type PoseSampleSchema,
-  type PresentSchema,
   type ServerMessage,
   type SettingsSchema,
 } from './generated/catgs_pb';
@@ -33,7 +32,6 @@ export type ClientBody = NonNullable<MessageInitShape<typeof ClientMessageSchema
 // Messages before encoding. Fields that are left out become zeros.
 export type HelloInit = MessageInitShape<typeof HelloSchema>;
 export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
-export type PresentInit = MessageInitShape<typeof PresentSchema>;
 export type AckInit = MessageInitShape<typeof AckSchema>;
 export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 

@@ -14,7 +14,7 @@ import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import { Codec, type FrameHeader, type PresentInit, type SettingsInit, type StreamConfig } from '../wire/wire';
+import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
 import type { FromWorker, ToWorker } from './messages';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
@@ -138,9 +138,7 @@ class Client {
         this.session_.keep({ case: 'follow', value: { watch: message.watch } });
         break;
       case 'present':
-        // The leader's pictures and field of view are also those of others, who see no warped view.
-        this.display_.may_overscan = !message.on;
-        this.session_.keep({ case: 'present', value: present_message(message) });
+        this.present(message);
         break;
       case 'ping':
         this.session_.send({ case: 'ping', value: { place: wire_vector(message.place) } });
@@ -155,6 +153,12 @@ class Client {
         this.post_snapshot(message.request);
         break;
     }
+  }
+
+  private present({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): void {
+    // The leader's pictures and field of view are also those of others, who see no warped view.
+    this.display_.may_overscan = !on;
+    this.session_.keep({ case: 'present', value: { on, name, pings, tellsPlaces: tells_places } });
   }
 
   private pick(id: number, { origin, direction }: Ray): void {
@@ -294,10 +298,6 @@ class Client {
     say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
   }
 }
-
-const present_message = ({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): PresentInit => ({
-  ...{ on, name, pings, tellsPlaces: tells_places },
-});
 
 const clip_message = (plane: ClipPlane | undefined): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
   plane ? { normal: wire_vector(plane.normal), offset: plane.offset } : {};
