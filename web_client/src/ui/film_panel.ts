@@ -95,9 +95,11 @@ export class FilmPanel {
   private save_path(): void {
     const eyes = this.eyes();
     if (!eyes) return;
-    save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), `${this.tools_.file_name()}.tum`);
+    const file = `${this.tools_.file_name()}.tum`;
+    save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), file);
     const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
-    this.say(words.path_saved(`catgs-render frames … --trace ${this.tools_.file_name()}.tum --fov-deg ${fov_deg.toFixed(1)} --out film.mp4`));
+    const command = ['catgs-render', 'frames', '…', '--trace', file, '--fov-deg', fov_deg.toFixed(1), '--out', 'film.mp4'];
+    this.say(words.path_saved(command.join(' ')));
   }
 
   private async order(): Promise<void> {
