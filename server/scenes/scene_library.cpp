@@ -276,7 +276,7 @@ GroundSource SceneLibrary::ground_source_of(const SceneBook& book) const {
   if (trees_.ready(book.found)) source.tree = trees_.form_of(book.found)->tree;
   source.levels = chosen_levels(config_);
   source.beside = book.entry->sidecar;
-  source.beside.replace_extension(".walk");
+  if (!source.beside.empty()) source.beside.replace_extension(".walk");
   return source;
 }
 

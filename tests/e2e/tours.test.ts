@@ -343,8 +343,11 @@ describe('ways to move', () => {
     expect(distance(before, after)).toBeGreaterThan(0.1);
   });
 
-  it('on foot the height stays', async () => {
-    const { page } = await open(`${server.url}#stop=1`, windows.desktop);
+  it('on foot the height stays, where no ground is known', async () => {
+    const { page } = await new_page(windows.desktop);
+    await page.route('**/walk', (route) => route.fulfill({ status: 204 }));
+    await page.goto(`${server.url}#stop=1`);
+    await settle(page);
     await page.keyboard.press('KeyM');
     await page.keyboard.press('KeyM');
     await page.locator('#mode-label', { hasText: 'Walk' }).waitFor();

@@ -29,16 +29,17 @@ export class SceneGround {
     this.state_ = 'asked';
     const file = await this.fetch_file(scene_id, idle).catch((error: unknown) => {
       console.warn('the ground does not come', error);
-      return undefined;
+      return 'unknown' as const; // the next one who needs it asks again
     });
     if (scene_id !== this.scene_id_) return;
-    if (file === 'large') {
+    if (file === 'large' || file === 'unknown') {
       this.state_ = file;
       return;
     }
-    this.state_ = 'known';
     const map = file && (await this.read(file));
-    if (scene_id === this.scene_id_) this.known.emit(map);
+    if (scene_id !== this.scene_id_) return;
+    this.state_ = 'known';
+    this.known.emit(map);
   }
 
   private async read(file: ArrayBuffer): Promise<WalkMap | undefined> {
