@@ -56,7 +56,7 @@ class SceneGroundsTest : public FolderTest {
         metrics_, [this] { return now_; });
   }
   void run_until(const std::function<bool()>& holds) {
-    for (int i = 0; i < 20'000 && !holds(); ++i) {
+    for (int i = 0; i < 120'000 && !holds(); ++i) {
       io_->restart();
       io_->poll();
       library_->on_tick(now_);
