@@ -113,11 +113,15 @@ check_system() {
   grep -E "^Mem(Total|Available):" /proc/meminfo
 }
 
+# Scenes come with sidecars of their own, which have no tours. A tour that an author has changed stays.
 make_demo_scenes() {
-  mkdir -p "$demo_dir"
-  "$bin_dir/catgs-render" synth garden --gaussians 150000 --seed 1 "$demo_dir/garden.ply"
-  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$demo_dir/city.ply"
-  cp -r "$SOURCE_DIR"/deploy/demo/{city,garden}.* "$demo_dir"
+  local made=$demo_dir/made
+  mkdir -p "$made"
+  "$bin_dir/catgs-render" synth garden --gaussians 150000 --seed 1 "$made/garden.ply"
+  "$bin_dir/catgs-render" synth city --gaussians 300000 --seed 1 "$made/city.ply"
+  mv "$made"/*.ply "$demo_dir"
+  rm -r "$made"
+  cp -ru "$SOURCE_DIR"/deploy/demo/{city,garden}.* "$demo_dir"
 }
 
 ensure_scene() {
