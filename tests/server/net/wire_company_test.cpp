@@ -1,4 +1,4 @@
-// Messages of companies and of portals.
+// Messages of companies, portals and clip planes.
 #include <limits>
 #include <span>
 #include <string>
@@ -51,6 +51,18 @@ TEST(WireCompany, BoundsThePlaceOfAPingAndTheNameOfAScene) {
   EXPECT_THAT(complaint(message), HasSubstr("prepare.scene_id"));
   message.mutable_prepare()->set_scene_id("hall");
   EXPECT_EQ(parsed<Prepare>(message).scene_id, "hall");
+}
+
+TEST(WireClip, IsAPlaneOfFiniteNumbers) {
+  v1::ClientMessage message;
+  message.mutable_clip()->mutable_normal()->set_y(2.0f);
+  message.mutable_clip()->set_offset(-3.0f);
+  EXPECT_EQ(parsed<ClipPlane>(message), (ClipPlane{{0, 2, 0}, -3}));
+  message.mutable_clip()->mutable_normal()->set_x(std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THAT(complaint(message), HasSubstr("clip.normal.x"));
+  message.mutable_clip()->mutable_normal()->set_x(0.0f);
+  message.mutable_clip()->set_offset(std::numeric_limits<float>::infinity());
+  EXPECT_THAT(complaint(message), HasSubstr("clip.offset"));
 }
 
 TEST(WireCompany, TellsWhereACompanyIs) {

@@ -406,21 +406,6 @@ TEST(Wire, ReadsAndChecksPicks) {
   EXPECT_THAT(complaint(message), HasSubstr("pick.origin.y"));
 }
 
-TEST(Wire, ReadsAndChecksClipPlanes) {
-  v1::ClientMessage message;
-  message.mutable_clip()->mutable_normal()->set_y(2.0f);
-  message.mutable_clip()->set_offset(-3.0f);
-  const std::string text = message.SerializeAsString();
-  const auto* data = reinterpret_cast<const std::byte*>(text.data());
-  const auto plane = parsed<ClipPlane>({data, data + text.size()});
-  EXPECT_EQ(plane, (ClipPlane{{0, 2, 0}, -3}));
-  message.mutable_clip()->mutable_normal()->set_x(std::numeric_limits<float>::quiet_NaN());
-  EXPECT_THAT(complaint(message), HasSubstr("clip.normal.x"));
-  message.mutable_clip()->mutable_normal()->set_x(0.0f);
-  message.mutable_clip()->set_offset(std::numeric_limits<float>::infinity());
-  EXPECT_THAT(complaint(message), HasSubstr("clip.offset"));
-}
-
 TEST(Wire, SaysWhichMessagesReplaceEachOther) {
   EXPECT_EQ(wire::serialize(Welcome{}).topic, Topic::session);
   EXPECT_EQ(wire::serialize(StreamConfig{}).topic, Topic::stream);
