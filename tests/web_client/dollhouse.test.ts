@@ -1,7 +1,13 @@
 import { describe, expect, it } from 'vitest';
+import { Signal } from '#client/base/signal';
 import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
+import type { CameraMode } from '#client/camera/mode';
+import { Dollhouse } from '#client/ground/dollhouse';
+import type { Navigation } from '#client/ui/navigation';
 import { ceiling_cut, dollhouse_eye, is_house } from '#client/walk/dollhouse';
-import { first_of, to_world, type Storey, type WalkMap } from '#client/walk/walk_map';
+import { first_of, to_world, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
+import type { WorkerClient } from '#client/worker/client';
+import { camera, expect_vec } from './cameras';
 
 /** Ground everywhere, in a frame with y down. */
 function map_of(width: number, depth: number, storeys: readonly Storey[]): WalkMap {
@@ -57,5 +63,90 @@ describe('dollhouse', () => {
     expect(z).toBeGreaterThan(0);
     const north_in_view = rotate(conjugate(eye.orientation), map.axes[1]);
     expect(north_in_view[1]).toBeLessThan(0); // upwards in the picture
+  });
+});
+
+describe('a visitor of the dollhouse', () => {
+  function enter() {
+    const map = map_of(80, 70, [one, { low: 24, level: 26, area: 50 }]);
+    const made = camera('fly');
+    const clips: unknown[] = [];
+    const chosen: Stand[] = [];
+    const navigation = {
+      camera: made,
+      get eye() {
+        return made.eye;
+      },
+      reach: 5,
+      loop: { wake: () => undefined },
+      taken_over: new Signal(),
+      tapped: undefined as Navigation['tapped'],
+      set_mode: (mode: CameraMode) => made.set_mode(mode),
+      // Straight down onto the middle of the floor.
+      ray_at: () => ({ origin: to_world(map, { east: 40, north: 35, height: 30 }), direction: [0, 1, 0] as const }),
+    };
+    const house = new Dollhouse(
+      {
+        view: { clientWidth: 160, clientHeight: 90 } as HTMLElement,
+        worker: { post: ({ plane }: { plane: unknown }) => clips.push(plane) } as unknown as WorkerClient,
+        navigation: navigation as unknown as Navigation,
+        reduced_motion: true,
+        go_to: (stand) => chosen.push(stand),
+      },
+      map,
+    );
+    const shown: boolean[] = [];
+    house.changed.listen((now) => shown.push(now));
+    const before = made.pose;
+    house.show(0);
+    made.step(0.016);
+    return { house, map, made, clips, chosen, navigation, shown, before };
+  }
+
+  it('sees a storey from outside, and then another one', () => {
+    const { house, map, made, clips, shown } = enter();
+    expect(clips).toEqual([ceiling_cut(map, 0)]);
+    expect(made.mode).toBe('orbit');
+    const lower = made.pose.position;
+    expect_vec(lower, dollhouse_eye(map, 0, made.fov_y_rad, 16 / 9).eye.position);
+    house.show(1);
+    made.step(0.016);
+    expect(clips[1]).toEqual(ceiling_cut(map, 1));
+    expect(made.pose.position[1]).toBeCloseTo(lower[1] - 1.6);
+    expect(shown).toEqual([true]);
+  });
+
+  it('comes back to where they were', () => {
+    const { house, made, clips, navigation, shown, before } = enter();
+    house.leave();
+    made.step(0.016);
+    expect_vec(made.pose.position, before.position);
+    expect_vec(made.pose.orientation, before.orientation);
+    expect(made.mode).toBe('fly');
+    expect(clips.at(-1)).toBeUndefined();
+    expect(navigation.tapped).toBeUndefined();
+    expect(shown).toEqual([true, false]);
+    house.leave();
+    expect(clips).toHaveLength(2);
+  });
+
+  it('loses it when something else leads the camera, and is within the limits again', () => {
+    const { house, made, clips } = enter();
+    const from = made.pose.position;
+    house.end();
+    expect(house.shown).toBe(false);
+    expect(clips.at(-1)).toBeUndefined();
+    expect(made.mode).toBe('fly');
+    expect(made.pose.position).toEqual(from);
+    expect(made.within([99, 0, 0])).toEqual([20, 0, 0]);
+  });
+
+  it('points at the floor, also after something else heard the taps', () => {
+    const { house, navigation, chosen } = enter();
+    navigation.tapped = undefined;
+    house.show(0);
+    navigation.tapped!(0.5, 0.5);
+    expect(chosen).toHaveLength(1);
+    expect(chosen[0]).toMatchObject({ east: 40, north: 35 });
   });
 });

@@ -9,7 +9,7 @@ import { place_of, ray_through, surface_of } from '#client/camera/ray';
 import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
 import { Taps } from '#client/input/pointers';
-import { camera, expect_vec, hold, view_of } from './cameras';
+import { camera, expect_vec, hold, scene, view_of } from './cameras';
 
 const eye_level: Partial<SceneSetup> = {
   start_pose: { position: [0, -1.7, -5], orientation: identity },
@@ -97,6 +97,9 @@ describe('a double click', () => {
     expect(tap(1100, 90, 40)).toBe('drag');
     taps.down(90, 10, false); // a second finger
     expect(taps.up(1150, 90, 10)).toBe('drag');
+    taps.down(90, 10, true);
+    taps.cancel(); // by a long press
+    expect(taps.up(1900, 90, 10)).toBe('drag');
   });
 
   it('sends a ray to what is seen there', () => {
@@ -154,6 +157,16 @@ describe('a flight', () => {
     expect(heard).toEqual([false, false, true]);
     expect_vec(made.pose.position, to.position);
     expect(made.at_rest).toBe(true);
+  });
+
+  it('ends with the scene', () => {
+    const heard: boolean[] = [];
+    const made = camera('fly', eye_level);
+    made.fly(glide(made.eye, to, 1), (arrived) => heard.push(arrived));
+    made.load({ ...scene, ...eye_level, start_pose: { ...scene.start_pose, position: [1, 2, 3] } });
+    hold(made, {}, 2);
+    expect(heard).toEqual([false]);
+    expect_vec(made.pose.position, [1, 2, 3]);
   });
 });
 

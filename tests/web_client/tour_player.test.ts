@@ -50,7 +50,10 @@ describe('the player', () => {
         timers: time,
         now_us: () => time.now_us(),
         announce: (path) => paths.push(path),
-        reached: (tour_index, stop_index) => reached.push([tour_index, stop_index]),
+        reached: (tour_index, stop_index) => {
+          expect(state?.stop_index).toBe(stop_index); // the page knows where the visitor is
+          reached.push([tour_index, stop_index]);
+        },
         when_heard: (then) => {
           heard = then;
           if (!speaks) then();

@@ -103,6 +103,7 @@ export class CameraController {
   }
 
   load(scene: SceneSetup): void {
+    this.end_flight(false);
     this.scene_ = scene;
     this.rig_.load(scene);
     this.smoothing_.clear();
@@ -110,7 +111,6 @@ export class CameraController {
 
   /** Back to the start. */
   reset(): void {
-    this.end_flight(false);
     if (this.scene_) this.load(this.scene_);
     this.fov_y_rad = this.start?.fov_y_rad ?? default_fov_y_rad;
   }
@@ -132,6 +132,10 @@ export class CameraController {
     this.end_flight(false);
     this.smoothing_.clear();
     this.flight_ = { way, time_s: 0, ended };
+  }
+
+  get is_flying(): boolean {
+    return this.flight_ !== undefined;
   }
 
   stop_flight(): void {

@@ -18,9 +18,15 @@ interface DollhouseParts {
   readonly go_to: (stand: Stand) => void;
 }
 
+/** Where the visitor was. */
+interface Before {
+  readonly eye: Eye;
+  readonly mode: CameraMode;
+}
+
 export class Dollhouse {
   readonly changed = new Signal<boolean>();
-  private before_: { eye: Eye; mode: CameraMode } | undefined; // where the visitor was
+  private before_: Before | undefined;
 
   constructor(
     private readonly parts_: DollhouseParts,
@@ -40,9 +46,9 @@ export class Dollhouse {
       navigation.taken_over.emit();
       navigation.set_mode('orbit');
       camera.unlimited = true;
-      navigation.tapped = this.tapped;
       this.changed.emit(true);
     }
+    navigation.tapped = this.tapped;
     const { eye, focus } = dollhouse_eye(this.map_, storey, navigation.eye.fov_y_rad, view.clientWidth / Math.max(1, view.clientHeight));
     camera.fly_to(eye, focus, reduced_motion);
     navigation.loop.wake();
@@ -50,18 +56,26 @@ export class Dollhouse {
 
   /** Back to where the visitor was. */
   leave(): void {
-    const { before_: before } = this;
+    const before = this.end();
     if (!before) return;
     const { navigation, reduced_motion } = this.parts_;
-    this.end();
-    navigation.set_mode(before.mode);
     const ahead = add(before.eye.position, scale(rotate(before.eye.orientation, forward), navigation.reach));
     navigation.camera.fly_to(before.eye, ahead, reduced_motion);
     navigation.loop.wake();
   }
 
-  /** The whole scene again. The caller moves the camera. */
-  end(): void {
+  /** The whole scene again, in the mode from before. The caller moves the camera from where it is. */
+  end(): Before | undefined {
+    const { before_: before } = this;
+    if (before) {
+      this.close();
+      this.parts_.navigation.set_mode(before.mode);
+    }
+    return before;
+  }
+
+  /** The whole scene again. */
+  close(): void {
     if (!this.before_) return;
     this.before_ = undefined;
     const { navigation, worker } = this.parts_;

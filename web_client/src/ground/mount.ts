@@ -3,6 +3,7 @@ import { browser_timers, type Clock } from '../base/clock';
 import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { is_for_page } from '../input/view_input';
 import type { AccessToken } from '../session/token';
 import type { TourState } from '../tour/player';
 import { by_id } from '../ui/dom';
@@ -30,6 +31,7 @@ interface GroundParts {
   readonly go_to_stop: (index: number) => void;
 }
 
+const warn = (error: unknown): void => console.warn('the ground cannot be used', error); // the server is away
 const idle_after_ms = 2000; // the first picture
 
 export class GroundUse {
@@ -51,22 +53,27 @@ export class GroundUse {
     this.ground_ = new SceneGround(token);
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
-    navigation.went_back.listen(() => this.house_?.end());
+    navigation.went_back.listen(() => this.house_?.close());
+    navigation.led_away.listen(() => this.house_?.end());
     navigation.mode_chosen.listen(() => {
-      if (navigation.camera.mode !== 'orbit') this.house_?.end();
-      if (navigation.camera.mode !== 'walk') return;
+      const { mode } = navigation.camera;
+      this.house_?.leave();
+      navigation.set_mode(mode);
+      if (mode !== 'walk') return;
       this.chose_walk_ = true;
-      void this.walk();
+      this.walk();
+    });
+    window.addEventListener('keydown', (event) => {
+      if (event.code === 'Escape' && is_for_page(event)) this.house_?.leave();
     });
     toolbar.panel_shown.listen(({ panel, shown }) => {
-      if (panel === 'plan' && shown) void this.open_plan();
+      if (panel === 'plan' && shown) this.open_plan().catch(warn);
     });
     seen.moved.listen((eye) => {
       this.eye_ = eye;
       this.plan_?.move(eye);
     });
     tour_shown.listen((state) => {
-      if (state.playing || state.stop_index !== this.tour_?.stop_index) this.house_?.end();
       this.tour_ = state;
       this.show_stops();
     });
@@ -74,7 +81,7 @@ export class GroundUse {
     this.ground_.known.listen((map) => {
       this.map_ = map;
       this.button_.hidden = !map;
-      if (navigation.camera.mode === 'walk') void this.walk();
+      if (navigation.camera.mode === 'walk') this.walk();
     });
   }
 
@@ -86,7 +93,7 @@ export class GroundUse {
 
   private enter(scene_id: string): void {
     this.ground_.enter(scene_id);
-    this.house_?.end();
+    this.house_?.close();
     this.house_ = undefined;
     this.map_ = undefined;
     this.walking_?.end();
@@ -102,9 +109,9 @@ export class GroundUse {
     setTimeout(() => void this.ground_.want(true), idle_after_ms);
   }
 
-  private async walk(): Promise<void> {
+  private walk(): void {
     const { map_: map } = this;
-    if (map) await this.make_walking(map);
+    if (map) this.make_walking(map).catch(warn);
     else void this.ground_.want();
   }
 
@@ -132,19 +139,17 @@ export class GroundUse {
     ]);
     if (!walking) return;
     const go_to = (stand: Stand): void => {
-      this.house_?.end();
       parts.navigation.taken_over.emit();
-      walking.go_to(stand);
+      const before = this.house_?.end();
+      if (before) walking.land(stand, before.eye);
+      else walking.go_to(stand);
     };
     this.house_ ??= is_house(map) ? new Dollhouse({ ...parts, go_to }, map) : undefined;
     this.plan_ ??= new PlanPanel(
       {
         storage: parts.storage,
         go_to,
-        go_to_stop: (index) => {
-          this.house_?.end();
-          parts.go_to_stop(index);
-        },
+        go_to_stop: parts.go_to_stop,
         dollhouse: this.house_,
         stand_at: (position) => walking.walker.stand_at(position),
       },

@@ -1,6 +1,6 @@
 // Leads a walking visitor to where they point on the floor, and shows where that is.
 import type { Timers, Clock } from '../base/clock';
-import { length, sub, type Vec3 } from '../base/vector';
+import { add, dot, forward, length, look_at, normalize, rotate, scale, sub, type Vec3 } from '../base/vector';
 import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
 import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
@@ -86,6 +86,17 @@ export class Walking {
     const way = stroll(this.map, path, eye);
     this.travel(reduced_motion ? { duration_s: 0, at: () => way.at(way.duration_s) } : way);
     return true;
+  }
+
+  /** Flies down to a place, and looks level along the heading of `before`. */
+  land(to: Stand, before: Eye): void {
+    const { navigation, reduced_motion } = this.parts_;
+    const [, north, up] = this.map.axes;
+    const view = rotate(before.orientation, forward);
+    const heading = normalize(sub(view, scale(up, dot(view, up))), north);
+    const position = eyes_of(this.map, to);
+    const eye = { position, orientation: look_at(position, add(position, heading), up), fov_y_rad: before.fov_y_rad };
+    this.travel(glide(navigation.eye, eye, reduced_motion ? 0 : flight_s));
   }
 
   private walk_to(x: number, y: number): boolean {

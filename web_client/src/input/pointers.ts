@@ -82,6 +82,11 @@ export class Taps {
     this.down_ = is_only ? { x, y } : undefined;
   }
 
+  /** What is down is no tap. */
+  cancel(): void {
+    this.down_ = this.last_ = undefined;
+  }
+
   up(time_ms: number, x: number, y: number): 'drag' | 'tap' | 'double tap' {
     const { down_: down, last_: last } = this;
     this.down_ = this.last_ = undefined;

@@ -54,6 +54,7 @@ function bind_pointers(
   for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
     view.addEventListener(end, (event) => {
       const lifted = pointers.up(event.pointerId);
+      if (end === 'pointercancel') taps.cancel();
       if (end === 'pointerup') {
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
         if (what !== 'drag') {

@@ -58,12 +58,12 @@ export class MediaPart {
     }
     this.stop_ = stop;
     this.media_.show(stop?.media ?? [], this.addresses_);
-    this.narrator_.show(stop?.narration);
+    this.narrator_.show(stop?.narration, this.addresses_);
   }
 
   /** The visitor has come to the stop that is shown. */
   arrived(): void {
-    void this.narrator_.speak(this.addresses_);
+    void this.narrator_.speak();
   }
 
   when_heard(then: () => void): () => void {

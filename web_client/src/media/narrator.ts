@@ -10,6 +10,7 @@ export class Narrator {
   private readonly button_ = make('button', { id: 'tour-voice', type: 'button', hidden: true });
   private readonly words_ = make('p', { id: 'tour-words', dir: 'auto', hidden: true });
   private narration_: Narration | undefined;
+  private addresses_: MediaAddresses | undefined;
 
   /** `voice` is the element that `sounds` plays. */
   constructor(
@@ -21,7 +22,8 @@ export class Narrator {
     this.button_.append(icon('icon-voice'));
     this.button_.addEventListener('click', () => {
       if (sounds_.speaks) sounds_.hush(true);
-      else sounds_.resume();
+      else if (sounds_.voice === 'paused') sounds_.resume();
+      else this.begin();
     });
     voice_.addEventListener('ended', () => sounds_.voice_ended());
     voice_.addEventListener('error', () => {
@@ -32,17 +34,18 @@ export class Narrator {
   }
 
   /** Another stop is shown: nothing speaks any more. */
-  show(narration: Narration | undefined): void {
+  show(narration: Narration | undefined, addresses: MediaAddresses): void {
     this.narration_ = narration;
+    this.addresses_ = addresses;
     this.words_.textContent = '';
     this.words_.hidden = !narration?.captions;
     this.sounds_.hush();
   }
 
   /** The visitor is there. */
-  async speak(addresses: MediaAddresses): Promise<void> {
-    const narration = this.narration_;
-    if (!narration) return;
+  async speak(): Promise<void> {
+    const { narration_: narration, addresses_: addresses } = this;
+    if (!narration || !addresses) return;
     const address = await addresses.of(narration.src);
     if (narration !== this.narration_) return; // the visitor went on meanwhile
     this.voice_.replaceChildren();
@@ -55,11 +58,17 @@ export class Narrator {
     });
   }
 
+  /** The visitor wants to hear it before being there. */
+  private begin(): void {
+    this.sounds_.touch();
+    void this.speak();
+  }
+
   /** Shows the state of the sounds. */
   update(): void {
     const { speaks } = this.sounds_;
     const label = speaks ? text.media.pause_voice : text.media.hear;
-    this.button_.hidden = this.sounds_.voice === 'none';
+    this.button_.hidden = this.narration_ === undefined;
     this.button_.setAttribute('aria-label', label);
     this.button_.title = label;
     this.button_.setAttribute('aria-pressed', String(speaks));

@@ -95,8 +95,8 @@ export class TourPlayer {
     this.pause();
     if (!this.state.tour?.stops[stop_index]) return;
     this.stop_index_ = stop_index;
-    this.env_.reached(this.tour_index_, stop_index);
     this.tell();
+    this.env_.reached(this.tour_index_, stop_index);
   }
 
   next(): void {

@@ -149,7 +149,9 @@ export class AuthorPanel {
       draft.edit_tour({ starts_itself: this.autoplay_.checked });
       this.told();
     });
-    by_id('author-film', HTMLDetailsElement).addEventListener('toggle', () => void this.open_film());
+    by_id('author-film', HTMLDetailsElement).addEventListener('toggle', () => {
+      this.open_film().catch((error: unknown) => console.warn('films cannot be ordered', error));
+    });
     on_click('author-save', () => void this.save(this.made_from_));
     on_click('author-replace', () => void this.save(this.theirs_));
     on_click('author-download', () => this.download());

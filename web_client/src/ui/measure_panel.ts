@@ -51,7 +51,8 @@ export class MeasurePanel {
     on_click('measure-set', () => this.set_scale());
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel !== 'measure') return;
-      navigation.tapped = shown ? (x, y) => void this.mark(x, y) : undefined;
+      if (shown) navigation.tapped = this.tapped;
+      else if (navigation.tapped === this.tapped) navigation.tapped = undefined;
       if (!shown) this.set([]);
     });
     navigation.entered.listen(({ scene }) => {
@@ -61,6 +62,8 @@ export class MeasurePanel {
     seen.moved.listen((eye) => this.draw(eye));
     this.show();
   }
+
+  private readonly tapped = (x: number, y: number): void => void this.mark(x, y);
 
   private get scale(): Scale {
     return { metres_per_unit: this.metres_per_unit_, system: this.system_.value as System };

@@ -35,6 +35,8 @@ export class Navigation {
   readonly mode_chosen = new Signal();
   /** The camera went back to where visits begin. */
   readonly went_back = new Signal();
+  /** A flight or a jump begins that is no gesture: somebody or something else leads the camera from now on. */
+  readonly led_away = new Signal();
   /** The visitor has said which way is up. */
   readonly up_changed = new Signal();
   /** The visitor has chosen another speed by wheel or key. */
@@ -93,6 +95,7 @@ export class Navigation {
   }
 
   fly(way: Flight, ended: (arrived: boolean) => void): void {
+    this.led_away.emit();
     this.camera.fly(way, ended);
     this.loop.wake();
   }
@@ -103,6 +106,7 @@ export class Navigation {
 
   /** Puts the camera there, or as near as the scene's limits allow. Returns whether it is there. */
   put(eye: Eye): boolean {
+    this.led_away.emit();
     const position = this.camera.within(eye.position);
     this.camera.jump({ ...eye, position });
     this.camera.fov_y_rad = eye.fov_y_rad;
@@ -132,6 +136,7 @@ export class Navigation {
     );
     const floor = surface_of(found, this.eye.position);
     if (!floor) return false;
+    this.led_away.emit();
     this.camera.stand_on(floor.point, floor.normal, this.reduced_motion_);
     this.up_changed.emit();
     this.loop.wake();
@@ -161,10 +166,10 @@ export class Navigation {
     this.changed.emit();
   }
 
-  /** What visitors walk on from now on. `comes_down`: those who walk already come down to it. */
+  /** What visitors walk on from now on. `comes_down`: those who walk already come down to it, if nothing leads them. */
   set_ground(ground: Ground, comes_down: boolean): void {
     this.camera.ground = ground;
-    if (!comes_down || this.camera.mode !== 'walk') return;
+    if (!comes_down || this.camera.mode !== 'walk' || this.camera.is_flying) return;
     this.camera.begin_mode(this.reduced_motion_);
     this.loop.wake();
   }

@@ -79,6 +79,8 @@ export class Pointing {
         }
         const timer = setTimeout(() => {
           this.press_ = undefined;
+          // For the camera the press is over: it is no tap, too.
+          view.dispatchEvent(new PointerEvent('pointercancel', { pointerId: event.pointerId }));
           void this.point_at(...this.share_of(x, y));
         }, long_press_ms);
         this.press_ = { x, y, timer };

@@ -63,7 +63,8 @@ export class Together {
       pointing_.watch(this.leader_eye_);
     });
     navigation_.entered.listen(() => {
-      if (this.leader_eye_) navigation_.put(this.leader_eye_);
+      // Who watched goes on from the leader's view.
+      if (this.role_ === 'watching' && this.leader_eye_) navigation_.put(this.leader_eye_);
     });
     navigation_.taken_over.listen(() => {
       if (this.role_ === 'following') this.leave();

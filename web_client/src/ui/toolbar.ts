@@ -96,7 +96,7 @@ export class Toolbar {
   }
 
   private close_all(): void {
-    for (const panel of panels) this.show(panel, false);
+    for (const panel of panels) if (this.is_open(panel)) this.show(panel, false);
   }
 
   private show(panel: Panel, shown: boolean): void {
