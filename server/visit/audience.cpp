@@ -45,8 +45,11 @@ void Audience::send(const ServerMessage& message, TimePoint now) {
   if (visitor_) visitor_->connection().send(wire::serialize(message));
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     // Its company may not be allowed to see another scene.
-    if (std::exchange(scene_id_, welcome->scene.scene_id) != welcome->scene.scene_id)
+    if (!is_in(welcome->scene.scene_id)) {
       end_presentation();
+      presentation_.forget_camera();
+      scene_id_ = welcome->scene.scene_id;
+    }
     tell_spectators(for_spectators(*welcome), now);
   } else if (std::holds_alternative<StreamConfig>(message) ||
              std::holds_alternative<Drain>(message))
@@ -68,6 +71,8 @@ std::vector<std::uint64_t> Audience::send(OutgoingFrame frame, TimePoint now) {
 void Audience::add(std::shared_ptr<ClientConnection> spectator, Welcome welcome,
                    std::string link_id) {
   spectator->connection().send(wire::serialize(for_spectators(std::move(welcome))));
+  if (const Company& company = presentation_.places_told(); !company.places.empty())
+    spectator->connection().send(wire::serialize(company));
   spectators_.push_back({std::move(spectator), true, std::move(link_id)});
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/access/authorize.h"
@@ -26,10 +27,11 @@ class Audience {
   void attach(std::shared_ptr<ClientConnection> connection);
   /// The visitor's connection was lost or moves to another place.
   void detach() { visitor_.reset(); }
-  [[nodiscard]] bool is_visitor(const ClientConnection& connection) const {
-    return visitor_.get() == &connection;
-  }
   [[nodiscard]] bool connected() const { return visitor_ != nullptr; }
+  /// Null: the visitor's connection was lost.
+  [[nodiscard]] const ClientConnection* visitor() const { return visitor_.get(); }
+  /// True if the visitor was last welcomed to this scene.
+  [[nodiscard]] bool is_in(std::string_view scene_id) const { return scene_id_ == scene_id; }
   /// The address of the visitor's last connection.
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] std::size_t queued_frames() const;
@@ -42,10 +44,6 @@ class Audience {
   std::vector<std::uint64_t> send(OutgoingFrame frame, TimePoint now);
 
   [[nodiscard]] Presentation& presentation() { return presentation_; }
-  /// True if the visitor follows the leader of that presentation.
-  [[nodiscard]] bool follows(const Presentation& leader) const {
-    return visitor_ && leader.has(*visitor_);
-  }
   /// Somebody in the company points at a place. All in it hear of it, unless that is refused.
   void ping(const Pinged& pinged, TimePoint now);
   /// Where the company is now; empty: it is not told.

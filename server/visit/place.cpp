@@ -74,7 +74,7 @@ Place::~Place() { executor_->close(std::move(stream_)); }
 
 void Place::on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
                        TimePoint received) {
-  if (!audience_.is_visitor(from)) return audience_.on_message(from, message);
+  if (audience_.visitor() != &from) return audience_.on_message(from, message);
   visit_.on_link(link, received);
   const auto* hello = std::get_if<Hello>(&message);
   if (hello && visit_.life().state() == VisitState::awaiting_hello) visitor_.device = hello->device;
@@ -105,13 +105,13 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
 
 void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::size_t packet_bytes,
                           TimePoint now) {
-  if (!audience_.is_visitor(by)) return;
+  if (audience_.visitor() != &by) return;
   usage_.frame_sent(ticket, now);
   visit_.on_frame_sent(packet_bytes);
 }
 
 void Place::on_close(ClientConnection& closed, bool by_leaving) {
-  if (!audience_.is_visitor(closed)) return audience_.remove(closed);
+  if (audience_.visitor() != &closed) return audience_.remove(closed);
   audience_.detach();
   if (by_leaving || !visitor_.admitted_at)
     visit_.end("the client has left");
@@ -122,7 +122,7 @@ void Place::on_close(ClientConnection& closed, bool by_leaving) {
 }
 
 void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why) {
-  if (audience_.is_visitor(from)) {
+  if (audience_.visitor() == &from) {
     visit_.fail(code, why);
     return around_.frames.changed(*this);
   }
@@ -168,6 +168,9 @@ bool Place::may_be_watched() const {
 void Place::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message))
     note_error(facts(), *error, around_.metrics);
+  const auto* const welcome = std::get_if<Welcome>(&message);
+  // Who leads shows another scene than the one that the visitor enters.
+  if (welcome && !audience_.is_in(welcome->scene.scene_id)) admissions_.stop_following(*this);
   audience_.send(message, Clock::now());
 }
 

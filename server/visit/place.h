@@ -30,6 +30,8 @@ class Admissions {
   virtual SceneAnswer find_scene(const std::string& scene_id, TimePoint now) = 0;
   /// `from`, the place's visitor, follows another session from now on, or none.
   virtual void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) = 0;
+  /// The place's visitor follows nobody any more, and is told so.
+  virtual void stop_following(Place& place) = 0;
   /// The place that leads this follower; null: none does.
   virtual Place* leader_of(const ClientConnection& follower) = 0;
   [[nodiscard]] virtual std::uint32_t admitted() const = 0;

@@ -236,6 +236,14 @@ void Places::follow(Place& place, ClientConnection& from, const Follow& wish, Ti
   host.audience().presentation().add(from.shared_from_this());
 }
 
+void Places::stop_following(Place& place) {
+  const ClientConnection* const visitor = place.audience().visitor();
+  Place* const leader = visitor ? leader_of(*visitor) : nullptr;
+  if (!leader) return;
+  leader->audience().presentation().remove(*visitor);
+  place.send(Lead{LeadState::ended, {}, 0, {}});
+}
+
 Place* Places::leader_of(const ClientConnection& follower) {
   const auto leader = std::ranges::find_if(
       places_, [&](const auto& place) { return place->audience().presentation().has(follower); });
@@ -254,7 +262,8 @@ void Places::tell_places(Place& host, TimePoint now) {
   if (presentation.tells_places()) {
     add(host);
     for (const auto& place : places_)
-      if (place->audience().follows(presentation)) add(*place);
+      if (const auto* visitor = place->audience().visitor(); visitor && presentation.has(*visitor))
+        add(*place);
   }
   host.audience().tell_places(company, now);
 }

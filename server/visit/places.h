@@ -50,6 +50,7 @@ class Places final : public Admissions {
     return static_cast<std::uint32_t>(desk_.admitted());
   }
   void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) override;
+  void stop_following(Place& place) override;
   Place* leader_of(const ClientConnection& follower) override;
   void leave(Place& place) override;
 

@@ -45,6 +45,7 @@ void Presentation::add(const std::shared_ptr<ClientConnection>& follower) {
   Lead now = told_.value_or(Lead{LeadState::leads, wish_.name, followers_.size(), {}, wish_.pings});
   now.camera = camera_;
   follower->connection().send(wire::serialize(now));
+  if (!places_told_.places.empty()) follower->connection().send(wire::serialize(places_told_));
 }
 
 void Presentation::remove(const ClientConnection& follower) {

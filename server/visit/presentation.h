@@ -31,6 +31,8 @@ class Presentation {
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
   /// nothing: all know it.
   std::optional<Lead> news(std::size_t spectators, bool away, TimePoint now);
+  /// The visit is in another scene now, where its camera has not been yet.
+  void forget_camera() { camera_.reset(); }
   /// The newest camera of the visit, whether it leads or not.
   [[nodiscard]] const std::optional<PoseSample>& camera() const { return camera_; }
 
@@ -42,6 +44,8 @@ class Presentation {
   /// Where the company is now. Tells the followers, and returns true for all others, if that is
   /// new and they heard of it half a second ago or more.
   bool tell(const Company& company, TimePoint now);
+  /// Where the company was when it heard of it last.
+  [[nodiscard]] const Company& places_told() const { return places_told_; }
 
  private:
   void tell_followers(const ServerMessage& message) const;

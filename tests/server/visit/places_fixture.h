@@ -131,18 +131,20 @@ class PretendedRenderer final : public Renderer {
   const std::shared_ptr<DeviceSet> devices_;
 };
 
-/// One scene, always in memory, by any name.
+/// One scene, always in memory, by any name but "attic", which is another one.
 class OneScene final : public SceneSource {
  public:
   explicit OneScene(std::shared_ptr<Renderer> renderer) {
     scene_->renderer = std::move(renderer);
     scene_->facts.near_z = 0.2f;
+    *attic_ = *scene_;
+    attic_->facts.scene_id = "attic";
   }
   [[nodiscard]] std::string default_scene() const override { return "scene"; }
   [[nodiscard]] std::vector<std::string> scene_ids() const override { return ids; }
   [[nodiscard]] bool has(const std::string&) const override { return true; }
-  SceneAnswer want(const std::string&, TimePoint) override {
-    return std::shared_ptr<const SceneEntry>(scene_);
+  SceneAnswer want(const std::string& id, TimePoint) override {
+    return std::shared_ptr<const SceneEntry>(id == "attic" ? attic_ : scene_);
   }
   void prepare(const std::string& id, TimePoint) override { prepared.push_back(id); }
   void on_tick(TimePoint) override {}
@@ -152,6 +154,7 @@ class OneScene final : public SceneSource {
 
  private:
   std::shared_ptr<SceneEntry> scene_ = std::make_shared<SceneEntry>();
+  std::shared_ptr<SceneEntry> attic_ = std::make_shared<SceneEntry>();
 };
 
 /// What encoders of the test share.

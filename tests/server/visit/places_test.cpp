@@ -146,10 +146,13 @@ class CompanyTest : public PlacesTest {
     leader = &join();
     present(pings, tells_places);
     follower = &join();
+    follow(*follower);
+  }
+  void follow(Visitor& visitor) {
     v1::ClientMessage message;
     message.mutable_follow()->set_watch(leader->connection->welcome->watch_token());
-    say(*follower, message);
-    run_until([&] { return follower->connection->lead.has_value(); });
+    say(visitor, message);
+    run_until([&] { return visitor.connection->lead.has_value(); });
   }
   void present(bool pings, bool tells_places) {
     v1::ClientMessage message;
@@ -219,6 +222,47 @@ TEST_F(CompanyTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
   present(false, false);
   run_until([&] { return told.back().places_size() == 0; });
   EXPECT_EQ(leader->connection->companies.size(), told.size());
+}
+
+TEST_F(CompanyTest, WhoComesHearsAtOnceWhereTheOthersAre) {
+  begin(false, true);
+  move(*leader);
+  run_until([&] { return !follower->connection->companies.empty(); });
+  Visitor& later = join();
+  follow(later);
+  Visitor& spectator = join({}, "192.0.2.1", [&](v1::Hello& hello) {
+    hello.set_watch(leader->connection->welcome->watch_token());
+  });
+  for (const Visitor* newcomer : {&later, &spectator}) {
+    ASSERT_EQ(newcomer->connection->companies.size(), 1u) << "though nobody has moved";
+    EXPECT_EQ(newcomer->connection->companies[0].places(0).x(), 1.0f);
+  }
+}
+
+TEST_F(CompanyTest, WhoEntersAnotherSceneLeavesIt) {
+  begin(true, true);
+  move(*leader);
+  move(*follower);
+  const auto& told = leader->connection->companies;
+  run_until([&] { return !told.empty() && told.back().places_size() == 2; });
+  EXPECT_EQ(leader->connection->lead->company(), 1u);
+
+  v1::ClientMessage message;
+  message.mutable_select_scene()->set_scene_id("attic");
+  say(*follower, message);
+  run_until([&] { return follower->connection->welcome->scene().scene_id() == "attic"; });
+  EXPECT_EQ(follower->connection->lead->state(), v1::Lead::ENDED);
+  run_until([&] { return told.back().places_size() == 1; });
+  EXPECT_EQ(leader->connection->lead->company(), 0u);
+  EXPECT_EQ(heard_of(*follower, 1), 0u);
+
+  // Whoever comes back is where its camera has been since.
+  message.mutable_select_scene()->set_scene_id("scene");
+  say(*follower, message);
+  run_until([&] { return follower->connection->welcome->scene().scene_id() != "attic"; });
+  follow(*follower);
+  run_for(700ms);
+  EXPECT_EQ(told.back().places_size(), 1);
 }
 
 TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
