@@ -21,6 +21,18 @@ void check_cache_dir(const ServerConfig& config) {
                        "name another folder, for trees alone");
 }
 
+/// The answers' headers share a buffer of 4096 bytes.
+void check_policy(const ServerConfig& config) {
+  constexpr std::size_t most_bytes = 2048;
+  const std::size_t bytes =
+      content_security_policy(config.embed_origins, config.media_origins).size();
+  if (bytes > most_bytes)
+    throw InputError("--media-origin, --embed-origin", {},
+                     fmt::format("make a policy of {} bytes, which each answer says: {} at most",
+                                 bytes, most_bytes),
+                     "name fewer sites");
+}
+
 }  // namespace
 
 void validate(const ServerConfig& config, const ConfigSources& sources) {
@@ -31,6 +43,7 @@ void validate(const ServerConfig& config, const ConfigSources& sources) {
          .pool = {},
          .devices = std::make_shared<DeviceSet>(config.devices)});
   check_cache_dir(config);
+  check_policy(config);
   if (config.lod >= 0 && config.gaussian_budget > 0)
     throw InputError("--lod, --budget", {}, "both are given", "give one of them");
   // The default of one is no contradiction to the other.

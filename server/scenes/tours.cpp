@@ -187,10 +187,13 @@ void check_portal(const JsonField& portal) {
   const JsonField scene = portal.at("scene");
   if (const std::size_t bytes = scene.text().size(); bytes == 0 || bytes > max_scene_id_bytes)
     scene.fail(fmt::format("is not 1 to {} bytes", max_scene_id_bytes));
-  const bool to_stop = portal.find("tour") || portal.find("stop");
-  if (to_stop && portal.find("position"))
+  constexpr std::array<std::string_view, 4> of_view = {"position", "look_at", "orientation",
+                                                       "fov_deg"};
+  const bool to_view =
+      std::ranges::any_of(of_view, [&](auto name) { return portal.find(name).has_value(); });
+  if (to_view && (portal.find("tour") || portal.find("stop")))
     portal.fail("leads to a view and to a stop", "give position or stop");
-  if (portal.find("position")) check_view(portal);
+  if (to_view) check_view(portal);
   check_ordinal(portal.find("tour"), max_tours);
   check_ordinal(portal.find("stop"), max_stops);
 }

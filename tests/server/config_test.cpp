@@ -148,6 +148,17 @@ TEST_F(ConfigTest, SitesOfMediaSpeakHttps) {
     EXPECT_THROW(read_flag("media-origin", {other}), InputError) << other;
 }
 
+TEST_F(ConfigTest, SitesThatEachAnswerNamesAreFew) {
+  config.scenes = {"synth:city:1000"};
+  for (int i = 0; i < 10; ++i)
+    config.media_origins.push_back("https://media" + std::to_string(i) + ".example");
+  EXPECT_NO_THROW(validate(config));
+  config.embed_origins.assign(60, "https://museum.of.a.long.name.example");
+  EXPECT_THAT(
+      [&] { validate(config); },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("--embed-origin"), HasSubstr("name fewer sites"))));
+}
+
 TEST_F(ConfigTest, RefusesAnOpenDoor) {
   config.scenes = {"synth:city:1000"};
   EXPECT_NO_THROW(validate(config));

@@ -143,6 +143,15 @@ TEST(SentSidecar, OfAPortalIsRefusedByTheFieldThatIsWrong) {
   EXPECT_THAT(of(R"({"scene": "hall", "position": [0, 0, 0]})"), HasSubstr("orientation"));
   EXPECT_THAT(of(R"({"scene": "hall", "stop": 1, "position": [0, 0, 0], "look_at": [0, 0, 1]})"),
               HasSubstr("leads to a view and to a stop"));
+  for (const char* part : {R"("look_at": [0, 0, 1])", R"("orientation": [0, 0, 0, 1])",
+                           R"("fov_deg": 50)", R"("look_at": "nowhere")"}) {
+    EXPECT_THAT(of(fmt::format(R"({{"scene": "hall", {}}})", part)),
+                HasSubstr("'position' is missing"))
+        << part;
+    EXPECT_THAT(of(fmt::format(R"({{"scene": "hall", "tour": 1, {}}})", part)),
+                HasSubstr("leads to a view and to a stop"))
+        << part;
+  }
 }
 
 TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
