@@ -26,7 +26,7 @@
 namespace catgs {
 namespace {
 
-constexpr std::uint64_t most_whole_gaussians = 16'000'000;  // of a scene that is read as a whole
+constexpr std::uint64_t most_whole_gaussians = 4'000'000;  // of a scene that is read as a whole
 constexpr float eye_height_m = 1.6f;
 
 bool is_tree(const std::filesystem::path& path) {

@@ -49,9 +49,10 @@ void SceneGrounds::find(const std::string& scene_id, GroundSource source,
   boost::asio::post(
       finder_, [this, scene_id, source = std::move(source), found = std::move(found)] {
         run_in_background();
-        auto ground = std::make_shared<SceneGround>();
+        std::shared_ptr<SceneGround> ground;
         try {
           std::string bytes = find_now(scene_id, source);
+          ground = std::make_shared<SceneGround>();
           if (!bytes.empty()) {
             ground->etag = etag_of(bytes);
             ground->file = std::make_shared<const std::string>(std::move(bytes));
@@ -108,7 +109,7 @@ std::string SceneGrounds::kept_or_computed(const std::string& scene_id,
       if (cancelled_) throw Cancelled();
     });
     if (bytes.size() > max_file_bytes)
-      throw InputError(source.spec, "", "has too much ground for pages");
+      throw NoGround(InputError(source.spec, "", "has too much ground for pages"));
     log_info({.event = "ground_found", .scene = scene_id},
              "scene {}: its ground was found in {:.1f} s and takes {} kB", scene_id,
              std::chrono::duration<double>(Clock::now() - begin).count(), bytes.size() / 1000);
@@ -124,9 +125,12 @@ std::string SceneGrounds::kept_or_computed(const std::string& scene_id,
 void SceneGrounds::keep(const fs::path& path, const std::string& bytes) const {
   std::vector<std::pair<fs::file_time_type, fs::path>> files;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder_, error))
-    if (entry.path().extension() == ".walk")
-      files.emplace_back(entry.last_write_time(error), entry.path());
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code gone;
+    if (entry->path().extension() == ".walk")
+      files.emplace_back(entry->last_write_time(gone), entry->path());
+  }
   std::ranges::sort(files, std::greater<>());
   for (std::size_t k = max_kept - 1; k < files.size(); ++k) fs::remove(files[k].second, error);
   try {

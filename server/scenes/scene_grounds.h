@@ -31,7 +31,7 @@ class SceneGrounds {
 
   [[nodiscard]] bool busy() const { return busy_; }
   /// Takes the author's file, or the one in the folder, or computes one. `found` is called on the
-  /// session thread. Not while busy().
+  /// session thread, with null after a failure that may pass. Must not be called while busy().
   void find(const std::string& scene_id, GroundSource source,
             std::function<void(std::shared_ptr<const SceneGround>)> found);
 

@@ -25,6 +25,7 @@ using namespace std::chrono_literals;
 
 constexpr auto scan_interval = 30s;
 constexpr auto retry_after_failure = 30s;
+constexpr auto seek_ground_again_after = 5min;
 constexpr std::size_t most_prepared = 2;
 
 std::vector<std::filesystem::path> paths(const std::vector<std::string>& names) {
@@ -284,6 +285,7 @@ void SceneLibrary::want_ground(const std::string& id) {
   boost::asio::post(io_, [this, id] {
     SceneBook* const book = shelf_.find(id);
     if (!book || !book->entry || book->ground || book->outdated || grounds_.busy()) return;
+    if (book->ground_retry_at && clock_() < *book->ground_retry_at) return;
     const GroundSource source = ground_source_of(*book);
     grounds_.find(id, source,
                   [this, id, source, changed = book->found.changed](const auto& ground) {
@@ -293,6 +295,7 @@ void SceneLibrary::want_ground(const std::string& id) {
                         !same_ground(source, ground_source_of(*found_for)))
                       return;
                     found_for->ground = ground;
+                    if (!ground) found_for->ground_retry_at = clock_() + seek_ground_again_after;
                     publish();
                   });
   });

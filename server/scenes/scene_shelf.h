@@ -40,6 +40,7 @@ struct SceneBook {
   std::shared_ptr<const std::string> poster{};  // stays when the entry goes
   bool poster_tried = false;                    // for this content of the file
   std::shared_ptr<const SceneGround> ground{};  // of the entry; null: not known yet
+  std::optional<TimePoint> ground_retry_at{};   // after a failure to find it
   bool pinned = false;
   bool outdated = false;                // the file has changed since
   bool tree_lost = false;               // the entry reads a tree with damage: another is built

@@ -206,6 +206,22 @@ TEST_F(SceneGroundsTest, ATreeIsReadPartByPart) {
   EXPECT_TRUE(walk::stand_below(map_in(*ground->file), {6, 3, 2}));
 }
 
+TEST_F(SceneGroundsTest, AFailureThatPassesIsNoAnswer) {
+  start();
+  const Entry seen = load();
+  fs::rename(folder_ / "scenes/a.ply", folder_ / "scenes/a.away");
+  const auto ask = [&] { library_->want_ground(id()); };
+  for (int i = 0; i < 300; ++i) {
+    ask();
+    io_->restart();
+    io_->run_for(1ms);
+  }
+  EXPECT_EQ(listed(), nullptr);
+  fs::rename(folder_ / "scenes/a.away", folder_ / "scenes/a.ply");
+  now_ += 5min;
+  EXPECT_NE(found()->file, nullptr);
+}
+
 TEST_F(SceneGroundsTest, TheLibraryEndsWhileAGroundIsSought) {
   start();
   load();
