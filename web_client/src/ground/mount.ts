@@ -71,17 +71,21 @@ export class GroundUse {
     });
     seen.moved.listen((eye) => {
       this.eye_ = eye;
+      this.walking_?.move(eye);
       this.plan_?.move(eye);
     });
+    navigation.changed.listen(() => this.walking_?.draw());
     tour_shown.listen((state) => {
       this.tour_ = state;
       this.show_stops();
     });
     worker.on('presented', () => this.presented());
     this.ground_.known.listen((map) => {
-      this.map_ = map;
       this.button_.hidden = !map;
+      if (map === 'large') return;
+      this.map_ = map;
       if (navigation.camera.mode === 'walk') this.walk();
+      if (!this.panel_.hidden) this.open_plan().catch(warn);
     });
   }
 
@@ -98,7 +102,10 @@ export class GroundUse {
     this.map_ = undefined;
     this.walking_?.end();
     this.walking_ = this.plan_ = undefined;
-    this.panel_.hidden = this.button_.hidden = true;
+    this.people_ = [];
+    this.parts_.toolbar.close('plan');
+    this.panel_.replaceChildren();
+    this.button_.hidden = true;
     this.chose_walk_ = this.idle_ = false;
     if (this.parts_.navigation.camera.mode === 'walk') void this.ground_.want();
   }
@@ -130,7 +137,7 @@ export class GroundUse {
 
   private async open_plan(): Promise<void> {
     const { map_: map, parts_: parts } = this;
-    if (!map) return;
+    if (!map) return void this.ground_.want();
     const [{ PlanPanel }, { Dollhouse }, { is_house }, walking] = await Promise.all([
       import('./plan_panel'),
       import('./dollhouse'),

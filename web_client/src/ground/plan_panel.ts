@@ -1,12 +1,13 @@
 // The floor plan: a small map that follows the visitor, or the whole storey.
-import { dot, forward, rotate, type Vec3 } from '../base/vector';
+import { dot, forward, length, rotate, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { number } from '../text/number';
 import { text } from '../text/text';
 import type { Stop } from '../tour/tour';
-import { by_id, make } from '../ui/dom';
+import { by_id, icon, make } from '../ui/dom';
 import { clear_near } from '../walk/map_walker';
 import { cells_per_eye_height, count_at, first_at, height_of, storey_at, to_grid, type Stand, type WalkMap } from '../walk/walk_map';
+import { stand_below } from '../walk/walker';
 import type { Dollhouse } from './dollhouse';
 import { plan_picture, type PlanPicture } from './plan_picture';
 import { cells_of, px_of, type PlanView } from './plan_view';
@@ -20,16 +21,6 @@ const cone_px = 34;
 const unknown = '#c7cfd9';
 const accent = '#1f6feb';
 const people_colour = '#b3477d';
-
-const svg = 'http://www.w3.org/2000/svg';
-
-function icon(name: string): SVGElement {
-  const use = document.createElementNS(svg, 'use');
-  use.setAttribute('href', `#icon-${name}`);
-  const picture = document.createElementNS(svg, 'svg');
-  picture.append(use);
-  return picture;
-}
 
 interface PlanParts {
   readonly storage: Storage | undefined;
@@ -58,7 +49,7 @@ export class PlanPanel {
   private readonly size_ = make('button', { type: 'button' }, icon('full'));
   private readonly pictures_ = new Map<number, DrawnPlan | 'comes'>();
   private storey_ = 0;
-  private visitors_storey_ = -1;
+  private visitors_storey_: number | undefined;
   private stops_: readonly { stop: Stop; stand: Stand; button: HTMLButtonElement }[] = [];
   private people_: readonly Vec3[] = [];
   private eye_: Eye;
@@ -102,24 +93,28 @@ export class PlanPanel {
     this.eye_ = eye;
     if (this.host_.hidden) return;
     if (this.parts_.dollhouse?.shown) return this.draw_soon(); // the storey is the one that is shown
-    const storey = storey_at(this.map_, this.parts_.stand_at(eye.position).height);
-    if (storey !== this.visitors_storey_) {
-      this.visitors_storey_ = storey;
-      this.choose_storey(storey);
-    }
+    this.visit_storey(eye.position);
     this.draw_soon();
   }
 
   show_stops(stops: readonly Stop[], current: number | undefined): void {
+    const is_new = stops.length !== this.stops_.length || stops.some((stop, i) => stop !== this.stops_[i]?.stop);
+    if (is_new) this.make_stops(stops);
+    for (const [i, { button }] of this.stops_.entries()) {
+      if (i === current) button.setAttribute('aria-current', 'step');
+      else button.removeAttribute('aria-current');
+    }
+    this.draw_soon();
+  }
+
+  private make_stops(stops: readonly Stop[]): void {
     this.stops_ = stops.map((stop, i) => {
       const title = stop.title || text.tour.stop_numbered(number(i + 1));
       const button = make('button', { type: 'button', className: 'plan-stop', hidden: true, title, 'aria-label': title }, number(i + 1));
-      if (i === current) button.setAttribute('aria-current', 'step');
       button.addEventListener('click', () => this.parts_.go_to_stop(i));
       return { stop, stand: this.parts_.stand_at(stop.eye.position), button };
     });
     this.spots_.replaceChildren(...this.stops_.map(({ button }) => button));
-    this.draw_soon();
   }
 
   /** Where the eyes of other visitors are, in the world. */
@@ -148,6 +143,15 @@ export class PlanPanel {
     this.size_.title = large ? text.ground.smaller : text.ground.larger;
     this.size_.setAttribute('aria-label', this.size_.title);
     this.draw_soon();
+  }
+
+  /** The plan shows the storey that the visitor comes to. Where no ground is below, it stays. */
+  private visit_storey(position: Vec3): void {
+    const stand = stand_below(this.map_, position) ?? (this.visitors_storey_ === undefined ? this.parts_.stand_at(position) : undefined);
+    const storey = stand && storey_at(this.map_, stand.height);
+    if (storey === undefined || storey === this.visitors_storey_) return;
+    this.visitors_storey_ = storey;
+    this.choose_storey(storey);
   }
 
   private choose_storey(storey: number): void {
@@ -242,9 +246,16 @@ export class PlanPanel {
     context.scale(scale, scale);
     context.drawImage(plan, 0, 0);
     context.restore();
-    for (const place of this.people_) this.draw_dot(context, view, place, people_colour);
+    for (const place of this.people_) if (this.is_beside(place)) this.draw_dot(context, view, place, people_colour);
     if (this.storey_ === this.visitors_storey_) this.draw_visitor(context, view);
     this.place_stops(view);
+  }
+
+  /** Whether somebody's eyes there are in this storey, and not where the visitor is. */
+  private is_beside(place: Vec3): boolean {
+    const [, , height] = to_grid(this.map_, place);
+    const apart_cells = length(sub(place, this.eye_.position)) / this.map_.cell;
+    return storey_at(this.map_, height) === this.storey_ && apart_cells >= cells_per_eye_height;
   }
 
   private draw_visitor(context: CanvasRenderingContext2D, view: PlanView): void {

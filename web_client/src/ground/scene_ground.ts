@@ -9,10 +9,12 @@ const patience_ms = 10 * 60_000; // the server computes one scene at a time
 const usual_wait_s = 5;
 
 export class SceneGround {
-  /** The ground of the scene is known; undefined: nobody can walk in it. */
-  readonly known = new Signal<WalkMap | undefined>();
+  /** The ground of the scene is known; undefined: nobody can walk in it; 'large': it comes when it is wanted. */
+  readonly known = new Signal<WalkMap | 'large' | undefined>();
   private scene_id_ = '';
   private state_: 'unknown' | 'asked' | 'large' | 'known' = 'unknown';
+
+  private idle_ = false; // nobody waits for it
 
   constructor(private readonly token_: AccessToken) {}
 
@@ -24,16 +26,19 @@ export class SceneGround {
 
   /** `idle`: nobody waits for it. */
   async want(idle = false): Promise<void> {
-    if (this.state_ === 'asked' || this.state_ === 'known' || (idle && this.state_ !== 'unknown')) return;
+    if (!idle) this.idle_ = false;
+    if (!this.scene_id_ || this.state_ === 'asked' || this.state_ === 'known' || (idle && this.state_ !== 'unknown')) return;
+    this.idle_ = idle;
     const scene_id = this.scene_id_;
     this.state_ = 'asked';
-    const file = await this.fetch_file(scene_id, idle).catch((error: unknown) => {
+    const file = await this.fetch_file(scene_id).catch((error: unknown) => {
       console.warn('the ground does not come', error);
       return 'unknown' as const; // the next one who needs it asks again
     });
     if (scene_id !== this.scene_id_) return;
     if (file === 'large' || file === 'unknown') {
       this.state_ = file;
+      if (file === 'large') this.known.emit(file);
       return;
     }
     const map = file && (await this.read(file));
@@ -52,13 +57,13 @@ export class SceneGround {
     }
   }
 
-  private async fetch_file(scene_id: string, idle: boolean): Promise<ArrayBuffer | 'large' | undefined> {
+  private async fetch_file(scene_id: string): Promise<ArrayBuffer | 'large' | undefined> {
     const path = scene_path(scene_id, 'walk');
     for (const end_ms = Date.now() + patience_ms; Date.now() < end_ms && scene_id === this.scene_id_; ) {
       const stop = new AbortController();
       const answer = await ask_server(location.href, this.token_.value, path, { signal: stop.signal });
       if (answer.status === 200) {
-        if (!idle || Number(answer.headers.get('content-length') ?? 0) <= most_idle_bytes) return answer.arrayBuffer();
+        if (!this.idle_ || Number(answer.headers.get('content-length') ?? 0) <= most_idle_bytes) return answer.arrayBuffer();
         stop.abort();
         return 'large';
       }

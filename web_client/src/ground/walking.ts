@@ -5,7 +5,6 @@ import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
 import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
 import type { Navigation } from '../ui/navigation';
-import type { SeenCamera } from '../ui/seen_camera';
 import { floor_along } from '../walk/floor';
 import { MapWalker } from '../walk/map_walker';
 import { find_path } from '../walk/path';
@@ -23,7 +22,6 @@ const flight_s = 2.5;
 interface WalkingParts {
   readonly view: HTMLElement;
   readonly navigation: Navigation;
-  readonly seen: SeenCamera;
   readonly clock: Clock;
   readonly timers: Timers;
   /** Tells the server the path, for its forecasts. */
@@ -45,19 +43,14 @@ export class Walking {
     private readonly parts_: WalkingParts,
     readonly map: WalkMap,
   ) {
-    const { view, navigation, seen } = parts_;
+    const { view, navigation } = parts_;
     this.walker = new MapWalker(map);
     this.eye_ = navigation.eye;
     this.picture_.id = 'floor-ring';
     this.picture_.setAttribute('aria-hidden', 'true');
     this.picture_.append(this.ring_);
     view.append(this.picture_);
-    navigation.walk_to = (x, y) => this.walk_to(x, y);
-    const while_here = (action: () => void): void => {
-      if (!this.stop_.signal.aborted) action();
-    };
-    seen.moved.listen((eye) => while_here(() => this.move(eye)));
-    navigation.changed.listen(() => while_here(() => this.draw()));
+    navigation.walk_to = (x, y, again) => this.walk_to(x, y, again);
     const { signal } = this.stop_;
     view.addEventListener('pointermove', (event) => this.pointed(event), { signal });
     view.addEventListener('pointerleave', () => this.show(undefined), { signal });
@@ -99,9 +92,10 @@ export class Walking {
     this.travel(glide(navigation.eye, eye, reduced_motion ? 0 : flight_s));
   }
 
-  private walk_to(x: number, y: number): boolean {
+  private walk_to(x: number, y: number, again: boolean): boolean {
     const to = floor_along(this.map, this.parts_.navigation.ray_at(x, y));
     if (!to) return false;
+    if (again) return true; // the first of two clicks leads there
     this.parts_.navigation.taken_over.emit();
     if (!this.go_to(to)) return true; // there is no way, and no flight through walls either
     this.walks_ = !this.parts_.reduced_motion;
@@ -129,7 +123,8 @@ export class Walking {
     tell();
   }
 
-  private move(eye: Eye): void {
+  /** The camera of the picture is here now. */
+  move(eye: Eye): void {
     this.eye_ = eye;
     this.draw();
   }
@@ -148,7 +143,8 @@ export class Walking {
     this.draw();
   }
 
-  private draw(): void {
+  /** Also when the mode has changed. */
+  draw(): void {
     const corners = this.shown_ ? this.corners(this.shown_) : [];
     const inside = corners.every((corner) => corner !== undefined);
     this.picture_.classList.toggle('shown', corners.length > 0 && inside && this.parts_.navigation.camera.mode === 'walk');

@@ -16,6 +16,7 @@ export class MediaPart {
   private readonly narrator_: Narrator;
   private readonly media_: StopMedia;
   private addresses_: MediaAddresses;
+  private addresses_for_ = ''; // scene and token
   private tour_: Tour | undefined;
   private stop_: Stop | undefined;
   private playing_ = false;
@@ -40,7 +41,10 @@ export class MediaPart {
   }
 
   show_tours(scene_id: string, tours: readonly Tour[]): void {
-    this.addresses_ = new MediaAddresses(location.href, this.token_(), scene_id);
+    const token = this.token_();
+    // Sounds begin again at another address, so an author's edit does not change it.
+    if (this.addresses_for_ !== `${scene_id} ${token}`) this.addresses_ = new MediaAddresses(location.href, token, scene_id);
+    this.addresses_for_ = `${scene_id} ${token}`;
     const sounds = ({ sound, stops }: Tour): boolean =>
       sound !== undefined ||
       stops.some(({ media, narration }) => narration ?? media?.some(({ kind }) => kind !== 'image'));

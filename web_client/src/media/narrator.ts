@@ -1,7 +1,7 @@
 // The voice of a stop in the card of the tour: its button, and its words as text.
 import { text } from '../text/text';
 import type { Narration } from '../tour/media';
-import { by_id, make } from '../ui/dom';
+import { by_id, icon, make } from '../ui/dom';
 import type { MediaAddresses } from './addresses';
 import type { Sounds } from './sounds';
 import { captions_track } from './stop_media';
@@ -19,7 +19,7 @@ export class Narrator {
   ) {
     by_id('tour-place', HTMLElement).before(this.button_);
     by_id('tour-controls', HTMLElement).before(this.words_);
-    this.button_.append(icon('icon-voice'));
+    this.button_.append(icon('voice'));
     this.button_.addEventListener('click', () => {
       if (sounds_.speaks) sounds_.hush(true);
       else if (sounds_.voice === 'paused') sounds_.resume();
@@ -73,13 +73,4 @@ export class Narrator {
     this.button_.title = label;
     this.button_.setAttribute('aria-pressed', String(speaks));
   }
-}
-
-/** An icon of index.html. */
-export function icon(id: string): SVGElement {
-  const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
-  const use = document.createElementNS('http://www.w3.org/2000/svg', 'use');
-  use.setAttribute('href', `#${id}`);
-  svg.append(use);
-  return svg;
 }

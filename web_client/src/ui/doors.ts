@@ -23,10 +23,12 @@ const longest_cover_ms = 5000; // after the arrival
 const fade_ms = 400; // and a little
 
 export class Doors {
-  private scenes_: readonly SceneListing[] | undefined;
+  private scenes_: readonly SceneListing[] = []; // that `scenes_for_` may see
+  private scenes_for_ = '';
   /** `by`: the portal; undefined: the browser's history. */
-  private going_: { readonly by: Portal | undefined } | undefined;
+  private going_: { readonly by: Portal | undefined; readonly scene_id: string } | undefined;
   private awaited_: number | undefined; // the pose whose picture uncovers it, or a later one
+  private cover_ends_: ReturnType<typeof setTimeout> | undefined;
   private cover_: HTMLCanvasElement | undefined;
   private readonly prepared_ms_ = new Map<string, number>();
 
@@ -51,9 +53,9 @@ export class Doors {
     });
   }
 
-  /** The address is that of another scene. */
+  /** The address is that of another scene than the one where the visitor is or goes. */
   get leads_elsewhere(): boolean {
-    const { scene_id } = this.parts_.navigation;
+    const { scene_id } = this.going_ ?? this.parts_.navigation;
     return ![scene_id, scene_name(scene_id), ''].includes(this.address_scene);
   }
 
@@ -63,12 +65,17 @@ export class Doors {
   }
 
   async scenes(): Promise<readonly SceneListing[]> {
-    this.scenes_ ??= await list_scenes(location.href, this.parts_.token.value);
+    const token = this.parts_.token.value;
+    // An empty list is one that could not be had.
+    if (this.scenes_.length === 0 || this.scenes_for_ !== token) {
+      this.scenes_ = await list_scenes(location.href, token);
+      this.scenes_for_ = token;
+    }
     return this.scenes_;
   }
 
   behind(portal: Portal): Door {
-    return door_of(portal, this.scenes_ ?? []);
+    return door_of(portal, this.scenes_);
   }
 
   /** The visitor is near: asks the server to have the scene ready. */
@@ -105,7 +112,7 @@ export class Doors {
     if (!this.going_) return;
     this.going_ = undefined;
     this.awaited_ = this.parts_.navigation.loop.sample();
-    setTimeout(() => this.uncover(), longest_cover_ms);
+    this.cover_ends_ = setTimeout(() => this.uncover(), longest_cover_ms);
   }
 
   private get address_scene(): string {
@@ -113,8 +120,9 @@ export class Doors {
   }
 
   private async go(by: Portal | undefined, scene_id: string): Promise<void> {
-    this.going_ = { by };
+    this.going_ = { by, scene_id };
     this.awaited_ = undefined;
+    clearTimeout(this.cover_ends_);
     await this.cover();
     this.parts_.worker.post({ kind: 'select', scene_id });
   }

@@ -45,8 +45,11 @@ export class Navigation {
   readonly pad_pressed = new Signal<GamepadAction>();
   /** Hears clicks and taps in place of the camera: `x`, `y` are shares of the view, y down. */
   tapped: ((x: number, y: number) => void) | undefined;
-  /** Hears clicks and taps of visitors who walk, as `tapped` does; false: they mean something else. */
-  walk_to: ((x: number, y: number) => boolean) | undefined;
+  /**
+   * Hears clicks and taps of visitors who walk, as `tapped` does; false: they mean something else. `again`: the
+   * second of two.
+   */
+  walk_to: ((x: number, y: number, again: boolean) => boolean) | undefined;
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
   private readonly inertia_ = new Inertia();
@@ -211,7 +214,7 @@ export class Navigation {
       pointed_at: (x, y, how) => {
         if (this.tapped) {
           if (how !== 'double tap') this.tapped(x, y);
-        } else if (this.camera.mode === 'walk' && this.walk_to?.(x, y)) {
+        } else if (this.camera.mode === 'walk' && this.walk_to?.(x, y, how === 'double tap')) {
           return;
         } else if (how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk')) {
           void this.point_at(x, y);

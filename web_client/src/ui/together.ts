@@ -1,5 +1,6 @@
 // Watching together: one visitor leads, and others see what the leader sees. They watch the leader's own
 // pictures, or follow the leader's camera on a stream of their own where the server has a place for them.
+import { Signal } from '../base/signal';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, pursuit } from '../camera/flight';
 import { watch_token } from '../session/token';
@@ -24,6 +25,8 @@ const most_name_bytes = 64; // that the wire takes
 type Role = 'alone' | 'watching' | 'following' | 'left' | 'leading';
 
 export class Together {
+  /** The visitor is in no company any more. */
+  readonly parted = new Signal();
   private role_: Role = 'alone';
   private lead_: Lead | undefined;
   private leader_eye_: Eye | undefined;
@@ -188,6 +191,7 @@ export class Together {
 
   private become(role: Role): void {
     this.role_ = role;
+    if (role === 'alone' || role === 'left') this.parted.emit();
     const watching = role === 'watching';
     document.body.classList.toggle('watching', watching);
     this.toolbar_.watching = watching;

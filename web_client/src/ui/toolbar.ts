@@ -49,6 +49,10 @@ export class Toolbar {
     if (!this.is_open(panel)) this.toggle(panel);
   }
 
+  close(panel: Panel): void {
+    if (this.is_open(panel)) this.show(panel, false);
+  }
+
   /** Closes panels where they hide the picture or the tour's card. */
   make_room(): void {
     if (matchMedia(no_room_for_card).matches) this.close_all();
@@ -96,7 +100,7 @@ export class Toolbar {
   }
 
   private close_all(): void {
-    for (const panel of panels) if (this.is_open(panel)) this.show(panel, false);
+    for (const panel of panels) this.close(panel);
   }
 
   private show(panel: Panel, shown: boolean): void {

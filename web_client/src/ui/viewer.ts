@@ -63,7 +63,8 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   });
   worker.on('company_moved', ({ places }) => ground.show_people(places));
   const pointing = new Pointing(view, worker, navigation, notice, seen);
-  new Together(worker, navigation, toolbar, notice, pointing, reduced_motion);
+  const together = new Together(worker, navigation, toolbar, notice, pointing, reduced_motion);
+  together.parted.listen(() => ground.show_people([]));
   bind_page_events(worker);
   window.catgs = make_automation(worker, navigation, clock);
 
