@@ -169,7 +169,7 @@ describe('a visitor', () => {
     await page.locator('#tour-next').click();
     await page.getByText('A lost picture').waitFor();
     await page.getByText('A foreign one').waitFor(); // by the policy of the page
-    await page.getByText('This cannot be shown here: Voice').waitFor();
+    await page.getByText('This cannot be shown or played here: Voice').waitFor();
     expect(await page.locator('#tour-media .missing').count()).toBe(2);
     await keep_screenshot(page, 'media-missing');
     expect(await barriers(page)).toEqual([]);

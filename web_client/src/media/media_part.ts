@@ -21,7 +21,11 @@ export class MediaPart {
   private stop_: Stop | undefined;
   private playing_ = false;
 
-  constructor(private readonly token_: () => string) {
+  /** `pause`: of the tour. */
+  constructor(
+    private readonly token_: () => string,
+    pause: () => void,
+  ) {
     this.addresses_ = new MediaAddresses(location.href, '', '');
     const voice = make('audio', { preload: 'auto' });
     this.sounds_ = new Sounds({
@@ -30,7 +34,7 @@ export class MediaPart {
       changed: () => this.update(),
     });
     this.narrator_ = new Narrator(voice, this.sounds_);
-    this.media_ = new StopMedia({ plays: (playing) => this.sounds_.film(playing) });
+    this.media_ = new StopMedia({ plays: (playing) => this.sounds_.film(playing), enlarged: pause });
     by_id('tour', HTMLElement).append(voice);
     this.button_.addEventListener('click', () => this.sounds_.toggle());
     for (const gesture of ['pointerup', 'keydown', 'click'] as const) {

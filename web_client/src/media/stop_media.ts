@@ -8,6 +8,8 @@ import { show_large } from './large_picture';
 interface FilmListener {
   /** A film or a sound of the card begins or stops to play. */
   plays(playing: boolean): void;
+  /** The visitor looks at a picture in the whole window. */
+  enlarged(): void;
 }
 
 export class StopMedia {
@@ -56,7 +58,10 @@ export class StopMedia {
     const picture = make('img', { alt: medium.alt, lang: medium.language, onerror: fail });
     void addresses.of(medium.src).then((address) => (picture.src = address));
     const button = make('button', { type: 'button', title: text.media.enlarge, 'aria-haspopup': 'dialog' }, picture);
-    button.addEventListener('click', () => show_large(picture.src, medium));
+    button.addEventListener('click', () => {
+      this.listener_.enlarged();
+      show_large(picture.src, medium);
+    });
     return button;
   }
 

@@ -15,7 +15,11 @@ export class TourMedia implements GuideMedia {
   private state_: TourState | undefined;
   private arrived_ = false;
 
-  constructor(private readonly token_: () => string) {}
+  /** `pause_`: of the tour. */
+  constructor(
+    private readonly token_: () => string,
+    private readonly pause_: () => void,
+  ) {}
 
   show_tours(scene_id: string, tours: readonly Tour[]): void {
     this.tours_ = [scene_id, tours];
@@ -45,7 +49,7 @@ export class TourMedia implements GuideMedia {
     this.loading_ = true;
     try {
       const { MediaPart: Part } = await import('./media_part');
-      this.part_ = new Part(this.token_);
+      this.part_ = new Part(this.token_, this.pause_);
     } catch (error) {
       console.warn('the media of the tours cannot be shown', error); // the server is away
       this.loading_ = false;

@@ -128,6 +128,7 @@ export class Session {
     this.greeting_ = { ...this.greeting_, sceneId: scene_id };
     this.last_pose_ = undefined; // it is of the other scene
     this.path_ = [];
+    this.kept_.delete('clip');
     this.send({ case: 'selectScene', value: { sceneId: scene_id } });
   }
 

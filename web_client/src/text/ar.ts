@@ -390,7 +390,7 @@ export const text: Texts = {
     close: 'إغلاق',
     hear: 'الاستماع إلى التعليق',
     pause_voice: 'إيقاف التعليق مؤقتًا',
-    missing: 'لا يمكن عرض هذا هنا:',
+    missing: 'لا يمكن عرض هذا أو تشغيله هنا:',
     captions: 'ترجمة نصية',
     kinds: { image: 'صورة', video: 'فيديو', audio: 'صوت' },
     of_stop: 'صور وفيديو وتعليق صوتي',

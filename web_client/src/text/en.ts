@@ -382,7 +382,7 @@ export const text = {
     close: 'Close',
     hear: 'Hear the voice',
     pause_voice: 'Pause the voice',
-    missing: 'This cannot be shown here:',
+    missing: 'This cannot be shown or played here:',
     captions: 'Captions',
     kinds: { image: 'Picture', video: 'Film', audio: 'Sound' },
     of_stop: 'Pictures, films, voice',

@@ -385,7 +385,7 @@ export const text: Texts = {
     close: 'Cerrar',
     hear: 'Escuchar la voz',
     pause_voice: 'Pausar la voz',
-    missing: 'Esto no se puede mostrar aquí:',
+    missing: 'Esto no se puede mostrar ni reproducir aquí:',
     captions: 'Subtítulos',
     kinds: { image: 'Imagen', video: 'Vídeo', audio: 'Sonido' },
     of_stop: 'Imágenes, vídeos, voz',

@@ -385,7 +385,7 @@ export const text: Texts = {
     close: 'Fermer',
     hear: 'Écouter la voix',
     pause_voice: 'Mettre la voix en pause',
-    missing: 'Impossible à afficher ici :',
+    missing: 'Impossible à afficher ou à lire ici :',
     captions: 'Sous-titres',
     kinds: { image: 'Image', video: 'Film', audio: 'Son' },
     of_stop: 'Images, films, voix',

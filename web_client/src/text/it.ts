@@ -385,7 +385,7 @@ export const text: Texts = {
     close: 'Chiudi',
     hear: 'Ascolta la voce',
     pause_voice: 'Metti in pausa la voce',
-    missing: 'Non si può mostrare qui:',
+    missing: 'Non si può mostrare o riprodurre qui:',
     captions: 'Sottotitoli',
     kinds: { image: 'Immagine', video: 'Filmato', audio: 'Suono' },
     of_stop: 'Immagini, filmati, voce',

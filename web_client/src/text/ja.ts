@@ -383,7 +383,7 @@ export const text: Texts = {
     close: '閉じる',
     hear: '音声ガイドを聞く',
     pause_voice: '音声ガイドを一時停止',
-    missing: 'ここでは表示できません:',
+    missing: 'ここでは表示または再生できません:',
     captions: '字幕',
     kinds: { image: '画像', video: '動画', audio: '音声' },
     of_stop: '画像・動画・音声ガイド',

@@ -382,7 +382,7 @@ export const text: Texts = {
     close: '닫기',
     hear: '음성 안내 듣기',
     pause_voice: '음성 안내 일시 정지',
-    missing: '여기서 표시할 수 없습니다:',
+    missing: '여기서 표시하거나 재생할 수 없습니다:',
     captions: '자막',
     kinds: { image: '그림', video: '동영상', audio: '소리' },
     of_stop: '그림, 동영상, 음성 안내',

@@ -379,7 +379,7 @@ export const text: Texts = {
     close: '关闭',
     hear: '收听讲解',
     pause_voice: '暂停讲解',
-    missing: '此处无法显示：',
+    missing: '此处无法显示或播放：',
     captions: '字幕',
     kinds: { image: '图片', video: '视频', audio: '声音' },
     of_stop: '图片、视频、讲解',

@@ -13,6 +13,7 @@ import { AuthorAbout } from './author_about';
 import { AuthorLanguage } from './author_language';
 import { AuthorStops, type MediaFields, type StopActions } from './author_stops';
 import { by_id, on_click, save_file } from './dom';
+import type { FilmPanel } from './film_panel';
 
 interface AuthorTools {
   eye(): Eye;
@@ -46,6 +47,7 @@ export class AuthorPanel {
   private readonly save_ = by_id('author-save', HTMLButtonElement);
   private readonly replace_ = by_id('author-replace', HTMLButtonElement);
   private readonly done_ = by_id('author-done', HTMLOutputElement);
+  private film_: FilmPanel | undefined;
   private token_: string | undefined;
   private made_from_: SidecarTag;
   private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
@@ -86,6 +88,7 @@ export class AuthorPanel {
    */
   load(tours: readonly Tour[], about: SceneAbout, token: string | undefined, made_from: SidecarTag): void {
     this.token_ = token;
+    this.film_?.look();
     this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
     this.replace_.hidden = true;
@@ -163,8 +166,8 @@ export class AuthorPanel {
   private async open_film(): Promise<void> {
     const place = by_id('author-film-fields', HTMLElement);
     const { FilmPanel } = await import('./film_panel');
-    if (place.childElementCount > 0) return;
-    new FilmPanel(place, { ...this.tools_, tour: () => this.draft_.tour, token: () => this.token_ });
+    if (this.film_) return this.film_.look();
+    this.film_ = new FilmPanel(place, { ...this.tools_, tour: () => this.draft_.tour, token: () => this.token_ });
   }
 
   private async add(): Promise<void> {
@@ -290,7 +293,10 @@ export class AuthorPanel {
       if (field === undefined) this.edited();
       else this.told();
     };
-    by_id('author-sound', HTMLElement).replaceChildren(this.tools_.media.of_tour(tour, change));
+    const sound = by_id('author-sound', HTMLElement);
+    const has_focus = sound.contains(document.activeElement);
+    sound.replaceChildren(this.tools_.media.of_tour(tour, change));
+    if (has_focus) sound.querySelector<HTMLElement>('[data-control="sound"]')?.focus();
     this.show_what_can_be_done();
   }
 

@@ -28,6 +28,7 @@ const sizes: Readonly<Record<Kind, readonly (readonly [number, number])[]>> = {
   film: [[1280, 720], [1920, 1080]],
 };
 const look_again_ms = 500;
+const most_wait_ms = 15_000; // where no server answers
 
 export class FilmPanel {
   private readonly kind_ = make('select', {});
@@ -71,9 +72,16 @@ export class FilmPanel {
     const { kind } = this;
     this.size_.replaceChildren(...sizes[kind].map(([x, y], i) => new Option(`${x} × ${y}`, String(i))));
     this.path_.hidden = kind !== 'film';
+    this.say('');
+    this.look();
+  }
+
+  /** The token, or what it lets its holder do, may have changed. */
+  look(): void {
     const may_order = this.tools_.token() !== undefined;
     this.make_.hidden = !may_order;
-    this.say(may_order ? '' : words.not_author);
+    if (!may_order) this.say(words.not_author);
+    else if (this.said_.textContent === words.not_author) this.say('');
   }
 
   private say(what: string): void {
@@ -122,7 +130,7 @@ export class FilmPanel {
   private async watch(id: string, name: string): Promise<void> {
     this.job_ = id;
     this.cancel_.hidden = this.bar_.hidden = this.left_.hidden = false;
-    for (;;) {
+    for (let wait_ms = look_again_ms; ; ) {
       const now = await film_state(location.href, id);
       if (now) this.show(now.state, now.share, now.seconds_left);
       if (now?.state === 'failed') this.say(words.failed(now.error ?? ''));
@@ -132,7 +140,8 @@ export class FilmPanel {
         Object.assign(this.save_, { href: film_address(location.href, id), download: name, hidden: false });
       }
       if (now && now.state !== 'waiting' && now.state !== 'drawing') break;
-      await new Promise((resolve) => setTimeout(resolve, look_again_ms));
+      wait_ms = now ? look_again_ms : Math.min(2 * wait_ms, most_wait_ms);
+      await new Promise((resolve) => setTimeout(resolve, wait_ms));
     }
     this.cancel_.hidden = this.bar_.hidden = this.left_.hidden = true;
     this.job_ = undefined;

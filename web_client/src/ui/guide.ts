@@ -106,6 +106,10 @@ export class Guide {
     });
   }
 
+  pause(): void {
+    this.player_.pause();
+  }
+
   go_to_stop(index: number): void {
     this.player_.go_to(index);
   }

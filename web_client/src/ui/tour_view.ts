@@ -35,7 +35,7 @@ export class TourView {
       Space: () => player.toggle(),
     };
     window.addEventListener('keydown', (event) => {
-      if (event.code === 'Space' && event.target instanceof HTMLButtonElement) return; // a click
+      if (event.code === 'Space' && event.target instanceof Element && event.target.closest('button, summary')) return; // a click
       const action = actions[event.code];
       if (!action || !this.has_tours_ || !is_for_page(event)) return;
       event.preventDefault();

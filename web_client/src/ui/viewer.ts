@@ -53,8 +53,8 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
   const seen = new SeenCamera(worker, navigation);
-  const media = { media: new TourMedia(() => token.value), media_fields: new TourMediaFields() };
-  const guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion, ...media });
+  const media = { media: new TourMedia(() => token.value, () => guide.pause()), media_fields: new TourMediaFields() };
+  const guide: Guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion, ...media });
   new MeasurePanel({ view, navigation, toolbar, seen, storage, set_scale: guide.set_scale });
   const ground = new GroundUse({
     ...{ view, clock, worker, navigation, seen, toolbar, token, storage, reduced_motion },
@@ -97,11 +97,7 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
       view: stream_size.view,
       quality: stream_size.quality,
       rung,
-      device: device_kind({
-        user_agent: navigator.userAgent,
-        coarse_pointer: matchMedia('(pointer: coarse)').matches,
-        screen_px: Math.min(screen.width, screen.height),
-      }),
+      device: device_here(),
       presenter: presenter_choice(wishes.get('presenter')),
     },
     [canvas],
@@ -110,6 +106,13 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   if (jpeg) tell_of_jpeg(jpeg);
   return status;
 }
+
+const device_here = (): ReturnType<typeof device_kind> =>
+  device_kind({
+    user_agent: navigator.userAgent,
+    coarse_pointer: matchMedia('(pointer: coarse)').matches,
+    screen_px: Math.min(screen.width, screen.height),
+  });
 
 /** `?presenter=webgl2` and `?presenter=2d` override the page's own choice. */
 const presenter_choice = (wanted: string | null): PresenterChoice =>
