@@ -164,12 +164,13 @@ NetOptions Server::State::net_options() {
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return respond(request); };
   options.uploads.refusal = [this](const HttpRequest& request) {
-    if (FilmStudio::cancels(request)) return std::optional<HttpResponse>();
+    if (FilmStudio::cancels(request)) return authors.films->refuse_cancel(request);
     return MediaApi::is_file(request.path) ? api.media->refuse_upload(request)
                                            : api.scenes->refuse_upload(request);
   };
   options.uploads.most_bytes = [](std::string_view path) {
-    return MediaApi::is_file(path) ? max_media_bytes : max_upload_bytes;
+    if (MediaApi::is_file(path)) return max_media_bytes;
+    return SceneApi::orders_film({path, {}}) ? max_upload_bytes : max_sent_sidecar_bytes;
   };
   options.uploads.take = [this](const HttpRequest& request, std::string body,
                                 std::shared_ptr<const UploadPlace> place) {

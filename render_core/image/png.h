@@ -19,7 +19,7 @@ Image read_png(const std::filesystem::path& path);
 void write_png(const std::filesystem::path& path, const Image& image,
                std::span<const float> alpha = {});
 
-/// The same of bytes: three a pixel, row by row from the top.
+/// Writes bytes as they are: three a pixel, row by row from the top.
 void write_png(const std::filesystem::path& path, glm::ivec2 size_px,
                std::span<const std::uint8_t> rgb);
 

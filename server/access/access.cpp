@@ -5,6 +5,7 @@
 #include <charconv>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <span>
 #include <sstream>
 
@@ -142,8 +143,11 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
                              const ResolveScene& resolve) {
   std::string link_id;
   auto granted = read(token, now_unix_s, link_id);
-  if (auto* grant = std::get_if<LinkGrant>(&granted); grant && !grant->scene_id.empty())
-    grant->scene_id = resolve(grant->scene_id);
+  std::int64_t expires_unix_s = std::numeric_limits<std::int64_t>::max();
+  if (auto* grant = std::get_if<LinkGrant>(&granted)) {
+    if (!grant->scene_id.empty()) grant->scene_id = resolve(grant->scene_id);
+    if (!link_id.empty()) expires_unix_s = grant->expires_unix_s;
+  }
   Permit permit = [granted = std::move(granted), has_authors = !key_.empty()](
                       std::string_view scene_id, Use use) -> Refusal {
     if (use == Use::save && !has_authors)
@@ -155,6 +159,7 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
     return forbidden(grant.role, use);
   };
   permit.link_id = std::move(link_id);
+  permit.expires_unix_s = expires_unix_s;
   return permit;
 }
 

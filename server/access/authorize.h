@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -25,6 +27,7 @@ using Refusal = std::optional<std::string>;
 struct Permit : std::function<Refusal(std::string_view scene_id, Use use)> {
   using function::function;
   std::string link_id{};  // of a genuine link, even if it is refused; empty: the token is no link
+  std::int64_t expires_unix_s = std::numeric_limits<std::int64_t>::max();  // of a link
 };
 using Authorize = std::function<Permit(const std::string& token)>;
 

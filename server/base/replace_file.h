@@ -10,7 +10,7 @@ namespace catgs {
 /// one. On failure throws InputError with the remedy, and nothing has changed.
 void replace_file(const std::filesystem::path& file, std::string_view text);
 
-/// The same, but keeps no old file. `remedy`: of its errors.
+/// The same, but keeps no old file. Its errors suggest `remedy`.
 void overwrite_file(const std::filesystem::path& file, std::string_view content,
                     std::string_view remedy);
 

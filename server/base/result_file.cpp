@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "render_core/base/error.h"
+#include "server/base/read_at.h"
 
 namespace catgs {
 
@@ -33,14 +34,7 @@ std::uint64_t ResultFile::size() const {
 }
 
 bool ResultFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
-  while (!bytes.empty()) {
-    const ssize_t count =
-        ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
-    if (count <= 0) return false;
-    offset += static_cast<std::uint64_t>(count);
-    bytes = bytes.subspan(static_cast<std::size_t>(count));
-  }
-  return true;
+  return read_at(descriptor_, offset, bytes) == bytes.size();
 }
 
 }  // namespace catgs

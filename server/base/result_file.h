@@ -17,7 +17,7 @@ class ResultFile {
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;
 
-  /// By which this process can open it.
+  /// A path by which this process can open the file.
   [[nodiscard]] std::string path() const;
   [[nodiscard]] std::uint64_t size() const;
   /// Fills `bytes` from that offset. False: they are not there. Any thread.

@@ -136,8 +136,7 @@ void draw_frames(const FilmWish& wish, const SceneEntry& scene, ResultFile& file
       render(*view, request_of(scene, wish.views[i], wish.size_px), frame);
     video->write(frame);
     if (file.size() > most_film_bytes)
-      throw std::runtime_error(
-          fmt::format("the film is larger than {} MiB", most_film_bytes >> 20));
+      throw NotDrawn(fmt::format("the film is larger than {} MiB", most_film_bytes >> 20));
     on_drawn(static_cast<double>(i + 1) / static_cast<double>(count), Clock::now() - start);
   }
   video->finish();

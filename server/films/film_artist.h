@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <stdexcept>
 
 #include "server/base/clock.h"
 #include "server/base/result_file.h"
@@ -15,11 +16,17 @@ namespace catgs {
 /// cancel.
 using OnDrawn = std::function<void(double share, Clock::duration took)>;
 
+/// Why something is not drawn, in words for its author.
+struct NotDrawn : std::runtime_error {
+  using runtime_error::runtime_error;
+};
+
 /// The largest result, bytes.
 inline constexpr std::uint64_t most_film_bytes = std::uint64_t{512} << 20;
 
 /// Draws a picture (PNG) or a film (MP4, 30 frames a second) of the scene into `file`, on this
-/// thread. Large pictures are drawn in parts. Throws std::exception.
+/// thread. Large pictures are drawn in parts. Throws NotDrawn, and other
+/// exceptions with words for operators.
 void draw_film(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
                const OnDrawn& on_drawn);
 

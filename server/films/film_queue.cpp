@@ -1,31 +1,30 @@
 #include "server/films/film_queue.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "server/access/signed_token.h"
 
 namespace catgs {
-namespace {
 
-bool has_ended(const FilmJob& job) {
+bool has_ended(const FilmReport& job) {
   return job.state != FilmState::waiting && job.state != FilmState::drawing;
 }
 
-}  // namespace
-
 std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_id,
                                                              std::string owner, FilmWish wish) {
+  std::vector<FilmJob> old;
   const std::lock_guard lock(mutex_);
-  drop_old();
+  old = drop_old();
   if (std::ranges::any_of(
           jobs_, [&](const FilmJob& job) { return job.owner == owner && !has_ended(job); }))
     return Refused{true};
   if (std::ranges::count(jobs_, FilmState::waiting, &FilmJob::state) >=
       static_cast<std::ptrdiff_t>(most_waiting))
     return Refused{false};
-  jobs_.push_back({random_id(), std::move(scene_id), std::move(owner), std::move(wish)});
-  jobs_.back().changed = clock_();
+  const FilmReport report{.kind = wish.kind, .changed = clock_()};
+  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(owner), std::move(wish)});
   return jobs_.back().id;
 }
 
@@ -35,8 +34,9 @@ std::optional<FilmJob> FilmQueue::start_next() {
   if (next == jobs_.end()) return std::nullopt;
   next->state = FilmState::drawing;
   next->changed = clock_();
+  std::vector<FilmView> views = std::move(next->wish.views);  // whoever draws has them alone
   FilmJob started = *next;
-  next->wish.views = {};  // whoever draws has them
+  started.wish.views = std::move(views);
   return started;
 }
 
@@ -49,13 +49,14 @@ bool FilmQueue::drawn(const std::string& id, double share) {
 }
 
 void FilmQueue::finish(const std::string& id, std::shared_ptr<const ResultFile> result) {
+  std::vector<FilmJob> old;
   const std::lock_guard lock(mutex_);
   FilmJob* const job = known(id);
   if (!job || job->state != FilmState::drawing) return;
   job->result = std::move(result);
   job->share = 1.0;
   end(*job, FilmState::done);
-  drop_old();
+  old = drop_old();
 }
 
 void FilmQueue::fail(const std::string& id, std::string why) {
@@ -74,14 +75,15 @@ bool FilmQueue::cancel(std::string_view id) {
   return true;
 }
 
-std::optional<FilmJob> FilmQueue::find(std::string_view id) {
+std::optional<FilmReport> FilmQueue::find(std::string_view id) {
+  std::vector<FilmJob> old;
   const std::lock_guard lock(mutex_);
-  drop_old();
+  old = drop_old();
   const FilmJob* const job = known(id);
-  return job ? std::optional(*job) : std::nullopt;
+  return job ? std::optional<FilmReport>(*job) : std::nullopt;
 }
 
-std::optional<std::chrono::seconds> FilmQueue::left(const FilmJob& job) const {
+std::optional<std::chrono::seconds> FilmQueue::left(const FilmReport& job) const {
   if (job.state != FilmState::drawing || job.share <= 0.0) return std::nullopt;
   const double so_far_s = std::chrono::duration<double>(clock_() - job.changed).count();
   return std::chrono::seconds(
@@ -95,11 +97,11 @@ FilmJob* FilmQueue::known(std::string_view id) {
 
 void FilmQueue::end(FilmJob& job, FilmState state) {
   job.state = state;
-  job.wish.views = {};
+  std::vector<FilmView>().swap(job.wish.views);
   job.changed = clock_();
 }
 
-void FilmQueue::drop_old() {
+std::vector<FilmJob> FilmQueue::drop_old() {
   const TimePoint now = clock_();
   std::size_t kept = 0;
   std::uint64_t bytes = 0;
@@ -111,7 +113,12 @@ void FilmQueue::drop_old() {
         (kept > 1 && bytes > most_kept_bytes))
       job->id.clear();
   }
-  std::erase_if(jobs_, [](const FilmJob& job) { return job.id.empty(); });
+  const auto old =
+      std::ranges::stable_partition(jobs_, [](const FilmJob& job) { return !job.id.empty(); });
+  std::vector<FilmJob> dropped(std::make_move_iterator(old.begin()),
+                               std::make_move_iterator(old.end()));
+  jobs_.erase(old.begin(), old.end());
+  return dropped;
 }
 
 }  // namespace catgs

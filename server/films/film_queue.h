@@ -19,21 +19,28 @@ namespace catgs {
 
 enum class FilmState { waiting, drawing, done, failed, cancelled };
 
-/// One order of a picture or a film.
-struct FilmJob {
-  std::string id;  // whoever knows it may ask for the result
-  std::string scene_id;
-  std::string owner;  // who ordered it: one job at a time for each
-  FilmWish wish;
+/// What is told of a job.
+struct FilmReport {
+  FilmKind kind = FilmKind::picture;
   FilmState state = FilmState::waiting;
   double share = 0.0;  // drawn
   std::string error{};
   TimePoint changed{};  // when it began or ended
   std::shared_ptr<const ResultFile> result{};
 };
+/// True if the job neither waits nor is being drawn.
+bool has_ended(const FilmReport& job);
 
-/// The orders of authors: one is drawn at a time, and a few wait. Results are kept for an hour
-/// within bounds of number and bytes, the oldest go first. Thread-safe.
+/// One order of a picture or a film.
+struct FilmJob : FilmReport {
+  std::string id;  // whoever knows it may ask for the result
+  std::string scene_id;
+  std::string owner;  // who ordered it: one job at a time for each
+  FilmWish wish;
+};
+
+/// The orders of authors: one is drawn at a time, and a few wait. Results are kept for an hour,
+/// within bounds of number and bytes; the oldest go first. Thread-safe.
 class FilmQueue {
  public:
   static constexpr std::size_t most_waiting = 4;
@@ -58,14 +65,16 @@ class FilmQueue {
   /// False: there is no such job, or it has ended.
   bool cancel(std::string_view id);
   /// Nothing: there is no such job, or it ended too long ago.
-  [[nodiscard]] std::optional<FilmJob> find(std::string_view id);
+  [[nodiscard]] std::optional<FilmReport> find(std::string_view id);
   /// The time that the rest of a job takes, by what was drawn so far; nothing: not known.
-  [[nodiscard]] std::optional<std::chrono::seconds> left(const FilmJob& job) const;
+  [[nodiscard]] std::optional<std::chrono::seconds> left(const FilmReport& job) const;
 
  private:
   FilmJob* known(std::string_view id);
   void end(FilmJob& job, FilmState state);
-  void drop_old();
+  /// Returns the jobs that are too old: large files take time to close, so the caller lets go of
+  /// them once the mutex is free.
+  [[nodiscard]] std::vector<FilmJob> drop_old();
 
   const std::function<TimePoint()> clock_;
   std::mutex mutex_;

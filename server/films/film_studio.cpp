@@ -1,8 +1,8 @@
 #include "server/films/film_studio.h"
 
+#include <algorithm>
 #include <array>
 #include <span>
-#include <stdexcept>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -61,7 +61,7 @@ std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
     const auto job = queue_.find(*id);
     if (!job || !job->result) return no_such_job();
     HttpResponse response;
-    response.content_type = job->wish.kind == FilmKind::film ? "video/mp4" : "image/png";
+    response.content_type = job->kind == FilmKind::film ? "video/mp4" : "image/png";
     response.disk_body = std::make_shared<const DiskBody>(DiskBody{
         job->result->size(), [file = job->result](std::uint64_t offset, std::size_t bytes) {
           std::string piece(bytes, '\0');
@@ -87,6 +87,11 @@ bool FilmStudio::cancels(const HttpRequest& request) {
   return job_of(request.path, cancel_part).has_value();
 }
 
+std::optional<HttpResponse> FilmStudio::refuse_cancel(const HttpRequest& request) {
+  const auto job = queue_.find(*job_of(request.path, cancel_part));
+  return job && !has_ended(*job) ? std::nullopt : std::optional(no_such_job());
+}
+
 std::future<HttpResponse> FilmStudio::cancel(const HttpRequest& request) {
   std::promise<HttpResponse> answer;
   const bool cancelled = queue_.cancel(*job_of(request.path, cancel_part));
@@ -101,7 +106,11 @@ std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string ow
   auto future = answer->get_future();
   boost::asio::post(clerk_, [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
                              json = std::move(json), place = std::move(place)]() mutable {
-    if (!place->abandoned()) answer->set_value(take(std::move(scene_id), std::move(owner), json));
+    if (place->abandoned()) return;
+    HttpResponse response = take(std::move(scene_id), std::move(owner), json);
+    std::string().swap(json);
+    place.reset();  // it is free before the answer comes
+    answer->set_value(std::move(response));
   });
   return future;
 }
@@ -143,12 +152,11 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   const TimePoint started = Clock::now();
   try {
     const auto scene = scene_of(job.scene_id, stop);
-    if (!scene) throw std::runtime_error("the scene is not in memory: open it, and order again");
+    if (!scene) throw NotDrawn("the scene is not in memory: open it, and order again");
     const auto file = std::make_shared<ResultFile>();
     draw_film(job.wish, *scene, *file, [&](double share, Clock::duration took) {
       if (stop.stop_requested() || !queue_.drawn(job.id, share)) throw Cancelled();
-      if (Clock::now() - started > longest_job)
-        throw std::runtime_error("it takes longer than two hours");
+      if (Clock::now() - started > longest_job) throw NotDrawn("it takes longer than two hours");
       std::unique_lock lock(mutex_);
       if (around_.visitors_look()) wake_.wait_for(lock, stop, took, [] { return false; });
     });
@@ -158,7 +166,8 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   } catch (const std::exception& failure) {
     log_warning({.event = "film_failed", .scene = job.scene_id}, "scene {}: no film: {}",
                 job.scene_id, failure.what());
-    queue_.fail(job.id, failure.what());
+    const bool for_authors = dynamic_cast<const NotDrawn*>(&failure) != nullptr;
+    queue_.fail(job.id, for_authors ? failure.what() : "the server failed to draw it: try again");
   }
 }
 

@@ -46,6 +46,8 @@ class FilmStudio {
   std::optional<HttpResponse> respond(const HttpRequest& request);
   /// True if this PUT cancels a job.
   [[nodiscard]] static bool cancels(const HttpRequest& request);
+  /// Refuses such a PUT unless its job waits or is being drawn.
+  std::optional<HttpResponse> refuse_cancel(const HttpRequest& request);
   std::future<HttpResponse> cancel(const HttpRequest& request);
   /// The caller has checked that the sender may save the scene. One whose place is abandoned
   /// meanwhile orders nothing.

@@ -1,7 +1,7 @@
 #include "server/media/media_folder.h"
 
 #include <algorithm>
-#include <cerrno>
+#include <span>
 #include <system_error>
 #include <utility>
 
@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "render_core/base/error.h"
+#include "server/base/read_at.h"
 #include "server/base/replace_file.h"
 
 namespace catgs {
@@ -48,15 +49,7 @@ struct OpenFile {
   }
   [[nodiscard]] std::string read(std::uint64_t offset, std::size_t bytes) const {
     std::string content(bytes, '\0');
-    std::size_t filled = 0;
-    while (filled < bytes) {
-      const ssize_t got = ::pread(descriptor.get(), content.data() + filled, bytes - filled,
-                                  static_cast<off_t>(offset + filled));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) break;
-      filled += static_cast<std::size_t>(got);
-    }
-    content.resize(filled);
+    content.resize(read_at(descriptor.get(), offset, std::as_writable_bytes(std::span(content))));
     return content;
   }
 

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <chrono>
 #include <cstring>
-#include <span>
 #include <string_view>
 
 #include <netinet/in.h>
@@ -31,10 +30,12 @@ constexpr lws_usec_t answer_poll_us = 10'000;  // saves are rare
 /// Appends response headers to a fixed buffer; remembers whether everything found room.
 class HeaderWriter {
  public:
-  HeaderWriter(lws* wsi, int status, std::string_view content_type, std::uint64_t length)
+  HeaderWriter(lws* wsi, int status, const std::string& content_type, std::uint64_t length)
       : wsi_(wsi) {
-    ok_ = lws_add_http_common_headers(wsi, static_cast<unsigned>(status),
-                                      std::string(content_type).c_str(), length, &at_, end()) == 0;
+    const bool has_content = status != 204;  // RFC 9110: then there is no length either
+    ok_ = lws_add_http_common_headers(
+              wsi, static_cast<unsigned>(status), has_content ? content_type.c_str() : nullptr,
+              has_content ? length : LWS_ILLEGAL_HTTP_CONTENT_LEN, &at_, end()) == 0;
   }
   void add(const char* name_with_colon, std::string_view value) {
     ok_ = ok_ &&
@@ -127,13 +128,17 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
   const std::string if_range = request_header(wsi, WSI_TOKEN_HTTP_IF_RANGE);
   HttpRequest request{path,          if_none_match, encodings.find("gzip") != std::string::npos,
                       authorization, site,          query_arguments(wsi)};
-  request.range = range;
-  request.if_range = if_range;
+  if (!head_only_) {  // RFC 9110: ranges are for GET
+    request.range = range;
+    request.if_range = if_range;
+  }
   HttpResponse response = handler(request);
   serve(wsi);
   if (!response.on_disk) return answer(wsi, std::move(response));
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);
   answer_ = disk_.run(std::move(response.on_disk), waiter_);
+  if (!answer_.valid())
+    return answer(wsi, busy_response("503: many wait for files: try again in a second\n"));
   return 0;
 }
 
@@ -284,6 +289,8 @@ int LwsHttpExchange::write_piece(lws* wsi, std::vector<std::byte>& scratch) {
     const std::string piece = piece_.get();
     if (piece.size() != size) return -1;
     std::memcpy(scratch.data() + LWS_PRE, piece.data(), size);
+  } else if (response_.disk_body) {
+    return -1;  // the disk's threads had too much to do
   } else {
     const std::string& body = *response_.body;
     std::memcpy(scratch.data() + LWS_PRE, body.data() + body.size() - unwritten_, size);

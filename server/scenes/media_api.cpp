@@ -142,10 +142,9 @@ bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) c
 HttpResponse MediaApi::make_pass(const HttpRequest& request, const std::string& scene_id) const {
   const Permit permit = permit_of(parts_.authorize, request);
   if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
+  const std::int64_t end_s = std::min(parts_.now_unix_s() + pass_valid_s, permit.expires_unix_s);
   return text_response(
-      200, sign_token(pass_purpose,
-                      fmt::format("{}\n{}\n{}", scene_id, parts_.now_unix_s() + pass_valid_s,
-                                  permit.link_id),
+      200, sign_token(pass_purpose, fmt::format("{}\n{}\n{}", scene_id, end_s, permit.link_id),
                       parts_.key));
 }
 
@@ -226,7 +225,7 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, std::string
       writer_, [write, answer, content = std::move(content), place = std::move(place)]() mutable {
         HttpResponse response = busy_response("503: the connection is closed\n");
         if (!place->abandoned()) response = write(content);
-        content = {};  // the place is free before the answer comes
+        std::string().swap(content);  // the place is free before the answer comes
         place.reset();
         answer->set_value(std::move(response));
       });

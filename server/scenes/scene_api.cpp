@@ -121,6 +121,11 @@ HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
                                  std::string_view if_none_match) {
   constexpr int retry_after_s = 3;
   HttpResponse response;
+  if (!scene.ground && !scene.loaded) {
+    response = text_response(404, "404: the scene is not loaded yet\n");
+    response.retry_after_s = retry_after_s;
+    return response;
+  }
   if (!scene.ground) {
     scenes_.want_ground(scene.id);
     response = text_response(202, "202: where people can walk here is being found out\n");

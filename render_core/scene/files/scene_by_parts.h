@@ -19,7 +19,7 @@ struct SceneByParts {
 };
 
 SceneByParts by_parts(PartedScene scene);
-/// Of a scene in memory: all at once.
+/// The scene is in memory, so it is one part.
 SceneByParts by_parts(Scene scene);
 /// The leaves of a tree, 2^18 Gaussians at a time.
 SceneByParts by_parts(const SceneInPages& scene, std::shared_ptr<ThreadPool> pool);

@@ -1,6 +1,7 @@
 // Integration: pictures, films and sounds of tours. Real sockets on loopback, a whole server in
 // this process.
 
+#include <ctime>
 #include <filesystem>
 #include <vector>
 
@@ -12,7 +13,9 @@
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/synth/synth.h"
 #include "server/access/access.h"
+#include "server/access/signed_token.h"
 #include "server/media/media_folder.h"
+#include "server/net/http.h"
 #include "server/net/upload_places.h"
 #include "tests/server/media/sample_media.h"
 #include "tests/support/raw_socket.h"
@@ -24,6 +27,7 @@ namespace {
 
 using testing::HasSubstr;
 using testing::Not;
+using testing::Optional;
 
 class Media : public testing::Test {
  protected:
@@ -112,6 +116,12 @@ TEST_F(Media, AnswerRangesOfBytes) {
   const std::string answer = head.receive(std::chrono::milliseconds(500));
   EXPECT_THAT(answer, HasSubstr("content-length: " + size));
   EXPECT_TRUE(answer.ends_with("\r\n\r\n"));
+  RawSocket part_of_head(server->port());
+  part_of_head.send(
+      "HEAD /api/scenes/hall/media/film.mp4 HTTP/1.1\r\nHost: 127.0.0.1\r\nRange: bytes=0-4\r\n"
+      "\r\n");
+  EXPECT_THAT(part_of_head.receive(std::chrono::milliseconds(500)),
+              AllOf(HasSubstr(" 200 "), HasSubstr("content-length: " + size)));
 }
 
 TEST_F(Media, OfClientsThatGoOrStallCostOnlyTheirConnection) {
@@ -146,6 +156,15 @@ TEST_F(Media, NeedALinkOrAPassOfTheScene) {
   EXPECT_EQ(get("media?pass=" + pass).status, 401);
   EXPECT_EQ(http_get(server->port(), "/api/scenes/garden/media/door.jpg?pass=" + pass).status, 401);
   EXPECT_EQ(get("tours", {}, pass).status, 401);
+
+  const std::int64_t soon = std::time(nullptr) + 600;
+  const std::string key = read_key_file("", key_file);
+  const std::string brief =
+      get("media-pass", {}, make_link_token({"hall", "viewer", soon, "34cd"}, key)).body;
+  EXPECT_EQ(get(file + "?pass=" + brief).status, 200);
+  EXPECT_THAT(read_signed_token("catgs-media-v1", brief, key),
+              Optional(HasSubstr(fmt::format("\n{}\n", soon))))
+      << "it ends with its link";
 
   folder.write("revoked", "12ab\n");
   EXPECT_TRUE(eventually([&] { return get(file + "?pass=" + pass).status == 401; }));
@@ -224,7 +243,7 @@ TEST_F(Media, ThatAreLargeComeOneByOne) {
     return slow;
   };
   std::string film = film_;
-  film.resize(2 << 20, 'x');
+  film.resize(max_upload_bytes + 1, 'x');
   const std::string author = token("author");
   std::vector<RawSocket> slow;  // silent ones are hung up on
   ASSERT_TRUE(eventually([&] {

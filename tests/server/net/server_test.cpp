@@ -22,6 +22,7 @@
 #include "server/base/scene_id.h"
 #include "server/encode/decoder.h"
 #include "server/net/lws_websocket.h"
+#include "tests/render_core/scene/scene_test_support.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -368,6 +369,21 @@ TEST(Server, HasAPosterAndToursOfEachScene) {
        {"/api/scenes/atlantis/tours", "/api/scenes/atlantis/poster.jpg",
         "/api/scenes/atlantis/walk", "/api/scenes//tours", "/api/scenes/city/secrets"})
     EXPECT_EQ(http_get(server.port(), path).status, 404) << path;
+}
+
+TEST(Server, SaysThatNobodyWalksWithoutAWord) {
+  const TemporaryFolder folder;
+  save_scene(random_cloud(300, 0), folder / "dust.ply");
+  RunningServer server(
+      [&](ServerConfig& config) { config.scenes = {(folder / "dust.ply").string()}; });
+  HttpReply ground;
+  ASSERT_TRUE(eventually([&] {
+    ground = http_get(server.port(), "/api/scenes/dust/walk");
+    return ground.status != 202;
+  }));
+  EXPECT_EQ(ground.status, 204);
+  EXPECT_EQ(ground.headers.count("content-length"), 0u);
+  EXPECT_EQ(ground.headers.count("content-type"), 0u);
 }
 
 TEST(Server, FindsWherePeopleWalkWhenAPageAsks) {
