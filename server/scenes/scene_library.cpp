@@ -76,6 +76,17 @@ std::vector<ScenePages> pages_of(const SceneShelf& shelf) {
   return all;
 }
 
+GroundSource ground_source_of(const SceneBook& book, const SceneTrees& trees,
+                              const ServerConfig& config) {
+  GroundSource source = ground_source(book.found.path.string(), book.entry->facts);
+  if (is_synthetic(source.spec)) return source;
+  if (trees.ready(book.found)) source.tree = trees.form_of(book.found)->tree;
+  source.levels = chosen_levels(config);
+  source.beside = book.entry->sidecar;
+  if (!source.beside.empty()) source.beside.replace_extension(".walk");
+  return source;
+}
+
 }  // namespace
 
 SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
@@ -271,28 +282,18 @@ void SceneLibrary::want_poster(const std::string& id) {
   });
 }
 
-GroundSource SceneLibrary::ground_source_of(const SceneBook& book) const {
-  GroundSource source = ground_source(book.found.path.string(), book.entry->facts);
-  if (is_synthetic(source.spec)) return source;
-  if (trees_.ready(book.found)) source.tree = trees_.form_of(book.found)->tree;
-  source.levels = chosen_levels(config_);
-  source.beside = book.entry->sidecar;
-  if (!source.beside.empty()) source.beside.replace_extension(".walk");
-  return source;
-}
-
 void SceneLibrary::want_ground(const std::string& id) {
   boost::asio::post(io_, [this, id] {
     SceneBook* const book = shelf_.find(id);
     if (!book || !book->entry || book->ground || book->outdated || grounds_.busy()) return;
     if (book->ground_retry_at && clock_() < *book->ground_retry_at) return;
-    const GroundSource source = ground_source_of(*book);
+    const GroundSource source = ground_source_of(*book, trees_, config_);
     grounds_.find(id, source,
                   [this, id, source, changed = book->found.changed](const auto& ground) {
                     SceneBook* const found_for = shelf_.find(id);
                     if (!found_for || !found_for->entry || found_for->ground ||
                         found_for->found.changed != changed ||
-                        !same_ground(source, ground_source_of(*found_for)))
+                        !same_ground(source, ground_source_of(*found_for, trees_, config_)))
                       return;
                     found_for->ground = ground;
                     if (!ground) found_for->ground_retry_at = clock_() + seek_ground_again_after;
@@ -402,9 +403,10 @@ void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntr
   if (book->former && book->former->renderer == entry->renderer)
     entry = redrawn(*entry, *book->entry);
   if (book->entry->renderer != entry->renderer) return;
-  const GroundSource before = ground_source_of(*book);
+  const GroundSource before = ground_source_of(*book, trees_, config_);
   book->entry = std::move(entry);
-  if (!book->outdated && !same_ground(before, ground_source_of(*book))) book->ground.reset();
+  if (!book->outdated && !same_ground(before, ground_source_of(*book, trees_, config_)))
+    book->ground.reset();
   publish();
 }
 

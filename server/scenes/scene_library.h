@@ -90,7 +90,6 @@ class SceneLibrary final : public SceneSource {
   void release(const std::string& id);
   void start_scan(TimePoint now);
   void merge(std::vector<FoundScene> found);
-  [[nodiscard]] GroundSource ground_source_of(const SceneBook& book) const;
   /// Updates listing() and the metrics.
   void publish();
 
