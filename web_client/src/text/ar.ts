@@ -181,9 +181,9 @@ export const text: Texts = {
     set: 'ضبط المقياس',
   },
   ground: {
-    plan: 'مخطط الطابق', storey: 'الطابق', view_up: 'يدور مع اتجاه النظر',
-    dollhouse: 'بيت الدمية', larger: 'تكبير', smaller: 'تصغير',
+    plan: 'مخطط الطابق', storey: 'الطابق',
     storey_numbered: (n) => `الطابق ${n}`,
+    view_up: 'يدور مع اتجاه النظر', dollhouse: 'بيت الدمية', larger: 'تكبير', smaller: 'تصغير',
   },
   together: {
     present: 'قيادة جولة',

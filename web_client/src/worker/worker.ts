@@ -84,12 +84,7 @@ class Client {
   handle(message: Exclude<ToWorker, Start>): void {
     switch (message.kind) {
       case 'camera':
-        this.camera_ = message.sample;
-        if (!message.sample.at_rest) {
-          this.metrics_.pose_sent(BigInt(message.sample.pose_id), message.sample.time_us);
-          this.display_.camera = message.sample;
-        }
-        this.send_camera();
+        this.take_camera(message.sample);
         break;
       case 'view':
         this.view_ = message.view;
@@ -243,6 +238,15 @@ class Client {
         settings: settings(start.view, start.quality, this.display_.overscan),
       },
     );
+  }
+
+  private take_camera(sample: CameraSample): void {
+    this.camera_ = sample;
+    if (!sample.at_rest) {
+      this.metrics_.pose_sent(BigInt(sample.pose_id), sample.time_us);
+      this.display_.camera = sample;
+    }
+    this.send_camera();
   }
 
   private send_camera(): void {
