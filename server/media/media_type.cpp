@@ -68,8 +68,11 @@ std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t 
 }
 
 /// ISO 14496-12: a box "ftyp" whose brand names the kind of file. HEIC and AVIF have the same box.
+/// Its size comes first. A larger one than a list of brands needs could be the text of a page.
 const MediaType* type_of_brand(std::string_view head) {
+  constexpr std::uint32_t most_box_bytes = 4096;
   if (head.size() < 16 || head.substr(4, 4) != "ftyp") return nullptr;
+  if (big_endian(head, 0, 4) > most_box_bytes) return nullptr;
   constexpr std::array sounds = {"M4A "sv, "M4B "sv};
   constexpr std::array films = {"isom"sv, "iso2"sv, "iso3"sv, "iso4"sv, "iso5"sv, "iso6"sv,
                                 "mp41"sv, "mp42"sv, "avc1"sv, "M4V "sv, "dash"sv, "MSNV"sv};

@@ -64,7 +64,8 @@ TEST(MediaType, IsNoneForWhatMayHoldScriptsOrIsUnknown) {
                                      "\xff\xd8"s,
                                      "\xff\xfb"s,
                                      "\xff\xff\xff\xff"s + std::string(20, '\xff'),
-                                     "ftypisom"s})
+                                     "ftypisom"s,
+                                     "<p>\nftypisom\0\0\0\0isom"s})
     EXPECT_EQ(type_of(content), "none") << content.substr(0, 12);
 }
 
