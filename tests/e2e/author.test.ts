@@ -134,7 +134,10 @@ describe('an author', () => {
     await page.getByLabel('Stay, s (1)').fill('0.5');
     await page.getByLabel('Flight, s (1)').fill('0.2');
     await page.mouse.move(300, 200);
+    const at_stop = await pose_of(page);
     await page.mouse.wheel(0, -300);
+    // A busy page hears of a wheel later than of a question.
+    await expect.poll(async () => distance(at_stop, await pose_of(page))).toBeGreaterThan(0.1);
     await settle(page);
     const before = await pose_of(page);
     const panel = page.locator('#author-panel');

@@ -137,7 +137,7 @@ export class Guide {
   private make_author(): AuthorPanel {
     const { navigation, toolbar } = this.parts_;
     const { camera } = navigation;
-    const preview = new Preview(this.player_, toolbar, () => navigation.eye, (eye) => this.put(eye));
+    const preview = new Preview(this.player_, toolbar, () => navigation.eye, (eye) => navigation.put_back(eye));
     navigation.taken_over.listen(() => preview.forget());
     return new AuthorPanel({
       eye: () => camera.eye,

@@ -109,12 +109,17 @@ export class Navigation {
 
   /** Puts the camera there, or as near as the scene's limits allow. Returns whether it is there. */
   put(eye: Eye): boolean {
-    this.led_away.emit();
     const position = this.camera.within(eye.position);
-    this.camera.jump({ ...eye, position });
+    this.put_back({ ...eye, position });
+    return same(position, eye.position);
+  }
+
+  /** Puts the camera where it was before. The ground of a scene may lie outside of its limits. */
+  put_back(eye: Eye): void {
+    this.led_away.emit();
+    this.camera.jump(eye);
     this.camera.fov_y_rad = eye.fov_y_rad;
     this.moved();
-    return same(position, eye.position);
   }
 
   reset(): void {
