@@ -19,7 +19,7 @@ namespace catgs {
 
 enum class FilmState { waiting, drawing, done, failed, cancelled };
 
-/// What is told of a job.
+/// The facts of a job that its author is told.
 struct FilmReport {
   FilmKind kind = FilmKind::picture;
   FilmState state = FilmState::waiting;

@@ -63,7 +63,7 @@ SceneHints hints_of(const GroundSource& source) {
   return hints;
 }
 
-/// What is wrong then is so whenever the scene is asked for its ground.
+/// A mistake in the scene itself does not pass, so it means that there is no ground.
 template <class Body>
 auto known_of_scene(const Body& body) {
   try {

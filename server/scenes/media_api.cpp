@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view pass_purpose = "catgs-media-v1";
 constexpr std::int64_t pass_valid_s = 4 * 3600;
-/// Of a file that somebody opens by its address: it can do nothing at all.
+/// The policy of a file that somebody opens by its address. Such a file can do nothing at all.
 constexpr std::string_view file_policy = "default-src 'none'; sandbox";
 
 struct FilePath {
@@ -50,7 +50,7 @@ HttpResponse about_file(const MediaFile& file) {
   return response;
 }
 
-/// What a request wants of a file, kept until the disk was asked.
+/// A request for a file, kept until the disk was asked.
 struct Wanted {
   std::string name, if_none_match, range, if_range;
 };

@@ -34,7 +34,7 @@ void SceneShelf::merge(std::vector<FoundScene> found,
       book.outdated = book.entry != nullptr;
       book.poster.reset();
       book.poster_tried = false;
-      // What visitors still see has no file any more that tells its ground.
+      // Visitors still see the former scene, and no file tells its ground any more.
       book.ground = book.entry ? std::make_shared<const SceneGround>() : nullptr;
       book.retry_at.reset();
     }

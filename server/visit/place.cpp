@@ -169,7 +169,7 @@ void Place::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message))
     note_error(facts(), *error, around_.metrics);
   const auto* const welcome = std::get_if<Welcome>(&message);
-  // Who leads shows another scene than the one that the visitor enters.
+  // The visitor enters another scene than the one that the leader shows.
   if (welcome && !audience_.is_in(welcome->scene.scene_id)) admissions_.stop_following(*this);
   audience_.send(message, Clock::now());
 }

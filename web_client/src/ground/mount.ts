@@ -1,32 +1,20 @@
 // Walking on the scene's ground, and its floor plan. Both load when somebody needs them.
-import { browser_timers, type Clock } from '../base/clock';
+import { browser_timers } from '../base/clock';
 import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { is_for_page } from '../input/view_input';
-import type { AccessToken } from '../session/token';
 import type { TourState } from '../tour/player';
 import { by_id } from '../ui/dom';
-import type { Navigation } from '../ui/navigation';
-import type { SeenCamera } from '../ui/seen_camera';
-import type { Toolbar } from '../ui/toolbar';
+import type { PageParts } from '../ui/guide';
 import type { Stand, WalkMap } from '../walk/walk_map';
-import type { WorkerClient } from '../worker/client';
 import type { PlanPanel } from './plan_panel';
 import type { Dollhouse } from './dollhouse';
 import { SceneGround } from './scene_ground';
 import type { Walking } from './walking';
 
-interface GroundParts {
-  readonly view: HTMLElement;
-  readonly clock: Clock;
-  readonly worker: WorkerClient;
-  readonly navigation: Navigation;
-  readonly seen: SeenCamera;
-  readonly toolbar: Toolbar;
-  readonly token: AccessToken;
+interface GroundParts extends PageParts {
   readonly storage: Storage | undefined;
-  readonly reduced_motion: boolean;
   readonly tour_shown: Signal<TourState>;
   readonly go_to_stop: (index: number) => void;
 }

@@ -28,16 +28,20 @@ import { SharePanel } from './share_panel';
 import type { Toolbar } from './toolbar';
 import { TourView } from './tour_view';
 
-interface GuideParts {
+/** The parts of the page that its larger features share. */
+export interface PageParts {
   readonly view: HTMLElement;
   readonly clock: Clock;
   readonly worker: WorkerClient;
   readonly navigation: Navigation;
   readonly seen: SeenCamera;
   readonly toolbar: Toolbar;
-  readonly notice: Notice;
   readonly token: AccessToken;
   readonly reduced_motion: boolean;
+}
+
+interface GuideParts extends PageParts {
+  readonly notice: Notice;
   readonly media: GuideMedia;
   readonly media_fields: MediaFields;
 }
