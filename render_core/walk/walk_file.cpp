@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <new>
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,7 +23,7 @@ namespace {
 
 struct Header {
   static constexpr std::array<char, 8> right_magic = {'c', 'a', 't', 'g', 's', 'w', 'l', 'k'};
-  static constexpr std::uint32_t right_version = 1;
+  static constexpr std::uint32_t right_version = 2;
 
   std::array<char, 8> magic = right_magic;
   std::uint32_t version = right_version;
@@ -35,12 +36,17 @@ struct Header {
   std::array<float, 3> start{};  // east, north, height; cells
   std::array<std::uint32_t, 2> size{};
   std::uint32_t places = 0;
-  std::uint32_t unpacked_bytes = 0;
-  std::uint32_t packed_bytes = 0;  // the stream, up to the end of the file
+  std::uint32_t tile_side = walk::tile_side;
+  std::uint32_t packed_bytes = 0;  // the index and the tiles, up to the end of the file
   std::uint32_t storeys = 0;
   std::array<Storey, most_storeys> storey{};
 };
 static_assert(sizeof(Storey) == 12 && sizeof(Header) == 320);
+
+/// An entry of the index.
+struct TileBytes {
+  std::uint32_t packed = 0, unpacked = 0;
+};
 
 constexpr std::string_view damaged = "the file is damaged: compute it again";
 
@@ -49,6 +55,27 @@ std::uint32_t checksum_of(std::span<const std::byte> bytes) {
   const std::span rest = bytes.subspan(skipped);
   return static_cast<std::uint32_t>(
       crc32_z(0, reinterpret_cast<const Bytef*>(rest.data()), rest.size()));
+}
+
+/// Calls body(tile, columns) for each tile of a map of `size`, with the indices of its columns.
+template <class Body>
+void each_tile(const glm::ivec2& size, const Body& body) {
+  std::vector<std::size_t> columns;
+  std::size_t tile = 0;
+  for (int south = 0; south < size.y; south += tile_side)
+    for (int west = 0; west < size.x; west += tile_side, ++tile) {
+      columns.clear();
+      for (int y = south; y < std::min(south + tile_side, size.y); ++y)
+        for (int x = west; x < std::min(west + tile_side, size.x); ++x)
+          columns.push_back(static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x) +
+                            static_cast<std::size_t>(x));
+      body(tile, columns);
+    }
+}
+
+std::size_t tiles_in(const glm::ivec2& size) {
+  const glm::ivec2 tiles = (size + tile_side - 1) / tile_side;
+  return static_cast<std::size_t>(tiles.x) * static_cast<std::size_t>(tiles.y);
 }
 
 class Reader {
@@ -64,11 +91,9 @@ class Reader {
     require(header_.version == Header::right_version, "version", "is not known");
     require(header_.checksum == checksum_of(bytes), "checksum", "is wrong");
     read_header();
-    constexpr std::size_t most_growth = 1032;  // of deflate
-    require(header_.packed_bytes == bytes.size() - sizeof header_ &&
-                header_.unpacked_bytes / most_growth <= header_.packed_bytes,
-            "packed bytes", "are not those of the stream");
-    read_places(unpacked(std::span(bytes).subspan(sizeof header_)));
+    require(header_.packed_bytes == bytes.size() - sizeof header_, "packed bytes",
+            "are not those behind the header");
+    read_tiles(std::span(bytes).subspan(sizeof header_));
     const glm::ivec2 start(glm::floor(map_.start.place));
     require(map_.clear_at(start, map_.start.height), "start", "is no clear ground");
     return std::move(map_);
@@ -102,11 +127,9 @@ class Reader {
     require(h.size[0] >= 1 && h.size[0] <= grid_side && h.size[1] >= 1 && h.size[1] <= grid_side,
             "size", "is out of range");
     map_.size = glm::ivec2(h.size[0], h.size[1]);
-    const std::size_t columns = std::size_t{h.size[0]} * h.size[1];
-    require(h.places <= std::min(most_places, columns * most_in_column), "places", "are too many");
-    require(h.unpacked_bytes >= columns + 2 * std::size_t{h.places} &&
-                h.unpacked_bytes <= columns + 4 * std::size_t{h.places},
-            "unpacked bytes", "are not those of the places");
+    require(h.places <= std::min(most_places, columns() * most_in_column), "places",
+            "are too many");
+    require(h.tile_side == walk::tile_side, "tile side", "is not 64");
     require(h.storeys >= 1 && h.storeys <= most_storeys, "storeys", "are not 1 to 16");
     for (std::uint32_t k = 0; k < h.storeys; ++k) {
       const Storey& s = h.storey[k];
@@ -117,40 +140,79 @@ class Reader {
     }
   }
 
-  [[nodiscard]] std::vector<std::byte> unpacked(std::span<const std::byte> packed) const {
-    std::vector<std::byte> bytes(header_.unpacked_bytes);
-    uLongf size = bytes.size();
-    const int result = uncompress(reinterpret_cast<Bytef*>(bytes.data()), &size,
-                                  reinterpret_cast<const Bytef*>(packed.data()), packed.size());
-    require(result == Z_OK && size == bytes.size(), "stream", "cannot be unpacked");
-    return bytes;
+  [[nodiscard]] std::size_t columns() const {
+    return std::size_t{header_.size[0]} * header_.size[1];
   }
 
-  void read_places(std::span<const std::byte> bytes) {
-    const std::size_t columns = std::size_t{header_.size[0]} * header_.size[1];
-    const std::span counts = bytes.first(columns), kinds = bytes.subspan(columns, header_.places);
-    bytes = bytes.subspan(columns + header_.places);
-    map_.first.reserve(columns + 1);
-    map_.first.push_back(0);
-    map_.places.reserve(header_.places);
+  [[nodiscard]] std::vector<std::byte> unpacked(std::span<const std::byte> packed,
+                                                std::size_t bytes) const {
+    constexpr std::size_t most_growth = 1032;  // of deflate
+    require(bytes / most_growth <= packed.size(), "index", "has a tile that is too large");
+    std::vector<std::byte> tile(bytes);
+    uLongf size = bytes;
+    const int result = uncompress(reinterpret_cast<Bytef*>(tile.data()), &size,
+                                  reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+    require(result == Z_OK && size == bytes, "a tile", "cannot be unpacked");
+    return tile;
+  }
+
+  void read_tiles(std::span<const std::byte> bytes) {
+    std::vector<TileBytes> index(tiles_in(map_.size));
+    const std::size_t index_bytes = index.size() * sizeof(TileBytes);
+    require(index_bytes <= bytes.size(), "index", "is cut off");
+    std::memcpy(index.data(), bytes.data(), index_bytes);
+    bytes = bytes.subspan(index_bytes);
+    map_.first.assign(columns() + 1, 0);
+    std::vector<Place> by_tile;
+    by_tile.reserve(header_.places);
+    each_tile(map_.size, [&](std::size_t t, std::span<const std::size_t> columns) {
+      const auto [packed, size] = index[t];
+      if (packed == 0 && size == 0) return;
+      const std::size_t most = columns.size() + 4 * (header_.places - by_tile.size());
+      require(packed <= bytes.size() && size >= columns.size() && size <= most, "index",
+              "has a tile of a wrong size");
+      read_tile(unpacked(bytes.first(packed), size), columns, by_tile);
+      bytes = bytes.subspan(packed);
+    });
+    require(by_tile.size() == header_.places && bytes.empty(), "tiles",
+            "have other places than the file");
+    std::partial_sum(map_.first.begin(), map_.first.end(), map_.first.begin());
+    map_.places.resize(by_tile.size());
+    auto next = by_tile.begin();
+    each_tile(map_.size, [&](std::size_t, std::span<const std::size_t> columns) {
+      for (const std::size_t c : columns)
+        for (std::uint32_t i = map_.first[c]; i < map_.first[c + 1]; ++i) map_.places[i] = *next++;
+    });
+  }
+
+  /// Notes how many places each column has, and appends them to `places`.
+  void read_tile(std::span<const std::byte> bytes, std::span<const std::size_t> columns,
+                 std::vector<Place>& places) {
+    const std::span counts = bytes.first(columns.size());
+    std::size_t count = 0;
+    for (const std::byte in_column : counts) count += static_cast<std::size_t>(in_column);
+    bytes = bytes.subspan(counts.size());
+    require(count <= std::min(bytes.size(), header_.places - places.size()), "a tile",
+            "has too many places");
+    std::span kinds = bytes.first(count);
+    bytes = bytes.subspan(count);
     std::array<int, most_in_column> last{};
-    for (const std::byte count : counts) {
-      const auto in_column = static_cast<std::size_t>(count);
-      require(in_column <= std::min(most_in_column, header_.places - map_.places.size()), "columns",
-              "have other places than the file");
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const auto in_column = static_cast<std::uint32_t>(counts[c]);
+      require(in_column <= most_in_column, "a column", "has too many places");
+      map_.first[columns[c] + 1] = in_column;
       for (std::size_t k = 0; k < in_column; ++k) {
-        const auto kind = static_cast<std::uint8_t>(kinds[map_.places.size()]);
+        const auto kind = static_cast<std::uint8_t>(kinds.front());
+        kinds = kinds.subspan(1);
         last[k] += read_difference(bytes);
         const bool right = kind <= static_cast<std::uint8_t>(Kind::obstacle) && last[k] >= 0 &&
                            last[k] < grid_levels * static_cast<int>(Place::per_cell) &&
                            (k == 0 || last[k] > last[k - 1]);
         require(right, "a place", "is out of range");
-        map_.places.push_back({static_cast<std::uint16_t>(last[k]), static_cast<Kind>(kind)});
+        places.push_back({static_cast<std::uint16_t>(last[k]), static_cast<Kind>(kind)});
       }
-      map_.first.push_back(static_cast<std::uint32_t>(map_.places.size()));
     }
-    require(map_.places.size() == header_.places && bytes.empty(), "columns",
-            "have other places than the file");
+    require(bytes.empty(), "a tile", "has more than its places");
   }
 
   /// Takes a zigzag varint of at most three bytes.
@@ -173,33 +235,47 @@ class Reader {
 
 }  // namespace
 
-std::string stream_of(const WalkMap& map) {
-  std::string counts, kinds, heights;
-  std::array<int, most_in_column> last{};
-  for (std::size_t c = 0; c + 1 < map.first.size(); ++c) {
-    counts.push_back(static_cast<char>(map.first[c + 1] - map.first[c]));
-    for (std::uint32_t i = map.first[c]; i < map.first[c + 1]; ++i) {
-      kinds.push_back(static_cast<char>(map.places[i].kind));
-      const int height = map.places[i].height;
-      const int d = height - std::exchange(last[i - map.first[c]], height);
-      std::uint32_t code = static_cast<std::uint32_t>(d) << 1 ^ (d < 0 ? ~0u : 0u);
-      for (; code >= 128; code >>= 7) heights.push_back(static_cast<char>(code | 128));
-      heights.push_back(static_cast<char>(code));
+std::vector<std::string> tiles_of(const WalkMap& map) {
+  std::vector<std::string> tiles;
+  each_tile(map.size, [&](std::size_t, std::span<const std::size_t> columns) {
+    std::string counts, kinds, heights;
+    std::array<int, most_in_column> last{};
+    for (const std::size_t c : columns) {
+      counts.push_back(static_cast<char>(map.first[c + 1] - map.first[c]));
+      for (std::uint32_t i = map.first[c]; i < map.first[c + 1]; ++i) {
+        kinds.push_back(static_cast<char>(map.places[i].kind));
+        const int height = map.places[i].height;
+        const int d = height - std::exchange(last[i - map.first[c]], height);
+        std::uint32_t code = static_cast<std::uint32_t>(d) << 1 ^ (d < 0 ? ~0u : 0u);
+        for (; code >= 128; code >>= 7) heights.push_back(static_cast<char>(code | 128));
+        heights.push_back(static_cast<char>(code));
+      }
     }
+    tiles.push_back(kinds.empty() ? "" : counts + kinds + heights);
+  });
+  return tiles;
+}
+
+std::string packed_tiles(std::span<const std::string> tiles) {
+  std::string index, streams;
+  for (const std::string& tile : tiles) {
+    uLongf size = tile.empty() ? 0 : compressBound(tile.size());
+    std::string stream(size, '\0');
+    if (!tile.empty() && compress2(reinterpret_cast<Bytef*>(stream.data()), &size,
+                                   reinterpret_cast<const Bytef*>(tile.data()), tile.size(),
+                                   Z_BEST_COMPRESSION) != Z_OK)
+      throw std::bad_alloc();
+    const TileBytes bytes = {static_cast<std::uint32_t>(size),
+                             static_cast<std::uint32_t>(tile.size())};
+    index.append(reinterpret_cast<const char*>(&bytes), sizeof bytes);
+    streams.append(stream, 0, size);
   }
-  return counts + kinds + heights;
+  return index + streams;
 }
 
 std::string pack(const WalkMap& map) {
   assert(map.places.size() <= most_places);
-  const std::string stream = stream_of(map);
-  uLongf size = compressBound(stream.size());
-  std::string bytes(sizeof(Header) + size, '\0');
-  if (compress2(reinterpret_cast<Bytef*>(bytes.data() + sizeof(Header)), &size,
-                reinterpret_cast<const Bytef*>(stream.data()), stream.size(),
-                Z_BEST_COMPRESSION) != Z_OK)
-    throw std::bad_alloc();
-  bytes.resize(sizeof(Header) + size);
+  const std::string tiles = packed_tiles(tiles_of(map));
   Header h;
   std::memcpy(h.origin.data(), &map.grid.origin, sizeof h.origin);
   std::memcpy(h.axes.data(), &map.grid.axes, sizeof h.axes);
@@ -209,12 +285,13 @@ std::string pack(const WalkMap& map) {
   h.start = {map.start.place.x, map.start.place.y, map.start.height};
   h.size = {static_cast<std::uint32_t>(map.size.x), static_cast<std::uint32_t>(map.size.y)};
   h.places = static_cast<std::uint32_t>(map.places.size());
-  h.unpacked_bytes = static_cast<std::uint32_t>(stream.size());
-  h.packed_bytes = static_cast<std::uint32_t>(size);
+  h.packed_bytes = static_cast<std::uint32_t>(tiles.size());
   h.storeys = static_cast<std::uint32_t>(std::min(map.storeys.size(), most_storeys));
   std::copy_n(map.storeys.begin(), h.storeys, h.storey.begin());
   for (std::size_t k = h.storeys; k < map.storeys.size(); ++k)
     h.storey[h.storeys - 1].area += map.storeys[k].area;
+  std::string bytes(sizeof h, '\0');
+  bytes += tiles;
   std::memcpy(bytes.data(), &h, sizeof h);
   h.checksum = checksum_of(std::as_bytes(std::span(bytes)));
   std::memcpy(bytes.data(), &h, sizeof h);

@@ -5,13 +5,13 @@ import type { CameraMode } from '#client/camera/mode';
 import { Dollhouse } from '#client/ground/dollhouse';
 import type { Navigation } from '#client/ui/navigation';
 import { ceiling_cut, dollhouse_eye, is_house } from '#client/walk/dollhouse';
-import { first_of, to_world, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
+import { to_world, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
 import type { WorkerClient } from '#client/worker/client';
 import { camera, expect_vec } from './cameras';
+import { flat_tiles } from './walk_maps';
 
 /** Ground everywhere, in a frame with y down. */
 function map_of(width: number, depth: number, storeys: readonly Storey[]): WalkMap {
-  const counts = new Uint8Array(width * depth).fill(1);
   return {
     origin: [5, 1, -2],
     axes: [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
@@ -21,11 +21,7 @@ function map_of(width: number, depth: number, storeys: readonly Storey[]): WalkM
     chest: 12,
     start: { east: 1, north: 1, height: 10 },
     storeys,
-    width,
-    depth,
-    counts,
-    first: first_of(counts),
-    places: new Uint16Array(width * depth).fill((10 * 16) << 2),
+    tiles: flat_tiles(width, depth, 10, () => true),
   };
 }
 const one: Storey = { low: 0, level: 10, area: 100 };

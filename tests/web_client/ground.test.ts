@@ -166,12 +166,12 @@ describe('pointing at the floor', () => {
   });
 });
 
-describe('a walk to a place', () => {
+describe('a walk to a place', async () => {
   const from = stand_below(map, [-1, 1, eye_m])!;
   const to = stand_below(map, [9, 5, 2.72 + eye_m])!;
   const start: Vec3 = eyes_of(map, from);
   const eye = { position: start, orientation: look_at(start, [-5, 1, eye_m], up), fov_y_rad: 1 };
-  const way = stroll(map, find_path(map, from, to), eye);
+  const way = stroll(map, await find_path(map, from, to), eye);
 
   it('begins with the present view and ends at the place', () => {
     expect_vec(way.at(0).position, start, 5);

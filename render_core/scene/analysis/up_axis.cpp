@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -80,9 +79,10 @@ float floor_size(const std::vector<Facet>& facets, const glm::vec3& up) {
   const glm::vec3 a = perpendicular(up), b = glm::cross(up, a);
   glm::vec3 low, extent;
   std::vector<float> values(facets.size());
-  for (const auto& [k, axis] : {std::pair(0, a), std::pair(1, b), std::pair(2, up)}) {
+  const glm::mat3 axes(a, b, up);
+  for (int k = 0; k < 3; ++k) {
     std::ranges::transform(facets, values.begin(),
-                           [&](const Facet& f) { return glm::dot(f.place, axis); });
+                           [&](const Facet& f) { return glm::dot(f.place, axes[k]); });
     std::ranges::sort(values);
     low[k] = quantile(values, 0.02f);
     extent[k] = std::max(quantile(values, 0.98f) - low[k], 1e-6f);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 
 #include "render_core/walk/walk_file.h"
@@ -15,13 +16,24 @@ void require_clear(const walk::WalkMap& map, const walk::Stand& stand) {
           "a walker stands on clear ground");
 }
 
-/// An input is the header and then the stream as it is before it is packed. Sizes and checksum are
-/// written here.
+constexpr std::size_t length_bytes = 2;
+
+/// An input is the header and then each tile as it is before it is packed, with its length before
+/// it. Sizes and checksum are written here.
 void parse_walk(Bytes input) {
   std::string header = text_of(input.first(std::min(input.size(), test::walk_header_bytes)));
   header.resize(test::walk_header_bytes);
-  const std::string bytes =
-      test::packed(header, text_of(input.subspan(std::min(input.size(), header.size()))));
+  input = input.subspan(std::min(input.size(), header.size()));
+  std::vector<std::string> tiles;
+  while (input.size() >= length_bytes) {
+    std::uint16_t length = 0;
+    std::memcpy(&length, input.data(), length_bytes);
+    input = input.subspan(length_bytes);
+    const std::size_t bytes = std::min<std::size_t>(length, input.size());
+    tiles.push_back(text_of(input.first(bytes)));
+    input = input.subspan(bytes);
+  }
+  const std::string bytes = test::packed(header, tiles);
   const walk::WalkMap map =
       walk::read_walk_file(MemorySource("input", std::as_bytes(std::span(bytes))));
   walk::Stand at = map.start;
@@ -39,7 +51,12 @@ void parse_walk(Bytes input) {
 std::map<std::string, std::string> walk_seeds() {
   using walk::Kind;
   const auto seed = [](const walk::WalkMap& map) {
-    return walk::pack(map).substr(0, test::walk_header_bytes) + walk::stream_of(map);
+    std::string input = walk::pack(map).substr(0, test::walk_header_bytes);
+    for (const std::string& tile : walk::tiles_of(map)) {
+      const auto length = static_cast<std::uint16_t>(tile.size());
+      input.append(reinterpret_cast<const char*>(&length), length_bytes).append(tile);
+    }
+    return input;
   };
   walk::WalkMap storeys = test::hand_made_map({4, 3}, [](int, int) { return Kind::clear; });
   storeys.places.push_back({800, Kind::clear});
@@ -49,6 +66,8 @@ std::map<std::string, std::string> walk_seeds() {
       {"yard",
        seed(test::hand_made_map(
            {8, 5}, [](int x, int y) { return x == 5 && y < 3 ? Kind::obstacle : Kind::clear; }))},
+      {"tiles", seed(test::hand_made_map(
+                    {2, 130}, [](int, int y) { return y < 64 ? Kind::clear : Kind{9}; }))},
       {"storeys", seed(storeys)}};
 }
 

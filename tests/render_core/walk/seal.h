@@ -3,9 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <string>
 
 #include <zlib.h>
+
+#include "render_core/walk/walk_file.h"
 
 namespace catgs::test {
 
@@ -18,16 +21,12 @@ inline void seal(std::string& bytes) {
   std::memcpy(bytes.data() + 12, &sum, sizeof sum);
 }
 
-/// A .walk file of a header and a stream that is not packed yet: sizes and checksum are set.
-inline std::string packed(const std::string& header, const std::string& stream) {
-  uLongf size = compressBound(stream.size());
-  std::string bytes = header + std::string(size, '\0');
-  compress2(reinterpret_cast<Bytef*>(bytes.data() + header.size()), &size,
-            reinterpret_cast<const Bytef*>(stream.data()), stream.size(), 1);
-  bytes.resize(header.size() + size);
-  const std::uint32_t sizes[2] = {static_cast<std::uint32_t>(stream.size()),
-                                  static_cast<std::uint32_t>(size)};
-  std::memcpy(bytes.data() + 116, sizes, sizeof sizes);
+/// A .walk file of a header and tiles that are not packed yet: sizes and checksum are set.
+inline std::string packed(const std::string& header, std::span<const std::string> tiles) {
+  const std::string rest = walk::packed_tiles(tiles);
+  const auto size = static_cast<std::uint32_t>(rest.size());
+  std::string bytes = header + rest;
+  std::memcpy(bytes.data() + 120, &size, sizeof size);
   seal(bytes);
   return bytes;
 }

@@ -52,6 +52,19 @@ TEST(WalkFile, KeepsAMap) {
   EXPECT_EQ(back.storeys[1].area, map.storeys[1].area);
 }
 
+TEST(WalkFile, KeepsAMapOfManyTiles) {
+  const WalkMap map = test::hand_made_map({150, 70}, [](int x, int y) {
+    return x < 64 && y < 64 ? Kind{9} : static_cast<Kind>((x + 3 * y) % 4);
+  });
+  WalkMap there = map;
+  there.start.place = {64.5f, 0.5f};
+  EXPECT_TRUE(tiles_of(map)[0].empty());
+  EXPECT_EQ(tiles_of(map).size(), 6u);
+  const WalkMap back = read(pack(there));
+  EXPECT_EQ(back.first, map.first);
+  EXPECT_EQ(back.places, map.places);
+}
+
 TEST(WalkFile, ARoomTakesFewBytes) {
   const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
   EXPECT_GT(map.places.size(), 4000u);
@@ -79,41 +92,50 @@ TEST(WalkFile, ForgedFieldsAreNamed) {
   EXPECT_THAT(refusal(with(92, nan)), HasSubstr("start"));
   EXPECT_THAT(refusal(with(92, 2000.0f)), AllOf(HasSubstr("start"), HasSubstr("no clear ground")));
   EXPECT_THAT(refusal(with(104, 5000u)), HasSubstr("size"));
-  EXPECT_THAT(refusal(with(104, 2u)), HasSubstr("columns"));
+  EXPECT_THAT(refusal(with(104, 2u)), HasSubstr("a tile"));
   EXPECT_THAT(refusal(with(112, 0xffffffffu)), HasSubstr("places"));
-  EXPECT_THAT(refusal(with(116, 20u)), HasSubstr("stream"));
+  EXPECT_THAT(refusal(with(112, 5u)), HasSubstr("a tile"));
+  EXPECT_THAT(refusal(with(112, 7u)), HasSubstr("tiles"));
+  EXPECT_THAT(refusal(with(116, 20u)), HasSubstr("tile side"));
+  EXPECT_THAT(refusal(with(320, 4u)), HasSubstr("a tile"));
+  EXPECT_THAT(refusal(with(320, 4000u)), HasSubstr("index"));
+  EXPECT_THAT(refusal(with(324, 5u)), HasSubstr("index"));
+  EXPECT_THAT(refusal(with(324, 500u)), HasSubstr("index"));
   EXPECT_THAT(refusal(with(120, 7u)), HasSubstr("packed bytes"));
   EXPECT_THAT(refusal(with(124, 17u)), HasSubstr("storeys"));
   EXPECT_THAT(refusal(with(128, nan)), HasSubstr("storeys"));
 }
 
-TEST(WalkFile, ForgedStreamsAreRefused) {
+TEST(WalkFile, ForgedTilesAreRefused) {
   const WalkMap map = test::hand_made_map({3, 2}, [](int, int) { return Kind::clear; });
   const std::string header = pack(map).substr(0, test::walk_header_bytes);
-  const auto refused = [&](const std::string& stream) {
-    return refusal(test::packed(header, stream));
+  const auto refused = [&](const std::string& tile) {
+    return refusal(test::packed(header, std::span(&tile, 1)));
   };
   // Six columns of one place at height 160, the first one as a varint of two bytes.
   const std::string counts(6, 1), kinds(6, 0),
       heights = std::string("\xc0\x02", 2) + std::string(5, 0);
   EXPECT_EQ(refused(counts + kinds + heights), "");
   EXPECT_THAT(refused(std::string("\6\0\0\0\0\0", 6) + kinds + heights), HasSubstr("a place"));
-  EXPECT_THAT(refused(std::string(6, 2) + kinds + heights), HasSubstr("a place"));
+  EXPECT_THAT(refused(std::string("\2\1\1\1\1\0", 6) + kinds + heights), HasSubstr("a place"));
   EXPECT_THAT(refused(counts + std::string(6, 4) + heights), HasSubstr("a place"));
   EXPECT_THAT(refused(counts + kinds + std::string(7, '\x80')), HasSubstr("heights"));
   EXPECT_THAT(refused(counts + kinds + std::string(7, '\1')), HasSubstr("a place"));
-  EXPECT_THAT(refused(counts + kinds + heights + '\0'), HasSubstr("columns"));
+  EXPECT_THAT(refused(counts + kinds + heights + '\0'), HasSubstr("a tile"));
+  EXPECT_THAT(refused(std::string(6, 65) + kinds + heights), HasSubstr("a tile"));
+  EXPECT_THAT(refused(counts), HasSubstr("a tile"));
+  EXPECT_THAT(refused(""), HasSubstr("tiles"));
 }
 
-/// A header that names much more than its stream can hold costs no memory.
+/// A header and an index that name much more than the tiles can hold cost no memory.
 TEST(WalkFile, NoMoreIsUnpackedThanDeflateCanMake) {
-  std::string bytes = with(104, 2048u);
-  const std::uint32_t size = 2048, places = 1u << 24, unpacked = (1u << 22) + (2u << 24);
-  std::memcpy(bytes.data() + 108, &size, 4);
-  std::memcpy(bytes.data() + 112, &places, 4);
-  std::memcpy(bytes.data() + 116, &unpacked, 4);
+  std::string bytes = with(112, 4096u * 64u);
+  const std::uint32_t side = 64, unpacked = 4096 + 4 * 4096 * 64;
+  std::memcpy(bytes.data() + 104, &side, 4);
+  std::memcpy(bytes.data() + 108, &side, 4);
+  std::memcpy(bytes.data() + 324, &unpacked, 4);
   test::seal(bytes);
-  EXPECT_THAT(refusal(bytes), HasSubstr("packed bytes"));
+  EXPECT_THAT(refusal(bytes), AllOf(HasSubstr("index"), HasSubstr("too large")));
 }
 
 }  // namespace

@@ -394,7 +394,7 @@ TEST(Server, FindsWherePeopleWalkWhenAPageAsks) {
   HttpReply ground = ask();
   EXPECT_EQ(ground.status, 202);
   EXPECT_EQ(ground.headers.at("retry-after"), "3");
-  for (int i = 0; i < 1200 && ground.status == 202; ++i) {
+  for (int i = 0; i < 2400 && ground.status == 202; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     ground = ask();
   }

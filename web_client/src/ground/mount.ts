@@ -42,8 +42,13 @@ export class GroundUse {
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
     navigation.went_back.listen(() => this.house_?.close());
-    navigation.led_away.listen(() => this.house_?.end());
+    navigation.taken_over.listen(() => this.walking_?.stay());
+    navigation.led_away.listen(() => {
+      this.house_?.end();
+      this.walking_?.stay();
+    });
     navigation.mode_chosen.listen(() => {
+      this.walking_?.stay();
       const { mode } = navigation.camera;
       this.house_?.leave();
       navigation.set_mode(mode);
@@ -137,7 +142,7 @@ export class GroundUse {
       parts.navigation.taken_over.emit();
       const before = this.house_?.end();
       if (before) walking.land(stand, before.eye);
-      else walking.go_to(stand);
+      else void walking.go_to(stand);
     };
     this.house_ ??= is_house(map) ? new Dollhouse({ ...parts, go_to }, map) : undefined;
     this.plan_ ??= new PlanPanel(

@@ -6,7 +6,8 @@ import { text } from '../text/text';
 import type { Stop } from '../tour/tour';
 import { by_id, icon, make } from '../ui/dom';
 import { clear_near } from '../walk/map_walker';
-import { cells_per_eye_height, count_at, first_at, height_of, storey_at, to_grid, type Stand, type WalkMap } from '../walk/walk_map';
+import { height_of } from '../walk/tiles';
+import { cells_per_eye_height, places_at, storey_at, to_grid, type Stand, type WalkMap } from '../walk/walk_map';
 import { stand_below } from '../walk/walker';
 import type { Dollhouse } from './dollhouse';
 import { plan_picture, type PlanPicture } from './plan_picture';
@@ -163,10 +164,8 @@ export class PlanPanel {
   private clicked(x: number, y: number): void {
     if (!this.drawn_) return;
     const [east, north] = cells_of(this.drawn_, x, y);
-    const [column, row] = [Math.floor(east), Math.floor(north)];
-    const first = first_at(this.map_, column, row);
-    for (let i = first + count_at(this.map_, column, row) - 1; first >= 0 && i >= first; --i) {
-      const height = height_of(this.map_, i);
+    for (const place of [...places_at(this.map_, Math.floor(east), Math.floor(north))].reverse()) {
+      const height = height_of(place);
       if (storey_at(this.map_, height) !== this.storey_) continue;
       const stand = clear_near(this.map_, { east, north, height });
       if (stand) return this.parts_.go_to(stand);

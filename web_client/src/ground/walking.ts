@@ -34,6 +34,7 @@ export class Walking {
   private readonly ring_ = document.createElementNS(svg, 'polygon');
   private readonly picture_ = document.createElementNS(svg, 'svg');
   private shown_: Stand | undefined; // in the ring
+  private sought_: Stand | undefined; // a way there
   private walks_ = false;
   private eye_: Eye;
   private cancel_announcing_ = (): void => undefined;
@@ -59,26 +60,35 @@ export class Walking {
   /** The visitor has left the scene. */
   end(): void {
     this.stop_.abort();
+    this.stay();
     this.cancel_announcing_();
     this.parts_.navigation.walk_to = undefined;
     this.picture_.remove();
   }
 
-  /** Walks to a place, or flies where the visitor does not walk. Returns whether there is a way. */
-  go_to(to: Stand): boolean {
+  /** Walks to a place, or flies where the visitor does not walk. */
+  async go_to(to: Stand): Promise<void> {
     const { navigation, reduced_motion } = this.parts_;
     const eye = navigation.eye;
     if (navigation.camera.mode !== 'walk') {
       const position = eyes_of(this.map, to);
       const duration_s = reduced_motion ? 0 : Math.min(flight_s, length(sub(position, eye.position)) / this.walker.eye_height);
       this.travel(glide(eye, { ...eye, position }, duration_s));
-      return true;
+      return;
     }
-    const path = find_path(this.map, this.walker.stand_at(eye.position), to);
-    if (path.length === 0) return false;
-    const way = stroll(this.map, path, eye);
+    this.sought_ = to;
+    const path = await find_path(this.map, this.walker.stand_at(eye.position), to);
+    if (this.sought_ !== to || path.length === 0) return; // no flight through walls either
+    const way = stroll(this.map, path, navigation.eye);
     this.travel(reduced_motion ? { duration_s: 0, at: () => way.at(way.duration_s) } : way);
-    return true;
+    if (reduced_motion) return;
+    this.walks_ = true;
+    this.show(to);
+  }
+
+  /** The visitor wants something else now. */
+  stay(): void {
+    this.sought_ = undefined;
   }
 
   /** Flies down to a place, and looks level along the heading of `before`. */
@@ -97,9 +107,7 @@ export class Walking {
     if (!to) return false;
     if (again) return true; // the first of two clicks leads there
     this.parts_.navigation.taken_over.emit();
-    if (!this.go_to(to)) return true; // there is no way, and no flight through walls either
-    this.walks_ = !this.parts_.reduced_motion;
-    this.show(to);
+    void this.go_to(to);
     return true;
   }
 

@@ -1,7 +1,7 @@
 // A storey as a dollhouse: seen from outside, without its ceiling. Pure.
 import { add, dot, look_at, scale, sub, type Vec3 } from '../base/vector';
 import type { ClipPlane, Eye } from '../camera/eye';
-import { count_at, to_world, type WalkMap } from './walk_map';
+import { block_around, to_world, type WalkMap } from './walk_map';
 
 const house_cells = 640; // 64 m for people of 1.6 m; what is larger is a landscape
 const cut_cells = 20; // above the floor: higher than doors' handles, lower than ceilings
@@ -10,8 +10,8 @@ const pitch_rad = (52 * Math.PI) / 180;
 const margin = 1.1;
 
 /** Whether a scene is a house: small, or with storeys. */
-export const is_house = ({ storeys, width, depth }: WalkMap): boolean =>
-  storeys.length > 1 || (storeys.length > 0 && Math.max(width, depth) <= house_cells);
+export const is_house = ({ storeys, tiles }: WalkMap): boolean =>
+  storeys.length > 1 || (storeys.length > 0 && Math.max(tiles.width, tiles.depth) <= house_cells);
 
 /** Cuts off all above a storey. */
 export function ceiling_cut({ storeys, origin, axes, cell }: WalkMap, storey: number): ClipPlane {
@@ -23,15 +23,7 @@ export function ceiling_cut({ storeys, origin, axes, cell }: WalkMap, storey: nu
 
 /** The middle of the map's ground at a storey's level, and the radius of a circle around all of it. World units. */
 function extent(map: WalkMap, storey: number): { middle: Vec3; radius: number } {
-  let [west, south, east, north] = [map.width, map.depth, 0, 0];
-  for (let row = 0; row < map.depth; ++row)
-    for (let column = 0; column < map.width; ++column)
-      if (count_at(map, column, row) > 0) {
-        west = Math.min(west, column);
-        east = Math.max(east, column + 1);
-        south = Math.min(south, row);
-        north = Math.max(north, row + 1);
-      }
+  const { west, south, east, north } = block_around(map, () => true)!; // the start is ground
   const middle = { east: (west + east) / 2, north: (south + north) / 2, height: map.storeys[storey]!.level };
   return { middle: to_world(map, middle), radius: (Math.hypot(east - west, north - south) / 2) * map.cell };
 }

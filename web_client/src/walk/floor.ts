@@ -2,7 +2,8 @@
 import { dot } from '../base/vector';
 import type { Ray } from '../camera/ray';
 import { clear_near } from './map_walker';
-import { clear_at, count_at, first_at, height_of, Kind, kind_of, to_grid, type Stand, type WalkMap } from './walk_map';
+import { height_of, Kind, kind_of } from './tiles';
+import { places_at, to_grid, type Stand, type WalkMap } from './walk_map';
 
 const farthest_cells = 1200;
 const before_wall_cells = 24; // as far as a place before a wall is looked for
@@ -11,11 +12,10 @@ const furniture_cells = 8;
 
 /** What a ray meets between two heights of a column: its ground, or something in the way. */
 function met_in(map: WalkMap, column: number, row: number, low: number, high: number): number | 'blocked' | undefined {
-  const first = first_at(map, column, row);
-  const end = first + count_at(map, column, row);
-  for (let i = end - 1; first >= 0 && i >= first; --i) {
-    const height = height_of(map, i);
-    const kind = kind_of(map, i);
+  const places = places_at(map, column, row);
+  for (let i = places.length - 1; i >= 0; --i) {
+    const height = height_of(places[i]!);
+    const kind = kind_of(places[i]!);
     if (kind === Kind.clear || kind === Kind.near) {
       if (low <= height && high >= height - map.step) return height;
     } else if (low <= height + (kind === Kind.obstacle ? wall_cells : furniture_cells) && high >= height) {
@@ -67,8 +67,6 @@ export function floor_along(map: WalkMap, ray: Ray): Stand | undefined {
 }
 
 function clear_below(map: WalkMap, column: number, row: number, height: number): number | undefined {
-  const first = first_at(map, column, row);
-  for (let i = first + count_at(map, column, row) - 1; first >= 0 && i >= first; --i)
-    if (height_of(map, i) <= height) return clear_at(map, column, row, height_of(map, i)) === i ? height_of(map, i) : undefined;
-  return undefined;
+  const place = places_at(map, column, row).findLast((at) => height_of(at) <= height);
+  return place !== undefined && kind_of(place) === Kind.clear ? height_of(place) : undefined;
 }

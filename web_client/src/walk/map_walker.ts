@@ -1,7 +1,8 @@
 // A visitor who walks on a WalkMap.
 import { dot, scale, add, type Vec3 } from '../base/vector';
 import type { Ground } from '../camera/ground';
-import { cells_per_eye_height, clear_at, eyes_of, height_of, type Stand, type WalkMap } from './walk_map';
+import { height_of } from './tiles';
+import { cells_per_eye_height, clear_at, eyes_of, type Stand, type WalkMap } from './walk_map';
 import { move, stand_below } from './walker';
 
 const farthest_cells = 96;
@@ -39,7 +40,7 @@ export function clear_near(map: WalkMap, stand: Stand, most_cells = 8): Stand | 
       const place = clear_at(map, column + x, row + y, stand.height);
       if (place < 0) continue;
       nearest = distance;
-      const height = height_of(map, place);
+      const height = height_of(place);
       best = distance === 0 ? { ...stand, height } : { east: column + x + 0.5, north: row + y + 0.5, height };
     }
   return best;

@@ -1,21 +1,15 @@
 // The ground of a scene on which a visitor can walk: a `.walk` file (render_core/walk/walk_file.h).
-import { Breaths } from '../base/breaths';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
+import { column_in_tile, height_of, Kind, kind_of, PackedTiles, require, tile_at, tile_side, type Tiles } from './tiles';
 
 const header_bytes = 320;
-const most_in_column = 64;
 const most_side = 2048;
 const most_places = 2 ** 24;
 const most_storeys = 16;
 const most_levels = 1024; // cells
 const most_person_cells = 160;
 const most_bytes = 2 ** 27; // of a file
-const most_growth = 1032; // of deflate
-const per_cell = 16; // units of a stored height
 export const cells_per_eye_height = 16;
-
-/** What a column has at a height: `clear` ground has room for a body all around. */
-export const Kind = { clear: 0, near: 1, low: 2, obstacle: 3 } as const;
 
 /** Where a walker stands: east, north and height of the ground, in cells. */
 export interface Stand {
@@ -40,24 +34,7 @@ export interface WalkMap {
   readonly chest: number; // cells; what is lower is furniture, not a wall
   readonly start: Stand;
   readonly storeys: readonly Storey[]; // from below
-  readonly width: number; // columns to the east
-  readonly depth: number; // rows to the north
-  readonly counts: Uint8Array; // places of each column, row by row
-  readonly first: Uint32Array; // index of the first place of each block of columns
-  readonly places: Uint16Array; // height << 2 | kind; the places of a column ascend
-}
-
-const block = 16; // columns
-
-/** The index of columns with so many places. */
-export function first_of(counts: Uint8Array): Uint32Array {
-  const first = new Uint32Array(Math.ceil(counts.length / block));
-  let sum = 0;
-  for (let c = 0; c < counts.length; ++c) {
-    if (c % block === 0) first[c / block] = sum;
-    sum += counts[c]!;
-  }
-  return first;
+  readonly tiles: Tiles; // its columns, to the east, and its rows, to the north
 }
 
 export const to_grid = (map: WalkMap, place: Vec3): Vec3 => {
@@ -85,33 +62,64 @@ export function storey_at(map: WalkMap, height: number): number {
   return storey;
 }
 
-export const height_of = (map: WalkMap, place: number): number => (map.places[place]! >> 2) / per_cell;
-export const kind_of = (map: WalkMap, place: number): number => map.places[place]! & 3;
+const holds = ({ width, depth }: Tiles, column: number, row: number): boolean =>
+  column >= 0 && row >= 0 && column < width && row < depth;
 
-/** The first place of a column; -1 outside of the map. Further ones follow, `count_at` in all. */
-export function first_at(map: WalkMap, column: number, row: number): number {
-  if (!(column >= 0 && row >= 0 && column < map.width && row < map.depth)) return -1;
-  const c = row * map.width + column;
-  let place = map.first[(c / block) | 0]!;
-  for (let k = c - (c % block); k < c; ++k) place += map.counts[k]!;
-  return place;
+/** The places of a column ascend. Outside of the map there are none. */
+export function places_at({ tiles }: WalkMap, column: number, row: number): Uint16Array {
+  if (!holds(tiles, column, row)) return no_places;
+  const { first, places } = tiles.at(tile_at(tiles, column, row));
+  const c = column_in_tile(tiles, column, row);
+  return places.subarray(first[c], first[c + 1]);
 }
-
-export const count_at = (map: WalkMap, column: number, row: number): number =>
-  column >= 0 && column < map.width ? (map.counts[row * map.width + column] ?? 0) : 0;
+const no_places = new Uint16Array(0);
 
 /** The clear ground of a column within a step of `height`; -1 where there is none. */
-export function clear_at(map: WalkMap, column: number, row: number, height: number): number {
-  const first = first_at(map, column, row);
-  if (first < 0) return -1;
-  const end = first + map.counts[row * map.width + column]!;
-  for (let i = first; i < end; ++i)
-    if (kind_of(map, i) === Kind.clear && Math.abs(height_of(map, i) - height) <= map.step) return i;
+export function clear_at({ tiles, step }: WalkMap, column: number, row: number, height: number): number {
+  if (!holds(tiles, column, row)) return -1;
+  const { first, places } = tiles.at(tile_at(tiles, column, row));
+  const c = column_in_tile(tiles, column, row);
+  const i = clear_in(places, first[c]!, first[c + 1]!, height, step);
+  return i < 0 ? -1 : places[i]!;
+}
+
+/** The index of the clear ground within a step of `height` among the places of a column; -1 where there is none. */
+export function clear_in(places: Uint16Array, begin: number, end: number, height: number, step: number): number {
+  for (let i = begin; i < end; ++i)
+    if (kind_of(places[i]!) === Kind.clear && Math.abs(height_of(places[i]!) - height) <= step) return i;
   return -1;
 }
 
-function require(right: boolean, field: string): void {
-  if (!right) throw new Error(`walk file: ${field} is out of range`);
+/** A part of a map: columns from `west` up to `east`, rows from `south` up to `north`. */
+export interface Block {
+  readonly west: number;
+  readonly south: number;
+  readonly east: number;
+  readonly north: number;
+}
+
+/** The parts of a map that have places, of one tile each. */
+export function* blocks({ tiles }: WalkMap): Generator<Block> {
+  const { width, depth } = tiles;
+  for (let south = 0; south < depth; south += tile_side)
+    for (let west = 0; west < width; west += tile_side)
+      if (tiles.has(tile_at(tiles, west, south)))
+        yield { west, south, east: Math.min(west + tile_side, width), north: Math.min(south + tile_side, depth) };
+}
+
+/** The smallest block around the columns with such places; undefined: there are none. */
+export function block_around(map: WalkMap, such: (place: number) => boolean): Block | undefined {
+  let [west, south, east, north] = [Infinity, Infinity, 0, 0];
+  for (const block of blocks(map)) {
+    if (block.west >= west && block.south >= south && block.east <= east && block.north <= north) continue;
+    for (let row = block.south; row < block.north; ++row)
+      for (let column = block.west; column < block.east; ++column) {
+        if (!places_at(map, column, row).some(such)) continue;
+        [west, south] = [Math.min(west, column), Math.min(south, row)];
+        [east, north] = [Math.max(east, column + 1), Math.max(north, row + 1)];
+      }
+  }
+  return east > 0 ? { west, south, east, north } : undefined;
 }
 
 /** CRC-32 of ISO 3309, four bits at a time. */
@@ -130,34 +138,21 @@ function crc32(bytes: Uint8Array): number {
   return ~crc >>> 0;
 }
 
-async function unpacked(packed: Uint8Array<ArrayBuffer>, bytes: number): Promise<Uint8Array> {
-  const out = new Uint8Array(bytes);
-  let at = 0;
-  const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate')).getReader();
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    require(at + part.value.length <= bytes, 'stream');
-    out.set(part.value, at);
-    at += part.value.length;
-  }
-  require(at === bytes, 'stream');
-  return out;
-}
-
 /** Throws an Error that names the field that is wrong. */
-export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
+export function read_walk_file(file: ArrayBuffer): WalkMap {
   require(file.byteLength > header_bytes && file.byteLength <= most_bytes, 'length');
   const view = new DataView(file);
   const word = (at: number): number => view.getUint32(at, true);
   const float = (at: number): number => view.getFloat32(at, true);
   const triple = (at: number): Vec3 => [float(at), float(at + 4), float(at + 8)];
   const magic = String.fromCharCode(...new Uint8Array(file, 0, 8));
-  require(magic === 'catgswlk' && word(8) === 1, 'version');
+  require(magic === 'catgswlk' && word(8) === 2, 'version');
   require(crc32(new Uint8Array(file, 16)) === word(12), 'checksum');
-  const [width, depth, count, bytes] = [word(104), word(108), word(112), word(116)];
+  const [width, depth] = [word(104), word(108)];
   require(width >= 1 && width <= most_side && depth >= 1 && depth <= most_side, 'size');
-  require(count <= most_places, 'places');
-  require(bytes <= most_growth * file.byteLength && bytes <= width * depth + 4 * count, 'unpacked');
-  require(bytes >= width * depth + 2 * count, 'unpacked');
+  require(word(112) <= most_places, 'places');
+  require(word(116) === tile_side, 'tile side');
+  require(word(120) === file.byteLength - header_bytes, 'packed bytes');
   const map: WalkMap = {
     origin: triple(16),
     axes: [triple(28), triple(40), triple(52)],
@@ -167,9 +162,7 @@ export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
     chest: float(84) * cells_per_eye_height,
     start: { east: float(92), north: float(96), height: float(100) },
     storeys: read_storeys(word(124), (k) => triple(128 + 12 * k), word),
-    width,
-    depth,
-    ...(await read_places(await unpacked(new Uint8Array(file, header_bytes), bytes), width * depth, count)),
+    tiles: new PackedTiles(width, depth, word(112), new Uint8Array(file, header_bytes)),
   };
   require_sound(map);
   return map;
@@ -201,39 +194,4 @@ function require_sound(map: WalkMap): void {
     'storeys',
   );
   require(clear_at(map, Math.floor(start.east), Math.floor(start.north), start.height) >= 0, 'start');
-}
-
-async function read_places(
-  bytes: Uint8Array,
-  columns: number,
-  count: number,
-): Promise<Pick<WalkMap, 'counts' | 'first' | 'places'>> {
-  const counts = bytes.slice(0, columns);
-  const places = new Uint16Array(count);
-  const last = new Int32Array(most_in_column); // by rank in a column
-  let at = columns + count;
-  let place = 0;
-  const breaths = new Breaths();
-  for (let c = 0; c < columns; ++c) {
-    if (c % 4096 === 0) await breaths.take();
-    const in_column = counts[c]!;
-    require(in_column <= most_in_column && place + in_column <= count, 'columns');
-    for (let k = 0; k < in_column; ++k, ++place) {
-      let code = 0;
-      for (let shift = 0, more = true; more; shift += 7) {
-        require(at < bytes.length && shift < 21, 'heights');
-        const byte = bytes[at++]!;
-        code |= (byte & 127) << shift;
-        more = byte >= 128;
-      }
-      const height = last[k]! + ((code >> 1) ^ -(code & 1));
-      const kind = bytes[columns + place]!;
-      require(height >= 0 && height < most_levels * per_cell && kind <= 3, 'a place');
-      require(k === 0 || height > last[k - 1]!, 'a place');
-      places[place] = (height << 2) | kind;
-      last[k] = height;
-    }
-  }
-  require(place === count && at === bytes.length, 'columns');
-  return { counts, first: first_of(counts), places };
 }

@@ -1,6 +1,7 @@
 // A body that walks on a WalkMap: the same steps as render_core/walk/walker.h, which is its oracle.
 import type { Vec3 } from '../base/vector';
-import { clear_at, count_at, first_at, height_of, Kind, kind_of, to_grid, type Stand, type WalkMap } from './walk_map';
+import { height_of, Kind, kind_of } from './tiles';
+import { clear_at, places_at, to_grid, type Stand, type WalkMap } from './walk_map';
 
 const piece = 0.4; // cells; a body moves by at most this much at a time
 const most_pieces = 25_000;
@@ -10,12 +11,12 @@ const aside = [0, 1, -1, 2, -2, 3, -3].map((k) => (k * Math.PI) / 8);
 export function ground_at(map: WalkMap, east: number, north: number, height: number): number | undefined {
   const here = clear_at(map, Math.floor(east), Math.floor(north), height);
   if (here < 0) return undefined;
-  const own = height_of(map, here);
+  const own = height_of(here);
   const column = Math.floor(east - 0.5);
   const row = Math.floor(north - 0.5);
   const at = (x: number, y: number): number => {
     const found = clear_at(map, column + x, row + y, own);
-    return found < 0 ? own : height_of(map, found);
+    return found < 0 ? own : height_of(found);
   };
   const mix = (a: number, b: number, share: number): number => a + (b - a) * share;
   const x = east - 0.5 - column;
@@ -31,25 +32,22 @@ function try_piece(map: WalkMap, from: Stand, x: number, y: number): Stand | und
   if (ground < 0) return undefined;
   if (here[0] !== there[0] && here[1] !== there[1]) {
     // Two cells that touch in a corner alone: the body passes through one of those beside them.
-    const height = height_of(map, ground);
+    const height = height_of(ground);
     ground = clear_at(map, there[0], here[1], height);
     if (ground < 0) ground = clear_at(map, here[0], there[1], height);
     if (ground < 0) return undefined;
   }
-  const height = ground_at(map, east, north, height_of(map, ground));
+  const height = ground_at(map, east, north, height_of(ground));
   return height === undefined ? undefined : { east, north, height };
 }
 
 /** The clear ground below a place of the world, where a visitor would come to stand. */
 export function stand_below(map: WalkMap, place: Vec3): Stand | undefined {
   const [east, north, height] = to_grid(map, place);
-  const [column, row] = [Math.floor(east), Math.floor(north)];
-  const first = first_at(map, column, row);
-  let stand: Stand | undefined;
-  for (let i = first; first >= 0 && i < first + count_at(map, column, row); ++i)
-    if (kind_of(map, i) === Kind.clear && height_of(map, i) <= height + map.step)
-      stand = { east, north, height: height_of(map, i) };
-  return stand;
+  const below = places_at(map, Math.floor(east), Math.floor(north)).findLast(
+    (at) => kind_of(at) === Kind.clear && height_of(at) <= height + map.step,
+  );
+  return below === undefined ? undefined : { east, north, height: height_of(below) };
 }
 
 /** Where a walker comes that wants to move by (x, y) cells to the east and north; it slides along walls. */
