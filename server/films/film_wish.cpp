@@ -24,41 +24,44 @@ FilmKind read_kind(const JsonField& field) {
   const std::string name = field.text();
   for (std::size_t i = 0; i < kind_names.size(); ++i)
     if (kind_names[i] == name) return static_cast<FilmKind>(i);
-  field.fail("is no kind", fmt::format("known are {}", fmt::join(kind_names, ", ")));
+  field.fail("is no kind of film", fmt::format("write {}", fmt::join(kind_names, ", ")));
 }
 
 glm::ivec2 read_size(const JsonField& field, FilmKind kind) {
-  if (field.size() != 2) field.fail("is not width and height");
+  if (field.size() != 2) field.fail("is not width and height", "two numbers, like [1280, 720]");
   const glm::ivec2 most = largest_px[static_cast<std::size_t>(kind)];
   glm::ivec2 size_px{0};
   for (int i = 0; i < 2; ++i) {
     const std::uint64_t side = field[static_cast<std::size_t>(i)].count();
     if (side < least_side_px || side > static_cast<std::uint64_t>(most[i]))
       field.fail(
-          fmt::format("is not in {}x{}…{}x{}", least_side_px, least_side_px, most.x, most.y));
+          fmt::format("is not between {0}x{0} and {1}x{2} pixels", least_side_px, most.x, most.y),
+          fmt::format("a {} has no other size", kind_names[static_cast<std::size_t>(kind)]));
     size_px[i] = static_cast<int>(side);
   }
   if (kind == FilmKind::panorama && size_px.x != 2 * size_px.y)
-    field.fail("is not twice as wide as high");
+    field.fail("is not twice as wide as high", "a panorama is, like [4096, 2048]");
   if (kind == FilmKind::film && (size_px.x % 2 != 0 || size_px.y % 2 != 0))
-    field.fail("has an odd side");
+    field.fail("has an odd side", "a film has an even width and height");
   return size_px;
 }
 
 FilmView read_view(const JsonField& field, const FilmView* before) {
-  const std::size_t count = field.size();
-  if (count != 8 && !(count == 7 && before)) field.fail("is not x, y, z, qx, qy, qz, qw, fov_deg");
+  const std::size_t count = field.value().is_array() ? field.size() : 0;
+  if (count != 8 && !(count == 7 && before))
+    field.fail("is not [x, y, z, qx, qy, qz, qw, fov_deg]",
+               "only after the first view, fov_deg may be left out, or a whole number may repeat "
+               "the view before");
   const auto number = [&](std::size_t i) { return field[i].number(); };
   FilmView view;
   view.world_from_camera.position = field.as_place({number(0), number(1), number(2)});
-  const glm::quat orientation(number(6), number(3), number(4), number(5));
-  const float norm = glm::length(orientation);
-  if (!(norm > 0.9f && norm < 1.1f)) field.fail("has no unit quaternion");
-  view.world_from_camera.orientation = orientation / norm;
+  view.world_from_camera.orientation =
+      field.as_orientation({number(6), number(3), number(4), number(5)});
   if (count == 7) {
     view.fov_y_rad = before->fov_y_rad;
   } else {
-    if (!(number(7) >= 5.0f && number(7) <= 160.0f)) field.fail("has a field of view beyond 5…160");
+    if (!(number(7) >= 5.0f && number(7) <= 160.0f))
+      field.fail("has a field of view that is not between 5 and 160 degrees");
     view.fov_y_rad = glm::radians(number(7));
   }
   return view;
@@ -76,7 +79,9 @@ FilmWish parse_film_wish(std::string_view json) {
   const JsonField views = root.at("views");
   const std::size_t most = wish.kind == FilmKind::film ? most_film_frames : 1;
   const auto check_count = [&](std::size_t more) {
-    if (more > most - wish.views.size()) views.fail(fmt::format("has more than {} views", most));
+    if (more > most - wish.views.size())
+      views.fail(fmt::format("has more than {} view{}", most, most > 1 ? "s" : ""),
+                 most > 1 ? "a film lasts ten minutes at most" : "only a film has several");
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const JsonField entry = views[i];
@@ -90,7 +95,7 @@ FilmWish parse_film_wish(std::string_view json) {
       wish.views.push_back(read_view(entry, before));
     }
   }
-  if (wish.views.empty()) views.fail("is empty");
+  if (wish.views.empty()) views.fail("is empty", "give at least one view");
   return wish;
 }
 

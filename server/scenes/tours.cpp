@@ -167,10 +167,13 @@ void check_sound(const JsonField& sound, const Origins& origins) {
 
 void check_view(const JsonField& view) {
   static_cast<void>(view.at("position").place());
-  if (const auto target = view.find("look_at"))
+  const auto target = view.find("look_at"), orientation = view.find("orientation");
+  if (target)
     static_cast<void>(target->place());
+  else if (orientation)
+    static_cast<void>(orientation->orientation());
   else
-    static_cast<void>(view.at("orientation").orientation());
+    view.fail("'look_at' or 'orientation' is missing", "a place, or a quaternion x, y, z, w");
   check_number(view.find("fov_deg"), 5.0f, 160.0f);
 }
 

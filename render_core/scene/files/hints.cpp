@@ -40,8 +40,10 @@ Sidecar::StartPose parse_start_pose(const JsonField& field) {
     if (field.find("orientation")) field.fail("has both 'look_at' and 'orientation'", "keep one");
     pose.look_at = target->place();
     if (*pose.look_at == pose.position) target->fail("is the position itself");
+  } else if (const auto orientation = field.find("orientation")) {
+    pose.orientation = orientation->orientation();
   } else {
-    pose.orientation = field.at("orientation").orientation();
+    field.fail("'look_at' or 'orientation' is missing", "a place, or a quaternion x, y, z, w");
   }
   return pose;
 }

@@ -115,7 +115,7 @@ float JsonField::number() const {
 }
 
 std::uint64_t JsonField::count() const {
-  if (!value_->is_number_unsigned()) fail("is not a count");
+  if (!value_->is_number_unsigned()) fail("is not a whole number from 0 on");
   return value_->get<std::uint64_t>();
 }
 
@@ -134,9 +134,13 @@ std::vector<float> JsonField::numbers(std::size_t expected_size) const {
 
 glm::quat JsonField::orientation() const {
   const std::vector<float> q = numbers(4);
-  const glm::quat orientation(q[3], q[0], q[1], q[2]);
-  if (std::abs(glm::length(orientation) - 1.0f) > 0.01f) fail("is no unit quaternion x, y, z, w");
-  return glm::normalize(orientation);
+  return as_orientation({q[3], q[0], q[1], q[2]});
+}
+
+glm::quat JsonField::as_orientation(const glm::quat& q) const {
+  if (std::abs(glm::length(q) - 1.0f) > 0.01f)
+    fail("its quaternion x, y, z, w does not have length 1");
+  return glm::normalize(q);
 }
 
 glm::vec3 JsonField::vec3() const {

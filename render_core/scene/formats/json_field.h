@@ -48,6 +48,8 @@ class JsonField {
   [[nodiscard]] glm::vec3 as_place(const glm::vec3& at) const;
   /// A unit quaternion x, y, z, w, to one percent; normalised.
   [[nodiscard]] glm::quat orientation() const;
+  /// The same for a quaternion that this field stores in another form.
+  [[nodiscard]] glm::quat as_orientation(const glm::quat& q) const;
   [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
 
   /// Numbers of double precision, each finite as a float too.

@@ -178,7 +178,7 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   EXPECT_EQ(mistake(caption(16'000)), "");
   EXPECT_THAT(mistake(caption(16'001)), HasSubstr("caption: has more than"));
   EXPECT_THAT(mistake(R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})"),
-              HasSubstr("'orientation' is missing"));
+              HasSubstr("stops[0]: 'look_at' or 'orientation' is missing"));
   const auto turned = [](const char* orientation) {
     return fmt::format(
         R"({{"tours": [{{"stops": [{{"position": [0, 0, 0], "orientation": {}}}]}}]}})",
@@ -186,7 +186,7 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   };
   EXPECT_EQ(mistake(turned("[0, 0, 0.995, 0]")), "") << "pages round them";
   EXPECT_THAT(mistake(turned("[0, 0, 0, 0]")),
-              HasSubstr("tours[0].stops[0].orientation: is no unit quaternion"));
+              HasSubstr("tours[0].stops[0].orientation: its quaternion"));
   const auto tours = [](std::size_t count) {
     const std::vector<std::string> all(count, R"({"stops": []})");
     return fmt::format(R"({{"tours": [{}]}})", fmt::join(all, ","));

@@ -93,7 +93,7 @@ TEST(Sidecar, ErrorsNameTheField) {
   EXPECT_THAT(error(R"({"focus": [1, 2, "c"]})"), HasSubstr("focus[2]: is not a number"));
   EXPECT_THAT(error(R"({"limits": {"min": [0, 0, 0], "max": [1, 0, 1]}})"), HasSubstr("limits"));
   EXPECT_THAT(error(R"({"start_pose": {"position": [0, 0, 0]}})"),
-              HasSubstr("start_pose: 'orientation' is missing"));
+              HasSubstr("start_pose: 'look_at' or 'orientation' is missing"));
   EXPECT_THAT(error(R"({"start_pose": {"position": [0, 0, 0], "orientation": [1, 1, 1, 1]}})"),
               HasSubstr("start_pose.orientation"));
 }

@@ -132,7 +132,7 @@ TEST(Sog, ErrorsNameTheField) {
   EXPECT_THAT(error([](Json& m) { m["version"] = 3; }),
               HasSubstr("scene.sog/meta.json: version: is not supported"));
   EXPECT_THAT(error([](Json& m) { m.erase("count"); }), HasSubstr("'count' is missing"));
-  EXPECT_THAT(error([](Json& m) { m["count"] = -4; }), HasSubstr("count: is not a count"));
+  EXPECT_THAT(error([](Json& m) { m["count"] = -4; }), HasSubstr("count: is not a whole number"));
   EXPECT_THAT(error([](Json& m) { m["means"]["mins"] = {1, 2}; }), HasSubstr("means.mins"));
   EXPECT_THAT(error([](Json& m) { m["means"]["maxs"][1] = "a"; }), HasSubstr("means.maxs[1]"));
   EXPECT_THAT(error([](Json& m) { m["scales"]["codebook"].erase(3); }),
