@@ -12,7 +12,6 @@
 
 namespace catgs {
 
-inline constexpr std::string_view media_folder_extension = ".media";
 inline constexpr std::size_t max_media_files = 256;  // of a scene
 inline constexpr std::uint64_t max_media_folder_bytes = std::uint64_t{1} << 30;
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <string>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -13,45 +12,10 @@ namespace catgs {
 namespace {
 
 using namespace std::string_view_literals;
-
-constexpr MediaType jpeg{"image/jpeg", MediaKind::image};
-constexpr MediaType png{"image/png", MediaKind::image};
-constexpr MediaType webp{"image/webp", MediaKind::image};
-constexpr MediaType mp4{"video/mp4", MediaKind::video};
-constexpr MediaType webm{"video/webm", MediaKind::video};
-constexpr MediaType mp3{"audio/mpeg", MediaKind::audio};
-constexpr MediaType m4a{"audio/mp4", MediaKind::audio};
-constexpr MediaType ogg{"audio/ogg", MediaKind::audio};
-constexpr MediaType wav{"audio/wav", MediaKind::audio};
-constexpr MediaType vtt{"text/vtt; charset=utf-8", MediaKind::captions};
-
-constexpr std::array<std::pair<std::string_view, const MediaType*>, 11> extensions = {
-    {{"jpg", &jpeg},
-     {"jpeg", &jpeg},
-     {"png", &png},
-     {"webp", &webp},
-     {"mp4", &mp4},
-     {"webm", &webm},
-     {"mp3", &mp3},
-     {"m4a", &m4a},
-     {"ogg", &ogg},
-     {"wav", &wav},
-     {"vtt", &vtt}}};
+using namespace media_types;
 
 constexpr std::string_view formats =
     "tours take JPEG, PNG, WebP, MP4, WebM, MP3, M4A, Ogg, WAV and WebVTT";
-
-/// The format that a name promises; null: none.
-const MediaType* type_named(std::string_view name) {
-  const auto dot = name.rfind('.');
-  if (dot == name.npos) return nullptr;
-  std::string extension(name.substr(dot + 1));
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  const auto found =
-      std::ranges::find(extensions, extension, [](const auto& e) { return e.first; });
-  return found == extensions.end() ? nullptr : found->second;
-}
 
 /// An unsigned number of `count` bytes at `at`, which must be there.
 std::uint32_t big_endian(std::string_view bytes, std::size_t at, std::size_t count) {
@@ -182,20 +146,6 @@ const MediaType* media_type_of(std::string_view head) {
   return is_mp3(head) ? &mp3 : nullptr;
 }
 
-bool is_media_name(std::string_view name) {
-  constexpr std::size_t max_name_bytes = 100;
-  return !name.empty() && name.size() <= max_name_bytes && name.front() != '.' &&
-         std::ranges::all_of(name, [](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                  c == '.' || c == '_' || c == '-';
-         });
-}
-
-std::optional<MediaKind> media_kind_named(std::string_view name) {
-  const MediaType* type = type_named(name);
-  return type ? std::optional(type->kind) : std::nullopt;
-}
-
 std::optional<PixelSize> image_size(std::string_view content) {
   const MediaType* type = media_type_of(content);
   if (type == &jpeg) return jpeg_size(content);
@@ -211,7 +161,7 @@ void check_media(std::string_view name, std::string_view content) {
   if (content.size() > max_media_bytes)
     throw InputError(file, {}, fmt::format("is larger than {} MiB", max_media_bytes >> 20),
                      "save it at a lower quality");
-  const MediaType* named = type_named(name);
+  const MediaType* named = media_type_named(name);
   const MediaType* type = media_type_of(content.substr(0, media_head_bytes));
   if (!named || !type) throw InputError(file, {}, "is of no format that is shown here", formats);
   if (!same_format(named, type))

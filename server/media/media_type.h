@@ -4,15 +4,9 @@
 #include <optional>
 #include <string_view>
 
+#include "render_core/scene/files/media_name.h"
+
 namespace catgs {
-
-enum class MediaKind { image, video, audio, captions };
-
-/// A format of files that tours may show: what browsers can show, and what cannot hold scripts.
-struct MediaType {
-  std::string_view content_type;
-  MediaKind kind;
-};
 
 /// So many bytes of a file tell its type.
 inline constexpr std::size_t media_head_bytes = 4096;
@@ -20,13 +14,6 @@ inline constexpr std::size_t media_head_bytes = 4096;
 /// Recognises a file by its first bytes, whatever its name says; null: none of our formats. A file
 /// that is valid in two formats is served as the one that is recognised here.
 const MediaType* media_type_of(std::string_view head);
-
-/// Whether a text is the name of a file of a media folder: 1 to 100 letters, digits and `._-`,
-/// without a dot at its beginning.
-bool is_media_name(std::string_view name);
-
-/// The kind that the extension of a name or an address promises; nothing: no known extension.
-std::optional<MediaKind> media_kind_named(std::string_view name);
 
 struct PixelSize {
   std::uint32_t width = 0;

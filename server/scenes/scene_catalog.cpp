@@ -178,7 +178,7 @@ std::shared_ptr<const SceneEntry> load_scene(
     entry->sidecar = locate_scene(spec).hints.sidecar;
     const std::optional<std::string> text = sidecar_text(entry->sidecar);
     if (text) entry->sidecar_tag = etag_of(*text);
-    entry->tours = ToursAnswers(tours_of(entry->sidecar, text));
+    entry->tours = ToursAnswers(tours_of(entry->sidecar, text, config.media_origins));
   }
   auto made =
       tree ? make_renderer(tree, core)

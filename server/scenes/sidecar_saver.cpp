@@ -20,12 +20,13 @@ namespace {
 
 /// The scene's entry with its new sidecar applied.
 std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar& sidecar,
-                                          const std::optional<std::string>& text) {
+                                          const std::optional<std::string>& text,
+                                          const MediaOrigins& media_origins) {
   SceneHints hints = hints_of(entry.facts);
   use_sidecar(sidecar, entry.sidecar.filename().string(), hints);
   auto scene = std::make_shared<SceneEntry>(entry);
   use_hints(hints, entry.name, scene->facts);
-  scene->tours = ToursAnswers(tours_of(entry.sidecar, text));
+  scene->tours = ToursAnswers(tours_of(entry.sidecar, text, media_origins));
   scene->sidecar_tag = text ? etag_of(*text) : "";
   return scene;
 }
@@ -119,14 +120,16 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
           tagged(412, "412: somebody else saved this scene since you opened it\n", current)};
       try {
         if (current != scene.sidecar_tag)
-          refused.revised = revised(scene, there ? sidecar_in(file, *there) : Sidecar(), there);
+          refused.revised =
+              revised(scene, there ? sidecar_in(file, *there) : Sidecar(), there, media_origins_);
       } catch (const InputError& broken) {
         log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
                     "scene {}: goes on as it was: {}", request.scene_id, broken.what());
       }
       return refused;
     }
-    auto shown = revised(scene, sidecar, request.json);  // throws before any file is changed
+    auto shown =
+        revised(scene, sidecar, request.json, media_origins_);  // throws before any file is changed
     if (request.place->abandoned()) return {text_response(503, "503: the connection is closed\n")};
     if (there != request.json) replace_file(file, request.json);  // which keeps the one before
     log_info({.event = "saved", .scene = request.scene_id},

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render_core/scene/files/hints.h"
+#include "render_core/scene/files/tour_check.h"
 
 namespace catgs {
 
@@ -17,11 +18,12 @@ namespace catgs {
 ///   whole sidecar;
 /// - `settings` is the SuperSplat viewer's file: `<scene>.settings.json`, or `settings.json` in the
 ///   scene's folder.
-/// A missing one is null. Only size and syntax are checked here; the page reads the content. Throws
-/// InputError for a mistake in the sidecar. An unusable settings file was not written for us, so it
-/// is only logged. `sidecar` is the sidecar's path, even if there is no file. `text` is its
-/// content, if any.
-std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text);
+/// A missing one is null. Throws InputError where size or syntax of the sidecar are wrong. The page
+/// reads the tours, as far as it can, so a mistake that check_tours() finds in them is only logged.
+/// So is an unusable settings file, which was not written for us. `sidecar` is the sidecar's path,
+/// even if there is no file. `text` is its content, if any.
+std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text,
+                     const MediaOrigins& media_origins = {});
 
 /// The answers to requests for a scene's tours: {"may_save": …, "document": …}. They are made once,
 /// because they may be megabytes and are requested often.
@@ -35,11 +37,9 @@ struct ToursAnswers {
 /// same text.
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);
 
-/// Checks a sidecar sent by an author. It is stricter than for operators' files: every field of its
-/// tours must be known, of the right type and within bounds. Media are files of the scene's folder,
-/// or addresses at `media_origins`. Throws InputError that names the field.
-Sidecar check_sent_sidecar(std::string_view json,
-                           const std::vector<std::string>& media_origins = {});
+/// Checks a sidecar sent by an author. It is stricter than for operators' files: every field must
+/// be known, and check_tours() finds no mistake. Throws InputError that names the field.
+Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_origins = {});
 
 /// The size limit of check_sent_sidecar(): 32 tours of 256 stops with short captions.
 inline constexpr std::size_t max_sent_sidecar_bytes = 1 << 20;

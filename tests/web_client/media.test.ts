@@ -13,7 +13,7 @@ const up: Vec3 = [0, -1, 0];
 const place = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
 const read = (stop: object, tour: object = {}): Tour => read_tours([{ ...tour, stops: [{ ...place, ...stop }] }], up, 1)[0]!;
 const stop_of = (stop: object): Stop => read(stop).stops[0]!;
-const server = (file: string): string => readFileSync(new URL(`../../server/${file}`, import.meta.url), 'utf8');
+const source = (file: string): string => readFileSync(new URL(`../../${file}`, import.meta.url), 'utf8');
 
 describe('media of a sidecar', () => {
   const media = [
@@ -64,11 +64,11 @@ describe('media of a sidecar', () => {
   });
 
   it('have the limits and the formats of the server', () => {
-    const types = server('media/media_type.cpp');
+    const types = source('render_core/scene/files/media_name.cpp');
     const known = [...types.matchAll(/\{"(\w+)", &\w+\}/g)].map(([, extension]) => `.${extension}`);
     expect(accepted([...media_kinds, 'captions']).split(',').sort()).toEqual(known.sort());
-    expect(server('media/media_type.h')).toContain(`max_media_bytes = ${limits.max_media_bytes >> 20} << 20`);
-    expect(server('scenes/tours.cpp')).toContain(`max_media = ${limits.max_media};`);
+    expect(source('server/media/media_type.h')).toContain(`max_media_bytes = ${limits.max_media_bytes >> 20} << 20`);
+    expect(source('render_core/scene/files/tour_check.cpp')).toContain(`max_media = ${limits.max_media};`);
     expect([kind_of('a.JPG'), kind_of('a.jpg?x=.mp4'), kind_of('a.svg'), kind_of('mp4')]).toEqual(['image', 'image', undefined, undefined]);
   });
 });

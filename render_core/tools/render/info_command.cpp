@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -13,6 +12,7 @@
 
 #include "render_core/scene/analysis/robust_bounds.h"
 #include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/tour_check.h"
 #include "render_core/scene/scene.h"
 #include "render_core/scene/tree/read_tree.h"
 #include "render_core/scene/tree/tree_file.h"
@@ -106,6 +106,10 @@ std::string spread(const Json& q) {
                      q["p50"].get<double>(), q["p95"].get<double>(), q["max"].get<double>());
 }
 
+void print_notes(const Json& info) {
+  for (const Json& note : info["notes"]) fmt::print("{:<16}{}\n", "note", note.get<std::string>());
+}
+
 void print_text(const Json& info) {
   const auto line = [](std::string_view label, const std::string& value) {
     fmt::print("{:<16}{}\n", label, value);
@@ -138,14 +142,13 @@ void print_text(const Json& info) {
   line("  scale", fmt::format("{:.4g}", hints["scale"].get<double>()));
   line("  limits",
        fmt::format("{}  to  {}", point(hints["limits"]["min"]), point(hints["limits"]["max"])));
-  for (const Json& note : info["notes"]) line("note", note.get<std::string>());
+  print_notes(info);
   line("loaded in", fmt::format("{:.0f} ms, peak memory {:.1f} MB ({:.2f} x the scene)",
                                 info["load_ms"].get<double>(), 1e-6 * peak, peak / bytes));
 }
 
-/// The header of the tree that a path names, if it names one.
-std::optional<TreeHeader> tree_at(const std::filesystem::path& path) {
-  const SceneLocation location = locate_scene(path);
+/// The header of the tree at a place, if there is one.
+std::optional<TreeHeader> tree_at(const SceneLocation& location) {
   if (location.kind != SceneLocation::Kind::file) return std::nullopt;
   if (!is_tree(FileSource(location.path))) return std::nullopt;
   TreeFile tree(std::make_unique<FileSource>(location.path));
@@ -154,14 +157,21 @@ std::optional<TreeHeader> tree_at(const std::filesystem::path& path) {
 }
 
 void info(const InfoOptions& options, bool quiet) {
-  if (const auto tree = tree_at(options.scene.path)) {
-    const Json description = describe_tree(locate_scene(options.scene.path).path, *tree);
-    return options.json ? write_json("-", description) : print_tree(description);
+  const SceneLocation location = locate_scene(options.scene.path);
+  std::vector<std::string> notes;
+  if (auto mistake = mistake_in_tours(location.hints)) notes.push_back(*std::move(mistake));
+  if (const auto tree = tree_at(location)) {
+    Json description = describe_tree(location.path, *tree);
+    description["notes"] = notes;
+    if (options.json) return write_json("-", description);
+    print_tree(description);
+    return print_notes(description);
   }
   const auto start = std::chrono::steady_clock::now();
-  const Scene scene = load_scene(options.scene, options.threads, quiet);
+  Scene scene = load_scene(options.scene, options.threads, quiet);
   const std::chrono::duration<double, std::milli> load_ms =
       std::chrono::steady_clock::now() - start;
+  scene.notes.insert(scene.notes.end(), notes.begin(), notes.end());
   const Json description = describe(scene, load_ms.count());
   if (options.json)
     write_json("-", description);

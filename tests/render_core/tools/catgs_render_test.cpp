@@ -239,6 +239,9 @@ TEST_F(CatgsRender, InfoDescribesTheScene) {
   EXPECT_NEAR(json.at("opacity").at("p50").get<double>(), 0.9, 1e-6);
   EXPECT_NEAR(json.at("robust_bounds").at("min")[2].get<double>(), -0.9, 0.02);
   EXPECT_GT(json.at("peak_rss_bytes").get<double>(), json.at("bytes").get<double>());
+  std::ofstream(path("ball.json")) << R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})";
+  EXPECT_THAT(run("info " + scene()).out,
+              HasSubstr("ball.json: tours[0].stops[0]: 'look_at' or 'orientation' is missing"));
   const Outcome failed = run("info " + path("absent.ply"));
   EXPECT_EQ(failed.exit_code, 2);
   EXPECT_THAT(failed.out, HasSubstr("absent.ply: does not exist"));
@@ -317,8 +320,10 @@ TEST_F(CatgsRender, ConvertsToATreeAndBack) {
   ASSERT_EQ(tree.at("levels").size(), 2u);
   EXPECT_EQ(tree.at("levels")[0].at("gaussians"), 256);
   EXPECT_GT(tree.at("levels")[0].at("mean_error"), 0.0);
+  std::ofstream(path("ball.json")) << R"({"tours": [7]})";
   EXPECT_THAT(run("info " + path("ball.tree")).out,
-              AllOf(HasSubstr("bytes per Gaussian"), HasSubstr("3DGS ply")));
+              AllOf(HasSubstr("bytes per Gaussian"), HasSubstr("3DGS ply"),
+                    HasSubstr("ball.json: tours[0]: is not an object")));
 
   ASSERT_EQ(run(fmt::format("convert {} {}", path("ball.tree"), path("back.ply"))).exit_code, 0);
   const auto back = nlohmann::json::parse(run("info --json " + path("back.ply")).out);

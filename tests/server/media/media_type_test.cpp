@@ -69,16 +69,6 @@ TEST(MediaType, IsNoneForWhatMayHoldScriptsOrIsUnknown) {
     EXPECT_EQ(type_of(content), "none") << content.substr(0, 12);
 }
 
-TEST(MediaName, IsAPlainComponentOfAPath) {
-  for (const char* name : {"a.jpg", "A-b_c.2.webp", "0", "-.png"})
-    EXPECT_TRUE(is_media_name(name)) << name;
-  EXPECT_TRUE(is_media_name(std::string(100, 'a')));
-  EXPECT_FALSE(is_media_name(std::string(101, 'a')));
-  for (const std::string& name : {""s, "."s, ".."s, ".a.jpg"s, "a/b.jpg"s, "..\\a"s, "a b.jpg"s,
-                                  "a%2fb"s, "\xc3\xa9.jpg"s, "a\0.jpg"s, "a\n"s, "a?b"s, "a:b"s})
-    EXPECT_FALSE(is_media_name(name)) << name;
-}
-
 TEST(ImageSize, IsReadFromTheHeaders) {
   const auto size = [](std::string_view content) {
     const auto found = image_size(content);

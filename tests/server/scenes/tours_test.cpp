@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/save_scene.h"
@@ -12,6 +14,7 @@
 namespace catgs::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -91,6 +94,27 @@ TEST_F(Tours, SayWhatIsWrongInASidecar) {
   write("museum.json", R"({"tours": {"title": "Hall"}})");
   EXPECT_THAT([&] { tours_of(folder_ / "museum.json", sidecar_text(folder_ / "museum.json")); },
               ThrowsMessage<std::runtime_error>(HasSubstr("tours: is not an array")));
+}
+
+TEST_F(Tours, WithAMistakeAreServedAndLogged) {
+  std::ostringstream log;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "tours test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  const auto show = [&](const std::string& stop) {
+    log.str("");
+    write("museum.json", fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", stop));
+    return read()["tours"][0]["stops"].size();
+  };
+  EXPECT_EQ(show(R"({"position": [0, 0, 0], "look_at": [0, 0, 1]})"), 1u);
+  EXPECT_EQ(log.str(), "");
+  EXPECT_EQ(show(R"({"position": [0, 0, 0], "look_at": [0, 0, 1], "titel": "Door"})"), 1u);
+  EXPECT_THAT(log.str(), AllOf(HasSubstr("museum.json: tours[0].stops[0]: unknown field 'titel'"),
+                               HasSubstr("known are title")));
+  show(R"({"position": [0, 0, 0], "look_at": [0, 0, 1],
+           "media": [{"src": "https://media.example/a.mp4"}]})");
+  EXPECT_THAT(log.str(), HasSubstr("--media-origin"));
+  spdlog::set_default_logger(before);
 }
 
 constexpr std::string_view stop = R"({"position": [0, 1, 2], "look_at": [0, 1, 3])";

@@ -1,4 +1,4 @@
-// Limits of a scene's tours. server/scenes/tours.cpp has the same; tests/web_client/tours.test.ts compares them.
+// Limits of a scene's tours. render_core/scene/files/tour_check.cpp has the same; tests/web_client/tours.test.ts compares them.
 export const max_tours = 32;
 export const max_stops = 256;
 export const max_languages = 32;

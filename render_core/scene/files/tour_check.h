@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render_core/scene/files/hints.h"
+#include "render_core/scene/formats/json_field.h"
+
+namespace catgs {
+
+/// Sites that the media of tours may be at, like "https://media.example".
+using MediaOrigins = std::vector<std::string>;
+
+inline constexpr std::size_t max_portal_bytes = 128;  // of the id of a scene that one leads to
+
+/// Checks the tours of a sidecar, more strictly than pages do: every field must be known, of the
+/// right type and within bounds. Media are files of the scene's folder, or addresses at
+/// `media_origins`; null: at any site. Throws InputError that names the field.
+void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins);
+
+/// How people are told of a mistake that check_tours() finds in a file.
+inline constexpr std::string_view faulty_tours = "a mistake in tours, which pages may not show: ";
+
+/// What they are told of the tours of a scene, with media at any site; nothing: there is no
+/// mistake.
+std::optional<std::string> mistake_in_tours(const HintFiles& files);
+
+}  // namespace catgs
