@@ -112,6 +112,9 @@ Camera make_lens(const LensOptions& options, float hinted_near_z) {
   if (!options.clip.empty()) {
     const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
     camera.clip = {glm::vec3(plane[0], plane[1], plane[2]), static_cast<float>(plane[3])};
+    if (camera.clip.normal == glm::vec3(0.0f))
+      throw InputError("--clip", "", "has a normal of 0, which is no direction",
+                       "NX,NY,NZ points to what is left out, like 0,1,0");
   }
   return camera;
 }

@@ -163,6 +163,9 @@ CameraList read_camera_json(const ByteSource& file) {
   const JsonField root(file.name(), document);
   if (document.is_array()) return read_array(root);
   if (root.find("camera_path")) return read_path(root);
+  if (root.find("tours"))
+    root.fail("is a sidecar, whose tours are no camera path",
+              "with ?author, the page saves the camera path of a tour as a .tum file");
   if (!root.find("frames"))
     root.fail("lists no cameras",
               "cameras.json of a 3DGS training, transforms.json or camera_path.json of nerfstudio");

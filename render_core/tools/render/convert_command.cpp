@@ -9,6 +9,7 @@
 #include "render_core/scene/edit/edit_scene.h"
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/files/locate_scene.h"
+#include "render_core/scene/files/media_name.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/scene/files/scene_parts.h"
 #include "render_core/scene/files/tour_places.h"
@@ -38,6 +39,20 @@ struct Conversion {
   HintFiles hint_files;  // of the scene that is read
 };
 
+/// Copies what the tours show. Files that are there stay.
+void copy_media(const std::filesystem::path& from_sidecar,
+                const std::filesystem::path& to_sidecar) {
+  using std::filesystem::copy_options;
+  auto from = from_sidecar, to = to_sidecar;
+  from.replace_extension(media_folder_extension);
+  to.replace_extension(media_folder_extension);
+  if (std::error_code error; !std::filesystem::is_directory(from, error)) return;
+  std::filesystem::copy(
+      from, to,
+      copy_options::recursive | copy_options::skip_existing | copy_options::skip_symlinks);
+  fmt::print("{}: media of the tours, from {}\n", to.string(), from.string());
+}
+
 /// Estimated hints can be estimated again. Others would be lost with the files that they came from.
 void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
   const Placement& placement = conversion.edit.placement;
@@ -51,6 +66,9 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
   if (placement.moves()) place_tours(tours, placement);
   write_sidecar(placement.moves() ? placed(hints, placement) : hints, sidecar, &tours);
   fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
+  if (conversion.edit.crop)
+    fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
+  if (!tours.is_null()) copy_media(conversion.hint_files.sidecar, sidecar);
 }
 
 /// Before the scene is loaded, which may take minutes.

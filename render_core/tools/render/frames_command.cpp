@@ -21,7 +21,8 @@
 namespace catgs {
 namespace {
 
-constexpr double default_fps = 30.0;  // of scripts, and of videos at most
+constexpr double default_fps = 30.0;                // of scripts, and of videos at most
+constexpr const char* panorama_size = "4096x2048";  // unless another is asked for
 
 struct FramesOptions {
   RenderOptions render;
@@ -54,6 +55,10 @@ RenderSetup prepare_frames(const FramesOptions& options, bool quiet) {
   RenderOptions render = options.render;
   const glm::vec3 background = parse_colour("--background", options.background);
   if (!render.fps && !render.script.empty()) render.fps = default_fps;
+  if (options.panorama && !render.lens.size_given) {
+    render.lens.size = panorama_size;
+    render.lens.size_given = true;
+  }
   RenderSetup setup = prepare(render, quiet);
   setup.background = background;
   if (!render.fps && is_video(options.out) && setup.fps > default_fps) {
@@ -86,7 +91,7 @@ void check_panorama(const FramesOptions& options, glm::ivec2 size_px) {
   if (is_video(options.out))
     throw InputError("--panorama", "", "makes pictures, no videos", "give a folder or a .png file");
   if (size_px.x != 2 * size_px.y)
-    throw InputError("--size", "", "a panorama is twice as wide as high", "give --size 8192x4096");
+    throw InputError("--size", "", "a panorama is twice as wide as high", "like 8192x4096");
 }
 
 std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderSetup& setup) {
@@ -172,7 +177,9 @@ void add_frames_command(CLI::App& app) {
       "units, 0 where nothing is seen");
   command
       ->add_flag("--panorama", options->panorama,
-                 "Upright pictures of all around, equirectangular: --size 8192x4096")
+                 fmt::format("Upright pictures of all around, equirectangular. Their --size is {} "
+                             "by default",
+                             panorama_size))
       ->excludes(alpha)
       ->excludes(depth)
       ->excludes(command->get_option("--fov-deg"))

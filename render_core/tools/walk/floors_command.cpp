@@ -66,6 +66,9 @@ void floors(const FloorsOptions& options, bool quiet) {
   const auto seconds_since = [](Clock::time_point t) {
     return std::chrono::duration<double>(Clock::now() - t).count();
   };
+  if (std::filesystem::path(options.out).extension() != ".walk")
+    throw InputError(options.out, "", "is no name of a .walk file",
+                     "the server reads the ground of hall.ply from hall.walk");
   check_writable(options.out);
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const auto begin = Clock::now();

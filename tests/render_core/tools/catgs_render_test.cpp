@@ -214,7 +214,10 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
          "--warmup: 100000000000 frames of a path of 2");
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");
   expect(frames(still + "--near 0 --out x"), "--near: 0 is not a positive, finite distance");
+  expect(frames(still + "--clip 0,0,0,1 --out x"), "--clip: has a normal of 0");
   expect(frames("--script tour: --out x"), "--script: tour: names no file");
+  std::ofstream(path("tours.json")) << R"({"tours": []})";
+  expect(frames("--script tour:" + path("tours.json") + " --out x"), "tours.json: is a sidecar");
   expect(run(fmt::format("trace anchor {} --trace {} --fps 0 --out x", scene(), path("path.tum"))),
          "--fps: Value 0 not in range");
   expect(run("bnech " + scene()), "unknown command bnech: did you mean bench?");

@@ -69,8 +69,10 @@ TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
   std::ofstream(path("ball.json")) << R"({
     "start_pose": {"position": [0, 0, -4], "look_at": [0, 0, 0]}, "near": 0.125, "title": "Ball",
     "tours": [{"title": "Way", "stops": [{"position": [1, 0, 0], "look_at": [0, 0, 0]}]}]})";
+  folder_.write("ball.media/door.vtt", "WEBVTT");
   const std::string moves = "--scale 2 --translate=0,10,0";
   ASSERT_EQ(convert("moved.spz", moves).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(path("moved.media/door.vtt")));
   const auto sidecar = nlohmann::json::parse(std::ifstream(path("moved.json")));
   EXPECT_EQ(sidecar.at("start_pose").at("position"), nlohmann::json({0.0, 10.0, -8.0}));
   EXPECT_EQ(sidecar.at("near"), 0.25);

@@ -212,6 +212,11 @@ TEST_F(Frames, APanoramaShowsAllAround) {
     EXPECT_EQ(refused.exit_code, 2);
     EXPECT_THAT(refused.out, HasSubstr(word));
   }
+  EXPECT_THAT(run(fmt::format("frames {} --panorama --script orbit --renderer cpu --out {}",
+                              path("wall.ply"), path("no.png")))
+                  .out,
+              HasSubstr("one picture for 300 frames"))
+      << "a size is chosen";
 }
 
 }  // namespace

@@ -79,6 +79,8 @@ TEST_F(WalkCommands, WhatCannotBeDoneIsSaid) {
   EXPECT_NE(high.exit_code, 0);
   EXPECT_THAT(high.out, HasSubstr("nobody can stand"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.walk"));
+  EXPECT_THAT(run(fmt::format("floors {} {}", path("room.ply"), path("room.png"))).out,
+              HasSubstr("room.png: is no name of a .walk file"));
   folder_.write("bad.walk", "no walk file");
   const Outcome bad = run("walk " + path("bad.walk"));
   EXPECT_NE(bad.exit_code, 0);
