@@ -176,8 +176,10 @@ Pick parse(const v1::Pick& message) {
 }
 
 ClipPlane parse(const v1::Clip& message) {
-  return {parse("clip.normal", message.normal()),
-          checked("clip.offset", message.offset(), -max_clip_offset, max_clip_offset)};
+  const ClipPlane plane{
+      parse("clip.normal", message.normal()),
+      checked("clip.offset", message.offset(), -max_clip_offset, max_clip_offset)};
+  return plane.normal == glm::vec3(0.0f) ? ClipPlane{} : plane;
 }
 
 ClientMessage parse(const v1::ClientMessage& message) {

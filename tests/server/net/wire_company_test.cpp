@@ -58,6 +58,8 @@ TEST(WireClip, IsAPlaneOfFiniteNumbers) {
   message.mutable_clip()->mutable_normal()->set_y(2.0f);
   message.mutable_clip()->set_offset(-3.0f);
   EXPECT_EQ(parsed<ClipPlane>(message), (ClipPlane{{0, 2, 0}, -3}));
+  message.mutable_clip()->mutable_normal()->set_y(0.0f);
+  EXPECT_EQ(parsed<ClipPlane>(message), ClipPlane{}) << "without a normal, all are drawn";
   message.mutable_clip()->mutable_normal()->set_x(std::numeric_limits<float>::quiet_NaN());
   EXPECT_THAT(complaint(message), HasSubstr("clip.normal.x"));
   message.mutable_clip()->mutable_normal()->set_x(0.0f);
