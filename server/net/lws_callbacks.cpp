@@ -69,7 +69,9 @@ int on_put(lws* wsi, LwsHttpExchange& exchange) {
   const std::size_t most = site_of(wsi).uploads.most_bytes(request_header(wsi, WSI_TOKEN_PUT_URI));
   if (bytes >= 1 && bytes <= most) return on_upload(wsi, exchange, static_cast<std::size_t>(bytes));
   const int status = bytes < 1 ? 411 : 413;
-  const std::string why = fmt::format("{}: a Content-Length of 1 to {} is needed", status, most);
+  const std::string why =
+      bytes < 1 ? fmt::format("411: send a body of 1 to {} bytes and its Content-Length", most)
+                : fmt::format("413: send at most {} bytes, not {}", most, bytes);
   note_refused(wsi, static_cast<unsigned>(status), "upload refused: " + why);
   if (exchange.refuse_body(wsi, text_response(status, why + "\n"), service_of(wsi).scratch) != 0)
     return close_connection;
