@@ -313,6 +313,8 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
     }
     std::vector<RawSocket> silent;
     for (int i = 0; i < 20; ++i) silent.emplace_back(server->port());
+    // X-A is the beginning of a name that libwebsockets knows, and it waits for the rest.
+    silent.back().send("GET /healthz HTTP/1.1\r\n" + host() + "X-A: 1\r\n\r\n");
     RawSocket reads_nothing(server->port(), true);
     reads_nothing.send("GET /large.bin HTTP/1.1\r\n" + host() + "\r\n");
     RawSocket half_open(server->port());
