@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 
 #include "render_core/base/thread_pool.h"
@@ -128,6 +129,21 @@ TEST_F(SceneGroundsTest, TheNextStartReadsWhatWasFound) {
   EXPECT_EQ(bytes_in(kept().at(0)), *listed()->file);
 }
 
+TEST_F(SceneGroundsTest, OfManyThoseThatWereUsedLastStay) {
+  start();
+  constexpr int others = 300;
+  for (int i = 0; i < others; ++i) {
+    const fs::path file = write(fmt::format("cache/{}.walk", i), "");
+    fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(others - i));
+  }
+  load();
+  found();
+  EXPECT_EQ(kept().size(), SceneGrounds::max_kept);
+  constexpr int gone = others + 1 - static_cast<int>(SceneGrounds::max_kept);
+  EXPECT_FALSE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone - 1)));
+  EXPECT_TRUE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone)));
+}
+
 TEST_F(SceneGroundsTest, TheAuthorsFileComesFirst) {
   const std::string own = walk::pack(map_of(stairs(), {0, 3, 1.6f}));
   write("scenes/a.walk", own);
@@ -228,6 +244,20 @@ TEST_F(SceneGroundsTest, TheLibraryEndsWhileAGroundIsSought) {
   library_->want_ground(id());
   io_->poll();
   library_.reset();
+}
+
+/// Its header tells how large it is.
+TEST(GroundOfScene, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
+  const TemporaryFolder folder;
+  const auto error = [&](int gaussians) {
+    GroundSource source;
+    source.spec = folder.write("a.ply", fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n"
+                                                    "property float x\nend_header\n",
+                                                    gaussians));
+    return input_error([&] { compute_ground(source, 2, [] {}); });
+  };
+  EXPECT_THAT(error(4'000'001), ::testing::HasSubstr("--cache-dir"));
+  EXPECT_THAT(error(4'000'000), ::testing::Not(::testing::HasSubstr("--cache-dir")));
 }
 
 /// The public demo: its ground is found without its file.
