@@ -313,6 +313,23 @@ TEST_F(CatgsRender, SynthesizedScenesKeepTheirStartPose) {
   EXPECT_EQ(json.at("hints").at("source"), "sidecar city.json");
 }
 
+/// deploy/run.sh makes them with these options, and puts the demo's sidecars in place of theirs.
+TEST_F(CatgsRender, SidecarsOfTheDemoHaveTheHintsOfItsScenes) {
+  for (const auto& [scene, options] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"city", "--gaussians 300000"}, {"garden", "--gaussians 150000"}}) {
+    const std::string made = path(fmt::format("{}.splat", scene));
+    ASSERT_EQ(run(fmt::format("synth {} {} {}", scene, options, made)).exit_code, 0);
+    const auto numbers_in = [](const std::string& sidecar) {
+      return nlohmann::json::parse(std::ifstream(sidecar)).flatten();
+    };
+    const auto hints = numbers_in(path(fmt::format("{}.json", scene)));
+    const auto demo = numbers_in(fmt::format("{}/deploy/demo/{}.json", CATGS_SOURCE_DIR, scene));
+    EXPECT_GT(hints.size(), 15u);
+    for (const auto& [field, value] : hints.items())
+      EXPECT_NEAR(demo.value(field, 1e9), value.get<double>(), 1e-4) << scene << field;
+  }
+}
+
 TEST_F(CatgsRender, ConvertsToATreeAndBack) {
   const Outcome there = run(fmt::format("convert {} {}", scene(), path("ball.tree")));
   ASSERT_EQ(there.exit_code, 0) << there.out;
