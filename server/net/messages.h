@@ -253,6 +253,7 @@ struct Lead {
   std::size_t company = 0;           // who watch or follow
   std::optional<PoseSample> camera;  // to followers
   bool may_ping = false;             // followers may
+  bool elsewhere = false;            // of ended: the leader is in another scene
 };
 
 struct Pinged {

@@ -129,6 +129,7 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   message.set_name(lead.name);
   message.set_company(static_cast<std::uint32_t>(lead.company));
   message.set_may_ping(lead.may_ping);
+  message.set_elsewhere(lead.elsewhere);
   if (!lead.camera) return;
   auto& camera = *message.mutable_camera();
   camera.set_pose_id(lead.camera->pose_id);

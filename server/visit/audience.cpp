@@ -46,7 +46,7 @@ void Audience::send(const ServerMessage& message, TimePoint now) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     // Its company may not be allowed to see another scene.
     if (!is_in(welcome->scene.scene_id)) {
-      end_presentation();
+      end_presentation(true);
       presentation_.forget_camera();
       scene_id_ = welcome->scene.scene_id;
     }
@@ -136,8 +136,8 @@ void Audience::tell_places(const Company& company, TimePoint now) {
   tell_spectators(company, now);
 }
 
-void Audience::end_presentation() {
-  presentation_.end();
+void Audience::end_presentation(bool elsewhere) {
+  presentation_.end(elsewhere);
   for (const Spectator& s : std::exchange(spectators_, {})) {
     s.connection->connection().send(wire::serialize(
         ErrorMessage{ErrorCode::session_ended, "the presentation has ended", true}));

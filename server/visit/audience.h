@@ -71,8 +71,9 @@ class Audience {
   /// Sends everybody what is new about the presentation, and spectators a heartbeat after almost a
   /// second of silence.
   void keep_talking(TimePoint now);
-  /// Ends the presentation and closes all spectators' connections.
-  void end_presentation();
+  /// Ends the presentation and closes all spectators' connections. `elsewhere`: the visitor is in
+  /// another scene.
+  void end_presentation(bool elsewhere = false);
 
  private:
   struct Spectator {

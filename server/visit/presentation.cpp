@@ -30,9 +30,9 @@ void Presentation::begin(const Present& wish, TimePoint now) {
   wish_ = wish;
 }
 
-void Presentation::end() {
+void Presentation::end(bool elsewhere) {
   if (!std::exchange(since_, {})) return;
-  tell_followers(Lead{LeadState::ended, wish_.name, 0, {}});
+  tell_followers(Lead{LeadState::ended, wish_.name, 0, {}, false, elsewhere});
   followers_.clear();
   told_.reset();
   camera_.reset();

@@ -14,8 +14,8 @@ namespace catgs {
 class Presentation {
  public:
   void begin(const Present& wish, TimePoint now);
-  /// Tells the followers that it is over.
-  void end();
+  /// Tells the followers that it is over here. `elsewhere`: the leader is in another scene.
+  void end(bool elsewhere = false);
   /// When it began; nothing: the visit leads nobody.
   [[nodiscard]] std::optional<TimePoint> since() const { return since_; }
 

@@ -4,8 +4,9 @@ import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
-import { keep_screenshot, open, windows } from './support/browser';
+import { keep_screenshot, new_page, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
+import { present } from './support/company';
 import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
 import { scratch_folder, write_tours } from './support/scenes';
 
@@ -79,6 +80,25 @@ describe('a portal', () => {
     await expect.poll(async () => distance(there, await pose_of(page))).toBeLessThan(1e-3);
     await page.locator('.cover').waitFor({ state: 'detached' });
     expect(errors).toEqual([]);
+  });
+
+  it('takes those along who follow a guide, or watch', async () => {
+    const { page: leader, errors } = await open(`${server.url}?scene=town${token()}`, windows.desktop);
+    await go_to_stop(leader, 1);
+    const link = await present(leader);
+    await leader.keyboard.press('Escape');
+    const { page: follower, errors: more } = await open(`${link}&${token().slice(1)}`, windows.phone);
+    const { page: guest } = await new_page(windows.phone);
+    await guest.goto(link); // without a token of their own
+    for (const page of [follower, guest]) await page.getByText('Ada leads, 2 follow').waitFor();
+    await leader.locator('#tour-portal').click();
+    await follower.getByText('Ada goes on in another scene. You follow.').waitFor();
+    await expect.poll(() => scene_of(follower)).toBe('park');
+    for (const page of [leader, follower, guest]) await page.locator('#company', { hasText: /2 (people )?follow/ }).waitFor();
+    await expect.poll(async () => distance(await pose_of(leader), await pose_of(follower))).toBeLessThan(1e-3);
+    await settle(follower);
+    await keep_screenshot(follower, 'portal-followed');
+    expect([errors, more, await barriers(follower)]).toEqual([[], [], []]);
   });
 
   it('leads to a stop of another tour, and is passed by a playing one', async () => {

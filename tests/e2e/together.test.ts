@@ -6,6 +6,7 @@ import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { keep_screenshot, new_page, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
+import { present } from './support/company';
 import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
 import { scratch_folder } from './support/scenes';
 
@@ -18,16 +19,6 @@ beforeAll(() => {
   catgs_render('synth', 'city', scene, '--gaussians', '30000');
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
 });
-
-/** Presents as Ada. Returns the link for those who follow. */
-async function present(page: Page): Promise<string> {
-  await page.getByRole('button', { name: 'Share' }).click();
-  await page.getByLabel('Your name, for those who follow').fill('Ada');
-  await page.getByRole('button', { name: 'Present', exact: true }).click();
-  const link = await page.getByLabel('Link for those who follow').inputValue();
-  await page.getByText('You lead. Nobody follows yet.').waitFor();
-  return link;
-}
 
 async function move(page: Page): Promise<void> {
   await page.keyboard.press('Escape');

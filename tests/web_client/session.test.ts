@@ -143,6 +143,22 @@ describe('greeting', () => {
     expect(cases(2)).toEqual(['hello', 'follow', 'present', 'pose']);
   });
 
+  it('goes along into another scene, and stays there after a loss', () => {
+    session.keep({ case: 'follow', value: { watch: 'w' } });
+    session.start();
+    welcome(socket(0));
+    session.send_pose(pose(1n));
+    session.greet_anew({ watch: 'w', follow: true });
+    socket(1).events.opened();
+    expect(socket(1).sent('hello')[0]).toMatchObject({ sceneId: 'city', watch: 'w', resume: { token: 'again' } });
+    expect(socket(1).sent('hello')[0]!.resume!.pose).toBeUndefined(); // that was in the other scene
+    socket(1).say({ case: 'welcome', value: { scene: { sceneId: 'park' } } });
+    expect(cases(1)).toEqual(['hello', 'follow']);
+    session.retry();
+    socket(2).events.opened();
+    expect(socket(2).sent('hello')[0]).toMatchObject({ sceneId: 'park', watch: '' });
+  });
+
   it('gives up a server that accepts and says nothing', () => {
     session.start();
     socket(0).events.opened();

@@ -252,6 +252,7 @@ TEST_F(CompanyTest, WhoEntersAnotherSceneLeavesIt) {
   say(*follower, message);
   run_until([&] { return follower->connection->welcome->scene().scene_id() == "attic"; });
   EXPECT_EQ(follower->connection->lead->state(), v1::Lead::ENDED);
+  EXPECT_FALSE(follower->connection->lead->elsewhere()) << "the leader is where it was";
   run_until([&] { return told.back().places_size() == 1; });
   EXPECT_EQ(leader->connection->lead->company(), 0u);
   EXPECT_EQ(heard_of(*follower, 1), 0u);
@@ -263,6 +264,31 @@ TEST_F(CompanyTest, WhoEntersAnotherSceneLeavesIt) {
   follow(*follower);
   run_for(700ms);
   EXPECT_EQ(told.back().places_size(), 1);
+}
+
+TEST_F(CompanyTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
+  begin(false, false);
+  v1::ClientMessage message;
+  message.mutable_select_scene()->set_scene_id("attic");
+  say(*leader, message);
+  run_until([&] { return follower->connection->lead->state() == v1::Lead::ENDED; });
+  EXPECT_TRUE(follower->connection->lead->elsewhere());
+  run_until([&] { return leader->connection->welcome->scene().scene_id() == "attic"; });
+  present(true, false);
+  // Whoever asks from the old scene hears the same, and a new greeting leads to the leader's.
+  follower->connection->lead.reset();
+  follow(*follower);
+  EXPECT_TRUE(follower->connection->lead->elsewhere());
+  EXPECT_FALSE(follower->connection->error);
+  Visitor& again =
+      join(follower->connection->welcome->resume_token(), "192.0.2.1", [&](v1::Hello& hello) {
+        hello.set_watch(leader->connection->welcome->watch_token());
+        hello.set_follow(true);
+      });
+  EXPECT_EQ(again.connection->welcome->scene().scene_id(), "attic");
+  EXPECT_EQ(again.connection->welcome->session_id(), follower->connection->welcome->session_id());
+  follow(again);
+  EXPECT_EQ(again.connection->lead->state(), v1::Lead::LEADS);
 }
 
 TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {

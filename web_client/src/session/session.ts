@@ -97,6 +97,7 @@ export class Session {
   /** Opens a new connection with other decoders, another token or another scene. */
   greet_anew(change: Partial<Greeting>): void {
     this.greeting_ = { ...this.greeting_, ...change };
+    if (change.watch !== undefined) this.forget_scene(); // the leader may be in another one
     this.retry();
   }
 
@@ -126,9 +127,7 @@ export class Session {
   select_scene(scene_id: string): void {
     this.left_scene_ ??= this.greeting_.sceneId ?? '';
     this.greeting_ = { ...this.greeting_, sceneId: scene_id };
-    this.last_pose_ = undefined; // it is of the other scene
-    this.path_ = [];
-    this.kept_.delete('clip');
+    this.forget_scene();
     this.send({ case: 'selectScene', value: { sceneId: scene_id } });
   }
 
@@ -153,6 +152,13 @@ export class Session {
   stop(): void {
     this.send({ case: 'bye', value: {} });
     this.drop_links();
+  }
+
+  /** What was sent of this scene means nothing in another. */
+  private forget_scene(): void {
+    this.last_pose_ = undefined;
+    this.path_ = [];
+    this.kept_.delete('clip');
   }
 
   private connect(): void {
@@ -273,8 +279,9 @@ export class Session {
     link.welcomed_us = this.env_.clock.now_us();
     if (welcome.config) link.config = welcome.config;
     if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
-    // A session of its own stays one.
-    if (!welcome.watching) this.greeting_ = { ...this.greeting_, watch: '', follow: false };
+    // A session of its own stays one, in the scene where the leader was.
+    if (!welcome.watching && this.greeting_.watch)
+      this.greeting_ = { ...this.greeting_, sceneId: welcome.scene?.sceneId ?? '', watch: '', follow: false };
     this.left_scene_ = undefined;
     if (link === this.link_) this.go_live(link);
     else if (this.last_pose_) link.send({ case: 'pose', value: this.last_pose_ });

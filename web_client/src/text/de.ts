@@ -200,6 +200,7 @@ export const text: Texts = {
     follow: (name) => `${name} folgen`,
     follow_somebody: 'Der Führung folgen',
     over: 'Die Vorführung ist zu Ende. Sie können sich umsehen.',
+    goes_on: (name) => `${name} geht in eine andere Szene. Sie folgen.`,
     comes_by_itself: 'Das Bild kommt, sobald jemand vorführt.',
     view: (name) => `3D-Ansicht. ${name} bewegt die Kamera.`,
   },

@@ -198,6 +198,7 @@ export const text = {
     follow: (name: string): string => `Follow ${name}`,
     follow_somebody: 'Follow your guide',
     over: 'The presentation is over. You can look around.',
+    goes_on: (name: string): string => `${name} goes on in another scene. You follow.`,
     comes_by_itself: 'The picture comes when somebody presents.',
     view: (name: string): string => `3D view. ${name} moves the camera.`,
   },

@@ -203,6 +203,7 @@ export const text: Texts = {
     follow: (name) => `Seguir a ${name}`,
     follow_somebody: 'Seguir a su guía',
     over: 'La presentación ha terminado. Ya puede mirar alrededor.',
+    goes_on: (name) => `${name} continúa en otra escena. Usted le sigue.`,
     comes_by_itself: 'La imagen llegará cuando alguien presente.',
     view: (name) => `Vista 3D. ${name} mueve la cámara.`,
   },

@@ -203,6 +203,7 @@ export const text: Texts = {
     follow: (name) => `Suivre ${name}`,
     follow_somebody: 'Suivre votre guide',
     over: 'La présentation est terminée. Vous pouvez regarder autour de vous.',
+    goes_on: (name) => `${name} continue dans une autre scène. Vous suivez.`,
     comes_by_itself: "L'image arrive dès que quelqu'un présente.",
     view: (name) => `Vue 3D. ${name} déplace la caméra.`,
   },

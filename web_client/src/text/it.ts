@@ -203,6 +203,7 @@ export const text: Texts = {
     follow: (name) => `Segui ${name}`,
     follow_somebody: 'Segui la guida',
     over: 'La presentazione è finita. Puoi guardarti intorno.',
+    goes_on: (name) => `${name} prosegue in un'altra scena. Tu segui.`,
     comes_by_itself: "L'immagine arriva quando qualcuno presenta.",
     view: (name) => `Vista 3D. ${name} muove la telecamera.`,
   },

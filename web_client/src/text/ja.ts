@@ -201,6 +201,7 @@ export const text: Texts = {
     follow: (name) => `${name}について行く`,
     follow_somebody: '案内役について行く',
     over: '案内は終わりました。自由に見て回れます。',
+    goes_on: (name) => `${name}が別のシーンへ移りました。ついて行きます。`,
     comes_by_itself: '案内が始まると画像が表示されます。',
     view: (name) => `3Dビュー。${name}がカメラを動かしています。`,
   },

@@ -200,6 +200,7 @@ export const text: Texts = {
     follow: (name) => `${name} 님 따라가기`,
     follow_somebody: '안내자 따라가기',
     over: '안내가 끝났습니다. 자유롭게 둘러보세요.',
+    goes_on: (name) => `${name} 님이 다른 장면으로 갔습니다. 함께 이동합니다.`,
     comes_by_itself: '누군가 안내를 시작하면 화면이 나타납니다.',
     view: (name) => `3D 보기. ${name} 님이 카메라를 움직입니다.`,
   },

@@ -197,6 +197,7 @@ export const text: Texts = {
     follow: (name) => `跟随${name}`,
     follow_somebody: '跟随讲解员',
     over: '讲解已结束。您可以自由浏览。',
+    goes_on: (name) => `${name}已前往另一个场景。正在跟随。`,
     comes_by_itself: '有人开始讲解时，画面会自动出现。',
     view: (name) => `三维视图。${name}正在移动镜头。`,
   },

@@ -97,7 +97,10 @@ export class Together {
     this.lead_ = lead;
     if (eye) this.leader_eye_ = eye;
     if (this.role_ === 'leading' || this.role_ === 'watching') this.show();
-    else if (lead.state === Lead_State.ENDED) this.ended();
+    else if (lead.state === Lead_State.ENDED) {
+      if (!lead.elsewhere) this.ended();
+      else if (this.wants_) this.go_along();
+    }
     else if (eye && this.wants_) this.follow(eye);
     if (this.role_ === 'following' && differ(before, lead)) this.show();
   }
@@ -106,6 +109,14 @@ export class Together {
     if (this.role_ === 'following') this.notice_.show(words.over, 10);
     this.navigation_.stop_flight();
     this.become('alone');
+  }
+
+  /** The leader is in another scene. Begins anew there, or watches where the visitor may not go. */
+  private go_along(): void {
+    this.notice_.show(words.goes_on(this.lead_?.name || words.somebody), 10);
+    this.become('left'); // it comes to follow by the next message
+    this.navigation_.stop_flight();
+    this.worker_.post({ kind: 'watch', watch: this.token_ });
   }
 
   private follow(eye: Eye): void {
