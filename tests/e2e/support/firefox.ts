@@ -3,7 +3,9 @@ import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
+import { afterEach } from 'vitest';
 import { WebSocket } from 'ws';
+import type { AnyPage } from './camera';
 import { clean_up } from './clean_up';
 import { artefacts, firefox_path } from './paths';
 import { end } from './programs';
@@ -11,40 +13,56 @@ import { end } from './programs';
 interface Reply {
   readonly id?: number;
   readonly method?: string;
-  readonly params?: { level?: string; text?: string };
+  readonly params?: { level?: string; text?: string; source?: { context?: string } };
   readonly result?: Record<string, unknown>;
   readonly message?: string; // of an error
 }
 
 type Command = (method: string, params: object) => Promise<Record<string, unknown>>;
 
-export interface FirefoxPage {
+type Place = readonly [x: number, y: number];
+
+export interface FirefoxPage extends AnyPage {
   readonly errors: string[];
-  /** The value of an expression in the page. */
-  evaluate<T>(expression: string): Promise<T>;
-  /** Resolves when the expression is true. */
+  /** Resolves when the expression is true; fails after a minute. */
   until(expression: string): Promise<void>;
-  click(selector: string): Promise<void>;
-  drag(from: readonly [number, number], by: readonly [number, number]): Promise<void>;
+  /** Clicks the middle of the first element that matches, or a place of the window. */
+  click(where: string | Place): Promise<void>;
+  drag(from: Place, by: Place): Promise<void>;
   press(key: string): Promise<void>;
   keep_screenshot(name: string): Promise<void>;
 }
 
-/** Opens the address in a Firefox of its own. */
+let firefox: Promise<Command> | undefined;
+const errors_of = new Map<string | undefined, string[]>(); // by context
+
+afterEach(async () => {
+  for (const context of errors_of.keys()) await (await firefox!)('browsingContext.close', { context });
+  errors_of.clear();
+});
+
+/** Opens the address in a tab that is closed after the test, in a Firefox that all tests of a file share. */
 export async function open_in_firefox(url: string, width: number, height: number): Promise<FirefoxPage> {
+  firefox ??= start();
+  const command = await firefox;
+  const { context } = (await command('browsingContext.create', { type: 'tab' })) as { context: string };
   const errors: string[] = [];
-  const command = await connect(await launch(), errors);
-  await command('session.new', { capabilities: {} });
-  await command('session.subscribe', { events: ['log.entryAdded'] });
-  const { contexts } = (await command('browsingContext.getTree', {})) as { contexts: { context: string }[] };
-  const { context } = contexts[0]!;
+  errors_of.set(context, errors);
   await command('browsingContext.setViewport', { context, viewport: { width, height } });
   await command('browsingContext.navigate', { context, url, wait: 'complete' });
   return page_of(command, context, errors);
 }
 
+async function start(): Promise<Command> {
+  const command = await connect(await launch());
+  await command('session.new', { capabilities: {} });
+  await command('session.subscribe', { events: ['log.entryAdded'] });
+  return command;
+}
+
 function page_of(command: Command, context: string, errors: string[]): FirefoxPage {
-  const evaluate = async <T>(expression: string): Promise<T> => {
+  const evaluate = async <T>(what: string | (() => T | Promise<T>)): Promise<T> => {
+    const expression = typeof what === 'string' ? what : `(${what.toString()})()`;
     const { result, exceptionDetails } = (await command('script.evaluate', {
       expression: `(async () => JSON.stringify(await (${expression})))()`,
       target: { context },
@@ -55,19 +73,26 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
   };
   const pointer = (actions: object[]): Promise<unknown> =>
     command('input.performActions', { context, actions: [{ type: 'pointer', id: 'mouse', actions }] });
-  const move = ([x, y]: readonly [number, number], duration = 0): object => ({ type: 'pointerMove', x, y, duration });
+  const move = ([x, y]: Place, duration = 0): object => ({ type: 'pointerMove', x, y, duration });
   const [down, up] = ['pointerDown', 'pointerUp'].map((type) => ({ type, button: 0 })) as [object, object];
   return {
     errors,
     evaluate,
     until: async (expression) => {
-      while (!(await evaluate<boolean>(`Boolean(${expression})`))) await new Promise((resolve) => setTimeout(resolve, 50));
+      const end_ms = Date.now() + 60_000;
+      while (!(await evaluate<boolean>(`Boolean(${expression})`))) {
+        if (Date.now() > end_ms) throw new Error(`never true: ${expression}`);
+        await new Promise((resolve) => setTimeout(resolve, 50));
+      }
     },
-    click: async (selector) => {
-      const at = await evaluate<[number, number]>(
-        `(({ x, y, width, height }) => [Math.round(x + width / 2), Math.round(y + height / 2)])(document.querySelector('${selector}').getBoundingClientRect())`,
-      );
-      await pointer([move(at), down, up]);
+    click: async (where) => {
+      const middle = `(element) => {
+        element.scrollIntoView({ block: 'nearest' });
+        const { x, y, width, height } = element.getBoundingClientRect();
+        return [Math.round(x + width / 2), Math.round(y + height / 2)];
+      }`;
+      const at = typeof where === 'string' ? evaluate<Place>(`(${middle})(document.querySelector('${where}'))`) : where;
+      await pointer([move(await at), down, up]);
     },
     drag: async ([x, y], [dx, dy]) => {
       await pointer([move([x, y]), down, move([x + dx, y + dy], 300), up]);
@@ -108,7 +133,7 @@ function launch(): Promise<string> {
   });
 }
 
-async function connect(address: string, errors: string[]): Promise<Command> {
+async function connect(address: string): Promise<Command> {
   const socket = new WebSocket(`${address}/session`);
   await new Promise((resolve, reject) => socket.once('open', resolve).once('error', reject));
   clean_up(() => socket.terminate());
@@ -116,7 +141,7 @@ async function connect(address: string, errors: string[]): Promise<Command> {
   socket.on('message', (data) => {
     const reply = JSON.parse((data as Buffer).toString()) as Reply;
     if (reply.id !== undefined) waiting.get(reply.id)?.(reply);
-    else if (reply.params?.level === 'error') errors.push(reply.params.text ?? '');
+    else if (reply.params?.level === 'error') errors_of.get(reply.params.source?.context)?.push(reply.params.text ?? '');
   });
   let commands = 0;
   return (method, params) =>

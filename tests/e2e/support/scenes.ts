@@ -1,16 +1,28 @@
 // Scenes and camera paths that tests write for themselves.
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
 import type { Vec3 } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
 import { clean_up } from './clean_up';
+import { source_dir } from './paths';
+import { catgs_render } from './programs';
 
 /** Makes a folder for the tests of a file. */
 export function scratch_folder(): string {
   const folder = mkdtempSync(path.join(tmpdir(), 'catgs-e2e-'));
   clean_up(() => rmSync(folder, { recursive: true, force: true }));
   return folder;
+}
+
+/** Makes the demo city and garden with their tours, as deploy/run.sh does. Returns the city's file. */
+export function make_demo(folder: string): string {
+  const file = (name: string): string => path.join(folder, name);
+  catgs_render('synth', 'city', file('city.ply'), '--gaussians', '300000', '--seed', '1');
+  catgs_render('synth', 'garden', file('garden.ply'), '--gaussians', '150000', '--seed', '1');
+  for (const name of ['city.json', 'city.media', 'garden.json'])
+    cpSync(path.join(source_dir, 'deploy', 'demo', name), file(name), { recursive: true });
+  return file('city.ply');
 }
 
 export interface Sidecar {
