@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <glm/vector_relational.hpp>
+
 namespace catgs {
 namespace {
 
@@ -32,6 +34,10 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
   if (!(camera.near_z > 0 && std::isfinite(camera.near_z))) return "near plane must be positive";
   if (!finite(camera.clip.normal) || !std::isfinite(camera.clip.offset))
     return "clip plane is not finite";
+  const Crop& crop = camera.crop;
+  if (crop != Crop{} && (glm::any(glm::lessThan(crop.from_px, glm::ivec2(0))) ||
+                         glm::any(glm::greaterThan(crop.from_px + size, crop.whole_px))))
+    return "the part does not lie in the whole picture";
   if (!finite(request.background)) return "background is not finite";
   std::string mistake = find_mistake(camera.world_from_camera, "camera");
   if (mistake.empty() && request.forecast) {

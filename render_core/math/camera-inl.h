@@ -33,11 +33,13 @@ inline CameraModel<double> make_camera_model(const Camera& camera) {
   const auto vec3 = [](const glm::dvec3& v) { return Vec3<double>{v.x, v.y, v.z}; };
   const glm::dvec2 focal(camera.focal_px);
   const glm::dvec2 centre(camera.principal_point_px);
-  const glm::dvec2 size(camera.size_px);
+  const bool whole = camera.crop.whole_px == glm::ivec2(0);
+  const glm::dvec2 size(whole ? camera.size_px : camera.crop.whole_px);
+  const glm::dvec2 corner = -glm::dvec2(camera.crop.from_px);
   // With a centred principal point this is +-1.3 tan(fov / 2); else the same margin on both sides.
   const glm::dvec2 margin = (fov_clamp - 1.0) * 0.5 * size / focal;
-  const glm::dvec2 low = -centre / focal - margin;
-  const glm::dvec2 high = (size - centre) / focal + margin;
+  const glm::dvec2 low = (corner - centre) / focal - margin;
+  const glm::dvec2 high = (corner + size - centre) / focal + margin;
   return {vec3(glm::dvec3(camera.world_from_camera.position)),
           vec3(world_from_camera[0]),
           vec3(world_from_camera[1]),

@@ -30,6 +30,14 @@ struct ClipPlane {
   bool operator==(const ClipPlane&) const = default;
 };
 
+/// Where the part of a picture that a camera draws lies in the whole.
+struct Crop {
+  glm::ivec2 from_px{0};   // its upper left corner
+  glm::ivec2 whole_px{0};  // size of the whole picture; 0: the camera draws all of it
+
+  bool operator==(const Crop&) const = default;
+};
+
 /// A pinhole camera at a pose. Pixel centres lie at integer + 0.5.
 struct Camera {
   Pose world_from_camera;
@@ -38,18 +46,29 @@ struct Camera {
   glm::vec2 principal_point_px{0.0f};
   float near_z = 0.2f;  // world units along the view axis; Gaussians nearer than this are dropped
   ClipPlane clip{};
+  Crop crop{};  // the projection is clamped as in the whole picture, so that parts fit together
 };
 
 /// Whether both draw the same where they are at the same pose.
 inline bool same_lens(const Camera& a, const Camera& b) {
   return a.size_px == b.size_px && a.focal_px == b.focal_px &&
-         a.principal_point_px == b.principal_point_px && a.near_z == b.near_z && a.clip == b.clip;
+         a.principal_point_px == b.principal_point_px && a.near_z == b.near_z && a.clip == b.clip &&
+         a.crop == b.crop;
 }
 
 /// Camera with square pixels and the principal point in the middle of the image.
 inline Camera make_camera(const Pose& world_from_camera, glm::ivec2 size_px, float focal_px,
                           float near_z = 0.2f) {
   return {world_from_camera, size_px, glm::vec2(focal_px), glm::vec2(size_px) * 0.5f, near_z};
+}
+
+/// The camera that draws a part of the picture of `whole`, which is no part itself.
+inline Camera cropped(const Camera& whole, glm::ivec2 from_px, glm::ivec2 size_px) {
+  Camera part = whole;
+  part.size_px = size_px;
+  part.principal_point_px -= glm::vec2(from_px);
+  part.crop = {from_px, whole.size_px};
+  return part;
 }
 
 /// Focal length in pixels of an image `height_px` high that spans `fov_y_rad` vertically.

@@ -17,10 +17,7 @@ namespace catgs {
 namespace {
 
 constexpr float detail_px = 0.5f;  // of a scene in pages
-// A part of a picture is drawn with a border, which is cut off. The projection of a splat is
-// clamped to 1.3 times the field of view of what is drawn, so parts of wide splats would not fit
-// together.
-constexpr int part_px = 1024, border_px = 256;
+constexpr int part_px = 1024;
 
 FrameRequest request_of(const SceneEntry& scene, const FilmView& view, glm::ivec2 size_px) {
   FrameRequest request;
@@ -52,19 +49,16 @@ class Parts {
     const glm::ivec2 parts = (size_px + part_px - 1) / part_px;
     for (int i = 0; i < parts.x * parts.y; ++i) {
       const TimePoint start = Clock::now();
-      const glm::ivec2 kept = glm::ivec2(i % parts.x, i / parts.x) * part_px;
-      const glm::ivec2 end = glm::min(kept + part_px, size_px);
-      const glm::ivec2 from = glm::max(kept - border_px, glm::ivec2(0));
+      const glm::ivec2 from = glm::ivec2(i % parts.x, i / parts.x) * part_px;
       FrameRequest part = whole;
-      part.camera.size_px = glm::min(end + border_px, size_px) - from;
-      part.camera.principal_point_px -= glm::vec2(from);
+      part.camera = cropped(whole.camera, from, glm::min(glm::ivec2(part_px), size_px - from));
       FrameView frame;
       render(*view_, part, frame);
-      for (int y = kept.y; y < end.y; ++y) {
-        const auto* row = reinterpret_cast<const float*>(frame.planes[0].data +
-                                                         frame.planes[0].stride_bytes *
-                                                             static_cast<std::size_t>(y - from.y));
-        for (int x = kept.x; x < end.x; ++x) take(x, y, row + 3 * (x - from.x));
+      for (int y = 0; y < part.camera.size_px.y; ++y) {
+        const auto* row = reinterpret_cast<const float*>(
+            frame.planes[0].data + frame.planes[0].stride_bytes * static_cast<std::size_t>(y));
+        for (int x = 0; x < part.camera.size_px.x; ++x)
+          take(from.x + x, from.y + y, row + std::size_t{3} * static_cast<std::size_t>(x));
       }
       const double of_picture = static_cast<double>(i + 1) / (parts.x * parts.y);
       // Writing the file takes its time, too.

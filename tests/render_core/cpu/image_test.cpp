@@ -277,6 +277,12 @@ TEST(CpuView, RefusesImpossibleRequests) {
   expect_refusal(
       *rgb, [=](FrameRequest& r) { r.camera.principal_point_px.x = nan; }, "principal");
   expect_refusal(
+      *rgb,
+      [](FrameRequest& r) {
+        r.camera.crop = {{1, 0}, r.camera.size_px};
+      },
+      "whole picture");
+  expect_refusal(
       *rgb, [=](FrameRequest& r) { r.camera.world_from_camera.position.y = nan; }, "position");
   expect_refusal(
       *rgb,
