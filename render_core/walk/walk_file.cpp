@@ -88,7 +88,8 @@ class Reader {
     require(bytes.size() >= sizeof header_, "header", "is cut off");
     header_ = load_as<Header>(bytes.data());
     require(header_.magic == Header::right_magic, "magic", "is not that of a .walk file");
-    require(header_.version == Header::right_version, "version", "is not known");
+    if (header_.version != Header::right_version)
+      throw InputError(file_.name(), "version", "is not known", "compute it with this version");
     require(header_.checksum == checksum_of(bytes), "checksum", "is wrong");
     read_header();
     require(header_.packed_bytes == bytes.size() - sizeof header_, "packed bytes",
@@ -146,8 +147,6 @@ class Reader {
 
   [[nodiscard]] std::vector<std::byte> unpacked(std::span<const std::byte> packed,
                                                 std::size_t bytes) const {
-    constexpr std::size_t most_growth = 1032;  // of deflate
-    require(bytes / most_growth <= packed.size(), "index", "has a tile that is too large");
     std::vector<std::byte> tile(bytes);
     uLongf size = bytes;
     const int result = uncompress(reinterpret_cast<Bytef*>(tile.data()), &size,
@@ -156,39 +155,55 @@ class Reader {
     return tile;
   }
 
-  void read_tiles(std::span<const std::byte> bytes) {
+  /// The index, whose sizes are those of `bytes` behind it.
+  std::vector<TileBytes> read_index(std::span<const std::byte>& bytes) const {
+    constexpr std::size_t most_growth = 1032;  // of deflate
+    constexpr std::size_t most_tile = tile_side * tile_side * (1 + 4 * most_in_column);
     std::vector<TileBytes> index(tiles_in(map_.size));
     const std::size_t index_bytes = index.size() * sizeof(TileBytes);
     require(index_bytes <= bytes.size(), "index", "is cut off");
     std::memcpy(index.data(), bytes.data(), index_bytes);
     bytes = bytes.subspan(index_bytes);
+    std::uint64_t packed = 0, unpacked = 0;
+    for (const TileBytes& tile : index) {
+      require(tile.unpacked <= most_tile && tile.unpacked / most_growth <= tile.packed &&
+                  (tile.packed == 0) == (tile.unpacked == 0),
+              "index", "has a tile of a wrong size");
+      packed += tile.packed;
+      unpacked += tile.unpacked;
+    }
+    require(packed == bytes.size(), "index", "is not that of the tiles");
+    // Each place has a kind and a height.
+    require(2 * std::uint64_t{header_.places} <= unpacked, "places",
+            "are more than the tiles have");
+    return index;
+  }
+
+  void read_tiles(std::span<const std::byte> bytes) {
+    const std::vector<TileBytes> index = read_index(bytes);
     map_.first.assign(columns() + 1, 0);
     std::vector<Place> by_tile;
     by_tile.reserve(header_.places);
-    each_tile(map_.size, [&](std::size_t t, std::span<const std::size_t> columns) {
-      const auto [packed, size] = index[t];
-      if (packed == 0 && size == 0) return;
-      const std::size_t most = columns.size() + 4 * (header_.places - by_tile.size());
-      require(packed <= bytes.size() && size >= columns.size() && size <= most, "index",
-              "has a tile of a wrong size");
-      read_tile(unpacked(bytes.first(packed), size), columns, by_tile);
-      bytes = bytes.subspan(packed);
+    each_tile(map_.size, [&](std::size_t t, std::span<const std::size_t> of_tile) {
+      if (index[t].packed == 0) return;
+      read_tile(unpacked(bytes.first(index[t].packed), index[t].unpacked), of_tile, by_tile);
+      bytes = bytes.subspan(index[t].packed);
     });
-    require(by_tile.size() == header_.places && bytes.empty(), "tiles",
-            "have other places than the file");
+    require(by_tile.size() == header_.places, "tiles", "have other places than the file");
     std::partial_sum(map_.first.begin(), map_.first.end(), map_.first.begin());
     map_.places.resize(by_tile.size());
     auto next = by_tile.begin();
-    each_tile(map_.size, [&](std::size_t, std::span<const std::size_t> columns) {
-      for (const std::size_t c : columns)
+    each_tile(map_.size, [&](std::size_t, std::span<const std::size_t> of_tile) {
+      for (const std::size_t c : of_tile)
         for (std::uint32_t i = map_.first[c]; i < map_.first[c + 1]; ++i) map_.places[i] = *next++;
     });
   }
 
   /// Notes how many places each column has, and appends them to `places`.
-  void read_tile(std::span<const std::byte> bytes, std::span<const std::size_t> columns,
+  void read_tile(std::span<const std::byte> bytes, std::span<const std::size_t> of_tile,
                  std::vector<Place>& places) {
-    const std::span counts = bytes.first(columns.size());
+    require(bytes.size() >= of_tile.size(), "a tile", "is cut off");
+    const std::span counts = bytes.first(of_tile.size());
     std::size_t count = 0;
     for (const std::byte in_column : counts) count += static_cast<std::size_t>(in_column);
     bytes = bytes.subspan(counts.size());
@@ -197,10 +212,10 @@ class Reader {
     std::span kinds = bytes.first(count);
     bytes = bytes.subspan(count);
     std::array<int, most_in_column> last{};
-    for (std::size_t c = 0; c < columns.size(); ++c) {
+    for (std::size_t c = 0; c < of_tile.size(); ++c) {
       const auto in_column = static_cast<std::uint32_t>(counts[c]);
       require(in_column <= most_in_column, "a column", "has too many places");
-      map_.first[columns[c] + 1] = in_column;
+      map_.first[of_tile[c] + 1] = in_column;
       for (std::size_t k = 0; k < in_column; ++k) {
         const auto kind = static_cast<std::uint8_t>(kinds.front());
         kinds = kinds.subspan(1);

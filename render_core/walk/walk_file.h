@@ -12,8 +12,8 @@ namespace catgs::walk {
 
 // A .walk file: a header of 320 bytes, an index of tiles, and the tiles. All is little-endian. A
 // tile has tile_side x tile_side columns, fewer at the map's east and north. Tiles lie row by row,
-// east first, then north. So a client unpacks what is near and needs no memory for the rest. The
-// index has the packed and the unpacked size of each tile, 4 bytes each: 0 and 0 for a tile without
+// east first, then north. So a client can keep the packed file and unpack what is near. The index
+// has the packed and the unpacked size of each tile, 4 bytes each: 0 and 0 for a tile without
 // places. Each other tile is a zlib stream (RFC 1950) of three parts:
 //
 //   1. The number of places of each column, a byte each, row by row: east first, then north

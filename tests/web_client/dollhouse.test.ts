@@ -4,8 +4,8 @@ import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
 import type { CameraMode } from '#client/camera/mode';
 import { Dollhouse } from '#client/ground/dollhouse';
 import type { Navigation } from '#client/ui/navigation';
-import { ceiling_cut, dollhouse_eye, is_house } from '#client/walk/dollhouse';
-import { to_world, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
+import { ceiling_cut, dollhouse_eye, house_around } from '#client/walk/dollhouse';
+import { to_world, type Block, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
 import type { WorkerClient } from '#client/worker/client';
 import { camera, expect_vec } from './cameras';
 import { flat_tiles } from './walk_maps';
@@ -24,14 +24,16 @@ function map_of(width: number, depth: number, storeys: readonly Storey[]): WalkM
     tiles: flat_tiles(width, depth, 10, () => true),
   };
 }
+const all_of = ({ tiles }: WalkMap): Block => ({ west: 0, south: 0, east: tiles.width, north: tiles.depth });
 const one: Storey = { low: 0, level: 10, area: 100 };
 
 describe('dollhouse', () => {
-  it('is for houses', () => {
-    expect(is_house(map_of(80, 70, [one]))).toBe(true);
-    expect(is_house(map_of(1000, 70, [one]))).toBe(false);
-    expect(is_house(map_of(1000, 70, [one, { low: 30, level: 40, area: 50 }]))).toBe(true);
-    expect(is_house(map_of(80, 70, []))).toBe(false);
+  it('is for houses, around their ground', async () => {
+    expect(await house_around(map_of(80, 70, [one]))).toEqual({ west: 0, south: 0, east: 80, north: 70 });
+    expect(await house_around(map_of(1000, 70, [one]))).toBeUndefined();
+    expect(await house_around(map_of(1000, 70, [one, { low: 30, level: 40, area: 50 }]))).toBeDefined();
+    const yard = { ...map_of(200, 80, [one]), tiles: flat_tiles(200, 80, 10, (x, y) => x > 3 && x < 150 && y >= 66) };
+    expect(await house_around(yard)).toEqual({ west: 4, south: 66, east: 150, north: 80 });
   });
 
   it('cuts above the heads of doors, and below the next storey', () => {
@@ -45,7 +47,7 @@ describe('dollhouse', () => {
   it.each([16 / 9, 9 / 16])('shows all of the storey in a view of %f', (aspect) => {
     const map = map_of(80, 40, [one]);
     const fov_y_rad = 1;
-    const { eye, focus } = dollhouse_eye(map, 0, fov_y_rad, aspect);
+    const { eye, focus } = dollhouse_eye(map, all_of(map), 0, fov_y_rad, aspect);
     const tan = Math.tan(fov_y_rad / 2);
     for (const [east, north] of [[0, 0], [80, 0], [0, 40], [80, 40]] as const) {
       const corner = to_world(map, { east, north, height: one.level });
@@ -90,6 +92,7 @@ describe('a visitor of the dollhouse', () => {
         go_to: (stand) => chosen.push(stand),
       },
       map,
+      all_of(map),
     );
     const shown: boolean[] = [];
     house.changed.listen((now) => shown.push(now));
@@ -104,7 +107,7 @@ describe('a visitor of the dollhouse', () => {
     expect(clips).toEqual([ceiling_cut(map, 0)]);
     expect(made.mode).toBe('orbit');
     const lower = made.pose.position;
-    expect_vec(lower, dollhouse_eye(map, 0, made.fov_y_rad, 16 / 9).eye.position);
+    expect_vec(lower, dollhouse_eye(map, all_of(map), 0, made.fov_y_rad, 16 / 9).eye.position);
     house.show(1);
     made.step(0.016);
     expect(clips[1]).toEqual(ceiling_cut(map, 1));

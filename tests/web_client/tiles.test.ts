@@ -36,7 +36,7 @@ describe('a tile', () => {
     ['a tile', six.slice(0, 5)],
     ['a tile', six.slice(0, 8)],
   ])('is refused: %s', (field, bytes) => {
-    expect(() => new PackedTiles(3, 2, 6, packed([bytes])).at(0)).toThrow(`walk file: ${field} is out of range`);
+    expect(() => new PackedTiles(3, 2, 2, packed([bytes])).at(0)).toThrow(`walk file: ${field} is out of range`);
   });
 
   it('is refused where it has more or less than the index says, or is no stream', () => {
@@ -79,11 +79,14 @@ describe('the tiles of a map', () => {
 
   it('are refused where the index is not theirs, without memory for what it names', () => {
     const right = packed([six]);
-    for (const [at, value] of [[0, 4], [0, 500], [4, 2 ** 31]] as const) {
+    for (const [at, value] of [[0, 4], [0, 500], [4, 0], [4, 2 ** 31]] as const) {
       const forged = right.slice();
       new DataView(forged.buffer).setUint32(at, value, true);
       expect(() => new PackedTiles(3, 2, 6, forged)).toThrow('index');
     }
+    expect(() => new PackedTiles(3, 2, 2 ** 24, right)).toThrow('places');
+    expect(() => new PackedTiles(3, 2, 6, packed([Array<number>(600).fill(0)], [200]))).not.toThrow();
+    expect(() => new PackedTiles(3, 2, 6, packed([six], [0]))).toThrow('index');
     expect(() => new PackedTiles(3, 2, 6, right.slice(0, 7))).toThrow('index');
     expect(() => new PackedTiles(3, 2, 6, Uint8Array.from([...right, 0]))).toThrow('index');
   });

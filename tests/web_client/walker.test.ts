@@ -113,6 +113,26 @@ describe('a walker', () => {
   }, 60_000);
 });
 
+/** The shortest way over the grid from the first column to the last (Bellman and Ford); Infinity: there is none. */
+function shortest_of(on: WalkMap): number {
+  const { width, depth } = on.tiles;
+  const way = new Map<number, number>([[0, 0]]);
+  const clear = (x: number, y: number): boolean => clear_at(on, x, y, 10) >= 0;
+  for (let changed = true; changed; ) {
+    changed = false;
+    for (const [at, gone] of [...way])
+      for (const [x, y] of [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]] as const) {
+        const [east, north] = [(at % width) + x, Math.floor(at / width) + y];
+        if (!clear(east, north) || !clear(east - x, north) || !clear(east, north - y)) continue;
+        const next = north * width + east;
+        if (gone + Math.hypot(x, y) >= (way.get(next) ?? Infinity) - 1e-9) continue;
+        way.set(next, gone + Math.hypot(x, y));
+        changed = true;
+      }
+  }
+  return way.get(width * depth - 1) ?? Infinity;
+}
+
 describe('a path', () => {
   it('is as long as that of render_core', async () => {
     for (const { from, to, length } of golden.paths) {
@@ -133,6 +153,25 @@ describe('a path', () => {
     const total = path.slice(1).reduce((sum, at, k) => sum + distance(path[k]!, at), 0);
     expect(total).toBeGreaterThan(59.5);
     expect(total).toBeLessThan(64);
+  });
+
+  it('is at most a fifth longer than the shortest', async () => {
+    const random = random_from(5);
+    for (let round = 0; round < 20; ++round) {
+      const maze = flat_map(50, 40, (x, y) => x + y < 4 || x + y > 84 || random() > 0.3);
+      const path = await find_path(maze, { east: 0.5, north: 0.5, height: 10 }, { east: 49.5, north: 39.5, height: 10 });
+      const shortest = shortest_of(maze);
+      expect(path.length > 0).toBe(shortest < Infinity);
+      const total = path.slice(1).reduce((sum, at, k) => sum + distance(path[k]!, at), 0);
+      expect(total).toBeLessThanOrEqual(1.2 * shortest);
+    }
+  });
+
+  it('is not sought any further when nobody wants it', async () => {
+    const yard = flat_map(40, 40, () => true);
+    const [from, to] = [{ east: 0.5, north: 0.5, height: 10 }, { east: 39.5, north: 39.5, height: 10 }];
+    expect(await find_path(yard, from, to, () => false)).toEqual([]);
+    expect(await find_path(yard, from, to, () => true)).toEqual([from, to]);
   });
 
   it('is none where there is no way', async () => {

@@ -93,14 +93,16 @@ TEST(WalkFile, ForgedFieldsAreNamed) {
   EXPECT_THAT(refusal(with(92, 2000.0f)), AllOf(HasSubstr("start"), HasSubstr("no clear ground")));
   EXPECT_THAT(refusal(with(104, 5000u)), HasSubstr("size"));
   EXPECT_THAT(refusal(with(104, 2u)), HasSubstr("a tile"));
-  EXPECT_THAT(refusal(with(112, 0xffffffffu)), HasSubstr("places"));
-  EXPECT_THAT(refusal(with(112, 5u)), HasSubstr("a tile"));
+  EXPECT_THAT(refusal(with(8, 1u)), HasSubstr("compute it with this version"));
+  EXPECT_THAT(refusal(with(112, 0xffffffffu)), HasSubstr("places: are too many"));
+  EXPECT_THAT(refusal(with(112, 5u)), HasSubstr("a tile: has too many places"));
   EXPECT_THAT(refusal(with(112, 7u)), HasSubstr("tiles"));
   EXPECT_THAT(refusal(with(116, 20u)), HasSubstr("tile side"));
-  EXPECT_THAT(refusal(with(320, 4u)), HasSubstr("a tile"));
+  EXPECT_THAT(refusal(with(320, 4u)), HasSubstr("index: is not that of the tiles"));
   EXPECT_THAT(refusal(with(320, 4000u)), HasSubstr("index"));
-  EXPECT_THAT(refusal(with(324, 5u)), HasSubstr("index"));
-  EXPECT_THAT(refusal(with(324, 500u)), HasSubstr("index"));
+  EXPECT_THAT(refusal(with(324, 0u)), HasSubstr("index: has a tile of a wrong size"));
+  EXPECT_THAT(refusal(with(324, 13u)), HasSubstr("a tile: cannot be unpacked"));
+  EXPECT_THAT(refusal(with(324, 500u)), HasSubstr("a tile: cannot be unpacked"));
   EXPECT_THAT(refusal(with(120, 7u)), HasSubstr("packed bytes"));
   EXPECT_THAT(refusal(with(124, 17u)), HasSubstr("storeys"));
   EXPECT_THAT(refusal(with(128, nan)), HasSubstr("storeys"));
@@ -121,21 +123,25 @@ TEST(WalkFile, ForgedTilesAreRefused) {
   EXPECT_THAT(refused(counts + std::string(6, 4) + heights), HasSubstr("a place"));
   EXPECT_THAT(refused(counts + kinds + std::string(7, '\x80')), HasSubstr("heights"));
   EXPECT_THAT(refused(counts + kinds + std::string(7, '\1')), HasSubstr("a place"));
-  EXPECT_THAT(refused(counts + kinds + heights + '\0'), HasSubstr("a tile"));
-  EXPECT_THAT(refused(std::string(6, 65) + kinds + heights), HasSubstr("a tile"));
-  EXPECT_THAT(refused(counts), HasSubstr("a tile"));
-  EXPECT_THAT(refused(""), HasSubstr("tiles"));
+  EXPECT_THAT(refused(counts + kinds + heights + '\0'), HasSubstr("more than its places"));
+  EXPECT_THAT(refused(std::string(6, 65) + kinds + heights), HasSubstr("too many places"));
+  EXPECT_THAT(refused(std::string(12, 1)), HasSubstr("heights: are cut off"));
+  EXPECT_THAT(refused(""), HasSubstr("places: are more than the tiles have"));
 }
 
 /// A header and an index that name much more than the tiles can hold cost no memory.
 TEST(WalkFile, NoMoreIsUnpackedThanDeflateCanMake) {
-  std::string bytes = with(112, 4096u * 64u);
-  const std::uint32_t side = 64, unpacked = 4096 + 4 * 4096 * 64;
+  std::string bytes = with(112, 1u << 24);
+  EXPECT_THAT(refusal(bytes), HasSubstr("places: are too many"));
+  const std::uint32_t side = 64, places = 64 * 4096, unpacked = 4096 * 257;
   std::memcpy(bytes.data() + 104, &side, 4);
   std::memcpy(bytes.data() + 108, &side, 4);
+  std::memcpy(bytes.data() + 112, &places, 4);
+  test::seal(bytes);
+  EXPECT_THAT(refusal(bytes), HasSubstr("places: are more than the tiles have"));
   std::memcpy(bytes.data() + 324, &unpacked, 4);
   test::seal(bytes);
-  EXPECT_THAT(refusal(bytes), AllOf(HasSubstr("index"), HasSubstr("too large")));
+  EXPECT_THAT(refusal(bytes), HasSubstr("index: has a tile of a wrong size"));
 }
 
 }  // namespace

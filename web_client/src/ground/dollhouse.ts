@@ -6,7 +6,7 @@ import type { CameraMode } from '../camera/mode';
 import type { Navigation } from '../ui/navigation';
 import { ceiling_cut, dollhouse_eye } from '../walk/dollhouse';
 import { floor_along } from '../walk/floor';
-import type { Stand, WalkMap } from '../walk/walk_map';
+import type { Block, Stand, WalkMap } from '../walk/walk_map';
 import type { WorkerClient } from '../worker/client';
 
 interface DollhouseParts {
@@ -31,6 +31,7 @@ export class Dollhouse {
   constructor(
     private readonly parts_: DollhouseParts,
     private readonly map_: WalkMap,
+    private readonly around_: Block,
   ) {}
 
   get shown(): boolean {
@@ -49,7 +50,7 @@ export class Dollhouse {
       this.changed.emit(true);
     }
     navigation.tapped = this.tapped;
-    const { eye, focus } = dollhouse_eye(this.map_, storey, navigation.eye.fov_y_rad, view.clientWidth / Math.max(1, view.clientHeight));
+    const { eye, focus } = dollhouse_eye(this.map_, this.around_, storey, navigation.eye.fov_y_rad, view.clientWidth / Math.max(1, view.clientHeight));
     camera.fly_to(eye, focus, reduced_motion);
     navigation.loop.wake();
   }

@@ -131,20 +131,21 @@ export class GroundUse {
   private async open_plan(): Promise<void> {
     const { map_: map, parts_: parts } = this;
     if (!map) return void this.ground_.want();
-    const [{ PlanPanel }, { Dollhouse }, { is_house }, walking] = await Promise.all([
+    const [{ PlanPanel }, { Dollhouse }, { house_around }, walking] = await Promise.all([
       import('./plan_panel'),
       import('./dollhouse'),
       import('../walk/dollhouse'),
       this.make_walking(map),
     ]);
-    if (!walking) return;
+    const house = await house_around(map);
+    if (!walking || map !== this.map_) return;
     const go_to = (stand: Stand): void => {
       parts.navigation.taken_over.emit();
       const before = this.house_?.end();
       if (before) walking.land(stand, before.eye);
-      else void walking.go_to(stand);
+      else walking.go_to(stand).catch(warn);
     };
-    this.house_ ??= is_house(map) ? new Dollhouse({ ...parts, go_to }, map) : undefined;
+    this.house_ ??= house && new Dollhouse({ ...parts, go_to }, map, house);
     this.plan_ ??= new PlanPanel(
       {
         storage: parts.storage,

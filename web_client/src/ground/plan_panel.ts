@@ -183,7 +183,11 @@ export class PlanPanel {
 
   private picture_of(storey: number): DrawnPlan | undefined {
     const known = this.pictures_.get(storey);
-    if (!known) void this.make_picture(storey);
+    if (!known)
+      this.make_picture(storey).catch((error: unknown) => {
+        this.pictures_.delete(storey);
+        console.warn('the plan cannot be drawn', error);
+      });
     return known === 'comes' ? undefined : known;
   }
 

@@ -26,7 +26,7 @@ export interface PlanPicture {
 /** Higher places cover lower ones. Of the cells of a pixel the darkest counts, so that no wall is lost. */
 export async function plan_picture(map: WalkMap, storey: number): Promise<PlanPicture> {
   const in_storey = (place: number): boolean => storey_at(map, height_of(place)) === storey;
-  const { west, south, east, north } = block_around(map, in_storey) ?? { west: 0, south: 0, east: 1, north: 1 };
+  const { west, south, east, north } = (await block_around(map, in_storey)) ?? { west: 0, south: 0, east: 1, north: 1 };
   const cells = Math.ceil(Math.max(east - west, north - south) / most_px);
   const [width, height] = [Math.ceil((east - west) / cells), Math.ceil((north - south) / cells)];
   const rgba = new Uint8ClampedArray(4 * width * height);

@@ -19,6 +19,8 @@ const announced_s = 4; // the wire takes 256 samples
 const announce_again_s = 2;
 const flight_s = 2.5;
 
+const warn = (error: unknown): void => console.warn('there is no way', error);
+
 interface WalkingParts {
   readonly view: HTMLElement;
   readonly navigation: Navigation;
@@ -76,9 +78,11 @@ export class Walking {
       this.travel(glide(eye, { ...eye, position }, duration_s));
       return;
     }
+    navigation.stop_flight();
     this.sought_ = to;
-    const path = await find_path(this.map, this.walker.stand_at(eye.position), to);
-    if (this.sought_ !== to || path.length === 0) return; // no flight through walls either
+    const path = await find_path(this.map, this.walker.stand_at(eye.position), to, () => this.sought_ === to);
+    const moved = length(sub(navigation.eye.position, eye.position)) > this.map.radius * this.map.cell;
+    if (this.sought_ !== to || moved || path.length === 0) return; // no flight through walls either
     const way = stroll(this.map, path, navigation.eye);
     this.travel(reduced_motion ? { duration_s: 0, at: () => way.at(way.duration_s) } : way);
     if (reduced_motion) return;
@@ -107,7 +111,7 @@ export class Walking {
     if (!to) return false;
     if (again) return true; // the first of two clicks leads there
     this.parts_.navigation.taken_over.emit();
-    void this.go_to(to);
+    this.go_to(to).catch(warn);
     return true;
   }
 

@@ -1,7 +1,7 @@
 // A storey as a dollhouse: seen from outside, without its ceiling. Pure.
 import { add, dot, look_at, scale, sub, type Vec3 } from '../base/vector';
 import type { ClipPlane, Eye } from '../camera/eye';
-import { block_around, to_world, type WalkMap } from './walk_map';
+import { block_around, to_world, type Block, type WalkMap } from './walk_map';
 
 const house_cells = 640; // 64 m for people of 1.6 m; what is larger is a landscape
 const cut_cells = 20; // above the floor: higher than doors' handles, lower than ceilings
@@ -9,9 +9,12 @@ const below_storey_above_cells = 2;
 const pitch_rad = (52 * Math.PI) / 180;
 const margin = 1.1;
 
-/** Whether a scene is a house: small, or with storeys. */
-export const is_house = ({ storeys, tiles }: WalkMap): boolean =>
-  storeys.length > 1 || (storeys.length > 0 && Math.max(tiles.width, tiles.depth) <= house_cells);
+/** Where the ground of a house is; undefined where the scene is none: it is neither small nor has storeys. */
+export async function house_around(map: WalkMap): Promise<Block | undefined> {
+  const { storeys, tiles } = map;
+  const is_house = storeys.length > 1 || Math.max(tiles.width, tiles.depth) <= house_cells;
+  return is_house ? block_around(map, () => true) : undefined;
+}
 
 /** Cuts off all above a storey. */
 export function ceiling_cut({ storeys, origin, axes, cell }: WalkMap, storey: number): ClipPlane {
@@ -21,16 +24,11 @@ export function ceiling_cut({ storeys, origin, axes, cell }: WalkMap, storey: nu
   return { normal: axes[2], offset: dot(axes[2], origin) + height * cell };
 }
 
-/** The middle of the map's ground at a storey's level, and the radius of a circle around all of it. World units. */
-function extent(map: WalkMap, storey: number): { middle: Vec3; radius: number } {
-  const { west, south, east, north } = block_around(map, () => true)!; // the start is ground
-  const middle = { east: (west + east) / 2, north: (south + north) / 2, height: map.storeys[storey]!.level };
-  return { middle: to_world(map, middle), radius: (Math.hypot(east - west, north - south) / 2) * map.cell };
-}
-
 /** From the south and above, so that all of the storey is in a view of this width / height. */
-export function dollhouse_eye(map: WalkMap, storey: number, fov_y_rad: number, aspect: number): { eye: Eye; focus: Vec3 } {
-  const { middle, radius } = extent(map, storey);
+export function dollhouse_eye(map: WalkMap, around: Block, storey: number, fov_y_rad: number, aspect: number): { eye: Eye; focus: Vec3 } {
+  const { west, south, east, north: end } = around;
+  const middle = to_world(map, { east: (west + east) / 2, north: (south + end) / 2, height: map.storeys[storey]!.level });
+  const radius = (Math.hypot(east - west, end - south) / 2) * map.cell;
   const [, north, up] = map.axes;
   const half_rad = Math.min(fov_y_rad / 2, Math.atan(Math.tan(fov_y_rad / 2) * aspect));
   const distance = (margin * radius) / Math.sin(half_rad);

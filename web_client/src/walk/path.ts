@@ -123,10 +123,10 @@ class Search {
 
 /**
  * A way over the grid and its eight directions, with straight pieces between its turns. It is at most a fifth longer
- * than the shortest. It begins with `from`. Empty where there is none. While it runs, it takes 15 bytes for each
- * place of the map, and it lets the page draw.
+ * than the shortest. It begins with `from`. Empty where there is none, or where it is not `wanted` any more. While the
+ * search runs, it keeps the tiles that it came to, takes 15 bytes for each place of the map, and lets the page draw.
  */
-export async function find_path(map: WalkMap, from: Stand, to: Stand): Promise<Stand[]> {
+export async function find_path(map: WalkMap, from: Stand, to: Stand, wanted = (): boolean => true): Promise<Stand[]> {
   const search = new Search(map);
   const { state, cost, before } = search;
   const goal = [Math.floor(to.east), Math.floor(to.north)] as const;
@@ -148,7 +148,10 @@ export async function find_path(map: WalkMap, from: Stand, to: Stand): Promise<S
   const beside = [-1, -1, -1, -1];
   const breaths = new Breaths();
   for (let k = 0; !open.empty && state[end] !== State.done; ++k) {
-    if (k % nodes_a_breath === 0) await breaths.take();
+    if (k % nodes_a_breath === 0) {
+      await breaths.take();
+      if (!wanted()) return [];
+    }
     const node = open.pop();
     if (state[node] === State.done) continue;
     state[node] = State.done;

@@ -1,12 +1,14 @@
 // The columns of a WalkMap, unpacked where somebody needs them: a map of two million places takes its file's bytes.
 import { unzlibSync } from 'fflate';
 
-export const tile_side = 64; // columns
+const tile_bits = 6;
+export const tile_side = 2 ** tile_bits; // columns
 const most_in_column = 64;
-const most_levels = 1024; // cells
+export const most_levels = 1024; // cells
 const per_cell = 16; // units of a stored height
 const kept_tiles = 20;
 const most_growth = 1032; // of deflate
+const most_tile_bytes = tile_side ** 2 * (1 + 4 * most_in_column);
 
 /** What a column has at a height: `clear` ground has room for a body all around. */
 export const Kind = { clear: 0, near: 1, low: 2, obstacle: 3 } as const;
@@ -32,9 +34,11 @@ export interface Tiles {
 
 /** Of a column, inside of the map. */
 export const tile_at = ({ width }: Tiles, column: number, row: number): number =>
-  (row >> 6) * Math.ceil(width / tile_side) + (column >> 6);
-export const column_in_tile = ({ width }: Tiles, column: number, row: number): number =>
-  (row & 63) * Math.min(tile_side, width - (column & ~63)) + (column & 63);
+  (row >> tile_bits) * Math.ceil(width / tile_side) + (column >> tile_bits);
+export function column_in_tile({ width }: Tiles, column: number, row: number): number {
+  const [x, y] = [column & (tile_side - 1), row & (tile_side - 1)];
+  return y * Math.min(tile_side, width - (column - x)) + x;
+}
 
 export const tiles_in = (width: number, depth: number): number => Math.ceil(width / tile_side) * Math.ceil(depth / tile_side);
 
@@ -100,15 +104,19 @@ export class PackedTiles implements Tiles {
     this.begin_ = new Uint32Array(tiles + 1);
     this.unpacked_ = new Uint32Array(tiles);
     this.bytes_ = bytes.subarray(8 * tiles);
+    let sum = 0;
     for (let t = 0; t < tiles; ++t) {
       const [packed, unpacked] = [index.getUint32(8 * t, true), index.getUint32(8 * t + 4, true)];
       const end = this.begin_[t]! + packed;
       require(end <= this.bytes_.length && unpacked <= most_growth * packed, 'index');
-      require(unpacked <= tile_side ** 2 * (1 + 4 * most_in_column), 'index');
+      require(unpacked <= most_tile_bytes && packed <= 2 * unpacked + 64, 'index');
+      require((packed === 0) === (unpacked === 0), 'index');
+      sum += unpacked;
       this.begin_[t + 1] = end;
       this.unpacked_[t] = unpacked;
     }
     require(this.begin_[tiles] === this.bytes_.length, 'index');
+    require(2 * count <= sum, 'places'); // a kind and a height each
   }
 
   has(index: number): boolean {

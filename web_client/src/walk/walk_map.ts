@@ -1,12 +1,12 @@
 // The ground of a scene on which a visitor can walk: a `.walk` file (render_core/walk/walk_file.h).
+import { Breaths } from '../base/breaths';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
-import { column_in_tile, height_of, Kind, kind_of, PackedTiles, require, tile_at, tile_side, type Tiles } from './tiles';
+import { column_in_tile, height_of, Kind, kind_of, most_levels, PackedTiles, require, tile_at, tile_side, type Tiles } from './tiles';
 
 const header_bytes = 320;
 const most_side = 2048;
 const most_places = 2 ** 24;
 const most_storeys = 16;
-const most_levels = 1024; // cells
 const most_person_cells = 160;
 const most_bytes = 2 ** 27; // of a file
 export const cells_per_eye_height = 16;
@@ -108,9 +108,11 @@ export function* blocks({ tiles }: WalkMap): Generator<Block> {
 }
 
 /** The smallest block around the columns with such places; undefined: there are none. */
-export function block_around(map: WalkMap, such: (place: number) => boolean): Block | undefined {
+export async function block_around(map: WalkMap, such: (place: number) => boolean): Promise<Block | undefined> {
   let [west, south, east, north] = [Infinity, Infinity, 0, 0];
+  const breaths = new Breaths();
   for (const block of blocks(map)) {
+    await breaths.take();
     if (block.west >= west && block.south >= south && block.east <= east && block.north <= north) continue;
     for (let row = block.south; row < block.north; ++row)
       for (let column = block.west; column < block.east; ++column) {
