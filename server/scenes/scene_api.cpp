@@ -101,12 +101,12 @@ HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part,
   }
   if (part == Part::walk) return ground_of(*found, request.if_none_match);
   if (!found->poster) {
-    HttpResponse none = text_response(404, "404: the scene has no poster\n");
-    if (found->loaded) return none;
+    if (found->loaded) return text_response(404, "404: the scene has no poster\n");
     scenes_.want_poster(found->id);
-    none = text_response(404, "404: the scene is not loaded yet, and has no poster before\n");
-    none.retry_after_s = 5;
-    return none;
+    // No error: browsers would report that to visitors who look at the console.
+    HttpResponse later = text_response(202, "202: the poster comes when the scene is loaded\n");
+    later.retry_after_s = 5;
+    return later;
   }
   HttpResponse response;
   response.content_type = "image/jpeg";

@@ -222,6 +222,15 @@ TEST_F(SceneLibraryTest, WhatIsListedCanBeOpenedWhateverItsFileIsCalled) {
   }
 }
 
+TEST_F(SceneLibraryTest, APosterIsPromisedUntilItsSceneHasBeenLoaded) {
+  start();
+  const auto poster = [&] { return http_get(server_->port(), "/api/scenes/attic/poster.jpg"); };
+  const HttpReply first = poster();
+  EXPECT_EQ(first.status, 202) << "no error, which a browser would report";
+  EXPECT_EQ(first.headers.count("retry-after"), 1u);
+  eventually([&] { return poster().status == 200; }, "the poster");
+}
+
 TEST_F(SceneLibraryTest, AServerStopsWhileItLoads) {
   save_scene(random_cloud(200'000, 3), folder_ / "large.ply");
   server_ = std::make_unique<RunningServer>(

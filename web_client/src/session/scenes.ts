@@ -29,7 +29,7 @@ export async function fetch_poster(
 ): Promise<Blob | 'later' | undefined> {
   try {
     const response = await ask_server(page_url, token, scene_path(scene_id, 'poster.jpg'));
-    if (!response.ok) return response.headers.has('retry-after') ? 'later' : undefined;
+    if (response.status !== 200) return response.headers.has('retry-after') ? 'later' : undefined;
     const blob = await response.blob();
     return blob.type.startsWith('image/') ? blob : undefined;
   } catch (error) {
