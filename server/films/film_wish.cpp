@@ -34,9 +34,9 @@ glm::ivec2 read_size(const JsonField& field, FilmKind kind) {
   for (int i = 0; i < 2; ++i) {
     const std::uint64_t side = field[static_cast<std::size_t>(i)].count();
     if (side < least_side_px || side > static_cast<std::uint64_t>(most[i]))
-      field.fail(
-          fmt::format("is not between {0}x{0} and {1}x{2} pixels", least_side_px, most.x, most.y),
-          fmt::format("a {} has no other size", kind_names[static_cast<std::size_t>(kind)]));
+      field.fail(fmt::format("is not between {0}x{0} and {1}x{2} pixels, as a {3} is",
+                             least_side_px, most.x, most.y,
+                             kind_names[static_cast<std::size_t>(kind)]));
     size_px[i] = static_cast<int>(side);
   }
   if (kind == FilmKind::panorama && size_px.x != 2 * size_px.y)
@@ -50,8 +50,8 @@ FilmView read_view(const JsonField& field, const FilmView* before) {
   const std::size_t count = field.value().is_array() ? field.size() : 0;
   if (count != 8 && !(count == 7 && before))
     field.fail("is not [x, y, z, qx, qy, qz, qw, fov_deg]",
-               "only after the first view, fov_deg may be left out, or a whole number may repeat "
-               "the view before");
+               "give fov_deg in the first view; later ones may leave it out, and a whole number "
+               "repeats the view before");
   const auto number = [&](std::size_t i) { return field[i].number(); };
   FilmView view;
   view.world_from_camera.position = field.as_place({number(0), number(1), number(2)});

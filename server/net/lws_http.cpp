@@ -32,7 +32,8 @@ class HeaderWriter {
  public:
   HeaderWriter(lws* wsi, int status, const std::string& content_type, std::uint64_t length)
       : wsi_(wsi) {
-    const bool has_content = status != 204 && status != 304;  // RFC 9110: else no length either
+    // RFC 9110 forbids a length in a 204. In a 304 it would be that of the page.
+    const bool has_content = status != 204 && status != 304;
     ok_ = lws_add_http_common_headers(
               wsi, static_cast<unsigned>(status), has_content ? content_type.c_str() : nullptr,
               has_content ? length : LWS_ILLEGAL_HTTP_CONTENT_LEN, &at_, end()) == 0;

@@ -86,9 +86,9 @@ MediaKind check_source(const JsonField& medium, const MediaOrigins* origins) {
   const bool is_address = src.find(':') != src.npos;
   if (!is_address && !is_media_name(src))
     source.fail("is no name of a file", "letters, digits, . - and _ alone, or an https address");
+  if (is_address && !src.starts_with("https://")) source.fail("is no https address");
   const auto at_origin = [&](const std::string& origin) { return src.starts_with(origin + "/"); };
-  const bool at_site =
-      origins ? std::ranges::any_of(*origins, at_origin) : src.starts_with("https://");
+  const bool at_site = !origins || std::ranges::any_of(*origins, at_origin);
   if (is_address && (src.size() > max_address_bytes || !at_site))
     source.fail("is at no site that this server shows media of",
                 "the operator names sites by --media-origin");

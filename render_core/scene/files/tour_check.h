@@ -22,7 +22,7 @@ inline constexpr std::size_t max_portal_bytes = 128;  // of the id of a scene th
 void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins);
 
 /// How people are told of a mistake that check_tours() finds in a file.
-inline constexpr std::string_view faulty_tours = "a mistake in tours, which pages may not show: ";
+inline constexpr std::string_view faulty_tours = "pages may not show all of these tours: ";
 
 /// What they are told of the tours of a scene, with media at any site; nothing: there is no
 /// mistake.

@@ -70,9 +70,16 @@ TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
     "start_pose": {"position": [0, 0, -4], "look_at": [0, 0, 0]}, "near": 0.125, "title": "Ball",
     "tours": [{"title": "Way", "stops": [{"position": [1, 0, 0], "look_at": [0, 0, 0]}]}]})";
   folder_.write("ball.media/door.vtt", "WEBVTT");
+  folder_.write("ball.media/hall.vtt", "WEBVTT");
+  folder_.write("moved.media/hall.vtt", "there before");
+  std::filesystem::create_symlink(path("ball.json"), path("ball.media/link.vtt"));
   const std::string moves = "--scale 2 --translate=0,10,0";
-  ASSERT_EQ(convert("moved.spz", moves).exit_code, 0);
+  const Outcome moved = convert("moved.spz", moves);
+  ASSERT_EQ(moved.exit_code, 0);
+  EXPECT_THAT(moved.out, HasSubstr("1 media of the tours, from " + path("ball.media")));
   EXPECT_TRUE(std::filesystem::exists(path("moved.media/door.vtt")));
+  EXPECT_EQ(std::filesystem::file_size(path("moved.media/hall.vtt")), 12u);
+  EXPECT_FALSE(std::filesystem::exists(path("moved.media/link.vtt")));
   const auto sidecar = nlohmann::json::parse(std::ifstream(path("moved.json")));
   EXPECT_EQ(sidecar.at("start_pose").at("position"), nlohmann::json({0.0, 10.0, -8.0}));
   EXPECT_EQ(sidecar.at("near"), 0.25);
