@@ -206,8 +206,8 @@ Cameras read_text_cameras(const std::filesystem::path& path, Distortion distorti
                          "CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
     };
     need();
-    const Model& model = model_of(path.string(), where_of(line), std::string_view(model_name),
-                                  &Model::name, distortion);
+    const Model model = model_of(path.string(), where_of(line), std::string_view(model_name),
+                                 &Model::name, distortion);
     std::array<double, max_parameters> parameters{};
     const auto used = std::span(parameters).first(model.parameters);
     for (double& parameter : used) fields >> parameter;

@@ -27,7 +27,7 @@ TEST(GltfRefusals, ErrorsNameTheField) {
   EXPECT_THAT(error_of([](Json& j) {
                 j["nodes"][0]["rotation"] = {0, 0, 0, 2};
               }),
-              HasSubstr("nodes[0].rotation: its quaternion"));
+              HasSubstr("nodes[0].rotation: is no quaternion"));
   EXPECT_THAT(error_of([](Json& j) {
                 j["nodes"][0]["scale"] = {1, 0, 1};
               }),
