@@ -22,7 +22,6 @@ let frames: bigint[];
 let configs: string[];
 let notices: string[];
 let stayed: string[];
-let leaders: string[];
 let streams_ended: number;
 
 beforeEach(() => {
@@ -34,7 +33,6 @@ beforeEach(() => {
   configs = [];
   notices = [];
   stayed = [];
-  leaders = [];
   streams_ended = 0;
   session = new Session(
     { open: network.open, clock: time, timers: time, random: () => 0.5 },
@@ -51,7 +49,7 @@ beforeEach(() => {
       picked: () => undefined,
       pinged: () => undefined,
       company: () => undefined,
-      lead: ({ name }) => leaders.push(name),
+      lead: () => undefined,
       notice: (message) => notices.push(message),
       stayed: (message) => stayed.push(message),
     },
@@ -66,7 +64,6 @@ beforeEach(() => {
 });
 
 const last_state = (): SessionState | undefined => states[states.length - 1];
-const cases = (i: number): unknown[] => socket(i).heard.map((body) => body.case);
 const socket = (i: number): FakeSocket => {
   const found = sockets[i];
   if (!found) throw new Error(`connection ${i} was not opened`);
@@ -115,48 +112,6 @@ describe('greeting', () => {
     expect(last_state()).toEqual(loading);
     expect(card_for(loading, false)?.title).toBe('Loading the scene');
     expect(card_for(waiting, false)?.title).toContain('Number 3');
-  });
-
-  it('watches where it has no place, and follows and leads on a stream of its own, also after a loss', () => {
-    session.keep({ case: 'follow', value: { watch: 'w' } });
-    session.greet_anew({ watch: 'w', follow: true });
-    socket(0).events.opened();
-    expect(socket(0).sent('hello')[0]).toMatchObject({ watch: 'w', follow: true });
-    socket(0).say({ case: 'welcome', value: { watching: true } });
-    session.send_pose(pose(1n));
-    expect(cases(0)).toEqual(['hello']);
-    socket(0).say({ case: 'lead', value: { name: 'Ada' } });
-    expect(leaders).toEqual(['Ada']);
-    socket(0).say({ case: 'error', value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true } });
-    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'no_leader' });
-    session.retry();
-    socket(1).events.opened();
-    expect(socket(1).sent('hello')[0]).toMatchObject({ watch: 'w' });
-    socket(1).say({ case: 'welcome', value: { resumeToken: 'again' } });
-    expect(cases(1)).toEqual(['hello', 'follow', 'pose']);
-    session.keep({ case: 'present', value: { on: true, name: 'me' } });
-    socket(1).events.closed(1006, '');
-    session.retry();
-    socket(2).events.opened();
-    expect(socket(2).sent('hello')[0]).toMatchObject({ watch: '', follow: false });
-    socket(2).say({ case: 'welcome', value: {} });
-    expect(cases(2)).toEqual(['hello', 'follow', 'present', 'pose']);
-  });
-
-  it('goes along into another scene, and stays there after a loss', () => {
-    session.keep({ case: 'follow', value: { watch: 'w' } });
-    session.start();
-    welcome(socket(0));
-    session.send_pose(pose(1n));
-    session.greet_anew({ watch: 'w', follow: true });
-    socket(1).events.opened();
-    expect(socket(1).sent('hello')[0]).toMatchObject({ sceneId: 'city', watch: 'w', resume: { token: 'again' } });
-    expect(socket(1).sent('hello')[0]!.resume!.pose).toBeUndefined(); // that was in the other scene
-    socket(1).say({ case: 'welcome', value: { scene: { sceneId: 'park' } } });
-    expect(cases(1)).toEqual(['hello', 'follow']);
-    session.retry();
-    socket(2).events.opened();
-    expect(socket(2).sent('hello')[0]).toMatchObject({ sceneId: 'park', watch: '' });
   });
 
   it('gives up a server that accepts and says nothing', () => {

@@ -57,6 +57,7 @@ interface SessionEnvironment {
 }
 
 const stable_ms = 5000; // after a connection that lived this long, backoff starts anew
+const tries_to_go_along = 3; // for about a second: a leader's page presents again when it is in its new scene
 const keep_alive_ms = 10_000;
 const congested_bytes = 32 * 1024;
 const congestion_poll_ms = 20;
@@ -279,12 +280,17 @@ export class Session {
     link.welcomed_us = this.env_.clock.now_us();
     if (welcome.config) link.config = welcome.config;
     if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
-    // A session of its own stays one, in the scene where the leader was.
-    if (!welcome.watching && this.greeting_.watch)
-      this.greeting_ = { ...this.greeting_, sceneId: welcome.scene?.sceneId ?? '', watch: '', follow: false };
+    this.led(welcome);
     this.left_scene_ = undefined;
     if (link === this.link_) this.go_live(link);
     else if (this.last_pose_) link.send({ case: 'pose', value: this.last_pose_ });
+  }
+
+  /** The leader's scene is that of a session of its own, now or when it leaves. Such a session stays one. */
+  private led({ watching, mayLeave, scene }: Welcome): void {
+    if (!this.greeting_.watch || (watching && !mayLeave)) return;
+    this.greeting_ = { ...this.greeting_, sceneId: scene?.sceneId ?? '' };
+    if (!watching) this.greeting_ = { ...this.greeting_, watch: '', follow: false };
   }
 
   /** Takes over: the successor has its first picture, or the old connection is gone. */
@@ -320,7 +326,12 @@ export class Session {
       this.listener_.notice(error.message);
     } else if (link === this.successor_) {
       this.lost(link, 'refused', error.message);
-    } else if (error.code === Error_Code.SESSION_ENDED || error.code === Error_Code.NO_LEADER) {
+    } else if (this.goes_along_in_vain(link, error.code)) {
+      this.listener_.notice(error.message);
+      this.kept_.delete('follow'); // until the visitor asks for it again
+      this.greet_anew({ watch: '', follow: false });
+    } else if (lacks_leader(error.code)) {
+      if (link.welcome) this.attempt_ = 0; // the leader led until now, and may have gone to another scene
       this.wait('no_leader', error.message);
     } else if (is_temporary(error.code)) {
       this.wait('refused', error.message);
@@ -329,6 +340,12 @@ export class Session {
       this.resume_token_ = '';
       this.listener_.state({ phase: 'failed', code: error.code, message: error.message });
     }
+  }
+
+  /** Whether it is time to return to the session that the visitor had before. */
+  private goes_along_in_vain(link: Link, code: Error_Code): boolean {
+    if (!this.greeting_.watch || !this.resume_token_ || link.welcome) return false;
+    return this.attempt_ + 1 >= tries_to_go_along || !(lacks_leader(code) || is_temporary(code));
   }
 
   /** Tries less and less often, because a fleet of one server refuses until it has ended. */
@@ -372,6 +389,10 @@ function path_ahead(path: readonly PoseInit[], now_us: number): { path?: { sampl
 /** Whether an error refuses a scene. */
 const shuts_out = (code: Error_Code): boolean =>
   code === Error_Code.UNKNOWN_SCENE || code === Error_Code.UNAUTHORIZED || code === Error_Code.SERVER_FULL;
+
+/** Whether there was nobody to watch. */
+const lacks_leader = (code: Error_Code): boolean =>
+  code === Error_Code.SESSION_ENDED || code === Error_Code.NO_LEADER;
 
 /** Whether time may cure a refusal. All others need another link, token, scene or program. */
 function is_temporary(code: Error_Code): boolean {
