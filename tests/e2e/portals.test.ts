@@ -93,12 +93,53 @@ describe('a portal', () => {
     for (const page of [follower, guest]) await page.getByText('Ada leads, 2 follow').waitFor();
     await leader.locator('#tour-portal').click();
     await follower.getByText('Ada goes on in another scene. You follow.').waitFor();
-    await expect.poll(() => scene_of(follower)).toBe('park');
+    for (const page of [follower, guest]) await expect.poll(() => scene_of(page)).toBe('park');
+    await guest.locator('#card').waitFor({ state: 'hidden' });
+    expect(follower.url()).toMatch(/scene=park.*#watch=/);
     for (const page of [leader, follower, guest]) await page.locator('#company', { hasText: /2 (people )?follow/ }).waitFor();
     await expect.poll(async () => distance(await pose_of(leader), await pose_of(follower))).toBeLessThan(1e-3);
     await settle(follower);
     await keep_screenshot(follower, 'portal-followed');
     expect([errors, more, await barriers(follower)]).toEqual([[], [], []]);
+  });
+
+  it('lets go of whoever leaves a guide by the history, or after the end', async () => {
+    const { page: leader } = await open(`${server.url}?scene=town${token()}`, windows.desktop);
+    await go_to_stop(leader, 1);
+    const link = await present(leader);
+    await leader.keyboard.press('Escape');
+    const { page: follower } = await open(`${link}&${token().slice(1)}`, windows.desktop);
+    await follower.getByText('Ada leads').waitFor();
+    // Both come to the park, each by itself.
+    for (const page of [follower, leader]) {
+      if (page === follower) await go_to_stop(page, 1);
+      await page.locator('#tour-portal').click();
+      await expect.poll(() => scene_of(page)).toBe('park');
+    }
+    await follower.getByRole('button', { name: 'Follow Ada' }).click();
+    await follower.getByText('Ada leads').waitFor();
+    await keep_screenshot(follower, 'portal-before-back');
+    const stays_in = async (scene: string): Promise<void> => {
+      await expect.poll(() => scene_of(follower)).toBe(scene);
+      await settle(follower);
+      expect(await scene_of(follower)).toBe(scene);
+      expect(await follower.getByText('Ada goes on in another scene').count()).toBe(0);
+    };
+    await follower.goBack();
+    await follower.getByRole('button', { name: 'Follow Ada' }).waitFor();
+    await stays_in('town');
+    await keep_screenshot(follower, 'portal-left-by-history');
+
+    await leader.goBack();
+    await expect.poll(() => scene_of(leader)).toBe('town');
+    await follower.getByRole('button', { name: 'Follow Ada' }).click();
+    await follower.getByText('Ada leads').waitFor();
+    await leader.locator('#company-action').click();
+    await follower.getByText('The presentation is over').waitFor();
+    await present(leader);
+    await leader.keyboard.press('Escape');
+    await follower.goForward();
+    await stays_in('park');
   });
 
   it('leads to a stop of another tour, and is passed by a playing one', async () => {

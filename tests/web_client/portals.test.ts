@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { rotate, type Vec3 } from '#client/base/vector';
-import { address_in, arrival, door_of, lasting_name } from '#client/portals/portals';
+import { address_in, address_led_to, arrival, door_of, lasting_name } from '#client/portals/portals';
 import { read_tours, write_tours, type Portal } from '#client/tour/tour';
 import { expect_vec } from './cameras';
 
@@ -59,5 +59,11 @@ describe('a portal', () => {
     const view = { eye: undefined, mode: undefined, tour_index: undefined, stop_index: 1 };
     const address = address_in('https://a.example/x/?scene=town&lang=de&author#watch=w&token=t', 'hall', view);
     expect(address).toBe('https://a.example/x/?scene=hall&lang=de&author=#stop=2');
+  });
+
+  it('comes along with a leader, and leads to no view of the scene before', () => {
+    const led = (hash: string): string => address_led_to(`https://a.example/x/?scene=town&lang=de#${hash}`, 'hall');
+    expect(led('watch=w')).toBe('https://a.example/x/?scene=hall&lang=de#watch=w');
+    expect(led('at=1,2,3,0,0,0,1,60&stop=2')).toBe('https://a.example/x/?scene=hall&lang=de');
   });
 });

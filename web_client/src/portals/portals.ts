@@ -1,6 +1,7 @@
 // Ways from scene to scene. Pure.
 import { look_at, type Vec3 } from '../base/vector';
 import { scene_name, type SceneListing } from '../session/scenes';
+import { watch_token } from '../session/token';
 import { share_address, type SharedView } from '../tour/share';
 import type { Portal } from '../tour/tour';
 
@@ -36,5 +37,14 @@ export function address_in(page_url: string, scene_id: string, view: SharedView)
   for (const [name, value] of new URL(page_url).searchParams) {
     if (name !== 'scene') url.searchParams.append(name, value);
   }
+  return url.href;
+}
+
+/** The page's address in the scene where another visitor has led this one. Reloaded, it still follows that visitor. */
+export function address_led_to(page_url: string, scene_id: string): string {
+  const url = new URL(page_url);
+  url.searchParams.set('scene', scene_id);
+  const watch = watch_token(page_url);
+  url.hash = watch && new URLSearchParams({ watch }).toString();
   return url.href;
 }

@@ -1,6 +1,6 @@
 // Leads visitors through portals. The old picture covers the new scene until that has one from where they arrive.
 import { same_view } from '../camera/same_view';
-import { address_in, arrival, door_of, type Door } from '../portals/portals';
+import { address_in, address_led_to, arrival, door_of, type Door } from '../portals/portals';
 import { list_scenes, scene_name, type SceneListing } from '../session/scenes';
 import type { AccessToken } from '../session/token';
 import type { SharedView } from '../tour/share';
@@ -90,18 +90,17 @@ export class Doors {
   enter(portal: Portal): void {
     const { scene_id } = this.behind(portal);
     if (!scene_id || this.going_) return;
-    const { navigation } = this.parts_;
-    navigation.taken_over.emit();
-    // The way back leads to this view.
-    history.replaceState(null, '', address_in(location.href, navigation.scene_id, this.present_()));
     void this.go(portal, scene_id);
   }
 
   /** The other scene is there. Returns where the visitor arrives; undefined: as the address says. */
   arrive(scene_id: string): SharedView | undefined {
+    const { camera, led } = this.parts_.navigation;
+    // Otherwise, the history would lead away from where somebody has led this visitor.
+    if (!this.going_ && led && this.leads_elsewhere)
+      history.replaceState(null, '', address_led_to(location.href, scene_id));
     const by = this.going_?.by;
     if (!by) return undefined;
-    const { camera } = this.parts_.navigation;
     const view = arrival(by, camera.up, camera.fov_y_rad);
     history.pushState(null, '', address_in(location.href, scene_id, view));
     return view;
@@ -120,11 +119,15 @@ export class Doors {
   }
 
   private async go(by: Portal | undefined, scene_id: string): Promise<void> {
+    const { navigation, worker } = this.parts_;
+    navigation.taken_over.emit();
+    // The way back through a portal leads to this view.
+    if (by) history.replaceState(null, '', address_in(location.href, navigation.scene_id, this.present_()));
     this.going_ = { by, scene_id };
     this.awaited_ = undefined;
     clearTimeout(this.cover_ends_);
     await this.cover();
-    this.parts_.worker.post({ kind: 'select', scene_id });
+    worker.post({ kind: 'select', scene_id });
   }
 
   /** The server does not let the visitor in. */

@@ -27,7 +27,7 @@ export class Navigation {
   readonly loop: CameraLoop;
   /** The visitor has entered another scene. */
   readonly entered = new Signal<{ scene: SceneFacts; scene_ids: readonly string[] }>();
-  /** The visitor has begun to move the camera by a gesture, a key or a stick. */
+  /** The visitor has begun to move the camera by a gesture, a key or a stick, or leaves the scene. */
   readonly taken_over = new Signal();
   /** The mode or the field of view may have changed. */
   readonly changed = new Signal();

@@ -105,7 +105,10 @@ export class Together {
     if (this.role_ === 'following' && differ(before, lead)) this.show();
   }
 
+  /** Whoever presents again does not fetch the visitor back. */
   private ended(): void {
+    this.wants_ = false;
+    this.worker_.post({ kind: 'follow', watch: '' });
     if (this.role_ === 'following') this.notice_.show(words.over, 10);
     this.navigation_.stop_flight();
     this.become('alone');
@@ -223,7 +226,7 @@ export class Together {
       alone: '',
       watching: this.leader_gone_ ? '' : away ? words.away(name) : leads,
       following: away ? words.away(name) : leads,
-      left: words.leads(name),
+      left: '', // nobody tells those who left whether the leader still leads
       leading: words.you_lead(count, number(count)),
     };
     const action: Readonly<Record<Role, string>> = {
