@@ -44,7 +44,8 @@ void Audience::close(CloseCode code, std::string_view reason) {
 void Audience::send(const ServerMessage& message, TimePoint now) {
   if (visitor_) visitor_->connection().send(wire::serialize(message));
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
-    // Its company may not be allowed to see another scene.
+    // Its company greets anew, if it wants to see what the visitor presents there. Each gets a
+    // visit of its own where its own link allows that, and watches otherwise.
     if (!is_in(welcome->scene.scene_id)) {
       end_presentation(true);
       presentation_.forget_camera();

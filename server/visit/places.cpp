@@ -229,7 +229,11 @@ void Places::follow(Place& place, ClientConnection& from, const Follow& wish, Ti
   if (&host == &place) return refuse(ErrorCode::bad_message, "a session cannot follow itself");
   const auto scene_of = [](Place& any) { return any.visit().stream().scene()->facts.scene_id; };
   if (scene_of(host) != scene_of(place))
-    return place.visit().say(Lead{LeadState::ended, {}, 0, {}, false, true}, now);
+    return place.visit().say(Lead{.state = LeadState::ended,
+                                  .name = host.audience().presentation().name(),
+                                  .camera = {},
+                                  .elsewhere = true},
+                             now);
   if (host.audience().full())
     return refuse(ErrorCode::server_full,
                   fmt::format("{} people follow this session already", host.audience().company()));

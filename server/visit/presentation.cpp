@@ -32,7 +32,8 @@ void Presentation::begin(const Present& wish, TimePoint now) {
 
 void Presentation::end(bool elsewhere) {
   if (!std::exchange(since_, {})) return;
-  tell_followers(Lead{LeadState::ended, wish_.name, 0, {}, false, elsewhere});
+  tell_followers(
+      Lead{.state = LeadState::ended, .name = wish_.name, .camera = {}, .elsewhere = elsewhere});
   followers_.clear();
   told_.reset();
   camera_.reset();

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/base/rate_limit.h"
@@ -16,6 +17,8 @@ class Presentation {
   void begin(const Present& wish, TimePoint now);
   /// Tells the followers that it is over here. `elsewhere`: the leader is in another scene.
   void end(bool elsewhere = false);
+  /// Of the leader, as it said when it began to present; empty: it gave none.
+  [[nodiscard]] const std::string& name() const { return wish_.name; }
   /// When it began; nothing: the visit leads nobody.
   [[nodiscard]] std::optional<TimePoint> since() const { return since_; }
 

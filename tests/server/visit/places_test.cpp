@@ -157,11 +157,20 @@ class CompanyTest : public PlacesTest {
   void present(bool pings, bool tells_places) {
     v1::ClientMessage message;
     message.mutable_present()->set_on(true);
+    message.mutable_present()->set_name("Ada");
     message.mutable_present()->set_pings(pings);
     message.mutable_present()->set_tells_places(tells_places);
     say(*leader, message);
     run_until(
         [&] { return leader->connection->lead && leader->connection->lead->may_ping() == pings; });
+  }
+  /// The leader presents there, as its page does.
+  void lead_to_the_attic() {
+    v1::ClientMessage message;
+    message.mutable_select_scene()->set_scene_id("attic");
+    say(*leader, message);
+    run_until([&] { return leader->connection->welcome->scene().scene_id() == "attic"; });
+    present(true, false);
   }
   /// How many pings both of them hear of `count` that this visitor sends.
   std::size_t heard_of(Visitor& from, int count) {
@@ -268,17 +277,14 @@ TEST_F(CompanyTest, WhoEntersAnotherSceneLeavesIt) {
 
 TEST_F(CompanyTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
   begin(false, false);
-  v1::ClientMessage message;
-  message.mutable_select_scene()->set_scene_id("attic");
-  say(*leader, message);
-  run_until([&] { return follower->connection->lead->state() == v1::Lead::ENDED; });
+  lead_to_the_attic();
+  EXPECT_EQ(follower->connection->lead->state(), v1::Lead::ENDED);
   EXPECT_TRUE(follower->connection->lead->elsewhere());
-  run_until([&] { return leader->connection->welcome->scene().scene_id() == "attic"; });
-  present(true, false);
   // Whoever asks from the old scene hears the same, and a new greeting leads to the leader's.
   follower->connection->lead.reset();
   follow(*follower);
   EXPECT_TRUE(follower->connection->lead->elsewhere());
+  EXPECT_EQ(follower->connection->lead->name(), "Ada");
   EXPECT_FALSE(follower->connection->error);
   Visitor& again =
       join(follower->connection->welcome->resume_token(), "192.0.2.1", [&](v1::Hello& hello) {
@@ -289,6 +295,38 @@ TEST_F(CompanyTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
   EXPECT_EQ(again.connection->welcome->session_id(), follower->connection->welcome->session_id());
   follow(again);
   EXPECT_EQ(again.connection->lead->state(), v1::Lead::LEADS);
+}
+
+TEST_F(CompanyTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
+  authorize = [](const std::string& token) {
+    return [narrow = token == "narrow"](std::string_view scene_id, Use) -> Refusal {
+      return narrow && scene_id == "attic" ? Refusal("not yours") : std::nullopt;
+    };
+  };
+  begin(false, false);
+  const auto join_by_narrow_link = [&](const std::string& resume_token, const auto& wish) {
+    return join(resume_token, "192.0.2.1",
+                [&](v1::Hello& hello) {
+                  hello.set_token("narrow");
+                  wish(hello);
+                })
+        .connection;
+  };
+  const auto before = join_by_narrow_link({}, [](v1::Hello&) {});
+  ASSERT_FALSE(before->welcome->watching());
+  lead_to_the_attic();
+  const auto along = join_by_narrow_link(before->welcome->resume_token(), [&](v1::Hello& hello) {
+    hello.set_watch(leader->connection->welcome->watch_token());
+    hello.set_follow(true);
+  });
+  ASSERT_TRUE(along->welcome);
+  EXPECT_TRUE(along->welcome->watching());
+  EXPECT_EQ(along->welcome->scene().scene_id(), "attic");
+  EXPECT_FALSE(along->welcome->may_leave());
+  const auto alone = join_by_narrow_link(before->welcome->resume_token(),
+                                         [](v1::Hello& hello) { hello.set_scene_id("attic"); });
+  ASSERT_TRUE(alone->error);
+  EXPECT_EQ(alone->error->code(), v1::Error::UNAUTHORIZED);
 }
 
 TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
