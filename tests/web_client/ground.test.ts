@@ -1,8 +1,9 @@
 // Visitors who walk on the ground of a scene, where they point, and the plan of it.
-import { describe, expect, it } from 'vitest';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { dot, length, look_at, rotate, sub, type Vec3 } from '#client/base/vector';
 import { CameraController } from '#client/camera/camera_controller';
 import { no_axes } from '#client/camera/movement';
+import { SceneGround } from '#client/ground/scene_ground';
 import { plan_picture } from '#client/ground/plan_picture';
 import { cells_of, px_of } from '#client/ground/plan_view';
 import { floor_along } from '#client/walk/floor';
@@ -11,6 +12,7 @@ import { find_path } from '#client/walk/path';
 import { stroll } from '#client/walk/stroll';
 import { cells_per_eye_height, clear_at, eyes_of, to_grid, type Stand, type WalkMap } from '#client/walk/walk_map';
 import { stand_below } from '#client/walk/walker';
+import type { AccessToken } from '#client/session/token';
 import { expect_vec } from './cameras';
 import { flat_map, map, random_from } from './walk_maps';
 
@@ -230,5 +232,50 @@ describe('the plan', () => {
     expect_vec(px_of(turned, 41, 30), [100, 47]);
     expect_vec(px_of(turned, 40, 31), [97, 50]);
     for (const up_rad of [0, 1, -2.5]) expect_vec(cells_of({ ...view, up_rad }, ...px_of({ ...view, up_rad }, 17, 55)), [17, 55]);
+  });
+});
+
+describe('a ground that the server still seeks', () => {
+  const asked = vi.fn(() => Promise.resolve(new Response(null, { status: 202, headers: { 'retry-after': '5' } })));
+  const told = vi.fn();
+  let ground: SceneGround;
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    vi.stubGlobal('fetch', asked);
+    vi.stubGlobal('location', { href: 'http://host/' });
+    asked.mockClear();
+    told.mockClear();
+    ground = new SceneGround({ value: '' } as AccessToken);
+    ground.sought.listen(told);
+    ground.enter('hall');
+  });
+
+  afterEach(() => {
+    ground.enter(''); // nobody asks on
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
+
+  it('is told of once in each scene to those who wait for it', async () => {
+    void ground.want();
+    await vi.advanceTimersByTimeAsync(1);
+    expect(told).toHaveBeenCalledTimes(1);
+    void ground.want();
+    await vi.advanceTimersByTimeAsync(12_000);
+    expect(asked).toHaveBeenCalledTimes(3);
+    expect(told).toHaveBeenCalledTimes(1);
+    ground.enter('tower');
+    void ground.want();
+    await vi.advanceTimersByTimeAsync(1);
+    expect(told).toHaveBeenCalledTimes(2);
+  });
+
+  it('is told of at once to those who want it while the page seeks it for nobody', async () => {
+    void ground.want(true);
+    await vi.advanceTimersByTimeAsync(6000);
+    expect(told).not.toHaveBeenCalled();
+    void ground.want();
+    expect(told).toHaveBeenCalledTimes(1);
   });
 });

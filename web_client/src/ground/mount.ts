@@ -4,9 +4,11 @@ import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { is_for_page } from '../input/view_input';
+import { text } from '../text/text';
 import type { TourState } from '../tour/player';
 import { by_id } from '../ui/dom';
 import type { PageParts } from '../ui/guide';
+import type { Notice } from '../ui/notice';
 import type { Stand, WalkMap } from '../walk/walk_map';
 import type { PlanPanel } from './plan_panel';
 import type { Dollhouse } from './dollhouse';
@@ -14,6 +16,7 @@ import { SceneGround } from './scene_ground';
 import type { Walking } from './walking';
 
 interface GroundParts extends PageParts {
+  readonly notice: Notice;
   readonly storage: Storage | undefined;
   readonly tour_shown: Signal<TourState>;
   readonly go_to_stop: (index: number) => void;
@@ -37,7 +40,7 @@ export class GroundUse {
   private idle_ = false;
 
   constructor(private readonly parts_: GroundParts) {
-    const { navigation, worker, toolbar, seen, token, tour_shown } = parts_;
+    const { navigation, worker, toolbar, seen, token, notice, tour_shown } = parts_;
     this.ground_ = new SceneGround(token);
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
@@ -73,6 +76,7 @@ export class GroundUse {
       this.show_stops();
     });
     worker.on('presented', () => this.presented());
+    this.ground_.sought.listen(() => notice.show(text.ground.sought, 10));
     this.ground_.known.listen((map) => {
       this.button_.hidden = !map;
       if (map === 'large') return;

@@ -11,9 +11,11 @@ const usual_wait_s = 5;
 export class SceneGround {
   /** The ground of the scene is known; undefined: nobody can walk in it; 'large': it comes when it is wanted. */
   readonly known = new Signal<WalkMap | 'large' | undefined>();
+  /** Somebody waits for the ground, and the server still seeks it. Comes once a scene. */
+  readonly sought = new Signal();
   private scene_id_ = '';
   private state_: 'unknown' | 'asked' | 'large' | 'known' = 'unknown';
-
+  private seeking_: 'no' | 'quietly' | 'told' = 'no';
   private idle_ = false; // nobody waits for it
 
   constructor(private readonly token_: AccessToken) {}
@@ -22,11 +24,13 @@ export class SceneGround {
   enter(scene_id: string): void {
     this.scene_id_ = scene_id;
     this.state_ = 'unknown';
+    this.seeking_ = 'no';
   }
 
   /** `idle`: nobody waits for it. */
   async want(idle = false): Promise<void> {
     if (!idle) this.idle_ = false;
+    this.tell();
     if (!this.scene_id_ || this.state_ === 'asked' || this.state_ === 'known' || (idle && this.state_ !== 'unknown')) return;
     this.idle_ = idle;
     const scene_id = this.scene_id_;
@@ -45,6 +49,12 @@ export class SceneGround {
     if (scene_id !== this.scene_id_) return;
     this.state_ = 'known';
     this.known.emit(map);
+  }
+
+  private tell(): void {
+    if (this.idle_ || this.seeking_ !== 'quietly') return;
+    this.seeking_ = 'told';
+    this.sought.emit();
   }
 
   private async read(file: ArrayBuffer): Promise<WalkMap | undefined> {
@@ -67,7 +77,9 @@ export class SceneGround {
         stop.abort();
         return 'large';
       }
-      if (answer.status !== 202) return undefined;
+      if (answer.status !== 202 || scene_id !== this.scene_id_) return undefined;
+      if (this.seeking_ === 'no') this.seeking_ = 'quietly';
+      this.tell();
       const wait_s = Number(answer.headers.get('retry-after') ?? usual_wait_s);
       await new Promise((resolve) => setTimeout(resolve, wait_s * 1000));
     }

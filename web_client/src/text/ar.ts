@@ -184,6 +184,7 @@ export const text: Texts = {
     plan: 'مخطط الطابق', storey: 'الطابق',
     storey_numbered: (n) => `الطابق ${n}`,
     view_up: 'يدور مع اتجاه النظر', dollhouse: 'بيت الدمية', larger: 'تكبير', smaller: 'تصغير',
+    sought: 'يجري البحث عن الأرض. يمكنك السير عليها بعد لحظات.',
   },
   together: {
     present: 'قيادة جولة',

@@ -180,6 +180,7 @@ export const text: Texts = {
     dollhouse: 'Puppenhaus',
     larger: 'Größer',
     smaller: 'Kleiner',
+    sought: 'Der Boden wird noch gesucht. Gleich können Sie darauf gehen.',
   },
   together: {
     present: 'Vorführen',

@@ -178,6 +178,7 @@ export const text = {
     dollhouse: 'Dollhouse',
     larger: 'Larger',
     smaller: 'Smaller',
+    sought: 'The ground is being found. You can walk on it in a moment.',
   },
   together: {
     present: 'Present',

@@ -181,6 +181,7 @@ export const text: Texts = {
     dollhouse: 'Casa de muñecas',
     larger: 'Ampliar',
     smaller: 'Reducir',
+    sought: 'Se está buscando el suelo. En un momento podrá caminar por él.',
   },
   together: {
     present: 'Presentar',

@@ -181,6 +181,7 @@ export const text: Texts = {
     dollhouse: 'Maison de poupée',
     larger: 'Agrandir',
     smaller: 'Réduire',
+    sought: 'Le sol est en cours de recherche. Vous pourrez y marcher dans un instant.',
   },
   together: {
     present: 'Présenter',

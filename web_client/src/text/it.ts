@@ -181,6 +181,7 @@ export const text: Texts = {
     dollhouse: 'Casa delle bambole',
     larger: 'Ingrandisci',
     smaller: 'Riduci',
+    sought: 'Si sta cercando il suolo. Tra un momento potrai camminarci.',
   },
   together: {
     present: 'Presenta',

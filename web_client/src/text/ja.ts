@@ -181,6 +181,7 @@ export const text: Texts = {
     dollhouse: 'ドールハウス',
     larger: '拡大',
     smaller: '縮小',
+    sought: '地面を調べています。まもなく歩けるようになります。',
   },
   together: {
     present: '案内する',

@@ -180,6 +180,7 @@ export const text: Texts = {
     dollhouse: '인형의 집',
     larger: '크게',
     smaller: '작게',
+    sought: '바닥을 찾고 있습니다. 잠시 후 걸을 수 있습니다.',
   },
   together: {
     present: '안내하기',

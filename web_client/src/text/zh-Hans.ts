@@ -177,6 +177,7 @@ export const text: Texts = {
     dollhouse: '娃娃屋',
     larger: '放大',
     smaller: '缩小',
+    sought: '正在查找地面，稍后即可行走。',
   },
   together: {
     present: '讲解',

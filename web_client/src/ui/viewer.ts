@@ -57,7 +57,7 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   const guide: Guide = new Guide({ view, clock, worker, navigation, seen, toolbar, notice, token, reduced_motion, ...media });
   new MeasurePanel({ view, navigation, toolbar, seen, storage, set_scale: guide.set_scale });
   const ground = new GroundUse({
-    ...{ view, clock, worker, navigation, seen, toolbar, token, storage, reduced_motion },
+    ...{ view, clock, worker, navigation, seen, toolbar, notice, token, storage, reduced_motion },
     tour_shown: guide.tour_shown,
     go_to_stop: (index) => guide.go_to_stop(index),
   });
