@@ -119,7 +119,7 @@ describe('texts for people', () => {
     for (let at: ts.Node = parent; !ts.isSourceFile(at); at = at.parent) {
       if (ts.isStatement(at)) return false;
       const called = ts.isCallExpression(at) || ts.isNewExpression(at) ? at.expression.getText() : '';
-      if (/^console\.|Error$|querySelector|matchMedia|\.matches$|message\.startsWith$|\.undecodable$/.test(called)) return true;
+      if (/^console\.|^require$|Error$|querySelector|matchMedia|\.matches$|message\.startsWith$|\.undecodable$/.test(called)) return true;
     }
     return false;
   }
