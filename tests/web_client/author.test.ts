@@ -36,6 +36,19 @@ describe('a draft of a tour', () => {
     expect(draft.stops[0]!.caption).toBe('about c');
   });
 
+  it('knows the first picture that nobody has described', () => {
+    const medium = (src: string, kind: 'image' | 'video', alt: string): object => ({ src, kind, alt });
+    const with_media = (...media: object[]): Stop => ({ ...stop('s'), media: media as unknown as Stop['media'] });
+    const draft = new TourDraft();
+    draft.add(with_media(medium('roof.jpg', 'image', 'A roof'), medium('opening.mp4', 'video', '')));
+    expect(draft.undescribed).toBeUndefined();
+    draft.add_tour();
+    draft.add(stop('first'));
+    draft.add(with_media(medium('roof.jpg', 'image', 'A roof'), medium('door.jpg', 'image', '')));
+    draft.choose(0);
+    expect(draft.undescribed).toEqual({ tour: 1, stop: 1, medium: 1 });
+  });
+
   it('is taken back edit by edit, and typing is one edit', () => {
     const draft = new TourDraft();
     const first = draft.state;

@@ -85,6 +85,7 @@ export class AuthorMedia implements MediaFields {
     });
     alt.dataset['control'] = `alt ${i}`;
     alt.addEventListener('input', () => {
+      alt.setCustomValidity(''); // what the author was told (AuthorStops.demand)
       const change = ({ alt_in }: Medium): Partial<Medium> =>
         own ? { alt: alt.value } : { alt_in: new Map([...alt_in, [language, alt.value]]) };
       set(i, change, `alt ${medium.src}`);
@@ -145,7 +146,7 @@ export class AuthorMedia implements MediaFields {
       const name = await shelf.add(file, (words) => (said.textContent = words));
       said.textContent = '';
       if (button.isConnected) chosen(name);
-      else by_id('author-done', HTMLOutputElement).textContent = text.media.sent(name);
+      else by_id('author-said', HTMLOutputElement).textContent = text.media.sent(name);
     } catch (error) {
       said.textContent = error instanceof Error ? error.message : String(error);
     }

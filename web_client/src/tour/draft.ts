@@ -69,6 +69,17 @@ export class TourDraft {
     return this.shown.indexOf(this.tour);
   }
 
+  /** The first picture that nobody has described: the indices of its tour, its stop and itself. */
+  get undescribed(): { readonly tour: number; readonly stop: number; readonly medium: number } | undefined {
+    for (const [tour, { stops }] of this.state.tours.entries()) {
+      for (const [stop, { media = [] }] of stops.entries()) {
+        const medium = media.findIndex(({ kind, alt }) => kind === 'image' && alt === '');
+        if (medium >= 0) return { tour, stop, medium };
+      }
+    }
+    return undefined;
+  }
+
   /** Edits another tour from here on. That changes nothing, so there is nothing to undo. */
   choose(edited: number): void {
     this.typed_in_ = undefined;

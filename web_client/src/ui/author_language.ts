@@ -17,6 +17,10 @@ export class AuthorLanguage {
     return this.choice_.value;
   }
 
+  choose_all(): void {
+    this.choice_.value = '';
+  }
+
   /** Offers the languages of the page, and those that these tours have besides. */
   offer(tours: readonly Tour[]): void {
     const used = tours.flatMap(({ translations, stops }) => [translations, ...stops.map((stop) => stop.translations)]);

@@ -46,6 +46,8 @@ export class AuthorPanel {
   private readonly autoplay_ = by_id('author-autoplay', HTMLInputElement);
   private readonly save_ = by_id('author-save', HTMLButtonElement);
   private readonly replace_ = by_id('author-replace', HTMLButtonElement);
+  /** What came of editing is said where the author edits, and what came of saving beside its buttons. */
+  private readonly said_ = by_id('author-said', HTMLOutputElement);
   private readonly done_ = by_id('author-done', HTMLOutputElement);
   private film_: FilmPanel | undefined;
   private token_: string | undefined;
@@ -112,7 +114,7 @@ export class AuthorPanel {
   /** Which way is up is no longer as it was saved. */
   scene_changed(): void {
     this.saved_ = undefined;
-    this.done_.textContent = '';
+    this.say('');
   }
 
   private bind(): void {
@@ -145,7 +147,7 @@ export class AuthorPanel {
     on_click('author-start', () => {
       draft.edit({ start: tools.eye() });
       this.told();
-      this.done_.textContent = text.author.start_set;
+      this.say(text.author.start_set);
     });
     on_click('author-preview', () => tools.preview());
     this.autoplay_.addEventListener('change', () => {
@@ -178,10 +180,10 @@ export class AuthorPanel {
     const title = text.tour.stop_numbered(number(this.draft_.stops.length + 1));
     this.draft_.add({ title, caption: '', ...untranslated, eye, marker, stay_s: undefined, fly_s: undefined, portal: undefined });
     this.edited(this.draft_.stops.length - 1);
-    this.done_.textContent = marker ? '' : text.author.no_marker;
     const added = by_id('author-stops', HTMLOListElement).lastElementChild;
     added?.scrollIntoView({ block: 'nearest' });
     added?.querySelector('input')?.select();
+    this.say(marker ? '' : text.author.no_marker);
   }
 
   private async take_view(index: number): Promise<void> {
@@ -201,7 +203,7 @@ export class AuthorPanel {
     if (at < 0) return;
     if (marker) this.draft_.change(at, { marker });
     this.edited();
-    if (!marker) this.done_.textContent = text.author.nothing_there;
+    if (!marker) this.say(text.author.nothing_there);
   }
 
   private remove(index: number): void {
@@ -210,9 +212,23 @@ export class AuthorPanel {
     if (this.draft_.stops.length === 0) by_id('author-add', HTMLButtonElement).focus();
   }
 
+  /** Undefined: there is no scene, or a description is missing, and the author is led to its field. */
   private sidecar(): string | undefined {
+    if (this.asks_description()) return undefined;
     const scene = this.tools_.scene();
     return scene && `${JSON.stringify(this.draft_.sidecar(scene), undefined, 2)}\n`;
+  }
+
+  private asks_description(): boolean {
+    const { undescribed } = this.draft_;
+    if (!undescribed) return false;
+    const { tour, stop, medium } = undescribed;
+    if (tour !== this.draft_.state.edited) this.draft_.choose(tour);
+    this.language_.choose_all();
+    this.edited(stop);
+    const { src } = this.draft_.stops[stop]!.media![medium]!;
+    this.stops_.demand(`alt ${medium}`, text.author.not_described(number(stop + 1), src));
+    return true;
   }
 
   private async save(made_from: SidecarTag): Promise<void> {
@@ -221,7 +237,7 @@ export class AuthorPanel {
     const { state } = this.draft_;
     const focused = document.activeElement;
     this.save_.disabled = this.replace_.disabled = true;
-    this.done_.textContent = text.author.saving;
+    this.say(text.author.saving, this.done_);
     const result = await save_sidecar(
       location.href,
       this.token_,
@@ -234,12 +250,12 @@ export class AuthorPanel {
       this.saved_ = state;
       this.made_from_ = result.tag;
       this.replace_.hidden = true;
-      this.done_.textContent = text.author.saved;
+      this.say(text.author.saved, this.done_);
     } else if (result.kind === 'changed') {
       this.theirs_ = result.tag;
       this.replace_.hidden = false;
-      this.done_.textContent = text.author.changed_meanwhile;
-    } else this.done_.textContent = text.author.not_saved(result.why);
+      this.say(text.author.changed_meanwhile, this.done_);
+    } else this.say(text.author.not_saved(result.why), this.done_);
     // A button that is disabled loses the focus.
     if (focused === this.save_ || focused === this.replace_) this.save_.focus();
   }
@@ -250,8 +266,13 @@ export class AuthorPanel {
     const name = `${this.tools_.file_name()}.json`;
     save_file(new Blob([sidecar], { type: 'application/json' }), name);
     this.saved_ = this.draft_.state;
-    this.done_.textContent =
-      this.token_ === undefined ? text.author.downloaded(name) : text.author.downloaded_too(name);
+    this.say(this.token_ === undefined ? text.author.downloaded(name) : text.author.downloaded_too(name), this.done_);
+  }
+
+  private say(what: string, where = this.said_): void {
+    this.said_.textContent = this.done_.textContent = '';
+    where.textContent = what;
+    where.scrollIntoView({ block: 'nearest' }); // does nothing where it is empty
   }
 
   private edited(open_stop?: number): void {
@@ -260,7 +281,7 @@ export class AuthorPanel {
   }
 
   private told(): void {
-    this.done_.textContent = '';
+    this.say('');
     this.show_what_can_be_done();
     const { shown, shown_index, state } = this.draft_;
     if (state.start !== this.start_) this.tools_.start_at(state.start);

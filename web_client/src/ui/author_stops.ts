@@ -66,6 +66,15 @@ export class AuthorStops {
     (find(control) ?? find('title'))?.focus();
   }
 
+  /** Leads the author to a field of the open stop, and says there what is wrong with it. */
+  demand(control: string, why: string): void {
+    const field = this.list_.children[this.open_]?.querySelector<HTMLInputElement>(`[data-control="${control}"]`);
+    const fold = field?.closest('details');
+    if (fold) fold.open = true;
+    field?.setCustomValidity(why);
+    field?.reportValidity();
+  }
+
   private row_of(stop: Stop, i: number, count: number): HTMLElement {
     const { actions_: actions } = this;
     const media = this.media_.of_stop(() => actions.stop(i), number(i + 1), this.language_, (change, field) =>

@@ -27,6 +27,7 @@ const sizes: Readonly<Record<Kind, readonly (readonly [number, number])[]>> = {
   panorama: [[4096, 2048], [8192, 4096]],
   film: [[1280, 720], [1920, 1080]],
 };
+const endings: Readonly<Record<Kind, string>> = { picture: '.png', panorama: '-360.png', film: '.mp4' };
 const look_again_ms = 500;
 const most_wait_ms = 15_000; // where no server answers
 
@@ -86,6 +87,7 @@ export class FilmPanel {
 
   private say(what: string): void {
     this.said_.textContent = what;
+    this.said_.scrollIntoView({ block: 'nearest' }); // does nothing where it is empty
   }
 
   /** The frames of the film; undefined, and the panel says why: there is none. */
@@ -116,7 +118,7 @@ export class FilmPanel {
     if (!eyes || token === undefined) return;
     const { kind } = this;
     const size = sizes[kind][Number(this.size_.value)]!;
-    const name = `${this.tools_.file_name()}.${kind === 'film' ? 'mp4' : 'png'}`;
+    const name = this.tools_.file_name() + endings[kind];
     this.save_.hidden = true;
     this.say('');
     this.make_.disabled = true;
@@ -130,14 +132,15 @@ export class FilmPanel {
   private async watch(id: string, name: string): Promise<void> {
     this.job_ = id;
     this.cancel_.hidden = this.bar_.hidden = this.left_.hidden = false;
+    this.bar_.scrollIntoView({ block: 'nearest' });
     for (let wait_ms = look_again_ms; ; ) {
       const now = await film_state(location.href, id);
       if (now) this.show(now.state, now.share, now.seconds_left);
       if (now?.state === 'failed') this.say(words.failed(now.error ?? ''));
       if (now?.state === 'cancelled') this.say(words.cancelled);
       if (now?.state === 'done') {
-        this.say(words.done);
         Object.assign(this.save_, { href: film_address(location.href, id), download: name, hidden: false });
+        this.say(words.done);
       }
       if (now && now.state !== 'waiting' && now.state !== 'drawing') break;
       wait_ms = now ? look_again_ms : Math.min(2 * wait_ms, most_wait_ms);
