@@ -61,6 +61,7 @@ describe('units', () => {
   it('fit the size, and decimals the error', () => {
     expect(written({ value: 6.841, error: 0.1 }, metric)).toBe('3.421\u00a0m ± 0.050\u00a0m');
     expect(written({ value: 0.05, error: 0.01 }, metric)).toBe('2.50\u00a0cm ± 0.50\u00a0cm');
+    expect(written({ value: -6.841, error: 0.1 }, metric)).toBe('−3.421\u00a0m ± 0.050\u00a0m');
     expect(written({ value: 5000, error: 40 }, metric)).toBe('2.500\u00a0km ± 0.020\u00a0km');
     expect(written({ value: 8, error: 1 }, metric, 2)).toBe('2.00\u00a0m² ± 0.25\u00a0m²');
     expect(written({ value: 2, error: 0.1 }, { metres_per_unit: 0.3048, system: 'imperial' })).toBe('2.00\u00a0ft ± 0.10\u00a0ft');

@@ -239,6 +239,15 @@ describe('wording', () => {
     const message = 'this server needs an access token: open the link you were given';
     const state = { phase: 'failed', code: Error_Code.UNAUTHORIZED, message } as const;
     expect(card_for(state, false)?.text).toBe(`T${message.slice(1)}.`);
+    expect(card_for(state, false)?.action).toBeUndefined();
+  });
+
+  it('offers those whose link is refused to look without its token', () => {
+    const state = { phase: 'failed', code: Error_Code.UNAUTHORIZED, message: 'this link has expired' } as const;
+    expect(card_for(state, false, [], true)).toMatchObject({ asks_token: true, action: { does: 'look' } });
+    const history = { state: null, replaceState: () => undefined };
+    const by_link = (href: string): boolean => new AccessToken({ href }, history, undefined).from_link;
+    expect(['#token=old', ''].map((fragment) => by_link(`http://host/?author${fragment}`))).toEqual([true, false]);
   });
 
   it('explains JPEG by what is missing', () => {

@@ -32,7 +32,7 @@ describe('a portal', () => {
     expect(() => portal({ stop: 1 })).toThrow("portal: 'scene' is missing");
     expect(() => portal({ scene: 'hall', stop: 0 })).toThrow('portal.stop');
     expect(() => portal({ scene: 'hall', tour: 1.5 })).toThrow('portal.tour');
-    expect(() => portal({ scene: 'hall', position: [0, 0, 0] })).toThrow("portal: 'orientation' is missing");
+    expect(() => portal({ scene: 'hall', position: [0, 0, 0] })).toThrow("portal: 'look_at' or 'orientation' is missing");
   });
 
   it('leads to the scene of its id, or to the only one of its name', () => {

@@ -80,7 +80,7 @@ describe('tours of a sidecar', () => {
     [[{ title: 'x' }], "tours[0]: 'stops' is missing"],
     [[{ stops: [{ position: [1, 2] }] }], 'tours[0].stops[0].position: is not 3 numbers'],
     [[{ stops: [{ position: [1, 2, 'x'], orientation: [0, 0, 0, 1] }] }], 'position[2]: is not a number'],
-    [[{ stops: [{ position: [0, 0, 0] }] }], "'orientation' is missing"],
+    [[{ stops: [{ position: [0, 0, 0] }] }], "tours[0].stops[0]: 'look_at' or 'orientation' is missing"],
     [[{ stops: [], title: 7 }], 'tours[0].title: is not a text'],
     [Array(33).fill({ stops: [] }), 'has 33 entries, at most 32'],
   ])('say what is wrong with %j', (document, complaint) => {

@@ -47,7 +47,7 @@ export class PlanPanel {
   private readonly storeys_ = make('select', { 'aria-label': text.ground.storey });
   private readonly view_up_ = make('button', { type: 'button', title: text.ground.view_up, 'aria-label': text.ground.view_up }, icon('compass'));
   private readonly house_ = make('button', { type: 'button', title: text.ground.dollhouse, 'aria-label': text.ground.dollhouse }, icon('dollhouse'));
-  private readonly size_ = make('button', { type: 'button' }, icon('full'));
+  private readonly size_ = make('button', { type: 'button' });
   private readonly pictures_ = new Map<number, DrawnPlan | 'comes'>();
   private storey_ = 0;
   private visitors_storey_: number | undefined;
@@ -141,6 +141,7 @@ export class PlanPanel {
 
   private set_large(large: boolean): void {
     this.host_.classList.toggle('large', large);
+    this.size_.replaceChildren(icon(large ? 'small' : 'full'));
     this.size_.title = large ? text.ground.smaller : text.ground.larger;
     this.size_.setAttribute('aria-label', this.size_.title);
     this.draw_soon();

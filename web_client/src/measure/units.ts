@@ -43,7 +43,7 @@ export function written({ value, error }: Measured, scale: Scale, power: 1 | 2 =
   const sign = unit.sign && `\u00a0${unit.sign}${power === 2 ? '²' : ''}`;
   const digits = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(Math.max(error * factor, 1e-6)))));
   const text = (amount: number): string =>
-    `${number(amount * factor, { minimumFractionDigits: digits, maximumFractionDigits: digits })}${sign}`;
+    `${number(amount * factor, { minimumFractionDigits: digits, maximumFractionDigits: digits }).replace('-', '−')}${sign}`;
   return `${text(value)} ± ${text(error)}`;
 }
 

@@ -19,6 +19,8 @@ export function watch_token(href: string): string {
 
 /** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
+  /** The page was opened by a link with a token. */
+  readonly from_link: boolean;
   private value_: string;
 
   /**
@@ -32,6 +34,7 @@ export class AccessToken {
     private readonly storage_: Storage | undefined,
   ) {
     this.value_ = storage_?.getItem(storage_key) ?? '';
+    this.from_link = has_token(location.href);
     const url = new URL(location.href);
     const fragment = fragment_of(location.href);
     const token = fragment.get('token');

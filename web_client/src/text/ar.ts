@@ -160,6 +160,7 @@ export const text: Texts = {
     resume: 'متابعة',
     call: 'نبّهني عندما يحين دوري',
     open: (scene_id) => `افتح ${scene_id}`,
+    look: 'المشاهدة دون رمز دخول',
     open_first: 'افتح المشهد الأول',
   },
   measure: {
@@ -435,6 +436,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: 'ليس كائنًا',
     missing: (member) => `الحقل '${member}' مفقود`,
+    missing_both: (one, other) => `الحقل '${one}' أو '${other}' مفقود`,
     not_a_list: 'ليس قائمة',
     too_many: (count, most) => `فيه ${count} من العناصر، والحد ${most}`,
     not_a_text: 'ليس نصًا',

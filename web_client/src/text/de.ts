@@ -152,6 +152,7 @@ export const text: Texts = {
     resume: 'Weitermachen',
     call: 'Rufen, wenn ich an der Reihe bin',
     open: (scene_id) => `${scene_id} öffnen`,
+    look: 'Ohne Zugangscode ansehen',
     open_first: 'Die erste Szene öffnen',
   },
   measure: {
@@ -432,6 +433,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: 'ist kein Objekt',
     missing: (member) => `„${member}“ fehlt`,
+    missing_both: (one, other) => `„${one}“ oder „${other}“ fehlt`,
     not_a_list: 'ist keine Liste',
     too_many: (count, most) => `hat ${count} Einträge, höchstens ${most} sind erlaubt`,
     not_a_text: 'ist kein Text',

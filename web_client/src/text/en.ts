@@ -150,6 +150,7 @@ export const text = {
     resume: 'Continue',
     call: 'Call me when it is my turn',
     open: (scene_id: string): string => `Open ${scene_id}`,
+    look: 'Look without a token',
     open_first: 'Open the first scene',
   },
   measure: {
@@ -434,6 +435,7 @@ export const text = {
   mistakes: {
     not_an_object: 'is not an object',
     missing: (member: string): string => `'${member}' is missing`,
+    missing_both: (one: string, other: string): string => `'${one}' or '${other}' is missing`,
     not_a_list: 'is not a list',
     too_many: (count: number, most: number): string => `has ${count} entries, at most ${most}`,
     not_a_text: 'is not a text',

@@ -153,6 +153,7 @@ export const text: Texts = {
     resume: 'Continuar',
     call: 'Avisarme cuando sea mi turno',
     open: (scene_id) => `Abrir ${scene_id}`,
+    look: 'Ver sin código de acceso',
     open_first: 'Abrir la primera escena',
   },
   measure: {
@@ -436,6 +437,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: 'no es un objeto',
     missing: (member) => `falta «${member}»`,
+    missing_both: (one, other) => `falta «${one}» o «${other}»`,
     not_a_list: 'no es una lista',
     too_many: (count, most) => `tiene ${count} entradas, como máximo ${most}`,
     not_a_text: 'no es un texto',

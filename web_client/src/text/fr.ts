@@ -153,6 +153,7 @@ export const text: Texts = {
     resume: 'Continuer',
     call: "M'appeler quand ce sera mon tour",
     open: (scene_id) => `Ouvrir ${scene_id}`,
+    look: "Voir sans code d'accès",
     open_first: 'Ouvrir la première scène',
   },
   measure: {
@@ -436,6 +437,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: "n'est pas un objet",
     missing: (member) => `« ${member} » manque`,
+    missing_both: (one, other) => `« ${one} » ou « ${other} » manque`,
     not_a_list: "n'est pas une liste",
     too_many: (count, most) => `a ${count} entrées, au plus ${most}`,
     not_a_text: "n'est pas un texte",

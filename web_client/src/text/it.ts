@@ -153,6 +153,7 @@ export const text: Texts = {
     resume: 'Continua',
     call: 'Avvisami quando tocca a me',
     open: (scene_id) => `Apri ${scene_id}`,
+    look: 'Guarda senza codice di accesso',
     open_first: 'Apri la prima scena',
   },
   measure: {
@@ -435,6 +436,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: 'non è un oggetto',
     missing: (member) => `manca «${member}»`,
+    missing_both: (one, other) => `manca «${one}» o «${other}»`,
     not_a_list: 'non è una lista',
     too_many: (count, most) => `ha ${count} voci, al massimo ${most}`,
     not_a_text: 'non è un testo',

@@ -153,6 +153,7 @@ export const text: Texts = {
     resume: '続ける',
     call: '順番が来たら知らせる',
     open: (scene_id) => `${scene_id} を開く`,
+    look: 'アクセスコードなしで見る',
     open_first: '最初のシーンを開く',
   },
   measure: {
@@ -433,6 +434,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: 'オブジェクトではありません',
     missing: (member) => `「${member}」がありません`,
+    missing_both: (one, other) => `「${one}」または「${other}」がありません`,
     not_a_list: 'リストではありません',
     too_many: (count, most) => `${count} 件あります（上限 ${most} 件）`,
     not_a_text: 'テキストではありません',

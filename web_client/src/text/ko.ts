@@ -152,6 +152,7 @@ export const text: Texts = {
     resume: '계속',
     call: '내 차례가 되면 알림',
     open: (scene_id) => `${scene_id} 열기`,
+    look: '접근 코드 없이 보기',
     open_first: '첫 장면 열기',
   },
   measure: {
@@ -431,6 +432,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: '객체가 아닙니다',
     missing: (member) => `'${member}' 항목이 없습니다`,
+    missing_both: (one, other) => `'${one}' 또는 '${other}' 항목이 없습니다`,
     not_a_list: '목록이 아닙니다',
     too_many: (count, most) => `항목이 ${count}개입니다. 최대 ${most}개입니다`,
     not_a_text: '텍스트가 아닙니다',

@@ -149,6 +149,7 @@ export const text: Texts = {
     resume: '继续',
     call: '轮到我时通知我',
     open: (scene_id) => `打开 ${scene_id}`,
+    look: '不使用访问码查看',
     open_first: '打开第一个场景',
   },
   measure: {
@@ -428,6 +429,7 @@ export const text: Texts = {
   mistakes: {
     not_an_object: '不是对象',
     missing: (member) => `缺少“${member}”`,
+    missing_both: (one, other) => `缺少“${one}”或“${other}”`,
     not_a_list: '不是列表',
     too_many: (count, most) => `有 ${count} 项，最多 ${most} 项`,
     not_a_text: '不是文本',

@@ -2,6 +2,7 @@
 import { look_at, type Quat, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight } from '../camera/flight';
+import { text } from '../text/text';
 import { JsonPlace } from './json_place';
 import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
 import {
@@ -92,7 +93,7 @@ export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour
 function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   const position = stop.at('position').vec3();
   const target = stop.find('look_at')?.vec3();
-  const orientation = target ? look_at(position, target, up) : stop.at('orientation').orientation();
+  const orientation = target ? look_at(position, target, up) : orientation_of(stop);
   return {
     title: stop.find('title')?.text() ?? '',
     caption: stop.find('caption')?.text() ?? '',
@@ -107,6 +108,10 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   };
 }
 
+/** For places without `look_at`. */
+const orientation_of = (place: JsonPlace): Quat =>
+  (place.find('orientation') ?? place.fail(text.mistakes.missing_both('look_at', 'orientation'))).orientation();
+
 function read_portal(portal: JsonPlace | undefined): Portal | undefined {
   if (!portal) return undefined;
   const position = portal.find('position')?.vec3();
@@ -116,7 +121,7 @@ function read_portal(portal: JsonPlace | undefined): Portal | undefined {
     view: position && {
       position,
       look_at: target,
-      orientation: target ? undefined : portal.at('orientation').orientation(),
+      orientation: target ? undefined : orientation_of(portal),
       fov_y_rad: portal.find('fov_deg')?.fov_rad(),
     },
     tour_index: portal.find('tour')?.ordinal(max_tours),

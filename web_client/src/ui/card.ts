@@ -24,6 +24,7 @@ export class CardView {
       if (action?.does === 'reload') location.reload();
       else if (action?.does === 'open') location.href = scene_address(location.href, action.scene_id);
       else if (action?.does === 'call') this.promise_call();
+      else if (action?.does === 'look') this.token_given.emit('');
       else this.retried.emit();
     });
     this.form_.addEventListener('submit', (event) => {

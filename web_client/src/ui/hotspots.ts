@@ -13,6 +13,7 @@ import type { SeenCamera } from './seen_camera';
 export class Hotspots {
   private readonly host_ = by_id('hotspots', HTMLElement);
   private tour_: Tour | undefined;
+  private stop_: Stop | undefined; // where the tour is
   private spots_: { readonly stop: Stop; readonly button: HTMLButtonElement }[] = [];
 
   constructor(
@@ -31,6 +32,9 @@ export class Hotspots {
   /** `eye`: the camera of the view. */
   show({ tour, stop }: TourState, eye: Eye): void {
     if (tour !== this.tour_) this.show_tour(tour);
+    // The tour goes on, and the button of an earlier stop may still have the focus.
+    if (stop !== this.stop_) this.host_.classList.add('labels-dismissed');
+    this.stop_ = stop;
     for (const { stop: other, button } of this.spots_) {
       if (other === stop) button.setAttribute('aria-current', 'step');
       else button.removeAttribute('aria-current');

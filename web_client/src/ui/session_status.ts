@@ -53,7 +53,8 @@ export class SessionStatus {
 
   private show(): void {
     if (this.broken_) return;
-    this.card_.show(card_for(this.state_, this.has_picture_, this.scenes_));
+    const by_link = this.token_.from_link && this.token_.value !== '';
+    this.card_.show(card_for(this.state_, this.has_picture_, this.scenes_, by_link));
     this.toolbar_.set_active(this.state_.phase !== 'failed');
     document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
   }

@@ -15,7 +15,7 @@ export interface Card {
   readonly busy?: boolean; // the page goes on by itself
   readonly action?: {
     readonly label: string;
-    readonly does: 'retry' | 'reload' | 'open' | 'call';
+    readonly does: 'retry' | 'reload' | 'open' | 'call' | 'look';
     /** The scene that 'open' opens; empty: the first one. */
     readonly scene_id?: string;
   };
@@ -25,12 +25,14 @@ export interface Card {
 
 /**
  * The card for a state; undefined when the picture speaks for itself. `has_picture`: whether the canvas
- * shows one. `scenes`: those that this visitor may see, as far as known.
+ * shows one. `scenes`: those that this visitor may see, as far as known. `by_link`: this visitor has the
+ * token of a link, and the server may be open to those without one.
  */
 export function card_for(
   state: SessionState,
   has_picture: boolean,
   scenes: readonly SceneListing[] = [],
+  by_link = false,
 ): Card | undefined {
   switch (state.phase) {
     case 'live':
@@ -62,11 +64,11 @@ export function card_for(
         action: { label: actions.now, does: 'retry' },
       };
     case 'failed':
-      return failed_card(state.code, state.message, scenes);
+      return failed_card(state.code, state.message, scenes, by_link);
   }
 }
 
-function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[]): Card {
+function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[], by_link: boolean): Card {
   const retry = { label: actions.retry, does: 'retry' } as const;
   const said = ({ title, text }: { title: string; text: string }): Card => ({
     title,
@@ -75,7 +77,10 @@ function failed_card(code: Error_Code, message: string, scenes: readonly SceneLi
   });
   switch (code) {
     case Error_Code.UNAUTHORIZED:
-      return { title: cards.unauthorized, text: sentence(message).trim(), asks_token: true };
+      return {
+        ...{ title: cards.unauthorized, text: sentence(message).trim(), asks_token: true },
+        ...(by_link && { action: { label: actions.look, does: 'look' } }),
+      };
     case Error_Code.UNKNOWN_SCENE:
       return unknown_scene_card(message, scenes);
     case Error_Code.UNSUPPORTED_VERSION:
