@@ -65,8 +65,8 @@ TEST(FilmWish, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(mistake(film("")), HasSubstr("views: is empty"));
   EXPECT_THAT(mistake(film("7")), HasSubstr("views[0]"));
   EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 1]")), HasSubstr("views[0]: is not [x, y, z"));
-  EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 0, 60]")), HasSubstr("views[0]: its quaternion"));
-  EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 1.02, 60]")), HasSubstr("its quaternion"));
+  EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 0, 60]")), HasSubstr("views[0]: is no quaternion"));
+  EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 1.02, 60]")), HasSubstr("is no quaternion"));
   EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 1, 170]")), HasSubstr("field of view"));
   EXPECT_THAT(mistake(film("[1, 2, 3e9, 0, 0, 0, 1, 60]")), HasSubstr("views[0]: is no place"));
   EXPECT_THAT(mistake(film("[1, 2, \"x\", 0, 0, 0, 1, 60]")), HasSubstr("views[0][2]"));

@@ -210,7 +210,7 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   };
   EXPECT_EQ(mistake(turned("[0, 0, 0.995, 0]")), "") << "pages round them";
   EXPECT_THAT(mistake(turned("[0, 0, 0, 0]")),
-              HasSubstr("tours[0].stops[0].orientation: its quaternion"));
+              HasSubstr("tours[0].stops[0].orientation: is no quaternion"));
   const auto tours = [](std::size_t count) {
     const std::vector<std::string> all(count, R"({"stops": []})");
     return fmt::format(R"({{"tours": [{}]}})", fmt::join(all, ","));
