@@ -19,6 +19,20 @@ namespace {
 constexpr int near_steps = 3;      // from clear ground to the last place that is kept
 constexpr int obstacle_cells = 3;  // as far as obstacles are drawn
 
+/// Turns of long loops of one thread. `progress` is called at some of them.
+class Turns {
+ public:
+  explicit Turns(const std::function<void()>& progress) : progress_(progress) {}
+  void next() {
+    constexpr std::uint32_t at_a_time = 16384;
+    if (++count_ % at_a_time == 0) progress_();
+  }
+
+ private:
+  const std::function<void()>& progress_;
+  std::uint32_t count_ = 0;
+};
+
 struct Component {
   std::uint32_t seed = Surfaces::none;  // the surface that is nearest to the start, below it
   float distance = std::numeric_limits<float>::max();
@@ -27,16 +41,18 @@ struct Component {
 
 /// The surfaces of `among` that hang together with `seed`; takes them out of `among`.
 std::vector<std::uint32_t> flood(const Surfaces& surfaces, std::uint32_t seed,
-                                 std::vector<char>& among) {
+                                 std::vector<char>& among, Turns& turns) {
   std::vector<std::uint32_t> reached = {seed};
   among[seed] = 0;
-  for (std::size_t k = 0; k < reached.size(); ++k)
+  for (std::size_t k = 0; k < reached.size(); ++k) {
+    turns.next();
     for (int d = 0; d < 4; ++d) {
       const std::uint32_t next = surfaces.next(reached[k], d);
       if (next == Surfaces::none || !among[next]) continue;
       among[next] = 0;
       reached.push_back(next);
     }
+  }
   return reached;
 }
 
@@ -45,14 +61,14 @@ glm::vec3 middle_of(const Surfaces& surfaces, std::uint32_t i) {
 }
 
 /// The nearest component below `start` that is not small; its seed is `none` where there is none.
-Component component_below(const Surfaces& surfaces, std::vector<char> clear,
-                          const glm::vec3& start) {
+Component component_below(const Surfaces& surfaces, std::vector<char> clear, const glm::vec3& start,
+                          Turns& turns) {
   constexpr std::size_t small = 20;  // times smaller than the largest
   std::vector<Component> components;
   for (std::uint32_t i = 0; i < surfaces.count(); ++i) {
     if (!clear[i]) continue;
     Component component;
-    const std::vector<std::uint32_t> members = flood(surfaces, i, clear);
+    const std::vector<std::uint32_t> members = flood(surfaces, i, clear, turns);
     component.size = members.size();
     for (const std::uint32_t k : members) {
       const glm::vec3 place = middle_of(surfaces, k);
@@ -81,15 +97,16 @@ struct Found {
 
 class Collector {
  public:
-  Collector(const Surfaces& surfaces, const Person& person)
+  Collector(const Surfaces& surfaces, const Person& person, Turns& turns)
       : surfaces_(surfaces),
+        turns_(turns),
         person_(person),
         size_(surfaces.extent().max - surfaces.extent().min),
         kept_(surfaces.count()) {}
 
   /// Takes the ground that `seed` hangs together with among the clear one, and what is near to it.
   void take_ground(std::uint32_t seed, std::vector<char> clear) {
-    std::vector<std::uint32_t> edge = flood(surfaces_, seed, clear);
+    std::vector<std::uint32_t> edge = flood(surfaces_, seed, clear, turns_);
     for (const std::uint32_t i : edge) take(i, Kind::clear);
     for (int step = 0; step < near_steps; ++step) {
       std::vector<std::uint32_t> beyond;
@@ -162,6 +179,7 @@ class Collector {
 
   /// What stands in the way of a body on ground of this height.
   void add_obstacle(const glm::ivec2& column, float height, std::vector<Found>& to) const {
+    turns_.next();
     const glm::ivec2 at = column - surfaces_.extent().min;
     const std::span<const Run> runs = surfaces_.runs_at(column);
     const auto between = [&](float low, float high) {
@@ -178,8 +196,10 @@ class Collector {
   /// Sorted by column and height. Of those within a step, ground stays, or else the higher
   /// obstacle.
   [[nodiscard]] std::vector<Found> without_doubles(std::vector<Found> places) const {
-    std::ranges::sort(places, {},
-                      [](const Found& f) { return std::tuple(f.column, f.height, f.kind); });
+    std::ranges::sort(places, {}, [this](const Found& f) {
+      turns_.next();
+      return std::tuple(f.column, f.height, f.kind);
+    });
     const auto rank = [](const Found& f) {
       return f.kind == Kind::low ? 1 : f.kind == Kind::obstacle ? 2 : 3;
     };
@@ -196,6 +216,7 @@ class Collector {
   }
 
   const Surfaces& surfaces_;
+  Turns& turns_;
   Person person_;
   glm::ivec2 size_;
   std::vector<char> kept_;
@@ -205,14 +226,17 @@ class Collector {
 }  // namespace
 
 WalkMap find_ground(const Occupancy& occupancy, const Person& person, const glm::vec3& start,
-                    std::string_view name, ThreadPool& pool) {
-  const Surfaces surfaces(occupancy, person, pool);
+                    std::string_view name, ThreadPool& pool,
+                    const std::function<void()>& progress) {
+  const Surfaces surfaces(occupancy, person, pool, progress);
   const std::vector<char> clear = surfaces.with_room(pool);
-  const Component below = component_below(surfaces, clear, occupancy.grid().from_world(start));
+  Turns turns(progress);
+  const Component below =
+      component_below(surfaces, clear, occupancy.grid().from_world(start), turns);
   if (below.seed == Surfaces::none)
     throw InputError(name, "", "nobody can stand below its start",
                      "--eye-height has the scene's units; a sidecar can name another start or up");
-  Collector collector(surfaces, person);
+  Collector collector(surfaces, person, turns);
   collector.take_ground(below.seed, clear);
   collector.take_obstacles();
   WalkMap map = collector.map(occupancy.grid());

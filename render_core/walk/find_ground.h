@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string_view>
 
 #include <glm/vec3.hpp>
@@ -18,8 +19,10 @@ namespace catgs::walk {
 /// radius. Of the clear ground, all that hangs together with a place below `start` (world) is kept:
 /// with the nearest such place that reaches at least a twentieth as far as the largest.
 ///
-/// Throws InputError for `name` where there is no ground.
-WalkMap find_ground(const Occupancy& occupancy, const Person& person, const glm::vec3& start,
-                    std::string_view name, ThreadPool& pool);
+/// Throws InputError for `name` where there is no ground. `progress` is called often, by several
+/// threads at a time, and may throw to end the search.
+WalkMap find_ground(
+    const Occupancy& occupancy, const Person& person, const glm::vec3& start, std::string_view name,
+    ThreadPool& pool, const std::function<void()>& progress = [] {});
 
 }  // namespace catgs::walk

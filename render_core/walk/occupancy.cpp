@@ -95,7 +95,8 @@ void Occupancy::take(const std::vector<Share>& from, std::size_t& blocks_taken) 
 
 /// Chunks of the part spread their Gaussians side by side. Then each shard, which has columns of
 /// its own, takes the shares in the order of the chunks.
-void Occupancy::add(const GaussianCloud& part, ThreadPool& pool) {
+void Occupancy::add(const GaussianCloud& part, ThreadPool& pool,
+                    const std::function<void()>& progress) {
   constexpr std::size_t chunk_count = 32, most_shares = std::size_t{1} << 17;
   struct Chunk {
     std::size_t next, end;
@@ -108,12 +109,14 @@ void Occupancy::add(const GaussianCloud& part, ThreadPool& pool) {
   }
   while (std::ranges::any_of(chunks, [](const Chunk& c) { return c.next < c.end; })) {
     pool.parallel_for(chunk_count, [&](std::size_t k) {
+      progress();
       Chunk& chunk = chunks[k];
       for (auto& shares : chunk.shares) shares.clear();
       for (std::size_t count = 0; chunk.next < chunk.end && count < most_shares; ++chunk.next)
         count += spread(part, chunk.next, chunk.shares);
     });
     pool.parallel_for(shards, [&](std::size_t shard) {
+      progress();
       for (const Chunk& chunk : chunks) take(chunk.shares[shard], blocks_of_shard_[shard]);
     });
     if (std::ranges::max(blocks_of_shard_) > most_blocks_of_shard_)

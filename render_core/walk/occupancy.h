@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -37,8 +38,10 @@ class Occupancy {
   /// deviations (as VoxelGrid has it). That is spread over points up to 1.5 standard
   /// deviations away, a cell apart, but no more than 2^16 of them. The result depends on the order
   /// of the Gaussians and not on the threads. Takes up to 100 MB while it runs. Throws InputError
-  /// where a sixteenth of the columns meets more than a sixteenth of the most blocks.
-  void add(const GaussianCloud& part, ThreadPool& pool);
+  /// where a sixteenth of the columns meets more than a sixteenth of the most blocks. `progress` is
+  /// called often, by several threads at a time, and may throw to end it.
+  void add(
+      const GaussianCloud& part, ThreadPool& pool, const std::function<void()>& progress = [] {});
 
   struct Rect {
     glm::ivec2 min{0}, max{0};  // cells; `max` is beyond the last one

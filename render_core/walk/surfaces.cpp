@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace catgs::walk {
 
@@ -10,12 +11,17 @@ template <class Body>
 void Surfaces::for_all(ThreadPool& pool, const Body& body) const {
   constexpr std::size_t block = 16384;
   pool.parallel_for((count() + block - 1) / block, [&](std::size_t b) {
+    progress_();
     for (std::size_t i = b * block; i < std::min(count(), (b + 1) * block); ++i) body(i);
   });
 }
 
-Surfaces::Surfaces(const Occupancy& occupancy, const Person& person, ThreadPool& pool)
-    : person_(person), extent_(occupancy.extent()), width_(extent_.max.x - extent_.min.x) {
+Surfaces::Surfaces(const Occupancy& occupancy, const Person& person, ThreadPool& pool,
+                   std::function<void()> progress)
+    : person_(person),
+      progress_(std::move(progress)),
+      extent_(occupancy.extent()),
+      width_(extent_.max.x - extent_.min.x) {
   read_runs(occupancy, pool);
   open_.resize(count());
   height_.resize(count());
@@ -33,6 +39,7 @@ void Surfaces::read_runs(const Occupancy& occupancy, ThreadPool& pool) {
   std::vector<std::vector<Run>> of_row(rows);
   first_.resize(rows * columns + 1);
   pool.parallel_for(rows, [&](std::size_t row) {
+    progress_();
     for (std::size_t x = 0; x < columns; ++x) {
       const std::size_t before = of_row[row].size();
       occupancy.append_runs(extent_.min + glm::ivec2(x, row), of_row[row]);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -19,7 +20,10 @@ class Surfaces {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   static constexpr glm::ivec2 directions[4] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
-  Surfaces(const Occupancy& occupancy, const Person& person, ThreadPool& pool);
+  /// Here and in with_room(), `progress` is called often, by several threads at a time, and may
+  /// throw to end it.
+  Surfaces(const Occupancy& occupancy, const Person& person, ThreadPool& pool,
+           std::function<void()> progress);
 
   [[nodiscard]] std::size_t count() const { return runs_.size(); }
   [[nodiscard]] const Occupancy::Rect& extent() const { return extent_; }
@@ -46,6 +50,7 @@ class Surfaces {
   void for_all(ThreadPool& pool, const Body& body) const;
 
   Person person_;
+  std::function<void()> progress_;
   Occupancy::Rect extent_;
   int width_ = 0;
   std::vector<std::uint32_t> first_;   // by column of the extent, row by row

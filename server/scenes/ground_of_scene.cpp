@@ -106,8 +106,7 @@ std::string compute_ground(const GroundSource& source, int threads,
     occupancy.emplace(walk::grid_around(source.start, source.up, eye_height), most_blocks);
   };
   const auto take = [&](const GaussianCloud& part) {
-    progress();
-    known_of_scene([&] { occupancy->add(part, *pool); });
+    known_of_scene([&] { occupancy->add(part, *pool, progress); });
   };
   if (is_synthetic(source.spec)) {
     begin(eye_height_m / source.metres_per_unit);
@@ -117,9 +116,9 @@ std::string compute_ground(const GroundSource& source, int threads,
     begin(known_of_scene([&] { return eye_height_of(source, *scene.sample); }));
     scene.each(take);
   }
-  progress();
-  return walk::pack(known_of_scene(
-      [&] { return walk::find_ground(*occupancy, {}, source.start, source.spec, *pool); }));
+  return walk::pack(known_of_scene([&] {
+    return walk::find_ground(*occupancy, {}, source.start, source.spec, *pool, progress);
+  }));
 }
 
 std::string ground_name(const GroundSource& source) {

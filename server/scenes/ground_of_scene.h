@@ -33,8 +33,8 @@ struct NoGround : InputError {
 /// The bytes of a .walk file of the scene, for people of 1.6 m. Where the scene has no unit, the
 /// room around the start tells their size. Takes up to 1.4 GB for cells and 0.5 GB for what is
 /// found, beside the scene: that is read part by part where its format allows it, and else as a
-/// whole, with 4 M Gaussians at most. `progress` is called often and may throw to cancel. Throws
-/// NoGround, or InputError where the scene cannot be read.
+/// whole, with 4 M Gaussians at most. `progress` is called often, by several threads at a time, and
+/// may throw to cancel. Throws NoGround, or InputError where the scene cannot be read.
 std::string compute_ground(const GroundSource& source, int threads,
                            const std::function<void()>& progress);
 

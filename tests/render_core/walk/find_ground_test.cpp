@@ -1,5 +1,7 @@
 #include "render_core/walk/find_ground.h"
 
+#include <atomic>
+
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
@@ -90,6 +92,26 @@ TEST(FindGround, SteepSlopesAreNoGround) {
 TEST(FindGround, DependsNotOnTheThreads) {
   const GaussianCloud cloud = test::room(0.9f);
   EXPECT_EQ(pack(test::map_of(cloud, {2, 2, 1.6f}, 1)), pack(test::map_of(cloud, {2, 2, 1.6f}, 3)));
+}
+
+TEST(FindGround, EndsWhereItsProgressThrows) {
+  struct Stop {};
+  ThreadPool pool(2);
+  const GaussianCloud cloud = test::room(0.9f);
+  const glm::vec3 start(2, 2, 1.6f);
+  Occupancy occupancy(grid_around(start, {0, 0, 1}, test::eye_m));
+  EXPECT_THROW(occupancy.add(cloud, pool, [] { throw Stop(); }), Stop);
+  occupancy.add(cloud, pool);
+  std::atomic<int> calls = 0;
+  find_ground(occupancy, {}, start, "test", pool, [&] { ++calls; });
+  EXPECT_GT(calls, 70) << "rows of columns, and the loops behind them";
+  for (int last = 1; last <= calls; ++last) {
+    std::atomic<int> left = last;
+    const auto progress = [&] {
+      if (--left == 0) throw Stop();
+    };
+    EXPECT_THROW(find_ground(occupancy, {}, start, "test", pool, progress), Stop) << last;
+  }
 }
 
 TEST(FindGround, NoGroundIsAnError) {
