@@ -71,9 +71,12 @@ void add_options(CLI::App& app, CommandLine& line) {
     auto* option = app.add_option(name, line.values[setting.name],
                                   has_default ? setting.help + " [" + value + "]" : setting.help)
                        ->option_text(setting.value_name);
-    if (setting.kind == Setting::Kind::list)
-      option->option_text(setting.value_name + "...")->expected(1, -1);
+    // Only --scene takes all words behind it, for what follows another value is a scene.
+    if (setting.name == "scene")
+      option->option_text(setting.value_name + "...");
     else
+      option->allow_extra_args(false);
+    if (setting.kind != Setting::Kind::list)
       option->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   }
 }

@@ -250,6 +250,15 @@ TEST(ServerProgram, TheAddressThatItPrintsOpens) {
   }
 }
 
+/// As its usage line has it: options, then scenes.
+TEST(ServerProgram, AnOptionTakesItsOwnValueAndNoScene) {
+  Program program({"--scene", "synth:city:2000", "synth:city:2001", "--threads", "1",
+                   "synth:city:2002", "--fps=30", "synth:city:2003", "--allow-origin",
+                   "https://a.example", "synth:city:2004"});
+  const auto listed = nlohmann::json::parse(http_get(program.port(), "/api/scenes").body);
+  EXPECT_EQ(listed.at("scenes").size(), 5u) << listed;
+}
+
 TEST(ServerProgram, AStartThatFailsIsALineOfTheJsonLog) {
   Program refused({"--log-format", "json", "--scene", "nowhere.ply"}, "never said");
   EXPECT_EQ(refused.exit_status(), 2);
