@@ -65,4 +65,10 @@ std::optional<float> estimate_eye_height(const GaussianCloud& sample, const Scen
   return usual_share * bin * (floor.distance + ceiling.distance);
 }
 
+std::optional<float> eye_height_of(const GaussianCloud& sample, const SceneHints& hints) {
+  constexpr float usual_m = 1.6f;
+  const float metres = hints.about.metres_per_unit;
+  return metres > 0.0f ? usual_m / metres : estimate_eye_height(sample, hints);
+}
+
 }  // namespace catgs::walk

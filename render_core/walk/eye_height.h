@@ -13,4 +13,8 @@ namespace catgs::walk {
 /// it. Empty where there is no floor, or little of a ceiling. `sample`: an even sample is enough.
 std::optional<float> estimate_eye_height(const GaussianCloud& sample, const SceneHints& hints);
 
+/// The eye height (world units) of a person whose eyes are 1.6 m high, where the hints say how long
+/// a unit is. Else as estimated.
+std::optional<float> eye_height_of(const GaussianCloud& sample, const SceneHints& hints);
+
 }  // namespace catgs::walk

@@ -27,7 +27,6 @@ namespace catgs {
 namespace {
 
 constexpr std::uint64_t most_whole_gaussians = 4'000'000;  // of a scene that is read as a whole
-constexpr float eye_height_m = 1.6f;
 
 bool is_tree(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path) && is_tree(FileSource(path));
@@ -60,6 +59,7 @@ SceneHints hints_of(const GroundSource& source) {
   SceneHints hints;
   hints.start_pose.position = source.start;
   hints.up = source.up;
+  hints.about.metres_per_unit = source.metres_per_unit;
   return hints;
 }
 
@@ -74,9 +74,7 @@ auto known_of_scene(const Body& body) {
 }
 
 float eye_height_of(const GroundSource& source, const GaussianCloud& sample) {
-  if (source.metres_per_unit > 0.0f) return eye_height_m / source.metres_per_unit;
-  const auto estimate = walk::estimate_eye_height(sample, hints_of(source));
-  if (estimate) return *estimate;
+  if (const auto height = walk::eye_height_of(sample, hints_of(source))) return *height;
   throw InputError(source.spec, "", "has no floor and ceiling that tell how large people are",
                    "its sidecar can name metres_per_unit");
 }
@@ -109,7 +107,7 @@ std::string compute_ground(const GroundSource& source, int threads,
     known_of_scene([&] { occupancy->add(part, *pool, progress); });
   };
   if (is_synthetic(source.spec)) {
-    begin(eye_height_m / source.metres_per_unit);
+    begin(eye_height_of(source, {}));  // it has a unit
     synthesize_parts(source.spec, *pool, take);
   } else {
     const SceneByParts scene = open(source, pool, progress);

@@ -53,12 +53,13 @@ float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
                        "in the scene's units, over 0");
     return *options.eye_height;
   }
-  const auto estimate = walk::estimate_eye_height(*parts.sample, parts.hints);
-  if (!estimate)
+  const auto height = walk::eye_height_of(*parts.sample, parts.hints);
+  if (!height)
     throw InputError(options.scene.path, "",
                      "has no floor and ceiling at its start that would tell how large a person is",
-                     "give --eye-height in the scene's units: 1.6 where these are metres");
-  return *estimate;
+                     "give --eye-height in the scene's units: 1.6 where these are metres, or "
+                     "metres_per_unit in its sidecar");
+  return *height;
 }
 
 void floors(const FloorsOptions& options, bool quiet) {
@@ -92,7 +93,11 @@ void floors(const FloorsOptions& options, bool quiet) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   fmt::print("{}: {} Gaussians, eye height {:.4g}{}, cells of {:.4g}\n", options.out, gaussians,
-             eye_height, options.eye_height ? "" : " (estimated)", occupancy.grid().cell);
+             eye_height,
+             options.eye_height                         ? ""
+             : parts.hints.about.metres_per_unit > 0.0f ? " (1.6 m)"
+                                                        : " (estimated)",
+             occupancy.grid().cell);
   print_map(map, std::filesystem::file_size(options.out));
   fmt::print(
       "opened in {:.1f} s, occupancy {:.1f} s of {:.1f} s with reading, ground {:.1f} s; "
@@ -111,7 +116,8 @@ void add_floors_command(CLI::App& app) {
   add_scene_options(*command, options->scene);
   command->add_option("out", options->out, "File to write, .walk")->required();
   command->add_option("--eye-height", options->eye_height,
-                      "Of a person, in the scene's units [from the room's height at the start]");
+                      "Of a person, in the scene's units [1.6 m if its sidecar has "
+                      "metres_per_unit, else from the room's height at the start]");
   command->add_option("--plan", options->plan,
                       "Also write the floor plan as PNG; of several storeys, one each");
   command->add_option("--threads", options->threads, "0: one per processor")

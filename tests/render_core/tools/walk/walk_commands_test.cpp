@@ -61,6 +61,15 @@ TEST_F(WalkCommands, TheRoomTellsTheEyeHeight) {
   EXPECT_NEAR(map.grid.cell * walk::cells_per_eye_height, 1.6f, 0.25f);
 }
 
+TEST_F(WalkCommands, TheSidecarsUnitTellsTheEyeHeight) {
+  folder_.write(
+      "room.json",
+      R"({"up": [0, 0, 1], "start_pose": {"position": [2, 2, 1.6], "look_at": [2, 5, 1.6]}, "metres_per_unit": 1})");
+  const Outcome found = floors("");
+  ASSERT_EQ(found.exit_code, 0) << found.out;
+  EXPECT_THAT(found.out, HasSubstr("eye height 1.6 (1.6 m), cells of 0.1"));
+}
+
 /// The walls are not those of the scene that the map is of.
 TEST_F(WalkCommands, AWalkThroughWallsFails) {
   ASSERT_EQ(floors("--eye-height 1.6").exit_code, 0);
