@@ -137,6 +137,26 @@ ensure_scene() {
   fi
 }
 
+has_ground() { [[ ${1%.ply}.walk -nt $1 ]]; }
+
+# The server takes these files. Else it would look for the ground when the first visitor asks.
+find_demo_grounds() {
+  local scene
+  for scene in "${demo_scenes[@]}"; do
+    has_ground "$scene" || "$bin_dir/catgs-render" floors "$scene" "${scene%.ply}.walk" ||
+      echo "$scene is shown, but nobody walks in it"
+  done
+}
+
+ensure_grounds() {
+  ((${#scenes[@]} == 0)) || return 0
+  if has_ground "${demo_scenes[0]}" && has_ground "${demo_scenes[1]}"; then
+    step_done "Where people walk in the demo scenes: already found"
+  else
+    step "Find where people walk in the demo scenes" find_demo_grounds
+  fi
+}
+
 # ---- --lan: a certificate for this machine's addresses, a token, and the link as a QR code ------
 
 readonly lan_dir=$build_dir/lan
@@ -306,7 +326,7 @@ main() {
     build_packages+=("${lan_packages[@]}")
   fi
   lock_build run
-  steps_begin $((6 + lan)) "$log"
+  steps_begin $((6 + lan + (${#scenes[@]} == 0))) "$log"
   step "System: $distribution, $(nproc) cores, $cuda_note" check_system
   ensure_packages "${build_packages[@]}"
   local -a cuda_options=("-DCATGS_CUDA=$cuda_choice")
@@ -318,6 +338,7 @@ main() {
   compose_server_command
   check_server_options
   ensure_scene
+  ensure_grounds
   if ((lan)); then
     choose_lan_address
     step "Certificate and token for $lan_address" make_lan_credentials

@@ -307,6 +307,22 @@ class Serving(Machine):
         self.assertNotIn("your_scene.ply", output)
         self.assertIn("--lan", output)
 
+    def test_the_ground_of_the_demo_scenes_is_found_once(self):
+        output = self.serve(*self.options()).stdout
+        self.assertIn("] Find where people walk in the demo scenes ", output)
+        scenes = self.checkout / "build/run/scenes"
+        self.assertTrue((scenes / "city.walk").exists())
+        self.assertTrue((scenes / "garden.walk").exists())
+        found = self.calls().count("catgs-render floors")
+        self.assertEqual(found, 2)
+        self.assertIn("] Where people walk in the demo scenes: already found ", self.serve(*self.options()).stdout)
+        self.assertEqual(self.calls().count("catgs-render floors"), found)
+        newer = time.time() + 10
+        os.utime(scenes / "garden.ply", (newer, newer))
+        self.serve(*self.options())
+        self.assertEqual(self.calls().count("catgs-render floors"), found + 1)
+        self.assertNotIn("where people walk", self.serve(self.scene("a.ply"), *self.options()).stdout)
+
     def test_metrics_move_out_of_the_way_of_the_page(self):
         script = self.checkout / "deploy/run.sh"
         port = self.free_port()
