@@ -152,7 +152,11 @@ SceneLocation locate_scene(const fs::path& given) {
   std::error_code error;
   fs::path path = fs::absolute(given, error).lexically_normal();  // so that "." has a name
   if (!path.has_filename()) path = path.parent_path();
-  if (!fs::exists(path, error)) throw InputError(given.string(), "", "does not exist");
+  if (!fs::exists(path, error))
+    throw InputError(given.string(), "", "does not exist",
+                     given.string().starts_with("synth:")
+                         ? "catgs-render synth city OUT.ply makes such a scene"
+                         : "");
   if (is_scene_index(path)) path = path.parent_path();
   if (!fs::is_directory(path, error)) return at_file(given);
 

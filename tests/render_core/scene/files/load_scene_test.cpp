@@ -195,6 +195,8 @@ TEST_F(LoadScene, UnknownFilesAreRefusedWithTheListOfFormats) {
   EXPECT_THAT(input_error([&] { load_scene(write("empty.ply", "")); }), HasSubstr("supported"));
   EXPECT_THAT(input_error([&] { load_scene(folder_ / "absent.ply"); }),
               HasSubstr("does not exist"));
+  EXPECT_THAT(input_error([&] { load_scene("synth:city:300000"); }),
+              HasSubstr("catgs-render synth city OUT.ply"));
   LoadOptions level;
   level.lod = 1;
   EXPECT_THAT(
