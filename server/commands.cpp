@@ -29,6 +29,7 @@ void add_selftest_command(CLI::App& app, int& exit_code) {
 
 void add_token_command(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("token", "Make an access token for an expiring link");
+  command->footer("Example: catgs-server token --token-key-file KEY --scene hall-kdfmqrtv");
   auto options = std::make_shared<TokenOptions>();
   command->add_option("--scene", options->grant.scene_id,
                       "Scene id, as /api/scenes lists it; without it every scene");

@@ -123,21 +123,18 @@ int run(int argc, char** argv) {
   bound_heaps();
   CLI::App app("Streams 3D Gaussian Splatting scenes to browsers.", "catgs-server");
   app.set_version_flag("--version", build_version);
-  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    std::string command;
-    for (const CLI::App* given : failed->get_subcommands()) command += given->get_name() + " ";
-    return fmt::format("catgs-server: {} (see catgs-server {}--help)\n", error.what(), command);
-  });
-  app.footer(
-      "Flags override CATGS_<NAME> variables, and these override --config FILE (TOML).\n"
-      "Exit codes: 0 ended as asked, 1 failed (also when a required GPU cannot be used),\n"
-      "2 bad usage, scene or configuration.\n"
-      "Example: catgs-server synth:city:300000");
+  app.failure_message(failure_text);
   CommandLine line;
   add_options(app, line);
   int exit_code = exit_ok;
   add_selftest_command(app, exit_code);
   add_token_command(app, exit_code);
+  app.footer(  // behind the commands, which would take it over
+      "Folders, sites and networks may be several: give their flag once for each.\n"
+      "Flags override CATGS_<NAME> variables, and these override --config FILE (TOML).\n"
+      "Exit codes: 0 ended as asked, 1 failed (also when a required GPU cannot be used),\n"
+      "2 bad usage, scene or configuration.\n"
+      "Example: catgs-server synth:city:300000");
   try {
     parse_command_line(app, argc, argv);
     return app.get_subcommands().empty() ? serve(line) : exit_code;

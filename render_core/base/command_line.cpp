@@ -79,4 +79,10 @@ void parse_command_line(CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
+std::string failure_text(const CLI::App* app, const CLI::Error& error) {
+  std::string command = app->get_name() + " ";
+  for (const CLI::App* given : app->get_subcommands()) command += given->get_name() + " ";
+  return fmt::format("{}: {} (see {}--help)\n", app->get_name(), error.what(), command);
+}
+
 }  // namespace catgs

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include <CLI/CLI.hpp>
 
 namespace catgs {
@@ -9,5 +11,8 @@ namespace catgs {
 /// unknown command with "a command is required". Here InputError names the word, what is wrong with
 /// it, and the nearest known one. Everything else is as in CLI11.
 void parse_command_line(CLI::App& app, int argc, const char* const* argv);
+
+/// For CLI::App::failure_message(): `PROGRAM: what is wrong`, and whose --help tells more.
+std::string failure_text(const CLI::App* app, const CLI::Error& error);
 
 }  // namespace catgs

@@ -21,9 +21,7 @@ int run(int argc, char** argv) {
   app.fallthrough();
   bool quiet = false;  // read by is_quiet()
   app.add_flag("-q,--quiet", quiet, "Show no progress on the terminal");
-  app.failure_message([](const CLI::App*, const CLI::Error& error) {
-    return fmt::format("catgs-render: {} (see --help)\n", error.what());
-  });
+  app.failure_message(failure_text);
   app.footer(
       "Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal error.");
 

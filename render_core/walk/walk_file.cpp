@@ -87,7 +87,9 @@ class Reader {
     const std::vector<std::byte> bytes = file_.read_all(most_bytes);
     require(bytes.size() >= sizeof header_, "header", "is cut off");
     header_ = load_as<Header>(bytes.data());
-    require(header_.magic == Header::right_magic, "magic", "is not that of a .walk file");
+    if (header_.magic != Header::right_magic)
+      throw InputError(file_.name(), "magic", "is not that of a .walk file",
+                       "catgs-render floors SCENE OUT.walk makes one");
     if (header_.version != Header::right_version)
       throw InputError(file_.name(), "version", "is not known", "compute it with this version");
     require(header_.checksum == checksum_of(bytes), "checksum", "is wrong");

@@ -148,12 +148,14 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
     if (!grant->scene_id.empty()) grant->scene_id = resolve(grant->scene_id);
     if (!link_id.empty()) expires_unix_s = grant->expires_unix_s;
   }
-  Permit permit = [granted = std::move(granted), has_authors = !key_.empty()](
-                      std::string_view scene_id, Use use) -> Refusal {
+  Permit permit = [granted = std::move(granted), has_authors = !key_.empty(),
+                   has_link = !token.empty()](std::string_view scene_id, Use use) -> Refusal {
     if (use == Use::save && !has_authors)
       return "nobody can save on this server: it was started without --token-key-file, which "
              "links of role author are made with";
     if (const auto* refused = std::get_if<std::string>(&granted)) return *refused;
+    if (use == Use::save && !has_link)
+      return "only a link of role author lets you save: open the one you were given";
     const auto& grant = std::get<LinkGrant>(granted);
     if (!grant.scene_id.empty() && grant.scene_id != scene_id) return other_scene(grant, scene_id);
     return forbidden(grant.role, use);

@@ -59,6 +59,9 @@ FilmStudio::~FilmStudio() {
 std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
   if (const auto id = job_of(request.path, file_part)) {
     const auto job = queue_.find(*id);
+    if (job && !has_ended(*job))
+      return text_response(
+          404, fmt::format("404: it is not ready yet: {}{} says how far it is\n", folder, *id));
     if (!job || !job->result) return no_such_job();
     HttpResponse response;
     response.content_type = job->kind == FilmKind::film ? "video/mp4" : "image/png";

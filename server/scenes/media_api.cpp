@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/base/printable.h"
 #include "server/access/signed_token.h"
 #include "server/base/log_event.h"
 #include "server/net/byte_range.h"
@@ -180,9 +181,10 @@ std::optional<HttpResponse> MediaApi::refuse_upload(const HttpRequest& request) 
   const Permit permit = permit_of(parts_.authorize, request);
   if (auto refused = refuse_change(parts_.scenes, permit, scene_id)) return refused;
   if (!is_media_name(path.name) || !media_kind_named(path.name))
-    return text_response(400,
-                         "400: this is no name of a picture, film or sound: use letters, digits, "
-                         ". - and _, and an extension such as .jpg, .mp4, .mp3 or .vtt\n");
+    return text_response(
+        400, fmt::format("400: \"{}\" is no name of a picture, film or sound: use letters, digits, "
+                         ". - and _, and an extension such as .jpg, .mp4, .mp3 or .vtt\n",
+                         printable(path.name)));
   if (!folder_of(scene_id))
     return text_response(409, "409: the scene is no file in memory: open it, then try again\n");
   return std::nullopt;

@@ -149,7 +149,8 @@ HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
 std::optional<HttpResponse> SceneApi::refuse_upload(const HttpRequest& request) {
   const auto wish = author_scene_of(request.path);
   if (!wish)
-    return text_response(405, "405: only the sidecars and media of scenes are saved here\n");
+    return text_response(
+        405, "405: only sidecars and media of scenes, and orders of films, are taken here\n");
   return refuse_change(scenes_, permit_of(authorize_, request), scenes_.resolve(*wish));
 }
 

@@ -40,7 +40,8 @@ class LimitCheck final : public nlohmann::json_sax<nlohmann::json> {
                    const nlohmann::json::exception& error) override {
     if (dynamic_cast<const nlohmann::json::out_of_range*>(&error) != nullptr)
       throw InputError(file_, "", fmt::format("holds a number out of range: {}", error.what()));
-    throw InputError(file_, fmt::format("byte {}", byte), "is not valid JSON");
+    throw InputError(file_, fmt::format("byte {}", byte), "is not valid JSON",
+                     "mend it there: a comma, bracket or quote is missing or too many");
   }
 
  private:

@@ -93,7 +93,9 @@ TEST_F(Films, AreOrderedByAuthorsAlone) {
 TEST_F(Films, AreCancelledByWhoKnowsTheirJob) {
   const std::string job = job_of(order(film, token("author")));
   EXPECT_EQ(order(picture, token("author")).status, 409) << "one at a time";
-  EXPECT_EQ(http_get(server->port(), "/api/films/" + job + "/file").status, 404) << "not yet";
+  const HttpReply early = http_get(server->port(), "/api/films/" + job + "/file");
+  EXPECT_EQ(early.status, 404);
+  EXPECT_THAT(early.body, HasSubstr("not ready yet: /api/films/" + job));
   EXPECT_EQ(cancel(job), 200);
   EXPECT_EQ(report(job).at("state"), "cancelled");
   EXPECT_EQ(order(picture, token("author")).status, 202);

@@ -211,7 +211,7 @@ TEST_F(Media, AreCheckedBeforeTheyAreKept) {
     return reply.body;
   };
   EXPECT_THAT(refused("a.jpg", "<html>"), HasSubstr("409: a.jpg: is of no format"));
-  EXPECT_THAT(refused("a.svg", "<svg/>"), HasSubstr("400: this is no name"));
+  EXPECT_THAT(refused("a.svg", "<svg/>"), HasSubstr("400: \"a.svg\" is no name of a picture"));
   EXPECT_THAT(refused("a.png", jpeg_file()), HasSubstr("its content is image/jpeg"));
   EXPECT_THAT(refused("a.png", png_file(100'000, 1)), HasSubstr("100000 x 1 pixels"));
   EXPECT_THAT(refused(".a.jpg", jpeg_file()), HasSubstr("no name"));

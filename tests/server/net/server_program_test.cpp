@@ -267,7 +267,7 @@ TEST(ServerProgram, AStartThatFailsIsALineOfTheJsonLog) {
 
 /// libwebsockets has a line about each head that is too long.
 TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
-  Program program({"token"}, "--help");
+  Program program({"token"}, "--help)");
   EXPECT_THAT(program.log(), HasSubstr("--token-key-file is required"));
   EXPECT_THAT(program.log(), HasSubstr("see catgs-server token --help"));
   EXPECT_EQ(program.exit_status(), 2);

@@ -81,7 +81,8 @@ TEST(Sidecar, ErrorsNameTheField) {
   for (const char* metres : {"0", "-1", "1e7", "\"1 m\""})
     EXPECT_THAT(error(fmt::format(R"({{"metres_per_unit": {}}})", metres).c_str()),
                 HasSubstr("metres_per_unit:"));
-  EXPECT_THAT(error(R"({"up": )"), HasSubstr("city.json: byte"));
+  EXPECT_THAT(error(R"({"up": )"),
+              AllOf(HasSubstr("city.json: byte"), HasSubstr("(mend it there")));
   EXPECT_THAT(error("[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
   EXPECT_THAT(error(R"({"up": [0, 0, 0]})"), HasSubstr("up: has no direction"));

@@ -90,6 +90,9 @@ TEST_F(WalkCommands, WhatCannotBeDoneIsSaid) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.walk"));
   EXPECT_THAT(run(fmt::format("floors {} {}", path("room.ply"), path("room.png"))).out,
               HasSubstr("room.png: is no name of a .walk file"));
+  EXPECT_THAT(run("floors " + path("room.ply")).out,
+              HasSubstr("out is required (see catgs-render floors --help)"));
+  EXPECT_THAT(run("walk " + path("room.ply")).out, HasSubstr("catgs-render floors SCENE OUT.walk"));
   folder_.write("bad.walk", "no walk file");
   const Outcome bad = run("walk " + path("bad.walk"));
   EXPECT_NE(bad.exit_code, 0);
