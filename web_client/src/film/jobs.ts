@@ -7,6 +7,9 @@ export interface FilmWish {
   readonly views: readonly (readonly number[] | number)[];
 }
 
+/** How the file's name ends, after that of the scene. A picture and a panorama of a scene may lie in one folder. */
+export const film_endings: Readonly<Record<FilmWish['kind'], string>> = { picture: '.png', panorama: '-360.png', film: '.mp4' };
+
 export interface FilmState {
   readonly state: 'waiting' | 'drawing' | 'done' | 'failed' | 'cancelled';
   readonly share: number;

@@ -1,6 +1,6 @@
 // Pictures and films for authors. It loads when an author opens it.
 import type { Eye } from '../camera/eye';
-import { cancel_film, film_address, film_state, order_film, type FilmWish } from '../film/jobs';
+import { cancel_film, film_address, film_endings, film_state, order_film, type FilmWish } from '../film/jobs';
 import { film_eyes, film_fps, film_length_s, most_film_frames, write_tum, write_views } from '../film/path';
 import { duration, number } from '../text/number';
 import { text } from '../text/text';
@@ -27,7 +27,6 @@ const sizes: Readonly<Record<Kind, readonly (readonly [number, number])[]>> = {
   panorama: [[4096, 2048], [8192, 4096]],
   film: [[1280, 720], [1920, 1080]],
 };
-const endings: Readonly<Record<Kind, string>> = { picture: '.png', panorama: '-360.png', film: '.mp4' };
 const look_again_ms = 500;
 const most_wait_ms = 15_000; // where no server answers
 
@@ -118,7 +117,7 @@ export class FilmPanel {
     if (!eyes || token === undefined) return;
     const { kind } = this;
     const size = sizes[kind][Number(this.size_.value)]!;
-    const name = this.tools_.file_name() + endings[kind];
+    const name = this.tools_.file_name() + film_endings[kind];
     this.save_.hidden = true;
     this.say('');
     this.make_.disabled = true;
