@@ -108,7 +108,7 @@ describe('a portal', () => {
     await go_to_stop(leader, 1);
     const link = await present(leader);
     await leader.keyboard.press('Escape');
-    const { page: follower } = await open(`${link}&${token().slice(1)}`, windows.desktop);
+    const { page: follower } = await open(`${link}&${token().slice(1)}`, { ...windows.desktop, reducedMotion: 'reduce' });
     await follower.getByText('Ada leads').waitFor();
     // Both come to the park, each by itself.
     for (const page of [follower, leader]) {

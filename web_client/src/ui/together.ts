@@ -110,8 +110,8 @@ export class Together {
     this.wants_ = false;
     this.worker_.post({ kind: 'follow', watch: '' });
     if (this.role_ === 'following') this.notice_.show(words.over, 10);
-    this.navigation_.stop_flight();
     this.become('alone');
+    this.navigation_.stop_flight();
   }
 
   /** The leader is in another scene. Begins anew there, or watches where the visitor may not go. */
