@@ -248,8 +248,10 @@ TEST(SentSidecar, MediaAreRefusedByTheFieldThatIsWrong) {
   for (const char* src : {"../a.jpg", "/a.jpg", "a/b.jpg", ".a.jpg", ""})
     EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
                 HasSubstr("src: is no name of a file"));
-  for (const char* src : {"http://media.example/a.jpg", "javascript:alert(1)", "data:image/png,x",
-                          "https://media.example.evil.example/a.jpg", "https://evil.example/a.jpg"})
+  for (const char* src : {"http://media.example/a.jpg", "javascript:alert(1)", "data:image/png,x"})
+    EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
+                HasSubstr("src: is no https address"));
+  for (const char* src : {"https://media.example.evil.example/a.jpg", "https://evil.example/a.jpg"})
     EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
                 HasSubstr("src: is at no site"));
   const auto entries = [&](std::size_t count) {
