@@ -137,7 +137,8 @@ ensure_scene() {
   fi
 }
 
-has_ground() { [[ ${1%.ply}.walk -nt $1 ]]; }
+# An author may have moved the start, or said how long a unit is.
+has_ground() { [[ ${1%.ply}.walk -nt $1 && ${1%.ply}.walk -nt ${1%.ply}.json ]]; }
 
 # The server takes these files. Else it would look for the ground when the first visitor asks.
 find_demo_grounds() {

@@ -130,7 +130,7 @@ int run(int argc, char** argv) {
   add_selftest_command(app, exit_code);
   add_token_command(app, exit_code);
   app.footer(  // behind the commands, which would take it over
-      "Folders, sites and networks may be several: give their flag once for each.\n"
+      "Give a flag once for each folder, site or network.\n"
       "Flags override CATGS_<NAME> variables, and these override --config FILE (TOML).\n"
       "Exit codes: 0 ended as asked, 1 failed (also when a required GPU cannot be used),\n"
       "2 bad usage, scene or configuration.\n"

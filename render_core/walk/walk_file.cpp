@@ -159,7 +159,7 @@ class Reader {
 
   /// The index, whose sizes are those of `bytes` behind it.
   std::vector<TileBytes> read_index(std::span<const std::byte>& bytes) const {
-    constexpr std::size_t most_growth = 1032;  // of deflate
+    constexpr std::uint64_t most_growth = 1032;  // of deflate
     constexpr std::size_t most_tile = tile_side * tile_side * (1 + 4 * most_in_column);
     std::vector<TileBytes> index(tiles_in(map_.size));
     const std::size_t index_bytes = index.size() * sizeof(TileBytes);
@@ -168,8 +168,10 @@ class Reader {
     bytes = bytes.subspan(index_bytes);
     std::uint64_t packed = 0, unpacked = 0;
     for (const TileBytes& tile : index) {
-      require(tile.unpacked <= most_tile && tile.unpacked / most_growth <= tile.packed &&
-                  (tile.packed == 0) == (tile.unpacked == 0),
+      const std::uint64_t size = tile.packed, grown = tile.unpacked;
+      // zlib packs nothing into more than this.
+      require(grown <= most_tile && grown <= most_growth * size && size <= 2 * grown + 64 &&
+                  (size == 0) == (grown == 0),
               "index", "has a tile of a wrong size");
       packed += tile.packed;
       unpacked += tile.unpacked;

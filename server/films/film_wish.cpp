@@ -34,7 +34,7 @@ glm::ivec2 read_size(const JsonField& field, FilmKind kind) {
   for (int i = 0; i < 2; ++i) {
     const std::uint64_t side = field[static_cast<std::size_t>(i)].count();
     if (side < least_side_px || side > static_cast<std::uint64_t>(most[i]))
-      field.fail(fmt::format("is not between {0}x{0} and {1}x{2} pixels, as a {3} is",
+      field.fail(fmt::format("is no size of a {3}: that is between {0}x{0} and {1}x{2} pixels",
                              least_side_px, most.x, most.y,
                              kind_names[static_cast<std::size_t>(kind)]));
     size_px[i] = static_cast<int>(side);

@@ -1,6 +1,5 @@
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '#client/base/vector';
-import { film_endings } from '#client/film/jobs';
 import { film_eyes, film_fps, film_length_s, most_film_frames, write_tum, write_views } from '#client/film/path';
 import { read_tours, type Tour } from '#client/tour/tour';
 import { expect_vec } from './cameras';
@@ -44,9 +43,4 @@ describe('the camera of a film', () => {
     expect(lines.length).toBe(film_fps);
     expect(lines[1]).toBe('0.033333 0.0000000 0.0000000 2.0000000 0.0000000 0.0000000 0.0000000 1.0000000');
   });
-});
-
-it('a picture, a panorama and a film of one scene have different names', () => {
-  const names = Object.values(film_endings).map((ending) => `hall${ending}`);
-  expect(new Set(names).size).toBe(3);
 });

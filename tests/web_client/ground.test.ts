@@ -271,6 +271,16 @@ describe('a ground that the server still seeks', () => {
     expect(told).toHaveBeenCalledTimes(2);
   });
 
+  it('is not promised to those who want it when there is none', async () => {
+    void ground.want(true);
+    await vi.advanceTimersByTimeAsync(1);
+    asked.mockResolvedValueOnce({ status: 404, headers: new Headers() } as Response);
+    await vi.advanceTimersByTimeAsync(12_000);
+    void ground.want();
+    await vi.advanceTimersByTimeAsync(1);
+    expect(told).not.toHaveBeenCalled();
+  });
+
   it('is told of at once to those who want it while the page seeks it for nobody', async () => {
     void ground.want(true);
     await vi.advanceTimersByTimeAsync(6000);

@@ -245,9 +245,14 @@ describe('wording', () => {
   it('offers those whose link is refused to look without its token', () => {
     const state = { phase: 'failed', code: Error_Code.UNAUTHORIZED, message: 'this link has expired' } as const;
     expect(card_for(state, false, [], true)).toMatchObject({ asks_token: true, action: { does: 'look' } });
-    const history = { state: null, replaceState: () => undefined };
-    const by_link = (href: string): boolean => new AccessToken({ href }, history, undefined).from_link;
-    expect(['#token=old', ''].map((fragment) => by_link(`http://host/?author${fragment}`))).toEqual([true, false]);
+    const kept = new Map<string, string>();
+    const storage = { getItem: (key: string) => kept.get(key) ?? null, setItem: (key: string, text: string) => kept.set(key, text) };
+    const opened = (href: string): AccessToken =>
+      new AccessToken({ href }, { state: null, replaceState: () => undefined }, storage as unknown as Storage);
+    const token = opened('http://host/?author#token=old');
+    token.set_aside();
+    expect(token.value).toBe('');
+    expect(opened('http://host/?author').value).toBe('old'); // a reload has it again
   });
 
   it('explains JPEG by what is missing', () => {

@@ -41,7 +41,7 @@ class LimitCheck final : public nlohmann::json_sax<nlohmann::json> {
     if (dynamic_cast<const nlohmann::json::out_of_range*>(&error) != nullptr)
       throw InputError(file_, "", fmt::format("holds a number out of range: {}", error.what()));
     throw InputError(file_, fmt::format("byte {}", byte), "is not valid JSON",
-                     "mend it there: a comma, bracket or quote is missing or too many");
+                     "check the commas, brackets and quotes there");
   }
 
  private:

@@ -50,16 +50,19 @@ void copy_media(const std::filesystem::path& from_sidecar,
   if (!fs::is_directory(from, error)) return;
   fs::create_directories(to, error);
   std::size_t copied = 0, there = 0;
-  for (fs::directory_iterator it(from, error), end; !error && it != end; it.increment(error)) {
-    const fs::path name = it->path().filename();
-    if (!is_media_name(name.string()) || it->is_symlink() || !it->is_regular_file()) continue;
-    ++(fs::copy_file(*it, to / name, fs::copy_options::skip_existing, error) ? copied : there);
-    if (error) break;
-  }
+  if (!error)
+    for (fs::directory_iterator it(from, error), end; !error && it != end; it.increment(error)) {
+      std::error_code unknown;  // such a file is none that is copied
+      const fs::path name = it->path().filename();
+      if (!is_media_name(name.string()) || it->is_symlink(unknown) || !it->is_regular_file(unknown))
+        continue;
+      ++(fs::copy_file(*it, to / name, fs::copy_options::skip_existing, error) ? copied : there);
+      if (error) break;
+    }
   if (error)
     throw InputError(to.string(), "", "cannot take the media of the tours: " + error.message(),
                      "copy " + from.string() + " by hand");
-  fmt::print("{}: {} media of the tours, from {} ({} were there)\n", to.string(), copied,
+  fmt::print("{}: copied {} media files from {}, {} were there already\n", to.string(), copied,
              from.string(), there);
 }
 
@@ -74,11 +77,11 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
   }
   nlohmann::ordered_json tours = tours_in_sidecar(conversion.hint_files);
   if (placement.moves()) place_tours(tours, placement);
-  if (!tours.is_null()) copy_media(conversion.hint_files.sidecar, sidecar);
   write_sidecar(placement.moves() ? placed(hints, placement) : hints, sidecar, &tours);
   fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
   if (conversion.edit.crop)
     fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
+  if (!tours.is_null()) copy_media(conversion.hint_files.sidecar, sidecar);
 }
 
 /// Before the scene is loaded, which may take minutes.

@@ -185,10 +185,7 @@ export class PlanPanel {
   private picture_of(storey: number): DrawnPlan | undefined {
     const known = this.pictures_.get(storey);
     if (!known)
-      this.make_picture(storey).catch((error: unknown) => {
-        this.pictures_.delete(storey);
-        console.warn('the plan cannot be drawn', error);
-      });
+      this.make_picture(storey).catch((error: unknown) => console.warn('the plan cannot be drawn', error));
     return known === 'comes' ? undefined : known;
   }
 

@@ -52,7 +52,7 @@ export class SceneGround {
   }
 
   private tell(): void {
-    if (this.idle_ || this.seeking_ !== 'quietly') return;
+    if (this.state_ !== 'asked' || this.idle_ || this.seeking_ !== 'quietly') return;
     this.seeking_ = 'told';
     this.sought.emit();
   }

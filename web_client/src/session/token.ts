@@ -19,8 +19,6 @@ export function watch_token(href: string): string {
 
 /** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
-  /** The page was opened by a link with a token. */
-  readonly from_link: boolean;
   private value_: string;
 
   /**
@@ -34,7 +32,6 @@ export class AccessToken {
     private readonly storage_: Storage | undefined,
   ) {
     this.value_ = storage_?.getItem(storage_key) ?? '';
-    this.from_link = has_token(location.href);
     const url = new URL(location.href);
     const fragment = fragment_of(location.href);
     const token = fragment.get('token');
@@ -47,6 +44,11 @@ export class AccessToken {
 
   get value(): string {
     return this.value_;
+  }
+
+  /** Until the page is loaded again. */
+  set_aside(): void {
+    this.value_ = '';
   }
 
   set value(token: string) {

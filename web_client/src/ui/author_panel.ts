@@ -272,7 +272,7 @@ export class AuthorPanel {
   private say(what: string, where = this.said_): void {
     this.said_.textContent = this.done_.textContent = '';
     where.textContent = what;
-    where.scrollIntoView({ block: 'nearest' }); // does nothing where it is empty
+    where.scrollIntoView({ block: 'nearest' }); // an empty output is not displayed: nothing scrolls
   }
 
   private edited(open_stop?: number): void {

@@ -86,7 +86,7 @@ export class FilmPanel {
 
   private say(what: string): void {
     this.said_.textContent = what;
-    this.said_.scrollIntoView({ block: 'nearest' }); // does nothing where it is empty
+    this.said_.scrollIntoView({ block: 'nearest' }); // an empty output is not displayed: nothing scrolls
   }
 
   /** The frames of the film; undefined, and the panel says why: there is none. */

@@ -31,7 +31,8 @@ export class SessionStatus {
     worker_.on('broken', ({ message }) => this.break_off(message));
     card_.retried.listen(() => worker_.post({ kind: 'retry' }));
     card_.token_given.listen((token) => {
-      token_.value = token;
+      if (token) token_.value = token;
+      else token_.set_aside();
       worker_.post({ kind: 'token', token });
     });
     setTimeout(() => this.show(), first_card_after_ms);
@@ -53,8 +54,7 @@ export class SessionStatus {
 
   private show(): void {
     if (this.broken_) return;
-    const by_link = this.token_.from_link && this.token_.value !== '';
-    this.card_.show(card_for(this.state_, this.has_picture_, this.scenes_, by_link));
+    this.card_.show(card_for(this.state_, this.has_picture_, this.scenes_, this.token_.value !== ''));
     this.toolbar_.set_active(this.state_.phase !== 'failed');
     document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
   }

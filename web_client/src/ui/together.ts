@@ -110,7 +110,7 @@ export class Together {
     this.wants_ = false;
     this.worker_.post({ kind: 'follow', watch: '' });
     if (this.role_ === 'following') this.notice_.show(words.over, 10);
-    this.become('alone');
+    this.become(this.role_ === 'following' ? 'alone' : 'left'); // who asks too early may ask again
     this.navigation_.stop_flight();
   }
 

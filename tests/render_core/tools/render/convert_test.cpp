@@ -76,7 +76,8 @@ TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
   const std::string moves = "--scale 2 --translate=0,10,0";
   const Outcome moved = convert("moved.spz", moves);
   ASSERT_EQ(moved.exit_code, 0);
-  EXPECT_THAT(moved.out, HasSubstr("1 media of the tours, from " + path("ball.media")));
+  EXPECT_THAT(moved.out,
+              HasSubstr("copied 1 media files from " + path("ball.media") + ", 1 were there"));
   EXPECT_TRUE(std::filesystem::exists(path("moved.media/door.vtt")));
   EXPECT_EQ(std::filesystem::file_size(path("moved.media/hall.vtt")), 12u);
   EXPECT_FALSE(std::filesystem::exists(path("moved.media/link.vtt")));
