@@ -82,7 +82,7 @@ TEST(Sidecar, ErrorsNameTheField) {
     EXPECT_THAT(error(fmt::format(R"({{"metres_per_unit": {}}})", metres).c_str()),
                 HasSubstr("metres_per_unit:"));
   EXPECT_THAT(error(R"({"up": )"),
-              AllOf(HasSubstr("city.json: byte"), HasSubstr("(mend it there")));
+              AllOf(HasSubstr("city.json: byte"), HasSubstr("(check the commas")));
   EXPECT_THAT(error("[]"), HasSubstr("not a JSON object"));
   EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
   EXPECT_THAT(error(R"({"up": [0, 0, 0]})"), HasSubstr("up: has no direction"));
