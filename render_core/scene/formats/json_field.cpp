@@ -139,8 +139,7 @@ glm::quat JsonField::orientation() const {
 }
 
 glm::quat JsonField::as_orientation(const glm::quat& q) const {
-  if (std::abs(glm::length(q) - 1.0f) > 0.01f)
-    fail("is no quaternion x, y, z, w of length 1");
+  if (std::abs(glm::length(q) - 1.0f) > 0.01f) fail("is no quaternion x, y, z, w of length 1");
   return glm::normalize(q);
 }
 

@@ -49,8 +49,7 @@ TEST(FilmWish, LastsTenMinutesAtMost) {
 TEST(FilmWish, HasASizeThatItsKindMayHave) {
   EXPECT_EQ(mistake(film(view, "[7680, 4320]", "picture")), "");
   EXPECT_EQ(mistake(film(view, "[8192, 4096]", "panorama")), "");
-  EXPECT_THAT(mistake(film(view, "[7682, 4320]", "picture")),
-              HasSubstr("between 16x16 and"));
+  EXPECT_THAT(mistake(film(view, "[7682, 4320]", "picture")), HasSubstr("between 16x16 and"));
   EXPECT_THAT(mistake(film(view, "[4096, 4096]", "panorama")), HasSubstr("twice as wide as high"));
   EXPECT_THAT(mistake(film(view, "[3840, 2160]")), HasSubstr("between 16x16 and"));
   EXPECT_THAT(mistake(film(view, "[321, 180]")), HasSubstr("size: has an odd side"));

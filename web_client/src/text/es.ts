@@ -27,8 +27,7 @@ export const text: Texts = {
     full_screen: 'Pantalla completa',
     full_screen_key: 'Pantalla completa (F)',
     loading: 'Cargando',
-    loading_stays:
-      'Si este mensaje no desaparece, el navegador es demasiado antiguo o bloquea los scripts. Sirven Chrome 94, Edge 94, Firefox 113, Safari 16.4 o versiones más recientes.',
+    loading_stays: 'Si este mensaje no desaparece, el navegador es demasiado antiguo o bloquea los scripts. Sirven Chrome 94, Edge 94, Firefox 113, Safari 16.4 o versiones más recientes.',
     connect: 'Conectar',
     no_script: 'CaT-GS transmite una escena 3D ya dibujada y necesita JavaScript.',
   },
@@ -293,8 +292,7 @@ export const text: Texts = {
     bitrate: 'Tasa de bits',
     picture: 'Imagen',
     detail: 'Detalle',
-    detail_title:
-      'En escenas que el servidor lee por páginas: el mayor error dibujado, las gaussianas en la imagen, los niveles más fino y más basto del árbol y las páginas que aún faltan',
+    detail_title: 'En escenas que el servidor lee por páginas: el mayor error dibujado, las gaussianas en la imagen, los niveles más fino y más basto del árbol y las páginas que aún faltan',
     level: (level) => `nivel ${level}`,
     levels: (finest, coarsest) => `niveles ${finest} a ${coarsest}`,
     pages_missing: (count, written) => (count === 1 ? 'falta una página' : `faltan ${written} páginas`),
@@ -379,8 +377,7 @@ export const text: Texts = {
     too_large: (bytes, most) => `${bytes} bytes son demasiados, caben ${most}`,
     status: (status) => `estado ${status}`,
     replace: 'Reemplazar la otra versión',
-    changed_meanwhile:
-      'No se guardó: otra persona ha guardado esta escena desde que usted la abrió. Para ver la otra versión, descargue su archivo y recargue la página. O reemplace la otra versión por la suya.',
+    changed_meanwhile: 'No se guardó: otra persona ha guardado esta escena desde que usted la abrió. Para ver la otra versión, descargue su archivo y recargue la página. O reemplace la otra versión por la suya.',
   },
   media: {
     sound_on: 'Activar el sonido',
@@ -428,8 +425,7 @@ export const text: Texts = {
     outside: 'Esa vista está fuera de lo que pueden ver los visitantes. Esta es la más cercana.',
     copy_yourself: 'Cópielo del campo de arriba.',
     token: 'Su código de acceso no está incluido. Los visitantes necesitan el suyo.',
-    no_frames:
-      'Los navegadores aún no lo muestran en ningún otro sitio. El servidor tiene que nombrar ese sitio con --embed-origin.',
+    no_frames: 'Los navegadores aún no lo muestran en ningún otro sitio. El servidor tiene que nombrar ese sitio con --embed-origin.',
     frames: (sites) =>
       `Los navegadores solo lo muestran en páginas de ${sites}. El servidor las nombra con --embed-origin.`,
     frame_title: 'Recorrido 3D',

@@ -27,8 +27,7 @@ export const text: Texts = {
     full_screen: 'Plein écran',
     full_screen_key: 'Plein écran (F)',
     loading: 'Chargement',
-    loading_stays:
-      'Si ce message reste, le navigateur est trop ancien ou bloque les scripts. Chrome 94, Edge 94, Firefox 113, Safari 16.4 ou une version plus récente conviennent.',
+    loading_stays: 'Si ce message reste, le navigateur est trop ancien ou bloque les scripts. Chrome 94, Edge 94, Firefox 113, Safari 16.4 ou une version plus récente conviennent.',
     connect: 'Se connecter',
     no_script: 'CaT-GS diffuse une scène 3D calculée à distance et a besoin de JavaScript.',
   },
@@ -260,8 +259,7 @@ export const text: Texts = {
     slower: "L'image peut être plus lente ici qu'ailleurs.",
     failed_lately:
       "La vidéo n'a pas pu être décodée ici récemment. Les images arrivent donc en JPEG, ce qui demande plus de débit. La vidéo sera réessayée dans une semaine, ou dès que vous effacez les données de ce site.",
-    no_decoder:
-      "Ce navigateur n'offre pas de décodeur vidéo aux pages (WebCodecs). Les images arrivent donc en JPEG, ce qui demande plus de débit. Une version récente de Chrome, Edge, Firefox ou Safari reçoit la vidéo.",
+    no_decoder: "Ce navigateur n'offre pas de décodeur vidéo aux pages (WebCodecs). Les images arrivent donc en JPEG, ce qui demande plus de débit. Une version récente de Chrome, Edge, Firefox ou Safari reçoit la vidéo.",
     not_secure:
       "Les images arrivent en JPEG, car les navigateurs n'offrent leur décodeur vidéo (WebCodecs) que sur https:// et localhost. Servez cette page avec TLS pour obtenir la vidéo, qui demande bien moins de débit.",
     failed_now: (why) => `La vidéo ne peut pas être décodée ici (${why}). Les images arrivent en JPEG.`,
@@ -293,8 +291,7 @@ export const text: Texts = {
     bitrate: 'Débit',
     picture: 'Image',
     detail: 'Détail',
-    detail_title:
-      "Pour les scènes que le serveur lit par pages : la plus grande erreur dessinée, les gaussiennes dans l'image, les niveaux le plus fin et le plus grossier de l'arbre, et les pages qui manquent encore",
+    detail_title: "Pour les scènes que le serveur lit par pages : la plus grande erreur dessinée, les gaussiennes dans l'image, les niveaux le plus fin et le plus grossier de l'arbre, et les pages qui manquent encore",
     level: (level) => `niveau ${level}`,
     levels: (finest, coarsest) => `niveaux ${finest} à ${coarsest}`,
     pages_missing: (count, written) => (count === 1 ? 'une page manque' : `${written} pages manquent`),
@@ -428,8 +425,7 @@ export const text: Texts = {
     outside: 'Cette vue est hors de ce que les visiteurs peuvent voir. Voici la plus proche.',
     copy_yourself: 'Copiez-le depuis le champ ci-dessus.',
     token: "Votre code d'accès n'y figure pas. Les visiteurs ont besoin du leur.",
-    no_frames:
-      "Les navigateurs ne l'affichent encore sur aucun autre site. Le serveur doit nommer ce site avec --embed-origin.",
+    no_frames: "Les navigateurs ne l'affichent encore sur aucun autre site. Le serveur doit nommer ce site avec --embed-origin.",
     frames: (sites) =>
       `Les navigateurs ne l'affichent que dans les pages de ${sites}. Le serveur les nomme avec --embed-origin.`,
     frame_title: 'Visite 3D',

@@ -27,8 +27,7 @@ export const text: Texts = {
     full_screen: 'Schermo intero',
     full_screen_key: 'Schermo intero (F)',
     loading: 'Caricamento',
-    loading_stays:
-      'Se il messaggio non scompare, il browser è troppo vecchio o blocca gli script. Vanno bene Chrome 94, Edge 94, Firefox 113, Safari 16.4 o versioni più recenti.',
+    loading_stays: 'Se il messaggio non scompare, il browser è troppo vecchio o blocca gli script. Vanno bene Chrome 94, Edge 94, Firefox 113, Safari 16.4 o versioni più recenti.',
     connect: 'Connetti',
     no_script: 'CaT-GS trasmette una scena 3D già disegnata e ha bisogno di JavaScript.',
   },
@@ -293,8 +292,7 @@ export const text: Texts = {
     bitrate: 'Bitrate',
     picture: 'Immagine',
     detail: 'Dettaglio',
-    detail_title:
-      "Per le scene che il server legge a pagine: l'errore più grande disegnato, le gaussiane nell'immagine, il livello più fine e il più grezzo dell'albero e le pagine che ancora mancano",
+    detail_title: "Per le scene che il server legge a pagine: l'errore più grande disegnato, le gaussiane nell'immagine, il livello più fine e il più grezzo dell'albero e le pagine che ancora mancano",
     level: (level) => `livello ${level}`,
     levels: (finest, coarsest) => `livelli da ${finest} a ${coarsest}`,
     pages_missing: (count, written) => (count === 1 ? 'manca una pagina' : `mancano ${written} pagine`),
@@ -428,8 +426,7 @@ export const text: Texts = {
     outside: 'Quella vista è fuori da ciò che i visitatori possono vedere. Questa è la più vicina.',
     copy_yourself: 'Copialo dal campo qui sopra.',
     token: 'Il tuo codice di accesso non è incluso. I visitatori ne hanno bisogno di uno proprio.',
-    no_frames:
-      'I browser non lo mostrano ancora in nessun altro sito. Il server deve indicare quel sito con --embed-origin.',
+    no_frames: 'I browser non lo mostrano ancora in nessun altro sito. Il server deve indicare quel sito con --embed-origin.',
     frames: (sites) => `I browser lo mostrano solo nelle pagine di ${sites}. Il server le indica con --embed-origin.`,
     frame_title: 'Tour 3D',
   },
