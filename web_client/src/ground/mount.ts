@@ -78,6 +78,7 @@ export class GroundUse {
     worker.on('presented', () => this.presented());
     this.ground_.sought.listen(() => notice.show(text.ground.sought, 10));
     this.ground_.known.listen((map) => {
+      notice.withdraw(text.ground.sought);
       this.button_.hidden = !map;
       if (map === 'large') return;
       this.map_ = map;

@@ -18,6 +18,11 @@ export class Notice {
     this.notice_.hidden = false;
   }
 
+  /** It is not true any more. */
+  withdraw(message: string): void {
+    if (this.text_.textContent === message) this.hide();
+  }
+
   private hide(): void {
     this.notice_.hidden = true;
   }
