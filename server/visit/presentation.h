@@ -17,7 +17,7 @@ class Presentation {
   void begin(const Present& wish, TimePoint now);
   /// Tells the followers that it is over here. `elsewhere`: the leader is in another scene.
   void end(bool elsewhere = false);
-  /// Of the leader, as it said when it began to present; empty: it gave none.
+  /// The leader gave this name when it began to present; empty: it gave none.
   [[nodiscard]] const std::string& name() const { return wish_.name; }
   /// When it began; nothing: the visit leads nobody.
   [[nodiscard]] std::optional<TimePoint> since() const { return since_; }

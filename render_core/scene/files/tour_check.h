@@ -24,8 +24,8 @@ void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins);
 /// How people are told of a mistake that check_tours() finds in a file.
 inline constexpr std::string_view faulty_tours = "pages may not show all of these tours: ";
 
-/// What they are told of the tours of a scene, with media at any site; nothing: there is no
-/// mistake.
+/// Checks the tours of a scene, with media at any site. Returns what people are told of the first
+/// mistake; nothing where there is none.
 std::optional<std::string> mistake_in_tours(const HintFiles& files);
 
 }  // namespace catgs

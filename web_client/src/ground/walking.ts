@@ -19,7 +19,7 @@ const announced_s = 4; // the wire takes 256 samples
 const announce_again_s = 2;
 const flight_s = 2.5;
 
-const warn = (error: unknown): void => console.warn('there is no way', error);
+const warn = (error: unknown): void => console.warn('no way can be sought', error);
 
 interface WalkingParts {
   readonly view: HTMLElement;

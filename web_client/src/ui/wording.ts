@@ -25,14 +25,14 @@ export interface Card {
 
 /**
  * The card for a state; undefined when the picture speaks for itself. `has_picture`: whether the canvas
- * shows one. `scenes`: those that this visitor may see, as far as known. `by_link`: this visitor has the
- * token of a link, and the server may be open to those without one.
+ * shows one. `scenes`: those that this visitor may see, as far as known. `has_token`: this visitor has a
+ * token, and the server may be open to those without one.
  */
 export function card_for(
   state: SessionState,
   has_picture: boolean,
   scenes: readonly SceneListing[] = [],
-  by_link = false,
+  has_token = false,
 ): Card | undefined {
   switch (state.phase) {
     case 'live':
@@ -64,11 +64,11 @@ export function card_for(
         action: { label: actions.now, does: 'retry' },
       };
     case 'failed':
-      return failed_card(state.code, state.message, scenes, by_link);
+      return failed_card(state.code, state.message, scenes, has_token);
   }
 }
 
-function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[], by_link: boolean): Card {
+function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[], has_token: boolean): Card {
   const retry = { label: actions.retry, does: 'retry' } as const;
   const said = ({ title, text }: { title: string; text: string }): Card => ({
     title,
@@ -79,7 +79,7 @@ function failed_card(code: Error_Code, message: string, scenes: readonly SceneLi
     case Error_Code.UNAUTHORIZED:
       return {
         ...{ title: cards.unauthorized, text: sentence(message).trim(), asks_token: true },
-        ...(by_link && { action: { label: actions.look, does: 'look' } }),
+        ...(has_token && { action: { label: actions.look, does: 'look' } }),
       };
     case Error_Code.UNKNOWN_SCENE:
       return unknown_scene_card(message, scenes);

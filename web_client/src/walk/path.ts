@@ -5,7 +5,7 @@ import { clear_in, type Stand, type WalkMap } from './walk_map';
 import { straight } from './walker';
 
 const diagonal = Math.SQRT2;
-const straight_on = 1.2; // weight of what is left of the way (Pohl 1970): the search tries a third of the places
+const straight_on = 1.2; // weight of what is left of the way (Pohl 1970): the search takes a third of the time
 const nodes_a_breath = 64;
 const most_skipped = 256; // places that a straight line is tried over
 

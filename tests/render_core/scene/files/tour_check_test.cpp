@@ -20,7 +20,7 @@ class ToursOnDisk : public FolderTest {
   }
 };
 
-// What check_tours() finds is tested as authors meet it: tests/server/scenes/tours_test.cpp.
+// tests/server/scenes/tours_test.cpp tests what check_tours() finds, as authors meet it.
 TEST_F(ToursOnDisk, MistakesNameFileAndField) {
   EXPECT_FALSE(mistake_in_tours({folder_ / "hall.json", {}, {}}));
   EXPECT_EQ(mistake(R"({"position": [0, 0, 0], "look_at": [0, 0, 1]})"), "");
