@@ -7,9 +7,9 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/cpu/cpu_renderer.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/reference/reference.h"
-#include "render_core/renderer.h"
 
 namespace catgs {
 namespace {

@@ -5,6 +5,8 @@
 #include <memory>
 #include <string>
 
+#include <CLI/CLI.hpp>
+
 #include "render_core/base/error.h"
 #include "server/access/access.h"
 #include "server/base/scene_id.h"

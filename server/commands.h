@@ -1,6 +1,6 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "render_core/base/cli_fwd.h"
 
 namespace catgs {
 

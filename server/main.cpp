@@ -17,10 +17,10 @@
 #include "render_core/base/command_line.h"
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
 #include "server/base/log.h"
 #include "server/commands.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/server.h"
 
 namespace catgs {

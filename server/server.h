@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "server/base/clock.h"
-#include "server/config.h"
+#include "server/config/config.h"
 
 namespace catgs {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include <CLI/CLI.hpp>
+#include "render_core/base/cli_fwd.h"
 
 namespace catgs {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "render_core/base/thread_pool.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs {
 

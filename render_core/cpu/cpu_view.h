@@ -12,11 +12,11 @@
 #include "render_core/cpu/page_slots.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/cpu/tile_lists.h"
-#include "render_core/frame_driver.h"
+#include "render_core/frame/frame_driver.h"
+#include "render_core/frame/paged_frame.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/image/host_image.h"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/paged_frame.h"
-#include "render_core/renderer.h"
 
 namespace catgs {
 

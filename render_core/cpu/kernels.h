@@ -13,10 +13,10 @@
 #include "render_core/cpu/depth_limits.h"
 #include "render_core/cpu/list_sort.h"
 #include "render_core/cpu/scene_store.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/image/host_image.h"
 #include "render_core/math/camera.h"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/renderer.h"
 
 namespace catgs {
 

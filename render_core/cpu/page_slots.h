@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "render_core/cpu/scene_store.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/tree/paged_tree.h"
 
 namespace catgs {

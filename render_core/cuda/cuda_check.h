@@ -4,7 +4,7 @@
 
 #include <cuda_runtime_api.h>
 
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
 
 namespace catgs::cuda {
 

@@ -5,8 +5,8 @@
 
 #include "render_core/base/device_set.h"
 #include "render_core/base/thread_pool.h"
-#include "render_core/device_error.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/device_error.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs {
 

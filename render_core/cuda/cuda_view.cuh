@@ -12,9 +12,9 @@
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/cuda/view_memory.cuh"
-#include "render_core/frame_driver.h"
-#include "render_core/paged_frame.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/frame_driver.h"
+#include "render_core/frame/paged_frame.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs::cuda {
 

@@ -8,7 +8,7 @@
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/stream.h"
 #include "render_core/cuda/tree_cut.cuh"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/tree/paged_tree.h"
 
 namespace catgs::cuda {

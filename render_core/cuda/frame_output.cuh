@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "render_core/cuda/frame_arrays.cuh"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs::cuda {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
 
 namespace catgs {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "render_core/cuda/stream.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs::cuda {
 

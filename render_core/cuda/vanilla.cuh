@@ -6,7 +6,7 @@
 #include "render_core/cuda/memory_table.h"
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs::cuda {
 

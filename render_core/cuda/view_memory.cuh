@@ -8,7 +8,7 @@
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/tile_sort.cuh"
 #include "render_core/cuda/tiles.cuh"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs::cuda {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/math/camera.h"
-#include "render_core/renderer.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/scene.h"
 

@@ -3,7 +3,7 @@
 #include <cassert>
 #include <vector>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs {
 

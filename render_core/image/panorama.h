@@ -3,8 +3,8 @@
 #include <functional>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/image/image.h"
-#include "render_core/renderer.h"
 
 namespace catgs {
 

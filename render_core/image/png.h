@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <span>
 
+#include "render_core/frame/renderer.h"
 #include "render_core/image/image.h"
-#include "render_core/renderer.h"
 
 namespace catgs {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "render_core/base/thread_pool.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs {
 

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include <CLI/CLI.hpp>
+#include "render_core/base/cli_fwd.h"
 
 namespace catgs {
 
@@ -24,11 +24,7 @@ inline constexpr int exit_bad_input = 2;
 inline constexpr int exit_internal = 3;
 
 /// The program's --quiet, which every subcommand obeys.
-inline bool is_quiet(const CLI::App& command) {
-  const CLI::App* app = &command;
-  while (app->get_parent() != nullptr) app = app->get_parent();
-  return app->get_option("--quiet")->count() > 0;
-}
+bool is_quiet(const CLI::App& command);
 
 void add_bench_command(CLI::App& app);
 void add_compare_command(CLI::App& app);

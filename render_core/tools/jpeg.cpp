@@ -6,7 +6,7 @@
 #include <turbojpeg.h>
 
 #include "render_core/base/error.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/tools/picture.h"
 

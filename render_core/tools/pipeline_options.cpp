@@ -1,5 +1,6 @@
 #include "render_core/tools/pipeline_options.h"
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"

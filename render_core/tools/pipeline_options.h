@@ -3,10 +3,9 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
+#include "render_core/base/cli_fwd.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/motion/predictor.h"
-#include "render_core/renderer.h"
 
 namespace catgs {
 

@@ -6,13 +6,12 @@
 #include <string>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
-
+#include "render_core/base/cli_fwd.h"
 #include "render_core/base/thread_pool.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/motion/camera_path.h"
 #include "render_core/motion/predictor.h"
 #include "render_core/motion/script.h"
-#include "render_core/renderer.h"
 #include "render_core/scene/scene.h"
 #include "render_core/tools/pipeline_options.h"
 #include "render_core/tools/scene_options.h"

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/math/axis_name.h"
-#include "render_core/renderer.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/tools/parse_numbers.h"
 #include "render_core/tools/progress.h"

@@ -5,8 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
-
+#include "render_core/base/cli_fwd.h"
 #include "render_core/math/camera.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"

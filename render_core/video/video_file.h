@@ -5,7 +5,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 
 namespace catgs {
 

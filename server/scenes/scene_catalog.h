@@ -10,7 +10,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/scene_size.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/scenes/scene_entry.h"
 
 namespace catgs {

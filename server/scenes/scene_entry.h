@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/analysis/surface_points.h"
 #include "server/net/messages.h"
 #include "server/scenes/tours.h"

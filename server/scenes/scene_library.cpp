@@ -11,7 +11,7 @@
 #include "render_core/base/device_set.h"
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
 #include "render_core/scene/tree/page_pools.h"
 #include "server/base/log_event.h"
 #include "server/base/scene_id.h"

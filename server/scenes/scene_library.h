@@ -13,7 +13,7 @@
 #include <boost/asio/thread_pool.hpp>
 
 #include "server/base/metrics.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_grounds.h"
 #include "server/scenes/scene_redrawing.h"

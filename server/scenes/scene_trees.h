@@ -16,7 +16,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/metrics.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_residency.h"

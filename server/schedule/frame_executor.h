@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "server/encode/encoder.h"
 #include "server/pipeline/frame_ticket.h"
 #include "server/schedule/stream_encoders.h"

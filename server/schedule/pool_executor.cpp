@@ -3,7 +3,7 @@
 #include <exception>
 #include <utility>
 
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
 
 namespace catgs {
 namespace {

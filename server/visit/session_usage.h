@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "server/pipeline/frame_ticket.h"
 
 namespace catgs {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "server/base/clock.h"
 #include "server/flow/flow_control.h"
 #include "server/net/messages.h"

@@ -38,7 +38,7 @@ class RuleFindings(unittest.TestCase):
                         '#include "server/visit/visit.h"')
         self.expect_one("no network", "render_core/scene/a.cpp", "#include <libavcodec/avcodec.h>")
         self.expect_one("does not lie above", "render_core/scene/a.cpp",
-                        '#include "render_core/renderer.h"')
+                        '#include "render_core/frame/renderer.h"')
         self.expect_one("chooses a core", "server/main.cpp",
                         '#include "render_core/cpu/cpu_renderer.h"')
         self.expect_one("does not lie above", "render_core/scene/formats/a.cpp",

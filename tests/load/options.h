@@ -4,13 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "render_core/base/cli_fwd.h"
 #include "render_core/motion/script.h"
 #include "tests/load/link.h"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
 
 namespace catgs::load {
 

@@ -9,8 +9,8 @@
 
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/metrics/image_quality.h"
-#include "render_core/renderer.h"
 #include "server/base/scene_id.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_ids.h"

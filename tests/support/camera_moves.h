@@ -6,8 +6,8 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "render_core/frame/renderer.h"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/renderer.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs::test {

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
+#include "render_core/frame/renderer.h"
 #include "render_core/metrics/image_quality.h"
 #include "render_core/motion/trajectory.h"
-#include "render_core/renderer.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/keep_if.h"
 #include "tests/support/catgs_views.h"
 #include "tests/support/rendered.h"

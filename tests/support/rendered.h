@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs::test {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "proto/catgs.pb.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "server/server.h"
 
 namespace catgs::test {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs::test {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "render_core/frame/renderer.h"
 #include "render_core/math/camera.h"
-#include "render_core/renderer.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs::test {

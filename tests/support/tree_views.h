@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/tree/page_pools.h"
 #include "render_core/scene/tree/read_tree.h"
 #include "tests/render_core/scene/tree/tree_test_support.h"

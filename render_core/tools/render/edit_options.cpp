@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string_view>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 

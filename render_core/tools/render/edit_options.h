@@ -3,8 +3,7 @@
 #include <optional>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
+#include "render_core/base/cli_fwd.h"
 #include "render_core/scene/edit/edit_scene.h"
 
 namespace catgs {

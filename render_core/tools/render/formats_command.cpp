@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <sys/resource.h>

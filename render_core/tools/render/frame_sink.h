@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/tools/render/frame_layers.h"
 
 namespace catgs {

@@ -1,6 +1,7 @@
 // catgs-render synth: writes a procedural scene and a sidecar with its hints.
 #include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/scene/files/hints.h"

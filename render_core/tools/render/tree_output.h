@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json_fwd.hpp>
 
+#include "render_core/base/cli_fwd.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/tree/build_tree.h"
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <numbers>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/scene/formats/byte_source.h"

@@ -6,7 +6,7 @@
 
 #include "render_core/motion/trajectory.h"
 #include "render_core/scene/formats/colmap.h"
-#include "server/config.h"
+#include "server/config/config.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
 

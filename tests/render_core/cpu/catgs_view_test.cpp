@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/motion/script.h"
 #include "render_core/motion/trajectory.h"
-#include "render_core/renderer.h"
 #include "render_core/synth/synth.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/catgs_views.h"

@@ -9,7 +9,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {

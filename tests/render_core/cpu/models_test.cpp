@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/thread_pool.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "tests/support/rendered.h"
 #include "tests/support/surfels.h"
 #include "tests/support/test_scenes.h"

@@ -8,8 +8,8 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/cpu/scene_store.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/motion/frame_groups.h"
-#include "render_core/renderer.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"

@@ -15,7 +15,7 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/clusters.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"

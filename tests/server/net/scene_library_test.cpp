@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/renderer.h"
+#include "render_core/frame/renderer.h"
 #include "render_core/scene/files/save_scene.h"
 #include "server/base/scene_id.h"
 #include "tests/render_core/scene/scene_test_support.h"

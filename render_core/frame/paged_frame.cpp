@@ -1,0 +1,39 @@
+#include "render_core/frame/paged_frame.h"
+
+#include <utility>
+
+#include "render_core/base/error.h"
+
+namespace catgs {
+
+PagedFrame::PagedFrame(PagedTree& tree, const ViewSettings& settings)
+    : tree_(tree), keeps_pages_(settings.pipeline == Pipeline::paper), watch_(tree.watch()) {
+  if (settings.pipeline == Pipeline::vanilla)
+    throw InputError("--pipeline vanilla", "", "draws whole scenes only, not parts of a tree",
+                     "leave --detail and --scene-memory out");
+}
+
+void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
+  cameras_ = {request.camera};
+  if (plan.window > 0) cameras_.push_back(plan.window_end);
+  Lookout lookout{cameras_, request.detail_px, request.waits_for_pages};
+  if (request.soon) {
+    lookout.cameras.push_back(request.camera);
+    lookout.cameras.back().world_from_camera = *request.soon;
+  }
+  table_.reset();
+  watch_->look(std::move(lookout));
+  if (request.waits_for_pages) tree_.settle(*watch_);
+  changes_ = watch_->changes();
+  table_ = tree_.table();
+  now_s_ = tree_.now_s();
+}
+
+void PagedFrame::end(FrameStats& stats) {
+  if (!keeps_pages_) table_.reset();
+  stats.missing_pages = watch_->missing();
+  stats.coarsest_px = watch_->coarsest_px();
+  stats.settled = !watch_->waits(tree_.now_s());
+}
+
+}  // namespace catgs
