@@ -148,8 +148,8 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
     if (!grant->scene_id.empty()) grant->scene_id = resolve(grant->scene_id);
     if (!link_id.empty()) expires_unix_s = grant->expires_unix_s;
   }
-  Permit permit = [granted = std::move(granted), has_authors = !key_.empty(),
-                   has_link = !token.empty()](std::string_view scene_id, Use use) -> Refusal {
+  auto check = [granted = std::move(granted), has_authors = !key_.empty(),
+                has_link = !token.empty()](std::string_view scene_id, Use use) -> Refusal {
     if (use == Use::save && !has_authors)
       return "nobody can save on this server: it was started without --token-key-file, which "
              "links of role author are made with";
@@ -160,9 +160,8 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
     if (!grant.scene_id.empty() && grant.scene_id != scene_id) return other_scene(grant, scene_id);
     return forbidden(grant.role, use);
   };
-  permit.link_id = std::move(link_id);
-  permit.expires_unix_s = expires_unix_s;
-  return permit;
+  return {
+      .check = std::move(check), .link_id = std::move(link_id), .expires_unix_s = expires_unix_s};
 }
 
 std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,

@@ -22,10 +22,20 @@ enum class Use {
 /// The reason of a refusal, for people; nothing: allowed.
 using Refusal = std::optional<std::string>;
 
-/// Answers what a token permits, as of when it was read. Checking a token takes time; asking a
-/// Permit about each scene does not.
-struct Permit : std::function<Refusal(std::string_view scene_id, Use use)> {
-  using function::function;
+/// What a token permits, as of when it was read. Checking a token takes time; asking a Permit about
+/// each scene does not.
+struct Permit {
+  using Check = std::function<Refusal(std::string_view scene_id, Use use)>;
+
+  [[nodiscard]] bool allows(std::string_view scene_id, Use use) const {
+    return !check(scene_id, use).has_value();
+  }
+  /// The reason why `use` is refused; nothing if it is allowed.
+  [[nodiscard]] Refusal refusal(std::string_view scene_id, Use use) const {
+    return check(scene_id, use);
+  }
+
+  Check check;
   std::string link_id{};  // of a genuine link, even if it is refused; empty: the token is no link
   std::int64_t expires_unix_s = std::numeric_limits<std::int64_t>::max();  // of a link
 };

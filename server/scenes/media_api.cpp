@@ -118,7 +118,7 @@ std::optional<MediaFolder> MediaApi::folder_of(std::string_view scene_id) const 
 
 Refusal MediaApi::refusal(const HttpRequest& request, std::string_view scene_id) const {
   if (has_pass(request, scene_id)) return std::nullopt;
-  return permit_of(parts_.authorize, request)(scene_id, Use::list);
+  return permit_of(parts_.authorize, request).refusal(scene_id, Use::list);
 }
 
 /// A pass says: the scene, when it ends, and the link that it was made for.
@@ -142,7 +142,7 @@ bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) c
 
 HttpResponse MediaApi::make_pass(const HttpRequest& request, const std::string& scene_id) const {
   const Permit permit = permit_of(parts_.authorize, request);
-  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
+  if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
   const std::int64_t end_s = std::min(parts_.now_unix_s() + pass_valid_s, permit.expires_unix_s);
   return text_response(
       200, sign_token(pass_purpose, fmt::format("{}\n{}\n{}", scene_id, end_s, permit.link_id),

@@ -61,7 +61,7 @@ std::string SceneApi::preview(const HttpRequest& request) {
           ? listing->begin()
           : std::ranges::find(*listing, scenes_.resolve(argument->substr(name.size())),
                               &SceneLibrary::Listing::id);
-  if (scene == listing->end() || authorize_("")(scene->id, Use::own_session)) return {};
+  if (scene == listing->end() || !authorize_("").allows(scene->id, Use::own_session)) return {};
   return preview_elements({request.site, scene->id, scene->title, scene->about, scene->gaussians,
                            scene->poster != nullptr});
 }
@@ -71,9 +71,9 @@ std::string SceneApi::preview(const HttpRequest& request) {
 HttpResponse SceneApi::list_scenes(const Permit& permit) {
   const auto listing = scenes_.listing();
   std::vector<const SceneLibrary::Listing*> shown;
-  Refusal refusal = listing->empty() ? permit({}, Use::list) : std::nullopt;
+  Refusal refusal = listing->empty() ? permit.refusal({}, Use::list) : std::nullopt;
   for (const auto& scene : *listing) {
-    if (auto refused = permit(scene.id, Use::list))
+    if (auto refused = permit.refusal(scene.id, Use::list))
       refusal = std::move(refused);
     else
       shown.push_back(&scene);
@@ -90,14 +90,15 @@ HttpResponse SceneApi::list_scenes(const Permit& permit) {
 HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part,
                                      const HttpRequest& request) {
   const Permit permit = permit_of(authorize_, request);
-  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
+  if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
   const auto listing = scenes_.listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: " + no_such_scene(scene_id) + "\n");
   if (part == Part::tours) {
     static const ToursAnswers none;
     const ToursAnswers& tours = found->tours ? *found->tours : none;
-    return json_response(permit(scene_id, Use::save) ? tours.for_viewers : tours.for_authors);
+    return json_response(permit.allows(scene_id, Use::save) ? tours.for_authors
+                                                            : tours.for_viewers);
   }
   if (part == Part::walk) return ground_of(*found, request.if_none_match);
   if (!found->poster) {

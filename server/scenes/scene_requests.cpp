@@ -28,8 +28,8 @@ HttpResponse unauthorized(std::string_view why) {
 
 std::optional<HttpResponse> refuse_change(const SceneLibrary& scenes, const Permit& permit,
                                           std::string_view scene_id) {
-  if (const auto refused = permit(scene_id, Use::list)) return unauthorized(*refused);
-  if (const auto refused = permit(scene_id, Use::save))
+  if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
+  if (const auto refused = permit.refusal(scene_id, Use::save))
     return text_response(403, "403: " + *refused + "\n");
   if (std::ranges::count(*scenes.listing(), scene_id, &SceneLibrary::Listing::id) == 0)
     return text_response(404, "404: " + no_such_scene(scene_id) + "\n");

@@ -40,11 +40,11 @@ std::variant<std::string, ErrorMessage> AdmissionDesk::choose(const Hello& hello
   if (hello.scene_id.empty()) {
     const std::vector<std::string> ids = around_.scenes.scene_ids();
     const auto allowed = std::ranges::find_if(
-        ids, [&](const std::string& id) { return !permit(id, Use::own_session); });
+        ids, [&](const std::string& id) { return permit.allows(id, Use::own_session); });
     wanted = allowed != ids.end() ? *allowed : around_.scenes.default_scene();
   }
   // Check the token first, so that a refusal tells nothing about the scenes here.
-  if (const auto refusal = permit(wanted, Use::own_session))
+  if (const auto refusal = permit.refusal(wanted, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, true};
   if (!around_.scenes.has(wanted))
     return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(wanted), true};

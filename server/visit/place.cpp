@@ -53,7 +53,8 @@ void ping(Place& place, const ClientConnection& from, Admissions& admissions, co
 void prepare(const VisitContext& around, const std::string& token, const Prepare& wish,
              TimePoint now) {
   const std::string scene_id = around.scenes.resolve(wish.scene_id);
-  if (!around.authorize(token)(scene_id, Use::own_session)) around.scenes.prepare(scene_id, now);
+  if (around.authorize(token).allows(scene_id, Use::own_session))
+    around.scenes.prepare(scene_id, now);
 }
 
 }  // namespace
@@ -140,7 +141,7 @@ void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why)
 
 SceneAnswer Place::find_scene(const std::string& wish) {
   const std::string scene_id = around_.scenes.resolve(wish);
-  if (const auto refusal = around_.authorize(visitor_.token)(scene_id, Use::own_session))
+  if (const auto refusal = around_.authorize(visitor_.token).refusal(scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
   return admissions_.find_scene(scene_id, Clock::now());
 }
@@ -148,7 +149,7 @@ SceneAnswer Place::find_scene(const std::string& wish) {
 std::vector<std::string> Place::scene_ids() {
   std::vector<std::string> ids = around_.scenes.scene_ids();
   const Permit permit = around_.authorize(visitor_.token);
-  std::erase_if(ids, [&](const std::string& id) { return permit(id, Use::own_session); });
+  std::erase_if(ids, [&](const std::string& id) { return !permit.allows(id, Use::own_session); });
   return ids;
 }
 
@@ -162,7 +163,8 @@ void Place::sign(Welcome& welcome) {
 
 bool Place::may_be_watched() const {
   return around_.options.max_spectators > 0 &&
-         !around_.authorize(visitor_.token)(visit_.stream().scene()->facts.scene_id, Use::watch);
+         around_.authorize(visitor_.token)
+             .allows(visit_.stream().scene()->facts.scene_id, Use::watch);
 }
 
 void Place::send(const ServerMessage& message) {

@@ -148,7 +148,8 @@ std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_to
   const Permit permit = around_.authorize(access_token);
   if (around_.revoked_links()->contains(permit.link_id))
     return refused(ErrorCode::unauthorized, link_revoked);
-  if (const auto why = permit(scene_id, Use::watch); why && !permit(scene_id, Use::own_session))
+  if (const auto why = permit.refusal(scene_id, Use::watch);
+      why && permit.allows(scene_id, Use::own_session))
     return refused(ErrorCode::unauthorized, *why);
   return host.get();
 }
@@ -157,7 +158,7 @@ std::optional<std::variant<Place*, ErrorMessage>> Places::presenter_for_spectato
     const Hello& hello) {
   const Permit permit = around_.authorize(hello.token);
   const auto only_watches = [&](const std::string& scene_id) {
-    return permit(scene_id, Use::own_session) && !permit(scene_id, Use::watch);
+    return !permit.allows(scene_id, Use::own_session) && permit.allows(scene_id, Use::watch);
   };
   const std::string wanted = around_.scenes.resolve(hello.scene_id);
   const auto ids = around_.scenes.scene_ids();
@@ -178,7 +179,8 @@ std::optional<std::variant<Place*, ErrorMessage>> Places::presenter_for_spectato
 
 bool Places::has_room_for_follower(Hello& hello, Place& host) {
   const std::string& scene_id = host.visit().stream().scene()->facts.scene_id;
-  if (!hello.follow || around_.authorize(hello.token)(scene_id, Use::own_session)) return false;
+  if (!hello.follow || !around_.authorize(hello.token).allows(scene_id, Use::own_session))
+    return false;
   hello.scene_id = scene_id;
   return desk_.has_spare_place(hello);
 }
@@ -201,7 +203,7 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
   const Permit permit = around_.authorize(hello.token);
   connection->watch(host);
   Welcome welcome = visit.stream().welcome();
-  welcome.may_leave = !permit(welcome.scene.scene_id, Use::own_session).has_value();
+  welcome.may_leave = permit.allows(welcome.scene.scene_id, Use::own_session);
   audience.add(connection, std::move(welcome), permit.link_id);
   {
     const std::string address = connection->connection().peer_address();

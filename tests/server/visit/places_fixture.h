@@ -19,7 +19,7 @@
 
 #include "proto/catgs.pb.h"
 #include "render_core/cuda/place_view.h"
-#include "render_core/device_error.h"
+#include "render_core/frame/device_error.h"
 #include "server/frame_path.h"
 #include "server/schedule/pool_executor.h"
 #include "server/visit/places.h"
@@ -331,7 +331,7 @@ class PlacesTest : public testing::Test {
   int pool_threads = 2;
   VisitOptions options;
   DeviceFailures::OnLost on_devices_lost = [](const auto&) {};
-  Authorize authorize = [](const auto&) { return [](auto, Use) { return std::nullopt; }; };
+  Authorize authorize = [](const auto&) { return Permit{[](auto, Use) { return std::nullopt; }}; };
   std::vector<EncoderChoice> encoders = {{EncoderKind::nvenc, Codec::h264, "h264_nvenc"},
                                          {EncoderKind::x264, Codec::h264, "libx264"}};
   boost::asio::io_context io;

@@ -46,9 +46,9 @@ TEST_F(PlacesTest, ATokenIsCheckedAsOftenHoweverManyScenesThereAre) {
   int checks = 0;
   authorize = [&](const auto&) {
     ++checks;
-    return [](auto scene_id, Use) {
+    return Permit{[](auto scene_id, Use) {
       return scene_id == "secret" ? Refusal("not for you") : std::nullopt;
-    };
+    }};
   };
   start();
   join();
@@ -299,9 +299,9 @@ TEST_F(CompanyTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
 
 TEST_F(CompanyTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
   authorize = [](const std::string& token) {
-    return [narrow = token == "narrow"](std::string_view scene_id, Use) -> Refusal {
+    return Permit{[narrow = token == "narrow"](std::string_view scene_id, Use) -> Refusal {
       return narrow && scene_id == "attic" ? Refusal("not yours") : std::nullopt;
-    };
+    }};
   };
   begin(false, false);
   const auto join_by_narrow_link = [&](const std::string& resume_token, const auto& wish) {
@@ -331,9 +331,9 @@ TEST_F(CompanyTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
 
 TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
   authorize = [](const auto&) {
-    return [](std::string_view scene_id, Use) -> Refusal {
+    return Permit{[](std::string_view scene_id, Use) -> Refusal {
       return scene_id == "vault" ? Refusal("not yours") : std::nullopt;
-    };
+    }};
   };
   start();
   Visitor& visitor = join();
