@@ -76,7 +76,7 @@ std::map<std::string, std::string> gltf_seeds() {
   seeds["whole"] = test::encode_gltf(test::random_cloud(1, 0)).glb();
   nodes.json["buffers"][0]["uri"] = "a.bin";
   seeds["beside"] = nodes.json.dump();
-  nodes.json["buffers"][0]["uri"] = "data:;base64," + std::string(300, 'P');
+  nodes.json["buffers"][0]["uri"] = fmt::format("data:;base64,{:P>300}", "");
   seeds["data"] = nodes.json.dump();
   return seeds;
 }
