@@ -28,7 +28,7 @@ struct SceneCounts {
   double seconds = 0.0;     // on show: connected, and the page was not hidden
   std::uint64_t bytes = 0;  // of pictures
   std::array<std::uint64_t, device_kinds> devices{};  // visits, by DeviceKind
-  std::map<StopId, std::uint64_t> stops;              // visits that reached the stop
+  std::map<StopId, std::uint64_t> stops{};            // visits that reached the stop
 };
 
 using DayCounts = std::map<std::string, SceneCounts>;  // by the scene's id
