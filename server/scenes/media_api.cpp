@@ -210,11 +210,11 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, std::string
       const auto may_replace = [&](const std::string& etag) { return precondition.holds(etag); };
       if (!folder.save(name, bytes, may_replace))
         return text_response(412, "412: another file has this name\n");
-    } catch (const FolderBusy& busy) {
-      return busy_response(fmt::format("503: {}\n", busy.what()));
     } catch (const InputError& error) {
       log_warning({.event = "media_refused", .scene = scene_id},
                   "scene {}: an author's file was not kept: {}", scene_id, error.what());
+      if (dynamic_cast<const FolderBusy*>(&error))
+        return busy_response(fmt::format("503: {}\n", error.what()));
       return text_response(409, fmt::format("409: {}\n", error.what()));
     } catch (const std::exception& failure) {  // memory, say: it costs this file only
       log_error({.event = "save_failed", .scene = scene_id}, "scene {}: a file was not saved: {}",

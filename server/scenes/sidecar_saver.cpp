@@ -145,11 +145,11 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
              "scene {}: an author saved {} ({} bytes)", request.scene_id, file.string(),
              request.json.size());
     return {tagged(200, "saved\n", etag_of(request.json)), std::move(shown)};
-  } catch (const FolderBusy& busy) {
-    return {busy_response(fmt::format("503: {}\n", busy.what()))};
   } catch (const InputError& unwritable) {
     log_warning({.event = "save_failed", .scene = request.scene_id},
                 "scene {}: an author cannot save: {}", request.scene_id, unwritable.what());
+    if (dynamic_cast<const FolderBusy*>(&unwritable))
+      return {busy_response(fmt::format("503: {}\n", unwritable.what()))};
     std::string why = unwritable.what();
     const std::string path = file.string();  // for the operator's log only
     if (why.starts_with(path)) why.replace(0, path.size(), file.filename().string());
