@@ -30,7 +30,8 @@ fs::path random_name_beside(const fs::path& target) {
   std::array<unsigned char, random_digits> random{};
   if (::getrandom(random.data(), random.size(), 0) != static_cast<ssize_t>(random.size()))
     fail(errno);
-  std::string name = "." + target.filename().string().substr(0, most_bytes) + ".";
+  std::string name = ".";
+  name.append(target.filename().string().substr(0, most_bytes)).append(".");
   for (const unsigned char byte : random) name += hex[byte % hex.size()];
   return target.parent_path() / name.append(extension);
 }

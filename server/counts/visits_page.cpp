@@ -115,9 +115,8 @@ class DayByDay {
     std::function<std::string(const std::string& date, const DayCounts& day)> of_day;
     std::function<std::string()> end = [] { return std::string(); };
   };
-  DayByDay(const VisitBook& book, Parts parts) : book_(book), parts_(std::move(parts)) {
-    text_ = std::move(parts_.head);
-  }
+  DayByDay(const VisitBook& book, Parts parts)
+      : book_(book), parts_(std::move(parts)), text_(parts_.head) {}
 
   /// See HttpResponse::next_piece.
   std::optional<std::string> next() {
