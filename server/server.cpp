@@ -5,6 +5,7 @@
 #include <chrono>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -114,6 +115,7 @@ struct Server::State {
   HttpResponse respond(const HttpRequest& request);
   HttpResponse respond_admin(const HttpRequest& request);
   void count_visits();
+  void remove_stale_files() const;
   void print_banner() const;
   void wait_for_signal();
   /// Ends readiness. Clients are told after `wait` and closed after a further `deadline`.
@@ -247,13 +249,20 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
 void Server::State::count_visits() {
   if (config.visit_counts == "off") return;
   counts.emplace(unix_now_s);
-  if (config.visit_counts != "memory") book.emplace(config.visit_counts, *counts);
-  visits_page.emplace(*counts, unix_now_s, [this](const std::string& scene_id) {
+  book.emplace(config.visit_counts == "memory" ? "" : config.visit_counts, *counts);
+  visits_page.emplace(*book, unix_now_s, [this](const std::string& scene_id) {
     const auto listing = scenes->listing();
     const auto scene = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
-    return scene != listing->end() && scene->tours ? titles_of_tours(*scene->tours->for_viewers)
-                                                   : std::vector<TourTitles>();
+    return scene != listing->end() && scene->tours ? scene->tours->titles : nullptr;
   });
+}
+
+/// What killed servers have left where authors save.
+void Server::State::remove_stale_files() const {
+  std::set<std::filesystem::path> folders(config.scene_folders.begin(), config.scene_folders.end());
+  for (const auto& scene : *scenes->listing())
+    if (!scene.sidecar.empty()) folders.insert(scene.sidecar.parent_path());
+  authors.saver->remove_stale_files_in(std::move(folders));
 }
 
 Server::Server(const ServerConfig& config, const ServerParts& parts)
@@ -264,6 +273,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       s.config, RendererOptions{.kind = s.config.renderer, .pool = s.pool, .devices = s.devices},
       s.io, s.metrics);
   s.authors.saver = std::make_unique<SidecarSaver>(*s.scenes, s.io, s.config.media_origins);
+  if (!s.config.token_key_file.empty()) s.remove_stale_files();  // others save nothing
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) {
     const auto resolve = [&s](auto wish) { return s.scenes->resolve(wish); };

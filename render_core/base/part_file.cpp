@@ -30,29 +30,28 @@ fs::path without_links(const fs::path& path) {
 
 }  // namespace
 
-PartFile::PartFile(const fs::path& path) : path_(path), target_(without_links(path)) {
+PartFile::PartFile(const fs::path& path, Special special) : path_(path) {
+  const fs::path target = special == Special::written ? without_links(path) : path;
   std::error_code error;
-  if (fs::is_directory(target_, error)) fail(path_, "is a folder");
-  part_ = target_;
-  if (!is_special(target_)) part_ += ".part";
-  file_.open(part_, std::ios::binary | std::ios::trunc);
+  if (fs::is_directory(target, error)) fail(path_, "is a folder");
+  try {
+    if (special == Special::replaced || !is_special(target)) fresh_.emplace(target);
+  } catch (const std::system_error& failure) {
+    fail(path_, "cannot be written: " + failure.code().message());
+  }
+  file_.open(fresh_ ? fresh_->path() : target, std::ios::binary | std::ios::trunc);
   if (!file_) fail(path_, "cannot be written");
-}
-
-PartFile::~PartFile() {
-  file_.close();
-  std::error_code ignored;
-  if (part_ != target_) fs::remove(part_, ignored);
 }
 
 void PartFile::finish() {
   file_.close();
   if (!file_) fail(path_, "cannot be written");
-  if (part_ == target_) return;
-  std::error_code error;
-  fs::rename(part_, target_, error);
-  if (error) fail(path_, error.message());
-  part_ = target_;
+  try {
+    if (fresh_) fresh_->become_target();
+  } catch (const std::system_error& failure) {
+    fail(path_, failure.code().message());
+  }
+  fresh_.reset();
 }
 
 void check_writable(const fs::path& path) {

@@ -2,25 +2,32 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
+
+#include "render_core/base/new_file.h"
 
 namespace catgs {
 
-/// A file that is written whole or not at all. It carries the suffix `.part` until finish(), so a
-/// failed write leaves the previous file in place. Pipes and devices are written directly. Throws
-/// InputError.
+/// A file that is written whole or not at all: a failed write leaves the previous file in place,
+/// and writers of one path do not meet. Throws InputError.
 class PartFile {
  public:
-  explicit PartFile(const std::filesystem::path& path);
-  ~PartFile();
-  PartFile(const PartFile&) = delete;
-  PartFile& operator=(const PartFile&) = delete;
+  /// The meaning of a path that names a link, a pipe or a device. Opening a pipe waits for its
+  /// reader.
+  enum class Special {
+    written,   // the link's target is replaced; pipes and devices are written directly
+    replaced,  // the file takes its place, which never waits
+  };
+
+  explicit PartFile(const std::filesystem::path& path, Special special = Special::written);
 
   [[nodiscard]] std::ostream& stream() { return file_; }
-  /// Renames the file to its final name.
+  /// Gives the file its name.
   void finish();
 
  private:
-  std::filesystem::path path_, target_, part_;
+  const std::filesystem::path path_;
+  std::optional<NewFile> fresh_;  // nothing: the path is written directly
   std::ofstream file_;
 };
 

@@ -1,11 +1,14 @@
 #include "server/access/list_file.h"
 
+#include <cstddef>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "server/base/required_file.h"
+#include "render_core/base/error.h"
+#include "render_core/scene/formats/byte_source.h"
 
 namespace catgs {
 
@@ -26,9 +29,27 @@ bool ListFile::changed() const {
   return given() && look(now) && now != read_;
 }
 
+/// Waits for no writer of a pipe that has taken the file's place.
+std::string ListFile::text() const {
+  constexpr std::uint64_t max_bytes = 16 << 20;
+  try {
+    const std::vector<std::byte> bytes = FileSource(path_).read_all(max_bytes);
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  } catch (const InputError& error) {
+    throw InputError(flag_, {}, error.what(),
+                     "check the path and that the server's user may read the file");
+  }
+}
+
 std::vector<ListFile::Entry> ListFile::read() {
   look(read_);  // before it is read: what is written meanwhile is a change
-  std::ifstream in = open_required_file(flag_, path_);
+  const std::string content = text();
+  const bool is_blank = content.find_first_not_of(" \t\r\n") == std::string::npos;
+  if (is_blank && had_text_)
+    throw InputError(
+        source(), {}, "was emptied",
+        "if nothing in it is meant to count any more, write a line such as \"# none\"");
+  std::istringstream in(content);
   std::vector<Entry> entries;
   int number = 0;
   for (std::string line; std::getline(in, line);) {
@@ -37,6 +58,7 @@ std::vector<ListFile::Entry> ListFile::read() {
     if (line.empty() || line.front() == '#') continue;
     entries.push_back({fmt::format("{}:{}", source(), number), std::move(line)});
   }
+  had_text_ = !is_blank;
   return entries;
 }
 

@@ -19,7 +19,8 @@ class ListFile {
     std::string place;  // "--token-file tokens:3", for errors
     std::string text;
   };
-  /// Throws InputError that names flag and path if the file cannot be read.
+  /// Throws InputError that names flag and path if the file cannot be read, or was emptied since:
+  /// a loss of its content is no new content. A comment is one.
   std::vector<Entry> read();
   /// True if it was written or replaced since read(). A file that is missing has not changed.
   [[nodiscard]] bool changed() const;
@@ -35,10 +36,12 @@ class ListFile {
   };
   /// False: the file cannot be looked at.
   bool look(State& state) const;
+  [[nodiscard]] std::string text() const;
 
   const std::string flag_;
   const std::filesystem::path path_;
   State read_;
+  bool had_text_ = false;  // when it was read last
 };
 
 }  // namespace catgs

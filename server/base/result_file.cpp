@@ -3,7 +3,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
+#include <string_view>
+#include <system_error>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -14,13 +15,24 @@
 #include "server/base/read_at.h"
 
 namespace catgs {
+namespace {
 
-ResultFile::ResultFile() {
+constexpr std::string_view remedy = "give TMPDIR a folder that can be written";
+
+std::filesystem::path temporary_folder() {
   std::error_code error;
-  std::string name = (std::filesystem::temp_directory_path(error) / "catgs-XXXXXX").string();
+  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (error) throw InputError("TMPDIR", {}, error.message(), remedy);
+  return folder;
+}
+
+}  // namespace
+
+ResultFile::ResultFile() : folder_(temporary_folder()) {
+  std::string name = (folder_ / "catgs-XXXXXX").string();
   descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
   if (descriptor_ < 0)
-    throw InputError(name, {}, std::strerror(errno), "give TMPDIR a folder that can be written");
+    throw InputError("TMPDIR " + folder_.string(), {}, std::strerror(errno), remedy);
   ::unlink(name.c_str());
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 
@@ -17,6 +18,8 @@ class ResultFile {
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;
 
+  /// Where it lies.
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   /// A path by which this process can open the file.
   [[nodiscard]] std::string path() const;
   [[nodiscard]] std::uint64_t size() const;
@@ -24,6 +27,7 @@ class ResultFile {
   bool read(std::uint64_t offset, std::span<std::byte> bytes) const;
 
  private:
+  const std::filesystem::path folder_;
   int descriptor_;
 };
 

@@ -1,24 +1,24 @@
 #include "server/counts/visit_book.h"
 
 #include <algorithm>
-#include <chrono>
+#include <exception>
+#include <iterator>
+#include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
-#include "render_core/base/part_file.h"
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
+#include "server/base/replace_file.h"
 
 namespace catgs {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::minutes save_interval{1};
 constexpr std::uint64_t max_bytes = 16 << 20;  // a day within all limits has less
 constexpr std::string_view prefix = "visits-", extension = ".json";
 
@@ -79,10 +79,12 @@ DayCounts read_counts(const ByteSource& file) {
   return day;
 }
 
-VisitBook::VisitBook(fs::path folder, VisitCounts& counts)
+VisitBook::VisitBook(fs::path folder, VisitCounts& counts, std::chrono::milliseconds save_interval)
     : folder_(std::move(folder)), counts_(counts) {
-  restore();
-  thread_ = std::jthread([this](const std::stop_token& stop) {
+  if (folder_.empty()) return;
+  lock_.emplace(own_folder("--visit-counts", folder_, "visits.lock"));
+  drop_old_days();
+  thread_ = std::jthread([this, save_interval](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     do {
       wake_.wait_for(lock, stop, save_interval, [] { return false; });
@@ -91,49 +93,81 @@ VisitBook::VisitBook(fs::path folder, VisitCounts& counts)
   });
 }
 
-VisitBook::~VisitBook() = default;
+fs::path VisitBook::file_of(const std::string& date) const {
+  return folder_ / (std::string(prefix) + date + std::string(extension));
+}
 
-void VisitBook::restore() {
-  const auto refuse = [&](const std::string& why) {
-    throw InputError("--visit-counts " + folder_.string(), {}, why,
-                     "name a folder that the server may write, or \"memory\", or \"off\"");
-  };
+std::vector<std::string> VisitBook::saved_dates() const {
+  std::vector<std::string> dates;
   std::error_code error;
-  fs::create_directories(folder_, error);
-  if (error && !fs::is_directory(folder_)) refuse(error.message());
-  check_writable(folder_ / "visits-0000-00-00.json");
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder_, error))
-    if (!date_in(entry.path()).empty()) files.push_back(entry.path());
-  if (error) refuse(error.message());
-  std::ranges::sort(files);
-  while (files.size() > VisitCounts::most_days) {
-    fs::remove(files.front(), error);
-    files.erase(files.begin());
-  }
-  for (const fs::path& file : files) {
-    try {
-      counts_.restore(date_in(file), read_counts(FileSource(file)));
-    } catch (const InputError& failure) {
-      log_warning({.event = "visit_counts_unreadable"}, "set aside as .damaged: {}",
-                  failure.what());
-      fs::rename(file, file.string() + ".damaged", error);
-    }
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error))
+    if (std::string date = date_in(entry->path()); !date.empty()) dates.push_back(std::move(date));
+  std::ranges::sort(dates);
+  return dates;
+}
+
+void VisitBook::drop_old_days() const {
+  const std::vector<std::string> dates = saved_dates();
+  std::error_code error;
+  for (std::size_t i = 0; i + VisitCounts::most_days < dates.size(); ++i)
+    fs::remove(file_of(dates[i]), error);
+}
+
+std::vector<std::string> VisitBook::dates() const {
+  const std::lock_guard lock(files_mutex_);
+  std::vector<std::string> dates = counts_.dates();
+  if (folder_.empty()) return dates;
+  std::ranges::copy(saved_dates(), std::back_inserter(dates));
+  std::ranges::sort(dates);
+  const auto twice = std::ranges::unique(dates);
+  dates.erase(twice.begin(), twice.end());
+  return dates;
+}
+
+DayCounts VisitBook::day(const std::string& date) const {
+  if (folder_.empty()) return counts_.day(date);
+  const std::lock_guard lock(files_mutex_);
+  DayCounts day = saved(date);
+  add(counts_.day(date), day);
+  return day;
+}
+
+DayCounts VisitBook::saved(const std::string& date) const {
+  const fs::path file = file_of(date);
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(file, error))) return {};
+  try {
+    return read_counts(FileSource(file));
+  } catch (const InputError& failure) {
+    log_warning({.event = "visit_counts_unreadable"}, "set aside as .damaged: {}", failure.what());
+    fs::rename(file, file.string() + ".damaged", error);
+    return {};
   }
 }
 
-/// A day that cannot be written is tried again the next time.
 void VisitBook::save() {
-  for (const auto& [date, day] : counts_.take_changed()) {
-    try {
-      PartFile file(folder_ / (std::string(prefix) + date + std::string(extension)));
-      file.stream() << counts_json(day);
-      file.finish();
-    } catch (const InputError& failure) {
-      counts_.mark_changed(date);
-      log_warning({.event = "visit_counts_unwritten"}, "visits are not saved: {}", failure.what());
-    }
+  for (const std::string& date : counts_.dates()) {
+    const std::lock_guard lock(files_mutex_);
+    save(date);
   }
+}
+
+/// Counts that cannot be written wait for the next time.
+void VisitBook::save(const std::string& date) {
+  std::error_code error;
+  const bool is_new = !fs::exists(file_of(date), error);
+  const DayCounts fresh = counts_.take(date);
+  try {
+    DayCounts day = saved(date);
+    add(fresh, day);
+    overwrite_file(file_of(date), counts_json(day), "make room for it");
+  } catch (const std::exception& failure) {
+    counts_.put_back(date, fresh);
+    log_warning({.event = "visit_counts_unwritten"}, "visits are not saved: {}", failure.what());
+    return;
+  }
+  if (is_new) drop_old_days();
 }
 
 }  // namespace catgs

@@ -1,14 +1,17 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
-#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "render_core/scene/formats/byte_source.h"
+#include "server/base/file_lock.h"
 #include "server/counts/visit_counts.h"
 
 namespace catgs {
@@ -18,23 +21,35 @@ std::string counts_json(const DayCounts& day);
 /// The inverse. Throws InputError that names the field.
 DayCounts read_counts(const ByteSource& file);
 
-/// Keeps counts in a folder, a file for each day: "visits-2026-11-25.json". They are written once a
-/// minute and at the end, on a thread of its own. To forget a day, delete its file while no server
-/// runs.
+/// The counts of all days. A folder keeps them, in a file for each day:
+/// "visits-2026-11-25.json". What was counted is added to it once a minute and at the end, on a
+/// thread of its own. To forget a day, delete its file while no server runs.
 class VisitBook {
  public:
-  /// Makes the folder if needed, and restores its days. Files of days that are too long ago are
-  /// deleted. One that cannot be read is set aside as "….damaged", with a warning. Throws
-  /// InputError where the folder cannot be used. `counts` outlives the book.
-  VisitBook(std::filesystem::path folder, VisitCounts& counts);
-  ~VisitBook();
+  /// `folder`: empty: counts stay in memory. It is made if needed, and belongs to this process as
+  /// long as the book exists. Files of days that are too long ago are deleted. No day is read.
+  /// Throws InputError where the folder cannot be used. `counts` outlives the book.
+  VisitBook(std::filesystem::path folder, VisitCounts& counts,
+            std::chrono::milliseconds save_interval = std::chrono::minutes(1));
+
+  /// The days that have counts, oldest first. Any thread. May block.
+  [[nodiscard]] std::vector<std::string> dates() const;
+  /// A file that cannot be read is set aside as "….damaged", with a warning. Any thread. May block.
+  [[nodiscard]] DayCounts day(const std::string& date) const;
 
  private:
-  void restore();
   void save();
+  // The lock is held.
+  void save(const std::string& date);
+  [[nodiscard]] DayCounts saved(const std::string& date) const;
+  [[nodiscard]] std::filesystem::path file_of(const std::string& date) const;
+  [[nodiscard]] std::vector<std::string> saved_dates() const;
+  void drop_old_days() const;
 
   const std::filesystem::path folder_;
+  std::optional<FileLock> lock_;  // of the folder
   VisitCounts& counts_;
+  mutable std::mutex files_mutex_;  // what is in a file is not in `counts_`
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::jthread thread_;

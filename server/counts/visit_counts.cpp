@@ -2,11 +2,34 @@
 
 #include <algorithm>
 #include <chrono>
-#include <utility>
 
 #include <fmt/format.h>
 
 namespace catgs {
+namespace {
+
+std::size_t stops_of(const DayCounts& day) {
+  std::size_t stops = 0;
+  for (const auto& [id, counts] : day) stops += counts.stops.size();
+  return stops;
+}
+
+std::size_t entries_of(const DayCounts& day) { return day.size() + stops_of(day); }
+
+SceneCounts& scene_of(const std::string& id, DayCounts& day) {
+  if (day.size() < VisitCounts::most_scenes || day.contains(id)) return day[id];
+  return day[std::string(VisitCounts::other_scenes)];
+}
+
+/// `stops`: of the whole day.
+void add_stop(StopId stop, std::uint64_t visits, SceneCounts& to, std::size_t& stops) {
+  if (stops >= VisitCounts::most_stops && !to.stops.contains(stop)) return;
+  const auto [counted, is_new] = to.stops.try_emplace(stop, 0);
+  counted->second += visits;
+  stops += is_new ? 1 : 0;
+}
+
+}  // namespace
 
 std::string date_of(std::int64_t unix_s) {
   using namespace std::chrono;
@@ -22,17 +45,36 @@ bool is_date(std::string_view text) {
          });
 }
 
+void add(const DayCounts& from, DayCounts& to) {
+  std::size_t stops = stops_of(to);
+  for (const auto& [id, counts] : from) {
+    SceneCounts& sum = scene_of(id, to);
+    sum.visits += counts.visits;
+    sum.seconds += counts.seconds;
+    sum.bytes += counts.bytes;
+    for (std::size_t i = 0; i < device_kinds; ++i) sum.devices[i] += counts.devices[i];
+    for (const auto& [stop, visits] : counts.stops) add_stop(stop, visits, sum, stops);
+  }
+}
+
 DayCounts& VisitCounts::today() {
   const std::string date = date_of(unix_s_());
-  changed_.insert(date);
   // The clock may be behind, so the oldest day may not be the one to make.
-  if (!days_.contains(date) && days_.size() >= most_days) days_.erase(days_.begin());
+  while (days_.size() > 1 &&
+         (entries_ > most_entries || (!days_.contains(date) && days_.size() >= most_days))) {
+    auto oldest = days_.begin();
+    if (oldest->first == date) ++oldest;
+    entries_ -= entries_of(oldest->second);
+    days_.erase(oldest);
+  }
   return days_[date];
 }
 
 SceneCounts& VisitCounts::counts_of(const std::string& scene_id, DayCounts& day) {
-  if (day.size() < most_scenes || day.contains(scene_id)) return day[scene_id];
-  return day[std::string(other_scenes)];
+  const std::size_t before = day.size();
+  SceneCounts& counts = scene_of(scene_id, day);
+  entries_ += day.size() - before;
+  return counts;
 }
 
 void VisitCounts::visit(const std::string& scene_id, DeviceKind device) {
@@ -52,38 +94,39 @@ void VisitCounts::spend(const std::string& scene_id, double seconds, std::uint64
 void VisitCounts::reach(const std::string& scene_id, StopId stop) {
   const std::lock_guard lock(mutex_);
   DayCounts& day = today();  // one look at the clock, which may pass midnight
-  auto& stops = counts_of(scene_id, day).stops;
-  if (const auto known = stops.find(stop); known != stops.end()) {
-    ++known->second;
-    return;
-  }
-  std::size_t all = 0;
-  for (const auto& [id, counts] : day) all += counts.stops.size();
-  if (all < most_stops) stops[stop] = 1;
+  const std::size_t before = stops_of(day);
+  std::size_t stops = before;
+  add_stop(stop, 1, counts_of(scene_id, day), stops);
+  entries_ += stops - before;
 }
 
-void VisitCounts::restore(const std::string& date, DayCounts counts) {
+std::vector<std::string> VisitCounts::dates() const {
   const std::lock_guard lock(mutex_);
-  days_[date] = std::move(counts);
-  while (days_.size() > most_days) days_.erase(days_.begin());
+  std::vector<std::string> dates;
+  for (const auto& [date, day] : days_) dates.push_back(date);
+  return dates;
 }
 
-CountsByDay VisitCounts::since(std::string_view date) const {
+DayCounts VisitCounts::day(const std::string& date) const {
   const std::lock_guard lock(mutex_);
-  return {days_.lower_bound(date), days_.end()};
+  const auto day = days_.find(date);
+  return day == days_.end() ? DayCounts() : day->second;
 }
 
-void VisitCounts::mark_changed(const std::string& date) {
+DayCounts VisitCounts::take(const std::string& date) {
   const std::lock_guard lock(mutex_);
-  changed_.insert(date);
+  auto day = days_.extract(date);
+  if (!day) return {};
+  entries_ -= entries_of(day.mapped());
+  return std::move(day.mapped());
 }
 
-CountsByDay VisitCounts::take_changed() {
+void VisitCounts::put_back(const std::string& date, const DayCounts& counts) {
   const std::lock_guard lock(mutex_);
-  CountsByDay changed;
-  for (const std::string& date : std::exchange(changed_, {}))
-    if (const auto day = days_.find(date); day != days_.end()) changed.insert(*day);
-  return changed;
+  DayCounts& day = days_[date];
+  entries_ -= entries_of(day);
+  add(counts, day);
+  entries_ += entries_of(day);
 }
 
 }  // namespace catgs

@@ -6,10 +6,10 @@
 #include <functional>
 #include <map>
 #include <mutex>
-#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "server/net/messages.h"
 
@@ -28,11 +28,10 @@ struct SceneCounts {
   double seconds = 0.0;     // on show: connected, and the page was not hidden
   std::uint64_t bytes = 0;  // of pictures
   std::array<std::uint64_t, device_kinds> devices{};  // visits, by DeviceKind
-  std::map<StopId, std::uint64_t> stops;              // visits that reached the stop
+  std::map<StopId, std::uint64_t> stops{};            // visits that reached the stop
 };
 
-using DayCounts = std::map<std::string, SceneCounts>;               // by the scene's id
-using CountsByDay = std::map<std::string, DayCounts, std::less<>>;  // by date, "2026-11-25" in UTC
+using DayCounts = std::map<std::string, SceneCounts>;  // by the scene's id
 
 /// Counts visits by scene and day. Thread-safe.
 class VisitCounts {
@@ -42,6 +41,8 @@ class VisitCounts {
   static constexpr std::size_t most_scenes = 1000;
   /// Of a day, in all scenes. Further stops are not counted.
   static constexpr std::size_t most_stops = 20'000;
+  /// Scenes and stops of all days. Beyond it the oldest day goes.
+  static constexpr std::size_t most_entries = 400'000;
   static constexpr std::string_view other_scenes = "(others)";
 
   /// `unix_s`: the time, which decides about the day.
@@ -51,25 +52,28 @@ class VisitCounts {
   void spend(const std::string& scene_id, double seconds, std::uint64_t bytes);
   void reach(const std::string& scene_id, StopId stop);
 
-  /// Puts a day in place that was counted before.
-  void restore(const std::string& date, DayCounts counts);
-  /// The days from `date` on. Empty: all.
-  [[nodiscard]] CountsByDay since(std::string_view date = {}) const;
-  /// The days that have changed since the last call.
-  [[nodiscard]] CountsByDay take_changed();
-  /// The day is to be taken again.
-  void mark_changed(const std::string& date);
+  /// The days that have counts, oldest first.
+  [[nodiscard]] std::vector<std::string> dates() const;
+  /// Empty: nothing was counted.
+  [[nodiscard]] DayCounts day(const std::string& date) const;
+  /// Hands over the counts of a day, which begins anew.
+  DayCounts take(const std::string& date);
+  /// Takes counts back that were handed over.
+  void put_back(const std::string& date, const DayCounts& counts);
 
  private:
   // The lock is held.
   DayCounts& today();
-  static SceneCounts& counts_of(const std::string& scene_id, DayCounts& day);
+  SceneCounts& counts_of(const std::string& scene_id, DayCounts& day);
 
   const std::function<std::int64_t()> unix_s_;
-  mutable std::mutex mutex_;  // guards the rest
-  CountsByDay days_;
-  std::set<std::string> changed_;  // dates
+  mutable std::mutex mutex_;               // guards the rest
+  std::map<std::string, DayCounts> days_;  // by date, "2026-11-25" in UTC
+  std::size_t entries_ = 0;                // in all of them
 };
+
+/// Adds the counts of a day, or of a part of it, to `to`, within the limits of a day.
+void add(const DayCounts& from, DayCounts& to);
 
 /// The date in UTC of a Unix time.
 std::string date_of(std::int64_t unix_s);

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
+#include <fmt/ranges.h>
 
 #include "server/base/scene_id.h"
 
@@ -42,14 +42,6 @@ int days_of(const HttpRequest& request) {
   return std::clamp(days, 1, static_cast<int>(VisitCounts::most_days));
 }
 
-void add(const SceneCounts& from, SceneCounts& to) {
-  to.visits += from.visits;
-  to.seconds += from.seconds;
-  to.bytes += from.bytes;
-  for (std::size_t i = 0; i < device_kinds; ++i) to.devices[i] += from.devices[i];
-  for (const auto& [stop, visits] : from.stops) to.stops[stop] += visits;
-}
-
 /// RFC 4180. A text that a spreadsheet would take for a formula gets an apostrophe.
 std::string csv_text(std::string_view text) {
   std::string out = "\"";
@@ -57,20 +49,6 @@ std::string csv_text(std::string_view text) {
     out += '\'';
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
   return out + '"';
-}
-
-std::string counts_csv(const CountsByDay& days) {
-  std::string out = "date,scene,visits,seconds,bytes";
-  for (const std::string_view device : device_names) out += fmt::format(",{}", device);
-  out += "\r\n";
-  for (const auto& [date, day] : days)
-    for (const auto& [id, counts] : day) {
-      out += fmt::format("{},{},{},{:.0f},{}", date, csv_text(id), counts.visits, counts.seconds,
-                         counts.bytes);
-      for (const std::uint64_t visits : counts.devices) out += fmt::format(",{}", visits);
-      out += "\r\n";
-    }
-  return out;
 }
 
 /// A bar for each day, up to `top`. `text`: of the highest bar.
@@ -117,96 +95,135 @@ std::string scene_row(const std::string& name, const SceneCounts& counts) {
 }
 
 /// Titles are for people; without one, the number stands.
-std::pair<std::string, std::string> stop_titles(const std::vector<TourTitles>& titles,
+std::pair<std::string, std::string> stop_titles(const VisitsPage::Titles& titles,
                                                 const StopId& id) {
   std::pair<std::string, std::string> of{fmt::format("tour {}", id.tour + 1),
                                          fmt::format("stop {}", id.stop + 1)};
-  if (id.tour >= titles.size()) return of;
-  const TourTitles& tour = titles[id.tour];
+  if (!titles || id.tour >= titles->size()) return of;
+  const TourTitles& tour = (*titles)[id.tour];
   if (!tour.tour.empty()) of.first = tour.tour;
   if (id.stop < tour.stops.size() && !tour.stops[id.stop].empty()) of.second = tour.stops[id.stop];
   return of;
 }
 
-}  // namespace
-
-std::vector<TourTitles> titles_of_tours(const std::string& answer) {
-  const auto document = nlohmann::json::parse(answer, nullptr, false);
-  const auto title = [](const nlohmann::json& of) {
-    const bool has_one = of.is_object() && of.contains("title") && of["title"].is_string();
-    return has_one ? of["title"].get<std::string>() : std::string();
+/// A document that is made from one day after the other, so that it takes the memory of one.
+class DayByDay {
+ public:
+  struct Parts {
+    std::string head;
+    std::function<std::vector<std::string>()> dates;
+    std::function<std::string(const std::string& date, const DayCounts& day)> of_day;
+    std::function<std::string()> end = [] { return std::string(); };
   };
-  std::vector<TourTitles> titles;
-  try {
-    for (const auto& tour : document.at("document").at("tours")) {
-      TourTitles of{title(tour), {}};
-      const auto& stops = tour.at("stops");
-      if (!stops.is_array()) continue;
-      for (const auto& stop : stops) of.stops.push_back(title(stop));
-      if (!of.stops.empty()) titles.push_back(std::move(of));
-    }
-  } catch (const nlohmann::json::exception&) {  // no tours, or some that pages cannot read either
+  DayByDay(const VisitBook& book, Parts parts)
+      : book_(book), parts_(std::move(parts)), text_(parts_.head) {}
+
+  /// See HttpResponse::next_piece.
+  std::optional<std::string> next() {
+    constexpr std::size_t most_bytes = 64 * 1024;
+    if (sent_ == text_.size() && !read_more()) return std::nullopt;
+    std::string piece = text_.substr(sent_, most_bytes);
+    sent_ += piece.size();
+    return piece;
   }
-  return titles;
+
+ private:
+  bool read_more() {
+    if (!dates_) dates_ = parts_.dates();
+    if (days_ > dates_->size()) return false;
+    text_ = days_ < dates_->size() ? parts_.of_day((*dates_)[days_], book_.day((*dates_)[days_]))
+                                   : parts_.end();
+    ++days_;
+    sent_ = 0;
+    return true;
+  }
+
+  const VisitBook& book_;
+  const Parts parts_;
+  std::optional<std::vector<std::string>> dates_;
+  std::size_t days_ = 0;  // that were read, and one for the end
+  std::string text_;
+  std::size_t sent_ = 0;  // bytes of it
+};
+
+std::string counts_rows(const std::string& date, const DayCounts& day) {
+  std::string out;
+  for (const auto& [id, counts] : day) {
+    out += fmt::format("{},{},{},{:.0f},{}", date, csv_text(id), counts.visits, counts.seconds,
+                       counts.bytes);
+    for (const std::uint64_t visits : counts.devices) out += fmt::format(",{}", visits);
+    out += "\r\n";
+  }
+  return out;
 }
 
-std::optional<HttpResponse> VisitsPage::respond(const HttpRequest& request) const {
-  if (request.path == "/visits")
-    return text_response(200, html(request), "text/html; charset=utf-8");
-  if (request.path == "/visits.css") return text_response(200, std::string(style), "text/css");
-  if (request.path == "/visits.csv")
-    return text_response(200, counts_csv(counts_.since()), "text/csv; charset=utf-8");
-  if (request.path == "/visits/stops.csv")
-    return text_response(200, stops_csv(), "text/csv; charset=utf-8");
-  return std::nullopt;
+std::string stops_rows(const std::string& date, const DayCounts& day,
+                       const VisitsPage::TitlesOf& titles_of) {
+  std::string out;
+  for (const auto& [id, counts] : day) {
+    const auto titles = counts.stops.empty() ? nullptr : titles_of(id);
+    for (const auto& [stop, visits] : counts.stops) {
+      const auto [tour, title] = stop_titles(titles, stop);
+      out += fmt::format("{},{},{},{},{},{},{}\r\n", date, csv_text(id), stop.tour + 1,
+                         stop.stop + 1, csv_text(tour), csv_text(title), visits);
+    }
+  }
+  return out;
 }
 
-std::string VisitsPage::html(const HttpRequest& request) const {
-  const std::string only = argument(request, "scene");
-  const int days = days_of(request);
-  const CountsByDay all = counts_.since(date_of(unix_s_() - (days - 1) * seconds_a_day));
-  DayCounts scenes;
-  SceneCounts sum;
-  std::vector<std::pair<std::string, double>> visits, hours;
-  for (int i = days - 1; i >= 0; --i) {
-    const std::string date = date_of(unix_s_() - i * seconds_a_day);
+/// What the page shows of some days, of all scenes or of one.
+struct Summary {
+  std::string only;  // a scene's id; empty: all
+  DayCounts scenes{};
+  SceneCounts sum{};  // without stops
+  std::vector<std::pair<std::string, double>> visits{}, hours{};
+
+  void take(const std::string& date, DayCounts day) {
     SceneCounts of_day;
-    if (const auto day = all.find(date); day != all.end())
-      for (const auto& [id, counts] : day->second) {
-        add(counts, scenes[id]);
-        if (only.empty() || id == only) add(counts, of_day);
-      }
+    for (auto& [id, counts] : day) {
+      if (id != only) counts.stops.clear();
+      if (!only.empty() && id != only) continue;
+      of_day.visits += counts.visits;
+      of_day.seconds += counts.seconds;
+    }
+    add(day, scenes);
+    sum.visits += of_day.visits;
+    sum.seconds += of_day.seconds;
     visits.emplace_back(date, static_cast<double>(of_day.visits));
     hours.emplace_back(date, of_day.seconds / 3600.0);
-    add(of_day, sum);
   }
-  const std::string what = only.empty() ? "all scenes" : escape_html(name_in(only));
+};
+
+std::string html_of(const Summary& all, const VisitsPage::TitlesOf& titles_of) {
+  const std::size_t days = all.visits.size();
+  const std::string what = all.only.empty() ? "all scenes" : escape_html(name_in(all.only));
   std::string out = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\" />"
       "<meta name=\"viewport\" content=\"width=device-width\" /><title>Visits</title>"
       "<link rel=\"stylesheet\" href=\"/visits.css\" /></head><body>\n"
       "<h1>Visits: {}, {} days</h1>\n<p>{} visits, {:.1f} hours. ",
-      what, days, sum.visits, sum.seconds / 3600.0);
+      what, days, all.sum.visits, all.sum.seconds / 3600.0);
   for (const int other : {7, 30, 90, 400})
     out += fmt::format("<a href=\"/visits?days={}\">{} days</a> · ", other, other);
   out += "<a href=\"/visits.csv\">CSV</a> · <a href=\"/visits/stops.csv\">CSV of stops</a></p>\n";
-  out += "<h2>Visits by day</h2>\n" + plot(visits, "visits");
-  out += "<h2>Hours by day</h2>\n" + plot(hours, "hours");
+  out += "<h2>Visits by day</h2>\n" + plot(all.visits, "visits");
+  out += "<h2>Hours by day</h2>\n" + plot(all.hours, "hours");
   out +=
       "<h2>Scenes</h2>\n<div class=\"wide\"><table><tr><th>Scene</th><th>Visits</th>"
       "<th>Hours</th><th>Minutes a visit</th><th>MB an hour</th><th>Desktop</th><th>Phone</th>"
       "<th>Tablet</th><th>Headset</th><th>Unknown</th></tr>\n";
-  for (const auto& [id, counts] : scenes)
+  for (const auto& [id, counts] : all.scenes)
     out += scene_row(fmt::format("<a href=\"/visits?days={}&amp;scene={}\">{}</a>", days,
                                  escape_html(percent_encoded(id)), escape_html(name_in(id))),
                      counts);
   out += "</table></div>\n";
-  if (only.empty()) return out + "</body></html>\n";
+  const auto shown = all.scenes.find(all.only);
+  if (shown == all.scenes.end()) return out + "</body></html>\n";
   out +=
       "<h2>Stops</h2>\n<table><tr><th>Tour</th><th>Stop</th><th>Visits that reached it</th>"
       "</tr>\n";
-  const std::vector<TourTitles> titles = titles_(only);
-  for (const auto& [stop, reached] : sum.stops) {
+  const VisitsPage::Titles titles = titles_of(all.only);
+  for (const auto& [stop, reached] : shown->second.stops) {
     const auto [tour, title] = stop_titles(titles, stop);
     out += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(tour),
                        escape_html(title), reached);
@@ -214,19 +231,51 @@ std::string VisitsPage::html(const HttpRequest& request) const {
   return out + "</table>\n</body></html>\n";
 }
 
-std::string VisitsPage::stops_csv() const {
-  std::string out = "date,scene,tour,stop,tour title,stop title,visits\r\n";
-  std::map<std::string, std::vector<TourTitles>> titles;
-  for (const auto& [date, day] : counts_.since())
-    for (const auto& [id, counts] : day) {
-      if (!counts.stops.empty() && !titles.contains(id)) titles[id] = titles_(id);
-      for (const auto& [stop, visits] : counts.stops) {
-        const auto [tour, title] = stop_titles(titles[id], stop);
-        out += fmt::format("{},{},{},{},{},{},{}\r\n", date, csv_text(id), stop.tour + 1,
-                           stop.stop + 1, csv_text(tour), csv_text(title), visits);
-      }
-    }
-  return out;
+DayByDay::Parts page_parts(const HttpRequest& request, std::int64_t unix_s,
+                           const VisitsPage::TitlesOf& titles_of) {
+  DayByDay::Parts parts;
+  parts.dates = [days = days_of(request), unix_s] {
+    std::vector<std::string> dates;
+    for (int i = days - 1; i >= 0; --i) dates.push_back(date_of(unix_s - i * seconds_a_day));
+    return dates;
+  };
+  const auto summary = std::make_shared<Summary>(Summary{argument(request, "scene")});
+  if (!summary->only.empty()) summary->scenes[summary->only];  // however many others there are
+  parts.of_day = [summary](const std::string& date, const DayCounts& day) {
+    summary->take(date, day);
+    return std::string();
+  };
+  parts.end = [summary, titles_of] { return html_of(*summary, titles_of); };
+  return parts;
+}
+
+}  // namespace
+
+std::optional<HttpResponse> VisitsPage::respond(const HttpRequest& request) const {
+  if (request.path == "/visits.css") return text_response(200, std::string(style), "text/css");
+  DayByDay::Parts parts;
+  parts.dates = [&book = book_] { return book.dates(); };
+  HttpResponse response;
+  response.content_type = "text/csv; charset=utf-8";
+  if (request.path == "/visits") {
+    parts = page_parts(request, unix_s_(), titles_of_);
+    response.content_type = "text/html; charset=utf-8";
+  } else if (request.path == "/visits.csv") {
+    parts.head =
+        fmt::format("date,scene,visits,seconds,bytes,{}\r\n", fmt::join(device_names, ","));
+    parts.of_day = counts_rows;
+  } else if (request.path == "/visits/stops.csv") {
+    parts.head = "date,scene,tour,stop,tour title,stop title,visits\r\n";
+    parts.of_day = [titles_of = titles_of_](const std::string& date, const DayCounts& day) {
+      return stops_rows(date, day, titles_of);
+    };
+  } else {
+    return std::nullopt;
+  }
+  response.next_piece = [document = std::make_shared<DayByDay>(book_, std::move(parts))] {
+    return document->next();
+  };
+  return response;
 }
 
 }  // namespace catgs

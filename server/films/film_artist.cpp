@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -136,13 +137,26 @@ void draw_frames(const FilmWish& wish, const SceneEntry& scene, ResultFile& file
   video->finish();
 }
 
-}  // namespace
-
-void draw_film(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
-               const OnDrawn& on_drawn) {
+void draw(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
+          const OnDrawn& on_drawn) {
   if (wish.kind == FilmKind::film) return draw_frames(wish, scene, file, on_drawn);
   if (wish.kind == FilmKind::panorama) return draw_around(wish, scene, file, on_drawn);
   draw_picture(wish, scene, file, on_drawn);
+}
+
+}  // namespace
+
+/// The file has no name, so that its folder tells operators where there is no room.
+void draw_film(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
+               const OnDrawn& on_drawn) {
+  try {
+    draw(wish, scene, file, on_drawn);
+  } catch (const InputError& failure) {
+    std::string why = failure.what();
+    const std::string path = file.path();
+    if (why.starts_with(path)) why.replace(0, path.size(), "TMPDIR " + file.folder().string());
+    throw InputError("", "", why);
+  }
 }
 
 }  // namespace catgs

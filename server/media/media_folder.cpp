@@ -100,7 +100,8 @@ std::vector<MediaFile> MediaFolder::list() const {
   return files;
 }
 
-void MediaFolder::save(const std::string& name, std::string_view content) const {
+bool MediaFolder::save(const std::string& name, std::string_view content,
+                       const MayReplace& may_replace) const {
   check_media(name, content);
   std::error_code error;
   fs::create_directory(path_, error);
@@ -110,16 +111,22 @@ void MediaFolder::save(const std::string& name, std::string_view content) const 
         fmt::format("this folder cannot be made beside the scene: {}", error.message()),
         "let the operator make it, writable for the server");
   require_room(name, content.size());
-  overwrite_file(path_ / name, content, by_hand);
+  Replacement fresh(path_ / name, content, by_hand);  // this may take long, and without the lock
+  const FileLock lock = lock_for_saving(path_.parent_path());
+  const std::optional<MediaFile> there = find(name);
+  if (!may_replace(there ? there->etag : "")) return false;
+  require_room(name, content.size());
+  fresh.take_place();
+  return true;
 }
 
-/// Counts all that lies in the folder, whatever it is.
+/// Counts all that lies in the folder, whatever it is, but for files that are being written.
 void MediaFolder::require_room(const std::string& name, std::uint64_t bytes) const {
   std::size_t files = 1;
   std::error_code error;
   for (fs::directory_iterator entry(path_, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().filename() == name) continue;
+    if (entry->path().filename() == name || is_name_of_new_file(entry->path())) continue;
     std::error_code no_file;
     const std::uint64_t size = entry->file_size(no_file);
     if (!no_file) bytes += size;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -38,9 +39,15 @@ class MediaFolder {
                                  std::uint64_t offset, std::size_t bytes) const;
   /// The files of known formats, in the order of their names; at most max_media_files.
   [[nodiscard]] std::vector<MediaFile> list() const;
-  /// Adds or replaces a file that check_media() accepts. Makes the folder if it is missing. Throws
-  /// InputError if it is full or cannot be written.
-  void save(const std::string& name, std::string_view content) const;
+  /// Decides, by the tag of the present file, whether it may be replaced. Empty: there is none.
+  using MayReplace = std::function<bool(const std::string& etag)>;
+  /// Adds or replaces a file that check_media() accepts. Makes the folder if it is missing. Servers
+  /// that share a folder ask `may_replace` and replace the file one after the other. Returns false
+  /// where it may not. Throws FolderBusy, and InputError if the folder is full or cannot be
+  /// written.
+  bool save(
+      const std::string& name, std::string_view content,
+      const MayReplace& may_replace = [](const std::string&) { return true; }) const;
 
  private:
   void require_room(const std::string& name, std::uint64_t bytes) const;

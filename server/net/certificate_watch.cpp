@@ -15,7 +15,11 @@ namespace {
 constexpr lws_usec_t look_every_us = 1'000'000;
 
 /// libwebsockets would combine the new certificate with the old key, so the pair is tested first.
+/// Opening a pipe would wait for its writer.
 bool usable(const std::string& certificate, const std::string& key) {
+  std::error_code error;
+  for (const std::string& file : {certificate, key})
+    if (!std::filesystem::is_regular_file(file, error)) return false;
   const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> trial(SSL_CTX_new(TLS_server_method()),
                                                                 SSL_CTX_free);
   const bool ok = trial &&

@@ -19,9 +19,12 @@ namespace catgs {
 class DiskThreads {
  public:
   explicit DiskThreads(std::shared_ptr<LwsWaker> waker) : waker_(std::move(waker)) {}
-  ~DiskThreads() { threads_.join(); }
+  ~DiskThreads() { join(); }
   DiskThreads(const DiskThreads&) = delete;
   DiskThreads& operator=(const DiskThreads&) = delete;
+
+  /// Waits for the work under way. Afterwards none is done any more.
+  void join() { threads_.join(); }
 
   static constexpr std::size_t most_waiting = 1024;
 

@@ -46,9 +46,13 @@ struct HttpResponse {
   std::string location;   // empty: no header Location
   std::shared_ptr<const std::string> body;
   std::shared_ptr<const DiskBody> disk_body{};  // in place of `body`
-  bool accepts_ranges = false;                  // says so, in a header Accept-Ranges
-  std::string content_range{};                  // empty: no header Content-Range
-  std::string policy{};  // its Content-Security-Policy; empty: that of the pages
+  /// Makes a body of unknown length, in place of `body`. Returns its next piece; nothing: it is
+  /// whole. An empty piece gives way to others for a moment. After an exception the connection is
+  /// closed. May block. Called on any thread, by one at a time.
+  std::function<std::optional<std::string>()> next_piece{};
+  bool accepts_ranges = false;  // says so, in a header Accept-Ranges
+  std::string content_range{};  // empty: no header Content-Range
+  std::string policy{};         // its Content-Security-Policy; empty: that of the pages
   /// Makes the real answer where that takes a look at the disk; the other members then mean
   /// nothing. May block. Called on another thread.
   std::function<HttpResponse()> on_disk{};

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -133,6 +134,7 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
     request.range = range;
     request.if_range = if_range;
   }
+  chunked_ = request_header(wsi, WSI_TOKEN_HTTP) != "HTTP/1.0";
   HttpResponse response = handler(request);
   serve(wsi);
   if (!response.on_disk) return answer(wsi, std::move(response));
@@ -249,7 +251,9 @@ int LwsHttpExchange::answer(lws* wsi, HttpResponse response) {
 
 /// Two pieces of a body are in memory at most: this one, and the one that is being written.
 void LwsHttpExchange::read_ahead() {
-  if (!response_.disk_body || unwritten_ == 0) return;
+  if (unwritten_ == 0) return;
+  if (response_.next_piece) next_piece_ = disk_.run(response_.next_piece, waiter_);
+  if (!response_.disk_body) return;
   const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(chunk_bytes, unwritten_));
   const std::uint64_t offset = response_.disk_body->length - unwritten_;
   piece_ = disk_.run<std::string>(
@@ -257,10 +261,12 @@ void LwsHttpExchange::read_ahead() {
 }
 
 int LwsHttpExchange::write_headers(lws* wsi) {
-  unwritten_ = response_.disk_body ? response_.disk_body->length
-               : response_.body    ? response_.body->size()
-                                   : 0;
+  unwritten_ = response_.next_piece  ? LWS_ILLEGAL_HTTP_CONTENT_LEN
+               : response_.disk_body ? response_.disk_body->length
+               : response_.body      ? response_.body->size()
+                                     : 0;
   HeaderWriter headers(wsi, response_.status, response_.content_type, unwritten_);
+  if (response_.next_piece && chunked_) headers.add("transfer-encoding:", "chunked");
   headers.add("cache-control:", response_.cache_control);
   if (!response_.etag.empty()) headers.add("etag:", response_.etag);
   if (!response_.location.empty()) headers.add("location:", response_.location);
@@ -278,29 +284,47 @@ int LwsHttpExchange::on_writable(lws* wsi, std::vector<std::byte>& scratch) {
   if (!answering_) return answer_.valid() && is_ready(answer_) ? answer_now(wsi) : 0;
   if (unwritten_ == 0) return -1;
   if (piece_.valid() && !is_ready(piece_)) return 0;  // its thread wakes this one
+  if (next_piece_.valid() && !is_ready(next_piece_)) return 0;
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, piece_timeout_s);
   lws_callback_on_writable(wsi);
-  return write_piece(wsi, scratch);
+  return response_.next_piece ? write_next_piece(wsi, scratch) : write_piece(wsi, scratch);
+}
+
+int LwsHttpExchange::write_next_piece(lws* wsi, std::vector<std::byte>& scratch) {
+  if (!next_piece_.valid()) return -1;  // the disk's threads had too much to do
+  const std::optional<std::string> piece = next_piece_.get();
+  if (!piece) unwritten_ = 0;
+  read_ahead();
+  if (chunked_ && !piece) return write(wsi, "0\r\n\r\n", scratch);
+  if (!piece || piece->empty()) return 0;
+  return write(wsi, chunked_ ? fmt::format("{:x}\r\n{}\r\n", piece->size(), *piece) : *piece,
+               scratch);
 }
 
 int LwsHttpExchange::write_piece(lws* wsi, std::vector<std::byte>& scratch) {
   const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(chunk_bytes, unwritten_));
-  scratch.resize(LWS_PRE + size);
+  std::string piece;
   if (piece_.valid()) {
-    const std::string piece = piece_.get();
+    piece = piece_.get();
     if (piece.size() != size) return -1;
-    std::memcpy(scratch.data() + LWS_PRE, piece.data(), size);
   } else if (response_.disk_body) {
     return -1;  // the disk's threads had too much to do
-  } else {
-    const std::string& body = *response_.body;
-    std::memcpy(scratch.data() + LWS_PRE, body.data() + body.size() - unwritten_, size);
   }
+  const std::string_view bytes =
+      response_.body
+          ? std::string_view(*response_.body).substr(response_.body->size() - unwritten_, size)
+          : std::string_view(piece);
   unwritten_ -= size;
   read_ahead();
+  return write(wsi, bytes, scratch);
+}
+
+int LwsHttpExchange::write(lws* wsi, std::string_view bytes, std::vector<std::byte>& scratch) {
+  scratch.resize(LWS_PRE + bytes.size());
+  std::memcpy(scratch.data() + LWS_PRE, bytes.data(), bytes.size());
   auto* payload = reinterpret_cast<unsigned char*>(scratch.data()) + LWS_PRE;
   const auto protocol = unwritten_ == 0 ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP;
-  return lws_write(wsi, payload, size, protocol) == static_cast<int>(size) ? 0 : -1;
+  return lws_write(wsi, payload, bytes.size(), protocol) == static_cast<int>(bytes.size()) ? 0 : -1;
 }
 
 }  // namespace catgs

@@ -66,6 +66,8 @@ class LwsHttpExchange {
   void read_ahead();
   int write_headers(lws* wsi);
   int write_piece(lws* wsi, std::vector<std::byte>& scratch);
+  int write_next_piece(lws* wsi, std::vector<std::byte>& scratch);
+  int write(lws* wsi, std::string_view bytes, std::vector<std::byte>& scratch);
 
   AnsweredConnections& served_;
   DiskThreads& disk_;
@@ -73,8 +75,10 @@ class LwsHttpExchange {
   HttpResponse response_;
   bool head_only_ = false;
   bool answering_ = false;
-  std::uint64_t unwritten_ = 0;     // bytes of the body
+  std::uint64_t unwritten_ = 0;     // bytes of the body; of unknown length: not 0 until it is whole
+  bool chunked_ = true;             // a body of unknown length is, but for clients of HTTP/1.0
   std::future<std::string> piece_;  // of a body on the disk: the next one
+  std::future<std::optional<std::string>> next_piece_;  // of a body of unknown length
 
   // Uploads only. The request's head is gone by the time its body is complete.
   std::string path_;

@@ -213,6 +213,7 @@ void NetServer::stop() {
     lws_context_destroy(s.context);
   }
   s.context = nullptr;
+  s.service.disk.join();  // answers may need what outlives this object no more
 }
 
 int NetServer::port() const { return state_->port; }

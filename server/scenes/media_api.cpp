@@ -11,6 +11,7 @@
 #include "render_core/base/printable.h"
 #include "server/access/signed_token.h"
 #include "server/base/log_event.h"
+#include "server/base/replace_file.h"
 #include "server/net/byte_range.h"
 #include "server/scenes/scene_requests.h"
 
@@ -201,28 +202,29 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, std::string
     answer->set_value(text_response(409, "409: the scene left the memory: open it again\n"));
     return future;
   }
-  const auto write =
-      [folder = *folder, scene_id, name = std::string(path.name),
-       precondition = Precondition{std::string(request.if_match),
-                                   std::string(request.if_none_match)}](std::string_view bytes) {
-        try {
-          const std::optional<MediaFile> there = folder.find(name);
-          if (!precondition.holds(there ? there->etag : ""))
-            return text_response(412, "412: another file has this name\n");
-          folder.save(name, bytes);
-        } catch (const InputError& error) {
-          log_warning({.event = "media_refused", .scene = scene_id},
-                      "scene {}: an author's file was not kept: {}", scene_id, error.what());
-          return text_response(409, fmt::format("409: {}\n", error.what()));
-        } catch (const std::exception& failure) {  // memory, say: it costs this file only
-          log_error({.event = "save_failed", .scene = scene_id},
-                    "scene {}: a file was not saved: {}", scene_id, failure.what());
-          return text_response(500, "500: the server failed to save: try again\n");
-        }
-        log_info({.event = "media_saved", .scene = scene_id},
-                 "scene {}: an author saved {} ({} bytes)", scene_id, name, bytes.size());
-        return text_response(200, "saved\n");
-      };
+  const auto write = [folder = *folder, scene_id, name = std::string(path.name),
+                      precondition = Precondition{std::string(request.if_match),
+                                                  std::string(request.if_none_match)}](
+                         std::string_view bytes) {
+    try {
+      const auto may_replace = [&](const std::string& etag) { return precondition.holds(etag); };
+      if (!folder.save(name, bytes, may_replace))
+        return text_response(412, "412: another file has this name\n");
+    } catch (const InputError& error) {
+      log_warning({.event = "media_refused", .scene = scene_id},
+                  "scene {}: an author's file was not kept: {}", scene_id, error.what());
+      if (dynamic_cast<const FolderBusy*>(&error))
+        return busy_response(fmt::format("503: {}\n", error.what()));
+      return text_response(409, fmt::format("409: {}\n", error.what()));
+    } catch (const std::exception& failure) {  // memory, say: it costs this file only
+      log_error({.event = "save_failed", .scene = scene_id}, "scene {}: a file was not saved: {}",
+                scene_id, failure.what());
+      return text_response(500, "500: the server failed to save: try again\n");
+    }
+    log_info({.event = "media_saved", .scene = scene_id}, "scene {}: an author saved {} ({} bytes)",
+             scene_id, name, bytes.size());
+    return text_response(200, "saved\n");
+  };
   boost::asio::post(
       writer_, [write, answer, content = std::move(content), place = std::move(place)]() mutable {
         HttpResponse response = busy_response("503: the connection is closed\n");

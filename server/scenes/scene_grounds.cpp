@@ -11,12 +11,12 @@
 #include <boost/asio/post.hpp>
 
 #include "render_core/base/error.h"
-#include "render_core/base/part_file.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/walk/walk_file.h"
 #include "server/base/clock.h"
 #include "server/base/log_event.h"
 #include "server/base/prompt_thread.h"
+#include "server/base/replace_file.h"
 #include "server/net/http.h"
 
 namespace catgs {
@@ -134,9 +134,7 @@ void SceneGrounds::keep(const fs::path& path, const std::string& bytes) const {
   std::ranges::sort(files, std::greater<>());
   for (std::size_t k = max_kept - 1; k < files.size(); ++k) fs::remove(files[k].second, error);
   try {
-    PartFile file(path);
-    file.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    file.finish();
+    overwrite_file(path, bytes, "make room in --cache-dir");
   } catch (const InputError& failure) {  // a full disk costs the next start some time
     log_warning({.event = "ground_not_kept"}, "{}", failure.what());
   }

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <span>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <boost/asio/post.hpp>
@@ -11,6 +12,7 @@
 #include "render_core/base/error.h"
 #include "server/base/log_event.h"
 #include "server/base/replace_file.h"
+#include "server/media/media_folder.h"
 #include "server/scenes/poster.h"
 #include "server/scenes/scene_facts.h"
 #include "server/scenes/tours.h"
@@ -99,6 +101,26 @@ void SidecarSaver::start_save(const SharedRequest& request) {
   });
 }
 
+/// `there`: what is in force instead, and its tag.
+SidecarSaver::Outcome SidecarSaver::refuse_outdated(const Request& request,
+                                                    const std::optional<std::string>& there,
+                                                    const std::string& tag) const {
+  const SceneEntry& scene = *request.entry;
+  log_info({.event = "save_outdated", .scene = request.scene_id},
+           "scene {}: an author's sidecar was made from an older one than {}", request.scene_id,
+           scene.sidecar.string());
+  Outcome refused{tagged(412, "412: somebody else saved this scene since you opened it\n", tag)};
+  try {
+    if (tag != scene.sidecar_tag)
+      refused.revised = revised(scene, there ? sidecar_in(scene.sidecar, *there) : Sidecar(), there,
+                                media_origins_);
+  } catch (const InputError& broken) {
+    log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
+                "scene {}: goes on as it was: {}", request.scene_id, broken.what());
+  }
+  return refused;
+}
+
 SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
   const SceneEntry& scene = *request.entry;
   const std::filesystem::path& file = scene.sidecar;
@@ -109,29 +131,16 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
     return {text_response(400, fmt::format("400: {}\n", mistake.what()))};
   }
   try {
-    // Read it once, because another server may replace it meanwhile.
+    Replacement fresh(file, request.json, beside_the_scene);
+    const FileLock lock = lock_for_saving(file.parent_path());
+    // Read it once, because somebody may replace it by hand meanwhile.
     const std::optional<std::string> there = sidecar_text(file);
     const std::string current = there ? etag_of(*there) : "";
-    if (!request.precondition.holds(current)) {
-      log_info({.event = "save_outdated", .scene = request.scene_id},
-               "scene {}: an author's sidecar was made from an older one than {}", request.scene_id,
-               file.string());
-      Outcome refused{
-          tagged(412, "412: somebody else saved this scene since you opened it\n", current)};
-      try {
-        if (current != scene.sidecar_tag)
-          refused.revised =
-              revised(scene, there ? sidecar_in(file, *there) : Sidecar(), there, media_origins_);
-      } catch (const InputError& broken) {
-        log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
-                    "scene {}: goes on as it was: {}", request.scene_id, broken.what());
-      }
-      return refused;
-    }
+    if (!request.precondition.holds(current)) return refuse_outdated(request, there, current);
     auto shown =
         revised(scene, sidecar, request.json, media_origins_);  // throws before any file is changed
     if (request.place->abandoned()) return {text_response(503, "503: the connection is closed\n")};
-    if (there != request.json) replace_file(file, request.json);  // which keeps the one before
+    if (there != request.json) fresh.take_place_and_keep_old();
     log_info({.event = "saved", .scene = request.scene_id},
              "scene {}: an author saved {} ({} bytes)", request.scene_id, file.string(),
              request.json.size());
@@ -139,11 +148,26 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
   } catch (const InputError& unwritable) {
     log_warning({.event = "save_failed", .scene = request.scene_id},
                 "scene {}: an author cannot save: {}", request.scene_id, unwritable.what());
+    if (dynamic_cast<const FolderBusy*>(&unwritable))
+      return {busy_response(fmt::format("503: {}\n", unwritable.what()))};
     std::string why = unwritable.what();
     const std::string path = file.string();  // for the operator's log only
     if (why.starts_with(path)) why.replace(0, path.size(), file.filename().string());
     return {text_response(409, fmt::format("409: {}\n", why))};
   }
+}
+
+void SidecarSaver::remove_stale_files_in(std::set<std::filesystem::path> folders) {
+  boost::asio::post(writer_, [folders = std::move(folders)] {
+    for (const std::filesystem::path& folder : folders) {
+      remove_stale_files(folder, surely_stale);
+      std::error_code error;
+      for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+           entry.increment(error))
+        if (entry->path().extension() == media_folder_extension)
+          remove_stale_files(entry->path(), surely_stale);
+    }
+  });
 }
 
 void SidecarSaver::finish(Request& request, const Outcome& outcome) {

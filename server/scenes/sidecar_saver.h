@@ -1,8 +1,10 @@
 #pragma once
 
 #include <deque>
+#include <filesystem>
 #include <future>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -33,12 +35,14 @@ class SidecarSaver {
 
   /// Any thread. The future is ready when visitors get the saved sidecar. The caller has checked
   /// the sender's permission. If the sidecar on disk does not meet `precondition`, it is kept and
-  /// applied, as another server may have written it. The answer is then 412 with its tag. Requests
-  /// run one after the other; one with an abandoned place is dropped without an answer. If two
-  /// servers share a folder and save at the same moment, both may find the old sidecar. The later
-  /// save then wins.
+  /// applied, as another server may have written it. The answer is then 412 with its tag. Servers
+  /// that share a folder look at the sidecar and replace it one after the other. Requests run one
+  /// after the other, too; one with an abandoned place is dropped without an answer.
   std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition,
                                  std::shared_ptr<const UploadPlace> place);
+
+  /// Removes what killed servers have left in these folders and in the media folders there.
+  void remove_stale_files_in(std::set<std::filesystem::path> folders);
 
   /// Session thread. The current save finishes. Waiting and later saves are answered with 503.
   void stop();
@@ -65,6 +69,9 @@ class SidecarSaver {
   void finish(Request& request, const Outcome& outcome);
   // Writer thread.
   [[nodiscard]] Outcome write(const Request& request) const;
+  [[nodiscard]] Outcome refuse_outdated(const Request& request,
+                                        const std::optional<std::string>& there,
+                                        const std::string& tag) const;
 
   SceneLibrary& scenes_;
   boost::asio::io_context& io_;

@@ -82,7 +82,8 @@ std::string tours_of(const std::filesystem::path& sidecar, const std::optional<s
   return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-ToursAnswers::ToursAnswers(std::string_view document) {
+ToursAnswers::ToursAnswers(std::string_view document)
+    : titles(std::make_shared<const std::vector<TourTitles>>(titles_of_tours(document))) {
   const auto answer = [&](bool may_save) {
     return std::make_shared<const std::string>(
         fmt::format(R"({{"may_save":{},"document":{}}})", may_save, document));

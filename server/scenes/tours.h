@@ -10,6 +10,7 @@
 
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/files/tour_check.h"
+#include "render_core/scene/files/tour_titles.h"
 
 namespace catgs {
 
@@ -31,6 +32,12 @@ struct ToursAnswers {
   explicit ToursAnswers(std::string_view document = "{}");
   std::shared_ptr<const std::string> for_viewers;
   std::shared_ptr<const std::string> for_authors;
+  std::shared_ptr<const std::vector<TourTitles>> titles;
+
+  /// True if the scene has this stop. Tours and stops count from 0.
+  [[nodiscard]] bool has_stop(std::size_t tour, std::size_t stop) const {
+    return tour < titles->size() && stop < (*titles)[tour].stops.size();
+  }
 };
 
 /// The current content of the sidecar; nothing: no sidecar. Tag, hints and tours must come from the

@@ -1,7 +1,6 @@
 #include "server/scenes/tree_cache.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <span>
@@ -9,11 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/locate_scene.h"
@@ -44,7 +40,8 @@ bool is_tree_name(std::string_view name) {
   return ends_with_digits(content_digits) && ends_with_digits(path_digits) && !name.empty();
 }
 
-/// What a killed build leaves of a tree: PartFile and ScratchFile add to its name.
+/// What a killed build leaves of a tree, besides NewFile: ScratchFile adds to its name. Earlier
+/// versions added ".part".
 bool is_remnant(std::string_view name) { return is_tree_name(name.substr(0, name.rfind('.'))); }
 
 std::string hex_digest(const std::string& text, std::size_t bytes) {
@@ -101,11 +98,6 @@ Content content_of(const SceneLocation& scene) {
   return content;
 }
 
-[[noreturn]] void refuse(const fs::path& folder, const std::string& why,
-                         std::string_view remedy = "name a folder that the server may write") {
-  throw InputError("--cache-dir " + folder.string(), {}, why, remedy);
-}
-
 }  // namespace
 
 std::string tree_name(const fs::path& scene, const LoadOptions& levels) {
@@ -126,31 +118,18 @@ std::string tree_name(const fs::path& scene, const LoadOptions& levels) {
   }
 }
 
-TreeCache::TreeCache(fs::path folder) : folder_(std::move(folder)) {
+TreeCache::TreeCache(fs::path folder)
+    : folder_(std::move(folder)), lock_(own_folder("--cache-dir", folder_, "lock")) {
   std::error_code error;
-  fs::create_directories(folder_, error);
-  if (error && !fs::is_directory(folder_)) refuse(folder_, error.message());
-  const fs::path lock = folder_ / "lock";
-  lock_ = ::open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (lock_ < 0) refuse(folder_, "cannot be written: " + std::generic_category().message(errno));
-  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    const bool taken = errno == EWOULDBLOCK;
-    const std::string why = taken ? "belongs to another server that runs"
-                                  : "cannot be locked: " + std::generic_category().message(errno);
-    ::close(lock_);
-    refuse(folder_, why, "give each server a folder of its own");
-  }
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     const std::string name = entry.path().filename().string();
-    if (!entry.is_regular_file(error)) continue;
-    if (is_tree_name(name))
+    const bool is_file = fs::is_regular_file(entry.symlink_status(error));
+    if (is_file && is_tree_name(name))
       names_.insert(name);
-    else if (is_remnant(name))
+    else if (is_file && is_remnant(name))
       fs::remove(entry.path(), error);
   }
 }
-
-TreeCache::~TreeCache() { ::close(lock_); }
 
 void TreeCache::remove(const std::string& name) {
   std::error_code error;

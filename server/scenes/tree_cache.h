@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "render_core/scene/files/load_scene.h"
+#include "server/base/file_lock.h"
 
 namespace catgs {
 
@@ -22,9 +23,6 @@ class TreeCache {
   /// belongs to this process as long as the cache exists. Throws InputError that names --cache-dir
   /// if the folder cannot be written, or belongs to another process.
   explicit TreeCache(std::filesystem::path folder);
-  ~TreeCache();
-  TreeCache(const TreeCache&) = delete;
-  TreeCache& operator=(const TreeCache&) = delete;
 
   [[nodiscard]] std::filesystem::path path_of(std::string_view name) const {
     return folder_ / name;
@@ -40,7 +38,7 @@ class TreeCache {
 
  private:
   const std::filesystem::path folder_;
-  int lock_ = -1;  // descriptor of the file whose lock marks the folder as taken
+  const FileLock lock_;
   std::set<std::string> names_;
 };
 

@@ -90,9 +90,12 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
     if (const auto* wish = std::get_if<Prepare>(&message))
       return preparations_.take(received) ? prepare(around_, visitor_.token, *wish, received)
                                           : void();
-    if (const auto* reached = std::get_if<Reached>(&message))
-      return tally_.reached(visit_.stream().scene()->facts.scene_id, visitor_.device,
-                            {reached->tour, reached->stop});
+    if (const auto* reached = std::get_if<Reached>(&message)) {
+      const SceneEntry& scene = *visit_.stream().scene();
+      if (scene.tours.has_stop(reached->tour, reached->stop))
+        tally_.reached(scene.facts.scene_id, visitor_.device, {reached->tour, reached->stop});
+      return;
+    }
   }
   if (const auto* pose = std::get_if<PoseSample>(&message)) {
     audience_.presentation().moved(*pose, received);

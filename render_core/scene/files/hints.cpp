@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/base/part_file.h"
 #include "render_core/base/printable.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/math/look_at.h"
@@ -167,10 +167,9 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
     document["background"] = fmt::format("#{:06x}", about.background_rgb);
   if (about.metres_per_unit != 0.0f) document["metres_per_unit"] = about.metres_per_unit;
   if (tours && !tours->is_null()) document["tours"] = *tours;
-  std::ofstream file(path);
-  file << document.dump(2) << '\n';
-  file.close();
-  if (!file.good()) throw InputError(path.string(), "", "cannot be written");
+  PartFile file(path);  // a server may read it meanwhile
+  file.stream() << document.dump(2) << '\n';
+  file.finish();
 }
 
 }  // namespace catgs

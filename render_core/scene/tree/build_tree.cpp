@@ -239,7 +239,7 @@ void check_space(const std::filesystem::path& out, const TreeShape& shape,
 TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
                       std::size_t memory_bytes, ThreadPool& pool, const LoadContext& context) {
   constexpr double measured = 0.1, sorted = 0.3;  // of the time, about
-  PartFile file(out);
+  PartFile file(out, PartFile::Special::replaced);
   FirstReading first = read_first(scene, out, memory_bytes);
   context.report(measured);
   const TreeShape shape(first.gaussians, first.sh_degree);

@@ -85,7 +85,8 @@ TEST_F(PartFileTest, IsTriedBeforehandWithoutATrace) {
   EXPECT_EQ(files(), 1);
   const std::string remedy = " (does the folder exist, and is there space?)";
   const fs::path nowhere = folder_ / "no/report";
-  EXPECT_EQ(complaint(nowhere), nowhere.string() + ": cannot be written" + remedy);
+  EXPECT_EQ(complaint(nowhere),
+            nowhere.string() + ": cannot be written: No such file or directory" + remedy);
   EXPECT_EQ(complaint(folder_.path()), folder_.path().string() + ": is a folder" + remedy);
   EXPECT_EQ(complaint("/dev/null"), "");
 }

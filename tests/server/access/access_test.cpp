@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "render_core/base/error.h"
 #include "tests/support/temporary_folder.h"
@@ -170,6 +171,43 @@ TEST_F(AccessTest, LinksEndOneByOneWhenTheirIdsAreRevoked) {
   EXPECT_TRUE(refusal(access, lost, "city", 0)) << "nor does its loss";
 }
 
+TEST_F(AccessTest, AnEmptiedFileRevivesNoLink) {
+  const std::string lost = make_link_token({"city", "viewer", 1000, "0123456789ab"}, key);
+  const auto path = folder.write("revoked", "0123456789ab\n");
+  AccessControl access({}, folder.write("key", std::string(key)), false, path);
+  auto time = std::filesystem::last_write_time(path);
+  const auto write = [&](const std::string& text) {
+    folder.write("revoked", text);
+    std::filesystem::last_write_time(path, time += std::chrono::seconds(2));
+  };
+  for (const char* emptied : {"", "\n", " \r\n\n"}) {
+    write(emptied);
+    EXPECT_TRUE(refusal(access, lost, "city", 0)) << "a loss of its content";
+  }
+  write("0123456789ac\n");
+  EXPECT_FALSE(refusal(access, lost, "city", 0)) << "somebody took it out";
+  write("0123456789ab\n");
+  EXPECT_TRUE(refusal(access, lost, "city", 0));
+  write("# none\n");
+  EXPECT_FALSE(refusal(access, lost, "city", 0)) << "somebody took the last one out";
+}
+
+TEST_F(AccessTest, APipeInPlaceOfAListIsNotWaitedFor) {
+  const std::string lost = make_link_token({"city", "viewer", 1000, "0123456789ab"}, key);
+  const auto revoked = folder.write("revoked", "0123456789ab\n");
+  const auto tokens = folder.write("tokens", "alpha-alpha\n");
+  AccessControl access(tokens, folder.write("key", std::string(key)), false, revoked);
+  for (const auto& path : {revoked, tokens}) {
+    std::filesystem::remove(path);
+    ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  }
+  EXPECT_TRUE(refusal(access, lost, "city", 0));
+  EXPECT_FALSE(refusal(access, "alpha-alpha", "city", 0)) << "those read before stay in force";
+  EXPECT_THAT(
+      [&] { AccessControl(tokens, {}); },
+      ThrowsMessage<InputError>(AllOf(HasSubstr("--token-file"), HasSubstr("not a regular file"))));
+}
+
 TEST_F(AccessTest, RevokedLinksHaveANumberAndAForm) {
   const auto of = [&](const std::string& text) {
     AccessControl({}, folder.write("key", std::string(key)), false, folder.write("revoked", text));
@@ -234,7 +272,7 @@ TEST_F(AccessTest, FilesThatCannotBeReadAreNamedWithTheirFlag) {
   EXPECT_THAT([&] { AccessControl({}, absent); },
               says("--token-key-file", absent, "No such file or directory"));
   EXPECT_THAT([&] { AccessControl(folder.path(), {}); },
-              says("--token-file", folder.path().string(), "it is a folder"));
+              says("--token-file", folder.path().string(), "is not a regular file"));
 }
 
 TEST_F(AccessTest, NamesWhatIsWrong) {

@@ -1,7 +1,12 @@
 #include "server/base/replace_file.h"
 
+#include <atomic>
 #include <fstream>
 #include <iterator>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,10 +18,15 @@ namespace catgs {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::chrono_literals;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 using testing::UnorderedElementsAre;
+
+void replace_file(const fs::path& file, std::string_view text) {
+  Replacement(file, text, beside_the_scene).take_place_and_keep_old();
+}
 
 class ReplaceFile : public testing::Test {
  protected:
@@ -66,7 +76,7 @@ TEST_F(ReplaceFile, ChangesNothingWhereItFails) {
   fs::create_directories(folder / "taken.json" / "inside");
   EXPECT_THROW(replace_file(folder / "taken.json", "text"), InputError);
   EXPECT_TRUE(fs::is_directory(folder / "taken.json"));
-  EXPECT_FALSE(fs::exists(folder / ".taken.json.new"));
+  EXPECT_THAT(names(), UnorderedElementsAre("taken.json"));
 }
 
 TEST_F(ReplaceFile, SaysThatAFolderIsReadOnly) {
@@ -74,6 +84,43 @@ TEST_F(ReplaceFile, SaysThatAFolderIsReadOnly) {
   EXPECT_THAT([] { replace_file("/sys/hall.json", "text"); },
               ThrowsMessage<InputError>(AllOf(HasSubstr("the folder is read-only for the server"),
                                               HasSubstr("download the file"))));
+}
+
+TEST_F(ReplaceFile, ReadersFindACompleteFileWhoeverWrites) {
+  constexpr int rounds = 300;
+  const std::string longer(50'000, 'l'), shorter(10'000, 's');
+  overwrite_file(file, longer, "");
+  std::atomic<int> writers{2};
+  const auto write = [&](const std::string& text) {
+    for (int i = 0; i < rounds; ++i) overwrite_file(file, text, "");
+    --writers;
+  };
+  std::thread one(write, longer), other(write, shorter);
+  int torn = 0;
+  while (writers > 0) {
+    const std::string text = read(file);
+    torn += text != longer && text != shorter ? 1 : 0;
+  }
+  one.join();
+  other.join();
+  EXPECT_EQ(torn, 0);
+  EXPECT_THAT(names(), UnorderedElementsAre("hall.json"));
+}
+
+TEST_F(ReplaceFile, AFolderIsSavedInByOneAtATime) {
+  std::optional<FileLock> first = lock_for_saving(folder.path());
+  EXPECT_THAT([&] { lock_for_saving(folder.path(), 10ms); },
+              ThrowsMessage<FolderBusy>(HasSubstr("another server saves in this folder")));
+  std::thread other([&] { lock_for_saving(folder.path()); });
+  first.reset();
+  other.join();
+  EXPECT_NO_THROW(lock_for_saving(folder.path(), 0ms));
+}
+
+TEST_F(ReplaceFile, ALockThatIsALinkIsNotFollowed) {
+  fs::create_symlink(folder / "elsewhere", folder / ".catgs-lock");
+  EXPECT_THROW(lock_for_saving(folder.path()), InputError);
+  EXPECT_FALSE(fs::exists(folder / "elsewhere"));
 }
 
 }  // namespace

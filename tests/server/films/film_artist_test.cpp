@@ -1,11 +1,18 @@
 #include "server/films/film_artist.h"
 
 #include <array>
+#include <cstdlib>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
 
+#include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/image/png.h"
 #include "render_core/metrics/image_quality.h"
@@ -87,6 +94,38 @@ TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
                          }),
                std::runtime_error);
   EXPECT_EQ(frames, 3);
+}
+
+TEST_F(FilmArtist, AFullFolderForResultsIsNamed) {
+  const auto complaint = [&](FilmKind kind) -> std::string {
+    ResultFile file;
+    rlimit before{};
+    ::getrlimit(RLIMIT_FSIZE, &before);
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, before.rlim_max};  // a disk has no room then, for this process
+    ::setrlimit(RLIMIT_FSIZE, &small);
+    std::string text;
+    try {
+      const std::vector<FilmView> views(kind == FilmKind::film ? 30 : 1, view);
+      draw_film({kind, {256, 128}, views}, scene, file, [](double, Clock::duration) {});
+    } catch (const InputError& error) {
+      text = error.what();
+    }
+    ::setrlimit(RLIMIT_FSIZE, &before);
+    return text;
+  };
+  const std::string folder = "TMPDIR " + std::filesystem::temp_directory_path().string() + ": ";
+  for (const FilmKind kind : {FilmKind::picture, FilmKind::panorama, FilmKind::film})
+    EXPECT_THAT(complaint(kind), testing::StartsWith(folder));
+}
+
+TEST_F(FilmArtist, AMissingFolderForResultsIsNamed) {
+  const char* const before = std::getenv("TMPDIR");
+  const std::string kept = before ? before : "";
+  ::setenv("TMPDIR", "/absent", 1);
+  EXPECT_THAT([] { ResultFile(); },
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("TMPDIR: ")));
+  before ? ::setenv("TMPDIR", kept.c_str(), 1) : ::unsetenv("TMPDIR");
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 #include "server/media/media_folder.h"
 
+#include <array>
 #include <filesystem>
+#include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -85,6 +88,27 @@ TEST_F(MediaFolderTest, ReplacesALinkAndNotWhatItLeadsTo) {
   EXPECT_FALSE(fs::is_symlink(folder_ / "hall.media/a.png"));
   EXPECT_EQ(fs::file_size(folder_ / "secret.png"), png_file().size());
   EXPECT_EQ(media_.find("a.png")->bytes, png_file().size());
+}
+
+TEST_F(MediaFolderTest, OneOfTwoServersReplacesAFileThatBothHaveSeen) {
+  media_.save("a.png", png_file());
+  for (int round = 0; round < 50; ++round) {
+    const std::string seen = media_.find("a.png")->etag;
+    std::array<std::string, 2> contents;
+    std::array<bool, 2> saved{};
+    std::vector<std::thread> servers;
+    for (std::size_t i = 0; i < 2; ++i)
+      servers.emplace_back([&, i] {
+        contents[i] = png_file() + fmt::format("{} {}", round, i);
+        const MediaFolder own(folder_ / "hall.json");
+        saved[i] = own.save("a.png", contents[i], [&](const auto& etag) { return etag == seen; });
+      });
+    for (std::thread& server : servers) server.join();
+    ASSERT_NE(saved[0], saved[1]) << round;
+    const auto file = media_.find("a.png");
+    ASSERT_EQ(media_.read("a.png", file->etag, 0, 1000), contents[saved[0] ? 0 : 1]) << round;
+  }
+  EXPECT_THAT(names(), ElementsAre("a.png"));
 }
 
 TEST_F(MediaFolderTest, RefusesWhatIsNotWhatItSaysBeforeItMakesAFolder) {

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
+#include <future>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -21,6 +24,7 @@
 #include <unistd.h>
 
 #include "render_core/scene/files/save_scene.h"
+#include "server/access/access.h"
 #include "server/net/visitor_address.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/raw_socket.h"
@@ -368,6 +372,34 @@ TEST(ServerProgram, SessionsGoOnAfterItWasStopped) {
   EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 2)).session_id(),
             welcome.session_id());
   EXPECT_TRUE(again.receive_frame().header.idr());
+}
+
+TEST(ServerProgram, OneOfTwoOverAFolderSavesAndTheOtherSaysSo) {
+  const TemporaryFolder folder;
+  save_scene(random_cloud(100, 0), folder / "hall.ply");
+  const std::string key(32, 'k'), scene = (folder / "hall.ply").string();
+  const std::vector<std::string> settings = {"--scene", scene, "--token-key-file",
+                                             folder.write("key", key).string()};
+  const Program one(settings), other(settings);
+  const std::string author = "Bearer " + make_link_token({"", "author", 1'000'000'000'000}, key);
+  std::string tag;
+  for (int round = 0; round < 25; ++round) {
+    const auto save = [&](const Program& program, const std::string& title) {
+      return http_put(program.port(), "/api/scenes/hall/sidecar", title,
+                      {{"authorization", author},
+                       {tag.empty() ? "if-none-match" : "if-match", tag.empty() ? "*" : tag}});
+    };
+    const std::string longer = fmt::format(R"({{"title": "{}{}"}})", std::string(500, 'a'), round);
+    const std::string shorter = fmt::format(R"({{"title": "b{}"}})", round);
+    auto second = std::async(std::launch::async, [&] { return save(other, shorter); });
+    const HttpReply a = save(one, longer), b = second.get();
+    ASSERT_EQ(std::min(a.status, b.status), 200) << a.body << b.body;
+    ASSERT_EQ(std::max(a.status, b.status), 412) << a.body << b.body;
+    std::ifstream written(folder / "hall.json");
+    ASSERT_EQ(std::string(std::istreambuf_iterator<char>(written), {}),
+              a.status == 200 ? longer : shorter);
+    tag = (a.status == 200 ? a : b).headers.at("etag");
+  }
 }
 
 }  // namespace

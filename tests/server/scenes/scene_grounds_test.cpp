@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
+#include <sys/stat.h>
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/save_scene.h"
@@ -128,6 +129,23 @@ TEST_F(SceneGroundsTest, TheNextStartReadsWhatWasFound) {
   load();
   EXPECT_TRUE(walk::stand_below(map_in(*found()->file), {6, 3, 2}));
   EXPECT_EQ(bytes_in(kept().at(0)), *listed()->file);
+}
+
+TEST_F(SceneGroundsTest, APipeInPlaceOfAFileIsReplaced) {
+  start();
+  load();
+  found();
+  const fs::path file = kept().at(0);
+  for (const fs::path& name : {file, fs::path(file.string() + ".part")}) {
+    fs::remove(name);
+    ASSERT_EQ(::mkfifo(name.c_str(), 0600), 0);
+  }
+  ASSERT_EQ(::mkfifo((folder_ / "scenes/a.walk").c_str(), 0600), 0);  // in place of the author's
+  start();
+  load();
+  const Ground ground = found();
+  ASSERT_TRUE(fs::is_regular_file(file));
+  EXPECT_EQ(bytes_in(file), *ground->file);
 }
 
 TEST_F(SceneGroundsTest, OfManyThoseThatWereUsedLastStay) {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/math/look_at.h"
@@ -220,6 +221,29 @@ TEST_F(SceneTreesTest, WhatAKilledBuildLeftIsNotUsed) {
   start();
   EXPECT_THAT(trees(), IsEmpty());
   EXPECT_FALSE(load("a")->in_pages);
+}
+
+/// Opening one would wait for its reader, and a server that ends would wait for the build.
+TEST_F(SceneTreesTest, PipesAndLinksInPlaceOfATreeAreReplaced) {
+  start();
+  build("a");
+  const fs::path tree = trees().at(0);
+  library_.reset();
+  for (const fs::path& name : {tree, fs::path(tree.string() + ".part")}) {
+    fs::remove(name);
+    ASSERT_EQ(::mkfifo(name.c_str(), 0600), 0);
+  }
+  start();
+  build("a");
+  EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(tree)));
+  library_.reset();
+  write("secret", "of somebody");
+  fs::remove(tree);
+  fs::create_symlink(folder_ / "secret", tree);
+  start();
+  build("a");
+  EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(tree)));
+  EXPECT_EQ(bytes_in(folder_ / "secret"), "of somebody");
 }
 
 TEST_F(SceneTreesTest, ASceneThatDoesNotFitWaitsForItsTree) {

@@ -2,18 +2,25 @@
 
 #include "server/scenes/sidecar_saver.h"
 
+#include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <functional>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/save_scene.h"
 #include "server/base/metrics.h"
+#include "server/base/replace_file.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
@@ -163,6 +170,104 @@ TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
   EXPECT_EQ(on_disk(), sidecar_at(1)) << "what was told to be saved is there";
   io_.restart();
   EXPECT_EQ(io_.poll(), 0u) << "nothing goes on, no poster either";
+}
+
+/// A server's saver with a session thread of its own.
+class Saver {
+ public:
+  Saver(const ServerConfig& config, std::string name) : name_(std::move(name)) {
+    library_.emplace(config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(1)},
+                     io_, metrics_);
+    saver_.emplace(*library_, io_);
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~Saver() {
+    boost::asio::post(io_, [this] { saver_->stop(); });
+    idle_.reset();
+    thread_.join();
+    saver_.reset();
+  }
+  Saver(const Saver&) = delete;
+  Saver& operator=(const Saver&) = delete;
+
+  Saved save(const std::string& json, const std::string& if_match) {
+    const Precondition precondition{if_match, if_match.empty() ? "*" : ""};
+    return saver_->save(library_->resolve("hall"), json, precondition, place_);
+  }
+  [[nodiscard]] std::string said(int round) const {
+    return fmt::format(R"({{"title": "{} {}", "credits": "{}"}})", name_, round,
+                       std::string(name_ == "one" ? 700 : 10, 'x'));
+  }
+
+ private:
+  const std::string name_;
+  Metrics metrics_;
+  boost::asio::io_context io_;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> idle_{
+      io_.get_executor()};
+  std::optional<SceneLibrary> library_;
+  std::optional<SidecarSaver> saver_;
+  std::shared_ptr<UploadPlace> place_ = std::make_shared<UploadPlace>();
+  std::thread thread_;
+};
+
+TEST_F(SidecarSaverTest, OneOfTwoServersOverAFolderSavesAndTheOtherIsTold) {
+  ServerConfig config;
+  config.scenes = {(folder_ / "hall.ply").string()};
+  Saver one(config, "one"), other(config, "other");
+  std::atomic<bool> ended{false};
+  std::atomic<int> cut{0}, reads{0};
+  std::thread reader([&] {
+    while (!ended) {
+      const std::string text = on_disk();
+      cut += text.empty() || text.ends_with("\"}") ? 0 : 1;
+      ++reads;
+    }
+  });
+  std::string tag;
+  constexpr int rounds = 60;
+  for (int round = 0; round < rounds; ++round) {
+    Saved first = one.save(one.said(round), tag), second = other.save(other.said(round), tag);
+    const HttpResponse a = first.get(), b = second.get();
+    const bool one_saved = a.status == 200;
+    EXPECT_EQ(one_saved ? b.status : a.status, 412) << round;
+    EXPECT_EQ(one_saved ? a.status : b.status, 200) << round;
+    EXPECT_EQ(on_disk(), one_saved ? one.said(round) : other.said(round)) << round;
+    tag = etag_of(on_disk());
+    EXPECT_EQ(a.etag, tag) << "who was refused is told what is in force";
+    EXPECT_EQ(b.etag, tag);
+  }
+  ended = true;
+  reader.join();
+  EXPECT_GT(reads, 0);
+  EXPECT_EQ(cut, 0);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+    EXPECT_FALSE(is_name_of_new_file(entry.path())) << entry.path();
+}
+
+TEST_F(SidecarSaverTest, ASaveWaitsForNoServerThatHoldsTheFolder) {
+  const FileLock held = lock_for_saving(folder_.path());
+  Saved busy = save(sidecar_at(1));
+  run_until([&] { return is_ready(busy); });
+  const HttpResponse answer = busy.get();
+  EXPECT_EQ(answer.status, 503);
+  EXPECT_GT(answer.retry_after_s, 0);
+  EXPECT_EQ(on_disk(), "");
+}
+
+TEST_F(SidecarSaverTest, WhatKilledServersHaveLeftIsRemoved) {
+  const auto left = [&](const std::string& name) {
+    const auto file = folder_.write(name, "half");
+    std::filesystem::last_write_time(
+        file, std::filesystem::file_time_type::clock::now() - surely_stale - 1h);
+    return file;
+  };
+  const auto sidecar = left(".hall.json.3f0c91d29b1deb4d.new");
+  const auto medium = left("hall.media/.door.jpg.3f0c91d29b1deb4d.new");
+  const auto other = left("hall.media/door.jpg");
+  saver_->remove_stale_files_in({folder_.path()});
+  run_until([&] { return !std::filesystem::exists(sidecar) && !std::filesystem::exists(medium); });
+  EXPECT_TRUE(std::filesystem::exists(other));
 }
 
 }  // namespace

@@ -148,6 +148,8 @@ class OneScene final : public SceneSource {
   }
   void prepare(const std::string& id, TimePoint) override { prepared.push_back(id); }
   void on_tick(TimePoint) override {}
+  /// Before anybody comes.
+  void give_tours(std::string_view document) { scene_->tours = ToursAnswers(document); }
 
   std::vector<std::string> prepared;
   std::vector<std::string> ids = {"scene"};
@@ -213,7 +215,7 @@ class PlacesTest : public testing::Test {
     frame_path.emplace(io, executor, static_cast<int>(devices->views().size()), on_devices_lost,
                        metrics);
     places.emplace(VisitContext{io, options, executor, *devices, *frame_path, scenes, encoders,
-                                authorize, SessionTokens("a key"), metrics});
+                                authorize, SessionTokens("a key"), metrics, &counts});
   }
   void TearDown() override {
     for (auto& client : clients) client.listener->on_close(true);
@@ -336,6 +338,7 @@ class PlacesTest : public testing::Test {
                                          {EncoderKind::x264, Codec::h264, "libx264"}};
   boost::asio::io_context io;
   Metrics metrics;
+  VisitCounts counts{unix_now_s};
   std::deque<Visitor> clients;
   std::optional<CountedFrames> frame_path;
   std::optional<Places> places;

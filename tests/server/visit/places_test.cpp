@@ -346,5 +346,23 @@ TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
   EXPECT_THAT(scenes.prepared, testing::ElementsAre("hall", "attic"));
 }
 
+TEST_F(PlacesTest, StopsThatNoTourHasAreNotCounted) {
+  scenes.give_tours(R"({"tours":[{"stops":[{},{}]},{"stops":[]},{"stops":[{}]}]})");
+  start();
+  Visitor& visitor = join();
+  for (std::uint32_t tour = 0; tour < 32; ++tour)
+    for (std::uint32_t stop = 0; stop < 8; ++stop) {
+      v1::ClientMessage message;
+      message.mutable_reached()->set_tour(tour);
+      message.mutable_reached()->set_stop(stop);
+      say(visitor, message);
+    }
+  run_for(100ms);
+  DayCounts all;
+  for (const std::string& date : counts.dates()) add(counts.day(date), all);
+  EXPECT_EQ(all[""].stops, (std::map<StopId, std::uint64_t>{{{0, 0}, 1}, {{0, 1}, 1}, {{1, 0}, 1}}))
+      << "pages leave out tours without stops";
+}
+
 }  // namespace
 }  // namespace catgs::test

@@ -1,0 +1,299 @@
+// Counts of visits over days and starts, and the pages that show them.
+
+#include "server/counts/visit_book.h"
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "render_core/base/error.h"
+#include "server/counts/visit_tally.h"
+#include "server/counts/visits_page.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::int64_t noon = 1'764'072'000;  // 2025-11-25 12:00:00 UTC
+constexpr std::int64_t day_s = 86'400;
+constexpr const char* today = "2025-11-25";
+
+class VisitBookTest : public testing::Test {
+ protected:
+  [[nodiscard]] std::size_t files() const {
+    const auto is_day = [](const fs::directory_entry& entry) {
+      return entry.path().extension() == ".json";
+    };
+    return static_cast<std::size_t>(
+        std::count_if(fs::directory_iterator(folder_.path()), fs::directory_iterator(), is_day));
+  }
+  [[nodiscard]] fs::path file_of(const std::string& date) const {
+    return folder_ / ("visits-" + date + ".json");
+  }
+  VisitsPage page_of(const VisitBook& book) {
+    return {book, [this] { return now_s_.load(); }, [this](const auto&) { return titles_; }};
+  }
+  static HttpResponse ask(const VisitsPage& page, const std::string& path,
+                          std::vector<std::string> arguments = {}) {
+    HttpRequest request;
+    request.path = path;
+    request.arguments = std::move(arguments);
+    return page.respond(request).value_or(text_response(404, ""));
+  }
+  static std::string rest_of(const HttpResponse& response) {
+    std::string text;
+    while (const auto piece = response.next_piece()) text += *piece;
+    return text;
+  }
+
+  const TemporaryFolder folder_;
+  std::atomic<std::int64_t> now_s_{noon};
+  VisitCounts counts_{[this] { return now_s_.load(); }};
+  VisitsPage::Titles titles_;
+};
+
+TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
+  {
+    const VisitBook book(folder_.path(), counts_);
+    counts_.visit("hall \"A\"", DeviceKind::tablet);
+    counts_.spend("hall \"A\"", 12.5, 1'000'000'000'000);
+    counts_.reach("hall \"A\"", {1, 2});
+    now_s_ += day_s;
+    counts_.visit("garden", DeviceKind::headset);
+  }
+  EXPECT_TRUE(counts_.dates().empty()) << "what is in a file is in memory no more";
+  const VisitBook book(folder_.path(), counts_);
+  EXPECT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
+  const SceneCounts hall = book.day(today).at("hall \"A\"");
+  EXPECT_EQ(hall.visits, 1u);
+  EXPECT_EQ(hall.seconds, 12.5);
+  EXPECT_EQ(hall.bytes, 1'000'000'000'000u);
+  EXPECT_EQ(hall.devices[static_cast<std::size_t>(DeviceKind::tablet)], 1u);
+  EXPECT_EQ(hall.stops, (std::map<StopId, std::uint64_t>{{{1, 2}, 1}}));
+  EXPECT_EQ(files(), 2u);
+  counts_.visit("garden", DeviceKind::headset);
+  EXPECT_EQ(book.day("2025-11-26").at("garden").visits, 2u) << "in the file, and not yet there";
+}
+
+TEST_F(VisitBookTest, WithoutAFolderCountsStayInMemory) {
+  const VisitBook book({}, counts_);
+  counts_.visit("hall", DeviceKind::tablet);
+  EXPECT_THAT(book.dates(), ElementsAre(today));
+  EXPECT_EQ(book.day(today).at("hall").visits, 1u);
+}
+
+TEST_F(VisitBookTest, ADayWithinAllLimitsIsReadAgain) {
+  const std::string first = std::string(120, 'x') + "0";
+  for (std::size_t i = 0; i < VisitCounts::most_scenes + 5; ++i)
+    counts_.visit(std::string(120, 'x') + std::to_string(i), DeviceKind::unknown);
+  for (std::uint32_t i = 0; i < VisitCounts::most_stops + 5; ++i)
+    counts_.reach(first, {i / 256, i % 256});
+  { const VisitBook book(folder_.path(), counts_); }
+  counts_.visit("one more", DeviceKind::unknown);
+  counts_.reach(first, {1'000, 0});
+  { const VisitBook book(folder_.path(), counts_); }
+  const DayCounts day = VisitBook(folder_.path(), counts_).day(today);
+  EXPECT_EQ(day.size(), VisitCounts::most_scenes + 1);
+  EXPECT_EQ(day.at(std::string(VisitCounts::other_scenes)).visits, 6u);
+  EXPECT_EQ(day.at(first).stops.size(), VisitCounts::most_stops);
+}
+
+TEST_F(VisitBookTest, TheStartReadsNoDay) {
+  std::ofstream(file_of("2025-11-24")) << R"({"scenes":{"hall":{"visits":-1}}})";
+  ASSERT_EQ(::mkfifo(file_of("2025-11-23").c_str(), 0600), 0);
+  std::ofstream(folder_ / "visits-notes.json") << "of somebody else";
+  const VisitBook book(folder_.path(), counts_);
+  EXPECT_TRUE(fs::exists(file_of("2025-11-24")));
+  EXPECT_THAT(book.dates(), ElementsAre("2025-11-23", "2025-11-24"));
+  for (const std::string& date : book.dates()) {
+    EXPECT_TRUE(book.day(date).empty());
+    EXPECT_FALSE(fs::exists(file_of(date)));
+    EXPECT_TRUE(fs::exists(file_of(date).string() + ".damaged")) << "it is set aside";
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "visits-notes.json"));
+}
+
+TEST_F(VisitBookTest, OldDaysAreDeleted) {
+  for (std::size_t i = 0; i < VisitCounts::most_days + 3; ++i)
+    std::ofstream(file_of(date_of(noon - static_cast<std::int64_t>(i) * day_s))) << "{}";
+  {
+    const VisitBook book(folder_.path(), counts_);
+    EXPECT_EQ(book.dates().size(), VisitCounts::most_days);
+    now_s_ += day_s;
+    counts_.visit("hall", DeviceKind::unknown);
+  }
+  EXPECT_EQ(files(), VisitCounts::most_days) << "a new day takes the place of the oldest";
+  EXPECT_TRUE(fs::exists(file_of("2025-11-26")));
+}
+
+TEST_F(VisitBookTest, AFolderServesOneServerAtATime) {
+  const auto refused = [&](const fs::path& folder) -> std::string {
+    try {
+      VisitCounts counts([] { return noon; });
+      const VisitBook book(folder, counts);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  {
+    const VisitBook book(folder_.path(), counts_);
+    EXPECT_THAT(refused(folder_.path()),
+                AllOf(HasSubstr("--visit-counts"), HasSubstr("another server")));
+  }
+  EXPECT_EQ(refused(folder_.path()), "");
+  std::ofstream(folder_ / "file") << "";
+  EXPECT_THAT(refused(folder_ / "file"), AllOf(HasSubstr("--visit-counts"), HasSubstr("file")));
+}
+
+TEST_F(VisitBookTest, ADayThatCannotBeWrittenWaits) {
+  fs::create_directories(file_of(today).string() + ".damaged/inside");
+  fs::create_directories(file_of(today) / "inside");
+  {
+    const VisitBook book(folder_.path(), counts_);
+    counts_.visit("hall", DeviceKind::unknown);
+  }
+  EXPECT_EQ(counts_.day(today).at("hall").visits, 1u);
+  fs::remove_all(file_of(today));
+  { const VisitBook book(folder_.path(), counts_); }
+  EXPECT_EQ(VisitBook(folder_.path(), counts_).day(today).at("hall").visits, 1u);
+}
+
+/// Several visits go on while the clock passes midnight and is set back, and days are written and
+/// read all the time.
+TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
+  constexpr int visitors = 3, rounds = 2000;
+  constexpr std::int64_t midnight = noon + day_s / 2;
+  std::array<std::atomic<int>, 2> surely{};  // visits that began and ended on one day
+  std::atomic<int> going{visitors};
+  std::atomic<bool> grows{true};
+  {
+    const VisitBook book(folder_.path(), counts_, 1ms);
+    const auto visit = [&](int visitor) {
+      TimePoint now = TimePoint{} + 1h;
+      for (int i = 0; i < rounds; ++i) {
+        const bool before = now_s_ < midnight;
+        VisitTally tally(&counts_);
+        tally.on_show("hall", DeviceKind::desktop, 0, now);
+        if (before == (now_s_ < midnight)) ++surely[before ? 0 : 1];
+        tally.on_show("hall", DeviceKind::desktop, 10, now += 1s);
+        tally.reached("hall", DeviceKind::desktop,
+                      {static_cast<std::uint32_t>(visitor), static_cast<std::uint32_t>(i % 200)});
+      }
+      --going;
+    };
+    std::vector<std::thread> threads;
+    for (int i = 0; i < visitors; ++i) threads.emplace_back(visit, i);
+    threads.emplace_back([&] {
+      std::uint64_t seen = 0;
+      while (going > 0) {
+        const DayCounts day = book.day("2025-11-26");
+        const std::uint64_t now = day.empty() ? 0 : day.at("hall").visits;
+        if (now < seen) grows = false;
+        seen = now;
+      }
+    });
+    for (std::int64_t i = 0; going > 0; ++i) now_s_ = midnight - 5 + i % 10;
+    for (std::thread& thread : threads) thread.join();
+  }
+  EXPECT_TRUE(grows) << "a day lost visits for a while";
+  const VisitBook book(folder_.path(), counts_);
+  ASSERT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
+  const SceneCounts before = book.day(today).at("hall"), after = book.day("2025-11-26").at("hall");
+  EXPECT_EQ(before.visits + after.visits, static_cast<std::uint64_t>(visitors * rounds));
+  EXPECT_GE(before.visits, static_cast<std::uint64_t>(surely[0]));
+  EXPECT_GE(after.visits, static_cast<std::uint64_t>(surely[1]));
+  EXPECT_DOUBLE_EQ(before.seconds + after.seconds, visitors * rounds);
+  EXPECT_EQ(before.bytes + after.bytes, 10u * visitors * rounds);
+  std::uint64_t stops = 0;
+  for (const SceneCounts* day : {&before, &after})
+    for (const auto& [stop, visits] : day->stops) stops += visits;
+  EXPECT_EQ(stops, static_cast<std::uint64_t>(visitors * rounds));
+}
+
+TEST_F(VisitBookTest, ThePageShowsWhatWasCountedAndEscapesIt) {
+  const VisitBook book({}, counts_);
+  const VisitsPage pages = page_of(book);
+  counts_.visit("<hall>", DeviceKind::desktop);
+  counts_.spend("<hall>", 7200.0, 3'000'000'000);
+  counts_.reach("<hall>", {0, 0});
+  counts_.reach("<hall>", {0, 7});
+  titles_ = std::make_shared<const std::vector<TourTitles>>(
+      std::vector<TourTitles>{{"The <house>", {"Gate & door"}}});
+  const std::string all = rest_of(ask(pages, "/visits"));
+  EXPECT_THAT(all, AllOf(HasSubstr("1 visits, 2.0 hours"), HasSubstr("<td>1500</td>"),
+                         HasSubstr("scene=%3Chall%3E"), Not(HasSubstr("<hall>"))));
+  const std::string one = rest_of(ask(pages, "/visits", {"scene=<hall>", "days=7"}));
+  EXPECT_THAT(one, AllOf(HasSubstr("The &lt;house&gt;"), HasSubstr("Gate &amp; door"),
+                         HasSubstr("stop 8"), Not(HasSubstr("<house>"))));
+  EXPECT_THAT(rest_of(ask(pages, "/visits", {"days=-5"})), HasSubstr("1 days"));
+  EXPECT_EQ(ask(pages, "/visit").status, 404);
+}
+
+TEST_F(VisitBookTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
+  const VisitBook book({}, counts_);
+  const VisitsPage pages = page_of(book);
+  counts_.visit("=1+\"1\"", DeviceKind::desktop);
+  counts_.reach("=1+\"1\"", {0, 0});
+  EXPECT_EQ(rest_of(ask(pages, "/visits.csv")),
+            "date,scene,visits,seconds,bytes,unknown,desktop,phone,tablet,headset\r\n"
+            "2025-11-25,\"'=1+\"\"1\"\"\",1,0,0,0,1,0,0,0\r\n");
+  EXPECT_THAT(rest_of(ask(pages, "/visits/stops.csv")),
+              HasSubstr("2025-11-25,\"'=1+\"\"1\"\"\",1,1,\"tour 1\",\"stop 1\",1\r\n"));
+}
+
+/// The network thread asks for an answer. Another one makes its pieces.
+TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
+  const auto write = [&](const char* date, const char* scene) {
+    std::ofstream(file_of(date)) << counts_json({{scene, {.visits = 1, .stops = {{{0, 0}, 1}}}}});
+  };
+  const VisitBook book(folder_.path(), counts_);
+  const VisitsPage pages = page_of(book);
+  for (const char* path : {"/visits", "/visits.csv", "/visits/stops.csv"}) {
+    for (const char* date : {"2025-11-22", "2025-11-23", "2025-11-24"}) write(date, "before");
+    const HttpResponse response = ask(pages, path, {"days=4"});
+    ASSERT_EQ(response.body, nullptr);
+    write("2025-11-22", "changed_1");
+    std::string text = response.next_piece().value();
+    if (std::string(path) != "/visits") text += response.next_piece().value();  // after its head
+    write("2025-11-23", "changed_2");
+    text += response.next_piece().value();
+    write("2025-11-24", "changed_3");
+    text += rest_of(response);
+    EXPECT_THAT(text, AllOf(HasSubstr("changed_1"), HasSubstr("changed_2"), HasSubstr("changed_3"),
+                            Not(HasSubstr("before"))))
+        << path;
+  }
+}
+
+TEST_F(VisitBookTest, PiecesOfALongPageHaveALargestSize) {
+  const VisitBook book({}, counts_);
+  for (std::uint32_t i = 0; i < VisitCounts::most_stops; ++i)
+    counts_.reach("hall", {i / 256, i % 256});
+  const VisitsPage pages = page_of(book);
+  const HttpResponse response = ask(pages, "/visits/stops.csv");
+  std::size_t bytes = 0, pieces = 0;
+  while (const auto piece = response.next_piece()) {
+    EXPECT_LE(piece->size(), 64u * 1024u);
+    bytes += piece->size();
+    ++pieces;
+  }
+  EXPECT_GT(bytes, 20u * VisitCounts::most_stops);
+  EXPECT_GT(pieces, 5u);
+}
+
+}  // namespace
+}  // namespace catgs::test

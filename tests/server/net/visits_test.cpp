@@ -1,0 +1,85 @@
+// Integration: pages of counts on the admin port. Real sockets on loopback, a whole server in this
+// process.
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/base/clock.h"
+#include "server/counts/visit_book.h"
+#include "tests/support/raw_socket.h"
+#include "tests/support/server_client.h"
+#include "tests/support/temporary_folder.h"
+
+namespace catgs::test {
+namespace {
+
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+
+class Visits : public testing::Test {
+ protected:
+  Visits() {
+    VisitCounts counts([this] { return day_s_; });
+    const VisitBook book(folder_.path(), counts);
+    for (int day = 0; day < 5; ++day, day_s_ -= 86'400)
+      for (std::uint32_t stop = 0; stop < 2000; ++stop) counts.reach("hall", {0, stop});
+  }
+  void start() {
+    server_.emplace([&](ServerConfig& config) { config.visit_counts = folder_.path().string(); });
+  }
+  /// The whole answer, as it comes.
+  std::string answer(const std::string& request_line) {
+    RawSocket socket(server_->admin_port());
+    socket.send(request_line + "\r\nHost: 127.0.0.1\r\n\r\n");
+    std::string text;
+    socket.receive_until("\r\n\r\n", text);
+    return text + socket.receive(std::chrono::milliseconds(500));
+  }
+
+  const TemporaryFolder folder_;
+  std::int64_t day_s_ = unix_now_s();
+  std::optional<RunningServer> server_;
+};
+
+TEST_F(Visits, AreSentAsFarAsTheyAreRead) {
+  start();
+  const HttpReply csv = http_get(server_->admin_port(), "/visits/stops.csv");
+  EXPECT_EQ(csv.status, 200);
+  EXPECT_EQ(csv.headers.at("transfer-encoding"), "chunked");
+  EXPECT_FALSE(csv.headers.contains("content-length"));
+  EXPECT_EQ(std::ranges::count(csv.body, '\n'), 1 + 5 * 2000) << "of several pieces";
+  EXPECT_THAT(csv.body, EndsWith("\"tour 1\",\"stop 2000\",1\r\n"));
+  const HttpReply page = http_get(server_->admin_port(), "/visits?days=7&scene=hall");
+  EXPECT_THAT(page.body, AllOf(HasSubstr("Visits: hall, 7 days"), HasSubstr("</html>")));
+  EXPECT_EQ(http_get(server_->admin_port(), "/visits.css").status, 200);
+}
+
+TEST_F(Visits, HaveNoChunksForClientsOfHttp10) {
+  start();
+  const std::string old = answer("GET /visits.csv HTTP/1.0");
+  EXPECT_THAT(old, AllOf(Not(HasSubstr("chunked")), HasSubstr("\r\n\r\ndate,scene,visits"),
+                         EndsWith(",0,0,0,0,0,0,0\r\n")));
+  const std::string head = answer("HEAD /visits.csv HTTP/1.1");
+  EXPECT_THAT(head, AllOf(HasSubstr(" 200 "), EndsWith("\r\n\r\n"), Not(HasSubstr("date,scene"))));
+}
+
+TEST_F(Visits, OfAClientThatGoesCostOnlyItsConnection) {
+  start();
+  for (int i = 0; i < 20; ++i) {
+    RawSocket gone(server_->admin_port());
+    gone.send("GET /visits/stops.csv HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+  }
+  EXPECT_EQ(http_get(server_->admin_port(), "/visits.csv").status, 200);
+  RawSocket last(server_->admin_port());
+  last.send("GET /visits/stops.csv HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+  server_.reset();  // while it is being answered
+}
+
+}  // namespace
+}  // namespace catgs::test
