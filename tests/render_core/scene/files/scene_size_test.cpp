@@ -17,7 +17,7 @@ class SceneSizeTest : public FolderTest {
   /// The headers announce what is loaded, and its memory.
   void expect_as_loaded(const std::string& name, const std::string& content) {
     const auto path = write(name, content);
-    const SceneSize size = read_scene_size(path);
+    const SceneSize size = read_scene_size(locate_scene(path));
     const Scene scene = load_scene(path);
     EXPECT_EQ(size.gaussians, scene.report.read) << name;
     EXPECT_EQ(size.sh_degree, scene.cloud.sh_degree) << name;
@@ -41,7 +41,8 @@ TEST_F(SceneSizeTest, IsThatOfTheLoadedScene) {
 }
 
 TEST_F(SceneSizeTest, TakesTheHighestDegreeWhereOnlyImagesTell) {
-  const SceneSize size = read_scene_size(write("v1.sog", zip(encode_sog(random_cloud(90, 1), 1))));
+  const SceneSize size =
+      read_scene_size(locate_scene(write("v1.sog", zip(encode_sog(random_cloud(90, 1), 1)))));
   EXPECT_EQ(size.gaussians, 90u);
   EXPECT_EQ(size.sh_degree, 3);
 }
@@ -49,8 +50,8 @@ TEST_F(SceneSizeTest, TakesTheHighestDegreeWhereOnlyImagesTell) {
 TEST_F(SceneSizeTest, ReadsFoldersToo) {
   for (const auto& [name, content] : encode_sog(random_cloud(80, 2), 2))
     write("house/" + name, content);
-  EXPECT_EQ(read_scene_size(folder_ / "house").gaussians, 80u);
-  EXPECT_EQ(read_scene_size(folder_ / "house").sh_degree, 2);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "house")).gaussians, 80u);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "house")).sh_degree, 2);
 }
 
 TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
@@ -60,7 +61,7 @@ TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
   header.replace(header.find("vertex 1\n"), 9, "vertex 60000000\n");
   const auto path = write("huge.ply", header);
   std::filesystem::resize_file(path, header.size() + 60'000'000ull * 62 * 4);
-  const SceneSize size = read_scene_size(path);
+  const SceneSize size = read_scene_size(locate_scene(path));
   EXPECT_EQ(size.gaussians, 60'000'000u);
   EXPECT_EQ(size.bytes(), GaussianCloud::bytes(60'000'000, 3));
 }
@@ -68,10 +69,10 @@ TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
 TEST_F(SceneSizeTest, ACountThatTheFileCannotHoldIsAnError) {
   std::string lying = ply_bytes(random_cloud(10, 0));
   lying.replace(lying.find("vertex 10"), 9, "vertex 99");
-  EXPECT_THAT([&] { read_scene_size(write("a.ply", lying)); },
+  EXPECT_THAT([&] { read_scene_size(locate_scene(write("a.ply", lying))); },
               ::testing::ThrowsMessage<InputError>(HasSubstr("a.ply")));
-  EXPECT_THROW(read_scene_size(write("b.txt", "hello")), InputError);
-  EXPECT_THROW(read_scene_size(folder_ / "absent.ply"), InputError);
+  EXPECT_THROW(read_scene_size(locate_scene(write("b.txt", "hello"))), InputError);
+  EXPECT_THROW(read_scene_size(locate_scene(folder_ / "absent.ply")), InputError);
 }
 
 }  // namespace

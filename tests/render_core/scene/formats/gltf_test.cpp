@@ -281,8 +281,8 @@ TEST_F(GltfFiles, BuffersMayBeDataOrLieBeside) {
   const Scene scene = load_scene(path);
   EXPECT_EQ(scene.format, "glTF");
   EXPECT_EQ(scene.cloud.mean, cloud.mean);
-  EXPECT_EQ(read_scene_size(path).gaussians, 300u);
-  EXPECT_EQ(read_scene_size(path).sh_degree, 1);
+  EXPECT_EQ(read_scene_size(locate_scene(path)).gaussians, 300u);
+  EXPECT_EQ(read_scene_size(locate_scene(path)).sh_degree, 1);
 
   for (const char* uri : {"../bytes.bin", "%2e%2e/bytes.bin", "/etc/passwd", "a%00.bin", ""}) {
     parts.json["buffers"][0]["uri"] = uri;
@@ -301,7 +301,7 @@ TEST_F(GltfFiles, AreKnownByTheirContentOrName) {
   const Scene scene = load_scene(write("a.ply", encode_gltf(cloud).glb()));
   EXPECT_EQ(scene.format, "glTF");
   EXPECT_EQ(scene.cloud.size(), 300u);
-  const SceneSize size = read_scene_size(folder_ / "a.ply");
+  const SceneSize size = read_scene_size(locate_scene(folder_ / "a.ply"));
   EXPECT_EQ(size.gaussians, 300u);
   EXPECT_EQ(size.sh_degree, 2);
 }

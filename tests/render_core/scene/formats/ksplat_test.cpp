@@ -50,8 +50,8 @@ TEST_F(KsplatFiles, AreKnownByTheirName) {
   const Scene scene = load_scene(path);
   EXPECT_EQ(scene.format, "ksplat");
   EXPECT_EQ(scene.cloud.size(), 300u);
-  EXPECT_EQ(read_scene_size(path).gaussians, 300u);
-  EXPECT_EQ(read_scene_size(path).sh_degree, 1);
+  EXPECT_EQ(read_scene_size(locate_scene(path)).gaussians, 300u);
+  EXPECT_EQ(read_scene_size(locate_scene(path)).sh_degree, 1);
 }
 
 /// The error of a file of three sections with another number at a byte.

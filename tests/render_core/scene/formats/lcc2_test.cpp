@@ -155,8 +155,8 @@ TEST_F(Lcc2Test, IsFoundByItsFileAndItsFolder) {
   LoadOptions coarse;
   coarse.lod = 2;
   EXPECT_EQ(load_scene(folder_.path(), coarse).hints.near_z, 0.125f);
-  EXPECT_EQ(read_scene_size(folder_ / "hall.lcc2", coarse).gaussians, 90u);
-  EXPECT_EQ(read_scene_size(folder_ / "hall.lcc2").sh_degree, 2);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "hall.lcc2"), coarse).gaussians, 90u);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "hall.lcc2")).sh_degree, 2);
   std::filesystem::rename(folder_ / "hall.lcc2", folder_ / "meta.lcc2");
   EXPECT_EQ(load_scene(folder_ / "meta.lcc2").name, folder_.path().filename().string());
 }

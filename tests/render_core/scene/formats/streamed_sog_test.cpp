@@ -52,9 +52,11 @@ class StreamedSogTest : public FolderTest {
     return cloud;
   }
 
-  StreamedSog load(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
+  DecodedScene load(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
     write("lod-meta.json", meta_.dump());
-    return read_streamed_sog(FolderFiles(folder_.path()), level, budget, two_threads());
+    const FolderFiles files(folder_.path());
+    const OpenStreamedSog scene = open_streamed_sog(files, level, budget);
+    return {scene.detail, read_streamed_sog(files, scene, two_threads())};
   }
 
   Json meta_;
@@ -72,7 +74,7 @@ TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
   LoadOptions options;
   EXPECT_EQ(load_scene(path, options).cloud.mean, load().cloud.mean);
   options.lod = 2;
-  EXPECT_EQ(read_scene_size(path, options).gaussians, 33u);
+  EXPECT_EQ(read_scene_size(locate_scene(path), options).gaussians, 33u);
   const Scene scene = load_scene(path, options);
   EXPECT_EQ(scene.cloud.size(), 33u);
   EXPECT_EQ(scene.format, "streamed sog (level 2 of 0…2)");
@@ -81,7 +83,8 @@ TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
     files["env/" + name] = content;
   meta_["environment"] = "env/meta.json";
   files["lod-meta.json"] = meta_.dump();
-  EXPECT_EQ(read_scene_size(write("museum.ssog", zip(files)), options).gaussians, 40u);
+  EXPECT_EQ(read_scene_size(locate_scene(write("museum.ssog", zip(files))), options).gaussians,
+            40u);
 }
 
 TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
@@ -89,8 +92,8 @@ TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
   EXPECT_EQ(load(0).cloud.size(), 600u);
   EXPECT_EQ(load(1).cloud.size(), 40u + 50 + 12);  // the third node's next coarser one
   EXPECT_EQ(load(2).cloud.size(), 33u);
-  EXPECT_EQ(load(0).detail, "level 0 of 0…2");
-  EXPECT_EQ(load(1).detail, "levels 1 and 2 of 0…2");
+  EXPECT_EQ(load(0).format, "level 0 of 0…2");
+  EXPECT_EQ(load(1).format, "levels 1 and 2 of 0…2");
   const GaussianCloud coarse = random_cloud(33, 1, 33);
   const GaussianCloud read = load(2).cloud;
   for (std::size_t i = 0; i < 33; ++i)
@@ -170,7 +173,8 @@ TEST_F(StreamedSogTest, ArchivesAreUnpackedOneAtATime) {
   const auto look = [&](double) { most = std::max(most, resident_bytes()); };
   write("lod-meta.json", meta_.dump());
   ThreadPool pool(2);
-  read_streamed_sog(FolderFiles(folder_.path()), {}, {}, LoadContext(pool, look));
+  const FolderFiles scene(folder_.path());
+  read_streamed_sog(scene, open_streamed_sog(scene, {}, {}), LoadContext(pool, look));
   ASSERT_GT(most, 0u);
   EXPECT_LT(most, before + parts * files["junk"].size() / 4);
 }

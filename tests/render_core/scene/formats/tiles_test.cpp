@@ -202,7 +202,7 @@ TEST_F(TilesTest, TilesetsHoldTilesets) {
   LoadOptions coarse;
   coarse.lod = 1;
   EXPECT_EQ(load_scene(folder_.path(), coarse).cloud.mean[0].x, 11.0f);
-  EXPECT_EQ(read_scene_size(folder_.path()).gaussians, 1u);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_.path())).gaussians, 1u);
 }
 
 TEST_F(TilesTest, SeveralContentsOfATileAreOneLevel) {
