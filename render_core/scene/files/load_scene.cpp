@@ -8,6 +8,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/files/sanitize.h"
 #include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/transform.h"
 #include "render_core/scene/tree/read_tree.h"

@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/load_scene.h"
@@ -174,7 +175,7 @@ TEST_F(ScenePartsTest, SayWhatIsLeftOut) {
   std::string bytes = ply_bytes(cloud);
   // Harmonics of degree 4: 27 properties more, before those of the opacity.
   std::string more;
-  for (int k = 45; k < 72; ++k) more += "property float f_rest_" + std::to_string(k) + "\n";
+  for (int k = 45; k < 72; ++k) more += fmt::format("property float f_rest_{}\n", k);
   const std::size_t header_end = bytes.find("end_header\n") + 11;
   const std::size_t row = (bytes.size() - header_end) / cloud.size();
   std::string wider = bytes.substr(0, bytes.find("end_header")) + more + "end_header\n";
