@@ -83,7 +83,7 @@ TEST_F(ScenePartsTest, ATreeKeepsTheModel) {
             SplatModel::antialiased);
 }
 
-TEST_F(ScenePartsTest, HaveTheGaussiansOfTheLoadedScene) {
+TEST_F(ScenePartsTest, PartsHaveTheGaussiansOfTheLoadedScene) {
   GaussianCloud cloud = random_cloud(5000, 1);
   for (std::size_t i = 0; i < cloud.size(); i += 7) cloud.mean[i].x = NAN;
   for (std::size_t i = 0; i < cloud.size(); i += 11) cloud.opacity[i] = 1e-4f;
@@ -116,7 +116,7 @@ TEST_F(ScenePartsTest, HaveTheGaussiansOfTheLoadedScene) {
 }
 
 // A sample of every second row finds the same reach.
-TEST_F(ScenePartsTest, JudgeWhatIsAbsurdByASample) {
+TEST_F(ScenePartsTest, AbsurdGaussiansAreJudgedByASample) {
   GaussianCloud cloud = random_cloud(100'000, 0);
   cloud.mean[77'777].z = -2e8f;
   const auto path = write("a.ply", ply_bytes(cloud));
@@ -170,7 +170,7 @@ TEST_F(ScenePartsTest, AStreamedSogInAnArchiveGivesTheTreeOfItsFolder) {
   expect_same_tree(write("a.ssog", zip(files)), 0);
 }
 
-TEST_F(ScenePartsTest, SayWhatIsLeftOut) {
+TEST_F(ScenePartsTest, NotesTellWhatIsLeftOut) {
   GaussianCloud cloud = random_cloud(300, 3);
   std::string bytes = ply_bytes(cloud);
   // Harmonics of degree 4: 27 properties more, before those of the opacity.
@@ -187,7 +187,7 @@ TEST_F(ScenePartsTest, SayWhatIsLeftOut) {
               ::testing::Contains(HasSubstr("degree 4 are not shown")));
 }
 
-TEST_F(ScenePartsTest, AreNotOfOtherFormats) {
+TEST_F(ScenePartsTest, OtherFormatsHaveNoParts) {
   const GaussianCloud cloud = random_cloud(300, 0);
   for (const auto& path :
        {write("a.spz", encode_spz(cloud, {.version = 3})),
@@ -201,11 +201,11 @@ TEST_F(ScenePartsTest, AFileThatIsCutOffIsRefused) {
   std::string bytes = ply_bytes(random_cloud(300, 0));
   bytes.resize(bytes.size() - 1);
   const auto path = write("a.ply", bytes);
-  EXPECT_THAT(input_error([&] { scene_in_parts(locate_scene(path), {}, pool_); }),
-              HasSubstr("cut off"));
+  EXPECT_EQ(refusal_of([&] { scene_in_parts(locate_scene(path), {}, pool_); }),
+            (Refusal{path.string(), fmt::format("byte {}", bytes.size())}));
   const auto splat = write("b.splat", "x");
-  EXPECT_THAT(input_error([&] { scene_in_parts(locate_scene(splat), {}, pool_); }),
-              HasSubstr("cut off"));
+  EXPECT_EQ(refusal_of([&] { scene_in_parts(locate_scene(splat), {}, pool_); }),
+            (Refusal{splat.string(), "byte 1"}));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include <fmt/format.h>
+
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -9,8 +11,6 @@
 
 namespace catgs::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 class SceneSizeTest : public FolderTest {
  protected:
@@ -25,7 +25,7 @@ class SceneSizeTest : public FolderTest {
   }
 };
 
-TEST_F(SceneSizeTest, IsThatOfTheLoadedScene) {
+TEST_F(SceneSizeTest, SizesAreThoseOfTheLoadedScene) {
   ThreadPool pool(1);
   for (const int degree : {0, 3}) {
     const GaussianCloud cloud = random_cloud(300, degree);
@@ -40,21 +40,21 @@ TEST_F(SceneSizeTest, IsThatOfTheLoadedScene) {
   expect_as_loaded("f.spz", encode_spz(random_cloud(300, 3), {.extra_sh_degree = 4}));
 }
 
-TEST_F(SceneSizeTest, TakesTheHighestDegreeWhereOnlyImagesTell) {
+TEST_F(SceneSizeTest, HighestDegreeIsAssumedIfOnlyImagesTell) {
   const SceneSize size =
       read_scene_size(locate_scene(write("v1.sog", zip(encode_sog(random_cloud(90, 1), 1)))));
   EXPECT_EQ(size.gaussians, 90u);
   EXPECT_EQ(size.sh_degree, 3);
 }
 
-TEST_F(SceneSizeTest, ReadsFoldersToo) {
+TEST_F(SceneSizeTest, FoldersHaveSizesToo) {
   for (const auto& [name, content] : encode_sog(random_cloud(80, 2), 2))
     write("house/" + name, content);
   EXPECT_EQ(read_scene_size(locate_scene(folder_ / "house")).gaussians, 80u);
   EXPECT_EQ(read_scene_size(locate_scene(folder_ / "house")).sh_degree, 2);
 }
 
-TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
+TEST_F(SceneSizeTest, OnlyHeadersAreRead) {
   // The rows are a hole in the file: nothing of it could be decoded in this time or memory.
   std::string header = ply_bytes(random_cloud(1, 3));
   header.resize(header.find("end_header\n") + 11);
@@ -69,8 +69,9 @@ TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
 TEST_F(SceneSizeTest, ACountThatTheFileCannotHoldIsAnError) {
   std::string lying = ply_bytes(random_cloud(10, 0));
   lying.replace(lying.find("vertex 10"), 9, "vertex 99");
-  EXPECT_THAT([&] { read_scene_size(locate_scene(write("a.ply", lying))); },
-              ::testing::ThrowsMessage<InputError>(HasSubstr("a.ply")));
+  const std::string path = write("a.ply", lying).string();
+  EXPECT_EQ(refusal_of([&] { read_scene_size(locate_scene(path)); }),
+            (Refusal{path, fmt::format("byte {}", lying.size())}));
   EXPECT_THROW(read_scene_size(locate_scene(write("b.txt", "hello"))), InputError);
   EXPECT_THROW(read_scene_size(locate_scene(folder_ / "absent.ply")), InputError);
 }

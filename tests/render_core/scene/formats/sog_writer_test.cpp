@@ -98,7 +98,7 @@ TEST(SogWriter, EachModelIsWrittenAndReadAgain) {
 
 class SogFiles : public FolderTest {};
 
-TEST_F(SogFiles, AreSavedByTheirName) {
+TEST_F(SogFiles, FilesAreSavedByName) {
   const GaussianCloud cloud = random_cloud(2000, 1);
   save_scene(cloud, folder_ / "a.sog");
   const Scene scene = load_scene(folder_ / "a.sog");
