@@ -95,8 +95,9 @@ TEST(Sidecar, ErrorsNameTheField) {
     texts.push_back({fmt::format(R"({{"background": "{}"}})", colour), "background"});
   for (const char* metres : {"0", "-1", "1e7", "\"1 m\""})
     texts.push_back({fmt::format(R"({{"metres_per_unit": {}}})", metres), "metres_per_unit"});
-  for (const auto& [text, where] : texts)
-    EXPECT_EQ(refusal_of([&] { parse_sidecar(text); }), (Refusal{"city.json", where})) << text;
+  for (const Text& t : texts)
+    EXPECT_EQ(refusal_of([&] { parse_sidecar(t.text); }), (Refusal{"city.json", t.where}))
+        << t.text;
   EXPECT_EQ(input_error([] { parse_sidecar(R"({"mode": "swim"})"); }),
             "city.json: mode: is no mode (write orbit, fly, walk)");
 }

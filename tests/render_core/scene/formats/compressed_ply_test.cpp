@@ -54,15 +54,16 @@ TEST(CompressedPlyErrors, ErrorsNameElementAndProperty) {
   struct Change {
     const char *from, *to, *where;
   };
-  for (const auto& [from, to, where] : {
-           Change{"float min_scale_y", "float min_scale_q", "element chunk property min_scale_y"},
+  for (const Change& change : std::vector<Change>{
+           {"float min_scale_y", "float min_scale_q", "element chunk property min_scale_y"},
            {"uint packed_scale", "float packed_scale", "element vertex property packed_scale"},
            {"chunk 2", "chunk 1", "element chunk"},
            {"sh 300", "sh 299", "element sh"},
            {"little", "big", "header"},
            {"vertex 300", "vertex 18446744073709551615", "element vertex"},
        })
-    EXPECT_EQ(refusal_of([&] { parse(replaced(bytes, from, to)); }), (Refusal{"scene.ply", where}));
+    EXPECT_EQ(refusal_of([&] { parse(replaced(bytes, change.from, change.to)); }),
+              (Refusal{"scene.ply", change.where}));
   bytes = replaced(bytes, "vertex 300", "vertex 400");
   EXPECT_EQ(refusal_of([&] { parse(bytes); }),
             (Refusal{"scene.ply", fmt::format("byte {}", bytes.size())}));

@@ -202,7 +202,7 @@ TEST(Ply, ErrorsNameTheHeaderLine) {
     std::string text;
     int line;
   };
-  for (const auto& [text, line] : std::vector<Header>{
+  for (const Header& header : std::vector<Header>{
            {"plx\n", 1},
            {"ply\nformat ascii 2.0\n", 2},
            {format + "element vertex -1\n", 3},
@@ -213,9 +213,9 @@ TEST(Ply, ErrorsNameTheHeaderLine) {
            {format + "element a 1\nelement a 1\n", 4},
            {format + "element a 1\nproperty list uchar quad a\nend_header\n", 4},
        })
-    EXPECT_EQ(refusal_of([&] { parse(text); }),
-              (Refusal{"scene.ply", fmt::format("header line {}", line)}))
-        << text;
+    EXPECT_EQ(refusal_of([&] { parse(header.text); }),
+              (Refusal{"scene.ply", fmt::format("header line {}", header.line)}))
+        << header.text;
   EXPECT_EQ(input_error([&] { parse(format + "element vertex -1\n"); }),
             "scene.ply: header line 3: '-1' is not a count");
   const auto with_header_of = [](std::size_t bytes) {
@@ -241,7 +241,7 @@ TEST(Ply, ErrorsNameTheElementOrProperty) {
     std::string bytes;
     const char* where;
   };
-  for (const auto& [bytes, where] : std::vector<File>{
+  for (const File& file : std::vector<File>{
            {renamed("opacity", "opaaity"), "property opacity"},
            {renamed("f_rest_8", "f_xxxx_8"), "property f_rest_*"},
            {"ply\nformat ascii 1.0\nelement face 1\nproperty int a\nend_header\n1\n", "header"},
@@ -249,7 +249,7 @@ TEST(Ply, ErrorsNameTheElementOrProperty) {
            {with("element vertex", "element face 1\n" + list), "element vertex"},
            {renamed("vertex 3", "vertex 0"), "element vertex"},
        })
-    EXPECT_EQ(refusal_of([&] { parse(bytes); }), (Refusal{"scene.ply", where}));
+    EXPECT_EQ(refusal_of([&] { parse(file.bytes); }), (Refusal{"scene.ply", file.where}));
   EXPECT_EQ(parse(with("end_header", "element face 0\n" + list)).size(), 3u);
 }
 

@@ -210,7 +210,7 @@ TEST(Spz, LyingHeadersAreRefusedBeforeMemoryIsTaken) {
     std::string bytes;
     const char* where;
   };
-  for (const auto& [version, at, bytes, where] : std::vector<Lie>{
+  for (const Lie& lie : std::vector<Lie>{
            {4, 8, "\xff\xff\xff\x0f", "numPoints"},
            {3, 8, "\xff\xff\xff\x0f", "numPoints"},
            {3, 8, "\xff\xff\xff\xff", "numPoints"},
@@ -224,8 +224,9 @@ TEST(Spz, LyingHeadersAreRefusedBeforeMemoryIsTaken) {
            {4, 4, "\x09", "version"},
            {4, 4, "\x03", "version"},
        })
-    EXPECT_EQ(refusal_of([&] { parse(with(version, at, bytes)); }), (Refusal{"scene.spz", where}))
-        << at;
+    EXPECT_EQ(refusal_of([&] { parse(with(lie.version, lie.at, lie.bytes)); }),
+              (Refusal{"scene.spz", lie.where}))
+        << lie.at;
 }
 
 TEST(Spz, HarmonicsCountInWhatAHeaderCanClaim) {

@@ -69,8 +69,8 @@ TEST_F(TreeFileTest, HeaderFieldsAreChecked) {
   const auto where = [](const std::string& bytes) {
     return refusal_of([&] { read_tree_header(*source_of(bytes)); }).where;
   };
-  for (const auto& [change, field] : {
-           Header{[](auto& h) { h.magic[0] = 'x'; }, "magic"},
+  for (const Header& header : std::vector<Header>{
+           {[](auto& h) { h.magic[0] = 'x'; }, "magic"},
            {[](auto& h) { h.version = 2; }, "version"},
            {[](auto& h) { h.sh_degree = 4; }, "SH degree"},
            {[](auto& h) { h.gaussians = 0; }, "Gaussians"},
@@ -82,7 +82,7 @@ TEST_F(TreeFileTest, HeaderFieldsAreChecked) {
            {[](auto& h) { h.levels[2].mean_error = -1.0f; }, "level 2"},
            {[](auto& h) { --h.levels[0].gaussians; }, "level 0"},
        })
-    EXPECT_EQ(where(with_header(change)), field);
+    EXPECT_EQ(where(with_header(header.change)), header.where);
   std::string flipped = bytes_;
   flipped[20] ^= 1;
   EXPECT_EQ(where(flipped), "header");
@@ -96,8 +96,8 @@ TEST_F(TreeFileTest, ValuesOfPagesAreCheckedThoughTheirChecksumIsRight) {
     void (*change)(NodeFacts&);
     const char* fault;
   };
-  for (const auto& [change, text] : {
-           Facts{[](auto& f) { f.count = 0; }, "count of node 0.0"},
+  for (const Facts& facts : std::vector<Facts>{
+           {[](auto& f) { f.count = 0; }, "count of node 0.0"},
            {[](auto& f) { f.count = 257; }, "count"},
            {[](auto& f) { f.error = NAN; }, "error"},
            {[](auto& f) { f.error = 1.0f; }, "error"},
@@ -109,24 +109,24 @@ TEST_F(TreeFileTest, ValuesOfPagesAreCheckedThoughTheirChecksumIsRight) {
            {[](auto& f) { f.units.factor = 0x1p-100f; }, "unit"},
            {[](auto& f) { f.units.sh[2] = 1e30f; }, "harmonics"},
        })
-    EXPECT_THAT(fault(with_page(leaves, [&](TreePage& page) { change(page.facts(slot)); }), leaves),
-                HasSubstr(text));
+    EXPECT_THAT(
+        fault(with_page(leaves, [&](TreePage& page) { facts.change(page.facts(slot)); }), leaves),
+        HasSubstr(facts.fault));
   struct Record {
     std::size_t offset;
     std::uint16_t bits;
     const char* fault;
   };
-  for (const auto& [offset, bits, text] : {
-           Record{packed_offset(0, 16, 3) + 2, 0x7fc0, "mean"},  // NaN
+  for (const Record& record : std::vector<Record>{
+           {packed_offset(0, 16, 3) + 2, 0x7fc0, "mean"},  // NaN
            {packed_offset(0, 16, 3) + 14, 0x7c00, "colour"},
            {packed_offset(16, 16, 3) + 14, 0xfc01, "colour"},
-       })
-    EXPECT_THAT(fault(with_page(leaves,
-                                [&](TreePage& page) {
-                                  std::memcpy(&page.block(slot)[offset], &bits, sizeof bits);
-                                }),
-                      leaves),
-                HasSubstr(text));
+       }) {
+    const auto change = [&](TreePage& page) {
+      std::memcpy(&page.block(slot)[record.offset], &record.bits, sizeof record.bits);
+    };
+    EXPECT_THAT(fault(with_page(leaves, change), leaves), HasSubstr(record.fault));
+  }
 }
 
 TEST_F(TreeFileTest, PagesOfOtherPlacesAreNotTaken) {
